@@ -1,0 +1,1 @@
+"""ptmtools: architectural scenes that stream."""

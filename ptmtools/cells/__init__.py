@@ -1,0 +1,1 @@
+"""A scene becomes convex cells, portals and cut geometry (paper §3)."""

@@ -1,0 +1,167 @@
+"""Convex cells, the BSP tree that locates them, their portals, and the geometry cut to them.
+
+A *leaf* is a convex polyhedron, a leaf of the BSP tree that somebody can reach; a *cell* is a
+union of leaves (today one leaf each, `leaf_cell` is the identity). Index -1 means "no cell":
+solid matter, the outside of a closed model, or what nobody can reach.
+
+Lists of varying length are CSR: row i of ``x`` is ``x[x_start[i]:x_start[i + 1]]``.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: A child of a BSP node that is no node: ``OUTSIDE``, or leaf i as ``-2 - i``.
+OUTSIDE = -1
+
+
+@dataclass(frozen=True)
+class Cells:
+    """The subdivision of a scene. Metres, world coordinates, float64.
+
+    Attributes
+    ----------
+    node_plane: (N, 4) unit normal n and offset d; a point x is in front where n·x + d > 0.
+    node_child: (N, 2) int32, (front, back): a node index >= 0, `OUTSIDE`, or leaf i as -2 - i.
+        Node 0 is the root; a tree without nodes has the single leaf 0.
+    root_box: (2, 3) least and greatest corner of the box that was subdivided.
+    leaf_cell: (L,) int32 the cell of each leaf.
+    leaf_point, leaf_point_start: (P, 3) vertices of the leaves; (L + 1,) CSR over leaves.
+    face_index, face_start, leaf_face_start: faces as loops of indices into `leaf_point`,
+        counter-clockwise seen from outside the leaf; `face_start` (F + 1,) is CSR over faces into
+        `face_index`, `leaf_face_start` (L + 1,) is CSR over leaves into faces.
+    portal_leaf: (K, 2) int32 the leaves that a portal joins.
+    portal_plane: (K, 4) its plane; the normal points from `portal_leaf[:, 0]` into
+        `portal_leaf[:, 1]`.
+    portal_point, portal_start: (Q, 3) convex polygons, counter-clockwise seen against the normal
+        (from the side of `portal_leaf[:, 1]`); (K + 1,) CSR over portals.
+    portal_area: (K,) m² truly open, before the convex hull was taken.
+    vertex: (W, 3) positions of the geometry cut to the cells.
+    vertex_uv: (W, 2) texture coordinates of those vertices, exact at the cuts.
+    triangle: (M, 3) int32 into `vertex`, counter-clockwise seen from the front.
+    triangle_source: (M,) int32 index of the scene's triangle that it is a piece of.
+    triangle_cell: (M, 2) int32 the cell on its front and on its back. Equal where the piece lies
+        inside a cell; different only where it lies in a boundary; -1 where that side is no cell.
+        A pixel of the item buffer counts for the viewer's side.
+    closed: whether the flood of the reachable never met the root box.
+    notes: what the subdivision has to say, one line each ("open above: …").
+    """
+
+    node_plane: NDArray[np.float64]
+    node_child: NDArray[np.int32]
+    root_box: NDArray[np.float64]
+    leaf_cell: NDArray[np.int32]
+    leaf_point: NDArray[np.float64]
+    leaf_point_start: NDArray[np.int64]
+    face_index: NDArray[np.int32]
+    face_start: NDArray[np.int64]
+    leaf_face_start: NDArray[np.int64]
+    portal_leaf: NDArray[np.int32]
+    portal_plane: NDArray[np.float64]
+    portal_point: NDArray[np.float64]
+    portal_start: NDArray[np.int64]
+    portal_area: NDArray[np.float64]
+    vertex: NDArray[np.float64]
+    vertex_uv: NDArray[np.float64]
+    triangle: NDArray[np.int32]
+    triangle_source: NDArray[np.int32]
+    triangle_cell: NDArray[np.int32]
+    closed: bool = True
+    notes: tuple[str, ...] = ()
+
+    @property
+    def leaf_count(self) -> int:
+        return len(self.leaf_cell)
+
+    @property
+    def cell_count(self) -> int:
+        return int(self.leaf_cell.max()) + 1 if len(self.leaf_cell) else 0
+
+    @property
+    def portal_count(self) -> int:
+        return len(self.portal_leaf)
+
+    def portal(self, k: int) -> NDArray[np.float64]:
+        """(n, 3) polygon of portal ``k``."""
+        return self.portal_point[self.portal_start[k] : self.portal_start[k + 1]]
+
+    def leaf_points(self, leaf: int) -> NDArray[np.float64]:
+        """(n, 3) vertices of a leaf."""
+        return self.leaf_point[self.leaf_point_start[leaf] : self.leaf_point_start[leaf + 1]]
+
+    def leaf_faces(self, leaf: int) -> list[NDArray[np.int32]]:
+        """The face loops of a leaf, as indices into `leaf_point`."""
+        rows = range(int(self.leaf_face_start[leaf]), int(self.leaf_face_start[leaf + 1]))
+        return [self.face_index[self.face_start[f] : self.face_start[f + 1]] for f in rows]
+
+    def cell_leaves(self, cell: int) -> NDArray[np.int64]:
+        """The leaves of a cell."""
+        return np.flatnonzero(self.leaf_cell == cell)
+
+    def adjacent(self) -> list[NDArray[np.int32]]:
+        """For every cell the other cells with which it shares a portal, ascending."""
+        ends = self.leaf_cell[self.portal_leaf].reshape(-1, 2)
+        both = np.unique(np.concatenate([ends, ends[:, ::-1]]), axis=0)
+        both = both[both[:, 0] != both[:, 1]]
+        cut = np.searchsorted(both[:, 0], np.arange(1, self.cell_count))
+        return np.split(both[:, 1].astype(np.int32), cut) if self.cell_count else []
+
+    def locate_leaf(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
+        """(n,) leaf that contains each of the (n, 3) points, or -1; a point in a plane counts to
+        its back."""
+        points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        inside = np.all((points >= self.root_box[0]) & (points <= self.root_box[1]), axis=1)
+        if len(self.node_plane) == 0:
+            return np.where(inside & (self.leaf_count > 0), 0, -1).astype(np.int32)
+        at = np.where(inside, 0, OUTSIDE).astype(np.int64)
+        active = np.flatnonzero(inside)
+        while len(active):
+            node = at[active]
+            plane = self.node_plane[node]
+            front = np.einsum("ij,ij->i", plane[:, :3], points[active]) + plane[:, 3] > 0
+            at[active] = self.node_child[node, np.where(front, 0, 1)]
+            active = active[at[active] >= 0]
+        return np.where(at <= -2, -2 - at, -1).astype(np.int32)
+
+    def locate(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
+        """(n,) cell that contains each of the (n, 3) points, or -1."""
+        leaf = self.locate_leaf(points)
+        if self.leaf_count == 0:
+            return leaf
+        return np.where(leaf >= 0, self.leaf_cell[leaf], -1).astype(np.int32)
+
+    def emitted(self, two_sided: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+        """Which cell emits which piece: ``two_sided`` is the scene's (T,) flag.
+
+        Returns (triangle, cell), both (n,), ordered by cell, then triangle. A piece belongs to
+        the cell that it faces; a two-sided piece lying in a boundary to the cells on both sides
+        (design, "Ownership"). One-sided pieces whose front is no cell are nobody's.
+        """
+        front, back = self.triangle_cell[:, 0], self.triangle_cell[:, 1]
+        behind = (back != front) & two_sided[self.triangle_source]
+        triangle = np.concatenate([np.arange(len(front)), np.flatnonzero(behind)])
+        cell = np.concatenate([front, back[behind]])
+        kept = cell >= 0
+        triangle, cell = triangle[kept], cell[kept]
+        order = np.lexsort((triangle, cell))
+        return triangle[order].astype(np.int64), cell[order].astype(np.int32)
+
+    def to_arrays(self) -> dict[str, NDArray[np.generic]]:
+        """The subdivision as plain arrays."""
+        arrays = {f.name: getattr(self, f.name) for f in fields(self)}
+        about = {"closed": arrays.pop("closed"), "notes": arrays.pop("notes")}
+        text = json.dumps(about, sort_keys=True, ensure_ascii=False)
+        return {**arrays, "about": np.frombuffer(text.encode(), dtype=np.uint8)}
+
+    @staticmethod
+    def from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> Cells:
+        """Inverse of `to_arrays`."""
+        about = json.loads(bytes(np.asarray(arrays["about"], dtype=np.uint8)).decode())
+        names = [f.name for f in fields(Cells) if f.name not in ("closed", "notes")]
+        plain = {name: np.asarray(arrays[name]) for name in names}
+        return Cells(**plain, closed=bool(about["closed"]), notes=tuple(about["notes"]))  # type: ignore[arg-type]

@@ -1,0 +1,1 @@
+"""The `ptm` command: parses, calls one library function, prints."""

@@ -1,0 +1,1 @@
+"""Scene, cells and visibility become coverage hints (paper §5)."""

@@ -1,0 +1,98 @@
+"""The error tree: every failure that a user can cause, with a stable code and an exit status.
+
+The command prints one line, ``ptm: FILE: PLACE: what is wrong: remedy [CODE]``, and exits with
+the status of the error's class. Codes never change their meaning; new ones are appended.
+
+========  ======================================================================
+status    meaning
+========  ======================================================================
+0         done
+1         an internal error: a bug in ptmtools
+2         the command line is wrong (Click's own status)
+3         an input cannot be read or is not what it should be (`InputError`)
+4         an output cannot be written (`OutputError`)
+5         a database is damaged or of another version (`DatabaseError`)
+6         something that is not installed is needed (`MissingComponentError`)
+7         an input is beyond a limit (`LimitError`)
+8         a check found errors (``ptm validate``; ``--strict``)
+130       interrupted
+========  ======================================================================
+"""
+
+from __future__ import annotations
+
+from os import PathLike, fspath
+
+
+class PtmError(Exception):
+    """A failure with a remedy.
+
+    Parameters
+    ----------
+    code: stable identifier such as ``"PTM-I001"``.
+    message: what is wrong, one line, no trailing full stop.
+    file: the file in question, if there is one.
+    place: where in the file ("line 12", "level 3", "byte 40"), if known.
+    remedy: what the user can do about it, if anything can be said.
+    """
+
+    exit_status = 1
+
+    def __init__(
+        self,
+        code: str,
+        message: str,
+        *,
+        file: str | PathLike[str] | None = None,
+        place: str | None = None,
+        remedy: str | None = None,
+    ) -> None:
+        self.code = code
+        self.message = message
+        self.file = None if file is None else fspath(file)
+        self.place = place
+        self.remedy = remedy
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        where = ": ".join(part for part in (self.file, self.place) if part)
+        what = f"{where}: {self.message}" if where else self.message
+        if self.remedy:
+            what += f"; {self.remedy}"
+        return f"{what} [{self.code}]".replace("\r", " ").replace("\n", " ")
+
+
+class InputError(PtmError):
+    """An input cannot be read, or is not what it should be. Codes PTM-Ixxx."""
+
+    exit_status = 3
+
+
+class OutputError(PtmError):
+    """An output cannot be written, or would overwrite what is not ours. Codes PTM-Oxxx."""
+
+    exit_status = 4
+
+
+class DatabaseError(PtmError):
+    """A database is incomplete, damaged or of another version. Codes PTM-Dxxx."""
+
+    exit_status = 5
+
+
+class MissingComponentError(PtmError):
+    """A component that is not installed is needed. Codes PTM-Mxxx."""
+
+    exit_status = 6
+
+
+class LimitError(InputError):
+    """An input declares or needs more than a limit allows. Codes PTM-Lxxx."""
+
+    exit_status = 7
+
+
+class CheckError(PtmError):
+    """A check that the user asked for found errors. Codes PTM-Cxxx."""
+
+    exit_status = 8

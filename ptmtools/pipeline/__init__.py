@@ -1,0 +1,1 @@
+"""The order of the stages, their artifacts and their cache."""

@@ -1,0 +1,194 @@
+"""The scene: what ingest makes of a model file, and all that later stages know of it.
+
+Coordinates are world coordinates: float64, metres, Y up, with the centre of the model's floor at
+the origin (design, "Space"). Arrays are never modified in place.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Wrap = Literal["repeat", "clamp"]
+
+
+@dataclass(frozen=True)
+class Space:
+    """How world coordinates arise from the model's: ``world = R(up) @ (model - origin) * metres``.
+
+    Attributes
+    ----------
+    origin: (3,) centre of the floor of the bounding box, in the model's units and axes.
+    metres: metres in one unit of the model.
+    up: "y" or "z", the model's up axis; Z-up maps (x, y, z) to (x, z, -y).
+    unit_guessed, up_guessed: whether the value was guessed rather than given.
+    """
+
+    origin: tuple[float, float, float]
+    metres: float
+    up: Literal["y", "z"]
+    unit_guessed: bool = False
+    up_guessed: bool = False
+
+
+@dataclass(frozen=True)
+class Material:
+    """What the emitted files need of a material.
+
+    Attributes
+    ----------
+    name: the model's name for it.
+    color: (r, g, b) in [0, 1], multiplied with the image where there is one (Kd, baseColorFactor).
+    opacity: in [0, 1].
+    image: index into `Scene.images`, or -1.
+    wrap_s, wrap_t: what the image does beyond [0, 1].
+    transparent: never occludes: `opacity` < 1, alpha blending or testing, or a used texel with
+        alpha < 255.
+    """
+
+    name: str
+    color: tuple[float, float, float] = (0.8, 0.8, 0.8)
+    opacity: float = 1.0
+    image: int = -1
+    wrap_s: Wrap = "repeat"
+    wrap_t: Wrap = "repeat"
+    transparent: bool = False
+
+
+@dataclass(frozen=True)
+class SourceImage:
+    """One distinct image of the model, as the bytes of its file.
+
+    Attributes
+    ----------
+    name: file name with suffix, unique in the scene without regard to case, safe on any system.
+    sha256: hex digest of the bytes; distinct images have distinct digests.
+    load: returns the bytes.
+    """
+
+    name: str
+    sha256: str
+    load: Callable[[], bytes] = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A viewpoint: eye and a unit viewing direction in world coordinates, vertical field of view
+    in radians."""
+
+    name: str
+    position: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    field_of_view: float = np.pi / 4
+
+
+@dataclass(frozen=True)
+class Note:
+    """Something ingest did or missed: stable code, one line of text, where, and how often."""
+
+    code: str
+    message: str
+    place: str = ""
+    count: int = 1
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Triangles in world metres with their objects, materials and images.
+
+    Attributes
+    ----------
+    points: (V, 3) float64, metres.
+    triangles: (T, 3) int32 indices into `points`, counter-clockwise seen from the front.
+    uv: (T, 3, 2) float64 per corner, origin at the image's lower left; 0 where there is none.
+    triangle_object: (T,) int32 index into `objects`.
+    triangle_material: (T,) int32 index into `materials`.
+    two_sided: (T,) bool; False for glTF faces whose material is not doubleSided, and for both of
+        two coincident faces of opposite winding (each belongs to the side that it faces).
+    objects: names, unique not required.
+    materials, images, cameras: see their classes.
+    space: how the model was brought to world coordinates.
+    notes: what was dropped, missed or guessed, in the order of the model file.
+    """
+
+    points: NDArray[np.float64]
+    triangles: NDArray[np.int32]
+    uv: NDArray[np.float64]
+    triangle_object: NDArray[np.int32]
+    triangle_material: NDArray[np.int32]
+    two_sided: NDArray[np.bool_]
+    objects: tuple[str, ...]
+    materials: tuple[Material, ...]
+    images: tuple[SourceImage, ...] = ()
+    cameras: tuple[Camera, ...] = ()
+    space: Space = Space((0.0, 0.0, 0.0), 1.0, "y")
+    notes: tuple[Note, ...] = ()
+
+    @property
+    def corners(self) -> NDArray[np.float64]:
+        """(T, 3, 3) corner positions, metres."""
+        return self.points[self.triangles]
+
+    @property
+    def opaque(self) -> NDArray[np.bool_]:
+        """(T,) whether each triangle occludes."""
+        opaque = np.array([not m.transparent for m in self.materials], dtype=bool)
+        return opaque[self.triangle_material]
+
+    def to_arrays(self) -> dict[str, NDArray[np.generic]]:
+        """The scene as plain arrays, without the bytes of its images."""
+        about = {
+            "objects": self.objects,
+            "materials": [vars(m) for m in self.materials],
+            "images": [{"name": i.name, "sha256": i.sha256} for i in self.images],
+            "cameras": [vars(c) for c in self.cameras],
+            "space": vars(self.space),
+            "notes": [vars(n) for n in self.notes],
+        }
+        text = json.dumps(about, sort_keys=True, ensure_ascii=False)
+        return {
+            "points": self.points,
+            "triangles": self.triangles,
+            "uv": self.uv,
+            "triangle_object": self.triangle_object,
+            "triangle_material": self.triangle_material,
+            "two_sided": self.two_sided,
+            "about": np.frombuffer(text.encode(), dtype=np.uint8),
+        }
+
+    @staticmethod
+    def from_arrays(
+        arrays: Mapping[str, NDArray[np.generic]], load_image: Callable[[str], bytes]
+    ) -> Scene:
+        """Inverse of `to_arrays`; ``load_image(sha256)`` returns the bytes of an image."""
+        about = json.loads(bytes(np.asarray(arrays["about"], dtype=np.uint8)).decode())
+
+        def loader(digest: str) -> Callable[[], bytes]:
+            return lambda: load_image(digest)
+
+        return Scene(
+            points=np.asarray(arrays["points"], dtype=np.float64),
+            triangles=np.asarray(arrays["triangles"], dtype=np.int32),
+            uv=np.asarray(arrays["uv"], dtype=np.float64),
+            triangle_object=np.asarray(arrays["triangle_object"], dtype=np.int32),
+            triangle_material=np.asarray(arrays["triangle_material"], dtype=np.int32),
+            two_sided=np.asarray(arrays["two_sided"], dtype=np.bool_),
+            objects=tuple(about["objects"]),
+            materials=tuple(
+                Material(**{**m, "color": tuple(m["color"])}) for m in about["materials"]
+            ),
+            images=tuple(
+                SourceImage(i["name"], i["sha256"], loader(i["sha256"])) for i in about["images"]
+            ),
+            cameras=tuple(
+                Camera(c["name"], tuple(c["position"]), tuple(c["direction"]), c["field_of_view"])
+                for c in about["cameras"]
+            ),
+            space=Space(**{**about["space"], "origin": tuple(about["space"]["origin"])}),
+            notes=tuple(Note(**n) for n in about["notes"]),
+        )

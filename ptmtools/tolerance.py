@@ -1,0 +1,63 @@
+"""The one place that tolerances come from; they scale with the scene.
+
+All geometry behind ingest is float64 in metres with its origin at the centre of the model's
+floor, so the extent of the scene bounds every coordinate. A tolerance is a fixed share of that
+extent: the same building in other units, or moved, is treated alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: On-plane distance as a share of the extent: 0.1 mm in a building of 50 m, well above the
+#: rounding of the float32 coordinates that model files carry (6e-8 of the extent).
+PLANE_SHARE = 2e-6
+#: Planes nearer than this to one another are proposed as one: 1 cm in a building of 50 m.
+CLUSTER_SHARE = 2e-4
+#: A cell thinner than this is refused: it could be flat after rounding to float32.
+THIN_SHARE = 1e-4
+#: Relative rounding of float64 arithmetic on coordinates, with a margin.
+ROUNDING_SHARE = 1e-12
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Distances in metres and an angle, all derived from the scene's extent.
+
+    Attributes
+    ----------
+    extent: largest side of the scene's bounding box, metres.
+    plane: a point nearer than this to a plane lies in it.
+    cluster: parallel planes nearer than this are proposed as one split plane.
+    thin: the least thickness of a cell.
+    rounding: distances below this are rounding errors of the arithmetic itself.
+    cosine: unit normals with a dot product of at least this are parallel.
+    """
+
+    extent: float
+    plane: float
+    cluster: float
+    thin: float
+    rounding: float
+    cosine: float
+
+    @staticmethod
+    def for_points(points: NDArray[np.float64]) -> Tolerance:
+        """Tolerances for the (n, 3) points of a scene; an empty scene counts as 1 m."""
+        extent = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
+        return Tolerance.for_extent(extent if extent > 0 else 1.0)
+
+    @staticmethod
+    def for_extent(extent: float) -> Tolerance:
+        """Tolerances for a scene whose bounding box has the largest side ``extent`` (metres)."""
+        return Tolerance(
+            extent=extent,
+            plane=PLANE_SHARE * extent,
+            cluster=CLUSTER_SHARE * extent,
+            thin=THIN_SHARE * extent,
+            rounding=ROUNDING_SHARE * extent,
+            cosine=1.0 - 1e-6,
+        )

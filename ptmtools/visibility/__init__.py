@@ -1,0 +1,1 @@
+"""Cells become potentially visible sets (paper §3)."""

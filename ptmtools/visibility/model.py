@@ -1,0 +1,73 @@
+"""Cell-to-cell potentially visible sets, as CSR."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Pvs:
+    """Who may see whom. Symmetric; a row is the cell itself, then the others, ascending.
+
+    Attributes
+    ----------
+    start: (C + 1,) int64 CSR over cells.
+    cell: (n,) int32 the potentially visible cells; ``cell[start[i]] == i``.
+    fallbacks: portals whose flow was given up for a looser, still conservative set.
+    """
+
+    start: NDArray[np.int64]
+    cell: NDArray[np.int32]
+    fallbacks: int = 0
+
+    @property
+    def cell_count(self) -> int:
+        return len(self.start) - 1
+
+    def row(self, i: int) -> NDArray[np.int32]:
+        """The cells that cell ``i`` may see, itself first."""
+        return self.cell[self.start[i] : self.start[i + 1]]
+
+    @property
+    def average_share(self) -> float:
+        """Mean share of all cells that a cell may see, itself included, in [0, 1]."""
+        n = self.cell_count
+        return float(len(self.cell) / (n * n)) if n else 0.0
+
+    def to_matrix(self) -> NDArray[np.bool_]:
+        """(C, C) dense matrix."""
+        n = self.cell_count
+        matrix = np.zeros((n, n), dtype=np.bool_)
+        matrix[np.repeat(np.arange(n), np.diff(self.start)), self.cell] = True
+        return matrix
+
+    @staticmethod
+    def from_matrix(matrix: NDArray[np.bool_], fallbacks: int = 0) -> Pvs:
+        """From a (C, C) symmetric matrix; the diagonal is taken as set."""
+        n = len(matrix)
+        rest = matrix & ~np.eye(n, dtype=np.bool_)
+        rows = [np.concatenate([[i], np.flatnonzero(rest[i])]) for i in range(n)]
+        start = np.concatenate([[0], np.cumsum([len(r) for r in rows])]).astype(np.int64)
+        cell = np.concatenate(rows).astype(np.int32) if rows else np.zeros(0, np.int32)
+        return Pvs(start, cell, fallbacks)
+
+    def to_arrays(self) -> dict[str, NDArray[np.generic]]:
+        """The sets as plain arrays."""
+        return {
+            "start": self.start,
+            "cell": self.cell,
+            "fallbacks": np.array([self.fallbacks], dtype=np.int64),
+        }
+
+    @staticmethod
+    def from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> Pvs:
+        """Inverse of `to_arrays`."""
+        return Pvs(
+            np.asarray(arrays["start"], dtype=np.int64),
+            np.asarray(arrays["cell"], dtype=np.int32),
+            int(np.asarray(arrays["fallbacks"], dtype=np.int64)[0]),
+        )

@@ -1,0 +1,128 @@
+"""Fixtures shared by all tests: the real data, required components, and hand-made rooms."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ptmtools.cells.model import Cells
+from ptmtools.scene.model import Material, Scene
+
+ROOT = Path(__file__).resolve().parent.parent
+SHARED = Path(os.environ.get("PTM_SHARED", ROOT.parent / "shared"))
+
+
+def absent(what: str, remedy: str) -> None:
+    """Skip on a user's machine, fail in CI."""
+    if os.environ.get("CI", "").lower() == "true":
+        pytest.fail(f"{what} is missing; {remedy}", pytrace=False)
+    pytest.skip(f"{what} is missing; {remedy}")
+
+
+@pytest.fixture(scope="session")
+def require() -> Callable[[str, str], None]:
+    """``require(what, remedy)``: report a missing component (skip, or fail with CI=true)."""
+    return absent
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder of real test data."""
+    if not SHARED.is_dir():
+        absent(f"test data {SHARED}", "put it beside the checkout or name it in PTM_SHARED")
+    return SHARED
+
+
+RoomRow = Callable[[int], tuple[Scene, Cells]]
+
+
+@pytest.fixture(scope="session")
+def room_row() -> RoomRow:
+    """``room_row(n)``: n cubic rooms of 4 m in a row along x, joined by doors 2 m wide, 3 m high.
+
+    Room i spans x in [4i, 4i + 4], y in [0, 4], z in [-2, 2]; a door spans y in [0, 3], z in
+    [-1, 1]. Walls have no thickness; cells, portals and pieces are written down by hand.
+    """
+    return make_room_row
+
+
+def make_room_row(n: int) -> tuple[Scene, Cells]:
+    quads: list[np.ndarray] = []
+    sides: list[tuple[int, int]] = []
+
+    def quad(
+        a: list[float], b: list[float], c: list[float], d: list[float], f: int, k: int
+    ) -> None:
+        quads.append(np.array([a, b, c, d], dtype=np.float64))
+        sides.append((f, k))
+
+    for i in range(n):
+        l, r = 4.0 * i, 4.0 * i + 4
+        quad([l, 0, -2], [l, 0, 2], [r, 0, 2], [r, 0, -2], i, -1)  # floor, faces up
+        quad([l, 4, -2], [r, 4, -2], [r, 4, 2], [l, 4, 2], i, -1)  # ceiling, faces down
+        quad([l, 0, -2], [r, 0, -2], [r, 4, -2], [l, 4, -2], i, -1)  # faces +z
+        quad([l, 0, 2], [l, 4, 2], [r, 4, 2], [r, 0, 2], i, -1)  # faces -z
+    quad([0, 0, -2], [0, 4, -2], [0, 4, 2], [0, 0, 2], 0, -1)  # faces +x
+    e = 4.0 * n
+    quad([e, 0, -2], [e, 0, 2], [e, 4, 2], [e, 4, -2], n - 1, -1)  # faces -x
+    for i in range(n - 1):  # partitions face +x: front is room i + 1
+        x = 4.0 * i + 4
+        quad([x, 0, -2], [x, 4, -2], [x, 4, -1], [x, 0, -1], i + 1, i)
+        quad([x, 0, 1], [x, 4, 1], [x, 4, 2], [x, 0, 2], i + 1, i)
+        quad([x, 3, -1], [x, 4, -1], [x, 4, 1], [x, 3, 1], i + 1, i)
+
+    q = len(quads)
+    points = np.concatenate(quads)
+    base = 4 * np.arange(q)[:, None, None]
+    triangles = (base + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3).astype(np.int32)
+    corner_uv = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float64)
+    uv = np.tile(corner_uv[np.array([[0, 1, 2], [0, 2, 3]])], (q, 1, 1))
+    t = 2 * q
+    scene = Scene(
+        points=points,
+        triangles=triangles,
+        uv=uv,
+        triangle_object=np.repeat(np.arange(q), 2).astype(np.int32),
+        triangle_material=np.zeros(t, np.int32),
+        two_sided=np.ones(t, np.bool_),
+        objects=tuple(f"quad{i}" for i in range(q)),
+        materials=(Material("plain"),),
+    )
+
+    box = np.array([[x, y, z] for x in (0, 4) for y in (0, 4) for z in (-2, 2)], dtype=np.float64)
+    loops = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    leaf_point = np.concatenate([box + [4.0 * i, 0, 0] for i in range(n)])
+    face_index = np.concatenate([np.array(loops).ravel() + 8 * i for i in range(n)])
+    # A chain of planes x = 4i: behind it room i - 1, in front the rest.
+    node_plane = np.array([[1.0, 0, 0, -4.0 * i] for i in range(1, n)]).reshape(-1, 4)
+    front = [i if i < n - 1 else -2 - (n - 1) for i in range(1, n)]
+    back = [-2 - (i - 1) for i in range(1, n)]
+    node_child = np.array([front, back], dtype=np.int32).T.reshape(-1, 2)
+    door = np.array([[0, 0, -1], [0, 3, -1], [0, 3, 1], [0, 0, 1]], dtype=np.float64)
+    doors = [door + [4.0 * i, 0, 0] for i in range(1, n)]
+    cells = Cells(
+        node_plane=node_plane,
+        node_child=node_child,
+        root_box=np.array([[0.0, 0, -2], [e, 4, 2]]),
+        leaf_cell=np.arange(n, dtype=np.int32),
+        leaf_point=leaf_point,
+        leaf_point_start=8 * np.arange(n + 1),
+        face_index=face_index.astype(np.int32),
+        face_start=4 * np.arange(6 * n + 1),
+        leaf_face_start=6 * np.arange(n + 1),
+        portal_leaf=np.array([[i - 1, i] for i in range(1, n)], dtype=np.int32).reshape(-1, 2),
+        portal_plane=np.array([[1.0, 0, 0, -4.0 * i] for i in range(1, n)]).reshape(-1, 4),
+        portal_point=np.concatenate(doors) if doors else np.zeros((0, 3)),
+        portal_start=4 * np.arange(n),
+        portal_area=np.full(n - 1, 6.0),
+        vertex=points,
+        vertex_uv=np.tile(corner_uv, (q, 1)),
+        triangle=triangles,
+        triangle_source=np.arange(t, dtype=np.int32),
+        triangle_cell=np.repeat(np.array(sides, dtype=np.int32), 2, axis=0),
+    )
+    return scene, cells
