@@ -164,4 +164,4 @@ class Cells:
         about = json.loads(bytes(np.asarray(arrays["about"], dtype=np.uint8)).decode())
         names = [f.name for f in fields(Cells) if f.name not in ("closed", "notes")]
         plain = {name: np.asarray(arrays[name]) for name in names}
-        return Cells(**plain, closed=bool(about["closed"]), notes=tuple(about["notes"]))  # type: ignore[arg-type]
+        return Cells(**plain, closed=bool(about["closed"]), notes=tuple(about["notes"]))
