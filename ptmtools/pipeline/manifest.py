@@ -1,0 +1,152 @@
+"""What a database says of itself: `manifest.json`, the one file that is written last.
+
+::
+
+    {"format": "ptmtools database", "schema": 1,
+     "model": "museum.obj",                          the file's name, never its folder
+     "stages": {"cells": {
+         "software": "0.1.0",                        the ptmtools that computed it
+         "parameters": {"wall_area": 1.0, …},        the options that can change the outputs
+         "inputs":  {"stages/scene.npz": "9f86…"},   name → SHA-256 of what was read
+         "outputs": {"stages/cells.npz": "60b7…"},   path in the database → SHA-256
+         "counts":  {"cells": 52, "portals": 61, …}  figures and choices, for reports
+     }, …}}
+
+Stages stand in the order in which they run. There is no time and no folder of the machine in it:
+the same model and options give the same manifest anywhere. A stage is current if the present
+software would run it with the same parameters on the same inputs, and its outputs are all there.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from typing import Any
+
+from ptmtools.errors import DatabaseError
+
+FORMAT = "ptmtools database"
+SCHEMA = 1
+#: The stages, in the order in which they run.
+STAGES = ("scene", "cells", "pvs", "ach", "textures", "emit")
+
+_SHA256 = re.compile(r"[0-9a-f]{64}")
+
+
+@dataclass(frozen=True)
+class StageRecord:
+    """What one run of a stage was, see the module's description.
+
+    `inputs` may map to the empty string: a file that was looked for and not found.
+    """
+
+    software: str
+    parameters: Mapping[str, Any]
+    inputs: Mapping[str, str]
+    outputs: Mapping[str, str]
+    counts: Mapping[str, Any] = field(default_factory=dict)
+
+    def same_work(self, other: StageRecord) -> bool:
+        """Whether both were to do the same: software, parameters and inputs agree."""
+        return (self.software, dict(self.parameters), dict(self.inputs)) == (
+            other.software,
+            dict(other.parameters),
+            dict(other.inputs),
+        )
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """The contents of `manifest.json`."""
+
+    model: str
+    stages: Mapping[str, StageRecord] = field(default_factory=dict)
+
+    def with_stage(self, name: str, record: StageRecord) -> Manifest:
+        """This manifest with one stage recorded anew."""
+        stages = {**self.stages, name: record}
+        return Manifest(self.model, {s: stages[s] for s in STAGES if s in stages})
+
+    def outputs(self) -> dict[str, str]:
+        """Every file of the database with its SHA-256, except the manifest itself."""
+        return {p: h for record in self.stages.values() for p, h in record.outputs.items()}
+
+    def to_bytes(self) -> bytes:
+        """The text of `manifest.json`."""
+        document = {
+            "format": FORMAT,
+            "schema": SCHEMA,
+            "model": self.model,
+            "stages": {
+                name: {
+                    "software": record.software,
+                    "parameters": dict(record.parameters),
+                    "inputs": dict(sorted(record.inputs.items())),
+                    "outputs": dict(sorted(record.outputs.items())),
+                    "counts": dict(record.counts),
+                }
+                for name, record in self.stages.items()
+            },
+        }
+        return (json.dumps(document, indent=1, ensure_ascii=False) + "\n").encode()
+
+    @staticmethod
+    def from_bytes(data: bytes, *, file: str | PathLike[str]) -> Manifest:
+        """Inverse of `to_bytes`; ``file`` is named in the errors.
+
+        Raises
+        ------
+        DatabaseError: PTM-D001 if it is not a manifest of ours, PTM-D002 if it is damaged,
+            PTM-D003 if another version of ptmtools wrote it.
+        """
+        try:
+            document = json.loads(data)
+        except (ValueError, RecursionError) as fault:
+            raise _damaged(file, f"not JSON ({fault})") from fault
+        if not isinstance(document, dict) or document.get("format") != FORMAT:
+            raise DatabaseError(
+                "PTM-D001", "not a ptmtools database", file=file, remedy="give a database folder"
+            )
+        if document.get("schema") != SCHEMA:
+            raise DatabaseError(
+                "PTM-D003",
+                f"schema version {document.get('schema')!r}, this ptmtools reads {SCHEMA}",
+                file=file,
+                remedy="build the database again, or use the ptmtools that wrote it",
+            )
+        model, stages = document.get("model"), document.get("stages")
+        if not isinstance(model, str) or not isinstance(stages, dict):
+            raise _damaged(file, "no model or no stages")
+        if unknown := sorted(set(stages) - set(STAGES)):
+            raise _damaged(file, f"unknown stage {unknown[0]!r}")
+        return Manifest(model, {s: _record(stages[s], s, file) for s in STAGES if s in stages})
+
+
+def _record(entry: object, stage: str, file: str | PathLike[str]) -> StageRecord:
+    names = ("parameters", "inputs", "outputs", "counts")
+    if not isinstance(entry, dict) or not isinstance(entry.get("software"), str):
+        raise _damaged(file, f"stage {stage} is incomplete")
+    if not all(isinstance(entry.get(name), dict) for name in names):
+        raise _damaged(file, f"stage {stage} is incomplete")
+    for path, digest in entry["outputs"].items():
+        if not isinstance(digest, str) or not _SHA256.fullmatch(digest) or not _inside(path):
+            raise _damaged(file, f"stage {stage} has an impossible output {path!r}")
+    return StageRecord(entry["software"], *(entry[name] for name in names))
+
+
+def _inside(path: str) -> bool:
+    """Whether a relative path stays in the database, on every system."""
+    parts = path.split("/")
+    return bool(path) and "\\" not in path and ":" not in path and not {"", ".", ".."} & set(parts)
+
+
+def _damaged(file: str | PathLike[str], what: str) -> DatabaseError:
+    return DatabaseError(
+        "PTM-D002",
+        f"damaged manifest: {what}",
+        file=file,
+        remedy="restore it, or build the database again with --force",
+    )
