@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import errno
 import os
-import tempfile
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -27,8 +27,9 @@ def write_bytes(path: str | os.PathLike[str], data: bytes, force: bool = False) 
         written, PTM-O003 if the disk is full.
     """
     target = Path(path)
-    if target.is_dir():
-        raise OutputError("PTM-O002", "is a folder, not a file", file=target, remedy="name a file")
+    if target.exists() and not target.is_file():  # renaming would replace a device
+        kind = "a folder" if target.is_dir() else "a device"
+        raise OutputError("PTM-O002", f"is {kind}, not a file", file=target, remedy="name a file")
     if not force and os.path.lexists(target):
         raise OutputError(
             "PTM-O001",
@@ -37,17 +38,16 @@ def write_bytes(path: str | os.PathLike[str], data: bytes, force: bool = False) 
             remedy="name another output, or give --force to overwrite it",
         )
     with writing(target):
-        descriptor, name = tempfile.mkstemp(prefix=".ptm-", suffix=".tmp", dir=target.parent)
+        temporary = target.with_name(f".ptm-{secrets.token_hex(8)}.tmp")
         try:
-            with os.fdopen(descriptor, "wb") as file:
+            with temporary.open("xb") as file:
                 file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
-            os.chmod(name, 0o666 & ~_umask())
-            os.replace(name, target)
+            temporary.replace(target)
         except BaseException:
             with suppress(OSError):
-                os.unlink(name)
+                temporary.unlink()
             raise
 
 
@@ -64,10 +64,3 @@ def writing(file: str | os.PathLike[str]) -> Iterator[None]:
             file=file,
             remedy="free some space and run again" if full else "check the folder and its rights",
         ) from fault
-
-
-def _umask() -> int:
-    # The only way to read it is to set it; mkstemp ignores it.
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
