@@ -19,8 +19,11 @@ PLANE_SHARE = 2e-6
 CLUSTER_SHARE = 2e-4
 #: A cell thinner than this is refused: it could be flat after rounding to float32.
 THIN_SHARE = 1e-4
-#: Relative rounding of float64 arithmetic on coordinates, with a margin.
-ROUNDING_SHARE = 1e-12
+#: A gap between walls narrower than this is a crack of the modelling, not an opening: 0.5 mm in a
+#: building of 50 m.
+HAIRLINE_SHARE = 1e-5
+#: Rounding of float64 arithmetic on coordinates and their intersections, with a margin.
+ROUNDING_SHARE = 1e-10
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,7 @@ class Tolerance:
     plane: a point nearer than this to a plane lies in it.
     cluster: parallel planes nearer than this are proposed as one split plane.
     thin: the least thickness of a cell.
+    hairline: an opening narrower than this is a crack.
     rounding: distances below this are rounding errors of the arithmetic itself.
     cosine: unit normals with a dot product of at least this are parallel.
     """
@@ -41,6 +45,7 @@ class Tolerance:
     plane: float
     cluster: float
     thin: float
+    hairline: float
     rounding: float
     cosine: float
 
@@ -58,6 +63,7 @@ class Tolerance:
             plane=PLANE_SHARE * extent,
             cluster=CLUSTER_SHARE * extent,
             thin=THIN_SHARE * extent,
+            hairline=HAIRLINE_SHARE * extent,
             rounding=ROUNDING_SHARE * extent,
             cosine=1.0 - 1e-6,
         )

@@ -1,0 +1,26 @@
+"""The knobs of the subdivision."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class SubdivideOptions:
+    """What may split, and how far.
+
+    Attributes
+    ----------
+    wall_area: the least area in m² of a polygon that may split a cell. Smaller: more and tighter
+        cells, and a slower portal flow.
+    max_cells: stop at this many leaves, best splits first.
+    structural: globs over object and material names; what matches may split whatever its area.
+    detail: globs; what matches never splits a cell nor blocks a portal. `structural` wins.
+    viewpoints: eyes (x, y, z) in world metres from which the flood of the reachable starts.
+    """
+
+    wall_area: float = 2.0
+    max_cells: int = 2000
+    structural: tuple[str, ...] = ()
+    detail: tuple[str, ...] = ()
+    viewpoints: tuple[tuple[float, float, float], ...] = ()

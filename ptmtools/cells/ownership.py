@@ -1,0 +1,197 @@
+"""Cutting the geometry along the cell boundaries, and who owns each piece.
+
+Every triangle sinks through the BSP tree and is cut where it crosses a plane, so that each piece
+belongs to one leaf; texture coordinates at the cuts follow from barycentric coordinates of the
+source triangle. A piece that *lies* in a plane has two owners: the leaf that its front faces and
+the one behind it. It therefore sinks twice, once siding with its front and once with its back
+(design, "Ownership": true positions decide, not the plane that a cluster was snapped to).
+
+A whole tree node is treated at once in numpy, pieces as arrays; crossing points are computed from
+the endpoint in front to the endpoint behind, so that two triangles sharing an edge are cut in the
+same point to the last bit. Pieces outside the root box belong to the leaf that the planes alone
+assign: nothing of the model is lost to a clipped box.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.bsp import Tree
+from ptmtools.scene.model import Scene
+from ptmtools.tolerance import Tolerance
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Triangles cut to the leaves.
+
+    Attributes
+    ----------
+    points: (M, 3, 3) corner positions.
+    weights: (M, 3, 3) barycentric coordinates of the corners in the source triangle.
+    source: (M,) index of the scene's triangle.
+    leaf: (M, 2) int64 leaf of the tree on the front and on the back.
+    """
+
+    points: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    source: NDArray[np.int64]
+    leaf: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class _Batch:
+    """Pieces on their way down: `front` is the leaf on their front, once that is known; `lying`
+    whether they lay in some plane on the way."""
+
+    points: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    source: NDArray[np.int64]
+    front: NDArray[np.int64]
+    lying: NDArray[np.bool_]
+
+    def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> _Batch:
+        return _Batch(*(array[rows] for array in vars(self).values()))
+
+    @staticmethod
+    def join(parts: list[_Batch]) -> _Batch:
+        columns = zip(*(vars(part).values() for part in parts), strict=True)
+        return _Batch(*(np.concatenate(column) for column in columns))
+
+
+def cut_to_leaves(scene: Scene, tree: Tree, tolerance: Tolerance) -> Pieces:
+    """Cut all triangles of a scene along the planes of a tree."""
+    corners = scene.corners
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    count = len(corners)
+    whole = _Batch(
+        points=corners,
+        weights=np.tile(np.eye(3), (count, 1, 1)),
+        source=np.arange(count),
+        front=np.full(count, -1),
+        lying=np.zeros(count, dtype=bool),
+    )
+    batch, front = _sink(tree, whole, normals, tolerance)
+    within = batch.take(~batch.lying)
+    within_leaf = front[~batch.lying]
+    boundary = batch.take(batch.lying)
+    boundary = _Batch(**{**vars(boundary), "front": front[batch.lying]})
+    boundary, back = _sink(tree, boundary, -normals, tolerance)
+    pieces = _Batch.join([within, boundary])
+    leaf = np.concatenate(
+        [np.stack([within_leaf, within_leaf], axis=1), np.stack([boundary.front, back], axis=1)]
+    )
+    order = np.argsort(pieces.source, kind="stable")
+    return Pieces(pieces.points[order], pieces.weights[order], pieces.source[order], leaf[order])
+
+
+def _sink(
+    tree: Tree, batch: _Batch, facing: NDArray[np.float64], tolerance: Tolerance
+) -> tuple[_Batch, NDArray[np.int64]]:
+    """Let pieces sink to leaves; what lies in a plane goes to the side that ``facing`` (one
+    direction per scene triangle) points to. Returns the cut pieces and the leaf of each."""
+    arrived: list[_Batch] = []
+    leaves: list[NDArray[np.int64]] = []
+    stack = [(0 if len(tree.planes) else -2, batch)]
+    while stack:
+        node, here = stack.pop()
+        if node < 0:
+            arrived.append(here)
+            leaves.append(np.full(len(here.source), -2 - node))
+            continue
+        plane = tree.planes[node]
+        distance = here.points @ plane[:3] + plane[3]
+        ahead = distance > tolerance.plane
+        behind = distance < -tolerance.plane
+        some_ahead, some_behind = ahead.any(axis=1), behind.any(axis=1)
+        lies = ~some_ahead & ~some_behind
+        turned = facing[here.source] @ plane[:3] > 0
+        to_front = some_ahead & ~some_behind | lies & turned
+        to_back = some_behind & ~some_ahead | lies & ~turned
+        crossing = some_ahead & some_behind
+        here = _Batch(**{**vars(here), "lying": here.lying | lies})
+        sides = [[here.take(to_front)], [here.take(to_back)]]
+        if crossing.any():
+            sign = ahead[crossing].astype(np.int8) - behind[crossing]
+            for side, parts in enumerate(_split(here.take(crossing), distance[crossing], sign)):
+                sides[side].extend(parts)
+        for side in (0, 1):
+            joined = _Batch.join(sides[side])
+            if len(joined.source):
+                stack.append((int(tree.children[node, side]), joined))
+    if not arrived:
+        return batch, np.zeros(0, dtype=np.int64)
+    return _Batch.join(arrived), np.concatenate(leaves)
+
+
+def _split(
+    batch: _Batch, distance: NDArray[np.float64], sign: NDArray[np.int8]
+) -> tuple[list[_Batch], list[_Batch]]:
+    """Cut pieces with corners strictly on both sides; returns what is in front and behind."""
+    front: list[_Batch] = []
+    back: list[_Batch] = []
+    touching = (sign == 0).any(axis=1)
+    # One corner in the plane: cut from it to the opposite edge.
+    rows = np.flatnonzero(touching)
+    b, d, s = _turned(batch, distance, sign, rows, np.argmax(sign[rows] == 0, axis=1))
+    middle = _crossing(b, d, 1, 2)
+    first, second = _triangle(b, 0, 1, middle), _triangle(b, 0, middle, 2)
+    upper = s[:, 1] > 0
+    front += [first.take(upper), second.take(~upper)]
+    back += [second.take(upper), first.take(~upper)]
+    # One corner alone on its side: a triangle there, a quadrilateral on the other side.
+    rows = np.flatnonzero(~touching)
+    lone = np.argmax(sign[rows] == -np.sign(sign[rows].sum(axis=1))[:, None], axis=1)
+    b, d, s = _turned(batch, distance, sign, rows, lone)
+    p, q = _crossing(b, d, 0, 1), _crossing(b, d, 0, 2)
+    tip, base, rest = _triangle(b, 0, p, q), _triangle(b, p, 1, 2), _triangle(b, p, 2, q)
+    upper = s[:, 0] > 0
+    front += [tip.take(upper), base.take(~upper), rest.take(~upper)]
+    back += [base.take(upper), rest.take(upper), tip.take(~upper)]
+    return front, back
+
+
+#: Positions and barycentric coordinates, (n, 3) each.
+_Corner = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+def _turned(
+    batch: _Batch,
+    distance: NDArray[np.float64],
+    sign: NDArray[np.int8],
+    rows: NDArray[np.int64],
+    first: NDArray[np.int64],
+) -> tuple[_Batch, NDArray[np.float64], NDArray[np.int8]]:
+    """The given rows with their corners turned so that ``first`` comes first."""
+    b = batch.take(rows)
+    i = np.arange(len(rows))[:, None]
+    j = (first[:, None] + np.arange(3)) % 3
+    turned = _Batch(**{**vars(b), "points": b.points[i, j], "weights": b.weights[i, j]})
+    return turned, distance[rows][i, j], sign[rows][i, j]
+
+
+def _crossing(batch: _Batch, distance: NDArray[np.float64], i: int, j: int) -> _Corner:
+    """Where the edges from corner i to corner j cross, always reckoned from the front end."""
+    swap = distance[:, i] < distance[:, j]
+    d_front = np.where(swap, distance[:, j], distance[:, i])
+    d_back = np.where(swap, distance[:, i], distance[:, j])
+    t = (d_front / (d_front - d_back))[:, None]
+
+    def between(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        ahead = np.where(swap[:, None], values[:, j], values[:, i])
+        behind = np.where(swap[:, None], values[:, i], values[:, j])
+        mixed: NDArray[np.float64] = ahead + t * (behind - ahead)
+        return mixed
+
+    return between(batch.points), between(batch.weights)
+
+
+def _triangle(batch: _Batch, *corners: int | _Corner) -> _Batch:
+    """The batch with its corners replaced: an old corner by index, or a new one."""
+    each = [(batch.points[:, c], batch.weights[:, c]) if isinstance(c, int) else c for c in corners]
+    points = np.stack([position for position, _ in each], axis=1)
+    weights = np.stack([weight for _, weight in each], axis=1)
+    return _Batch(**{**vars(batch), "points": points, "weights": weights})

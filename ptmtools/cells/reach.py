@@ -1,0 +1,92 @@
+"""Which leaves somebody can reach, and whether the model is closed.
+
+The flood starts from the viewpoints, else from the largest leaf that has floor below it and does
+not touch the root box, and runs through the portals. The model is closed if it never meets the
+root box; what it does not reach is solid matter, a sealed void or the outside (design,
+"Reachable").
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.bsp import Tree
+from ptmtools.cells.polyhedron import BOX_FACE
+from ptmtools.cells.portals import Portals
+
+#: A surface whose normal leans less than this from the vertical can be stood on (cosine of 45°).
+FLOOR_COSINE = 0.7
+
+
+@dataclass(frozen=True)
+class Reach:
+    """The outcome of a flood.
+
+    Attributes
+    ----------
+    reached: (L,) bool over the leaves of the tree.
+    closed: whether no reached leaf touches the root box.
+    start: the leaves from which the flood began; empty if none qualified.
+    """
+
+    reached: NDArray[np.bool_]
+    closed: bool
+    start: tuple[int, ...]
+
+
+def flood(
+    tree: Tree, portals: Portals, corners: NDArray[np.float64], start: tuple[int, ...]
+) -> Reach:
+    """Flood through the portals from ``start``, or from the leaf that the module describes.
+
+    Parameters
+    ----------
+    corners: (T, 3, 3) structural triangles, in which the floor is looked for.
+    """
+    outer = np.array([BOX_FACE in body.tags for body in tree.leaves], dtype=bool)
+    if not start:
+        start = largest_with_floor(tree, ~outer, corners)
+    reached = np.zeros(len(tree.leaves), dtype=bool)
+    neighbours: list[list[int]] = [[] for _ in tree.leaves]
+    for a, b in portals.leaves.tolist():
+        neighbours[a].append(b)
+        neighbours[b].append(a)
+    stack = list(start)
+    reached[stack] = True
+    while stack:
+        for other in neighbours[stack.pop()]:
+            if not reached[other]:
+                reached[other] = True
+                stack.append(other)
+    closed = bool(start) and not bool(np.any(reached & outer))
+    return Reach(reached, closed, start)
+
+
+def largest_with_floor(
+    tree: Tree, allowed: NDArray[np.bool_], corners: NDArray[np.float64]
+) -> tuple[int, ...]:
+    """The largest allowed leaf with floor below its middle, as a tuple of one, or ()."""
+    order = sorted(np.flatnonzero(allowed).tolist(), key=lambda i: (-tree.leaves[i].volume, i))
+    for leaf in order:
+        if _floor_below(tree.leaves[leaf].points.mean(axis=0), corners):
+            return (leaf,)
+    return ()
+
+
+def _floor_below(eye: NDArray[np.float64], corners: NDArray[np.float64]) -> bool:
+    """Whether a plumb line from ``eye`` meets a triangle that can be stood on."""
+    flat = corners[:, :, [0, 2]] - eye[[0, 2]]
+    turn = flat[:, [1, 2, 0]]
+    side = flat[:, :, 0] * turn[:, :, 1] - flat[:, :, 1] * turn[:, :, 0]
+    hit = np.flatnonzero(np.all(side >= 0, axis=1) | np.all(side <= 0, axis=1))
+    p = corners[hit]
+    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    steep = np.abs(normal[:, 1]) < FLOOR_COSINE * np.linalg.norm(normal, axis=1)
+    p, normal = p[~steep], normal[~steep]
+    upright = normal[:, 1] != 0
+    p, normal = p[upright], normal[upright]
+    height = np.einsum("ij,ij->i", normal, p[:, 0] - eye) / normal[:, 1]
+    return bool(np.any(height < 0))

@@ -1,0 +1,222 @@
+"""Walls: the large coplanar polygons of a scene, and the planes that they propose.
+
+Triangles are gathered into *layers*, sets that lie in one plane within tolerance, largest area
+first. Parallel layers nearer to one another than the cluster distance propose a single plane, that
+of the heaviest layer: a mean plane between two faces of a thin panel would contain neither. In its
+plane, the triangles of a layer are united (shapely) and split into connected polygons; those of
+at least ``wall_area`` are walls (cf. the area-weighted clustering of Airey 1990).
+
+A polygon blocks a portal only where it lies in the portal's plane within tolerance (design,
+"Structure"), so the blocking set of a plane is wider than its walls: every opaque structural
+triangle there, whatever its size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.options import SubdivideOptions
+from ptmtools.scene.model import Scene
+from ptmtools.tolerance import Tolerance
+
+if TYPE_CHECKING:
+    Geometry = Any
+
+#: Normals are binned on a grid of this step, only to find candidates quickly.
+_NORMAL_STEP = 0.02
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A plane with two axes in it: ``to_plane`` and ``to_space`` are exact inverses up to rounding.
+
+    Attributes
+    ----------
+    plane: (4,) unit normal and offset, n·x + d = 0.
+    origin, u, v: a point of the plane and an orthonormal basis, u × v = n.
+    """
+
+    plane: NDArray[np.float64]
+    origin: NDArray[np.float64]
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+
+    @staticmethod
+    def of(plane: NDArray[np.float64]) -> Frame:
+        """A frame for a (4,) plane; the axes depend on nothing but the plane."""
+        normal = plane[:3]
+        axis = np.zeros(3)
+        axis[np.argmin(np.abs(normal))] = 1.0
+        u = np.cross(axis, normal)
+        u /= np.linalg.norm(u)
+        return Frame(plane, -plane[3] * normal, u, np.cross(normal, u))
+
+    def to_plane(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(…, 2) coordinates of (…, 3) points, projected along the normal."""
+        q = points - self.origin
+        return np.stack([q @ self.u, q @ self.v], axis=-1)
+
+    def to_space(self, flat: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(…, 3) points of (…, 2) coordinates."""
+        space: NDArray[np.float64] = self.origin + flat[..., :1] * self.u + flat[..., 1:] * self.v
+        return space
+
+
+@dataclass(frozen=True)
+class WallPlane:
+    """A plane that may split cells, and what lies in it.
+
+    Attributes
+    ----------
+    frame: the plane and its axes.
+    walls: shapely geometry in plane coordinates, the polygons that may split.
+    blocking: shapely geometry, everything opaque and structural in the plane.
+    """
+
+    frame: Frame
+    walls: Geometry
+    blocking: Geometry
+
+
+def structural_triangles(scene: Scene, options: SubdivideOptions) -> NDArray[np.bool_]:
+    """(T,) which triangles occlude: opaque, and not called detail by name."""
+    detail = _named(scene, options.detail) & ~_named(scene, options.structural)
+    return scene.opaque & ~detail
+
+
+def _named(scene: Scene, patterns: Iterable[str]) -> NDArray[np.bool_]:
+    patterns = tuple(patterns)
+
+    def match(name: str) -> bool:
+        return any(fnmatchcase(name, pattern) for pattern in patterns)
+
+    objects = np.array([match(name) for name in scene.objects], dtype=bool)
+    materials = np.array([match(m.name) for m in scene.materials], dtype=bool)
+    named: NDArray[np.bool_] = objects[scene.triangle_object] | materials[scene.triangle_material]
+    return named
+
+
+def find_walls(scene: Scene, options: SubdivideOptions, tolerance: Tolerance) -> list[WallPlane]:
+    """The planes that may split cells, heaviest first."""
+    import shapely
+
+    mask = structural_triangles(scene, options)
+    corners = scene.corners[mask]
+    forced = _named(scene, options.structural)[mask]
+    planes, areas = _planes_of(corners)
+    layers = _layers(corners, planes, areas, forced, options.wall_area, tolerance)
+    found: list[tuple[float, WallPlane]] = []
+    kept: list[NDArray[np.float64]] = []
+    for plane in layers:
+        if any(_parallel_and_near(plane, other, tolerance) for other in kept):
+            continue
+        frame = Frame.of(plane)
+        distance = corners @ plane[:3] + plane[3]
+        flat = np.all(np.abs(distance) <= tolerance.plane, axis=1) & (areas > 0)
+        blocking = unite(frame.to_plane(corners[flat]))
+        shapely.prepare(blocking)
+        parts = shapely.get_parts(blocking)
+        large = shapely.area(parts) >= options.wall_area
+        if np.any(forced[flat]):
+            named = unite(frame.to_plane(corners[flat & forced]))
+            large |= shapely.intersects(parts, named)
+        if not np.any(large):
+            continue
+        walls = shapely.union_all(parts[large])
+        kept.append(plane)
+        found.append((float(shapely.area(walls)), WallPlane(frame, walls, blocking)))
+    order = sorted(range(len(found)), key=lambda i: (-found[i][0], i))
+    return [found[i][1] for i in order]
+
+
+def unite(triangles: NDArray[np.float64]) -> Geometry:
+    """Union of (n, 3, 2) triangles of a plane: coplanar overlaps and T-junctions vanish."""
+    import shapely
+
+    polygons = shapely.polygons(np.concatenate([triangles, triangles[:, :1]], axis=1))
+    return shapely.union_all(shapely.make_valid(polygons))
+
+
+def _planes_of(
+    corners: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(n, 4) planes with one sign for both windings, and (n,) areas, of (n, 3, 3) triangles."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    double = np.linalg.norm(normal, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        normal = np.where(double[:, None] > 0, normal / double[:, None], 0.0)
+    largest = np.argmax(np.abs(normal), axis=1)
+    sign = np.sign(normal[np.arange(len(normal)), largest])
+    normal *= np.where(sign == 0, 1.0, sign)[:, None]
+    offset = -np.einsum("ij,ij->i", normal, corners.mean(axis=1))
+    return np.concatenate([normal, offset[:, None]], axis=1), double / 2.0
+
+
+def _layers(
+    corners: NDArray[np.float64],
+    planes: NDArray[np.float64],
+    areas: NDArray[np.float64],
+    forced: NDArray[np.bool_],
+    wall_area: float,
+    tolerance: Tolerance,
+) -> list[NDArray[np.float64]]:
+    """Planes that hold enough coplanar area to carry a wall, heaviest first.
+
+    A bin of similar normals and offsets that cannot reach ``wall_area`` together with its
+    neighbours is never looked at: curved detail falls away before anything quadratic happens.
+    """
+    possible = _dense_bins(planes, areas, wall_area, tolerance) | forced
+    candidate = np.flatnonzero(possible & (areas > 0))
+    corners, planes, areas, forced = (
+        corners[candidate],
+        planes[candidate],
+        areas[candidate],
+        forced[candidate],
+    )
+    free = np.ones(len(candidate), dtype=bool)
+    layers: list[tuple[float, NDArray[np.float64]]] = []
+    for seed in np.argsort(-areas, kind="stable"):
+        if not free[seed]:
+            continue
+        rest = np.flatnonzero(free)
+        plane = planes[seed]
+        near = np.all(np.abs(corners[rest] @ plane[:3] + plane[3]) <= tolerance.plane, axis=1)
+        members = rest[near]
+        free[members] = False
+        free[seed] = False
+        weight = float(areas[members].sum())
+        if weight >= wall_area or np.any(forced[members]):
+            layers.append((weight, plane))
+    layers.sort(key=lambda layer: -layer[0])
+    return [plane for _, plane in layers]
+
+
+def _dense_bins(
+    planes: NDArray[np.float64],
+    areas: NDArray[np.float64],
+    wall_area: float,
+    tolerance: Tolerance,
+) -> NDArray[np.bool_]:
+    step = np.array([_NORMAL_STEP] * 3 + [max(tolerance.cluster, _NORMAL_STEP * tolerance.extent)])
+    enough = np.zeros(len(planes), dtype=bool)
+    for shift in (0.0, 0.5):
+        key = np.floor(planes / step + shift).astype(np.int64)
+        _, label = np.unique(key, axis=0, return_inverse=True)
+        total = np.bincount(label.ravel(), weights=areas)
+        enough |= total[label.ravel()] * 8 >= wall_area
+    return enough
+
+
+def _parallel_and_near(
+    plane: NDArray[np.float64], other: NDArray[np.float64], tolerance: Tolerance
+) -> bool:
+    turn = float(plane[:3] @ other[:3])
+    if abs(turn) < tolerance.cosine:
+        return False
+    return abs(float(plane[3]) - float(np.sign(turn)) * float(other[3])) <= tolerance.cluster

@@ -1,0 +1,257 @@
+"""From a scene to convex cells, portals and cut geometry (paper §3).
+
+1. Walls propose planes (`structure`), the planes split the root box into convex leaves (`bsp`),
+   what no wall covers between two leaves is a portal (`portals`).
+2. A flood through the portals finds what somebody can reach (`reach`). The first root box is wider
+   than the model: if the flood never meets it, the model is closed and everything else is dropped.
+   If it does, the model is open; the root box is then clipped to the walls and the subdivision done
+   again, so that the open space over low walls does not join everything to everything.
+3. The geometry is cut to the leaves, and each piece gets its owners (`ownership`).
+
+Each reachable leaf is a cell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.bsp import Tree, build_tree
+from ptmtools.cells.model import OUTSIDE, Cells
+from ptmtools.cells.options import SubdivideOptions
+from ptmtools.cells.ownership import Pieces, cut_to_leaves
+from ptmtools.cells.polyhedron import Polyhedron
+from ptmtools.cells.portals import Portals, find_portals
+from ptmtools.cells.reach import Reach, flood, largest_with_floor
+from ptmtools.cells.structure import WallPlane, find_walls, structural_triangles
+from ptmtools.errors import InputError
+from ptmtools.progress import Progress, silent
+from ptmtools.scene.model import Scene
+from ptmtools.tolerance import Tolerance
+
+#: How far the first root box stands off the model, as a share of the model's extent.
+BOX_MARGIN = 0.01
+
+
+@dataclass(frozen=True)
+class _Space:
+    """One subdivision of one root box."""
+
+    box: NDArray[np.float64]
+    tree: Tree
+    portals: Portals
+    reach: Reach
+
+
+def subdivide(
+    scene: Scene, options: SubdivideOptions | None = None, progress: Progress = silent
+) -> Cells:
+    """Subdivide a scene into convex cells.
+
+    Raises
+    ------
+    InputError: PTM-I300 if an option is out of range, PTM-I301 if a viewpoint lies in no leaf,
+        PTM-I302 if a name pattern matches nothing.
+    """
+    options = options or SubdivideOptions()
+    _check(scene, options)
+    tolerance = Tolerance.for_points(scene.points)
+    walls = find_walls(scene, options, tolerance)
+    corners = scene.corners[structural_triangles(scene, options)]
+    used = scene.points[np.unique(scene.triangles)]
+    low, high = used.min(axis=0), used.max(axis=0)
+    margin = BOX_MARGIN * tolerance.extent
+    wide = np.array([low - margin, high + margin])
+    space = _divide(wide, walls, corners, options, tolerance, progress)
+    notes: list[str] = []
+    if not space.reach.closed:
+        tight = _clipped_box(walls, low, high, tolerance)
+        notes.append(_open_note(space, tight, low, high))
+        space = _divide(tight, walls, corners, options, tolerance, progress, whole=True)
+    pieces = cut_to_leaves(scene, space.tree, tolerance)
+    return _assemble(scene, space, pieces, notes)
+
+
+def _check(scene: Scene, options: SubdivideOptions) -> None:
+    if not options.wall_area > 0:
+        raise InputError(
+            "PTM-I300", f"wall area {options.wall_area:g} m² is not positive", remedy="try 2"
+        )
+    if options.max_cells < 1:
+        raise InputError("PTM-I300", f"at most {options.max_cells} cells is none", remedy="try 500")
+    for pattern in (*options.structural, *options.detail):
+        one = SubdivideOptions(detail=(pattern,))
+        if np.array_equal(structural_triangles(scene, one), scene.opaque) and not _matches(
+            scene, pattern
+        ):
+            raise InputError(
+                "PTM-I302",
+                f"no object or material is called {pattern!r}",
+                remedy="names are matched with * and ?, upper and lower case distinct",
+            )
+
+
+def _matches(scene: Scene, pattern: str) -> bool:
+    from fnmatch import fnmatchcase
+
+    names = (*scene.objects, *(m.name for m in scene.materials))
+    return any(fnmatchcase(name, pattern) for name in names)
+
+
+def _divide(
+    box: NDArray[np.float64],
+    walls: list[WallPlane],
+    corners: NDArray[np.float64],
+    options: SubdivideOptions,
+    tolerance: Tolerance,
+    progress: Progress,
+    whole: bool = False,
+) -> _Space:
+    """Subdivide a root box and flood it; ``whole``: leaves at the box count as inside."""
+    tree = build_tree(Polyhedron.box(box[0], box[1]), walls, options, tolerance, progress)
+    portals = find_portals(tree, walls, tolerance)
+    start = _viewpoint_leaves(tree, box, options)
+    if not start and whole:
+        every = np.ones(len(tree.leaves), dtype=bool)
+        start = largest_with_floor(tree, every, corners) or _largest(tree)
+    return _Space(box, tree, portals, flood(tree, portals, corners, start))
+
+
+def _largest(tree: Tree) -> tuple[int, ...]:
+    return (max(range(len(tree.leaves)), key=lambda i: (tree.leaves[i].volume, -i)),)
+
+
+def _viewpoint_leaves(
+    tree: Tree, box: NDArray[np.float64], options: SubdivideOptions
+) -> tuple[int, ...]:
+    if not options.viewpoints:
+        return ()
+    eyes = np.array(options.viewpoints, dtype=np.float64)
+    outside = np.flatnonzero(np.any((eyes < box[0]) | (eyes > box[1]), axis=1))
+    if len(outside):
+        x, y, z = eyes[outside[0]]
+        raise InputError(
+            "PTM-I301",
+            f"viewpoint {x:g},{y:g},{z:g} lies outside the model, which spans "
+            + " to ".join(",".join(f"{c:.2f}" for c in corner) for corner in box),
+            remedy="viewpoints are in metres, Y up, with the middle of the floor at 0,0,0",
+        )
+    found: list[int] = []
+    for eye in eyes:
+        node = 0 if len(tree.planes) else -2
+        while node >= 0:
+            plane = tree.planes[node]
+            node = int(tree.children[node, 0 if plane[:3] @ eye + plane[3] > 0 else 1])
+        if -2 - node not in found:
+            found.append(-2 - node)
+    return tuple(found)
+
+
+def _clipped_box(
+    walls: list[WallPlane],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    tolerance: Tolerance,
+) -> NDArray[np.float64]:
+    """The bounds of the walls; those of the model along axes in which the walls are flat."""
+    import shapely
+
+    if not walls:
+        return _thickened(low, high, tolerance)
+    points = np.concatenate([w.frame.to_space(shapely.get_coordinates(w.walls)) for w in walls])
+    low_wall, high_wall = points.min(axis=0), points.max(axis=0)
+    flat = high_wall - low_wall < tolerance.thin
+    return _thickened(
+        np.where(flat, low, np.maximum(low, low_wall)),
+        np.where(flat, high, np.minimum(high, high_wall)),
+        tolerance,
+    )
+
+
+def _thickened(
+    low: NDArray[np.float64], high: NDArray[np.float64], tolerance: Tolerance
+) -> NDArray[np.float64]:
+    """A box that is flat nowhere: a scene that is only a floor still has one cell above it."""
+    flat = high - low < tolerance.thin
+    return np.array([low, np.where(flat, low + BOX_MARGIN * tolerance.extent, high)])
+
+
+def _open_note(
+    space: _Space,
+    tight: NDArray[np.float64],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+) -> str:
+    if not space.reach.start:
+        why = "no room is closed off from the outside (no ceiling, or no outer wall)"
+    else:
+        why = "the outside can be reached from the rooms (windows, doors or gaps)"
+    size = " × ".join(f"{s:.2f}" for s in tight[1] - tight[0])
+    cropped = "" if np.allclose(tight, [low, high]) else ", lower or narrower than the model"
+    return f"the model is open: {why}; root box clipped to the walls, {size} m{cropped}"
+
+
+def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> Cells:
+    tree = space.tree
+    keep = space.reach.reached
+    rename = np.where(keep, np.cumsum(keep) - 1, -1).astype(np.int32)
+    bodies = [tree.leaves[i] for i in np.flatnonzero(keep)]
+    portals = space.portals.among(keep, rename)
+    children = tree.children.copy()
+    is_leaf = children <= -2
+    leaf = rename[-2 - children[is_leaf]]
+    children[is_leaf] = np.where(leaf >= 0, -2 - leaf, OUTSIDE)
+
+    owner = rename[pieces.leaf]
+    owned = np.any(owner >= 0, axis=1)
+    lost = len(np.unique(pieces.source)) - len(np.unique(pieces.source[owned]))
+    if lost:
+        notes = [*notes, f"{lost} triangles lie where nobody can see them"]
+    dropped = int(np.count_nonzero(~keep))
+    if dropped:
+        notes = [*notes, f"{dropped} of {len(keep)} leaves cannot be reached and were dropped"]
+    vertex, vertex_uv, triangle = _weld(scene, pieces, owned)
+
+    counts = np.array([len(b.points) for b in bodies])
+    point_start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    loops = [loop + point_start[i] for i, b in enumerate(bodies) for loop in b.faces]
+    return Cells(
+        node_plane=tree.planes,
+        node_child=children,
+        root_box=space.box,
+        leaf_cell=np.arange(len(bodies), dtype=np.int32),
+        leaf_point=np.concatenate([b.points for b in bodies]),
+        leaf_point_start=point_start,
+        face_index=np.concatenate(loops).astype(np.int32),
+        face_start=np.concatenate([[0], np.cumsum([len(x) for x in loops])]).astype(np.int64),
+        leaf_face_start=np.concatenate([[0], np.cumsum([len(b.faces) for b in bodies])]).astype(
+            np.int64
+        ),
+        portal_leaf=portals.leaves,
+        portal_plane=portals.planes,
+        portal_point=np.concatenate([np.zeros((0, 3)), *portals.polygons]),
+        portal_start=np.concatenate([[0], np.cumsum([len(p) for p in portals.polygons])]).astype(
+            np.int64
+        ),
+        portal_area=portals.areas,
+        vertex=vertex,
+        vertex_uv=vertex_uv,
+        triangle=triangle,
+        triangle_source=pieces.source[owned].astype(np.int32),
+        triangle_cell=owner[owned].astype(np.int32),
+        closed=space.reach.closed,
+        notes=tuple(notes),
+    )
+
+
+def _weld(
+    scene: Scene, pieces: Pieces, owned: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]:
+    """Vertices (position and texture coordinate) shared by the pieces, and (M, 3) indices."""
+    points = pieces.points[owned].reshape(-1, 3)
+    uv = np.einsum("mcw,mwk->mck", pieces.weights[owned], scene.uv[pieces.source[owned]])
+    both = np.concatenate([points, uv.reshape(-1, 2)], axis=1) + 0.0
+    distinct, index = np.unique(both, axis=0, return_inverse=True)
+    return distinct[:, :3].copy(), distinct[:, 3:].copy(), index.reshape(-1, 3).astype(np.int32)
