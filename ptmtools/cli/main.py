@@ -1,0 +1,144 @@
+"""The `ptm` command: which commands there are, and what becomes of a failure.
+
+Each command lives in a module that is imported when it is called, so that ``ptm --version`` and
+``ptm --help`` need nothing but Click. Whatever goes wrong ends in one line on stderr,
+``ptm: … [CODE]``, and in the exit status that `ptmtools.errors` documents.
+"""
+
+from __future__ import annotations
+
+import errno
+import importlib
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+
+import click
+
+from ptmtools.cli.output import Voice
+from ptmtools.errors import PtmError
+from ptmtools.version import __version__
+
+#: command → (module, function, what `ptm --help` says).
+COMMANDS = {
+    "build-scene": (
+        "scenes",
+        "build_scene",
+        "Build or update a database from a model: all stages.",
+    ),
+    "cells": ("scenes", "cells", "Read a model and cut it into cells and portals."),
+    "pvs": ("scenes", "pvs", "Find which cells may see each other."),
+    "ach": ("scenes", "ach", "Measure how much of the view each visible cell covers."),
+    "textures": ("scenes", "textures", "Encode the model's images as progressive textures."),
+    "emit": ("scenes", "emit", "Write the VRML97 files and hints.json."),
+    "validate": ("reports", "validate", "Check a database or a .ptm file."),
+    "info": ("reports", "info", "Say what is in a database or a .ptm file."),
+    "plot": ("reports", "plot", "Draw the floor plan of a database."),
+    "encode": ("images", "encode", "Encode images as .ptm files."),
+    "decode": ("images", "decode", "Decode a .ptm file to PNG."),
+}
+
+#: Exit statuses beside those of the error classes; see `ptmtools.errors`.
+INTERNAL, USAGE, INTERRUPTED, BROKEN_PIPE = 1, 2, 130, 141
+
+
+class Commands(click.Group):
+    """A group whose commands are imported when they are needed."""
+
+    def invoke(self, ctx: click.Context) -> object:
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:  # Click itself would make an internal error of it
+            ctx.exit(BROKEN_PIPE)
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        module, function, _ = COMMANDS[cmd_name]
+        command = getattr(importlib.import_module(f"ptmtools.cli.{module}"), function)
+        assert isinstance(command, click.Command)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, COMMANDS[name][2]) for name in COMMANDS])
+
+
+@click.group(
+    cls=Commands,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="`ptm COMMAND --help` explains a command. Exit statuses: docs/cli.md.",
+)
+@click.version_option(__version__, prog_name="ptm", message="%(prog)s %(version)s")
+@click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+@click.option("-v", "--verbose", is_flag=True, help="Say more; with errors, the traceback.")
+@click.pass_context
+def ptm(ctx: click.Context, quiet: bool, verbose: bool) -> None:
+    """Turn an architectural model into a database that streams."""
+    voice = ctx.ensure_object(Voice)
+    voice.quiet, voice.verbose = quiet, verbose
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs one command; returns its exit status. Never raises."""
+    voice = Voice()
+    try:
+        status = ptm.main(list(arguments), "ptm", standalone_mode=False, obj=voice)
+        sys.stdout.flush()
+        return status if isinstance(status, int) else 0
+    except BaseException as fault:
+        status, line = describe(fault)
+        if line:
+            print(f"ptm: {line}", file=sys.stderr)
+        if voice.verbose and not isinstance(fault, click.ClickException | SystemExit):
+            traceback.print_exception(fault)
+        if status == BROKEN_PIPE:
+            # Python flushes stdout once more as it ends; there is nobody left to read it.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return status
+
+
+def describe(fault: BaseException) -> tuple[int, str]:
+    """(exit status, one line) for whatever ended a command; an empty line says nothing."""
+    match fault:
+        case PtmError():
+            return fault.exit_status, str(fault)
+        case click.UsageError():
+            path = fault.ctx.command_path if fault.ctx else "ptm"
+            told = " ".join(fault.format_message().split()).rstrip(".")
+            return USAGE, f"{told}; see `{path} --help` [PTM-U001]"
+        case click.exceptions.Exit():
+            return fault.exit_code, ""
+        case KeyboardInterrupt() | click.Abort():
+            return INTERRUPTED, "interrupted; run the same command again to resume [PTM-X130]"
+        case BrokenPipeError():
+            return BROKEN_PIPE, ""
+        case MemoryError():
+            return 7, (
+                "not enough memory; use smaller images, fewer cells (--max-cells) or fewer "
+                "workers (-j 1) [PTM-L099]"
+            )
+        case OSError(errno=errno.ENOSPC | errno.EDQUOT):
+            return 4, f"{_file_of(fault)}the disk is full; free some space and run again [PTM-O003]"
+        case OSError(errno=int()):
+            return 3, f"{_file_of(fault)}{fault.strerror}; check the path and its rights [PTM-I099]"
+        case SystemExit():
+            return fault.code if isinstance(fault.code, int) else INTERNAL, ""
+    told = " ".join(str(fault).split())
+    return INTERNAL, (
+        f"internal error, {type(fault).__name__}: {told}; please report it, "
+        "run with -v for the traceback [PTM-X001]"
+    )
+
+
+def _file_of(fault: OSError) -> str:
+    return f"{fault.filename}: " if fault.filename else ""
+
+
+def run() -> None:
+    """The console script."""
+    sys.exit(main(sys.argv[1:]))

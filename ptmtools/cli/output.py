@@ -1,0 +1,72 @@
+"""What a command says: messages and progress on stderr, results on stdout."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ptmtools.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from rich.progress import TaskID
+
+
+@dataclass
+class Voice:
+    """How much to say: `quiet` nothing but errors, `verbose` every note and tracebacks."""
+
+    quiet: bool = False
+    verbose: bool = False
+
+    def say(self, text: str) -> None:
+        """A line of the result, on stdout."""
+        if not self.quiet:
+            click.echo(text)
+
+    def emit_json(self, document: Any) -> None:
+        """The result as JSON on stdout; ``--quiet`` does not silence what was asked for."""
+        click.echo(json.dumps(document, indent=1, ensure_ascii=False))
+
+    @contextmanager
+    def progress(self) -> Iterator[Progress]:
+        """A progress bar if stderr is a terminal, else nothing."""
+        if self.quiet or not sys.stderr.isatty():
+            yield silent
+            return
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import Progress as Bars
+
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+        with Bars(
+            *columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True
+        ) as bars:
+            task: dict[str, TaskID] = {}
+
+            def tell(done: int, total: int, what: str) -> None:
+                if what not in task:
+                    task[what] = bars.add_task(what, total=total)
+                bars.update(task[what], completed=done, total=total)
+
+            yield tell
+
+
+def size(count: int) -> str:
+    """A number of bytes for people: ``97.5 MB`` (MB = 2²⁰ B)."""
+    if count < 1 << 10:
+        return f"{count} B"
+    for power, unit in ((30, "GB"), (20, "MB")):
+        if count >= 1 << power:
+            return f"{count / (1 << power):.1f} {unit}"
+    return f"{count / 1024:.1f} kB"
+
+
+def count(number: int, one: str, many: str | None = None) -> str:
+    """``1 portal``, ``2 portals``."""
+    return f"{number:,} {one if number == 1 else many or one + 's'}"
