@@ -1,0 +1,104 @@
+"""Portal flow of a Quake map against the answer of ericw-tools' ``vis``, leaf by leaf.
+
+    python benchmarks/prt.py MAP.prt -o OUT.npz [--reference MAP.visible.npz]
+
+Reads PRT2 (N A B then N points in brackets per portal, then one line of leafs per cluster), runs
+`ptmtools.visibility.flow.portal_flow` over the clusters, lifts the result to leafs and writes
+``shape`` and ``visible`` (rows of big-endian bits). The reference is taken as the AND with its
+transpose, which is still conservative. CPU time is that of the process, after one warm-up that
+loads or compiles the kernels.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.visibility.flow import PortalFlow, Portals, portal_flow
+from ptmtools.visibility.pvs import PvsOptions, leaf_matrix
+
+
+def read_prt(path: Path) -> tuple[Portals, NDArray[np.int64]]:
+    """The portals between clusters, and the (leafs,) cluster of each leaf."""
+    lines = path.read_text().split("\n")
+    if lines[0].strip() != "PRT2":
+        raise SystemExit(f"{path}: not a PRT2 file")
+    leafs, clusters, count = (int(line) for line in lines[1:4])
+    ends = np.zeros((count, 2), np.int32)
+    normal = np.zeros((count, 3))
+    windings = []
+    for k, line in enumerate(lines[4 : 4 + count]):
+        words = line.replace("(", " ").replace(")", " ").split()
+        ends[k] = int(words[1]), int(words[2])
+        points = np.array(words[3:], dtype=np.float64).reshape(int(words[0]), 3)
+        arm = points - points[0]
+        area = np.cross(arm[1:-1], arm[2:]).sum(axis=0)
+        normal[k] = area / np.linalg.norm(area)  # counter-clockwise seen from the second cluster
+        windings.append(points)
+    cluster = np.full(leafs, -1, np.int64)
+    for c, line in enumerate(lines[4 + count : 4 + count + clusters]):
+        cluster[[int(word) for word in line.split()[:-1]]] = c
+    start = np.cumsum([0, *(len(w) for w in windings)])
+    return Portals(clusters, ends, normal, np.concatenate(windings), start), cluster
+
+
+def visible_leafs(portals: Portals, flow: PortalFlow, cluster: NDArray[np.int64]) -> NDArray:
+    """(leafs, leafs) bool from the flow over clusters; a leaf outside all clusters sees nothing."""
+    seen = leaf_matrix(portals.leaf_count, portals.leaf, flow)
+    inside = cluster >= 0
+    return seen[cluster][:, cluster] & inside[:, None] & inside
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("map", type=Path)
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("--reference", type=Path)
+    parser.add_argument("--budget", type=int, default=PvsOptions().budget)
+    parser.add_argument("--workers", type=int, default=1)
+    given = parser.parse_args(arguments)
+
+    portals, cluster = read_prt(given.map)
+    small = portals.start[1]
+    portal_flow(
+        Portals(
+            portals.leaf_count,
+            portals.leaf[:1],
+            portals.normal[:1],
+            portals.point[:small],
+            portals.start[:2],
+        ),
+        1,
+    )
+    cpu, wall = time.process_time(), time.perf_counter()
+    flow = portal_flow(portals, given.budget, given.workers)
+    cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
+    ours = visible_leafs(portals, flow, cluster)
+    np.savez_compressed(given.output, shape=np.array(ours.shape), visible=np.packbits(ours, axis=1))
+    print(
+        f"{given.map.name}: {len(ours)} leafs, {len(portals.leaf)} portals, "
+        f"average visible {ours.sum() / len(ours):.2f}, CPU {cpu:.2f} s, wall {wall:.2f} s, "
+        f"{flow.operations / 1e6:.2f} M operations ({flow.operations / 1e6 / cpu:.2f} M/s), "
+        f"cut short {int(flow.cut.sum())}"
+    )
+    if given.reference:
+        with np.load(given.reference) as stored:
+            shape = tuple(stored["shape"])
+            bits = np.unpackbits(stored["visible"], axis=1, count=shape[1])
+        theirs = bits.astype(bool)
+        both = theirs & theirs.T
+        print(
+            f"reference: average {theirs.sum() / len(theirs):.2f}, symmetric "
+            f"{both.sum() / len(both):.2f}; equal {np.mean(ours == both):.4%}, "
+            f"ours only {int((ours & ~both).sum())}, theirs only {int((both & ~ours).sum())}"
+        )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

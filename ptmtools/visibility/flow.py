@@ -1,0 +1,245 @@
+"""Which portals a straight line may cross after which: conservative portal-sequence flow (§3).
+
+The method is Teller & Séquin's (SIGGRAPH 1991) in the depth-first form of Quake's ``vis``. A line
+that leaves a leaf crosses a sequence of portals. The search keeps, for each sequence, what is
+left of the *source* portal and of the portal *passed* last; the planes that separate the two
+bound every line through both, so the next portal is clipped by them, and in turn what lies
+between the next portal and the passed one clips the source. An empty polygon ends the sequence.
+
+Over the textbook:
+
+* Bits stand for directed portals, not leaves, so that p sees q exactly if q's way back sees p's:
+  each finished portal prunes all later ones in both directions, and the result is symmetric as
+  it stands.
+* A separating plane is found by turning about an edge (one pass over the other polygon) and
+  accepted by measuring both polygons against it: ill-conditioned edges cost tightness only.
+* At each step the separators are also tried on every portal that is still possible and not yet
+  seen; if none is left, the whole subtree is.
+* Each source portal has a budget of operations, not of seconds. When it is spent, open branches
+  are not followed; what their separators leave of the possible set counts as seen.
+
+Portals are done in ascending order of how much they might see, in batches of fixed length: a
+batch reads only the results of the batches before it, hence the same answer for any number of
+workers.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.errors import InputError, LimitError
+from ptmtools.progress import Progress, silent
+from ptmtools.tolerance import Tolerance
+
+if TYPE_CHECKING:
+    from ptmtools.visibility.kernels import Geometry, Scratch
+
+#: Portals whose results appear to the others at once.
+BATCH = 64
+#: Rounds of the bitwise pre-pass; the third changes next to nothing.
+ROUNDS = 3
+#: A sequence longer than this is not followed further (its possible set counts as seen).
+DEPTH = 1024
+#: Vertices that clipping may add to a portal before it is left unclipped.
+GROWTH = 24
+#: Bytes that the two bit matrices may take: 60,000 portals.
+MATRIX_BYTES = 1 << 32
+
+
+@dataclass(frozen=True)
+class Portals:
+    """Convex openings between leaves; the input of `portal_flow`.
+
+    Attributes
+    ----------
+    leaf_count: number of leaves.
+    leaf: (K, 2) the leaves that each portal joins.
+    normal: (K, 3) normals pointing from ``leaf[:, 0]`` into ``leaf[:, 1]``.
+    point: (Q, 3) float64 convex polygons, either orientation.
+    start: (K + 1,) CSR over portals into `point`.
+    """
+
+    leaf_count: int
+    leaf: NDArray[np.int32]
+    normal: NDArray[np.float64]
+    point: NDArray[np.float64]
+    start: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class PortalFlow:
+    """The result of `portal_flow`.
+
+    Attributes
+    ----------
+    sees: (2K, W) uint64 rows of little-endian bits: directed portal p (2k crosses portal k along
+        its normal, 2k + 1 against it) may be followed by directed portal q on one straight line.
+    cut: (K,) whether the budget or the depth cut the search from a portal short.
+    operations: chain tests and clips that were done.
+    """
+
+    sees: NDArray[np.uint64]
+    cut: NDArray[np.bool_]
+    operations: int
+
+
+def portal_flow(
+    portals: Portals,
+    budget: int,
+    workers: int | None = None,
+    progress: Progress = silent,
+) -> PortalFlow:
+    """Conservative visibility from portal to portal (Teller & Séquin; paper §3).
+
+    Parameters
+    ----------
+    budget: operations for each directed portal; see the module's head.
+    workers: threads; None takes one for each processor. The result is the same for any number.
+
+    Raises InputError PTM-I400 (indices or sizes that do not fit together), PTM-I401 (a coordinate
+    that is not finite); LimitError PTM-L400 (more portals than fit into memory).
+    """
+    check(portals)
+    count = 2 * len(portals.leaf)
+    words = (count + 63) // 64
+    if 2 * count * words * 8 > MATRIX_BYTES:
+        raise LimitError(
+            "PTM-L400",
+            f"{count // 2:,} portals are too many for the portal flow",
+            remedy="subdivide less finely (a greater wall area, fewer cells)",
+        )
+    known = np.zeros((count, words), dtype=np.uint64)
+    cut = np.zeros(count, dtype=np.bool_)
+    if count == 0:
+        return PortalFlow(known, cut, 0)
+
+    from ptmtools.visibility import kernels
+
+    g = geometry(portals)
+    threads = min(workers or os.cpu_count() or 1, BATCH)
+    with ThreadPoolExecutor(threads) as pool:
+        rows = np.array_split(np.arange(count), 4 * threads)
+        front = np.zeros_like(known)
+        spans = [(int(r[0]), int(r[-1]) + 1) for r in rows if len(r)]
+        list(pool.map(lambda span: kernels.fill_ahead(g, *span, front), spans))
+        list(pool.map(lambda span: kernels.flood(g, front, *span, known), spans))
+        del front
+        for _ in range(ROUNDS):
+            kernels.tighten(g, known)
+
+        storage = [scratch(g, words) for _ in range(threads)]
+        order = np.argsort(np.bitwise_count(known).sum(axis=1), kind="stable")
+        operations = 0
+        for first in range(0, count, BATCH):
+            batch = order[first : first + BATCH]
+            seen = np.zeros((len(batch), words), dtype=np.uint64)
+            waiting = deque(range(len(batch)))
+
+            def work(
+                s: Scratch,
+                batch: NDArray[np.int64] = batch,
+                seen: NDArray[np.uint64] = seen,
+                waiting: deque[int] = waiting,
+            ) -> int:
+                done = 0
+                while True:
+                    try:
+                        i = waiting.popleft()
+                    except IndexError:
+                        return done
+                    p = int(batch[i])
+                    ops, cut[p] = kernels.flow(g, s, known, p, budget, seen[i])
+                    done += ops
+
+            operations += sum(pool.map(work, storage))
+            known[batch] = seen
+            for p in batch:
+                kernels.drop_unreturned(known, p)
+            progress(min(first + BATCH, count), count, "portals")
+    return PortalFlow(known, cut.reshape(-1, 2).any(axis=1), operations)
+
+
+def check(portals: Portals) -> None:
+    """Raises PTM-I400 or PTM-I401 unless the arrays fit together and are finite."""
+    k, start, leaf = len(portals.leaf), portals.start, portals.leaf
+    wrong = ""
+    if leaf.shape != (k, 2) or portals.normal.shape != (k, 3) or start.shape != (k + 1,):
+        wrong = "the portals' arrays differ in length"
+    elif start[0] != 0 or start[-1] != len(portals.point) or np.any(np.diff(start) < 1):
+        wrong = "the portals' offsets do not cover their points"
+    elif k and (leaf.min() < 0 or leaf.max() >= portals.leaf_count):
+        wrong = "a portal names a leaf that does not exist"
+    if wrong:
+        raise InputError("PTM-I400", wrong, remedy="build the cells again")
+    if not (np.isfinite(portals.point).all() and np.isfinite(portals.normal).all()):
+        raise InputError(
+            "PTM-I401", "a portal has a coordinate that is not finite", remedy="repair the model"
+        )
+
+
+def geometry(portals: Portals) -> Geometry:
+    """The portals as the kernels want them: centred, wound about their normals, with bounds."""
+    from ptmtools.visibility.kernels import Geometry
+
+    start = portals.start.astype(np.int64)
+    sizes = np.diff(start)
+    middle = (portals.point.min(axis=0) + portals.point.max(axis=0)) / 2
+    point = portals.point - middle
+    owner = np.repeat(np.arange(len(sizes)), sizes)
+    length = np.linalg.norm(portals.normal, axis=1, keepdims=True)
+    normal = portals.normal / np.where(length > 0, length, 1)
+
+    # Newell's area vector about the first vertex tells how a polygon is wound.
+    within = np.arange(len(point)) - start[owner]
+    following = np.where(within + 1 < sizes[owner], np.arange(len(point)) + 1, start[owner])
+    arm = point - point[start[owner]]
+    twice = np.add.reduceat(np.cross(arm, arm[following]), start[:-1], axis=0)
+    turned = np.einsum("ij,ij->i", twice, normal) < 0
+    mirrored = start[owner] + sizes[owner] - 1 - within
+    point = point[np.where(turned[owner], mirrored, np.arange(len(point)))]
+
+    along = np.einsum("ij,ij->i", point, normal[owner])
+    centre = np.add.reduceat(point, start[:-1], axis=0) / sizes[:, None]
+    reach = np.linalg.norm(point - centre[owner], axis=1)
+    enters = portals.leaf[:, ::-1].reshape(-1).astype(np.int64)
+    leaves = portals.leaf.reshape(-1)
+    out = np.argsort(leaves, kind="stable")
+    tolerance = Tolerance.for_points(point)
+    return Geometry(
+        point=np.ascontiguousarray(point),
+        start=start,
+        normal=np.ascontiguousarray(normal),
+        low=np.minimum.reduceat(along, start[:-1]),
+        high=np.maximum.reduceat(along, start[:-1]),
+        centre=centre,
+        radius=np.maximum.reduceat(reach, start[:-1]) + tolerance.rounding,
+        leaf=enters,
+        out_start=np.searchsorted(leaves[out], np.arange(portals.leaf_count + 1)).astype(np.int64),
+        out=out.astype(np.int64),
+        slack=tolerance.rounding,
+    )
+
+
+def scratch(g: Geometry, words: int) -> Scratch:
+    """Working storage for one worker."""
+    from ptmtools.visibility.kernels import Scratch
+
+    depth = min(DEPTH, len(g.leaf) + 1)
+    vertices = int(np.diff(g.start).max()) + GROWTH
+    return Scratch(
+        polygon=np.zeros((2 * depth + 3, vertices, 3)),
+        size=np.zeros(2 * depth + 3, np.int64),
+        plane=np.zeros((depth + 1, 2 * vertices, 4)),
+        planes=np.zeros(depth + 1, np.int64),
+        might=np.zeros((depth, words), np.uint64),
+        via=np.zeros(depth, np.int64),
+        at=np.zeros(depth, np.int64),
+        distance=np.zeros(vertices),
+    )

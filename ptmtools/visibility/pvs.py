@@ -1,0 +1,84 @@
+"""Cells become potentially visible sets (paper §3): the portal flow over leaves, lifted to cells.
+
+A viewer anywhere in a cell sees at most the cells of its row. The flow, its argument and its
+budget are in `flow`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.model import Cells
+from ptmtools.errors import InputError
+from ptmtools.progress import Progress, silent
+from ptmtools.visibility.flow import PortalFlow, Portals, portal_flow
+from ptmtools.visibility.model import Pvs
+
+
+@dataclass(frozen=True)
+class PvsOptions:
+    """Settings of `compute_pvs`.
+
+    Attributes
+    ----------
+    budget: operations (chain tests, clips) that the search from one side of a portal may take
+        before what it has not refuted counts as visible. 0 gives the separators of the first two
+        portals only; the result is conservative at any value.
+    workers: threads, None for one per processor; never changes the result.
+    """
+
+    budget: int = 200_000
+    workers: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.budget < 0 or (self.workers is not None and self.workers < 1):
+            raise InputError(
+                "PTM-I402",
+                f"budget {self.budget} or workers {self.workers} is out of range",
+                remedy="give a budget of at least 0 and at least one worker",
+            )
+
+
+def compute_pvs(
+    cells: Cells, options: PvsOptions = PvsOptions(), progress: Progress = silent
+) -> Pvs:
+    """Cell-to-cell visibility, conservative and symmetric (paper §3; Teller & Séquin).
+
+    A pair of cells is left out only if no straight line, but for hairlines thinner than the
+    rounding of the coordinates (`Tolerance.rounding`), leads from one to the other through
+    portals. Cells that share a portal always see each other. `Pvs.fallbacks` counts the portals
+    whose search was cut short by the budget.
+
+    Raises what `portal_flow` raises.
+    """
+    portals = Portals(
+        leaf_count=cells.leaf_count,
+        leaf=cells.portal_leaf.reshape(-1, 2),
+        normal=cells.portal_plane.reshape(-1, 4)[:, :3],
+        point=cells.portal_point.reshape(-1, 3),
+        start=cells.portal_start,
+    )
+    flow = portal_flow(portals, options.budget, options.workers, progress)
+    leaves = leaf_matrix(cells.leaf_count, portals.leaf, flow)
+    rows, columns = np.nonzero(leaves)
+    matrix = np.zeros((cells.cell_count, cells.cell_count), dtype=np.bool_)
+    matrix[cells.leaf_cell[rows], cells.leaf_cell[columns]] = True
+    return Pvs.from_matrix(matrix, int(flow.cut.sum()))
+
+
+def leaf_matrix(
+    leaf_count: int, portal_leaf: NDArray[np.int32], flow: PortalFlow
+) -> NDArray[np.bool_]:
+    """(L, L) which leaf may see which: itself, its neighbours, and what its portals see."""
+    enters = portal_leaf[:, ::-1].reshape(-1)
+    leaves = portal_leaf.reshape(-1)
+    matrix = np.eye(leaf_count, dtype=np.bool_)
+    matrix[leaves, enters] = True
+    bits = flow.sees.view(np.uint8).reshape(len(leaves), -1)
+    for p, row in enumerate(bits):
+        seen = np.unpackbits(row, count=len(leaves), bitorder="little")
+        matrix[leaves[p], enters[np.flatnonzero(seen)]] = True
+    return matrix
