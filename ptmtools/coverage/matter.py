@@ -1,0 +1,192 @@
+"""Which sample points are usable: not inside solid matter, not against a surface.
+
+A point too near to a surface sees hardly anything else, and one inside a statue sees the
+statue's inside; either would spoil the average (paper §5 leaves it open).
+
+*Near* is exact: the distance from the point to the nearest triangle.
+
+*Inside* is a question about closed surfaces only. The scene's triangles are welded by position
+and grouped by shared edges; a group is a *body* if it is closed (every edge is used an even number
+of times, so that the parity of the crossings along a ray does not depend on the ray), unless
+
+- most of its area lies in cell boundaries: then it is structure, and the subdivision has already
+  decided what is behind it (the mesh of a whole building is one group as often as not), or
+- it is wound consistently inwards: a shell that is meant to be seen from within.
+
+A point is in matter if it is inside a body. So winding need not be right for a statue, a table
+top or a leaf of paper has no inside, a wall modelled twice with opposite winding is closed and
+empty, and an open surface bounds nothing. Rejected: the parity of all crossings (each open or
+single sheet turns it over), and the generalised winding number (wrong wherever faces are wound
+at random, as in most OBJ files).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.model import Cells
+from ptmtools.scene.model import Scene
+
+#: Directions of the parity rays. Fixed, in no simple relation to each other or to the axes, so
+#: that an edge which one of them grazes is missed by the others; the majority counts.
+DIRECTIONS = np.array([[0.683, 0.577, 0.448], [-0.371, 0.819, -0.437], [0.291, -0.463, -0.837]])
+
+
+@dataclass(frozen=True)
+class Body:
+    """A closed surface with an inside: its (n, 3, 3) corners and (2, 3) bounding box, metres."""
+
+    corners: NDArray[np.float64]
+    box: NDArray[np.float64]
+
+    def contains(self, point: NDArray[np.float64]) -> bool:
+        """Whether a (3,) point is inside: odd crossings along most of the rays."""
+        if np.any(point < self.box[0]) or np.any(point > self.box[1]):
+            return False
+        odd = sum(crossings(self.corners - point, d) % 2 for d in DIRECTIONS)
+        return 2 * odd > len(DIRECTIONS)
+
+
+def crossings(corners: NDArray[np.float64], direction: NDArray[np.float64]) -> int:
+    """How many of the (n, 3, 3) triangles the ray from the origin along ``direction`` crosses."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    # Signed volumes with the ray's line: all of one sign where the line passes through.
+    u = np.cross(a, b) @ direction
+    v = np.cross(b, c) @ direction
+    w = np.cross(c, a) @ direction
+    through = ((u >= 0) & (v >= 0) & (w >= 0)) | ((u <= 0) & (v <= 0) & (w <= 0))
+    normal = np.cross(b - a, c - a)
+    ahead = np.einsum("ij,ij->i", normal, a) * (normal @ direction) > 0
+    return int(np.count_nonzero(through & ahead))
+
+
+def bodies(scene: Scene, cells: Cells) -> list[Body]:
+    """The closed surfaces of a scene that have an inside, in the order of their triangles."""
+    if len(scene.triangles) == 0:
+        return []
+    _, weld = np.unique(scene.points + 0.0, axis=0, return_inverse=True)  # -0 is 0
+    corner = weld.reshape(-1)[scene.triangles]
+    group = edge_groups(corner)
+    area = areas(scene.corners)
+    in_boundary = boundary_area(scene, cells)
+    order = np.argsort(group, kind="stable")
+    found = []
+    for members in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
+        balance = winding_balance(corner[members])
+        if balance is None or 2 * in_boundary[members].sum() > area[members].sum():
+            continue
+        corners = scene.corners[members]
+        box = np.array([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
+        inwards = balance and signed_volume(corners - box.mean(axis=0)) < 0
+        if not inwards:
+            found.append(Body(corners, box))
+    return found
+
+
+def edge_groups(corner: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(T,) for each (T, 3) triangle the least index of the triangles that it hangs together with
+    through shared edges."""
+    count = len(corner)
+    edges = np.sort(corner[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    _, edge = np.unique(edges, axis=0, return_inverse=True)
+    edge = edge.reshape(-1)
+    owner = np.repeat(np.arange(count), 3)
+    group = np.arange(count)
+    while True:
+        least = np.full(int(edge.max()) + 1, count)
+        np.minimum.at(least, edge, group[owner])
+        better = np.minimum(group, least[edge].reshape(-1, 3).min(axis=1))
+        better = better[better]  # pointer jumping: long strips need few rounds
+        if np.array_equal(better, group):
+            return group
+        group = better
+
+
+def winding_balance(corner: NDArray[np.int64]) -> bool | None:
+    """Whether a group of (n, 3) triangles is consistently wound; None if it is not closed."""
+    directed = corner[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    forward = directed[:, 0] < directed[:, 1]
+    _, edge = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True)
+    edge = edge.reshape(-1)
+    if np.any(np.bincount(edge) % 2):
+        return None
+    return bool(np.all(np.bincount(edge, weights=np.where(forward, 1.0, -1.0)) == 0))
+
+
+def signed_volume(corners: NDArray[np.float64]) -> float:
+    """Volume enclosed by a closed surface of (n, 3, 3) corners, positive if wound outwards."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+
+def areas(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) areas of (n, 3, 3) triangles, m²."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.asarray(np.linalg.norm(normal, axis=1) / 2)
+
+
+def boundary_area(scene: Scene, cells: Cells) -> NDArray[np.float64]:
+    """(T,) the area of each of the scene's triangles that lies in boundaries of cells, m²."""
+    lying = cells.triangle_cell[:, 0] != cells.triangle_cell[:, 1]
+    piece = areas(cells.vertex[cells.triangle[lying]])
+    total = np.zeros(len(scene.triangles))
+    np.add.at(total, cells.triangle_source[lying], piece)
+    return total
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What a sample point has to keep clear of.
+
+    Attributes
+    ----------
+    corners: (M, 3, 3) all surfaces, metres.
+    low, high: (M, 3) their bounding boxes.
+    bodies: the closed ones with an inside.
+    """
+
+    corners: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    bodies: tuple[Body, ...]
+
+    @staticmethod
+    def of(scene: Scene, cells: Cells) -> Surroundings:
+        """The surroundings in a subdivided scene."""
+        corners = cells.vertex[cells.triangle]
+        found = tuple(bodies(scene, cells))
+        return Surroundings(corners, corners.min(axis=1), corners.max(axis=1), found)
+
+    def in_matter(self, point: NDArray[np.float64]) -> bool:
+        """Whether a (3,) point is inside a body."""
+        return any(body.contains(point) for body in self.bodies)
+
+    def clearance(self, point: NDArray[np.float64], enough: float) -> float:
+        """Distance in metres from a (3,) point to the nearest surface, at most ``enough``."""
+        near = np.all((self.low <= point + enough) & (self.high >= point - enough), axis=1)
+        if not near.any():
+            return enough
+        return min(enough, float(distances(self.corners[near] - point).min()))
+
+
+def distances(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) distances of the origin from (n, 3, 3) triangles."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1)
+    nearest = np.full(len(corners), np.inf)
+    over = length > 0
+    for i in range(3):
+        a, b = corners[:, i], corners[:, (i + 1) % 3]
+        edge = b - a
+        along = -np.einsum("ij,ij->i", a, edge)
+        square = np.einsum("ij,ij->i", edge, edge)
+        t = np.divide(along, square, out=np.zeros_like(along), where=square > 0)
+        foot = a + np.clip(t, 0.0, 1.0)[:, None] * edge
+        nearest = np.minimum(nearest, np.linalg.norm(foot, axis=1))
+        over &= np.einsum("ij,ij->i", np.cross(edge, -a), normal) >= 0
+    height = np.abs(np.einsum("ij,ij->i", corners[:, 0], normal))
+    face = np.divide(height, length, out=np.full_like(height, np.inf), where=over)
+    return np.asarray(np.minimum(nearest, face))
