@@ -1,0 +1,79 @@
+# make demo    a sample museum, its database and a floor plan, from nothing but python3 and make
+# make test    everything the tests need, then the tests
+# make lint    ruff and mypy
+# make bench   the benchmarks, on the data at hand
+# make sample  only the sample museum
+# make setup   only the virtual environment
+# make clean   remove what was built, except the virtual environment
+
+SHELL := bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := help
+MAKEFLAGS += --no-builtin-rules
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+JOBS ?= 2
+PYTEST_ARGS ?=
+
+.PHONY: help setup demo test lint bench sample clean
+
+help:
+	@sed -n 's/^# \(make .*\)/\1/p' Makefile
+
+$(VENV)/.made:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "ptmtools needs Python 3.11 or newer; give one with: make PYTHON=python3.12 …" >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
+	  { echo "python3-venv is missing; on Debian or Ubuntu: apt install python3-venv" >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	@touch $@
+
+$(VENV)/.installed: $(VENV)/.made pyproject.toml
+	@echo "Installing ptmtools and what it needs into $(VENV) …"
+	$(PIP) install --editable '.[plot]'
+	@touch $@
+
+$(VENV)/.installed-dev: $(VENV)/.installed
+	@echo "Installing what the tests need into $(VENV) …"
+	$(PIP) install --editable '.[dev]'
+	@touch $@
+
+setup: $(VENV)/.installed
+
+# The stamp, not the OBJ, is the target: the script decides what to write again.
+build/museum/.made: $(wildcard sample_data/*.py sample_data/museum_parts/*.py) | $(VENV)/.installed
+	$(BIN)/python sample_data/make_museum.py -o build/museum
+	@touch $@
+
+sample: build/museum/.made
+
+demo: build/museum/.made
+	$(BIN)/ptm build-scene build/museum/museum.obj -o build/museum.db
+	$(BIN)/ptm plot build/museum.db --cell 0 -o build/museum.png --force
+	@echo
+	@echo "The floor plan, with what the first cell sees, is in build/museum.png."
+	@echo "Next:"
+	@echo "  $(BIN)/ptm validate build/museum.db                        check every file"
+	@echo "  $(BIN)/ptm info build/museum.db                            what is in it"
+	@echo "  $(BIN)/python -m http.server -d build/museum.db/www 8000   serve it"
+	@echo "  $(BIN)/ptm build-scene YOUR.obj -o your.db                 your own model"
+
+test: $(VENV)/.installed-dev
+	@.ci/system-packages
+	$(BIN)/python -m pytest -n $(JOBS) $(PYTEST_ARGS)
+
+lint: $(VENV)/.installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+bench: $(VENV)/.installed-dev
+	@for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python "$$file"; done
+
+clean:
+	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -not -path './$(VENV)/*' -prune -exec rm -rf {} +
