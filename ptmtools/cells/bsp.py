@@ -9,7 +9,8 @@ plane. Every plane with a fragment may split the node; the choice maximises
 node's cross-section that the wall covers, *balance* the smaller over the larger number of
 fragments on the two sides, *splits* the share of the other fragments that the plane cuts. Nodes
 are split in the order of the wall area that their best plane brings, so that a limit on the number
-of leaves keeps the best splits. A split that would leave a side thinner than the tolerance allows
+of leaves keeps the best splits. Where no wall is left, the reveals of a thick wall may still split
+(`reveals`). A split that would leave a side thinner than the tolerance allows
 is refused: no leaf is flat after rounding to float32.
 """
 
@@ -24,7 +25,8 @@ from numpy.typing import NDArray
 
 from ptmtools.cells.model import OUTSIDE
 from ptmtools.cells.options import SubdivideOptions
-from ptmtools.cells.polyhedron import Polyhedron, cut, section
+from ptmtools.cells.polyhedron import Polyhedron, clip_polygon, cut, section
+from ptmtools.cells.reveals import Reveals
 from ptmtools.cells.structure import WallPlane
 from ptmtools.progress import Progress
 from ptmtools.tolerance import Tolerance
@@ -45,76 +47,87 @@ class Tree:
 
     Attributes
     ----------
-    planes: (N, 4); wall: (N,) index of the wall plane that each node took; children: (N, 2) int32
-        as in `Cells.node_child`.
+    planes: (N, 4) the nodes' planes; walls: what lies in them.
+    children: (N, 2) int32 as in `Cells.node_child`.
     leaves: the convex polyhedra, face tags are node indices.
     """
 
     planes: NDArray[np.float64]
-    wall: NDArray[np.int64]
+    walls: tuple[WallPlane, ...]
     children: NDArray[np.int32]
     leaves: tuple[Polyhedron, ...]
 
 
 @dataclass(frozen=True)
 class _Fragment:
-    """What a node holds of one wall plane."""
+    """What a node holds of one wall plane; `outline` is the node's cross-section with it."""
 
-    wall: int
+    wall: WallPlane
     shape: Geometry
     area: float
     points: NDArray[np.float64]
+    outline: NDArray[np.float64]
     section_area: float
 
 
 @dataclass(order=True)
 class _Task:
-    priority: tuple[float, int]
+    """A node that waits for its split; `walled` until its walls are used up."""
+
+    priority: tuple[float, int, int]
     body: Polyhedron = field(compare=False)
     fragments: list[_Fragment] = field(compare=False)
     best: int = field(compare=False)
     parent: tuple[int, int] = field(compare=False)
+    walled: bool = field(compare=False)
 
 
 def build_tree(
     box: Polyhedron,
     walls: list[WallPlane],
+    reveals: Reveals,
     options: SubdivideOptions,
     tolerance: Tolerance,
     progress: Progress,
 ) -> Tree:
-    """Split ``box`` by the planes of ``walls``; see the module for the order of the splits."""
+    """Split ``box`` by the planes of ``walls``, then of ``reveals``; the module tells the order."""
     least = FRAGMENT_SHARE * options.wall_area
     planes: list[NDArray[np.float64]] = []
-    taken: list[int] = []
+    taken: list[WallPlane] = []
     children: list[list[int]] = []
     leaves: list[Polyhedron] = []
     queue: list[_Task] = []
-    serial = 0
 
     def place(parent: tuple[int, int], child: int) -> None:
         if parent[0] >= 0:
             children[parent[0]][parent[1]] = child
 
-    def push(body: Polyhedron, fragments: list[_Fragment], parent: tuple[int, int]) -> None:
-        nonlocal serial
-        best = _best_split(body, fragments, walls, least, tolerance)
-        if best < 0:
-            place(parent, -2 - len(leaves))
-            leaves.append(body)
-            return
-        serial += 1
-        heapq.heappush(queue, _Task((-fragments[best].area, serial), body, fragments, best, parent))
+    def finish(body: Polyhedron, parent: tuple[int, int]) -> None:
+        place(parent, -2 - len(leaves))
+        leaves.append(body)
 
-    push(box, _clip_to(box, [(i, w.walls) for i, w in enumerate(walls)], walls, tolerance), (-1, 0))
+    def push(
+        body: Polyhedron, fragments: list[_Fragment], parent: tuple[int, int], walled: bool
+    ) -> None:
+        best = _best_split(body, fragments, least if walled else 0.0, tolerance)
+        if best < 0 and walled:
+            walled = False
+            fragments = _sections(body, reveals.within(body, planes), tolerance)
+            best = _best_split(body, fragments, 0.0, tolerance)
+        if best < 0:
+            finish(body, parent)
+            return
+        priority = (-fragments[best].area, len(planes), parent[1])
+        heapq.heappush(queue, _Task(priority, body, fragments, best, parent, walled))
+
+    push(box, _sections(box, walls, tolerance), (-1, 0), True)
     while queue:
         task = heapq.heappop(queue)
         if len(leaves) + len(queue) + 2 > options.max_cells:
-            place(task.parent, -2 - len(leaves))
-            leaves.append(task.body)
+            finish(task.body, task.parent)
             continue
         wall = task.fragments[task.best].wall
-        plane = walls[wall].frame.plane
+        plane = wall.frame.plane
         node = len(planes)
         planes.append(plane)
         taken.append(wall)
@@ -124,53 +137,51 @@ def build_tree(
         for side, body in enumerate(cut(task.body, plane, node, tolerance.rounding)):
             if body is None:
                 raise AssertionError("a split that was accepted has two sides")
-            inherited = [(f.wall, f.shape) for f in rest if _reaches(f, plane, side, tolerance)]
-            push(body, _clip_to(body, inherited, walls, tolerance), (node, side))
+            facing = plane if side == 0 else -plane
+            inherited = [
+                (f.wall, f.shape, clip_polygon(f.outline, facing, tolerance.rounding))
+                for f in rest
+                if np.any(f.points @ facing[:3] + facing[3] > tolerance.plane)
+            ]
+            push(body, _fragments(inherited), (node, side), task.walled)
         progress(len(leaves), len(leaves) + len(queue), "splitting")
     return Tree(
         np.array(planes).reshape(-1, 4),
-        np.array(taken, dtype=np.int64),
+        tuple(taken),
         np.array(children, dtype=np.int32).reshape(-1, 2),
         tuple(leaves),
     )
 
 
-def _reaches(f: _Fragment, plane: NDArray[np.float64], side: int, tolerance: Tolerance) -> bool:
-    distance = f.points @ plane[:3] + plane[3]
-    if side == 0:
-        return bool(distance.max() > tolerance.plane)
-    return bool(distance.min() < -tolerance.plane)
+def _sections(body: Polyhedron, walls: list[WallPlane], tolerance: Tolerance) -> list[_Fragment]:
+    """The fragments of walls inside a body."""
+    cuts = [(w, w.walls, section(body, w.frame.plane, tolerance.rounding)) for w in walls]
+    return _fragments(cuts)
 
 
-def _clip_to(
-    body: Polyhedron,
-    shapes: list[tuple[int, Geometry]],
-    walls: list[WallPlane],
-    tolerance: Tolerance,
+def _fragments(
+    shapes: list[tuple[WallPlane, Geometry, NDArray[np.float64]]],
 ) -> list[_Fragment]:
-    """The fragments of wall polygons inside a body."""
+    """Wall polygons (wall, shape, outline of the node in the wall's plane) clipped to a node."""
     import shapely
 
     kept: list[_Fragment] = []
-    for wall, shape in shapes:
-        frame = walls[wall].frame
-        outline = section(body, frame.plane, tolerance.rounding)
+    for wall, shape, outline in shapes:
         if len(outline) < 3:
             continue
+        frame = wall.frame
         region = shapely.polygons(frame.to_plane(outline))
         inside = shapely.intersection(shape, region)
         area = float(shapely.area(inside))
-        if area <= 0:
-            continue
-        points = frame.to_space(shapely.get_coordinates(inside))
-        kept.append(_Fragment(wall, inside, area, points, float(shapely.area(region))))
+        if area > 0:
+            points = frame.to_space(shapely.get_coordinates(inside))
+            kept.append(_Fragment(wall, inside, area, points, outline, float(shapely.area(region))))
     return kept
 
 
 def _best_split(
     body: Polyhedron,
     fragments: list[_Fragment],
-    walls: list[WallPlane],
     least: float,
     tolerance: Tolerance,
 ) -> int:
@@ -183,7 +194,7 @@ def _best_split(
     for i, f in enumerate(fragments):
         if f.area < least:
             continue
-        plane = walls[f.wall].frame.plane
+        plane = f.wall.frame.plane
         reach = body.points @ plane[:3] + plane[3]
         if min(reach.max(), -reach.min()) < tolerance.thin:
             continue

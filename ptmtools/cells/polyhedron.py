@@ -76,7 +76,8 @@ def cut(
     for loop, face_tag in zip(body.faces, body.tags, strict=True):
         before: list[int] = []
         behind: list[int] = []
-        for a, b in zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True):
+        corners = loop.tolist()
+        for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
             if side[a] >= 0:
                 before.append(a)
             if side[a] <= 0:
@@ -108,6 +109,26 @@ def section(body: Polyhedron, plane: NDArray[np.float64], rounding: float) -> ND
     if front is None or back is None:
         return np.zeros((0, 3))
     return back.points[back.faces[-1]]
+
+
+def clip_polygon(
+    polygon: NDArray[np.float64], plane: NDArray[np.float64], rounding: float
+) -> NDArray[np.float64]:
+    """The part of a convex (n, 3) polygon in front of a plane; (0, 3) where nothing is left."""
+    distance = polygon @ plane[:3] + plane[3]
+    if np.all(distance >= -rounding):
+        return polygon
+    if np.all(distance <= rounding):
+        return polygon[:0]
+    following = np.concatenate([distance[1:], distance[:1]])
+    ahead = distance >= 0
+    crosses = distance * following < 0
+    with np.errstate(invalid="ignore", divide="ignore"):
+        t = np.where(crosses, distance / (distance - following), 0.0)[:, None]
+    cuts = polygon + t * (np.concatenate([polygon[1:], polygon[:1]]) - polygon)
+    both = np.stack([polygon, cuts], axis=1).reshape(-1, 3)
+    kept: NDArray[np.float64] = both[np.stack([ahead, crosses], axis=1).ravel()]
+    return kept
 
 
 def _around(points: NDArray[np.float64], loop: list[int], normal: NDArray[np.float64]) -> list[int]:

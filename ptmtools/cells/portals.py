@@ -52,15 +52,14 @@ class Portals:
         )
 
 
-def find_portals(tree: Tree, walls: list[WallPlane], tolerance: Tolerance) -> Portals:
+def find_portals(tree: Tree, tolerance: Tolerance) -> Portals:
     """All openings between the leaves of a tree, in the order of its nodes."""
     faces = _faces_by_node(tree)
     leaves: list[tuple[int, int]] = []
     planes: list[NDArray[np.float64]] = []
     polygons: list[NDArray[np.float64]] = []
     areas: list[float] = []
-    for node in range(len(tree.planes)):
-        wall = walls[int(tree.wall[node])]
+    for node, wall in enumerate(tree.walls):
         for back, front, flat, area in _open_pieces(faces[node], wall, tolerance):
             leaves.append((back, front))
             planes.append(tree.planes[node])

@@ -109,16 +109,15 @@ def find_walls(scene: Scene, options: SubdivideOptions, tolerance: Tolerance) ->
     mask = structural_triangles(scene, options)
     corners = scene.corners[mask]
     forced = _named(scene, options.structural)[mask]
-    planes, areas = _planes_of(corners)
+    planes, areas = planes_of(corners)
     layers = _layers(corners, planes, areas, forced, options.wall_area, tolerance)
     found: list[tuple[float, WallPlane]] = []
     kept: list[NDArray[np.float64]] = []
     for plane in layers:
-        if any(_parallel_and_near(plane, other, tolerance) for other in kept):
+        if any(parallel_and_near(plane, other, tolerance) for other in kept):
             continue
         frame = Frame.of(plane)
-        distance = corners @ plane[:3] + plane[3]
-        flat = np.all(np.abs(distance) <= tolerance.plane, axis=1) & (areas > 0)
+        flat = lying_in(plane, corners, tolerance)
         blocking = unite(frame.to_plane(corners[flat]))
         shapely.prepare(blocking)
         parts = shapely.get_parts(blocking)
@@ -143,7 +142,16 @@ def unite(triangles: NDArray[np.float64]) -> Geometry:
     return shapely.union_all(shapely.make_valid(polygons))
 
 
-def _planes_of(
+def lying_in(
+    plane: NDArray[np.float64], corners: NDArray[np.float64], tolerance: Tolerance
+) -> NDArray[np.bool_]:
+    """(n,) which of the (n, 3, 3) triangles lie in a plane."""
+    distance = np.abs(corners @ plane[:3] + plane[3])
+    lies: NDArray[np.bool_] = np.all(distance <= tolerance.plane, axis=1)
+    return lies
+
+
+def planes_of(
     corners: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(n, 4) planes with one sign for both windings, and (n,) areas, of (n, 3, 3) triangles."""
@@ -168,28 +176,26 @@ def _layers(
 ) -> list[NDArray[np.float64]]:
     """Planes that hold enough coplanar area to carry a wall, heaviest first.
 
-    A bin of similar normals and offsets that cannot reach ``wall_area`` together with its
-    neighbours is never looked at: curved detail falls away before anything quadratic happens.
+    Triangles are compared only within bins of similar normal and offset, and a bin is left as soon
+    as what is free in it cannot reach ``wall_area``: curved detail falls away before anything
+    quadratic happens.
     """
-    possible = _dense_bins(planes, areas, wall_area, tolerance) | forced
-    candidate = np.flatnonzero(possible & (areas > 0))
-    corners, planes, areas, forced = (
-        corners[candidate],
-        planes[candidate],
-        areas[candidate],
-        forced[candidate],
-    )
-    free = np.ones(len(candidate), dtype=bool)
+    bins = [_bins(planes, tolerance, shift) for shift in (0.0, 0.5)]
+    free = areas > 0
     layers: list[tuple[float, NDArray[np.float64]]] = []
     for seed in np.argsort(-areas, kind="stable"):
         if not free[seed]:
             continue
-        rest = np.flatnonzero(free)
-        plane = planes[seed]
-        near = np.all(np.abs(corners[rest] @ plane[:3] + plane[3]) <= tolerance.plane, axis=1)
-        members = rest[near]
-        free[members] = False
         free[seed] = False
+        near = np.unique(np.concatenate([rows[label[seed]] for label, rows in bins]))
+        near = near[free[near]]
+        if areas[near].sum() + areas[seed] < wall_area and not np.any(forced[near]):
+            if forced[seed]:
+                layers.append((float(areas[seed]), planes[seed]))
+            continue
+        plane = planes[seed]
+        members = np.append(near[lying_in(plane, corners[near], tolerance)], seed)
+        free[members] = False
         weight = float(areas[members].sum())
         if weight >= wall_area or np.any(forced[members]):
             layers.append((weight, plane))
@@ -197,25 +203,22 @@ def _layers(
     return [plane for _, plane in layers]
 
 
-def _dense_bins(
-    planes: NDArray[np.float64],
-    areas: NDArray[np.float64],
-    wall_area: float,
-    tolerance: Tolerance,
-) -> NDArray[np.bool_]:
-    step = np.array([_NORMAL_STEP] * 3 + [max(tolerance.cluster, _NORMAL_STEP * tolerance.extent)])
-    enough = np.zeros(len(planes), dtype=bool)
-    for shift in (0.0, 0.5):
-        key = np.floor(planes / step + shift).astype(np.int64)
-        _, label = np.unique(key, axis=0, return_inverse=True)
-        total = np.bincount(label.ravel(), weights=areas)
-        enough |= total[label.ravel()] * 8 >= wall_area
-    return enough
+def _bins(
+    planes: NDArray[np.float64], tolerance: Tolerance, shift: float
+) -> tuple[NDArray[np.int64], list[NDArray[np.int64]]]:
+    """The bin of each plane, and the planes of each bin."""
+    step = np.array([_NORMAL_STEP] * 3 + [_NORMAL_STEP * tolerance.extent])
+    key = np.floor(planes / step + shift).astype(np.int64)
+    _, label, count = np.unique(key, axis=0, return_inverse=True, return_counts=True)
+    label = label.ravel()
+    rows = np.split(np.argsort(label, kind="stable"), np.cumsum(count)[:-1])
+    return label, rows
 
 
-def _parallel_and_near(
+def parallel_and_near(
     plane: NDArray[np.float64], other: NDArray[np.float64], tolerance: Tolerance
 ) -> bool:
+    """Whether two planes are close enough to be proposed as one."""
     turn = float(plane[:3] @ other[:3])
     if abs(turn) < tolerance.cosine:
         return False

@@ -25,6 +25,7 @@ from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import Portals, find_portals
 from ptmtools.cells.reach import Reach, flood, largest_with_floor
+from ptmtools.cells.reveals import Reveals
 from ptmtools.cells.structure import WallPlane, find_walls, structural_triangles
 from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
@@ -79,6 +80,8 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
         raise InputError(
             "PTM-I300", f"wall area {options.wall_area:g} m² is not positive", remedy="try 2"
         )
+    if not options.wall_thickness >= 0:
+        raise InputError("PTM-I300", f"wall thickness {options.wall_thickness:g} m is negative")
     if options.max_cells < 1:
         raise InputError("PTM-I300", f"at most {options.max_cells} cells is none", remedy="try 500")
     for pattern in (*options.structural, *options.detail):
@@ -110,8 +113,10 @@ def _divide(
     whole: bool = False,
 ) -> _Space:
     """Subdivide a root box and flood it; ``whole``: leaves at the box count as inside."""
-    tree = build_tree(Polyhedron.box(box[0], box[1]), walls, options, tolerance, progress)
-    portals = find_portals(tree, walls, tolerance)
+    reveals = Reveals(corners, options.wall_thickness, tolerance)
+    body = Polyhedron.box(box[0], box[1])
+    tree = build_tree(body, walls, reveals, options, tolerance, progress)
+    portals = find_portals(tree, tolerance)
     start = _viewpoint_leaves(tree, box, options)
     if not start and whole:
         every = np.ones(len(tree.leaves), dtype=bool)

@@ -1,0 +1,282 @@
+"""Cells, portals, reach and ownership on rooms small enough to check by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ptmtools.cells import Cells, SubdivideOptions, structural_triangles, subdivide
+from ptmtools.errors import InputError
+from ptmtools.scene.model import Material, Scene
+
+
+def volume(cells: Cells, leaf: int) -> float:
+    centre = cells.leaf_points(leaf).mean(axis=0)
+    total = 0.0
+    for loop in cells.leaf_faces(leaf):
+        p = cells.leaf_point[loop] - centre
+        total += sum(float(np.linalg.det(p[[0, i, i + 1]])) for i in range(1, len(p) - 1))
+    return total / 6
+
+
+def piece_areas(cells: Cells) -> np.ndarray:
+    p = cells.vertex[cells.triangle]
+    return np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / 2
+
+
+@pytest.mark.parametrize("rooms", [1, 2, 5])
+def test_a_row_of_rooms(room_row, rooms: int) -> None:
+    scene, by_hand = room_row(rooms)
+    cells = subdivide(scene)
+    assert cells.closed
+    assert cells.cell_count == rooms
+    assert cells.portal_count == rooms - 1
+    assert np.allclose(cells.portal_area, 6.0)
+    for leaf in range(rooms):
+        assert volume(cells, leaf) == pytest.approx(64)
+    middles = np.array([[4 * i + 2.0, 2, 0] for i in range(rooms)])
+    where = cells.locate(middles)
+    assert sorted(where) == list(range(rooms))
+    assert [list(a) for a in cells.adjacent()] == [
+        sorted(where[j] for j in (i - 1, i + 1) if 0 <= j < rooms)
+        for i in (int(np.flatnonzero(where == c)[0]) for c in range(rooms))
+    ]
+    # Owners, by hand: -1 stays -1, room i is where[i].
+    order = np.lexsort((cells.triangle_source,))
+    rename = np.append(where, -1)
+    assert np.array_equal(cells.triangle_cell[order], rename[by_hand.triangle_cell])
+
+
+def test_portals_lie_in_both_leaves_and_point_forward(room_row) -> None:
+    cells = subdivide(room_row(4)[0])
+    for k in range(cells.portal_count):
+        polygon, plane = cells.portal(k), cells.portal_plane[k]
+        assert np.allclose(polygon @ plane[:3] + plane[3], 0)
+        assert np.cross(polygon[1] - polygon[0], polygon[2] - polygon[0]) @ plane[:3] > 0
+        behind, ahead = cells.portal_leaf[k]
+        middle = polygon.mean(axis=0)
+        assert cells.locate_leaf(middle + 0.1 * plane[:3]) == ahead
+        assert cells.locate_leaf(middle - 0.1 * plane[:3]) == behind
+
+
+def test_walls_with_thickness_leave_solid_matter_out(quads, room_faces) -> None:
+    # Two rooms 0.3 m apart, a door tunnel between them with jambs, floor and lintel.
+    left = room_faces((0, 0, -2), (4, 4, 2), "+x")
+    right = room_faces((4.3, 0, -2), (8.3, 4, 2), "-x")
+    walls = []
+    for x in (4.0, 4.3):
+        for y0, y1, z0, z1 in ((0, 4, -2, -1), (0, 4, 1, 2), (3, 4, -1, 1)):
+            walls.append([[x, y0, z0], [x, y1, z0], [x, y1, z1], [x, y0, z1]])
+    tunnel = room_faces((4, 0, -1), (4.3, 3, 1), "-x +x")
+    cells = subdivide(quads(left + right + walls + tunnel))
+    assert cells.closed
+    inside = cells.locate(np.array([[2.0, 1, 0], [4.15, 1, 0], [6, 1, 0]]))
+    assert len(set(inside)) == 3
+    assert np.all(inside >= 0)
+    # The doorway is a cell of its own; the matter around it and the outside are nobody's.
+    assert cells.cell_count == 3
+    matter = [[4.15, 3.5, 0], [4.15, 1, 1.5], [4.15, 1, -1.5]]
+    outside = [[-0.5, 1, 0], [2, 4.5, 0], [9, 1, 0]]
+    assert np.all(cells.locate(np.array(matter + outside)) == -1)
+
+
+def test_no_ceiling_is_open_and_said(quads, room_faces, partition) -> None:
+    faces = room_faces((0, 0, -2), (8, 4, 2), "+y") + partition(4, (0, 3, -1, 1))
+    cells = subdivide(quads(faces))
+    assert not cells.closed
+    assert any("open" in note for note in cells.notes)
+    assert cells.root_box[1, 1] == pytest.approx(4)
+    assert cells.cell_count == 2
+    assert np.allclose(cells.portal_area, 6.0)
+
+
+def test_a_window_opens_the_model_but_glass_is_not_a_wall(quads, room_faces) -> None:
+    glass = Material("glass", opacity=0.3, transparent=True)
+    hole = [[8, y, z] for y, z in ((1, -1), (3, -1), (3, 1), (1, 1))]
+    around = [
+        [[8, y0, z0], [8, y1, z0], [8, y1, z1], [8, y0, z1]]
+        for y0, y1, z0, z1 in ((0, 4, -2, -1), (0, 4, 1, 2), (0, 1, -1, 1), (3, 4, -1, 1))
+    ]
+    faces = [*room_faces((0, 0, -2), (8, 4, 2), "+x"), *around, hole]
+    material = [0] * (len(faces) - 1) + [1]
+    open_scene = quads(faces, materials=(Material("wall"), glass), material=material)
+    assert not subdivide(open_scene).closed
+    solid = replace(open_scene, materials=(Material("wall"), Material("board")))
+    assert subdivide(solid).closed
+
+
+def test_an_opening_of_a_square_centimetre_is_kept_and_a_crack_is_not(
+    quads, room_faces, partition
+) -> None:
+    shell = room_faces((0, 0, -2), (8, 4, 2))
+    tiny = subdivide(quads(shell + partition(4, (1, 1.01, 0, 0.01))))
+    assert tiny.portal_count == 1
+    assert tiny.portal_area[0] == pytest.approx(1e-4)
+    crack = subdivide(quads(shell + partition(4, (1, 3, 0, 1e-5))))
+    assert crack.portal_count == 0
+    assert crack.cell_count == 1  # the other room cannot be reached
+
+
+def test_a_slit_between_staggered_walls_stays_open(quads, room_faces) -> None:
+    # Two half walls 1 mm apart in depth that overlap: one can look through between them.
+    lower = [[4, 0, -2], [4, 2.5, -2], [4, 2.5, 2], [4, 0, 2]]
+    upper = [[4.001, 2, -2], [4.001, 4, -2], [4.001, 4, 2], [4.001, 2, 2]]
+    cells = subdivide(quads([*room_faces((0, 0, -2), (8, 4, 2)), lower, upper]))
+    assert cells.cell_count == 2
+    assert cells.portal_count == 1
+
+
+def test_walls_present_twice_and_overlapping_unite(quads, room_faces, partition) -> None:
+    doubled = partition(4, (0, 3, -1, 1))
+    doubled += [face[::-1] for face in doubled]
+    doubled.append([[4, 0, 0.9], [4, 4, 0.9], [4, 4, 2], [4, 0, 2]])
+    cells = subdivide(quads(room_faces((0, 0, -2), (8, 4, 2)) + doubled))
+    assert cells.cell_count == 2
+    assert cells.portal_area == pytest.approx([3 * 1.9])
+
+
+def test_a_concave_opening_becomes_its_hull(quads, room_faces) -> None:
+    shell = room_faces((0, 0, -2), (8, 4, 2))
+    # An opening like an L: a wall with a door and a hatch beside it.
+    solid = [(0, 4, -2, -1), (3, 4, -1, 2), (0, 2, 1, 2)]
+    walls = [[[4, y0, z0], [4, y1, z0], [4, y1, z1], [4, y0, z1]] for y0, y1, z0, z1 in solid]
+    cells = subdivide(quads(shell + walls))
+    assert cells.portal_count == 1
+    assert cells.portal_area[0] == pytest.approx(3 * 2 + 1 * 1)
+    flat = cells.portal(0)[:, 1:]
+    hull = 0.5 * abs(
+        np.sum(flat[:, 0] * np.roll(flat[:, 1], -1) - flat[:, 1] * np.roll(flat[:, 0], -1))
+    )
+    assert hull == pytest.approx(3 * 3 - 2 * 1 / 2)
+
+
+def furniture(scene_faces: list, quads) -> Scene:
+    screen = [[2, 0, -1.5], [2, 3, -1.5], [2, 3, 1.5], [2, 0, 1.5]]
+    names = ["shell"] * len(scene_faces) + ["screen_1"]
+    return quads([*scene_faces, screen], objects=names)
+
+
+def test_detail_and_structural_by_name(quads, room_faces) -> None:
+    scene = furniture(room_faces((0, 0, -2), (4, 4, 2)), quads)
+    assert subdivide(scene).cell_count == 2
+    assert subdivide(scene, SubdivideOptions(detail=("screen*",))).cell_count == 1
+    assert subdivide(scene, SubdivideOptions(wall_area=10)).cell_count == 1
+    forced = SubdivideOptions(wall_area=10, structural=("screen*",))
+    assert subdivide(scene, forced).cell_count == 2
+    both = SubdivideOptions(detail=("*",), structural=("shell", "screen_1"))
+    assert np.all(structural_triangles(scene, both))
+
+
+def test_max_cells_keeps_the_best_splits(room_row) -> None:
+    scene, _ = room_row(6)
+    cells = subdivide(scene, SubdivideOptions(max_cells=3))
+    assert cells.cell_count <= 3
+    assert subdivide(scene, SubdivideOptions(max_cells=1)).cell_count == 1
+
+
+def test_the_flood_starts_at_the_viewpoints(quads, room_faces) -> None:
+    # A large sealed hall and a small sealed room.
+    faces = room_faces((0, 0, -4), (20, 4, 4)) + room_faces((30, 0, -2), (34, 4, 2))
+    scene = quads(faces)
+    hall = subdivide(scene)
+    assert hall.locate(np.array([[10.0, 1, 0]]))[0] >= 0
+    assert hall.locate(np.array([[32.0, 1, 0]]))[0] == -1
+    room = subdivide(scene, SubdivideOptions(viewpoints=((32, 1.6, 0),)))
+    assert room.locate(np.array([[32.0, 1, 0]]))[0] >= 0
+    assert room.locate(np.array([[10.0, 1, 0]]))[0] == -1
+
+
+def test_cuts_keep_area_place_and_texture(quads, room_faces, partition) -> None:
+    # A banner of 6 m runs diagonally through both rooms and the door plane.
+    banner = [[1, 1, -0.9], [7, 1.2, 0.7], [7, 2.2, 0.7], [1, 2, -0.9]]
+    faces = [*room_faces((0, 0, -2), (8, 4, 2)), *partition(4, (0, 3, -1, 1)), banner]
+    scene = quads(faces)
+    cells = subdivide(scene, SubdivideOptions(detail=(f"quad{len(faces) - 1}",)))
+    cut_up = cells.triangle_source >= 2 * (len(faces) - 1)
+    owners = cells.triangle_cell[cut_up]
+    assert np.all(owners[:, 0] == owners[:, 1])
+    assert len(np.unique(owners)) == 2
+    corners = scene.corners
+    whole = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    parts = np.bincount(cells.triangle_source, weights=piece_areas(cells))
+    assert np.allclose(parts, whole / 2)
+    points = cells.vertex[cells.triangle]
+    assert np.array_equal(cells.locate(points[cut_up].mean(axis=1)), owners[:, 0])
+    # Texture coordinates stay the affine function of position that they were.
+    for t in np.unique(cells.triangle_source[cut_up]):
+        basis = np.column_stack([corners[t], np.ones(3)])
+        affine, *_ = np.linalg.lstsq(basis, scene.uv[t], rcond=None)
+        mine = cells.triangle[cells.triangle_source == t].ravel()
+        predicted = np.column_stack([cells.vertex[mine], np.ones(len(mine))]) @ affine
+        assert np.allclose(predicted, cells.vertex_uv[mine], atol=1e-9)
+
+
+def test_a_shared_edge_is_cut_in_one_point(quads, room_faces, partition) -> None:
+    # The banner's two triangles share a diagonal that crosses the plane of the partition.
+    banner = [[1, 1, -0.9], [7, 1.2, 0.7], [7, 2.2, 0.7], [1, 2, -0.9]]
+    faces = [*room_faces((0, 0, -2), (8, 4, 2)), *partition(4, (0, 3, -1, 1)), banner]
+    cells = subdivide(quads(faces), SubdivideOptions(detail=(f"quad{len(faces) - 1}",)))
+    cut_up = cells.triangle[cells.triangle_source >= 2 * (len(faces) - 1)]
+    at_cut = {tuple(p) for p in cells.vertex[cut_up.ravel()] if abs(p[0] - 4) < 1e-6}
+    assert len(at_cut) == 3
+
+
+def test_one_sided_faces_in_a_boundary_belong_to_the_side_they_face(
+    quads, room_faces, partition
+) -> None:
+    faces = room_faces((0, 0, -2), (8, 4, 2)) + partition(4, (0, 3, -1, 1))
+    scene = quads(faces)
+    cells = subdivide(scene)
+    boundary = cells.triangle_cell[:, 0] != cells.triangle_cell[:, 1]
+    inner = boundary & np.all(cells.triangle_cell >= 0, axis=1)
+    assert inner.sum() == 6
+    _, both = cells.emitted(scene.two_sided)
+    triangle, one = cells.emitted(np.zeros(len(scene.triangles), dtype=bool))
+    assert len(both) == len(one) + 6
+    assert np.array_equal(cells.triangle_cell[triangle, 0], one)
+
+
+def test_only_a_floor(quads) -> None:
+    cells = subdivide(quads([[[0, 0, 0], [0, 0, 5], [5, 0, 5], [5, 0, 0]]]))
+    assert cells.cell_count == 1
+    assert not cells.closed
+    assert np.ptp(cells.leaf_points(0), axis=0).min() > 0
+    assert np.all(cells.triangle_cell == 0)
+
+
+def test_same_input_same_arrays(room_row) -> None:
+    scene, _ = room_row(3)
+    first, second = subdivide(scene).to_arrays(), subdivide(scene).to_arrays()
+    assert all(np.array_equal(first[k], second[k]) for k in first)
+    back = Cells.from_arrays(first).to_arrays()
+    assert all(np.array_equal(first[k], back[k]) for k in first)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e-3, 1e3, 1e6])
+def test_the_subdivision_scales_with_the_scene(room_row, scale: float) -> None:
+    scene, _ = room_row(3)
+    large = replace(scene, points=scene.points * scale)
+    cells = subdivide(large, SubdivideOptions(wall_area=2 * scale**2))
+    assert cells.closed
+    assert cells.cell_count == 3
+    assert np.allclose(cells.portal_area, 6 * scale**2)
+
+
+@pytest.mark.parametrize(
+    ("options", "code"),
+    [
+        (SubdivideOptions(wall_area=0), "PTM-I300"),
+        (SubdivideOptions(wall_area=float("nan")), "PTM-I300"),
+        (SubdivideOptions(max_cells=0), "PTM-I300"),
+        (SubdivideOptions(viewpoints=((1e3, 0, 0),)), "PTM-I301"),
+        (SubdivideOptions(detail=("no such thing",)), "PTM-I302"),
+    ],
+)
+def test_bad_options(room_row, options: SubdivideOptions, code: str) -> None:
+    with pytest.raises(InputError) as caught:
+        subdivide(room_row(1)[0], options)
+    assert caught.value.code == code
