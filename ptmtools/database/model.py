@@ -1,0 +1,213 @@
+"""What goes into a database's served files besides the artifacts, and what comes out of them.
+
+Options and results of `emit`, `validate_database` and `plot_plan`. Positions are world metres, Y
+up (design, "Space"); angles are radians unless a name says otherwise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class TextureLevel:
+    """One level of a `.ptm`, numbered from the coarsest.
+
+    Attributes
+    ----------
+    width, height: texels.
+    offset, length: the bytes of the level's group in the file.
+    gpu_bytes: what the level occupies on the graphics card, this level alone.
+    """
+
+    width: int
+    height: int
+    offset: int
+    length: int
+    gpu_bytes: int
+
+
+@dataclass(frozen=True)
+class TextureRecord:
+    """What the emitted files say of one image of the scene.
+
+    Attributes
+    ----------
+    image: index into `Scene.images`.
+    file: the `.ptm`, relative to the served folder, "textures/NAME.ptm".
+    fallback: the PNG twin, relative to the served folder, or None.
+    width, height, components: of the finest level.
+    levels: coarsest first.
+    sha256: hex digest of the `.ptm`'s bytes.
+    """
+
+    image: int
+    file: str
+    fallback: str | None
+    width: int
+    height: int
+    components: int
+    levels: tuple[TextureLevel, ...]
+    sha256: str
+
+
+@dataclass(frozen=True)
+class GivenViewpoint:
+    """A viewpoint that the user asks for.
+
+    Attributes
+    ----------
+    position: world metres; put on the floor below where there is one within reach.
+    yaw: degrees, counter-clockwise seen from above, 0 looks along -Z; None looks along the
+        longest view.
+    """
+
+    position: Vector
+    yaw: float | None = None
+
+
+@dataclass(frozen=True)
+class Viewpoint:
+    """A place to start from.
+
+    Attributes
+    ----------
+    name: its DEF name, "VP_0".
+    description: for a browser's menu.
+    position: of the eye, world metres.
+    direction: unit vector.
+    orientation: (x, y, z, angle), the rotation that brings -Z to `direction` with Y kept up.
+    field_of_view: radians, the smaller of the horizontal and the vertical one.
+    cell: the cell that contains it.
+    """
+
+    name: str
+    description: str
+    position: Vector
+    direction: Vector
+    orientation: tuple[float, float, float, float]
+    field_of_view: float
+    cell: int
+
+
+@dataclass(frozen=True)
+class EmitOptions:
+    """
+    Attributes
+    ----------
+    title: WorldInfo's title in the root file.
+    fallback: name the PNG twin of a texture first in its URLs, the `.ptm` second; without it
+        only the `.ptm`.
+    viewpoints: asked for; empty takes the scene's cameras, or chooses if there are none.
+    viewpoint_count: how many to choose, at most.
+    avatar_size: NavigationInfo's: least distance to a wall, height of the eye above the floor,
+        highest step, metres.
+    field_of_view: of viewpoints that are no cameras, radians.
+    """
+
+    title: str = "ptmtools database"
+    fallback: bool = True
+    viewpoints: tuple[GivenViewpoint, ...] = ()
+    viewpoint_count: int = 4
+    avatar_size: Vector = (0.25, 1.6, 0.75)
+    field_of_view: float = 1.1
+
+
+@dataclass(frozen=True)
+class EmitReport:
+    """What `emit` wrote.
+
+    Attributes
+    ----------
+    files: paths relative to the served folder, in the order of writing.
+    viewpoints: the places to start from.
+    shapes, triangles: written, over all cells; a piece in a boundary counts once per cell.
+    collapsed: pieces left out because two corners are one after rounding to float32.
+    bytes: of all files together.
+    notes: what there is to say, one line each.
+    """
+
+    files: tuple[str, ...]
+    viewpoints: tuple[Viewpoint, ...]
+    shapes: int
+    triangles: int
+    collapsed: int
+    bytes: int
+    notes: tuple[str, ...] = ()
+
+
+Severity = Literal["error", "warning"]
+
+
+@dataclass(frozen=True)
+class Issue:
+    """One finding of a validation; the codes stand in docs/database.md.
+
+    Attributes
+    ----------
+    code: stable identifier, PTM-D650 and up.
+    severity: an error makes the file wrong, a warning makes it doubtful.
+    file: relative to the database, or the path that was given.
+    place: where in the file, "" for all of it.
+    message: one line.
+    """
+
+    code: str
+    severity: Severity
+    file: str
+    place: str
+    message: str
+
+    def __str__(self) -> str:
+        where = f"{self.file}: {self.place}" if self.place else self.file
+        return f"{where}: {self.severity}: {self.message} [{self.code}]"
+
+
+@dataclass(frozen=True)
+class ValidationReport:
+    """
+    Attributes
+    ----------
+    issues: errors and warnings, by file, in the order in which they were met.
+    files: how many files were read.
+    bytes: how many bytes they hold.
+    """
+
+    issues: tuple[Issue, ...]
+    files: int
+    bytes: int
+
+    @property
+    def errors(self) -> tuple[Issue, ...]:
+        return tuple(i for i in self.issues if i.severity == "error")
+
+    @property
+    def warnings(self) -> tuple[Issue, ...]:
+        return tuple(i for i in self.issues if i.severity == "warning")
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is no error."""
+        return not self.errors
+
+
+@dataclass(frozen=True)
+class PlotOptions:
+    """
+    Attributes
+    ----------
+    cell: shade its potentially visible set by ACH.
+    height: of the section above a storey's floor, metres.
+    storey_gap: floors farther apart than this belong to different storeys, metres.
+    width: of the picture, inches.
+    dpi: dots per inch.
+    """
+
+    cell: int | None = None
+    height: float = 1.2
+    storey_gap: float = 1.5
+    width: float = 12.0
+    dpi: int = 110

@@ -1,0 +1,53 @@
+"""The names of files and nodes: deterministic, unique, and legal in every reader.
+
+A DEF name is the object's name in ASCII, without '.', which several browsers take for a route's
+separator, led by the cell so that it stays unique when a reader merges the files.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+ROOT = "root.wrl"
+HINTS = "hints.json"
+CELL_FOLDER = "cells"
+
+_ILLEGAL = re.compile(r"[^A-Za-z0-9_]+")
+#: Longer object names are cut: they come from generators and say nothing more.
+_LONGEST = 48
+
+
+def cell_name(cell: int) -> str:
+    """ "c0000"; more digits where they are needed."""
+    return f"c{cell:04d}"
+
+
+def cell_file(cell: int) -> str:
+    """The name of a cell's file, as other cell files refer to it."""
+    return f"{cell_name(cell)}.wrl"
+
+
+def cell_path(cell: int) -> str:
+    """A cell's file relative to the served folder."""
+    return f"{CELL_FOLDER}/{cell_file(cell)}"
+
+
+class DefNames:
+    """Hands out the DEF names of one file."""
+
+    def __init__(self, prefix: str) -> None:
+        self._prefix = prefix
+        self._taken: set[str] = set()
+
+    def take(self, name: str) -> str:
+        """A name for the object ``name``, used nowhere else in the file."""
+        plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+        base = _ILLEGAL.sub("_", plain).strip("_")[:_LONGEST] or "shape"
+        wanted = f"{self._prefix}_{base}"
+        unique, count = wanted, 1
+        while unique in self._taken:
+            count += 1
+            unique = f"{wanted}_{count}"
+        self._taken.add(unique)
+        return unique
