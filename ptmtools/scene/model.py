@@ -114,6 +114,8 @@ class Scene:
     materials, images, cameras: see their classes.
     space: how the model was brought to world coordinates.
     notes: what was dropped, missed or guessed, in the order of the model file.
+    files: what was read or looked for beside the model file, relative to its folder, "/" between
+        names: a change to any of these may change the scene. Not part of the artifact.
     """
 
     points: NDArray[np.float64]
@@ -128,6 +130,7 @@ class Scene:
     cameras: tuple[Camera, ...] = ()
     space: Space = Space((0.0, 0.0, 0.0), 1.0, "y")
     notes: tuple[Note, ...] = ()
+    files: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def corners(self) -> NDArray[np.float64]:
