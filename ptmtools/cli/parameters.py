@@ -82,10 +82,12 @@ def options_of(cls: type, *, omit: Sequence[str] = ()) -> Decorator:
     return decorate
 
 
-def take(cls: type[T], values: dict[str, Any], **given: Any) -> T:
-    """An instance of ``cls`` from the parsed values, which it removes from ``values``."""
+def take(cls: type[T], values: dict[str, Any], *, keep: Sequence[str] = (), **given: Any) -> T:
+    """An instance of ``cls`` from the parsed values, which are removed from ``values`` but for
+    those in ``keep``."""
     names = [field.name for field in fields(cls) if field.name in values]  # type: ignore[arg-type]
-    return cls(**{name: values.pop(name) for name in names}, **given)
+    found = {name: values[name] if name in keep else values.pop(name) for name in names}
+    return cls(**found, **given)
 
 
 def _option(field: Field[Any], hint: Any, told: str | None) -> Decorator:

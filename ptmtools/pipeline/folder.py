@@ -147,6 +147,11 @@ class DatabaseWriter(DatabaseFolder):
         self._made = made
         self._pending: dict[str, str] = {}
 
+    @property
+    def staging(self) -> Path:
+        """Where outputs wait for their commit, each under its name in the database."""
+        return self.path / STAGING
+
     @staticmethod
     def open_for_stage(path: str | os.PathLike[str]) -> DatabaseWriter:
         """An existing database, to run one of its stages; raises as `DatabaseFolder.open` does,
@@ -204,7 +209,7 @@ class DatabaseWriter(DatabaseFolder):
         value: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        shutil.rmtree(self.path / STAGING, ignore_errors=True)
+        shutil.rmtree(self.staging, ignore_errors=True)
         os.close(self._lock)
         if not (self.path / MANIFEST).exists():
             _unmake(self._made)
@@ -221,11 +226,15 @@ class DatabaseWriter(DatabaseFolder):
         ------
         OutputError: PTM-O002, PTM-O003.
         """
-        file = self.path / STAGING / name
+        file = self.staging / name
         with writing(file):
             file.parent.mkdir(parents=True, exist_ok=True)
         write_bytes(file, data, force=True)
         self._pending[name] = sha256(data)
+
+    def adopt(self, name: str) -> None:
+        """Stages a file that another wrote into `staging`."""
+        self._pending[name] = sha256((self.staging / name).read_bytes())
 
     def put_arrays(self, stage: str, arrays: Mapping[str, NDArray[np.generic]]) -> None:
         """Stages ``stages/<stage>.npz``."""
@@ -240,10 +249,9 @@ class DatabaseWriter(DatabaseFolder):
         manifest = self.manifest
         for stage, record in records.items():
             manifest = manifest.with_stage(stage, record)
-        staging = self.path / STAGING
         with writing(self.path):
-            staging.mkdir(exist_ok=True)
-        write_bytes(staging / MANIFEST, manifest.to_bytes(), force=True)
+            self.staging.mkdir(exist_ok=True)
+        write_bytes(self.staging / MANIFEST, manifest.to_bytes(), force=True)
         _finish(self.path)
         self.manifest = manifest
         self._pending = {}

@@ -9,7 +9,8 @@
          "parameters": {"wall_area": 1.0, …},        the options that can change the outputs
          "inputs":  {"stages/scene.npz": "9f86…"},   name → SHA-256 of what was read
          "outputs": {"stages/cells.npz": "60b7…"},   path in the database → SHA-256
-         "counts":  {"cells": 52, "portals": 61, …}  figures and choices, for reports
+         "counts":  {"cells": 52, "portals": 61, …}, figures and choices, for reports
+         "notes":   ["open above: …"]                what it had to say, one line each
      }, …}}
 
 Stages stand in the order in which they run. There is no time and no folder of the machine in it:
@@ -21,7 +22,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from typing import Any
@@ -48,6 +49,7 @@ class StageRecord:
     inputs: Mapping[str, str]
     outputs: Mapping[str, str]
     counts: Mapping[str, Any] = field(default_factory=dict)
+    notes: Sequence[str] = ()
 
     def same_work(self, other: StageRecord) -> bool:
         """Whether both were to do the same: software, parameters and inputs agree."""
@@ -87,6 +89,7 @@ class Manifest:
                     "inputs": dict(sorted(record.inputs.items())),
                     "outputs": dict(sorted(record.outputs.items())),
                     "counts": dict(record.counts),
+                    "notes": list(record.notes),
                 }
                 for name, record in self.stages.items()
             },
@@ -129,12 +132,13 @@ def _record(entry: object, stage: str, file: str | PathLike[str]) -> StageRecord
     names = ("parameters", "inputs", "outputs", "counts")
     if not isinstance(entry, dict) or not isinstance(entry.get("software"), str):
         raise _damaged(file, f"stage {stage} is incomplete")
-    if not all(isinstance(entry.get(name), dict) for name in names):
+    notes = entry.get("notes")
+    if not all(isinstance(entry.get(name), dict) for name in names) or not isinstance(notes, list):
         raise _damaged(file, f"stage {stage} is incomplete")
     for path, digest in entry["outputs"].items():
         if not isinstance(digest, str) or not _SHA256.fullmatch(digest) or not _inside(path):
             raise _damaged(file, f"stage {stage} has an impossible output {path!r}")
-    return StageRecord(entry["software"], *(entry[name] for name in names))
+    return StageRecord(entry["software"], *(entry[name] for name in names), notes)
 
 
 def _inside(path: str) -> bool:

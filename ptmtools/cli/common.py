@@ -1,0 +1,66 @@
+"""Options and arguments that several commands share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Any
+
+import click
+
+from ptmtools.cli.output import Voice
+
+Command = Callable[..., Any]
+
+
+def voiced(function: Command) -> Command:
+    """Adds ``-q`` and ``-v``, and hands the `Voice` in as the first argument."""
+
+    @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+    @click.option("-v", "--verbose", is_flag=True, help="Say more; with errors, the traceback.")
+    @click.pass_obj
+    @wraps(function)
+    def command(voice: Voice, /, quiet: bool, verbose: bool, **values: Any) -> Any:
+        voice.quiet |= quiet
+        voice.verbose |= verbose
+        return function(voice, **values)
+
+    return command
+
+
+def as_json(function: Command) -> Command:
+    """Adds ``--json`` as ``as_json``."""
+    return click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")(
+        function
+    )
+
+
+def forced(function: Command) -> Command:
+    """Adds ``--force``."""
+    told = "Write over what is in the way though it is not ours."
+    return click.option("--force", is_flag=True, help=told)(function)
+
+
+def workers(function: Command) -> Command:
+    """Adds ``-j``; 0 is one for each processor."""
+    return click.option(
+        "-j",
+        "--jobs",
+        "workers",
+        type=click.IntRange(0, 1024),
+        default=0,
+        metavar="N",
+        help="Workers; 0, the default, is one for each processor. The result is the same.",
+    )(function)
+
+
+def database(function: Command) -> Command:
+    """Adds the argument ``DB``."""
+    return click.argument("db", type=click.Path())(function)
+
+
+def new_database(function: Command) -> Command:
+    """Adds ``-o DB``."""
+    return click.option(
+        "-o", "--output", "db", type=click.Path(), required=True, help="The database, a folder."
+    )(function)

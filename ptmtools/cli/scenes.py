@@ -1,0 +1,214 @@
+"""The commands that build a database: one for each stage, and one for all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import click
+
+from ptmtools.cells import SubdivideOptions
+from ptmtools.cli.common import as_json, database, forced, new_database, voiced, workers
+from ptmtools.cli.output import Voice, count, size
+from ptmtools.cli.parameters import Numbers, options_of, take
+from ptmtools.coverage import AchOptions
+from ptmtools.database import EmitOptions, GivenViewpoint
+from ptmtools.pipeline import (
+    BuildOptions,
+    BuildReport,
+    TextureOptions,
+    build_scene as build,
+    make_ach,
+    make_cells,
+    make_files,
+    make_pvs,
+    make_textures,
+)
+from ptmtools.scene import IngestOptions
+from ptmtools.visibility import PvsOptions
+
+#: Notes that are shown without ``-v``.
+SHOWN_NOTES = 12
+
+model_argument = click.argument("model", type=click.Path())
+viewpoints = click.option(
+    "--viewpoint",
+    "viewpoints",
+    type=Numbers([3, 4]),
+    multiple=True,
+    metavar="X,Y,Z[,YAW]",
+    help="A place to start from: world metres, and degrees counter-clockwise from -Z. May be "
+    "given several times. What can be reached from there becomes cells.",
+)
+
+
+@click.command("build-scene")
+@model_argument
+@new_database
+@options_of(IngestOptions)
+@options_of(SubdivideOptions, omit=["viewpoints"])
+@options_of(PvsOptions, omit=["workers"])
+@options_of(AchOptions, omit=["workers"])
+@options_of(TextureOptions)
+@options_of(EmitOptions, omit=["viewpoints", "fallback"])
+@viewpoints
+@workers
+@forced
+@as_json
+@voiced
+def build_scene(
+    voice: Voice, model: str, db: str, as_json: bool, viewpoints: Any, **values: Any
+) -> None:
+    """Build the database DB from MODEL, or bring it up to date.
+
+    MODEL is an OBJ, glTF or GLB file, or what pymeshlab reads. Only what changed since the last
+    build is computed again.
+    """
+    options = BuildOptions(
+        ingest=take(IngestOptions, values),
+        subdivide=take(SubdivideOptions, values, viewpoints=_positions(viewpoints)),
+        pvs=take(PvsOptions, values),
+        ach=take(AchOptions, values),
+        emit=take(EmitOptions, values, keep=("fallback",), viewpoints=_given(viewpoints)),
+        textures=take(TextureOptions, values),
+        **values,
+    )
+    with voice.progress() as progress:
+        report = build(model, db, options, progress)
+    _tell(voice, report, as_json)
+
+
+@click.command("cells")
+@model_argument
+@new_database
+@options_of(IngestOptions)
+@options_of(SubdivideOptions, omit=["viewpoints"])
+@viewpoints
+@forced
+@as_json
+@voiced
+def cells(
+    voice: Voice, model: str, db: str, as_json: bool, force: bool, viewpoints: Any, **values: Any
+) -> None:
+    """Read MODEL and cut it into cells and portals: the first stage of the database DB."""
+    read = take(IngestOptions, values)
+    cut = take(SubdivideOptions, values, viewpoints=_positions(viewpoints))
+    with voice.progress() as progress:
+        report = make_cells(model, db, read, cut, force=force, progress=progress)
+    _tell(voice, report, as_json)
+
+
+@click.command("pvs")
+@database
+@options_of(PvsOptions, omit=["workers"])
+@workers
+@as_json
+@voiced
+def pvs(voice: Voice, db: str, as_json: bool, workers: int, **values: Any) -> None:
+    """Find which cells of DB may see each other."""
+    with voice.progress() as progress:
+        report = make_pvs(db, take(PvsOptions, values), workers, progress)
+    _tell(voice, report, as_json)
+
+
+@click.command("ach")
+@database
+@options_of(AchOptions, omit=["workers"])
+@workers
+@as_json
+@voiced
+def ach(voice: Voice, db: str, as_json: bool, workers: int, **values: Any) -> None:
+    """Measure how much of the view from each cell of DB each visible cell covers."""
+    with voice.progress() as progress:
+        report = make_ach(db, take(AchOptions, values), workers, progress)
+    _tell(voice, report, as_json)
+
+
+@click.command("textures")
+@database
+@options_of(TextureOptions)
+@workers
+@as_json
+@voiced
+def textures(voice: Voice, db: str, as_json: bool, workers: int, **values: Any) -> None:
+    """Encode the images of DB as progressive textures."""
+    with voice.progress() as progress:
+        report = make_textures(db, take(TextureOptions, values), workers, progress)
+    _tell(voice, report, as_json)
+
+
+@click.command("emit")
+@database
+@options_of(EmitOptions, omit=["viewpoints"])
+@viewpoints
+@as_json
+@voiced
+def emit(voice: Voice, db: str, as_json: bool, viewpoints: Any, **values: Any) -> None:
+    """Write the VRML97 files and hints.json of DB."""
+    options = take(EmitOptions, values, viewpoints=_given(viewpoints))
+    with voice.progress() as progress:
+        report = make_files(db, options, progress)
+    _tell(voice, report, as_json)
+
+
+def _positions(given: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+    return tuple(viewpoint[:3] for viewpoint in given)
+
+
+def _given(given: tuple[tuple[float, ...], ...]) -> tuple[GivenViewpoint, ...]:
+    return tuple(GivenViewpoint((x, y, z), rest[0] if rest else None) for x, y, z, *rest in given)
+
+
+def _tell(voice: Voice, report: BuildReport, as_json: bool) -> None:
+    if as_json:
+        voice.emit_json(asdict(report))
+        return
+    for stage in report.stages:
+        done = f"{stage.seconds:7.1f} s" if stage.ran else "unchanged"
+        voice.say(f"{stage.stage:<9}{done:>10}   {_figures(stage.stage, stage.counts)}")
+    memory = f", at most {size(report.peak_memory)} of memory" if report.peak_memory else ""
+    voice.say(f"{'all':<9}{report.seconds:>8.1f} s{memory}")
+    shown = report.notes if voice.verbose else report.notes[:SHOWN_NOTES]
+    for note in shown:
+        voice.say(f"note: {note}")
+    if len(shown) < len(report.notes):
+        voice.say(f"note: {len(report.notes) - len(shown):,} more; -v shows them all")
+    if any(stage.stage == "emit" for stage in report.stages):
+        db = report.database
+        voice.say("")
+        voice.say(f"The database is {db}. Next:")
+        voice.say(f"  ptm plot {db} -o plan.png              its floor plan")
+        voice.say(f"  ptm validate {db}                      check every file")
+        voice.say(f"  python3 -m http.server -d {db}/www     serve it; start at root.wrl")
+
+
+def _figures(stage: str, counts: Mapping[str, Any]) -> str:
+    """What a stage made, on one line."""
+    n = counts
+    match stage:
+        case "scene":
+            guessed = [w for w, k in (("unit", "unit_guessed"), ("up axis", "up_guessed")) if n[k]]
+            how = f" ({' and '.join(guessed)} guessed)" if guessed else ""
+            return (
+                f"{count(n['triangles'], 'triangle')} in {count(n['objects'], 'object')}, "
+                f"{count(n['images'], 'image')}; 1 unit = {n['metres']:g} m, {n['up']} up{how}"
+            )
+        case "cells":
+            state = "closed" if n["closed"] else "open"
+            return f"{count(n['cells'], 'cell')}, {count(n['portals'], 'portal')}; {state}"
+        case "pvs":
+            return f"a cell sees {n['average_share']:.1%} of all cells on average"
+        case "ach":
+            return (
+                f"{count(n['samples'], 'sample point')}; backend {n['backend']} ({n['renderer']})"
+            )
+        case "textures":
+            raw, stored = n["raw_bytes"], n["ptm_bytes"]
+            share = f" ({stored / raw:.1%})" if raw else ""
+            return f"{count(n['textures'], 'texture')}, {size(raw)} → {size(stored)}{share}"
+        case _:
+            return (
+                f"{count(n['files'], 'file')}, {size(n['bytes'])}; "
+                f"{count(n['triangles'], 'triangle')}, {count(n['viewpoints'], 'viewpoint')}"
+            )

@@ -1,0 +1,148 @@
+"""The database folder: who may write in it, and that it never is in between two states."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ptmtools.errors import DatabaseError, OutputError
+from ptmtools.pipeline import folder as folders
+from ptmtools.pipeline.folder import MANIFEST, STAGING, DatabaseFolder, DatabaseWriter
+from ptmtools.pipeline.manifest import StageRecord
+
+
+def state(folder: Path) -> dict[str, bytes]:
+    """Every file below a folder with its bytes."""
+    files = (f for f in sorted(folder.rglob("*")) if f.is_file())
+    return {str(f.relative_to(folder)): f.read_bytes() for f in files}
+
+
+def write(db: Path, files: dict[str, bytes], stage: str = "cells", model: str = "m.obj") -> None:
+    with DatabaseWriter.open_for_model(db, model, force=True) as writer:
+        for name, data in files.items():
+            writer.put(name, data)
+        writer.commit({stage: StageRecord("1", {}, {}, writer.pending())})
+
+
+def test_commits_and_reads_back(tmp_path: Path) -> None:
+    write(tmp_path / "a" / "db", {"stages/x": b"1", "www/y": b"2"})
+    db = DatabaseFolder.open(tmp_path / "a" / "db")
+    outputs = db.record("cells").outputs
+    assert db.read("stages/x", outputs["stages/x"]) == b"1"
+    assert db.intact(outputs)
+    assert set(state(db.path)) == {MANIFEST, "stages/x", "www/y"}
+
+
+def test_what_a_stage_no_longer_makes_goes_and_what_is_foreign_stays(tmp_path: Path) -> None:
+    write(tmp_path, {"www/old/a": b"1", "www/keep": b"2"})
+    (tmp_path / "www" / "mine.txt").write_text("mine")
+    write(tmp_path, {"www/keep": b"3"})
+    assert set(state(tmp_path)) == {MANIFEST, "www/keep", "www/mine.txt"}
+    assert not (tmp_path / "www" / "old").exists()
+
+
+def test_without_a_commit_it_stays_what_it_was(tmp_path: Path) -> None:
+    write(tmp_path, {"www/a": b"1"})
+    before = state(tmp_path)
+
+    def update() -> None:
+        with DatabaseWriter.open_for_model(tmp_path, "m.obj") as writer:
+            writer.put("www/a", b"2")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        update()
+    assert state(tmp_path) == before
+
+
+def test_a_new_folder_goes_again_if_nothing_was_committed(tmp_path: Path) -> None:
+    with DatabaseWriter.open_for_model(tmp_path / "a" / "db", "m.obj") as writer:
+        writer.put("www/a", b"2")
+    assert not list(tmp_path.iterdir())
+
+
+class KilledError(BaseException):
+    """Nothing catches it: as if the process had ended."""
+
+
+@pytest.mark.parametrize(
+    ("moves", "committed"), [(0, False), (1, False), (2, True), (3, True), (4, True)]
+)
+def test_killed_within_a_commit_the_next_run_finishes_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moves: int, committed: bool
+) -> None:
+    """Two outputs are staged, the commit is made, two outputs and the manifest are moved."""
+    write(tmp_path, {"www/a": b"1", "www/gone": b"1"})
+    before = state(tmp_path)
+    monkeypatch.setattr(folders.shutil, "rmtree", lambda *a, **k: None)  # the end is not reached
+    real, left = Path.replace, moves
+
+    def replace(self: Path, target: Path) -> Path:
+        nonlocal left
+        if Path(target).parent.name != STAGING:
+            if left == 0:
+                raise KilledError
+            left -= 1
+        return real(self, target)
+
+    monkeypatch.setattr(Path, "replace", replace)
+    with pytest.raises(KilledError):
+        write(tmp_path, {"www/a": b"2", "www/b": b"2"})
+    monkeypatch.undo()
+
+    with DatabaseWriter.open_for_model(tmp_path, "m.obj"):
+        pass
+    if committed:
+        assert set(state(tmp_path)) == {MANIFEST, "www/a", "www/b"}
+        db = DatabaseFolder.open(tmp_path)
+        assert db.intact(db.manifest.outputs())
+        assert (tmp_path / "www/a").read_bytes() == b"2"
+    else:
+        assert state(tmp_path) == before
+
+
+def test_two_writers_do_not_meet(tmp_path: Path) -> None:
+    with (
+        DatabaseWriter.open_for_model(tmp_path, "m.obj"),
+        pytest.raises(DatabaseError, match="PTM-D007"),
+    ):
+        DatabaseWriter.open_for_model(tmp_path, "m.obj")
+
+
+def test_force_guards_what_is_not_ours(tmp_path: Path) -> None:
+    foreign = tmp_path / "foreign"
+    foreign.mkdir()
+    (foreign / "mine.txt").write_text("mine")
+    with pytest.raises(OutputError, match="PTM-O010"):
+        DatabaseWriter.open_for_model(foreign, "m.obj")
+    write(foreign, {"www/a": b"1"})
+    assert (foreign / "mine.txt").read_text() == "mine"
+
+    with pytest.raises(OutputError, match="PTM-O011"):
+        DatabaseWriter.open_for_model(foreign, "other.obj")
+    write(foreign, {"www/b": b"1"}, "pvs", model="other.obj")
+    assert set(state(foreign)) == {MANIFEST, "www/b", "mine.txt"}
+
+    file = tmp_path / "file"
+    file.write_text("mine")
+    with pytest.raises(OutputError, match="PTM-O001"):
+        DatabaseWriter.open_for_model(file, "m.obj", force=True)
+
+
+def test_says_what_is_missing_or_damaged(tmp_path: Path) -> None:
+    with pytest.raises(DatabaseError, match="PTM-D001"):
+        DatabaseFolder.open(tmp_path)
+    write(tmp_path, {"stages/cells.npz": b"no archive", "www/a": b"1"})
+    db = DatabaseFolder.open(tmp_path)
+    with pytest.raises(DatabaseError, match="PTM-D004"):
+        db.record("pvs")
+    with pytest.raises(DatabaseError, match="PTM-D006"):
+        db.read_arrays("cells", "this")
+    (tmp_path / "www/a").write_bytes(b"2")
+    with pytest.raises(DatabaseError, match="PTM-D006"):
+        db.read("www/a", db.record("cells").outputs["www/a"])
+    (tmp_path / "www/a").unlink()
+    with pytest.raises(DatabaseError, match="PTM-D005"):
+        db.read("www/a", db.record("cells").outputs["www/a"])
+    assert not db.intact(db.record("cells").outputs)
