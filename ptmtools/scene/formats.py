@@ -1,0 +1,163 @@
+"""Reads the other formats: PLY, STL and OFF through trimesh, the rest through pymeshlab.
+
+pymeshlab (GPL-3, needs libGL) does not tell which face has which texture, but writes it into an
+OBJ file; so it converts to OBJ in a temporary folder, and our own reader reads that. The same way
+is taken where trimesh gives up (mixed polygons in OFF) and for textured PLY, of which trimesh
+keeps one image. Both libraries cut polygons as fans.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ptmtools.errors import InputError, MissingComponentError
+from ptmtools.scene.reference import Folder
+from ptmtools.scene.source import Findings, Source, SourceMaterial
+
+TRIMESH = (".ply", ".stl", ".off")
+MESHLAB = (".3ds", ".3mf", ".ctm", ".dae", ".wrl", ".x3d")
+SUPPORTED = (".obj", ".glb", ".gltf", *TRIMESH, *MESHLAB)
+#: Enough of a PLY file for its header.
+_HEADER = 1 << 14
+
+
+def read_other(path: Path, folder: Folder, findings: Findings) -> Source:
+    """Read a file that is neither OBJ nor glTF, by its suffix.
+
+    Raises InputError for unknown suffixes and for what no library can read, and
+    MissingComponentError if pymeshlab is needed and cannot be imported.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in SUPPORTED:
+        raise InputError(
+            "PTM-I243",
+            f"models of type {suffix or '(no suffix)'} are not read",
+            file=path,
+            remedy=f"give one of {' '.join(SUPPORTED)}",
+        )
+    if suffix not in TRIMESH or (suffix == ".ply" and _textured_ply(path)):
+        return _read_meshlab(path, folder, findings)
+    try:
+        return _read_trimesh(path, findings)
+    except Exception as error:  # trimesh raises whatever a damaged file provokes
+        if isinstance(error, InputError):
+            raise
+        source = _read_meshlab(path, folder, findings)
+        findings.say(
+            "PTM-N230", f"read through pymeshlab, as trimesh gave up ({type(error).__name__})"
+        )
+        return source
+
+
+def _textured_ply(path: Path) -> bool:
+    with open(path, "rb") as stream:
+        return b"texturefile" in stream.read(_HEADER).split(b"end_header")[0].lower()
+
+
+def _read_trimesh(path: Path, findings: Findings) -> Source:
+    import trimesh
+
+    with open(path, "rb") as stream:
+        scene = trimesh.load_scene(stream, file_type=path.suffix.lower()[1:], process=False)
+    points, triangles, owner = [], [], []
+    names: list[str] = []
+    total = 0
+    for name in scene.graph.nodes_geometry:
+        matrix, geometry = scene.graph.get(name)
+        mesh = scene.geometry[geometry]
+        faces = np.asarray(getattr(mesh, "faces", np.zeros((0, 3))), dtype=np.int64)
+        local = np.asarray(mesh.vertices, dtype=np.float64)
+        if len(faces) and not 0 <= faces.min() <= faces.max() < len(local):
+            raise InputError("PTM-I246", "a face names a vertex that does not exist", file=path)
+        if getattr(mesh.visual, "kind", None) in ("vertex", "face"):
+            findings.say("PTM-N223", "colours of vertices and faces are not carried over")
+        points.append(local @ matrix[:3, :3].T + matrix[:3, 3])
+        triangles.append(faces + total)
+        owner.append(np.full(len(faces), len(names), dtype=np.int64))
+        names.append(path.stem if len(scene.geometry) == 1 else str(geometry))
+        total += len(local)
+    if not sum(len(faces) for faces in triangles):
+        raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with faces")
+    count = sum(len(faces) for faces in triangles)
+    return Source(
+        points=np.concatenate(points),
+        triangles=np.concatenate(triangles),
+        uv=np.zeros((count, 3, 2)),
+        triangle_object=np.concatenate(owner),
+        triangle_material=np.zeros(count, dtype=np.int64),
+        objects=tuple(names),
+        materials=(SourceMaterial("default"),),
+    )
+
+
+def _pymeshlab() -> Any:
+    try:
+        import pymeshlab
+    except ImportError as error:
+        raise MissingComponentError(
+            "PTM-M200",
+            f"pymeshlab cannot be imported ({error})",
+            remedy="pip install pymeshlab; apt install libgl1 libegl1; or convert to GLB",
+        ) from None
+    return pymeshlab
+
+
+def _read_meshlab(path: Path, folder: Folder, findings: Findings) -> Source:
+    pymeshlab = _pymeshlab()
+    from ptmtools.scene.obj import read_obj
+
+    meshes = pymeshlab.MeshSet()
+    parts = []
+    try:
+        meshes.load_new_mesh(str(path))
+        with tempfile.TemporaryDirectory() as scratch:
+            near = Folder(folder.root, folder.allow_outside, also=Path(scratch))
+            for mesh in meshes:
+                if not mesh.face_number():
+                    continue
+                meshes.set_current_mesh(mesh.id())
+                meshes.apply_matrix_freeze()
+                converted = Path(scratch) / f"{path.stem}_{mesh.id()}.obj"
+                meshes.save_current_mesh(
+                    str(converted),
+                    save_vertex_normal=False,
+                    save_vertex_color=False,
+                    save_textures=False,
+                )
+                part = read_obj(converted, near, findings)
+                parts.append(replace(part, objects=(mesh.label() or path.stem,)))
+    except pymeshlab.PyMeshLabException as error:
+        reason = str(error).splitlines()[0] if str(error) else "it gives no reason"
+        raise InputError(
+            "PTM-I254", f"pymeshlab cannot read it ({reason})", file=path, remedy="convert to GLB"
+        ) from None
+    if not parts:
+        raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with faces")
+    return _joined(parts)
+
+
+def _joined(parts: list[Source]) -> Source:
+    """One source of several, in order."""
+    points = np.cumsum([0] + [len(part.points) for part in parts])
+    objects = np.cumsum([0] + [len(part.objects) for part in parts])
+    materials = np.cumsum([0] + [len(part.materials) for part in parts])
+    return Source(
+        points=np.concatenate([part.points for part in parts]),
+        triangles=np.concatenate(
+            [part.triangles + n for part, n in zip(parts, points, strict=False)]
+        ),
+        uv=np.concatenate([part.uv for part in parts]),
+        triangle_object=np.concatenate(
+            [part.triangle_object + n for part, n in zip(parts, objects, strict=False)]
+        ),
+        triangle_material=np.concatenate(
+            [part.triangle_material + n for part, n in zip(parts, materials, strict=False)]
+        ),
+        objects=tuple(name for part in parts for name in part.objects),
+        materials=tuple(material for part in parts for material in part.materials),
+    )

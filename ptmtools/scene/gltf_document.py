@@ -1,0 +1,169 @@
+"""The container of a glTF model: its JSON, its buffers, and where in which file they lie.
+
+GLB chunks, data URIs and separate files all become `Buffer`s; sizes and ranges are checked
+before anything is made of them (glTF 2.0, sections 3.6 and 4.4).
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+from ptmtools.errors import InputError
+from ptmtools.scene.mtl import decode
+from ptmtools.scene.reference import Folder
+from ptmtools.scene.source import FileRange, HeldBytes
+
+_MAGIC, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
+
+
+@dataclass(frozen=True)
+class Buffer:
+    """The bytes of a buffer, and the file and offset they come from (no path: a data URI)."""
+
+    data: bytes
+    path: Path | None
+    offset: int = 0
+
+    def part(self, start: int, length: int) -> Callable[[], bytes]:
+        """A reader of ``length`` bytes from ``start``, for later."""
+        if self.path is None:
+            return HeldBytes(self.data[start : start + length])
+        return FileRange(self.path, self.offset + start, length)
+
+
+@dataclass(frozen=True)
+class Document:
+    """A glTF model: the parsed JSON and its buffers in order."""
+
+    tree: dict[str, Any]
+    buffers: tuple[Buffer, ...]
+
+    def view(self, index: int) -> tuple[Buffer, int, int]:
+        """Buffer, start and length of a buffer view; ValueError if it leaves the buffer."""
+        view = self.tree["bufferViews"][_natural(index)]
+        buffer = self.buffers[_natural(view["buffer"])]
+        start, length = _natural(view.get("byteOffset", 0)), _natural(view["byteLength"])
+        if start + length > len(buffer.data):
+            raise ValueError(f"buffer view {index} ends beyond its buffer")
+        return buffer, start, length
+
+
+def _natural(value: object) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise ValueError(f"{value!r} is not an index or a size")
+    return value
+
+
+def damaged(path: Path, what: str, place: str | None = None) -> InputError:
+    """The error for a file that is not what glTF 2.0 says."""
+    return InputError(
+        "PTM-I249",
+        f"not a valid glTF 2.0 model: {what}",
+        file=path,
+        place=place,
+        remedy="export or download it again",
+    )
+
+
+def open_document(path: Path, folder: Folder) -> Document:
+    """Read a .glb or .gltf file and all buffers it names.
+
+    Raises InputError where the container is damaged or a buffer is missing.
+    """
+    data = path.read_bytes()
+    binary: Buffer | None = None
+    if data[:4] == b"glTF":
+        text, binary = _chunks(path, data)
+    elif path.suffix.lower() == ".glb":
+        raise damaged(path, "the magic bytes are missing", "byte 0")
+    else:
+        text = data
+    try:
+        tree = json.loads(decode(text))
+    except (ValueError, RecursionError) as error:
+        raise damaged(path, f"its JSON cannot be read ({error})") from None
+    if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
+        raise damaged(path, "its JSON is no glTF document")
+    version = str(tree["asset"].get("version", ""))
+    if not version.startswith("2."):
+        raise damaged(path, f"version {version!r}")
+
+    buffers = []
+    for index, entry in enumerate(tree.get("buffers", [])):
+        place = f"buffer {index}"
+        if "uri" not in entry:
+            if binary is None or index:
+                raise damaged(path, "a buffer has no bytes", place)
+            buffer = binary
+        else:
+            buffer = _external(path, folder, str(entry["uri"]), place)
+        if len(buffer.data) < _natural(entry["byteLength"]):
+            raise damaged(
+                path, f"{entry['byteLength']} bytes expected, {len(buffer.data)} there", place
+            )
+        buffers.append(buffer)
+    return Document(tree, tuple(buffers))
+
+
+def _chunks(path: Path, data: bytes) -> tuple[bytes, Buffer | None]:
+    """The JSON and the binary chunk of a GLB file."""
+    if len(data) < 20:
+        raise damaged(path, "cut short", f"byte {len(data)}")
+    _, version, length = struct.unpack_from("<III", data)
+    if version != 2:
+        raise damaged(path, f"version {version}", "byte 4")
+    if length > len(data):
+        raise damaged(path, f"cut short, {length} bytes expected", f"byte {len(data)}")
+    text: bytes | None = None
+    binary: Buffer | None = None
+    at = 12
+    while at + 8 <= length:
+        size, kind = struct.unpack_from("<II", data, at)
+        at += 8
+        if at + size > length:
+            raise damaged(path, "a chunk ends beyond the file", f"byte {at - 8}")
+        if text is None:
+            if kind != _JSON:
+                raise damaged(path, "the first chunk is not JSON", f"byte {at - 8}")
+            text = data[at : at + size]
+        elif kind == _BINARY and binary is None:
+            binary = Buffer(data[at : at + size], path, at)
+        at += size
+    if text is None:
+        raise damaged(path, "no chunk", "byte 12")
+    return text, binary
+
+
+def _external(path: Path, folder: Folder, uri: str, place: str) -> Buffer:
+    if uri.startswith("data:"):
+        return Buffer(data_uri(path, uri, place), None)
+    found = folder.find(unquote(uri))
+    if found.path is None:
+        outside = found.outcome == "outside"
+        raise InputError(
+            "PTM-I205" if outside else "PTM-I203",
+            f"{uri[:80]}: " + ("lies outside the model's folder" if outside else "not found"),
+            file=path,
+            place=place,
+            remedy="allow reading outside of it" if outside else "put it beside the model",
+        )
+    return Buffer(found.path.read_bytes(), found.path)
+
+
+def data_uri(path: Path, uri: str, place: str) -> bytes:
+    """The bytes of a base64 data URI."""
+    head, comma, body = uri.partition(",")
+    try:
+        if not comma or not head.endswith(";base64"):
+            raise ValueError("not base64")
+        return base64.b64decode(unquote(body), validate=True)
+    except (ValueError, binascii.Error) as error:
+        raise damaged(path, f"data URI {head[:40]}: {error}", place) from None

@@ -1,0 +1,168 @@
+"""Materials, samplers and images of a glTF document (glTF 2.0, sections 3.8 and 3.9).
+
+Of the metallic-roughness model only the base colour is kept. Its factor is linear light, and the
+tint of the emitted files is not, so the factor is converted to sRGB; the product of tint and
+texel then differs from the linear product for partial tints, and the conversion is noted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.scene.gltf_document import Document, data_uri
+from ptmtools.scene.model import Wrap
+from ptmtools.scene.reference import Folder
+from ptmtools.scene.source import FileRange, Findings, HeldBytes, SourceMaterial, Texture
+
+_CLAMP, _MIRROR = 33071, 33648
+
+
+@dataclass(frozen=True)
+class Painted:
+    """How a material applies to a primitive.
+
+    Attributes
+    ----------
+    index: into `MaterialReader.materials`.
+    coords: the attribute with its texture coordinates.
+    matrix: (2, 3) KHR_texture_transform, origin at the upper left as glTF has it.
+    """
+
+    index: int
+    coords: str
+    matrix: NDArray[np.float64]
+
+
+class MaterialReader:
+    """Reads each material once, when a primitive first asks for it."""
+
+    def __init__(self, path: Path, document: Document, folder: Folder, findings: Findings) -> None:
+        self._path = path
+        self._document = document
+        self._folder = folder
+        self._findings = findings
+        self._painted: dict[int | None, Painted] = {}
+        self._materials: list[SourceMaterial] = []
+
+    @property
+    def materials(self) -> tuple[SourceMaterial, ...]:
+        return tuple(self._materials)
+
+    def read(self, index: int | None) -> Painted:
+        """The material of a primitive; None is the default material of the format."""
+        if index not in self._painted:
+            entry = {} if index is None else self._document.tree["materials"][index]
+            self._painted[index] = self._read(entry, index)
+        return self._painted[index]
+
+    def _read(self, entry: dict[str, Any], index: int | None) -> Painted:
+        place = f"material {index}"
+        name = str(entry.get("name") or ("default" if index is None else place))
+        extensions = entry.get("extensions", {})
+        base = entry.get("pbrMetallicRoughness", {})
+        factor = base.get("baseColorFactor", [1.0, 1.0, 1.0, 1.0])
+        use = base.get("baseColorTexture")
+        glossy = extensions.get("KHR_materials_pbrSpecularGlossiness")
+        if glossy is not None:
+            factor = glossy.get("diffuseFactor", [1.0, 1.0, 1.0, 1.0])
+            use = glossy.get("diffuseTexture")
+        r, g, b, a = (min(max(float(value), 0.0), 1.0) for value in factor)
+        if (r, g, b) != (1.0, 1.0, 1.0):
+            self._findings.say("PTM-N226", f"{name}: colour factor converted to sRGB", place)
+        mode = entry.get("alphaMode", "OPAQUE")
+        see_through = mode in ("MASK", "BLEND")
+        if extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0) > 0:
+            self._findings.say("PTM-N224", f"{name}: transmits light, never occludes", place)
+            see_through = True
+
+        texture, coords, matrix = None, "TEXCOORD_0", np.eye(2, 3)
+        if use is not None:
+            texture = self._texture(use["index"], place)
+            moved = use.get("extensions", {}).get("KHR_texture_transform", {})
+            matrix = _transform(moved)
+            coords = f"TEXCOORD_{moved.get('texCoord', use.get('texCoord', 0))}"
+            if moved:
+                self._findings.say(
+                    "PTM-N216", f"{name}: KHR_texture_transform is baked into its faces", place
+                )
+        self._materials.append(
+            SourceMaterial(
+                name=name,
+                color=(_encoded(r), _encoded(g), _encoded(b)),
+                opacity=a if mode == "BLEND" else 1.0,
+                see_through=see_through,
+                two_sided=bool(entry.get("doubleSided", False)),
+                texture=texture,
+            )
+        )
+        return Painted(len(self._materials) - 1, coords, matrix)
+
+    def _texture(self, index: int, place: str) -> Texture | None:
+        tree = self._document.tree
+        texture = tree["textures"][index]
+        sampler = tree["samplers"][texture["sampler"]] if "sampler" in texture else {}
+        source = texture.get("source")
+        for name in ("EXT_texture_webp", "KHR_texture_basisu"):
+            source = texture.get("extensions", {}).get(name, {}).get("source", source)
+        what = f"texture {index}"
+        if source is None:
+            self._findings.miss("PTM-N204", f"{what}: names no image", place)
+            return None
+        image = tree["images"][source]
+        uri = image.get("uri")
+        label = str(image.get("name") or f"image_{source}")
+        if "bufferView" in image:
+            buffer, start, length = self._document.view(image["bufferView"])
+            read = buffer.part(start, length)
+        elif uri is not None and uri.startswith("data:"):
+            read = HeldBytes(data_uri(self._path, uri, f"image {source}"))
+        else:
+            what = unquote(str(uri))
+            found = self._folder.find(what)
+            if found.path is None:
+                if found.outcome == "outside":
+                    self._findings.miss(
+                        "PTM-N205", f"{what}: lies outside the model's folder", place
+                    )
+                else:
+                    self._findings.miss("PTM-N204", f"{what}: not found", place)
+                return None
+            if found.outcome == "elsewhere":
+                self._findings.say(
+                    "PTM-N208", f"{what}: found as {self._folder.label(found.path)}", place
+                )
+            read, label = FileRange(found.path), PurePosixPath(found.path).name
+        return Texture(
+            read=read,
+            label=label,
+            what=what,
+            place=place,
+            wrap_s=self._wrap(sampler.get("wrapS"), what, place),
+            wrap_t=self._wrap(sampler.get("wrapT"), what, place),
+        )
+
+    def _wrap(self, mode: int | None, what: str, place: str) -> Wrap:
+        if mode == _MIRROR:
+            self._findings.say("PTM-N222", f"{what}: mirrored repeat becomes repeat", place)
+        return "clamp" if mode == _CLAMP else "repeat"
+
+
+def _encoded(linear: float) -> float:
+    """Linear light to sRGB (IEC 61966-2-1)."""
+    if linear <= 0.0031308:
+        return 12.92 * linear
+    return 1.0 if linear >= 1 else float(1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+def _transform(given: dict[str, Any]) -> NDArray[np.float64]:
+    """(2, 3) matrix of KHR_texture_transform: scale, then rotation, then offset."""
+    offset = np.array(given.get("offset", [0.0, 0.0]), dtype=np.float64)
+    scale = np.array(given.get("scale", [1.0, 1.0]), dtype=np.float64)
+    c, s = np.cos(given.get("rotation", 0.0)), np.sin(given.get("rotation", 0.0))
+    return np.column_stack([np.array([[c, s], [-s, c]]) * scale, offset])

@@ -1,0 +1,330 @@
+"""Ingest: a model file becomes a `Scene` in world metres, Y up.
+
+A reader turns the file into triangles as the model has them (`obj`, `gltf`, `formats`); faces are
+then cleaned, the space is settled, and of the materials and images those are kept that some
+remaining face uses. What was guessed, dropped or missed stands in the notes.
+
+Notes: N201 unit guessed, N202 up axis guessed, N203 library of materials missing, N204 texture
+missing, N205 a file outside the model's folder, N206 image unreadable, N207 unknown material,
+N208 file found in another folder than named, N209 degenerate faces dropped, N210 faces with
+coordinates that are not finite dropped, N211 and N212 duplicates dropped (of the same material,
+of another), N213 coincident faces of opposite winding, N214 statement not understood, N215
+texture option ignored, N216 scale and offset baked, N217 mask not carried over, N218 material
+defined twice, N219 statements skipped, N220 faces of fewer than three corners, N221 polygons
+that cross themselves, N222 mirrored wrap, N223 vertex colours, N224 glTF feature not carried
+over, N225 camera skipped, N226 colour factor converted to sRGB, N227 size implausible, N228
+texture coordinates not finite, N229 textured faces without texture coordinates, N230 read
+through another library, N231 material that cannot be seen.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.errors import InputError, LimitError
+from ptmtools.progress import Progress, silent
+from ptmtools.scene import space as spaces
+from ptmtools.scene.faces import KeptFaces, keep_faces
+from ptmtools.scene.images import ImageStore
+from ptmtools.scene.model import Camera, Material, Scene, Space
+from ptmtools.scene.reference import Folder
+from ptmtools.scene.source import MAX_VERTICES, Findings, Source
+from ptmtools.scene.texels import uses_holes
+
+#: A scene of less than a micrometre or more than a million kilometres is a mistake in the unit;
+#: in between, products of coordinates stay far from the ends of float64 and float32.
+SMALLEST_EXTENT, LARGEST_EXTENT = 1e-6, 1e9
+#: Colours where the model gives none: plain faces, and a tint that leaves an image as it is.
+PLAIN, WHITE = (0.8, 0.8, 0.8), (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class IngestOptions:
+    """How a model is read.
+
+    Attributes
+    ----------
+    unit: m, cm, mm, in, ft or the metres in one unit; None guesses from the size.
+    up: the model's up axis, "y" or "z"; None guesses from floor area and size.
+    strict: missing files, unknown materials, unreadable images and dropped faces are errors.
+    allow_outside: the model may name files outside its own folder.
+    """
+
+    unit: str | float | None = None
+    up: Literal["y", "z"] | None = None
+    strict: bool = False
+    allow_outside: bool = False
+
+
+def ingest(
+    path: str | os.PathLike[str],
+    options: IngestOptions = IngestOptions(),
+    progress: Progress = silent,
+) -> Scene:
+    """Read a model file.
+
+    Parameters
+    ----------
+    path: an OBJ, GLB, glTF, PLY, STL, OFF, DAE, 3DS, 3MF, X3D, VRML or CTM file.
+    options: see `IngestOptions`.
+    progress: called with bytes while reading, then with images.
+
+    Returns
+    -------
+    The scene, see `ptmtools.scene.model.Scene`; at least one triangle.
+
+    Raises
+    ------
+    InputError: the file is absent, empty, damaged, of an unknown kind, or has no usable face;
+        with ``strict`` also for anything that it asks for and does not get.
+    LimitError: more vertices than int32 can number, or a size that cannot be right.
+    MissingComponentError: a format needs a library that is not installed.
+    """
+    model = Path(path)
+    metres = None if options.unit is None else spaces.parse_unit(options.unit)
+    if options.up not in (None, "y", "z"):
+        raise InputError("PTM-I251", f"up axis {options.up!r} is not known", remedy="give y or z")
+    _check_file(model)
+    findings = Findings(model)
+    source = _read(model, Folder(model.parent, options.allow_outside), findings, progress)
+    if len(source.points) > MAX_VERTICES or len(source.triangles) > MAX_VERTICES:
+        raise LimitError("PTM-L200", f"more than {MAX_VERTICES} vertices or faces", file=model)
+
+    kept = keep_faces(source.points, source.triangles)
+    if not len(kept.triangles):
+        raise InputError(
+            "PTM-I248",
+            f"none of the {len(source.triangles)} faces has an area "
+            f"({kept.degenerate} degenerate, {kept.not_finite} with coordinates not finite)",
+            file=model,
+        )
+    _tell_faces(kept, source, findings)
+    space = _settle_space(model, kept, source, metres, options.up, findings)
+    uv = source.uv[kept.source]
+    finite_uv: NDArray[np.bool_] = np.isfinite(uv).all(axis=(1, 2))
+    if not finite_uv.all():
+        findings.say(
+            "PTM-N228",
+            "texture coordinates that are not finite count as 0",
+            "",
+            int((~finite_uv).sum()),
+        )
+        uv = np.where(finite_uv[:, None, None], uv, 0.0)
+
+    used_material, triangle_material = _in_use(source.triangle_material[kept.source])
+    used_object, triangle_object = _in_use(source.triangle_object[kept.source])
+    store = ImageStore(findings)
+    materials = []
+    for done, index in enumerate(used_material.tolist()):
+        progress(done, len(used_material), "materials")
+        faces = triangle_material == done
+        materials.append(_material(source, index, uv, faces, store, findings))
+    progress(len(used_material), len(used_material), "materials")
+    if options.strict:
+        findings.enforce()
+    return Scene(
+        points=_to_world(kept.points, space),
+        triangles=kept.triangles.astype(np.int32),
+        uv=uv,
+        triangle_object=triangle_object.astype(np.int32),
+        triangle_material=triangle_material.astype(np.int32),
+        two_sided=_two_sided(kept, source),
+        objects=tuple(source.objects[i] for i in used_object.tolist()),
+        materials=tuple(materials),
+        images=store.images,
+        cameras=tuple(_camera(camera, space) for camera in source.cameras),
+        space=space,
+        notes=findings.notes,
+    )
+
+
+def _check_file(model: Path) -> None:
+    try:
+        if model.is_dir():
+            raise InputError(
+                "PTM-I241", "is a directory", file=model, remedy="name the model file in it"
+            )
+        if not model.exists():
+            raise InputError("PTM-I240", "no such file", file=model)
+        if not model.is_file():
+            raise InputError("PTM-I240", "not a regular file", file=model)
+        with open(model, "rb") as stream:
+            if not stream.read(1):
+                raise InputError("PTM-I242", "empty file", file=model)
+    except OSError as error:
+        raise InputError("PTM-I256", error.strerror or str(error), file=model) from None
+    except ValueError as error:  # a NUL byte in the name
+        raise InputError("PTM-I240", f"no such file ({error})", file=model) from None
+
+
+def _read(model: Path, folder: Folder, findings: Findings, progress: Progress) -> Source:
+    suffix = model.suffix.lower()
+    try:
+        if suffix == ".obj":
+            from ptmtools.scene.obj import read_obj
+
+            return read_obj(model, folder, findings, progress)
+        if suffix in (".glb", ".gltf"):
+            from ptmtools.scene.gltf import read_gltf
+
+            return read_gltf(model, folder, findings)
+        from ptmtools.scene.formats import read_other
+
+        return read_other(model, folder, findings)
+    except OSError as error:
+        raise InputError(
+            "PTM-I256", error.strerror or str(error), file=error.filename or model
+        ) from None
+
+
+def _tell_faces(kept: KeptFaces, source: Source, findings: Findings) -> None:
+    if kept.degenerate:
+        findings.miss("PTM-N209", "degenerate faces dropped", "", kept.degenerate)
+    if kept.not_finite:
+        findings.miss("PTM-N210", "faces with coordinates not finite dropped", "", kept.not_finite)
+    dropped = np.flatnonzero((kept.also >= 0) & (kept.also != np.arange(len(kept.also))))
+    material = source.triangle_material
+    other = int((material[dropped] != material[kept.also[dropped]]).sum())
+    if len(dropped) - other:
+        findings.say("PTM-N211", "duplicate faces dropped", "", len(dropped) - other)
+    if other:
+        findings.say(
+            "PTM-N212", "duplicate faces of another material dropped, the first kept", "", other
+        )
+    pairs = int(kept.paired.sum()) // 2
+    if pairs:
+        findings.say(
+            "PTM-N213",
+            "pairs of coincident faces with opposite winding; each shows on its own side",
+            "",
+            pairs,
+        )
+
+
+def _two_sided(kept: KeptFaces, source: Source) -> NDArray[np.bool_]:
+    """(T,) a kept face has a back if it or a duplicate of it has, and if nothing lies there."""
+    backed = np.array([m.two_sided for m in source.materials], dtype=bool)
+    position = np.full(len(kept.also), -1, dtype=np.int64)
+    position[kept.source] = np.arange(len(kept.source))
+    standing = kept.also >= 0
+    result = np.zeros(len(kept.source), dtype=bool)
+    np.logical_or.at(
+        result,
+        position[kept.also[standing]],
+        backed[source.triangle_material[standing]],
+    )
+    return result & ~kept.paired
+
+
+def _settle_space(
+    model: Path,
+    kept: KeptFaces,
+    source: Source,
+    metres: float | None,
+    up: Literal["y", "z"] | None,
+    findings: Findings,
+) -> Space:
+    low, high = kept.points.min(axis=0), kept.points.max(axis=0)
+    with np.errstate(over="ignore"):
+        side = high - low
+    if not np.isfinite(side).all():
+        raise LimitError("PTM-L201", "coordinates are too large for float64", file=model)
+    up_guessed = unit_guessed = False
+    if up is None:
+        up = source.up
+    if up is None:
+        up, why = spaces.guess_up(kept.points[kept.triangles])
+        up_guessed = True
+        findings.say("PTM-N202", f"up axis guessed: {up} ({why}); give --up to override")
+    width, height = (max(side[0], side[2]), side[1]) if up == "y" else (max(side[:2]), side[2])
+    guess, why = spaces.guess_unit(float(width), float(height))
+    if metres is None and source.metres is None:
+        metres, unit_guessed = spaces.UNITS[guess], True
+        findings.say("PTM-N201", f"unit guessed: {guess} ({why}); give --unit to override")
+    elif metres is None:
+        metres = source.metres
+        assert metres is not None
+        if spaces.UNITS[guess] != metres:
+            findings.say(
+                "PTM-N227",
+                f"the format is in metres, but {guess} would be more likely ({why}); "
+                "give --unit to override",
+            )
+    extent = float(side.max()) * metres
+    if not SMALLEST_EXTENT <= extent <= LARGEST_EXTENT:
+        raise LimitError(
+            "PTM-L201",
+            f"the scene would be {extent:.3g} m large",
+            file=model,
+            remedy=f"give a --unit that makes it {SMALLEST_EXTENT:g} to {LARGEST_EXTENT:g} m",
+        )
+    origin = low + side / 2
+    floor = 1 if up == "y" else 2
+    origin[floor] = low[floor]
+    x, y, z = origin.tolist()
+    return Space((x, y, z), metres, up, unit_guessed, up_guessed)
+
+
+def _to_world(points: NDArray[np.float64], space: Space) -> NDArray[np.float64]:
+    return spaces.turned((points - np.array(space.origin)) * space.metres, space.up)
+
+
+def _camera(camera: Camera, space: Space) -> Camera:
+    position = _to_world(np.array([camera.position]), space)[0].tolist()
+    direction = spaces.turned(np.array([camera.direction]), space.up)[0].tolist()
+    return Camera(camera.name, tuple(position), tuple(direction), camera.field_of_view)
+
+
+def _in_use(index: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The distinct values in use, ascending, and for each entry its place among them."""
+    used, place = np.unique(index, return_inverse=True)
+    return used, place.reshape(-1)
+
+
+def _material(
+    source: Source,
+    index: int,
+    uv: NDArray[np.float64],
+    faces: NDArray[np.bool_],
+    store: ImageStore,
+    findings: Findings,
+) -> Material:
+    """The material as its kept ``faces`` (T,) need it."""
+    given = source.materials[index]
+    texture = given.texture
+    image = -1
+    transparent = given.see_through or given.opacity < 1
+    if texture is not None:
+        decoded = store.add(texture)
+        if decoded is not None:
+            image = decoded.index
+            if decoded.holes is not None and not transparent:
+                transparent = uses_holes(decoded.holes, uv[faces], texture.wrap_s, texture.wrap_t)
+    if given.mask is not None:
+        mask = given.mask
+        holes = store.mask_holes(mask)
+        if holes is not None and uses_holes(holes, uv[faces], mask.wrap_s, mask.wrap_t):
+            transparent = True
+            if texture is None or mask.label != texture.label:
+                findings.say(
+                    "PTM-N217",
+                    f"{mask.what}: marks the material transparent, and is not emitted",
+                    mask.place,
+                )
+    if given.opacity == 0:
+        findings.say("PTM-N231", f"material {given.name} cannot be seen (opacity 0)")
+    return Material(
+        name=given.name,
+        color=given.color or (PLAIN if image < 0 else WHITE),
+        opacity=given.opacity,
+        image=image,
+        wrap_s=texture.wrap_s if texture else "repeat",
+        wrap_t=texture.wrap_t if texture else "repeat",
+        transparent=transparent,
+    )

@@ -1,0 +1,378 @@
+"""Reads Wavefront OBJ.
+
+A reader of our own rather than trimesh's: trimesh 5.2 merges the faces of a material over all
+objects, drops the names of groups, the lines that libraries and textures came from and the
+options of ``map_Kd``, cuts concave polygons as fans, and passes over files that are missing.
+Statements are read line by line into flat arrays (about 40 bytes a corner); a million triangles
+take a few seconds. Normals, smoothing groups and vertex colours are not used by later stages and
+are skipped; curves, lines and points are skipped and counted.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from io import TextIOWrapper
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.errors import InputError, LimitError
+from ptmtools.progress import Progress, silent
+from ptmtools.scene.model import Wrap
+from ptmtools.scene.mtl import MapStatement, MtlMaterial, read_mtl
+from ptmtools.scene.polygon import triangulate
+from ptmtools.scene.reference import Folder
+from ptmtools.scene.source import (
+    MAX_VERTICES,
+    FileRange,
+    Findings,
+    Source,
+    SourceMaterial,
+    Texture,
+)
+
+#: Statements that say nothing about surfaces, skipped without a word.
+# fmt: off
+_SILENT = frozenset({
+    "vn", "vp", "s", "mg", "bevel", "c_interp", "d_interp", "lod", "shadow_obj", "trace_obj",
+    "maplib", "usemap", "cstype", "deg", "bmat", "step", "parm", "trim", "hole", "scrv", "sp",
+    "end", "con", "ctech", "stech", "call", "csh",
+})
+# fmt: on
+#: Statements that would draw something that is not a surface of triangles.
+_NOT_DRAWN = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "surf": "surfaces"}
+_LINES_A_TICK = 1 << 16
+
+
+@dataclass
+class _Statements:
+    """The statements of a file: flat arrays, and for names the line where each first stands."""
+
+    points: array[float] = field(default_factory=lambda: array("d"))
+    coords: array[float] = field(default_factory=lambda: array("d"))
+    corner_point: array[int] = field(default_factory=lambda: array("q"))
+    corner_coord: array[int] = field(default_factory=lambda: array("q"))
+    face_start: array[int] = field(default_factory=lambda: array("q", [0]))
+    face_line: array[int] = field(default_factory=lambda: array("q"))
+    face_object: array[int] = field(default_factory=lambda: array("q"))
+    face_material: array[int] = field(default_factory=lambda: array("q"))
+    objects: dict[str, int] = field(default_factory=dict)
+    materials: dict[str, int] = field(default_factory=dict)
+    material_line: list[int] = field(default_factory=list)
+    libraries: list[tuple[str, int]] = field(default_factory=list)
+    unknown: dict[str, list[int]] = field(default_factory=dict)
+
+
+def read_obj(path: Path, folder: Folder, findings: Findings, progress: Progress = silent) -> Source:
+    """Read an OBJ file with its materials.
+
+    Raises InputError with the line for what cannot be read, and where there is no face at all;
+    LimitError for more vertices than int32 can number.
+    """
+    said = _read_statements(path, findings, progress)
+    for key, lines in said.unknown.items():
+        what = _NOT_DRAWN.get(key, "not known")
+        findings.say("PTM-N219", f"{key}: {what}, skipped", f"{path.name}:{lines[0]}", len(lines))
+    if not said.face_line:
+        garbage = next(iter(said.unknown.values()), None) if not said.points else None
+        raise InputError(
+            "PTM-I247",
+            "not an OBJ file" if garbage else "no faces",
+            file=path,
+            place=f"line {garbage[0]}" if garbage else None,
+            remedy="give a model with f statements",
+        )
+    start = np.frombuffer(said.face_start, dtype=np.int64)
+    line = np.frombuffer(said.face_line, dtype=np.int64)
+    points = np.frombuffer(said.points, dtype=np.float64).reshape(-1, 3)
+    coords = np.frombuffer(said.coords, dtype=np.float64).reshape(-1, 2)
+    corner_point = np.frombuffer(said.corner_point, dtype=np.int64)
+    corner_coord = np.frombuffer(said.corner_coord, dtype=np.int64)
+    for corner, count, what in (
+        (corner_point, len(points), "vertex"),
+        (corner_coord, len(coords), "texture coordinate"),
+    ):
+        wrong = np.flatnonzero(corner >= count)
+        if len(wrong):
+            face = int(np.searchsorted(start, wrong[0], side="right")) - 1
+            raise InputError(
+                "PTM-I246",
+                f"{what} {corner[wrong[0]] + 1} does not exist, there are {count}",
+                file=path,
+                place=f"line {line[face]}",
+                remedy="the file may be cut short",
+            )
+
+    cut = triangulate(points[corner_point], start)
+    if cut.tangled:
+        findings.say(
+            "PTM-N221", "polygons cross themselves and were cut as fans", path.name, cut.tangled
+        )
+    coord = corner_coord[cut.corner]
+    uv = np.zeros((len(coord), 3, 2))
+    uv[coord >= 0] = coords[coord[coord >= 0]]
+    face_material = np.frombuffer(said.face_material, dtype=np.int64)
+    materials, maps = _materials(path, said, folder, findings, np.unique(face_material))
+    triangle_material = face_material[cut.polygon]
+    for index, statement in maps.items():
+        which = triangle_material == index
+        uv[which] = uv[which] * statement.scale + statement.offset
+        bare = np.unique(cut.polygon[which & (coord < 0).any(axis=1)])
+        if len(bare):
+            findings.say(
+                "PTM-N229",
+                f"faces of the textured material {materials[index].name} have no vt",
+                f"{path.name}:{line[bare[0]]}",
+                len(bare),
+            )
+    return Source(
+        points=points,
+        triangles=corner_point[cut.corner],
+        uv=uv,
+        triangle_object=np.frombuffer(said.face_object, dtype=np.int64)[cut.polygon],
+        triangle_material=triangle_material,
+        objects=tuple(said.objects),
+        materials=materials,
+    )
+
+
+def _name(text: str) -> str:
+    """A name as it was meant: the stream is read as Latin-1, most files are UTF-8."""
+    try:
+        return text.encode("latin-1").decode("utf-8")
+    except UnicodeDecodeError:
+        return text
+
+
+def _rest(line: str, key: str) -> str:
+    """What follows the keyword; only blanks are trimmed (a stray UTF-8 byte may look like one)."""
+    return _name(line.strip(" \t\r\n")[len(key) :].strip(" \t"))
+
+
+def _logical_lines(stream: TextIO) -> Iterator[tuple[int, str]]:
+    """Lines with their numbers from 1; a backslash at the end joins the next one."""
+    number = 0
+    for line in stream:
+        number += 1
+        first = number
+        while line.endswith("\\\n"):
+            number += 1
+            following = next(stream, "")
+            line = line[:-2] + " " + following
+        yield first, line
+
+
+def _read_statements(path: Path, findings: Findings, progress: Progress) -> _Statements:
+    said = _Statements()
+    points, coords = said.points, said.coords
+    size = path.stat().st_size
+    object_name = group_name = ""
+    object_index = material_index = -1
+    short: list[int] = []
+
+    with open(path, "rb") as raw, TextIOWrapper(raw, encoding="latin-1") as stream:
+        for number, line in _logical_lines(stream):
+            if not number % _LINES_A_TICK:
+                progress(raw.tell(), size, "reading")
+            words = line.split()
+            if not words:
+                continue
+            key = words[0]
+            if number == 1:
+                key = key.removeprefix("\u00ef\u00bb\u00bf")  # a byte order mark
+            if key.startswith("#"):
+                continue
+            if key in ("v", "vt", "f") and "#" in line:
+                words = line[: line.index("#")].split()
+            try:
+                if key == "v":
+                    points.extend(map(float, words[1:4]))
+                    if len(words) < 4:
+                        raise ValueError("a vertex has three coordinates")
+                elif key == "vt":
+                    coords.append(float(words[1]))
+                    coords.append(float(words[2]) if len(words) > 2 else 0.0)
+                elif key == "f":
+                    if len(words) < 4:
+                        short.append(number)
+                        continue
+                    if object_index < 0:
+                        name = "/".join(part for part in (object_name, group_name) if part)
+                        object_index = said.objects.setdefault(name or path.stem, len(said.objects))
+                    if material_index < 0:
+                        material_index = _material(said, "", number)
+                    _face(said, words)
+                    said.face_line.append(number)
+                    said.face_object.append(object_index)
+                    said.face_material.append(material_index)
+                elif key == "usemtl":
+                    material_index = _material(said, _rest(line, "usemtl"), number)
+                elif key == "o":
+                    object_name, group_name, object_index = _rest(line, "o"), "", -1
+                elif key == "g":
+                    group_name, object_index = _rest(line, "g"), -1
+                elif key == "mtllib":
+                    said.libraries.append((_rest(line, "mtllib"), number))
+                elif key not in _SILENT:
+                    if "\0" in line:
+                        raise ValueError("binary data")
+                    said.unknown.setdefault(key[:40], []).append(number)
+            except (ValueError, IndexError, OverflowError) as error:
+                raise InputError(
+                    "PTM-I245",
+                    f"{line.strip()[:60]!r} is not understood"
+                    + ("" if isinstance(error, IndexError) else f" ({error})"),
+                    file=path,
+                    place=f"line {number}",
+                ) from None
+    if len(points) // 3 > MAX_VERTICES:
+        raise LimitError(
+            "PTM-L200", f"more than {MAX_VERTICES} vertices", file=path, remedy="split the model"
+        )
+    if short:
+        findings.miss(
+            "PTM-N220", "faces of fewer than three corners", f"{path.name}:{short[0]}", len(short)
+        )
+    progress(size, size, "reading")
+    return said
+
+
+def _material(said: _Statements, name: str, line: int) -> int:
+    index = said.materials.setdefault(name, len(said.materials))
+    if index == len(said.material_line):
+        said.material_line.append(line)
+    return index
+
+
+def _face(said: _Statements, words: list[str]) -> None:
+    """Append the corners of a face: ``p``, ``p/t``, ``p//n`` or ``p/t/n``; -1 is the last one."""
+    for word in words[1:]:
+        parts = word.split("/")
+        point = int(parts[0])
+        coord = int(parts[1]) if len(parts) > 1 and parts[1] else None
+        if point < 0:
+            point += len(said.points) // 3 + 1
+        if coord is not None and coord < 0:
+            coord += len(said.coords) // 2 + 1
+        if point < 1 or (coord is not None and coord < 1):
+            raise ValueError(f"{word} counts back beyond the first, or is 0")
+        said.corner_point.append(point - 1)
+        said.corner_coord.append(-1 if coord is None else coord - 1)
+    said.face_start.append(len(said.corner_point))
+
+
+def _library_names(text: str) -> list[str]:
+    """The files of a mtllib statement: several, divided by blanks that names may contain too."""
+    names: list[str] = []
+    pending: list[str] = []
+    for word in text.split(" "):
+        pending.append(word)
+        if word.lower().rstrip("\"'").endswith(".mtl"):
+            names.append(" ".join(pending).strip())
+            pending = []
+    rest = " ".join(pending).strip()
+    return [*names, rest] if rest else names
+
+
+def _materials(
+    path: Path,
+    said: _Statements,
+    folder: Folder,
+    findings: Findings,
+    used: NDArray[np.int64],
+) -> tuple[tuple[SourceMaterial, ...], dict[int, MapStatement]]:
+    """All materials, and the map_Kd of those that have one."""
+    defined: dict[str, MtlMaterial] = {}
+    for text, line in said.libraries:
+        place = f"{path.name}:{line}"
+        for name in _library_names(text):
+            found = folder.find(name)
+            if found.path is None:
+                if found.outcome == "outside":
+                    findings.miss(
+                        "PTM-N205", f"mtllib {name}: lies outside the model's folder", place
+                    )
+                else:
+                    findings.miss("PTM-N203", f"mtllib {name}: not found", place)
+                continue
+            label = folder.label(found.path)
+            if found.outcome == "elsewhere":
+                findings.say("PTM-N208", f"mtllib {name}: found as {label}", place)
+            for key, material in read_mtl(found.path, label, findings).items():
+                defined.setdefault(key, material)
+
+    materials: list[SourceMaterial] = []
+    maps: dict[int, MapStatement] = {}
+    wanted = set(used.tolist())
+    for index, (name, line) in enumerate(zip(said.materials, said.material_line, strict=True)):
+        known = defined.get(name)
+        if known is None:
+            if name and index in wanted:
+                findings.miss("PTM-N207", f"usemtl {name}: no such material", f"{path.name}:{line}")
+            materials.append(SourceMaterial(name or "default"))
+            continue
+        texture = mask = None
+        if index in wanted:
+            texture = _texture(known, "map_Kd", known.map_kd, folder, findings)
+            mask = _texture(known, "map_d", known.map_d, folder, findings)
+        if texture is not None and known.map_kd is not None:
+            maps[index] = known.map_kd
+        materials.append(
+            SourceMaterial(
+                name=name,
+                color=known.color,
+                opacity=known.dissolve,
+                # A mask that cannot be read: better see too much than too little.
+                see_through=known.dissolve < 1 or (known.map_d is not None and mask is None),
+                texture=texture,
+                mask=mask,
+            )
+        )
+    return tuple(materials), maps
+
+
+def _texture(
+    material: MtlMaterial,
+    key: str,
+    statement: MapStatement | None,
+    folder: Folder,
+    findings: Findings,
+) -> Texture | None:
+    if statement is None:
+        return None
+    library = folder.label(material.library)
+    place = f"{library}:{statement.line}"
+    what = f"{key} {statement.file}"
+    found = folder.find(statement.file, material.library.parent)
+    if found.path is None:
+        if found.outcome == "outside":
+            findings.miss("PTM-N205", f"{what}: lies outside the model's folder", place)
+        else:
+            findings.miss("PTM-N204", f"{what}: not found", place)
+        return None
+    if found.outcome == "elsewhere":
+        findings.say("PTM-N208", f"{what}: found as {folder.label(found.path)}", place)
+    if statement.ignored:
+        findings.say("PTM-N215", f"{what}: ignored {' '.join(statement.ignored)}", place)
+    if statement.scale != (1.0, 1.0) or statement.offset != (0.0, 0.0):
+        if key == "map_Kd":
+            findings.say("PTM-N216", f"{what}: -s and -o are baked into its faces", place)
+        elif material.map_kd is None or (statement.scale, statement.offset) != (
+            material.map_kd.scale,
+            material.map_kd.offset,
+        ):
+            findings.say("PTM-N215", f"{what}: ignored -s -o", place)
+    wrap: Wrap = "clamp" if statement.clamp else "repeat"
+    return Texture(
+        read=FileRange(found.path),
+        label=found.path.name,
+        what=what,
+        place=place,
+        wrap_s=wrap,
+        wrap_t=wrap,
+        channel=statement.channel,
+    )

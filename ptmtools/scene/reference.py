@@ -1,0 +1,112 @@
+"""Finds the files that a model names: libraries of materials, textures, buffers.
+
+What a model says and what lies on the disk differ in known ways: backslashes, drive letters and
+leading slashes of the author's machine, upper and lower case, composed and decomposed umlauts.
+All of these are tried, inside the model's folder. Reads outside of that folder, also by way of a
+symbolic link, are refused unless asked for.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+Outcome = Literal["found", "elsewhere", "outside", "missing"]
+
+
+def _fold(name: str) -> str:
+    return unicodedata.normalize("NFC", name).casefold()
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The result of a search: a path unless it is "outside" or "missing"; "elsewhere" means that
+    only the end of the name was found, under another folder than the model says."""
+
+    outcome: Outcome
+    path: Path | None = None
+
+
+class Folder:
+    """The folder of a model, searched without regard to case where nothing else is found.
+
+    ``also`` is a second folder that may be read, for files made on the way.
+    """
+
+    def __init__(self, root: Path, allow_outside: bool = False, also: Path | None = None) -> None:
+        self.root = root
+        self.allow_outside = allow_outside
+        self._roots = [root] if also is None else [root, also]
+        self._real = [folder.resolve() for folder in self._roots]
+        self._listing: dict[Path, dict[str, str]] = {}
+
+    def find(self, reference: str, base: Path | None = None) -> Reference:
+        """Find the file called ``reference`` in a file that lies in ``base`` (default: root).
+
+        Tried in this order: the name as it stands; the name below ``base`` and below the root;
+        with ``allow_outside`` an absolute name; then ever shorter ends of the name, which serves
+        absolute paths of another machine.
+        """
+        base = self.root if base is None else base
+        bases = [base, *(folder for folder in self._roots if folder != base)]
+        name = reference.strip(" \t\r\n")
+        if len(name) > 1 and name[0] == name[-1] and name[0] in "\"'":
+            name = name[1:-1]
+        slashed = re.sub(r"^file://", "", name, flags=re.IGNORECASE).replace("\\", "/")
+        local = re.sub(r"^[A-Za-z]:", "", slashed)
+        absolute = local.startswith("/") or local != slashed
+        parts = [part for part in local.split("/") if part not in ("", ".")]
+        outside = False
+
+        tries: list[tuple[Path, list[str], Outcome]] = []
+        if "\\" in name:  # an archive unpacked where a backslash is a letter like any other
+            tries += [(b, [name], "found") for b in bases]
+        if not absolute:
+            tries += [(b, parts, "found") for b in bases]
+        elif self.allow_outside:
+            tries.append((Path("/"), parts, "found"))
+        for first in range(0 if absolute else 1, len(parts)):
+            if ".." not in parts[first:]:
+                tries += [(b, parts[first:], "elsewhere") for b in bases]
+        for start, steps, outcome in tries:
+            path = self._walk(start, steps)
+            if path is None:
+                continue
+            real = path.resolve()
+            if self.allow_outside or any(real.is_relative_to(folder) for folder in self._real):
+                return Reference(outcome, path)
+            outside = True
+        if absolute and not self.allow_outside and not outside:
+            outside = self._walk(Path("/"), parts) is not None
+        return Reference("outside" if outside else "missing")
+
+    def label(self, path: Path) -> str:
+        """The path as notes show it: below the model's folder, or else the bare name."""
+        return str(path.relative_to(self.root)) if path.is_relative_to(self.root) else path.name
+
+    def _walk(self, start: Path, steps: list[str]) -> Path | None:
+        here = start
+        try:
+            for step in steps:
+                if step == "..":
+                    here = here / step
+                    continue
+                exact = here / step
+                if not exact.exists():
+                    listing = self._list(here)
+                    if _fold(step) not in listing:
+                        return None
+                    exact = here / listing[_fold(step)]
+                here = exact
+            return here if steps and here.is_file() else None
+        except (OSError, ValueError):  # a name too long, or with a NUL byte
+            return None
+
+    def _list(self, folder: Path) -> dict[str, str]:
+        if folder not in self._listing:
+            names = sorted((entry.name for entry in folder.iterdir()), reverse=True)
+            self._listing[folder] = {_fold(name): name for name in names}
+        return self._listing[folder]

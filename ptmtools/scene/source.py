@@ -1,0 +1,160 @@
+"""What a reader makes of a model file, before anything is judged, dropped or moved.
+
+Coordinates are the file's own. A reader resolves the names of textures to something that can be
+read, but opens no image: which of them some surface uses is known only after the faces have been
+cleaned.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.errors import InputError
+from ptmtools.scene.model import Camera, Note, Wrap
+
+#: `Scene.triangles` is int32: more vertices cannot be numbered.
+MAX_VERTICES = 2**31 - 1
+
+
+@dataclass(frozen=True)
+class FileRange:
+    """Reads bytes of a file: all of it, or ``length`` bytes from ``offset``."""
+
+    path: Path
+    offset: int = 0
+    length: int | None = None
+
+    def __call__(self) -> bytes:
+        with open(self.path, "rb") as stream:
+            stream.seek(self.offset)
+            return stream.read() if self.length is None else stream.read(self.length)
+
+
+@dataclass(frozen=True)
+class HeldBytes:
+    """Bytes that have no file of their own (a data URI)."""
+
+    data: bytes
+
+    def __call__(self) -> bytes:
+        return self.data
+
+
+@dataclass(frozen=True)
+class Texture:
+    """An image as a material names it.
+
+    Attributes
+    ----------
+    read: returns the bytes of the image's file.
+    label: the name the emitted file is called after.
+    what: how the model speaks of it ("map_Kd bricks.png"), for notes.
+    place: where it does ("museum.mtl:12").
+    wrap_s, wrap_t: beyond [0, 1].
+    channel: the channel that a mask takes its values from: "m" (matte), "l" (luminance), "r",
+        "g", "b", or "" for matte where there is one and luminance elsewhere.
+    """
+
+    read: Callable[[], bytes]
+    label: str
+    what: str
+    place: str
+    wrap_s: Wrap = "repeat"
+    wrap_t: Wrap = "repeat"
+    channel: str = ""
+
+
+@dataclass(frozen=True)
+class SourceMaterial:
+    """A material of the model.
+
+    Attributes
+    ----------
+    color: tint in [0, 1], sRGB; None where the model says nothing.
+    opacity: in [0, 1].
+    see_through: the material itself says that it is blended, tested or transmitting.
+    two_sided: whether its faces have a back.
+    texture, mask: colours, and a separate image of opacities (``map_d``).
+    """
+
+    name: str
+    color: tuple[float, float, float] | None = None
+    opacity: float = 1.0
+    see_through: bool = False
+    two_sided: bool = True
+    texture: Texture | None = None
+    mask: Texture | None = None
+
+
+@dataclass(frozen=True)
+class Source:
+    """Triangles in the file's units and axes.
+
+    Attributes
+    ----------
+    points: (P, 3) float64, may be non-finite, unused or repeated.
+    triangles: (T, 3) int64 into `points`, in the order of the file.
+    uv: (T, 3, 2) float64 per corner, origin at the image's lower left.
+    triangle_object, triangle_material: (T,) int64.
+    objects, materials, cameras: see `ptmtools.scene.model`; cameras in the file's space.
+    metres, up: fixed by the format (glTF), else None.
+    """
+
+    points: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+    uv: NDArray[np.float64]
+    triangle_object: NDArray[np.int64]
+    triangle_material: NDArray[np.int64]
+    objects: tuple[str, ...]
+    materials: tuple[SourceMaterial, ...]
+    cameras: tuple[Camera, ...] = ()
+    metres: float | None = None
+    up: Literal["y", "z"] | None = None
+
+
+class Findings:
+    """Collects the notes of one ingest; under ``strict`` a miss becomes an error at the end.
+
+    Misses are what the model asks for and does not get: files, materials, faces. Error and note
+    share their number: note PTM-N203 is error PTM-I203.
+    """
+
+    def __init__(self, model: Path) -> None:
+        self.model = model
+        self._notes: dict[tuple[str, str, str], int] = {}
+        self._misses: list[tuple[str, str, str]] = []
+
+    def say(self, code: str, message: str, place: str = "", count: int = 1) -> None:
+        """Record something done or guessed."""
+        key = (code, message, place)
+        self._notes[key] = self._notes.get(key, 0) + count
+
+    def miss(self, code: str, message: str, place: str = "", count: int = 1) -> None:
+        """Record something that ``strict`` does not tolerate."""
+        if (code, message, place) not in self._notes:
+            self._misses.append((code, message, place))
+        self.say(code, message, place, count)
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        return tuple(Note(*key, count) for key, count in self._notes.items())
+
+    def enforce(self) -> None:
+        """Raise the first miss as an `InputError`, and tell how many more there are."""
+        if not self._misses:
+            return
+        code, message, place = self._misses[0]
+        more = len(self._misses) - 1
+        raise InputError(
+            code.replace("-N", "-I"),
+            message + (f" (and {more} more findings)" if more else ""),
+            file=self.model,
+            place=place or None,
+            remedy="mend the model, or go on without --strict",
+        )
