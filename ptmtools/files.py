@@ -1,66 +1,87 @@
-"""Writing a file so that it is there whole or not at all.
+"""Writing a file so that it is, at any moment, either as it was before or whole.
 
-The bytes go to a temporary file beside the target, are flushed to the disk and renamed onto it.
-A temporary file is named `.ptm-<random>.tmp`; whatever goes wrong, it is removed.
+The bytes go to a temporary file beside the target, are flushed to the disk, and take the target's
+name in one step. Whatever goes wrong, the temporary file is removed and the target is untouched.
 """
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import secrets
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import IO
 
 from ptmtools.errors import OutputError
 
-_FULL = (errno.ENOSPC, errno.EDQUOT)
 
+def write_bytes(path: str | os.PathLike[str], data: bytes, *, force: bool = False) -> None:
+    """Write ``data`` to ``path``; an existing file is replaced only with ``force``.
 
-def write_bytes(path: str | os.PathLike[str], data: bytes, force: bool = False) -> None:
-    """Writes a file atomically.
-
-    Raises
-    ------
-    OutputError: PTM-O001 if it exists and ``force`` is not given, PTM-O002 if it cannot be
-        written, PTM-O003 if the disk is full.
+    Raises OutputError: PTM-O001 the file exists, PTM-O002 it cannot be written, PTM-O003 the disk
+    is full.
     """
+    write_with(path, lambda file: file.write(data), force=force)
+
+
+def write_with(
+    path: str | os.PathLike[str], write: Callable[[IO[bytes]], object], *, force: bool = False
+) -> None:
+    """As `write_bytes`, for what ``write`` puts into the open binary file it is given."""
     target = Path(path)
     if target.exists() and not target.is_file():  # renaming would replace a device
         kind = "a folder" if target.is_dir() else "a device"
-        raise OutputError("PTM-O002", f"is {kind}, not a file", file=target, remedy="name a file")
-    if not force and os.path.lexists(target):
         raise OutputError(
-            "PTM-O001",
-            "exists already",
-            file=target,
-            remedy="name another output, or give --force to overwrite it",
+            "PTM-O002", f"is {kind}, not a file", file=target, remedy="name a file instead"
         )
+    if not force:
+        refuse_existing(target)
+    temporary = target.with_name(f".{target.name[:200]}.{secrets.token_hex(6)}.part")
     with writing(target):
-        temporary = target.with_name(f".ptm-{secrets.token_hex(8)}.tmp")
         try:
-            with temporary.open("xb") as file:
-                file.write(data)
+            with open(temporary, "xb") as file:
+                write(file)
                 file.flush()
                 os.fsync(file.fileno())
-            temporary.replace(target)
-        except BaseException:
-            with suppress(OSError):
-                temporary.unlink()
-            raise
+            os.replace(temporary, target)
+        finally:
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
 
 
-@contextmanager
-def writing(file: str | os.PathLike[str]) -> Iterator[None]:
-    """Turns what the system says about a file being written into an `OutputError`."""
+@contextlib.contextmanager
+def writing(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Whatever the system refuses while ``path`` is written becomes an OutputError, PTM-O002 or
+    PTM-O003."""
     try:
         yield
-    except OSError as fault:
-        full = fault.errno in _FULL
+    except OSError as error:
+        raise _output_error(Path(path), error) from error
+
+
+def refuse_existing(path: str | os.PathLike[str]) -> None:
+    """Raise OutputError PTM-O001 if there is something at ``path``."""
+    if os.path.lexists(path):
         raise OutputError(
-            "PTM-O003" if full else "PTM-O002",
-            "the disk is full" if full else f"cannot be written ({fault.strerror or fault})",
-            file=file,
-            remedy="free some space and run again" if full else "check the folder and its rights",
-        ) from fault
+            "PTM-O001",
+            "already exists and was left as it is",
+            file=path,
+            remedy="use --force to replace it, or name another file",
+        )
+
+
+def _output_error(target: Path, error: OSError) -> OutputError:
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return OutputError(
+            "PTM-O003",
+            "the disk is full",
+            file=target,
+            remedy="nothing was written; make room or write elsewhere",
+        )
+    remedy = "check that the folder exists and may be written to"
+    if error.errno == errno.ENOENT:
+        remedy = f"create the folder {target.parent} first"
+    reason = error.strerror or str(error)
+    return OutputError("PTM-O002", f"cannot be written ({reason})", file=target, remedy=remedy)
