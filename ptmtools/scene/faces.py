@@ -42,7 +42,7 @@ class KeptFaces:
 
 def keep_faces(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> KeptFaces:
     """Clean (T, 3) triangles over (P, 3) points; every index is in range."""
-    finite_point: NDArray[np.bool_] = np.isfinite(points).all(axis=1)
+    finite_point = np.asarray(np.isfinite(points).all(axis=1))
     finite = finite_point[triangles].all(axis=1)
     source = np.flatnonzero(finite)
     welded, index = _weld(points, triangles[source])

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, LimitError
-from ptmtools.scene.gltf_document import Document, damaged, open_document
+from ptmtools.scene.gltf_document import Document, damaged, natural, open_document
 from ptmtools.scene.gltf_material import MaterialReader, Painted
 from ptmtools.scene.model import Camera
 from ptmtools.scene.reference import Folder
@@ -57,7 +57,14 @@ def read_gltf(path: Path, folder: Folder, findings: Findings) -> Source:
     document = open_document(path, folder)
     try:
         return _read(path, document, folder, findings)
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError) as error:
+    except (
+        LookupError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        ArithmeticError,
+        AssertionError,
+    ) as error:
         # A document this deep has no end of ways to be malformed.
         what = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) else str(error)
         raise damaged(path, what.splitlines()[0] if what else type(error).__name__) from None
@@ -136,7 +143,7 @@ def _reachable(tree: dict[str, Any]) -> list[int]:
     seen: set[int] = set()
     stack = list(reversed(roots))
     while stack:
-        node = stack.pop()
+        node = natural(stack.pop())
         if node in seen:
             raise ValueError(f"node {node} has two parents")
         seen.add(node)

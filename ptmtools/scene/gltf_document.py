@@ -17,9 +17,8 @@ from typing import Any
 from urllib.parse import unquote
 
 from ptmtools.errors import InputError
-from ptmtools.scene.mtl import decode
 from ptmtools.scene.reference import Folder
-from ptmtools.scene.source import FileRange, HeldBytes
+from ptmtools.scene.source import FileRange, HeldBytes, decode
 
 _MAGIC, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
 
@@ -48,15 +47,16 @@ class Document:
 
     def view(self, index: int) -> tuple[Buffer, int, int]:
         """Buffer, start and length of a buffer view; ValueError if it leaves the buffer."""
-        view = self.tree["bufferViews"][_natural(index)]
-        buffer = self.buffers[_natural(view["buffer"])]
-        start, length = _natural(view.get("byteOffset", 0)), _natural(view["byteLength"])
+        view = self.tree["bufferViews"][natural(index)]
+        buffer = self.buffers[natural(view["buffer"])]
+        start, length = natural(view.get("byteOffset", 0)), natural(view["byteLength"])
         if start + length > len(buffer.data):
             raise ValueError(f"buffer view {index} ends beyond its buffer")
         return buffer, start, length
 
 
-def _natural(value: object) -> int:
+def natural(value: object) -> int:
+    """The value, if it is an index or a size; ValueError otherwise."""
     if isinstance(value, bool) or not isinstance(value, int) or value < 0:
         raise ValueError(f"{value!r} is not an index or a size")
     return value
@@ -105,7 +105,7 @@ def open_document(path: Path, folder: Folder) -> Document:
             buffer = binary
         else:
             buffer = _external(path, folder, str(entry["uri"]), place)
-        if len(buffer.data) < _natural(entry["byteLength"]):
+        if len(buffer.data) < natural(entry["byteLength"]):
             raise damaged(
                 path, f"{entry['byteLength']} bytes expected, {len(buffer.data)} there", place
             )
@@ -135,7 +135,7 @@ def _chunks(path: Path, data: bytes) -> tuple[bytes, Buffer | None]:
                 raise damaged(path, "the first chunk is not JSON", f"byte {at - 8}")
             text = data[at : at + size]
         elif kind == _BINARY and binary is None:
-            binary = Buffer(data[at : at + size], path, at)
+            binary = Buffer(data[at : at + size], path.absolute(), at)
         at += size
     if text is None:
         raise damaged(path, "no chunk", "byte 12")

@@ -8,7 +8,7 @@ texel then differs from the linear product for partial tints, and the conversion
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
@@ -137,7 +137,7 @@ class MaterialReader:
                 self._findings.say(
                     "PTM-N208", f"{what}: found as {self._folder.label(found.path)}", place
                 )
-            read, label = FileRange(found.path), PurePosixPath(found.path).name
+            read, label = FileRange(found.path), found.path.name
         return Texture(
             read=read,
             label=label,

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)$", re.IGNORECASE)
 #: Longest stem of a file name that is given out, in characters.
 _LONGEST_STEM = 80
+#: What looks like the suffix of a file, and not like the end of "wood 1.2".
+_NAME_SUFFIX = re.compile(r"\.[A-Za-z][A-Za-z0-9]{1,4}$")
 _SUFFIX = {"JPEG": "jpg", "TIFF": "tif", "MPO": "jpg", "JPEG2000": "jp2"}
 _MASK_BANDS = {"r": "R", "g": "G", "b": "B"}
 
@@ -113,8 +115,12 @@ class ImageStore:
         if mask.channel in ("", "m") and opened.has_transparency_data:
             return _holes(opened)
         band = _MASK_BANDS.get(mask.channel)
-        values = opened.convert("RGB").getchannel(band) if band else opened.convert("L")
-        holes = np.asarray(values) < 255
+        if opened.mode.startswith("I"):  # 16 bits, which convert() would clip
+            holes = np.asarray(opened) < 65535
+        elif band:
+            holes = np.asarray(opened.convert("RGB").getchannel(band)) < 255
+        else:
+            holes = np.asarray(opened.convert("L")) < 255
         return holes if holes.any() else None
 
     def _read(self, texture: Texture) -> bytes | None:
@@ -147,8 +153,8 @@ class ImageStore:
     def _name(self, label: str, kind: str) -> str:
         """A safe name whose stem alone is unique without regard to case."""
         stem = re.split(r"[\\/]", label)[-1]
-        dot = stem.rfind(".")
-        stem, suffix = (stem[:dot], stem[dot + 1 :]) if dot > 0 else (stem, "")
+        if known := _NAME_SUFFIX.search(stem):
+            stem = stem[: known.start()] or stem
         stem = unicodedata.normalize("NFKD", stem).encode("ascii", "ignore").decode()
         stem = re.sub(r"[^A-Za-z0-9_-]+", "_", stem).strip("_")[:_LONGEST_STEM] or "image"
         if _DEVICES.match(stem):
@@ -158,7 +164,7 @@ class ImageStore:
             count += 1
             unique = f"{stem}_{count}"
         self._stems.add(unique.lower())
-        return f"{unique}.{_SUFFIX.get(kind, kind.lower()) or suffix.lower() or 'img'}"
+        return f"{unique}.{_SUFFIX.get(kind, kind.lower())}"
 
 
 def _holes(opened: Image.Image) -> NDArray[np.bool_] | None:

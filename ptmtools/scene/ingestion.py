@@ -92,7 +92,8 @@ def ingest(
         raise InputError("PTM-I251", f"up axis {options.up!r} is not known", remedy="give y or z")
     _check_file(model)
     findings = Findings(model)
-    source = _read(model, Folder(model.parent, options.allow_outside), findings, progress)
+    folder = Folder(model.absolute().parent, options.allow_outside)
+    source = _read(model, folder, findings, progress)
     if len(source.points) > MAX_VERTICES or len(source.triangles) > MAX_VERTICES:
         raise LimitError("PTM-L200", f"more than {MAX_VERTICES} vertices or faces", file=model)
 
@@ -107,7 +108,7 @@ def ingest(
     _tell_faces(kept, source, findings)
     space = _settle_space(model, kept, source, metres, options.up, findings)
     uv = source.uv[kept.source]
-    finite_uv: NDArray[np.bool_] = np.isfinite(uv).all(axis=(1, 2))
+    finite_uv = np.asarray(np.isfinite(uv).all(axis=(1, 2)))
     if not finite_uv.all():
         findings.say(
             "PTM-N228",
@@ -141,6 +142,7 @@ def ingest(
         cameras=tuple(_camera(camera, space) for camera in source.cameras),
         space=space,
         notes=findings.notes,
+        files=tuple(folder.sought),
     )
 
 

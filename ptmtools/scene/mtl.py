@@ -12,7 +12,7 @@ import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ptmtools.scene.source import Findings
+from ptmtools.scene.source import Findings, decode
 
 #: Options of a texture statement with the least and the greatest number of their arguments.
 OPTIONS = {
@@ -33,14 +33,6 @@ OPTIONS = {
 _NUMERIC = {"-bm", "-boost", "-mm", "-o", "-s", "-t", "-texres"}
 #: Options that change colours or positions and are not carried over.
 _IGNORED = ("-cc", "-mm", "-t")
-
-
-def decode(raw: bytes) -> str:
-    """Text of a model file: UTF-8 with or without a mark, and Latin-1 where it is not that."""
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")
 
 
 def number(text: str) -> float:

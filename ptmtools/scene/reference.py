@@ -8,6 +8,7 @@ symbolic link, are refused unless asked for.
 
 from __future__ import annotations
 
+import os
 import re
 import unicodedata
 from dataclasses import dataclass
@@ -34,11 +35,17 @@ class Folder:
     """The folder of a model, searched without regard to case where nothing else is found.
 
     ``also`` is a second folder that may be read, for files made on the way.
+
+    Attributes
+    ----------
+    sought: the files found, relative to the root, and the names of those not found, as keys in
+        the order in which they were asked for.
     """
 
     def __init__(self, root: Path, allow_outside: bool = False, also: Path | None = None) -> None:
         self.root = root
         self.allow_outside = allow_outside
+        self.sought: dict[str, None] = {}
         self._roots = [root] if also is None else [root, also]
         self._real = [folder.resolve() for folder in self._roots]
         self._listing: dict[Path, dict[str, str]] = {}
@@ -77,10 +84,12 @@ class Folder:
                 continue
             real = path.resolve()
             if self.allow_outside or any(real.is_relative_to(folder) for folder in self._real):
+                self.sought[Path(os.path.relpath(path, self.root)).as_posix()] = None
                 return Reference(outcome, path)
             outside = True
         if absolute and not self.allow_outside and not outside:
             outside = self._walk(Path("/"), parts) is not None
+        self.sought["/".join(parts)] = None
         return Reference("outside" if outside else "missing")
 
     def label(self, path: Path) -> str:

@@ -22,6 +22,14 @@ from ptmtools.scene.model import Camera, Note, Wrap
 MAX_VERTICES = 2**31 - 1
 
 
+def decode(raw: bytes) -> str:
+    """Text of a model file: UTF-8 with or without a mark, and Latin-1 where it is not that."""
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
+
+
 @dataclass(frozen=True)
 class FileRange:
     """Reads bytes of a file: all of it, or ``length`` bytes from ``offset``."""

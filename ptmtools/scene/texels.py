@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ptmtools.scene.model import Wrap
 
 #: A triangle repeating the image more often than this, counted in images, is taken to use all.
-_MANY_TILES = 64
+_MANY_TILES = 16
 #: Texels tested at once.
 _BATCH = 1 << 20
 
@@ -38,14 +38,23 @@ def uses_holes(
         return True
     height, width = holes.shape
     wraps: tuple[Wrap, Wrap] = (wrap_s, wrap_t)
-    texel = np.stack([uv[..., 0] * width, (1.0 - uv[..., 1]) * height], axis=2)
-    for axis, size in enumerate((width, height)):
-        if wraps[axis] == "clamp":
-            np.clip(texel[..., axis], 0.0, size, out=texel[..., axis])
+    with np.errstate(over="ignore"):
+        texel = np.stack([uv[..., 0] * width, (1.0 - uv[..., 1]) * height], axis=2)
+    if not np.isfinite(texel).all():
+        return True
     # Texel i spreads over the open interval (i - 0.5, i + 1.5).
     low = np.floor(texel.min(axis=1) - 0.5)
     high = np.ceil(texel.max(axis=1) + 0.5)
-    if bool((((high - low) / [width, height]).prod(axis=1) > _MANY_TILES).any()):
+    span = (high - low) / [width, height]
+    # Beyond a clamped edge a triangle smears: its box stands for it.
+    smeared = np.zeros(len(uv), dtype=bool)
+    for axis, size in enumerate((width, height)):
+        if wraps[axis] == "clamp":
+            smeared |= (texel[..., axis].min(axis=1) < 0) | (texel[..., axis].max(axis=1) > size)
+            low[:, axis] = np.clip(low[:, axis], 0, size - 1)
+            high[:, axis] = np.clip(high[:, axis], 1, size)
+            span[:, axis] = np.minimum(span[:, axis], 1.0)
+    if (span.prod(axis=1) > _MANY_TILES).any():
         return True
     # Whole images away the texels are the same; near zero the numbers stay small and exact.
     for axis, size in enumerate((width, height)):
@@ -57,17 +66,17 @@ def uses_holes(
 
     box = np.concatenate([low, high], axis=1).astype(np.int64)
     table = _table(holes)
-    columns = _bounds(box[:, 0], box[:, 2], width, wrap_s)
-    rows = _bounds(box[:, 1], box[:, 3], height, wrap_t)
     inside = np.zeros(len(box), dtype=np.int64)
-    for sign_x, x in zip((-1, 1), columns, strict=True):
-        for sign_y, y in zip((-1, 1), rows, strict=True):
+    for sign_x, x in ((-1, box[:, 0]), (1, box[:, 2])):
+        for sign_y, y in ((-1, box[:, 1]), (1, box[:, 3])):
             inside += sign_x * sign_y * _up_to(table, x, y)
+    if (smeared & (inside > 0)).any():
+        return True
     candidates = np.flatnonzero(inside)
     # The smallest first: a used hole is found soonest where there is little to test.
     spans = (box[:, 2] - box[:, 0]) * (box[:, 3] - box[:, 1])
     return any(
-        _touches(holes, texel[t], box[t], wraps)
+        _touches(holes, texel[t], box[t])
         for t in candidates[np.argsort(spans[candidates], kind="stable")]
     )
 
@@ -77,14 +86,6 @@ def _table(holes: NDArray[np.bool_]) -> NDArray[np.int64]:
     table = np.zeros((holes.shape[0] + 1, holes.shape[1] + 1), dtype=np.int64)
     table[1:, 1:] = holes.cumsum(axis=0, dtype=np.int64).cumsum(axis=1)
     return table
-
-
-def _bounds(
-    low: NDArray[np.int64], high: NDArray[np.int64], size: int, wrap: Wrap
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    if wrap == "clamp":
-        return np.clip(low, 0, size - 1), np.clip(high, 1, size)
-    return low, high
 
 
 def _up_to(
@@ -107,14 +108,12 @@ def _touches(
     holes: NDArray[np.bool_],
     triangle: NDArray[np.float64],
     box: NDArray[np.int64],
-    wraps: tuple[Wrap, Wrap],
 ) -> bool:
     """Whether a triangle in texels reaches into the square of a hole within its box."""
     height, width = holes.shape
     x0, y0, x1, y1 = box.tolist()
     columns, rows = np.arange(x0, x1), np.arange(y0, y1)
-    column_of = columns % width if wraps[0] == "repeat" else np.clip(columns, 0, width - 1)
-    row_of = rows % height if wraps[1] == "repeat" else np.clip(rows, 0, height - 1)
+    column_of, row_of = columns % width, rows % height
     (ax, ay), (bx, by), (cx, cy) = triangle.tolist()
     if (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0:
         bx, by, cx, cy = cx, cy, bx, by
@@ -124,7 +123,7 @@ def _touches(
         y, x = np.nonzero(window)
         # The middle of each texel; its square reaches one texel to every side.
         px, py = columns[x] + 0.5, rows[start + y] + 0.5
-        hit = (np.minimum(np.minimum(ax, bx), cx) < px + 1) & (max(ax, bx, cx) > px - 1)
+        hit = (min(ax, bx, cx) < px + 1) & (max(ax, bx, cx) > px - 1)
         hit &= (min(ay, by, cy) < py + 1) & (max(ay, by, cy) > py - 1)
         for ux, uy, vx, vy in ((ax, ay, bx, by), (bx, by, cx, cy), (cx, cy, ax, ay)):
             ex, ey = vx - ux, vy - uy
