@@ -1,0 +1,34 @@
+"""The styles of painting, in the order in which a museum uses them.
+
+A composition is a (size, size, 3) field of colours in layered noise and gradients; most are then
+covered with three passes of strokes, from broad to fine, that take their colour from it and
+follow its contours (`brush.py`). Each style takes a generator and a size and returns an image.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from PIL import Image
+
+from museum_parts.abstract import color_field, constructed, drips, marbled
+from museum_parts.figurative import landscape, night, portrait, seascape, still_life
+from museum_parts.printed import manuscript, poster
+
+Painting = Callable[[np.random.Generator, int], Image.Image]
+
+#: Name, style, and the width over height of the canvas that it is meant for.
+PAINTINGS: list[tuple[str, Painting, float]] = [
+    ("landscape", landscape, 4 / 3),
+    ("portrait", portrait, 3 / 4),
+    ("poster", poster, 3 / 4),
+    ("seascape", seascape, 4 / 3),
+    ("still_life", still_life, 5 / 4),
+    ("color_field", color_field, 4 / 5),
+    ("night", night, 5 / 4),
+    ("constructed", constructed, 1.0),
+    ("manuscript", manuscript, 3 / 4),
+    ("drips", drips, 4 / 3),
+    ("marbled", marbled, 1.0),
+]
