@@ -117,6 +117,7 @@ def _read_meshlab(path: Path, folder: Folder, findings: Findings) -> Source:
         meshes.load_new_mesh(str(path))
         with tempfile.TemporaryDirectory() as scratch:
             near = Folder(folder.root, folder.allow_outside, also=Path(scratch))
+            near.sought = folder.sought
             for mesh in meshes:
                 if not mesh.face_number():
                     continue

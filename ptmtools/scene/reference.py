@@ -84,7 +84,8 @@ class Folder:
                 continue
             real = path.resolve()
             if self.allow_outside or any(real.is_relative_to(folder) for folder in self._real):
-                self.sought[Path(os.path.relpath(path, self.root)).as_posix()] = None
+                if not any(path.is_relative_to(folder) for folder in self._roots[1:]):
+                    self.sought[Path(os.path.relpath(path, self.root)).as_posix()] = None
                 return Reference(outcome, path)
             outside = True
         if absolute and not self.allow_outside and not outside:
