@@ -3,30 +3,55 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ptmtools.database.emission import emit
+    from ptmtools.database.model import (
+        EmitOptions,
+        EmitReport,
+        GivenViewpoint,
+        Issue,
+        PlotOptions,
+        TextureLevel,
+        TextureRecord,
+        ValidationReport,
+        Viewpoint,
+    )
+    from ptmtools.database.plan import plot_plan
+    from ptmtools.database.validate import validate_database, validate_ptm
+
+__all__ = [
+    "EmitOptions",
+    "EmitReport",
+    "GivenViewpoint",
+    "Issue",
+    "PlotOptions",
+    "TextureLevel",
+    "TextureRecord",
+    "ValidationReport",
+    "Viewpoint",
+    "emit",
+    "plot_plan",
+    "validate_database",
+    "validate_ptm",
+]
 
 _HOME = {
+    "EmitOptions": "model",
+    "EmitReport": "model",
+    "GivenViewpoint": "model",
+    "Issue": "model",
+    "PlotOptions": "model",
+    "TextureLevel": "model",
+    "TextureRecord": "model",
+    "ValidationReport": "model",
+    "Viewpoint": "model",
     "emit": "emission",
     "plot_plan": "plan",
     "validate_database": "validate",
     "validate_ptm": "validate",
-    **dict.fromkeys(
-        (
-            "EmitOptions",
-            "EmitReport",
-            "GivenViewpoint",
-            "Issue",
-            "PlotOptions",
-            "TextureLevel",
-            "TextureRecord",
-            "ValidationReport",
-            "Viewpoint",
-        ),
-        "model",
-    ),
 }
-
-__all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> Any:

@@ -20,7 +20,7 @@ class TextureLevel:
     ----------
     width, height: texels.
     offset, length: the bytes of the level's group in the file.
-    gpu_bytes: what the level occupies on the graphics card, this level alone.
+    gpu_bytes: texture memory of the pyramid up to and including this level.
     """
 
     width: int
@@ -39,7 +39,7 @@ class TextureRecord:
     image: index into `Scene.images`.
     file: the `.ptm`, relative to the served folder, "textures/NAME.ptm".
     fallback: the PNG twin, relative to the served folder, or None.
-    width, height, components: of the finest level.
+    width, height, components: of the finest level stored.
     levels: coarsest first.
     sha256: hex digest of the `.ptm`'s bytes.
     """

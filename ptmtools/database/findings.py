@@ -1,0 +1,81 @@
+"""What a validation can find: every code with its severity and meaning, and who gathers them."""
+
+from __future__ import annotations
+
+from ptmtools.database.model import Issue, Severity
+
+#: Code → (severity, what it means). docs/database.md repeats this table.
+CODES: dict[str, tuple[Severity, str]] = {
+    "PTM-D650": ("error", "the manifest is missing or damaged"),
+    "PTM-D651": ("error", "a file of the database is missing"),
+    "PTM-D652": ("error", "a file is not what its stage wrote: the hash differs"),
+    "PTM-D653": ("warning", "a file is served that no stage wrote"),
+    "PTM-D654": ("error", "a file cannot be read"),
+    "PTM-D655": ("warning", "the database is not finished: nothing was emitted yet"),
+    "PTM-D660": ("error", "a VRML file is not UTF-8"),
+    "PTM-D661": ("error", "a VRML file is not in the emission pattern"),
+    "PTM-D662": ("error", "a number in a VRML file is not finite"),
+    "PTM-D663": ("error", "a VRML file lacks a node or a field of the emission pattern"),
+    "PTM-D670": ("error", "a URL leads out of the served folder"),
+    "PTM-D671": ("error", "a URL names a file that is not there"),
+    "PTM-D672": ("error", "a cell file is missing"),
+    "PTM-D680": ("error", "coordIndex is out of range, or no list of triangles"),
+    "PTM-D681": ("error", "texCoordIndex is out of range, or does not match coordIndex"),
+    "PTM-D682": ("error", "a colour or transparency is outside 0 to 1, or colorIndex is wrong"),
+    "PTM-D683": ("error", "a hull is not a closed convex polyhedron"),
+    "PTM-D684": ("error", "a hull does not hold its cell's geometry or leaves"),
+    "PTM-D685": ("error", "leafPoint and leafStart do not describe leaves"),
+    "PTM-D690": ("error", "visibleUrl does not begin with the cell itself"),
+    "PTM-D691": ("error", "ach and visibleUrl differ in length"),
+    "PTM-D692": ("error", "an ach value is outside 0 to 1"),
+    "PTM-D693": ("error", "the ach values do not sum to 1"),
+    "PTM-D694": ("error", "adjacency is not symmetric"),
+    "PTM-D695": ("error", "visibility is not symmetric"),
+    "PTM-D696": ("error", "an adjacent cell is not visible"),
+    "PTM-D697": ("error", "a list of cells names one twice, or the cell itself out of place"),
+    "PTM-D698": ("error", "a cell's name is not its file's"),
+    "PTM-D699": ("error", "the root file and the cells disagree"),
+    "PTM-D700": ("error", "hints.json is damaged"),
+    "PTM-D701": ("error", "hints.json and the cell files disagree"),
+    "PTM-D702": ("error", "the ach values in hints.json are not a share of 1"),
+    "PTM-D703": ("warning", "coverage fell on cells outside the PVS: missed mass"),
+    "PTM-D704": ("error", "hints.json and a texture file disagree"),
+    "PTM-D705": ("error", "portals in hints.json are wrong, or not those of the adjacent cells"),
+    "PTM-D706": ("error", "hints.json and the viewpoints of the root file disagree"),
+    "PTM-D710": ("error", "a .ptm file is damaged"),
+    "PTM-D711": ("error", "a .ptm file and its PNG twin show different images"),
+    "PTM-D712": ("error", "a PNG twin cannot be read"),
+}
+
+
+class Findings:
+    """Gathers issues; a fault that repeats all over a file is told so often and then summed up."""
+
+    #: Issues of one code told one by one, per file.
+    MOST = 5
+
+    def __init__(self) -> None:
+        self._issues: dict[tuple[str, str], list[Issue]] = {}
+        self._untold: dict[tuple[str, str], int] = {}
+
+    def add(self, code: str, file: str, place: str, message: str) -> None:
+        """One issue; its severity is the code's."""
+        key = (file, code)
+        told = self._issues.setdefault(key, [])
+        if len(told) < self.MOST:
+            told.append(Issue(code, CODES[code][0], file, place, message))
+        else:
+            self._untold[key] = self._untold.get(key, 0) + 1
+
+    def has(self, code: str, file: str) -> bool:
+        return (file, code) in self._issues
+
+    def issues(self) -> tuple[Issue, ...]:
+        """All of them, by file and code."""
+        ordered: list[Issue] = []
+        for key in sorted(self._issues):
+            ordered += self._issues[key]
+            if more := self._untold.get(key):
+                last = self._issues[key][-1]
+                ordered.append(Issue(key[1], last.severity, key[0], "", f"{more} more of these"))
+        return tuple(ordered)

@@ -1,0 +1,302 @@
+"""A strict reader of the VRML97 that `emit` writes, and of nothing else.
+
+Browsers are lenient: view3dscene and X_ITE both pass over indices out of range, colours above 1
+and bytes that are not UTF-8. This reader is the opposite. It knows the nodes and fields of the
+emission pattern with their types, wants multiple values in brackets and truth in capitals, and
+stops at the first thing that it does not know. Number lists, which are nearly all of a file, are
+cut out whole and converted by NumPy: about 15 MB/s where a token at a time is 2.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+HEADER = "#VRML V2.0 utf8"
+
+#: Node → field → type; for SFNode the node that must stand there.
+NODES: dict[str, dict[str, str]] = {
+    "WorldInfo": {"title": "SFString", "info": "MFString"},
+    "NavigationInfo": {"type": "MFString", "avatarSize": "MFFloat", "headlight": "SFBool"},
+    "Viewpoint": {
+        "position": "SFVec3f",
+        "orientation": "SFRotation",
+        "fieldOfView": "SFFloat",
+        "description": "SFString",
+    },
+    "Inline": {"url": "MFString", "bboxCenter": "SFVec3f", "bboxSize": "SFVec3f"},
+    "Shape": {"appearance": "Appearance", "geometry": "IndexedFaceSet"},
+    "Appearance": {"material": "Material", "texture": "ImageTexture"},
+    "Material": {"diffuseColor": "SFColor", "transparency": "SFFloat"},
+    "ImageTexture": {"url": "MFString", "repeatS": "SFBool", "repeatT": "SFBool"},
+    "IndexedFaceSet": {
+        "solid": "SFBool",
+        "coord": "Coordinate",
+        "coordIndex": "MFInt32",
+        "texCoord": "TextureCoordinate",
+        "texCoordIndex": "MFInt32",
+        "color": "Color",
+        "colorIndex": "MFInt32",
+        "colorPerVertex": "SFBool",
+    },
+    "Coordinate": {"point": "MFVec3f"},
+    "TextureCoordinate": {"point": "MFVec2f"},
+    "Color": {"color": "MFColor"},
+}
+#: Numbers in one value of a numeric type.
+_WIDTH = {"Float": 1, "Int32": 1, "Vec2f": 2, "Vec3f": 3, "Color": 3, "Rotation": 4}
+_PLAIN = {"SFBool", "SFString", "MFString", *(n + t for n in ("SF", "MF") for t in _WIDTH)}
+
+_SPACE = re.compile(r"(?:[\s,]+|#[^\n]*)*")
+_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_NUMBERS = re.compile(r"[-+.,\s\deE]*")
+_STRING = re.compile(r'"((?:[^"\\\n]|\\["\\])*)"')
+_NOT_FINITE = re.compile(r"[+-]?(?:nan|inf|infinity)\b", re.IGNORECASE)
+
+
+class WrlError(Exception):
+    """The first thing in a file that is not the emission pattern.
+
+    `kind` is "encoding", "finite" (a number is not) or "syntax"; `place` says where.
+    """
+
+    def __init__(self, kind: str, place: str, message: str) -> None:
+        self.kind = kind
+        self.place = place
+        self.message = message
+        super().__init__(f"{place}: {message}")
+
+
+@dataclass(frozen=True)
+class Node:
+    """A node: strings and truths are Python's; numbers are arrays, (n, width) for multiple values
+    of vectors and colours; nodes are nodes. `line` is where it begins."""
+
+    type: str
+    name: str
+    fields: dict[str, Any]
+    line: int
+
+
+@dataclass(frozen=True)
+class Document:
+    """A file: its PROTOs as name → field → type, and its nodes, in order."""
+
+    protos: dict[str, dict[str, str]]
+    nodes: tuple[Node, ...]
+
+    def of_type(self, type: str) -> list[Node]:
+        return [n for n in self.nodes if n.type == type]
+
+
+def parse(data: bytes) -> Document:
+    """Reads a file.
+
+    Raises
+    ------
+    WrlError: at the first thing that the emission pattern does not have.
+    """
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError as fault:
+        raise WrlError("encoding", f"byte {fault.start}", "not UTF-8") from fault
+    return _Reader(text).document()
+
+
+class _Reader:
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self._at = 0
+        self._counted = (0, 1)
+        self._types = dict(NODES)
+        self._names: set[str] = set()
+
+    def document(self) -> Document:
+        if self._text.partition("\n")[0] != HEADER:
+            self._fail(f"the first line is not {HEADER!r}")
+        protos: dict[str, dict[str, str]] = {}
+        nodes: list[Node] = []
+        while self._skip() < len(self._text):
+            if self._peek("PROTO"):
+                name, fields = self._proto()
+                protos[name] = fields
+            else:
+                nodes.append(self._node(self._word("a node")))
+        return Document(protos, tuple(nodes))
+
+    def _proto(self) -> tuple[str, dict[str, str]]:
+        self._word("PROTO")
+        name = self._word("a PROTO's name")
+        if name in self._types:
+            self._fail(f"PROTO {name} is declared twice")
+        fields: dict[str, str] = {}
+        self._take("[")
+        while not self._peek("]"):
+            if self._word("field") != "field":
+                self._fail("only fields are declared in a PROTO")
+            type = self._word("a field's type")
+            if type not in _PLAIN:
+                self._fail(f"unknown field type {type!r}")
+            field = self._word("a field's name")
+            if field in fields:
+                self._fail(f"field {field} is declared twice")
+            self._value(type)
+            fields[field] = type
+        self._take("]")
+        self._take("{")
+        body = self._node(self._word("a node"))
+        if body.type != "WorldInfo":
+            self._fail("a PROTO's body is a WorldInfo, it draws nothing")
+        self._take("}")
+        self._types[name] = fields
+        return name, fields
+
+    def _node(self, type: str) -> Node:
+        name = ""
+        if type == "DEF":
+            name = self._word("a DEF name")
+            if name in self._names:
+                self._fail(f"the DEF name {name} is used twice")
+            self._names.add(name)
+            type = self._word("a node")
+        known = self._types.get(type)
+        if known is None:
+            self._fail(f"{type} is no node of the emission pattern")
+        line = self._line(self._at)
+        self._take("{")
+        fields: dict[str, Any] = {}
+        while not self._peek("}"):
+            field = self._word("a field")
+            if field not in known:
+                self._fail(f"{type} has no field {field!r} in the emission pattern")
+            if field in fields:
+                self._fail(f"{type} has two fields {field!r}")
+            fields[field] = self._value(known[field])
+        self._take("}")
+        return Node(type, name, fields, line)
+
+    def _value(self, type: str) -> Any:
+        if type in self._types:
+            node = self._node(self._word("a node"))
+            if node.type != type:
+                self._fail(f"a {node.type} stands where a {type} belongs")
+            return node
+        if type == "SFBool":
+            word = self._word("TRUE or FALSE")
+            if word not in ("TRUE", "FALSE"):
+                self._fail(f"{word!r} is neither TRUE nor FALSE")
+            return word == "TRUE"
+        if type == "SFString":
+            return self._string()
+        if type == "MFString":
+            self._take("[")
+            strings = []
+            while not self._peek("]"):
+                strings.append(self._string())
+            self._take("]")
+            return tuple(strings)
+        kind = type[2:]
+        return self._numbers(kind) if type.startswith("MF") else self._single(kind)
+
+    def _single(self, kind: str) -> NDArray[np.float64]:
+        values = []
+        for _ in range(_WIDTH[kind]):
+            self._skip()
+            found = _NUMBER.match(self._text, self._at)
+            if found is None:
+                self._no_number()
+            self._at = found.end()
+            values.append(float(found.group()))
+        return self._finite(np.array(values), self._at)
+
+    def _numbers(self, kind: str) -> NDArray[Any]:
+        self._take("[")
+        begin = self._at
+        found = _NUMBERS.match(self._text, begin)
+        assert found is not None
+        self._at = found.end()
+        if not self._text.startswith("]", self._at):
+            # Back to the start of the word that is no number.
+            while self._at > begin and self._text[self._at - 1] not in " ,\t\r\n":
+                self._at -= 1
+            self._no_number()
+        words = found.group().replace(",", " ").split()
+        try:
+            values = np.array(words, dtype=np.int64 if kind == "Int32" else np.float64)
+        except (ValueError, OverflowError):
+            self._fail(f"{self._bad(words, kind)!r} is no {kind}", begin)
+        if kind == "Int32":
+            limits = np.iinfo(np.int32)
+            if ((values < limits.min) | (values > limits.max)).any():
+                self._fail("an integer does not fit into 32 bits", begin)
+        else:
+            self._finite(values, begin)
+        self._take("]")
+        width = _WIDTH[kind]
+        if len(values) % width:
+            self._fail(f"{len(values)} numbers make no list of {kind}", begin)
+        return values.reshape(-1, width) if width > 1 else values
+
+    def _bad(self, words: list[str], kind: str) -> str:
+        shape = re.compile(r"[+-]?\d+") if kind == "Int32" else _NUMBER
+        return next((w for w in words if not shape.fullmatch(w)), "a number")
+
+    def _finite(self, values: NDArray[Any], at: int) -> NDArray[Any]:
+        with np.errstate(over="ignore"):
+            if not np.isfinite(values.astype(np.float32)).all():
+                raise WrlError("finite", self._place(at), "a number is not finite")
+        return values
+
+    def _no_number(self) -> NoReturn:
+        if _NOT_FINITE.match(self._text, self._at):
+            raise WrlError("finite", self._place(self._at), "a number is not finite")
+        self._fail(f"{self._text[self._at : self._at + 12]!r} is no number")
+
+    def _string(self) -> str:
+        self._skip()
+        found = _STRING.match(self._text, self._at)
+        if found is None:
+            self._fail("no string")
+        self._at = found.end()
+        return re.sub(r"\\(.)", r"\1", found.group(1))
+
+    def _word(self, what: str) -> str:
+        self._skip()
+        found = _WORD.match(self._text, self._at)
+        end = found.end() if found else self._at
+        if found is None or self._text[end : end + 1] not in " \t\r\n{}[],":
+            self._fail(f"{self._text[self._at : self._at + 12]!r} is not {what}")
+        self._at = end
+        return found.group()
+
+    def _take(self, sign: str) -> None:
+        if not self._peek(sign):
+            self._fail(f"{self._text[self._at : self._at + 12]!r} where {sign!r} belongs")
+        self._at += len(sign)
+
+    def _peek(self, sign: str) -> bool:
+        return self._text.startswith(sign, self._skip())
+
+    def _skip(self) -> int:
+        found = _SPACE.match(self._text, self._at)
+        assert found is not None
+        self._at = found.end()
+        return self._at
+
+    def _line(self, at: int) -> int:
+        before, line = self._counted
+        if at < before:
+            before, line = 0, 1
+        self._counted = (at, line + self._text.count("\n", before, at))
+        return self._counted[1]
+
+    def _place(self, at: int) -> str:
+        return f"line {self._line(at)}"
+
+    def _fail(self, message: str, at: int | None = None) -> NoReturn:
+        raise WrlError("syntax", self._place(self._at if at is None else at), message)
