@@ -35,7 +35,7 @@ class Reveals:
         self._planes, self._areas = planes_of(corners)
         self._limit = wall_thickness
         self._tolerance = tolerance
-        self._known: dict[tuple[int, int], list[WallPlane]] = {}
+        self._known: dict[bytes, list[WallPlane]] = {}
 
     def within(self, body: Polyhedron, planes: list[NDArray[np.float64]]) -> list[WallPlane]:
         """The reveals of the slab that a body lies in; none if it lies in no wall.
@@ -45,9 +45,11 @@ class Reveals:
         slab = self._slab(body, planes)
         if slab is None:
             return []
-        if slab not in self._known:
-            self._known[slab] = self._bridges(planes[slab[0]], planes[slab[1]])
-        return self._known[slab]
+        first, second = planes[slab[0]], planes[slab[1]]
+        key = first.tobytes() + second.tobytes()
+        if key not in self._known:
+            self._known[key] = self._bridges(first, second)
+        return self._known[key]
 
     def _slab(self, body: Polyhedron, planes: list[NDArray[np.float64]]) -> tuple[int, int] | None:
         """The nearest pair of parallel BSP planes that bound a body within the wall thickness."""
@@ -64,21 +66,29 @@ class Reveals:
         return pair
 
     def _bridges(self, first: NDArray[np.float64], second: NDArray[np.float64]) -> list[WallPlane]:
-        near = self._corners @ first[:3] + first[3]
-        far = self._corners @ second[:3] + second[3]
         slack = self._tolerance.hairline
-        touches = np.any(np.abs(near) <= slack, axis=1) & np.any(np.abs(far) <= slack, axis=1)
-        width = abs(float(first[3]) - float(np.sign(first[:3] @ second[:3])) * float(second[3]))
-        between = np.all((np.abs(near) + np.abs(far)) <= width + 2 * slack, axis=1)
-        bridging = np.flatnonzero(touches & between & (self._areas > 0))
+        turn = float(np.sign(first[:3] @ second[:3]))
+        width = abs(float(first[3]) - turn * float(second[3]))
+        inward = float(np.sign(float(first[3]) - turn * float(second[3]))) or 1.0
+        depth = inward * (self._corners @ first[:3] + first[3])
+        low, high = depth.min(axis=1), depth.max(axis=1)
+        inside = np.flatnonzero((high > slack) & (low < width - slack) & (self._areas > 0))
+        low, high = low[inside], high[inside]
+        spans = (np.abs(low) <= slack) & (np.abs(high - width) <= slack)
+        bridging = inside[spans]
         found: list[WallPlane] = []
         for seed in bridging[np.argsort(-self._areas[bridging], kind="stable")]:
             plane = self._planes[seed]
             if any(parallel_and_near(plane, w.frame.plane, self._tolerance) for w in found):
                 continue
             frame = Frame.of(plane)
-            flat = lying_in(plane, self._corners, self._tolerance) & (self._areas > 0)
-            part = bridging[flat[bridging]]
-            walls = unite(frame.to_plane(self._corners[part]))
-            found.append(WallPlane(frame, walls, unite(frame.to_plane(self._corners[flat]))))
+            flat = inside[lying_in(plane, self._corners[inside], self._tolerance)]
+            walls = np.intersect1d(flat, bridging)
+            found.append(
+                WallPlane(
+                    frame,
+                    unite(frame.to_plane(self._corners[walls])),
+                    unite(frame.to_plane(self._corners[flat])),
+                )
+            )
         return found

@@ -61,16 +61,17 @@ def subdivide(
     tolerance = Tolerance.for_points(scene.points)
     walls = find_walls(scene, options, tolerance)
     corners = scene.corners[structural_triangles(scene, options)]
+    reveals = Reveals(corners, options.wall_thickness, tolerance)
     used = scene.points[np.unique(scene.triangles)]
     low, high = used.min(axis=0), used.max(axis=0)
     margin = BOX_MARGIN * tolerance.extent
     wide = np.array([low - margin, high + margin])
-    space = _divide(wide, walls, corners, options, tolerance, progress)
+    space = _divide(wide, walls, reveals, corners, options, tolerance, progress)
     notes: list[str] = []
     if not space.reach.closed:
         tight = _clipped_box(walls, low, high, tolerance)
         notes.append(_open_note(space, tight, low, high))
-        space = _divide(tight, walls, corners, options, tolerance, progress, whole=True)
+        space = _divide(tight, walls, reveals, corners, options, tolerance, progress, whole=True)
     pieces = cut_to_leaves(scene, space.tree, tolerance)
     return _assemble(scene, space, pieces, notes)
 
@@ -106,6 +107,7 @@ def _matches(scene: Scene, pattern: str) -> bool:
 def _divide(
     box: NDArray[np.float64],
     walls: list[WallPlane],
+    reveals: Reveals,
     corners: NDArray[np.float64],
     options: SubdivideOptions,
     tolerance: Tolerance,
@@ -113,7 +115,6 @@ def _divide(
     whole: bool = False,
 ) -> _Space:
     """Subdivide a root box and flood it; ``whole``: leaves at the box count as inside."""
-    reveals = Reveals(corners, options.wall_thickness, tolerance)
     body = Polyhedron.box(box[0], box[1])
     tree = build_tree(body, walls, reveals, options, tolerance, progress)
     portals = find_portals(tree, tolerance)
