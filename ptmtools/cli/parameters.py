@@ -51,10 +51,12 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # generic only in new
 
 
 def descriptions(cls: type) -> dict[str, str]:
-    """What the docstring of a dataclass says of its fields: name → text on one line."""
-    text = inspect.getdoc(cls) or ""
+    """What the docstring of a dataclass, and of its bases, says of its fields: name → text."""
+    if cls is object:
+        return {}
+    found = {name: told for base in cls.__bases__ for name, told in descriptions(base).items()}
+    text = inspect.cleandoc(cls.__doc__ or "")
     _, _, body = text.partition("Attributes\n----------\n")
-    found: dict[str, str] = {}
     names: list[str] = []
     for line in body.splitlines():
         if head := re.match(r"(\w+(?:, \w+)*): (.*)", line):
@@ -82,11 +84,18 @@ def options_of(cls: type, *, omit: Sequence[str] = ()) -> Decorator:
     return decorate
 
 
-def take(cls: type[T], values: dict[str, Any], *, keep: Sequence[str] = (), **given: Any) -> T:
+def take(
+    cls: type[T],
+    values: dict[str, Any],
+    *,
+    omit: Sequence[str] = (),
+    share: Sequence[str] = (),
+    **given: Any,
+) -> T:
     """An instance of ``cls`` from the parsed values, which are removed from ``values`` but for
-    those in ``keep``."""
-    names = [field.name for field in fields(cls) if field.name in values]  # type: ignore[arg-type]
-    found = {name: values[name] if name in keep else values.pop(name) for name in names}
+    those that others ``share``; fields in ``omit`` keep their defaults."""
+    names = {field.name for field in fields(cls)} & set(values) - set(omit)  # type: ignore[arg-type]
+    found = {name: values[name] if name in share else values.pop(name) for name in sorted(names)}
     return cls(**found, **given)
 
 

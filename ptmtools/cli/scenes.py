@@ -12,21 +12,23 @@ from ptmtools.cells import SubdivideOptions
 from ptmtools.cli.common import as_json, database, forced, new_database, voiced, workers
 from ptmtools.cli.output import Voice, count, size
 from ptmtools.cli.parameters import Numbers, options_of, take
-from ptmtools.coverage import AchOptions
+from ptmtools.coverage.options import AchOptions
 from ptmtools.database import EmitOptions, GivenViewpoint
 from ptmtools.pipeline import (
     BuildOptions,
     BuildReport,
     TextureOptions,
-    build_scene as build,
     make_ach,
     make_cells,
     make_files,
     make_pvs,
     make_textures,
 )
+from ptmtools.pipeline import (
+    build_scene as build,
+)
 from ptmtools.scene import IngestOptions
-from ptmtools.visibility import PvsOptions
+from ptmtools.visibility.pvs import PvsOptions
 
 #: Notes that are shown without ``-v``.
 SHOWN_NOTES = 12
@@ -68,9 +70,9 @@ def build_scene(
     options = BuildOptions(
         ingest=take(IngestOptions, values),
         subdivide=take(SubdivideOptions, values, viewpoints=_positions(viewpoints)),
-        pvs=take(PvsOptions, values),
-        ach=take(AchOptions, values),
-        emit=take(EmitOptions, values, keep=("fallback",), viewpoints=_given(viewpoints)),
+        pvs=take(PvsOptions, values, omit=["workers"]),
+        ach=take(AchOptions, values, omit=["workers"]),
+        emit=take(EmitOptions, values, share=["fallback"], viewpoints=_given(viewpoints)),
         textures=take(TextureOptions, values),
         **values,
     )

@@ -1,1 +1,60 @@
-"""The order of the stages, their artifacts and their cache."""
+"""The order of the stages, their artifacts and their cache.
+
+The names below are loaded when first used, so that importing this package costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ptmtools.pipeline.build import (
+        BuildOptions,
+        BuildReport,
+        build_scene,
+        make_ach,
+        make_cells,
+        make_files,
+        make_pvs,
+        make_textures,
+    )
+    from ptmtools.pipeline.folder import DatabaseFolder
+    from ptmtools.pipeline.run import Artifacts, StageReport
+    from ptmtools.pipeline.textures import TextureOptions
+
+_HOME = {
+    "Artifacts": "run",
+    "BuildOptions": "build",
+    "BuildReport": "build",
+    "DatabaseFolder": "folder",
+    "StageReport": "run",
+    "TextureOptions": "textures",
+    "build_scene": "build",
+    "make_ach": "build",
+    "make_cells": "build",
+    "make_files": "build",
+    "make_pvs": "build",
+    "make_textures": "build",
+}
+
+__all__ = [
+    "Artifacts",
+    "BuildOptions",
+    "BuildReport",
+    "DatabaseFolder",
+    "StageReport",
+    "TextureOptions",
+    "build_scene",
+    "make_ach",
+    "make_cells",
+    "make_files",
+    "make_pvs",
+    "make_textures",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

@@ -14,15 +14,16 @@ from pathlib import Path
 from typing import Any
 
 from ptmtools.cells import SubdivideOptions, subdivide
-from ptmtools.coverage import AchOptions, compute_ach
+from ptmtools.coverage.ach import compute_ach
+from ptmtools.coverage.options import AchOptions
 from ptmtools.database import EmitOptions
 from ptmtools.pipeline.emission import put_files
 from ptmtools.pipeline.folder import DatabaseWriter, sha256
 from ptmtools.pipeline.run import IMAGES, Run, StageReport, peak_memory, work_of
-from ptmtools.pipeline.textures import TextureOptions, put_textures
+from ptmtools.pipeline.textures import TextureOptions, check_images, put_textures
 from ptmtools.progress import Progress, silent
 from ptmtools.scene import IngestOptions, Note, Scene, ingest
-from ptmtools.visibility import PvsOptions, compute_pvs
+from ptmtools.visibility.pvs import PvsOptions, compute_pvs
 
 PathLike = str | os.PathLike[str]
 
@@ -97,9 +98,9 @@ def build_scene(
     with DatabaseWriter.open_for_model(db, Path(model).name, force=options.force) as writer:
         run = Run(writer, progress)
         _read_and_cut(run, Path(model), options.ingest, options.subdivide)
+        put_textures(run, options.textures, workers)
         _look(run, replace(options.pvs, workers=workers))
         _sample(run, replace(options.ach, workers=workers))
-        put_textures(run, options.textures, workers)
         put_files(run, options.emit)
         return _closing(run, start)
 
@@ -198,6 +199,7 @@ def _read_and_cut(
     records = {}
     if not writer.is_current("scene", work):
         scene = ingest(model, ingest_options, run.progress)
+        check_images(scene)
         run.hold("scene", scene)
         writer.put_arrays("scene", scene.to_arrays())
         for image in scene.images:

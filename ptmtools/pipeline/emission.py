@@ -7,9 +7,7 @@ from typing import Any
 
 from ptmtools.database import EmitOptions, emit
 from ptmtools.pipeline.run import Run
-from ptmtools.pipeline.textures import texture_records
-
-SERVED = "www"
+from ptmtools.pipeline.textures import SERVED, texture_records
 
 
 def put_files(run: Run, options: EmitOptions) -> None:

@@ -138,7 +138,7 @@ def _record(entry: object, stage: str, file: str | PathLike[str]) -> StageRecord
     for path, digest in entry["outputs"].items():
         if not isinstance(digest, str) or not _SHA256.fullmatch(digest) or not _inside(path):
             raise _damaged(file, f"stage {stage} has an impossible output {path!r}")
-    return StageRecord(entry["software"], *(entry[name] for name in names), notes)
+    return StageRecord(entry["software"], **{name: entry[name] for name in names}, notes=notes)
 
 
 def _inside(path: str) -> bool:

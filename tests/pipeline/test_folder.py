@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -76,17 +77,17 @@ def test_killed_within_a_commit_the_next_run_finishes_it(
     write(tmp_path, {"www/a": b"1", "www/gone": b"1"})
     before = state(tmp_path)
     monkeypatch.setattr(folders.shutil, "rmtree", lambda *a, **k: None)  # the end is not reached
-    real, left = Path.replace, moves
+    real, left = os.replace, moves
 
-    def replace(self: Path, target: Path) -> Path:
+    def replace(source: Path, target: Path) -> None:
         nonlocal left
         if Path(target).parent.name != STAGING:
             if left == 0:
                 raise KilledError
             left -= 1
-        return real(self, target)
+        real(source, target)
 
-    monkeypatch.setattr(Path, "replace", replace)
+    monkeypatch.setattr(os, "replace", replace)
     with pytest.raises(KilledError):
         write(tmp_path, {"www/a": b"2", "www/b": b"2"})
     monkeypatch.undo()
