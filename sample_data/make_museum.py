@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import io
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -34,7 +35,7 @@ from museum_parts.surfaces import SURFACES
 from museum_parts.two_rooms import two_rooms
 from PIL import Image, ImageOps
 
-HEAD = "# ptmtools sample museum"
+HEAD = "# ptmtools sample"
 Color = tuple[float, float, float]
 #: A path in the folder that is written, and a function that returns the bytes.
 File = tuple[str, Callable[[], bytes]]
@@ -164,7 +165,7 @@ def users_pictures(folder: Path) -> list[Picture]:
 def mtl_text(things: list[Thing], surfaces: list[str], pictures: list[Picture]) -> str:
     """The materials that are used, in a fixed order."""
     used = {face.material for thing in things for face in thing.faces}
-    blocks = [HEAD + ": materials\n"]
+    blocks = [f"{HEAD} museum: materials\n"]
     for name, (texture, tint, plain) in MATERIALS.items():
         if name in used:
             textured = texture in surfaces
@@ -197,7 +198,7 @@ def make_museum(options: MuseumOptions) -> Iterator[File]:
     hung = hang(panels, [p.aspect for p in pictures], options.rooms, generator(options.seed, 3))
     things = [*shell, *hung, *furniture]
     head = [
-        f"{HEAD}: {options.rooms} rooms on {plan.storeys} floors, "
+        f"{HEAD} museum: {options.rooms} rooms on {plan.storeys} floors, "
         f"{len(surfaces) + len(pictures)} textures, seed {options.seed}",
         "# metres, Y up",
     ]
@@ -210,18 +211,18 @@ def make_museum(options: MuseumOptions) -> Iterator[File]:
     yield "museum.obj", lambda: model
 
 
-def ours(folder: Path) -> set[str]:
-    """The files of a museum made earlier in ``folder``, or nothing if it holds none."""
-    model, materials = folder / "museum.obj", folder / "museum.mtl"
+def ours(folder: Path, stem: str) -> set[str]:
+    """The files that an earlier run wrote into ``folder``, or nothing if it holds no such model."""
     try:
-        with model.open(encoding="utf-8") as file:
+        with (folder / f"{stem}.obj").open(encoding="utf-8") as file:
             if not file.readline().startswith(HEAD):
                 return set()
-        lines = materials.read_text(encoding="utf-8").splitlines()
+        lines = (folder / f"{stem}.mtl").read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError):
         return set()
     images = {line.split()[-1] for line in lines if line.startswith("map_Kd ")}
-    return {"museum.obj", "museum.mtl", *images}
+    safe = re.compile(r"(textures/)?[a-z0-9_]+\.(png|jpg)")
+    return {f"{stem}.obj", f"{stem}.mtl", *(name for name in images if safe.fullmatch(name))}
 
 
 def write(folder: Path, files: list[File], *, force: bool) -> None:
@@ -230,13 +231,10 @@ def write(folder: Path, files: list[File], *, force: bool) -> None:
     A folder that holds something and no museum is refused without ``force``; what is not ours is
     left alone. Textures of an earlier museum that this one does not have are removed.
     """
-    before = ours(folder) if folder.is_dir() else set()
-    if (
-        folder.exists()
-        and not before
-        and not force
-        and (not folder.is_dir() or any(folder.iterdir()))
-    ):
+    before = ours(folder, Path(files[-1][0]).stem) if folder.is_dir() else set()
+    if folder.exists() and not folder.is_dir():
+        raise NotADirectoryError(f"{folder} is not a folder")
+    if folder.exists() and not before and not force and any(folder.iterdir()):
         raise FileExistsError(f"{folder} holds files that this script did not write; use --force")
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".museum-", dir=folder) as staging:
@@ -251,8 +249,7 @@ def write(folder: Path, files: list[File], *, force: bool) -> None:
             target.parent.mkdir(exist_ok=True)
             os.replace(Path(staging) / str(k), target)
     for name in sorted(before - {name for name, _ in files}):
-        if not name.startswith(("/", "..")) and "/../" not in name:
-            (folder / name).unlink(missing_ok=True)
+        (folder / name).unlink(missing_ok=True)
 
 
 def _at_least(least: int, most: int) -> Callable[[str], int]:

@@ -129,7 +129,6 @@ def _storey(
     base = storey * STOREY
     length = starts[-1] - INNER_WALL
     room: dict[tuple[int, int], Box] = {}
-    walls, floors = rng.permutation(WALLS), rng.permutation(FLOORS)
     for k, (column, strip) in enumerate(slots):
         z = _strip_start(strip, depths)
         room[column, strip] = Box(
@@ -138,8 +137,8 @@ def _storey(
             storey=storey,
             low=(starts[column], base, z),
             high=(starts[column] + widths[column], base + ROOM_HEIGHT, z + depths[strip]),
-            wall=str(walls[k % len(walls)]),
-            floor=str(floors[k % len(floors)]),
+            wall=WALLS[(number + k) % len(WALLS)],
+            floor=FLOORS[(number + k) % len(FLOORS)],
             ceiling="ceiling",
         )
     plan.boxes += room.values()
@@ -290,5 +289,5 @@ def _stairwell(plan: Plan, wing: int, length: int, z: int, windows: bool) -> Non
     plan.boxes.append(shaft)
     if windows:  # each a little above a landing
         for storey in range(max(1, plan.storeys - 1)):
-            sill = storey * STOREY + STOREY // 2 + 600
+            sill = storey * STOREY + STOREY // 2 + 600 if plan.storeys > 1 else 1000
             _window(plan, shaft, 0, 1, 1, 1800, sill=sill, first=storey + 1)
