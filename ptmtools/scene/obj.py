@@ -46,6 +46,8 @@ _SILENT = frozenset({
 #: Statements that would draw something that is not a surface of triangles.
 _NOT_DRAWN = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "surf": "surfaces"}
 _LINES_A_TICK = 1 << 16
+#: A UTF-8 byte order mark, read as Latin-1.
+_MARK = "\u00ef\u00bb\u00bf"
 
 
 @dataclass
@@ -178,12 +180,12 @@ def _read_statements(path: Path, findings: Findings, progress: Progress) -> _Sta
         for number, line in _logical_lines(stream):
             if not number % _LINES_A_TICK:
                 progress(raw.tell(), size, "reading")
+            if number == 1:
+                line = line.removeprefix(_MARK)
             words = line.split()
             if not words:
                 continue
             key = words[0]
-            if number == 1:
-                key = key.removeprefix("\u00ef\u00bb\u00bf")  # a byte order mark
             if key.startswith("#"):
                 continue
             if key in ("v", "vt", "f") and "#" in line:

@@ -80,7 +80,7 @@ def _normalised(shape: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _fans(shape: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Fans (m, n - 2, 3) of local indices, and for which polygons they are right."""
-    m, n, _ = shape
+    m, n, _ = shape.shape
     steps = np.arange(1, n - 1)
     fan = np.stack([np.zeros_like(steps), steps, steps + 1], axis=1)
     with np.errstate(all="ignore"):

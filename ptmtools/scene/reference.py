@@ -90,8 +90,11 @@ class Folder:
             outside = True
         if absolute and not self.allow_outside and not outside:
             outside = self._walk(Path("/"), parts) is not None
-        self.sought["/".join(parts)] = None
-        return Reference("outside" if outside else "missing")
+        if outside:
+            return Reference("outside")
+        if ".." not in parts:
+            self.sought["/".join(parts)] = None
+        return Reference("missing")
 
     def label(self, path: Path) -> str:
         """The path as notes show it: below the model's folder, or else the bare name."""
