@@ -1,0 +1,217 @@
+"""The Haar coder of the `fast` profile: a group's bytes around the compiled pass.
+
+Layout of a coded group (all little endian): flags; the rank bitmaps; the predictor weights; the
+frequency tables; the number of escapes and the escapes; the rANS words to the end.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.texture.profiles import layout, tables
+from ptmtools.texture.profiles.fit import fit_weights
+
+#: Flag bits: weights are sent; from bit 4 on, component i is coded by rank.
+SENT_WEIGHTS = 1
+RANKED = 16
+
+Bytes = NDArray[np.uint8]
+
+
+class _Ranks:
+    """For each component, ranks in place of values (``ranks``) and back (``values``)."""
+
+    def __init__(self, sets: list[NDArray[np.intp] | None]) -> None:
+        count = len(sets)
+        self.ranks = np.tile(np.arange(256, dtype=np.int32), (count, 1))
+        self.values = self.ranks.copy()
+        self.tops = np.zeros(count, np.int64)
+        for c, used in enumerate(sets):
+            if used is not None:
+                # A value that does not occur (below, means do) has the rank of the nearest that
+                # does; the lower one where two are as near.
+                self.ranks[c] = np.searchsorted((used[:-1] + used[1:]) // 2, np.arange(256))
+                self.values[c, : len(used)] = used
+                self.tops[c] = len(used) - 1
+
+
+def _sparse_values(plane: Bytes) -> NDArray[np.intp] | None:
+    """The distinct values of a plane, if they are few for their range; else None."""
+    values = np.flatnonzero(np.bincount(plane.reshape(-1), minlength=256))
+    few = 100 * len(values) <= 88 * (values[-1] - values[0] + 1)
+    return values if len(values) > 1 and few and plane.size >= 64 * len(values) else None
+
+
+def encode(level: Bytes, below: Bytes) -> bytes:
+    """The group that refines ``below`` (h >> 1, w >> 1, c) to ``level`` (h, w, c)."""
+    from ptmtools.texture.profiles import kernels
+
+    components = level.shape[2]
+    sets = [
+        _sparse_values(level[: 2 * below.shape[0], : 2 * below.shape[1], c])
+        for c in range(components)
+    ]
+    ranks = _Ranks(sets)
+    sent = fit_weights(level, below, ranks.ranks)
+    n = level.size - below.size
+    symbols = np.zeros(n, np.uint16)
+    contexts = np.zeros(n, np.uint8)
+    counts = np.zeros((layout.TABLES, 256), np.int64)
+    _pass(True, level, below, sent, ranks, symbols, contexts, counts)
+    frequency, packed_tables = tables.choose(counts)
+    words = np.zeros(n + 16, np.uint16)
+    escapes = np.zeros(n, np.uint16)
+    start = np.cumsum(frequency, axis=1) - frequency
+    first, escaped = kernels.rans_encode(
+        symbols,
+        contexts,
+        below.shape[1],
+        n - 3 * below.size,
+        frequency,
+        start,
+        np.zeros(counts.shape, np.uint64),
+        np.zeros(counts.shape, np.uint64),
+        np.zeros(4, np.uint64),
+        words,
+        escapes,
+    )
+    flags = SENT_WEIGHTS if sent is not None else 0
+    flags |= sum(RANKED << c for c in range(components) if sets[c] is not None)
+    return b"".join(
+        [
+            bytes([flags]),
+            *(_bitmap(used) for used in sets if used is not None),
+            b"" if sent is None else sent[_sent_mask(components)].astype("<i2").tobytes(),
+            packed_tables,
+            (n - escaped).to_bytes(4, "little"),
+            escapes[escaped:].astype("<u2").tobytes(),
+            words[first:].astype("<u2").tobytes(),
+        ]
+    )
+
+
+def decode(data: bytes, below: Bytes, shape: tuple[int, int, int]) -> Bytes:
+    """The inverse of `encode`. Raises InputError PTM-I112 for what no encoder writes."""
+    from ptmtools.texture.profiles import kernels
+
+    components = shape[2]
+    reader = _Reader(data)
+    flags = reader.take(1)[0]
+    if flags & ~(SENT_WEIGHTS | RANKED * ((1 << components) - 1)):
+        raise tables.damaged(f"flags {flags} are unknown")
+    sets = [_bits(reader.take(32)) if flags >> 4 + c & 1 else None for c in range(components)]
+    sent = None
+    if flags & SENT_WEIGHTS:
+        mask = _sent_mask(components)
+        sent = np.zeros(mask.shape, np.int32)
+        sent[mask] = np.frombuffer(reader.take(2 * int(mask.sum())), "<i2")
+        if int(np.abs(sent).max()) > layout.WEIGHT_TOP:
+            raise tables.damaged("a weight is out of range")
+    frequency, used = tables.parse(reader.rest(), layout.TABLES)
+    reader.take(used)
+    escaped = int.from_bytes(reader.take(4), "little")
+    escapes = np.frombuffer(reader.take(2 * escaped), "<u2").astype(np.uint16)
+    stream = reader.rest()
+    if len(stream) < 16 or len(stream) % 2:
+        raise tables.damaged("its stream has no whole number of words")
+    level = np.zeros(shape, np.uint8)
+    edge = level.size - 4 * below.size
+    limit = len(stream) // 2
+    words = np.zeros(limit + max(below.shape[1], edge) + 8, np.uint16)
+    words[:limit] = np.frombuffer(stream, "<u2")
+    result = _pass(
+        False, level, below, sent, _Ranks(sets), words=words, limit=limit, escapes=escapes,
+        table=tables.decoding_table(frequency),
+    )  # fmt: skip
+    if result == kernels.TRUNCATED:
+        raise tables.damaged("its stream ends early")
+    if result != kernels.OK:
+        raise tables.damaged("its stream leads to impossible texels")
+    return level
+
+
+def _pass(
+    encoding: bool,
+    level: Bytes,
+    below: Bytes,
+    sent: NDArray[np.int32] | None,
+    ranks: _Ranks,
+    symbols: NDArray[np.uint16] | None = None,
+    contexts: Bytes | None = None,
+    counts: NDArray[np.int64] | None = None,
+    words: NDArray[np.uint16] | None = None,
+    limit: int = 0,
+    escapes: NDArray[np.uint16] | None = None,
+    table: NDArray[np.uint32] | None = None,
+) -> int:
+    """`kernels.haar_pass`, with empty arrays for what a direction does not use."""
+    from ptmtools.texture.profiles import kernels
+
+    components = level.shape[2]
+    classes = layout.class_of_activity()
+    edge = level.size - 4 * below.size
+    references = layout.references(components)
+    none = np.zeros(0, np.uint16)
+    return int(
+        kernels.haar_pass(
+            encoding,
+            level,
+            below,
+            np.array(layout.plane_order(components), np.int64),
+            references,
+            layout.BUILT_IN_WEIGHTS[references] if sent is None else sent,
+            layout.ACTIVITY_WEIGHTS[references],
+            classes,
+            ranks.ranks,
+            ranks.values,
+            ranks.tops,
+            none if symbols is None else symbols,
+            np.zeros(0, np.uint8) if contexts is None else contexts,
+            np.zeros((layout.TABLES, 256), np.int64) if counts is None else counts,
+            none if words is None else words,
+            limit,
+            none if escapes is None else escapes,
+            np.zeros(0, np.uint32) if table is None else table,
+            kernels.workspace(below.shape[1], components, edge, len(classes)),
+        )
+    )
+
+
+def _sent_mask(components: int) -> NDArray[np.bool_]:
+    """Which weights (c, 3, 7) are sent, in this order."""
+    mask = np.zeros((components, 3, 7), np.bool_)
+    for c in range(components):
+        for k in range(3):
+            mask[c, k, layout.features_used(k, layout.reference_count(components, c))] = True
+    return mask
+
+
+def _bitmap(values: NDArray[np.intp]) -> bytes:
+    used = np.zeros(256, np.bool_)
+    used[values] = True
+    return np.packbits(used, bitorder="little").tobytes()
+
+
+def _bits(bitmap: bytes) -> NDArray[np.intp]:
+    values = np.flatnonzero(np.unpackbits(np.frombuffer(bitmap, np.uint8), bitorder="little"))
+    if len(values) < 2:
+        raise tables.damaged("a rank bitmap has fewer than two values")
+    return values
+
+
+class _Reader:
+    """Bytes from the front; asking for more than there are is an error of the file."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        self._at = 0
+
+    def take(self, n: int) -> bytes:
+        if self._at + n > len(self._data):
+            raise tables.damaged("it is cut short")
+        self._at += n
+        return self._data[self._at - n : self._at]
+
+    def rest(self) -> bytes:
+        return self._data[self._at :]

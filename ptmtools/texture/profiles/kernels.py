@@ -1,0 +1,631 @@
+"""Compiled loops of the `fast` profile: the Haar pass over one group, and the rANS encoder.
+
+One pass serves both directions, so that encoder and decoder cannot disagree about a prediction:
+it walks the block rows of a level, predicts the three Haar differences of every block from what
+the decoder knows, and either collects the residuals (encoding) or takes them from the rANS stream
+and writes the texels (decoding). A whole row of one coefficient is predicted before its first
+residual is needed, which lets the compiler use vector instructions and keeps four rANS lanes busy.
+The arithmetic is exact in 32-bit integers; the format is specified in ``docs/format-ptm.md``.
+
+Tried and rejected: planar int32 copies of both levels (a third more memory traffic and 16 bytes a
+texel); contexts that look at the residual just decoded in the same row (breaks the row-at-a-time
+order, 2.5 times slower).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+i32 = np.int32
+
+#: Largest activity; larger ones count as this.
+ACTIVITY_TOP = 1023
+#: Predictions stay within the range of V, so that every residual fits in 16 bits.
+PREDICTION_TOP = 1020
+#: Symbols at or above this escape to a 16-bit value.
+ESCAPE = 255
+#: Bits of a rANS frequency table.
+TABLE_BITS = 11
+TABLE_SIZE = 1 << TABLE_BITS
+#: A rANS state stays at or above this and below 2^31.
+STATE_LOW = 1 << 15
+
+OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2
+
+
+class Workspace(NamedTuple):
+    """What a pass needs besides its arguments.
+
+    Made outside the compiled code: allocating inside would double the time to compile it.
+    """
+
+    rows: Any
+    gradient: Any
+    v: Any
+    h: Any
+    g: Any
+    ev: Any
+    eh: Any
+    eg: Any
+    near_v: Any
+    near_h: Any
+    near_g: Any
+    prediction: Any
+    activity: Any
+    decoded: Any
+    zeros: Any
+    starts: Any
+    state: Any
+
+
+def workspace(blocks: int, components: int, edge: int, activities: int) -> Workspace:
+    """For groups ``blocks`` wide, with so many ``edge`` samples and distinct ``activities``."""
+    wide = blocks + 2
+    # One plane more than there are: its residuals stay 0 and stand for an absent reference.
+    more = components + 1
+    return Workspace(
+        rows=np.zeros((components, 8, blocks + 4), i32),
+        gradient=np.zeros((components, 2, blocks), i32),
+        v=np.zeros((components, 2, wide), i32),
+        h=np.zeros((components, 2, wide), i32),
+        g=np.zeros(wide, i32),
+        ev=np.zeros((more, 2, wide), i32),
+        eh=np.zeros((more, 2, wide), i32),
+        eg=np.zeros((more, wide), i32),
+        near_v=np.zeros((components, wide), i32),
+        near_h=np.zeros((components, wide), i32),
+        near_g=np.zeros((components, wide), i32),
+        prediction=np.zeros(blocks, i32),
+        activity=np.zeros(blocks, i32),
+        decoded=np.zeros(max(blocks, edge), i32),
+        zeros=np.zeros(edge, i32),
+        starts=np.zeros((3, activities), np.uint64),
+        state=np.zeros(4, np.uint64),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _load_row(below: Any, plane: int, y: int, rank: Any, row: Any) -> None:
+    """Ranks of row y into ``row`` (width + 4), both ends and y replicated at the border."""
+    height, width = below.shape[0], below.shape[1]
+    y = min(max(y, 0), height - 1)
+    for x in range(width):
+        row[x + 2] = rank[below[y, x, plane]]
+    row[0] = row[1] = row[2]
+    row[width + 3] = row[width + 2] = row[width + 1]
+
+
+@njit(cache=True, nogil=True)
+def _gradient(above: Any, row: Any, under: Any, out: Any) -> None:
+    for x in range(out.size):
+        out[x] = i32(abs(i32(row[x + 3] - row[x + 1])) + abs(i32(under[x + 2] - above[x + 2])))
+
+
+@njit(cache=True, nogil=True)
+def _finish(p: Any, a: Any, x: int, prediction: Any, activity: Any) -> None:
+    p = i32(i32(p + 128) >> 8)
+    prediction[x] = min(max(p, i32(-PREDICTION_TOP)), i32(PREDICTION_TOP))
+    activity[x] = min(i32(a >> 6), i32(ACTIVITY_TOP))
+
+
+@njit(cache=True, nogil=True)
+def _context_v(
+    rows: Any, y: int, gradient: Any, r1: Any, r2: Any, near: Any, w: Any, a: Any,
+    prediction: Any, activity: Any,
+) -> None:  # fmt: skip
+    """Predictions and activities of a row of V, the difference between a block's two rows."""
+    nn, n, i = rows[(y - 2) & 7], rows[(y - 1) & 7], rows[y & 7]
+    s, ss = rows[(y + 1) & 7], rows[(y + 2) & 7]
+    w0, w1, w2, w3, w5, w6 = w[0], w[1], w[2], w[3], w[5], w[6]
+    a0, a1, a2, a3 = a[0], a[1], a[2], a[3]
+    for x in range(prediction.size):
+        side = i32(i32(s[x + 1] - n[x + 1]) + i32(s[x + 3] - n[x + 3]))
+        p = i32(
+            w0 * i32(s[x + 2] - n[x + 2])
+            + w1 * side
+            + w2 * i32(ss[x + 2] - i[x + 2])
+            + w3 * i32(i[x + 2] - nn[x + 2])
+            + w5 * r1[x + 1]
+            + w6 * r2[x + 1]
+        )
+        b = i32(
+            a0 * gradient[x]
+            + a1 * i32(2 * near[x + 1] + near[x] + near[x + 2])
+            + a2 * abs(r1[x + 1])
+            + a3 * abs(r2[x + 1])
+        )
+        _finish(p, b, x, prediction, activity)
+
+
+@njit(cache=True, nogil=True)
+def _context_h(
+    rows: Any, y: int, gradient: Any, v: Any, ev: Any, r1: Any, r2: Any, near: Any, w: Any, a: Any,
+    prediction: Any, activity: Any,
+) -> None:  # fmt: skip
+    """Predictions and activities of a row of h1, the difference along a block's upper row."""
+    n, i, s = rows[(y - 1) & 7], rows[y & 7], rows[(y + 1) & 7]
+    w0, w1, w2, w3, w5, w6 = w[0], w[1], w[2], w[3], w[5], w[6]
+    a0, a1, a2, a3, a4 = a[0], a[1], a[2], a[3], a[4]
+    for x in range(prediction.size):
+        p = i32(
+            w0 * i32(i[x + 3] - i[x + 1])
+            + w1 * i32(n[x + 3] - n[x + 1])
+            + w2 * i32(s[x + 3] - s[x + 1])
+            + w3 * i32(v[x + 2] - v[x])
+            + w5 * r1[x + 1]
+            + w6 * r2[x + 1]
+        )
+        b = i32(
+            a0 * gradient[x]
+            + a1 * i32(2 * near[x + 1] + near[x] + near[x + 2])
+            + a2 * abs(r1[x + 1])
+            + a3 * abs(r2[x + 1])
+            + a4 * abs(ev[x + 1])
+        )
+        _finish(p, b, x, prediction, activity)
+
+
+@njit(cache=True, nogil=True)
+def _context_g(
+    rows: Any, y: int, gradient: Any, v: Any, h: Any, h_under: Any, ev: Any, eh: Any, eh_under: Any,
+    r1: Any, r2: Any, near: Any, w: Any, a: Any, prediction: Any, activity: Any,
+) -> None:  # fmt: skip
+    """Predictions and activities of a row of h2', half the difference along the lower row."""
+    i, s = rows[y & 7], rows[(y + 1) & 7]
+    w0, w1, w2, w3, w4, w5, w6 = w[0], w[1], w[2], w[3], w[4], w[5], w[6]
+    a0, a1, a2, a3, a4, a5, a6 = a[0], a[1], a[2], a[3], a[4], a[5], a[6]
+    for x in range(prediction.size):
+        p = i32(
+            w0 * i32(i[x + 3] - i[x + 1])
+            + w1 * i32(s[x + 3] - s[x + 1])
+            + w2 * h[x + 1]
+            + w3 * h_under[x + 1]
+            + w4 * i32(v[x + 2] - v[x])
+            + w5 * r1[x + 1]
+            + w6 * r2[x + 1]
+        )
+        b = i32(
+            a0 * gradient[x]
+            + a1 * i32(2 * near[x + 1] + near[x] + near[x + 2])
+            + a2 * abs(r1[x + 1])
+            + a3 * abs(r2[x + 1])
+            + a4 * abs(ev[x + 1])
+            + a5 * abs(eh[x + 1])
+            + a6 * abs(eh_under[x + 1])
+        )
+        _finish(p, b, x, prediction, activity)
+
+
+@njit(cache=True, nogil=True)
+def _read_differences(level: Any, plane: int, y: int, k: int, rank: Any, out: Any) -> None:
+    """Coefficient k (V, h1, h2') of block row y, from the ranks of the texels."""
+    for x in range(out.size - 2):
+        p, q = rank[level[2 * y, 2 * x, plane]], rank[level[2 * y, 2 * x + 1, plane]]
+        r, s = rank[level[2 * y + 1, 2 * x, plane]], rank[level[2 * y + 1, 2 * x + 1, plane]]
+        if k == 0:
+            out[x + 1] = i32(p + q - r - s)
+        elif k == 1:
+            out[x + 1] = i32(p - q)
+        else:
+            out[x + 1] = i32(r - s) >> 1
+
+
+@njit(cache=True, nogil=True)
+def _emit(
+    values: Any, prediction: Any, activity: Any, classes: Any, first: int, residual: Any, near: Any,
+    symbols: Any, contexts: Any, counts: Any, at: int,
+) -> None:  # fmt: skip
+    """Encoding: residuals of a row, zigzag, with the table each is to be coded by."""
+    for x in range(prediction.size):
+        e = i32(values[x + 1] - prediction[x])
+        residual[x + 1] = e
+        near[x + 1] = abs(e)
+        z = i32(i32(e << 1) ^ i32(e >> 31))
+        t = first + classes[activity[x]]
+        symbols[at + x] = z
+        contexts[at + x] = t
+        counts[t, min(z, ESCAPE)] += 1
+
+
+@njit(cache=True, nogil=True)
+def _absorb(decoded: Any, prediction: Any, residual: Any, near: Any, values: Any) -> None:
+    """Decoding: what `_emit` does, the other way round."""
+    for x in range(prediction.size):
+        z = decoded[x]
+        e = i32(i32(z >> 1) ^ i32(-(z & 1)))
+        residual[x + 1] = e
+        near[x + 1] = abs(e)
+        values[x + 1] = i32(e + prediction[x])
+
+
+@njit(cache=True, nogil=True)
+def _write_blocks(row: Any, v: Any, h: Any, g: Any, level: Any, plane: int, y: int) -> int:
+    """Texels of a block row from its differences; returns bits outside a byte, if any were set."""
+    stray = i32(0)
+    for x in range(row.size - 4):
+        vx, hx = v[x + 1], h[x + 1]
+        t = i32(i32(vx + (vx & 1)) >> 1)
+        top = i32(2 * row[x + 2] + ((hx ^ t) & 1) + t)
+        bottom = i32(top - vx)
+        p = i32(i32(top + hx) >> 1)
+        q = i32(p - hx)
+        d = i32(2 * g[x + 1] + (bottom & 1))
+        r = i32(i32(bottom + d) >> 1)
+        s = i32(r - d)
+        stray |= p | q | r | s
+        level[2 * y, 2 * x, plane] = p
+        level[2 * y, 2 * x + 1, plane] = q
+        level[2 * y + 1, 2 * x, plane] = r
+        level[2 * y + 1, 2 * x + 1, plane] = s
+    return int(stray & ~255)
+
+
+@njit(cache=True, nogil=True)
+def _write_ranked_blocks(
+    below: Any, rank: Any, value: Any, top: int, v: Any, h: Any, g: Any, level: Any, plane: int,
+    y: int,
+) -> int:  # fmt: skip
+    """As `_write_blocks`, for a plane whose differences are those of ranks 0 … ``top``.
+
+    The differences fix the four ranks up to a common shift; each step of it raises the sum of the
+    four values by at least 4, so exactly one leaves a remainder of 0 … 3 over the texel below.
+    Returns nonzero if there is none.
+    """
+    stray = 0
+    for x in range(v.size - 2):
+        vx, hx = v[x + 1], h[x + 1]
+        dr = 2 * g[x + 1] + ((vx ^ hx) & 1)
+        dp = (dr + vx + hx) >> 1
+        dq = dp - hx
+        least = max(0, -min(dp, dq, dr))
+        most = top - max(0, max(dp, dq, dr))
+        if least > most:
+            stray = 1
+            continue
+        wanted = 4 * np.int64(below[y, x, plane])
+        u = rank[below[y, x, plane]] - ((dp + dq + dr + 2) >> 2)
+        u = min(max(u, least), most)
+        total = value[u] + value[u + dp] + value[u + dq] + value[u + dr]
+        while total < wanted and u < most:
+            u += 1
+            total = value[u] + value[u + dp] + value[u + dq] + value[u + dr]
+        while total > wanted + 3 and u > least:
+            u -= 1
+            total = value[u] + value[u + dp] + value[u + dq] + value[u + dr]
+        if total < wanted or total > wanted + 3:
+            stray = 1
+        level[2 * y, 2 * x, plane] = value[u + dp]
+        level[2 * y, 2 * x + 1, plane] = value[u + dq]
+        level[2 * y + 1, 2 * x, plane] = value[u + dr]
+        level[2 * y + 1, 2 * x + 1, plane] = value[u]
+    return stray
+
+
+@njit(cache=True, nogil=True)
+def _decode_row(
+    state: Any, words: Any, at: int, table: Any, starts: Any, activity: Any, n: int, out: Any
+) -> int:
+    """n symbols, lane x & 3 for symbol x; an entry is symbol << 24 | frequency << 12 | offset."""
+    mask = np.uint64(TABLE_SIZE - 1)
+    low, bits, sixteen = np.uint64(STATE_LOW), np.uint64(TABLE_BITS), np.uint64(16)
+    twelve, part = np.uint64(12), np.uint64(4095)
+    zero, one, four = np.uint64(0), np.uint64(1), np.uint64(4)
+    x0, x1, x2, x3 = state[0], state[1], state[2], state[3]
+    i, k = zero, np.uint64(at)
+    whole = np.uint64(n & ~3)
+    while i < whole:
+        e0 = np.uint64(table[starts[activity[i]] + (x0 & mask)])
+        e1 = np.uint64(table[starts[activity[i + one]] + (x1 & mask)])
+        e2 = np.uint64(table[starts[activity[i + np.uint64(2)]] + (x2 & mask)])
+        e3 = np.uint64(table[starts[activity[i + np.uint64(3)]] + (x3 & mask)])
+        x0 = ((e0 >> twelve) & part) * (x0 >> bits) + (e0 & part)
+        x1 = ((e1 >> twelve) & part) * (x1 >> bits) + (e1 & part)
+        x2 = ((e2 >> twelve) & part) * (x2 >> bits) + (e2 & part)
+        x3 = ((e3 >> twelve) & part) * (x3 >> bits) + (e3 & part)
+        out[i] = e0 >> np.uint64(24)
+        out[i + one] = e1 >> np.uint64(24)
+        out[i + np.uint64(2)] = e2 >> np.uint64(24)
+        out[i + np.uint64(3)] = e3 >> np.uint64(24)
+        refill = x0 < low
+        word = np.uint64(words[k])
+        x0 = (x0 << sixteen) | word if refill else x0
+        k += one if refill else zero
+        refill = x1 < low
+        word = np.uint64(words[k])
+        x1 = (x1 << sixteen) | word if refill else x1
+        k += one if refill else zero
+        refill = x2 < low
+        word = np.uint64(words[k])
+        x2 = (x2 << sixteen) | word if refill else x2
+        k += one if refill else zero
+        refill = x3 < low
+        word = np.uint64(words[k])
+        x3 = (x3 << sixteen) | word if refill else x3
+        k += one if refill else zero
+        i += four
+    state[0], state[1], state[2], state[3] = x0, x1, x2, x3
+    while i < np.uint64(n):
+        lane = i & np.uint64(3)
+        x = state[lane]
+        e = np.uint64(table[starts[activity[i]] + (x & mask)])
+        x = ((e >> twelve) & part) * (x >> bits) + (e & part)
+        out[i] = e >> np.uint64(24)
+        if x < low:
+            x = (x << sixteen) | np.uint64(words[k])
+            k += one
+        state[lane] = x
+        i += one
+    return int(k)
+
+
+@njit(cache=True, nogil=True)
+def _fill_escapes(out: Any, n: int, escapes: Any, at: int) -> int:
+    """Escaped symbols replaced by their values; -1 if there are not enough of them."""
+    seen = False
+    for x in range(n):
+        seen |= out[x] == ESCAPE
+    if seen:
+        for x in range(n):
+            if out[x] == ESCAPE:
+                if at == escapes.size:
+                    return -1
+                out[x] = escapes[at]
+                at += 1
+    return at
+
+
+@njit(cache=True, nogil=True)
+def _edge_prediction(level: Any, y: int, x: int, plane: int) -> int:
+    """Median of left, upper and left + upper - upper left; what lies outside gives way."""
+    if y == 0:
+        return int(level[y, x - 1, plane])
+    up = int(level[y - 1, x, plane])
+    if x == 0:
+        return up
+    left = int(level[y, x - 1, plane])
+    corner = int(level[y - 1, x - 1, plane])
+    return max(min(left, up), min(max(left, up), left + up - corner))
+
+
+@njit(cache=True, nogil=True)
+def haar_pass(
+    encoding: bool, level: Any, below: Any, planes: Any, references: Any, weights: Any,
+    activities: Any, classes: Any, ranks: Any, values: Any, tops: Any, symbols: Any,
+    contexts: Any, counts: Any, words: Any, limit: int, escapes: Any, table: Any, work: Any,
+) -> int:  # fmt: skip
+    """One group in either direction.
+
+    Parameters
+    ----------
+    encoding: True reads ``level`` and fills ``symbols``, ``contexts`` and ``counts``; False reads
+        ``words``, ``escapes`` and ``table`` and fills ``level``.
+    level: (h, w, c) uint8. below: (h >> 1, w >> 1, c) uint8, the level below.
+    planes: (c,) int64, the components in coding order.
+    references: (c,) int64, how many of the planes coded first each plane's residuals refer to.
+    weights: (c, 3, 7) int32 and activities: (c, 3, 7) int32, by plane in coding order.
+    classes: (1024,) int64, class of an activity.
+    ranks, values: (c, 256) int32, by component: value to rank, rank to value. tops: (c,) int64, the
+        highest rank, or 0 where values stand for themselves (``ranks`` is the identity then).
+    symbols: (n,) uint16, contexts: (n,) uint8, counts: (2 * classes + 1, 256) int64.
+    words: uint16, the stream, with a row's length and 8 more of padding behind ``limit``.
+    escapes: uint16. table: (2 * classes + 1) * 2048 uint32.
+    work: from `workspace`.
+
+    Returns OK, TRUNCATED (the stream ended early) or IMPOSSIBLE (no encoder writes this).
+    """
+    bh, bw, nc = below.shape
+    per_kind = (counts.shape[0] - 1) // 2
+    rows, gradient, state, starts = work.rows, work.gradient, work.state, work.starts
+    v, h, g = work.v, work.h, work.g
+    ev, eh, eg = work.ev, work.eh, work.eg
+    near_v, near_h, near_g = work.near_v, work.near_h, work.near_g
+    prediction, activity, decoded = work.prediction, work.activity, work.decoded
+    height, width = level.shape[0], level.shape[1]
+    tall = 2 * bh if width > 2 * bw else 0
+    edge = nc * (tall + (width if height > 2 * bh else 0))
+    for j in range(classes.size):
+        starts[0, j] = classes[j] * TABLE_SIZE
+        starts[1, j] = (per_kind + classes[j]) * TABLE_SIZE
+        starts[2, j] = 2 * per_kind * TABLE_SIZE
+
+    at, escaped, n = 0, 0, 0
+    if not encoding:
+        for lane in range(4):
+            state[lane] = np.uint64(words[2 * lane]) | (
+                np.uint64(words[2 * lane + 1] & 0x7FFF) << np.uint64(16)
+            )
+        at = 8
+
+    for c in range(nc):
+        for y in range(-2, 2):
+            _load_row(below, planes[c], y, ranks[planes[c]], rows[c, y & 7])
+    stray = 0
+    for y in range(bh + 1):
+        now, before = y & 1, 1 - (y & 1)
+        for c in range(nc):
+            plane = planes[c]
+            ref1 = 0 if references[c] > 0 else nc
+            ref2 = 1 if references[c] > 1 else nc
+            if y < bh:
+                _load_row(below, plane, y + 2, ranks[plane], rows[c, (y + 2) & 7])
+                _gradient(
+                    rows[c, (y - 1) & 7], rows[c, y & 7], rows[c, (y + 1) & 7], gradient[c, now]
+                )
+                for k in range(2):
+                    if k == 0:
+                        found, residual, near = v[c, now], ev[c, now], near_v[c]
+                        _context_v(
+                            rows[c], y, gradient[c, now], ev[ref1, now], ev[ref2, now], near,
+                            weights[c, 0], activities[c, 0], prediction, activity,
+                        )  # fmt: skip
+                    else:
+                        found, residual, near = h[c, now], eh[c, now], near_h[c]
+                        _context_h(
+                            rows[c], y, gradient[c, now], v[c, now], ev[c, now], eh[ref1, now],
+                            eh[ref2, now], near, weights[c, 1], activities[c, 1], prediction,
+                            activity,
+                        )  # fmt: skip
+                    if encoding:
+                        _read_differences(level, plane, y, k, ranks[plane], found)
+                        _emit(
+                            found, prediction, activity, classes, 0, residual, near, symbols,
+                            contexts, counts, n,
+                        )  # fmt: skip
+                        n += bw
+                    else:
+                        at = _decode_row(state, words, at, table, starts[0], activity, bw, decoded)
+                        escaped = _fill_escapes(decoded, bw, escapes, escaped)
+                        if at > limit or escaped < 0:
+                            return TRUNCATED
+                        _absorb(decoded, prediction, residual, near, found)
+            else:
+                for x in range(bw + 2):
+                    h[c, now, x] = h[c, before, x]
+                    eh[c, now, x] = 0
+            if y > 0:
+                _context_g(
+                    rows[c], y - 1, gradient[c, before], v[c, before], h[c, before], h[c, now],
+                    ev[c, before], eh[c, before], eh[c, now], eg[ref1], eg[ref2], near_g[c],
+                    weights[c, 2], activities[c, 2], prediction, activity,
+                )  # fmt: skip
+                if encoding:
+                    _read_differences(level, plane, y - 1, 2, ranks[plane], g)
+                    _emit(
+                        g, prediction, activity, classes, per_kind, eg[c], near_g[c], symbols,
+                        contexts, counts, n,
+                    )  # fmt: skip
+                    n += bw
+                else:
+                    at = _decode_row(state, words, at, table, starts[1], activity, bw, decoded)
+                    escaped = _fill_escapes(decoded, bw, escapes, escaped)
+                    if at > limit or escaped < 0:
+                        return TRUNCATED
+                    _absorb(decoded, prediction, eg[c], near_g[c], g)
+                    if tops[plane] > 0:
+                        stray |= _write_ranked_blocks(
+                            below, ranks[plane], values[plane], tops[plane], v[c, before],
+                            h[c, before], g, level, plane, y - 1,
+                        )  # fmt: skip
+                    else:
+                        stray |= _write_blocks(
+                            rows[c, (y - 1) & 7], v[c, before], h[c, before], g, level, plane,
+                            y - 1,
+                        )  # fmt: skip
+    if edge:
+        # The odd last column, then the odd last row: modulo 256, so nothing can escape.
+        if not encoding:
+            at = _decode_row(state, words, at, table, starts[2], work.zeros, edge, decoded)
+            if at > limit:
+                return TRUNCATED
+        i = 0
+        for j in range(edge // nc):
+            y, x = (j, width - 1) if j < tall else (height - 1, j - tall)
+            for plane in range(nc):
+                guess = _edge_prediction(level, y, x, plane)
+                if encoding:
+                    e = ((int(level[y, x, plane]) - guess + 128) & 255) - 128
+                    z = (e << 1) ^ (e >> 31)
+                    symbols[n + i] = z
+                    contexts[n + i] = 2 * per_kind
+                    counts[2 * per_kind, z] += 1
+                else:
+                    z = int(decoded[i])
+                    level[y, x, plane] = (guess + ((z >> 1) ^ -(z & 1))) & 255
+                i += 1
+    if encoding:
+        return OK
+    for lane in range(4):
+        stray |= state[lane] != STATE_LOW
+    return IMPOSSIBLE if stray or at != limit or escaped != escapes.size else OK
+
+
+@njit(cache=True, nogil=True)
+def normalise(counts: Any, frequency: Any) -> None:
+    """Frequencies (t, 256) int64 that sum to 2048 in each row of ``counts`` (t, 256) that has any.
+
+    Rounds, at least 1 where a count is positive; then moves single units where the length changes
+    least, which is by about count / (frequency ± ½). Ties go to the lower symbol.
+    """
+    for t in range(counts.shape[0]):
+        total = 0
+        for s in range(256):
+            total += counts[t, s]
+        if total == 0:
+            continue
+        left = TABLE_SIZE
+        for s in range(256):
+            n = counts[t, s]
+            if n > 0:
+                frequency[t, s] = max(1, (n * TABLE_SIZE + total // 2) // total)
+                left -= frequency[t, s]
+        step = 1 if left > 0 else -1
+        while left != 0:
+            best = -1
+            for s in range(256):
+                n, f = counts[t, s], frequency[t, s]
+                if f == 0 or f + step == 0:
+                    continue
+                if best < 0:
+                    best = s
+                    continue
+                mine = n * (2 * frequency[t, best] + step)
+                yours = counts[t, best] * (2 * f + step)
+                if (mine > yours) if step > 0 else (mine < yours):
+                    best = s
+            frequency[t, best] += step
+            left -= step
+
+
+@njit(cache=True, nogil=True)
+def rans_encode(
+    symbols: Any, contexts: Any, row: int, edge: int, frequency: Any, start: Any,
+    reciprocal: Any, shift: Any, state: Any, words: Any, escapes: Any,
+) -> tuple[int, int]:  # fmt: skip
+    """Code ``symbols`` from the last to the first, so that the decoder goes forwards.
+
+    frequency, start: (tables, 256) int64. A symbol without a frequency escapes. Words and escapes
+    are written from the ends of their arrays; returns where each begins. reciprocal, shift:
+    (tables, 256) uint64 and state: (4,) uint64 are overwritten.
+    """
+    tables = frequency.shape[0]
+    for t in range(tables):
+        for s in range(256):
+            f = frequency[t, s]
+            if f > 0:
+                bits = 0
+                while (1 << bits) < f:
+                    bits += 1
+                # x // f == x * reciprocal >> shift for every x below 2^31.
+                shift[t, s] = bits + 31
+                reciprocal[t, s] = ((1 << (bits + 31)) + f - 1) // f
+    for lane in range(4):
+        state[lane] = STATE_LOW
+    at, escaped = words.size, escapes.size
+    i = symbols.size
+    left = edge if edge else row
+    while i > 0:
+        for x in range(left - 1, -1, -1):
+            i -= 1
+            t = contexts[i]
+            z = symbols[i]
+            if t != tables - 1 and (z >= ESCAPE or frequency[t, z] == 0):
+                escaped -= 1
+                escapes[escaped] = z
+                z = ESCAPE
+            f = np.uint64(frequency[t, z])
+            s = state[x & 3]
+            if s >= f << np.uint64(20):
+                at -= 1
+                words[at] = s & np.uint64(0xFFFF)
+                s >>= np.uint64(16)
+            q = (s * reciprocal[t, z]) >> shift[t, z]
+            state[x & 3] = (q << np.uint64(TABLE_BITS)) + (s - q * f) + np.uint64(start[t, z])
+        left = row
+    for lane in range(3, -1, -1):
+        at -= 2
+        words[at] = state[lane] & np.uint64(0xFFFF)
+        words[at + 1] = state[lane] >> np.uint64(16)
+    return at, escaped

@@ -1,0 +1,206 @@
+"""Symbol frequencies of the `fast` profile: built in or sent, always in integers.
+
+Each table of a group is either one of a family of two-sided geometric distributions, named by one
+byte, or the frequencies counted, in nibbles. Small groups live on the first kind, large ones on
+the second; the encoder takes whichever is shorter, table by table.
+
+Tried and rejected: deflated frequencies (1 % shorter than nibbles, but then the bytes of a file
+would depend on the zlib that wrote it).
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.errors import InputError
+
+#: Bits of a table and its size: the frequencies of a table in use sum to this.
+TABLE_BITS = 11
+TABLE_SIZE = 1 << TABLE_BITS
+ESCAPE = 255
+#: Mean magnitudes, in sixteenths, of the built-in distributions 1, 2, …
+BUILT_IN_MEANS = (
+    1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96, 112, 128, 160,
+    192, 224, 256, 320, 384, 448, 512, 640, 768, 1024,
+)  # fmt: skip
+UNUSED = 0
+SENT = 255
+
+Frequencies = NDArray[np.int64]
+
+
+def normalise(counts: NDArray[np.int64]) -> Frequencies:
+    """Frequencies (t, 256) of the rows of ``counts`` (t, 256): see `kernels.normalise`."""
+    from ptmtools.texture.profiles import kernels
+
+    frequency = np.zeros_like(counts)
+    kernels.normalise(counts, frequency)
+    return frequency
+
+
+@cache
+def built_in() -> NDArray[np.int64]:
+    """The built-in tables (1 + n, 256); row 0 is empty.
+
+    Weight of magnitude m: 2^24 at 0, then each times ρ = mean / (16 + mean) in 16 bits; 2^14 is
+    added to the escape. Weights below 2^12 of the sum's 2^-11 share have frequency 0: they escape.
+    """
+    tables = np.zeros((1 + len(BUILT_IN_MEANS), 256), np.int64)
+    for row, mean in enumerate(BUILT_IN_MEANS, start=1):
+        ratio = 65536 * mean // (16 + mean)
+        weight = np.zeros(256, np.int64)
+        w = 1 << 24
+        for symbol in range(ESCAPE):
+            if symbol % 2 == 1:
+                w = w * ratio >> 16
+            weight[symbol] = w
+        weight[weight * (2 * TABLE_SIZE) < weight.sum()] = 0
+        weight[ESCAPE] = weight.sum() >> 10
+        tables[row] = weight
+    return normalise(tables)
+
+
+@cache
+def _built_in_lengths() -> NDArray[np.int64]:
+    """Length (n, 256) in 1/256 bits of every symbol under every built-in table."""
+    family = built_in()[1:]
+    lengths = _log_table()[family]
+    return np.where(family > 0, lengths, lengths[:, ESCAPE, None] + 16 * 256)
+
+
+@cache
+def _log_table() -> NDArray[np.int64]:
+    """-log2(f / 2048) in 1/256 bits for f = 0 … 2048 (0 for f = 0), by repeated squaring.
+
+    In integers: the choice of a table must not depend on a machine's logarithm.
+    """
+    table = np.zeros(TABLE_SIZE + 1, np.int64)
+    for f in range(1, TABLE_SIZE + 1):
+        whole = f.bit_length() - 1
+        mantissa = f << (30 - whole)
+        fraction = 0
+        for _ in range(8):
+            mantissa = mantissa * mantissa >> 30
+            fraction <<= 1
+            if mantissa >= 1 << 31:
+                mantissa >>= 1
+                fraction |= 1
+        table[f] = (TABLE_BITS - whole) * 256 - fraction
+    return table
+
+
+def choose(counts: NDArray[np.int64]) -> tuple[Frequencies, bytes]:
+    """Tables (t, 256) for the symbol counts (t, 256) of a group, and their serialised form.
+
+    The last table has no escape: it is built in only where that holds every symbol that occurs.
+    """
+    family = built_in()[1:]
+    cost = counts @ _built_in_lengths().T
+    cost[-1, (family[:, counts[-1] > 0] == 0).any(axis=1)] = 1 << 62
+    exact = normalise(counts)
+    exact_cost = (counts * _log_table()[exact]).sum(axis=1)
+    frequency = exact
+    kinds = bytearray()
+    numbers: list[int] = []
+    for t, best in enumerate(cost.argmin(axis=1).tolist()):
+        sent = _numbers(exact[t])
+        nibbles = sum(max(1, (n.bit_length() + 2) // 3) for n in sent)
+        if not exact[t].any():
+            kinds.append(UNUSED)
+        elif int(exact_cost[t]) + nibbles * 4 * 256 < int(cost[t, best]):
+            kinds.append(SENT)
+            numbers += sent
+        else:
+            kinds.append(1 + best)
+            frequency[t] = family[best]
+    packed = _pack_nibbles(numbers)
+    return frequency, bytes(kinds) + len(packed).to_bytes(2, "little") + packed
+
+
+def parse(data: bytes, tables: int) -> tuple[Frequencies, int]:
+    """The inverse of `choose`: frequencies (tables, 256), and how many bytes they took.
+
+    Raises InputError PTM-I112 for tables that no encoder writes.
+    """
+    kinds = data[:tables]
+    size = int.from_bytes(data[tables : tables + 2], "little")
+    end = tables + 2 + size
+    if len(data) < end:
+        raise damaged("its tables are cut short")
+    numbers = _unpack_nibbles(data[tables + 2 : end])
+    frequency = np.zeros((tables, 256), np.int64)
+    at = 0
+    for t, kind in enumerate(kinds):
+        if kind == SENT:
+            used = int(numbers[at + 1]) if at + 1 < len(numbers) else 256
+            row = numbers[at + 2 : at + 2 + used]
+            if used >= 256 or len(row) < used:
+                raise damaged(f"table {t} is cut short")
+            frequency[t, :used] = row
+            frequency[t, ESCAPE] = numbers[at]
+            at += 2 + used
+        elif kind != UNUSED:
+            if kind > len(BUILT_IN_MEANS):
+                raise damaged(f"table {t} is of an unknown kind, {kind}")
+            frequency[t] = built_in()[kind]
+        if kind != UNUSED and int(frequency[t].sum()) != TABLE_SIZE:
+            raise damaged(f"table {t} does not sum to {TABLE_SIZE}")
+    return frequency, end
+
+
+def decoding_table(frequency: Frequencies) -> NDArray[np.uint32]:
+    """Flat (tables * 2048,) entries symbol << 24 | frequency << 12 | offset."""
+    table = np.zeros((len(frequency), TABLE_SIZE), np.uint32)
+    for t, row in enumerate(frequency):
+        if row.any():
+            symbol = np.repeat(np.arange(256), row)
+            offset = np.arange(TABLE_SIZE) - (np.cumsum(row) - row)[symbol]
+            table[t] = symbol << 24 | row[symbol] << 12 | offset
+    return table.reshape(-1)
+
+
+def damaged(what: str) -> InputError:
+    """The error for a group whose contents contradict each other."""
+    return InputError(
+        "PTM-I112",
+        f"the group cannot be decoded: {what}",
+        remedy="the file is damaged or was not written by a conforming encoder; encode it again",
+    )
+
+
+def _numbers(frequency: Frequencies) -> list[int]:
+    """What is sent of a table: frequency of the escape, length of the rest, the rest."""
+    rest = frequency[:ESCAPE]
+    used = int(np.flatnonzero(rest)[-1]) + 1 if rest.any() else 0
+    return [int(frequency[ESCAPE]), used, *rest[:used].tolist()]
+
+
+def _pack_nibbles(numbers: list[int]) -> bytes:
+    """Numbers as nibbles of 3 bits, low ones first, 8 added where more follow; low nibble first."""
+    nibbles: list[int] = []
+    for n in numbers:
+        while n > 7:
+            nibbles.append(8 | (n & 7))
+            n >>= 3
+        nibbles.append(n)
+    if len(nibbles) % 2:
+        nibbles.append(0)
+    pairs = np.array(nibbles, np.uint8).reshape(-1, 2)
+    return (pairs[:, 0] | pairs[:, 1] << 4).tobytes()
+
+
+def _unpack_nibbles(data: bytes) -> NDArray[np.int64]:
+    pairs = np.frombuffer(data, np.uint8)
+    nibbles = np.stack([pairs & 15, pairs >> 4], axis=1).reshape(-1).astype(np.int64)
+    ends = nibbles < 8
+    number: NDArray[np.int64] = np.cumsum(ends) - ends
+    first = np.searchsorted(number, number)
+    shift = 3 * (np.arange(len(nibbles)) - first)
+    if len(shift) and int(shift.max()) > 9:
+        raise damaged("a table holds a number above 4095")
+    out = np.zeros(int(ends.sum()) + 1, np.int64)
+    np.add.at(out, number, (nibbles & 7) << shift)
+    return out[:-1]
