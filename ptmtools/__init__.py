@@ -1,1 +1,143 @@
-"""ptmtools: architectural scenes that stream."""
+"""ptmtools: architectural scenes that stream.
+
+The functions here are the commands of `ptm`: `build_scene` builds a database from a model,
+`ingest`, `subdivide`, `compute_pvs`, `compute_ach` and `emit` are its stages, `encode` and
+`decode` turn one image into a `.ptm` and back, `validate` and `plot_plan` look at the result.
+Each has a frozen class of options, which holds the defaults. Whatever a user can cause raises a
+`PtmError`.
+
+All of it is loaded when first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from ptmtools.version import __version__
+
+if TYPE_CHECKING:
+    from ptmtools.cells import Cells, SubdivideOptions, subdivide
+    from ptmtools.coverage.ach import compute_ach
+    from ptmtools.coverage.model import Ach
+    from ptmtools.coverage.options import AchOptions
+    from ptmtools.database import EmitOptions, PlotOptions, ValidationReport, emit, plot_plan
+    from ptmtools.errors import (
+        CheckError,
+        DatabaseError,
+        InputError,
+        LimitError,
+        MissingComponentError,
+        OutputError,
+        PtmError,
+    )
+    from ptmtools.pipeline import (
+        Artifacts,
+        BuildOptions,
+        BuildReport,
+        DatabaseFolder,
+        TextureOptions,
+        build_scene,
+        validate,
+    )
+    from ptmtools.scene import IngestOptions, Scene, ingest
+    from ptmtools.texture import (
+        EncodeOptions,
+        PtmHeader,
+        decode,
+        encode,
+        read_header,
+        read_image,
+        write_png,
+    )
+    from ptmtools.visibility.model import Pvs
+    from ptmtools.visibility.pvs import PvsOptions, compute_pvs
+
+_HOME = {
+    "Ach": "coverage.model",
+    "AchOptions": "coverage.options",
+    "Artifacts": "pipeline",
+    "BuildOptions": "pipeline",
+    "BuildReport": "pipeline",
+    "Cells": "cells",
+    "CheckError": "errors",
+    "DatabaseError": "errors",
+    "DatabaseFolder": "pipeline",
+    "EmitOptions": "database",
+    "EncodeOptions": "texture",
+    "IngestOptions": "scene",
+    "InputError": "errors",
+    "LimitError": "errors",
+    "MissingComponentError": "errors",
+    "OutputError": "errors",
+    "PlotOptions": "database",
+    "PtmError": "errors",
+    "PtmHeader": "texture",
+    "Pvs": "visibility.model",
+    "PvsOptions": "visibility.pvs",
+    "Scene": "scene",
+    "SubdivideOptions": "cells",
+    "TextureOptions": "pipeline",
+    "ValidationReport": "database",
+    "build_scene": "pipeline",
+    "compute_ach": "coverage.ach",
+    "compute_pvs": "visibility.pvs",
+    "decode": "texture",
+    "emit": "database",
+    "encode": "texture",
+    "ingest": "scene",
+    "plot_plan": "database",
+    "read_header": "texture",
+    "read_image": "texture",
+    "subdivide": "cells",
+    "validate": "pipeline",
+    "write_png": "texture",
+}
+
+__all__ = [
+    "Ach",
+    "AchOptions",
+    "Artifacts",
+    "BuildOptions",
+    "BuildReport",
+    "Cells",
+    "CheckError",
+    "DatabaseError",
+    "DatabaseFolder",
+    "EmitOptions",
+    "EncodeOptions",
+    "IngestOptions",
+    "InputError",
+    "LimitError",
+    "MissingComponentError",
+    "OutputError",
+    "PlotOptions",
+    "PtmError",
+    "PtmHeader",
+    "Pvs",
+    "PvsOptions",
+    "Scene",
+    "SubdivideOptions",
+    "TextureOptions",
+    "ValidationReport",
+    "__version__",
+    "build_scene",
+    "compute_ach",
+    "compute_pvs",
+    "decode",
+    "emit",
+    "encode",
+    "ingest",
+    "plot_plan",
+    "read_header",
+    "read_image",
+    "subdivide",
+    "validate",
+    "write_png",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

@@ -10,8 +10,12 @@ node's cross-section that the wall covers, *balance* the smaller over the larger
 fragments on the two sides, *splits* the share of the other fragments that the plane cuts. Nodes
 are split in the order of the wall area that their best plane brings, so that a limit on the number
 of leaves keeps the best splits. Where no wall is left, the reveals of a thick wall may still split
-(`reveals`). A split that would leave a side thinner than the tolerance allows
-is refused: no leaf is flat after rounding to float32.
+(`reveals`).
+
+A split that would leave a side thinner than a leaf may be is refused: no leaf is flat after
+rounding to float32. Where it would leave a side thinner than the cluster distance (a picture on a
+wall, the next room's wall a few millimetres out of line), the wall must close something: a part of
+the near boundary that is open without it.
 """
 
 from __future__ import annotations
@@ -109,11 +113,11 @@ def build_tree(
     def push(
         body: Polyhedron, fragments: list[_Fragment], parent: tuple[int, int], walled: bool
     ) -> None:
-        best = _best_split(body, fragments, least if walled else 0.0, tolerance)
+        best = _best_split(body, fragments, least if walled else 0.0, planes, taken, tolerance)
         if best < 0 and walled:
             walled = False
             fragments = _sections(body, reveals.within(body, planes), tolerance)
-            best = _best_split(body, fragments, 0.0, tolerance)
+            best = _best_split(body, fragments, 0.0, planes, taken, tolerance)
         if best < 0:
             finish(body, parent)
             return
@@ -183,6 +187,8 @@ def _best_split(
     body: Polyhedron,
     fragments: list[_Fragment],
     least: float,
+    planes: list[NDArray[np.float64]],
+    taken: list[WallPlane],
     tolerance: Tolerance,
 ) -> int:
     """Index of the fragment whose plane splits best, or -1."""
@@ -196,7 +202,12 @@ def _best_split(
             continue
         plane = f.wall.frame.plane
         reach = body.points @ plane[:3] + plane[3]
-        if min(reach.max(), -reach.min()) < tolerance.thin:
+        depth = min(reach.max(), -reach.min())
+        if depth < tolerance.thin:
+            continue
+        if depth < tolerance.cluster and _closes(body, f, planes, taken, tolerance) < max(
+            least, tolerance.hairline**2
+        ):
             continue
         distance = points @ plane[:3] + plane[3]
         front = np.maximum.reduceat(distance, start) > tolerance.plane
@@ -210,3 +221,25 @@ def _best_split(
         if score > best_score:
             best, best_score = i, score
     return best
+
+
+def _closes(
+    body: Polyhedron,
+    fragment: _Fragment,
+    planes: list[NDArray[np.float64]],
+    taken: list[WallPlane],
+    tolerance: Tolerance,
+) -> float:
+    """The area (m²) that a fragment closes of the boundary plane next to it."""
+    import shapely
+
+    frame = fragment.wall.frame
+    for tag in sorted({tag for tag in body.tags if tag >= 0}):
+        near = taken[tag].frame
+        if np.max(np.abs(fragment.points @ planes[tag][:3] + planes[tag][3])) < tolerance.cluster:
+            moved = shapely.transform(
+                fragment.shape,
+                lambda flat, near=near: near.to_plane(frame.to_space(flat)),
+            )
+            return float(shapely.area(shapely.difference(moved, taken[tag].blocking)))
+    return fragment.area

@@ -168,7 +168,7 @@ def _tell(voice: Voice, report: BuildReport, as_json: bool) -> None:
         return
     for stage in report.stages:
         done = f"{stage.seconds:7.1f} s" if stage.ran else "unchanged"
-        voice.say(f"{stage.stage:<9}{done:>10}   {_figures(stage.stage, stage.counts)}")
+        voice.say(f"{stage.stage:<9}{done:>10}   {figures(stage.stage, stage.counts)}")
     memory = f", at most {size(report.peak_memory)} of memory" if report.peak_memory else ""
     voice.say(f"{'all':<9}{report.seconds:>8.1f} s{memory}")
     shown = report.notes if voice.verbose else report.notes[:SHOWN_NOTES]
@@ -185,7 +185,7 @@ def _tell(voice: Voice, report: BuildReport, as_json: bool) -> None:
         voice.say(f"  python3 -m http.server -d {db}/www     serve it; start at root.wrl")
 
 
-def _figures(stage: str, counts: Mapping[str, Any]) -> str:
+def figures(stage: str, counts: Mapping[str, Any]) -> str:
     """What a stage made, on one line."""
     n = counts
     match stage:

@@ -11,6 +11,7 @@ model. Such pixels are left out of the hints and reported as missed mass.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -33,6 +34,9 @@ from ptmtools.visibility.model import Pvs
 
 #: Points of a stratum that are tried before the best of them is taken.
 TRIES = 32
+#: The default clearance as a share of the thinnest that a cell may be, so that even such a cell
+#: has usable points.
+CLEARANCE = 0.25
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,7 @@ def compute_ach(
     _check(scene, cells, pvs)
     surfaces = Surfaces.of(scene, cells)
     around = Surroundings.of(scene, cells)
-    clearance = options.clearance or Tolerance.for_points(scene.points).thin
+    clearance = options.clearance or CLEARANCE * Tolerance.for_points(scene.points).thin
     renderer = open_renderer(surfaces, options)
 
     def look(cell: int) -> tuple[NDArray[np.int64], int, int]:
@@ -73,7 +77,7 @@ def compute_ach(
         missed = np.zeros(cells.cell_count)
         samples = np.zeros(cells.cell_count, dtype=np.int32)
         rejected = np.zeros(cells.cell_count, dtype=np.int32)
-        threads = options.workers if renderer.backend == "embree" else 1
+        threads = (options.workers or os.cpu_count() or 1) if renderer.backend == "embree" else 1
         for cell, (covered, used, refused) in enumerate(_each(look, cells.cell_count, threads)):
             row = slice(int(pvs.start[cell]), int(pvs.start[cell + 1]))
             pixels[row] = covered[pvs.cell[row]]

@@ -10,11 +10,11 @@ from ptmtools.coverage.opengl import OpenGLRenderer, create_context, is_software
 from ptmtools.coverage.options import AchOptions
 from ptmtools.errors import MissingComponentError
 
-#: What a sample point costs, in µs on one core: Mesa's rasteriser for each triangle and each
-#: pixel, Embree for each ray. Only their proportions matter.
-RASTER_TRIANGLE = 0.5
-RASTER_PIXEL = 0.1
-RAY = 1.0
+#: What a sample point costs, in µs: Mesa's rasteriser for each triangle (six views of it) and each
+#: pixel, Embree for each ray. Fitted to `benchmarks/ach.py`; only their proportions matter.
+RASTER_TRIANGLE = 0.75
+RASTER_PIXEL = 0.03
+RAY = 0.25
 
 
 def rasterising_pays(triangles: int, face: int) -> bool:

@@ -29,8 +29,8 @@ class EmbreeRenderer:
         self._surfaces = surfaces
         self._opaque = np.flatnonzero(surfaces.opaque)
         self._transparent = np.flatnonzero(~surfaces.opaque)
-        self._opaque_tree = _tree(surfaces.corner[self._opaque])
-        self._transparent_tree = _tree(surfaces.corner[self._transparent])
+        self._opaque_tree = _tree(surfaces, self._opaque)
+        self._transparent_tree = _tree(surfaces, self._transparent)
         at = pixel_centres(face)
         x, y = (grid[None, ..., None] for grid in np.meshgrid(at, at))
         right, up, forward = (VIEWS[:, i][:, None, None] for i in range(3))
@@ -64,15 +64,15 @@ class EmbreeRenderer:
         self._opaque_tree = self._transparent_tree = None
 
 
-def _tree(corner: NDArray[np.float64]) -> Any:
-    """A committed Embree scene over (n, 3, 3) corners; None without any."""
+def _tree(surfaces: Surfaces, which: NDArray[np.int64]) -> Any:
+    """A committed Embree scene over the (n,) triangles ``which``; None without any."""
     from embreex.mesh_construction import TriangleMesh
     from embreex.rtcore_scene import EmbreeScene
 
-    if len(corner) == 0:
+    if len(which) == 0:
         return None
     tree = EmbreeScene(robust=True)
-    TriangleMesh(tree, corner.astype(np.float32))
+    TriangleMesh(tree, surfaces.place.astype(np.float32), surfaces.triangle[which])
     ray = np.ones((1, 3), dtype=np.float32)
     tree.run(ray, ray)  # builds the tree now, on this thread
     return tree

@@ -61,7 +61,8 @@ class Surfaces:
     ----------
     centre, scale: ``(world - centre) * scale`` lies within about 1 of the origin; scale is a
         power of two.
-    corner: (M, 3, 3) float64 normalised corners.
+    place: (W, 3) float64 normalised vertices.
+    triangle: (M, 3) int32 into `place`.
     normal: (M, 3) float64 unit normal of the scene's triangle that each is a piece of, which is
         better known than that of a sliver.
     cell: (M, 2) int32 the cell on the front and on the back, -1 for none.
@@ -71,7 +72,8 @@ class Surfaces:
 
     centre: NDArray[np.float64]
     scale: float
-    corner: NDArray[np.float64]
+    place: NDArray[np.float64]
+    triangle: NDArray[np.int32]
     normal: NDArray[np.float64]
     cell: NDArray[np.int32]
     opaque: NDArray[np.bool_]
@@ -94,7 +96,8 @@ class Surfaces:
         return Surfaces(
             centre=centre,
             scale=float(scale),
-            corner=(cells.vertex[cells.triangle] - centre) * scale,
+            place=(cells.vertex - centre) * scale,
+            triangle=cells.triangle,
             normal=normal,
             cell=cells.triangle_cell,
             opaque=scene.opaque[cells.triangle_source],
@@ -102,7 +105,7 @@ class Surfaces:
         )
 
     def normalised(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
-        """A (3,) point in world metres, in the coordinates of `corner`."""
+        """A (3,) point in world metres, in the coordinates of `place`."""
         return np.asarray((point - self.centre) * self.scale)
 
     def viewer_cell(
@@ -110,7 +113,7 @@ class Surfaces:
     ) -> NDArray[np.int32]:
         """(n,) the cell for which each of the (n,) triangles counts, seen from a (3,) point in
         world metres; -1 for none."""
-        towards = self.normalised(point) - self.corner[triangle, 0]
+        towards = self.normalised(point) - self.place[self.triangle[triangle, 0]]
         in_front = np.einsum("ij,ij->i", towards, self.normal[triangle]) > 0
         return np.asarray(self.cell[triangle, np.where(in_front, 0, 1)], dtype=np.int32)
 

@@ -26,10 +26,10 @@ class AchOptions:
     face: pixels a side of each of the six views. Positions matter far more: ask for more samples
         before a larger face.
     backend: "gl" (OpenGL), "embree" (rays on the processor), or "auto" (see `choose_backend`).
-    clearance: metres that a sample point keeps from every surface; None for `Tolerance.thin`,
-        1e-4 of the scene's extent.
+    clearance: metres that a sample point keeps from every surface; None for a quarter of
+        `Tolerance.thin`, 2.5e-5 of the scene's extent.
     seed: which stretch of the sequence of sample points is taken.
-    workers: threads of the embree backend. Changes nothing in the result.
+    workers: threads of the embree backend, None for one per processor; never changes the result.
     """
 
     samples: int = 8
@@ -37,14 +37,14 @@ class AchOptions:
     backend: Backend = "auto"
     clearance: float | None = None
     seed: int = 0
-    workers: int = field(default=1, compare=False)
+    workers: int | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         """Raises `InputError` PTM-I500 for a value that makes no sense."""
         self._within("samples", self.samples, 1, MAX_SAMPLES)
         self._within("face", self.face, 1, MAX_FACE)
         self._within("seed", self.seed, 0, 2**32 - 1)
-        self._within("workers", self.workers, 1, 1024)
+        self._within("workers", 1 if self.workers is None else self.workers, 1, 1024)
         if self.backend not in get_args(Backend):
             known = ", ".join(get_args(Backend))
             raise InputError("PTM-I500", f"no backend '{self.backend}'", remedy=f"one of {known}")

@@ -211,3 +211,18 @@ class PlotOptions:
     storey_gap: float = 1.5
     width: float = 12.0
     dpi: int = 110
+
+
+@dataclass(frozen=True)
+class PlotReport:
+    """
+    Attributes
+    ----------
+    file: the picture.
+    floors: heights of the storeys drawn, metres.
+    bytes: of the picture.
+    """
+
+    file: str
+    floors: tuple[float, ...]
+    bytes: int

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ptmtools.pipeline.folder import DatabaseFolder
     from ptmtools.pipeline.run import Artifacts, StageReport
     from ptmtools.pipeline.textures import TextureOptions
+    from ptmtools.pipeline.validation import validate
 
 _HOME = {
     "Artifacts": "run",
@@ -36,6 +37,7 @@ _HOME = {
     "make_files": "build",
     "make_pvs": "build",
     "make_textures": "build",
+    "validate": "validation",
 }
 
 __all__ = [
@@ -51,6 +53,7 @@ __all__ = [
     "make_files",
     "make_pvs",
     "make_textures",
+    "validate",
 ]
 
 

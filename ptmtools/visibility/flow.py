@@ -212,14 +212,14 @@ def geometry(portals: Portals) -> Geometry:
     leaves = portals.leaf.reshape(-1)
     out = np.argsort(leaves, kind="stable")
     tolerance = Tolerance.for_points(point)
+    radius = np.maximum.reduceat(reach, start[:-1]) + tolerance.rounding
     return Geometry(
         point=np.ascontiguousarray(point),
         start=start,
         normal=np.ascontiguousarray(normal),
         low=np.minimum.reduceat(along, start[:-1]),
         high=np.maximum.reduceat(along, start[:-1]),
-        centre=centre,
-        radius=np.maximum.reduceat(reach, start[:-1]) + tolerance.rounding,
+        ball=np.column_stack([centre, radius]),
         leaf=enters,
         out_start=np.searchsorted(leaves[out], np.arange(portals.leaf_count + 1)).astype(np.int64),
         out=out.astype(np.int64),

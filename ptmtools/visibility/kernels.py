@@ -33,8 +33,7 @@ class Geometry(NamedTuple):
     normal: np.ndarray  # (K, 3)
     low: np.ndarray  # (K,) least and
     high: np.ndarray  # (K,) greatest normal·x over the portal's own points
-    centre: np.ndarray  # (K, 3)
-    radius: np.ndarray  # (K,)
+    ball: np.ndarray  # (K, 4) centre and radius of a ball around it
     leaf: np.ndarray  # (2K,) the leaf that a directed portal leads into
     out_start: np.ndarray  # (L + 1,) CSR over leaves:
     out: np.ndarray  # (2K,) the directed portals that lead out of a leaf
@@ -151,72 +150,94 @@ def drop_unreturned(known, p):
 
 
 @njit(cache=True, nogil=True)
-def clip(s, slot, n0, n1, n2, c, slack):
+def clip(polygon, size, slot, distance, n0, n1, n2, c, slack):
     """Keeps what of a polygon lies at n·x >= c, and ``slack`` more; in place.
 
     EMPTY if nothing reaches beyond c + slack. A polygon that would outgrow its slot stays WHOLE.
     """
-    count = s.size[slot]
+    count = size[slot]
     low, high = np.inf, -np.inf
-    poly = s.polygon[slot]
     for i in range(count):
-        d = n0 * poly[i, 0] + n1 * poly[i, 1] + n2 * poly[i, 2] - c
-        s.distance[i] = d
+        d = n0 * polygon[slot, i, 0] + n1 * polygon[slot, i, 1] + n2 * polygon[slot, i, 2] - c
+        distance[i] = d
         low = min(low, d)
         high = max(high, d)
     if high <= slack:
         return EMPTY
-    if low >= -slack or count + 1 > s.polygon.shape[1]:
+    if low >= -slack or count + 1 > polygon.shape[1]:
         return WHOLE
-    spare = s.polygon[len(s.polygon) - 1]
+    spare = len(polygon) - 1
     m = 0
     for i in range(count):
         j = i + 1 if i + 1 < count else 0
-        d, e = s.distance[i] + slack, s.distance[j] + slack
+        d, e = distance[i] + slack, distance[j] + slack
         if d >= 0:
-            spare[m] = poly[i]
+            for a in range(3):
+                polygon[spare, m, a] = polygon[slot, i, a]
             m += 1
         if (d > 0 and e < 0) or (d < 0 and e > 0):
             t = d / (d - e)
             for a in range(3):
-                spare[m, a] = poly[i, a] + t * (poly[j, a] - poly[i, a])
+                x = polygon[slot, i, a]
+                polygon[spare, m, a] = x + t * (polygon[slot, j, a] - x)
             m += 1
-    for i in range(m):
-        poly[i] = spare[i]
-    s.size[slot] = m
+    copy(polygon, size, spare, slot, m)
     return CUT
 
 
 @njit(cache=True, nogil=True)
-def separators_through(s, a, normal, sign, b, flip, row, slack):
+def copy(polygon, size, source, target, count):
+    """Puts the first ``count`` vertices of one slot into another."""
+    for i in range(count):
+        for a in range(3):
+            polygon[target, i, a] = polygon[source, i, a]
+    size[target] = count
+
+
+@njit(cache=True, nogil=True)
+def load(point, start, k, polygon, size, slot):
+    """Puts the winding of portal k into a slot."""
+    first = start[k]
+    count = start[k + 1] - first
+    for i in range(count):
+        for a in range(3):
+            polygon[slot, i, a] = point[first + i, a]
+    size[slot] = count
+
+
+@njit(cache=True, nogil=True)
+def separators_through(
+    polygon, size, a, n0, n1, n2, sign, b, flip, plane, row, count, slack
+):
     """Appends to plane row ``row`` the separating planes through the edges of polygon ``a``.
 
-    ``normal`` is a's own, counter-clockwise; ``sign·normal`` points towards polygon ``b``. The
-    plane through an edge turns about it: outward in a's plane + t · towards b. The least t that
-    has all of b on the far side gives the tightest separator. It is accepted by measuring both
-    polygons against it, so a badly conditioned edge can only cost tightness. With ``flip`` the
-    kept side is a's (a is the nearer to the target), else b's.
+    (n0, n1, n2) is a's own normal, counter-clockwise; times ``sign`` it points towards polygon
+    ``b``. The plane through an edge turns about it: outward in a's plane + t · towards b. The
+    least t that has all of b on the far side gives the tightest separator. It is accepted by
+    measuring both polygons against it, so a badly conditioned edge can only cost tightness. With
+    ``flip`` the kept side is a's (a is the nearer to the target), else b's. Returns the number of
+    planes in the row.
     """
-    pa, pb = s.polygon[a], s.polygon[b]
-    na, nb = s.size[a], s.size[b]
-    count = s.planes[row]
-    for i in range(na):
-        if count == s.plane.shape[1]:
+    size_a, size_b = size[a], size[b]
+    for i in range(size_a):
+        if count == plane.shape[1]:
             break
-        j = i + 1 if i + 1 < na else 0
-        e0, e1, e2 = pa[j, 0] - pa[i, 0], pa[j, 1] - pa[i, 1], pa[j, 2] - pa[i, 2]
-        w0 = e1 * normal[2] - e2 * normal[1]
-        w1 = e2 * normal[0] - e0 * normal[2]
-        w2 = e0 * normal[1] - e1 * normal[0]
+        j = i + 1 if i + 1 < size_a else 0
+        a0, a1, a2 = polygon[a, i, 0], polygon[a, i, 1], polygon[a, i, 2]
+        e0, e1, e2 = polygon[a, j, 0] - a0, polygon[a, j, 1] - a1, polygon[a, j, 2] - a2
+        w0 = e1 * n2 - e2 * n1
+        w1 = e2 * n0 - e0 * n2
+        w2 = e0 * n1 - e1 * n0
         length = np.sqrt(w0 * w0 + w1 * w1 + w2 * w2)
         if length <= 0.0:
             continue
-        w0, w1, w2 = w0 / length, w1 / length, w2 / length
+        length = 1.0 / length
+        w0, w1, w2 = w0 * length, w1 * length, w2 * length
         t = -np.inf
-        for k in range(nb):
-            r0, r1, r2 = pb[k, 0] - pa[i, 0], pb[k, 1] - pa[i, 1], pb[k, 2] - pa[i, 2]
+        for k in range(size_b):
+            r0, r1, r2 = polygon[b, k, 0] - a0, polygon[b, k, 1] - a1, polygon[b, k, 2] - a2
             u = w0 * r0 + w1 * r1 + w2 * r2
-            v = sign * (normal[0] * r0 + normal[1] * r1 + normal[2] * r2)
+            v = sign * (n0 * r0 + n1 * r1 + n2 * r2)
             if v > slack:
                 t = max(t, -u / v)
             elif u < -slack:
@@ -226,74 +247,70 @@ def separators_through(s, a, normal, sign, b, flip, row, slack):
             continue
         scale = 1.0 / np.sqrt(1.0 + t * t)
         t *= sign
-        m0 = (w0 + t * normal[0]) * scale
-        m1 = (w1 + t * normal[1]) * scale
-        m2 = (w2 + t * normal[2]) * scale
+        m0, m1, m2 = (w0 + t * n0) * scale, (w1 + t * n1) * scale, (w2 + t * n2) * scale
         near, far = -np.inf, np.inf
-        for k in range(na):
-            near = max(near, m0 * pa[k, 0] + m1 * pa[k, 1] + m2 * pa[k, 2])
-        for k in range(nb):
-            far = min(far, m0 * pb[k, 0] + m1 * pb[k, 1] + m2 * pb[k, 2])
+        for k in range(size_a):
+            near = max(near, m0 * polygon[a, k, 0] + m1 * polygon[a, k, 1] + m2 * polygon[a, k, 2])
+        for k in range(size_b):
+            far = min(far, m0 * polygon[b, k, 0] + m1 * polygon[b, k, 1] + m2 * polygon[b, k, 2])
         if near > far + slack:
             continue
-        out = s.plane[row, count]
         if flip:
-            out[0], out[1], out[2], out[3] = -m0, -m1, -m2, -near
-        else:
-            out[0], out[1], out[2], out[3] = m0, m1, m2, far
+            m0, m1, m2, far = -m0, -m1, -m2, -near
+        plane[row, count, 0] = m0
+        plane[row, count, 1] = m1
+        plane[row, count, 2] = m2
+        plane[row, count, 3] = far
         count += 1
-    s.planes[row] = count
+    return count
 
 
 @njit(cache=True, nogil=True)
-def separate(s, a, normal_a, sign_a, b, normal_b, sign_b, row, slack):
+def separate(polygon, size, a, k, sign_a, b, j, sign_b, normal, plane, row, slack):
     """Plane row ``row`` := all planes that separate a from b; kept is the side of b, and beyond.
 
-    ``sign_a·normal_a`` points towards b, ``sign_b·normal_b`` towards a.
+    Polygon a lies in portal k and b in portal j; ``sign_a`` times k's normal points towards b,
+    ``sign_b`` times j's towards a. Returns the number of planes.
     """
-    s.planes[row] = 0
-    separators_through(s, a, normal_a, sign_a, b, False, row, slack)
-    separators_through(s, b, normal_b, sign_b, a, True, row, slack)
+    n0, n1, n2 = normal[k, 0], normal[k, 1], normal[k, 2]
+    count = separators_through(
+        polygon, size, a, n0, n1, n2, sign_a, b, False, plane, row, 0, slack
+    )
+    n0, n1, n2 = normal[j, 0], normal[j, 1], normal[j, 2]
+    return separators_through(
+        polygon, size, b, n0, n1, n2, sign_b, a, True, plane, row, count, slack
+    )
 
 
 @njit(cache=True, nogil=True)
-def clip_all(s, slot, row, slack):
-    """Clips a polygon by every plane of a row; returns (status, planes tried)."""
+def clip_all(polygon, size, slot, distance, plane, row, count, slack):
+    """Clips a polygon by the planes of a row; the status of `clip`."""
     status = WHOLE
-    for i in range(s.planes[row]):
-        m = s.plane[row, i]
-        now = clip(s, slot, m[0], m[1], m[2], m[3], slack)
+    for i in range(count):
+        n0, n1, n2 = plane[row, i, 0], plane[row, i, 1], plane[row, i, 2]
+        now = clip(polygon, size, slot, distance, n0, n1, n2, plane[row, i, 3], slack)
         if now == EMPTY:
-            return EMPTY, i + 1
+            return EMPTY
         if now == CUT:
             status = CUT
-    return status, s.planes[row]
+    return status
 
 
 @njit(cache=True, nogil=True)
-def load(g, s, slot, k):
-    """Puts the winding of portal k into a slot."""
-    count = g.start[k + 1] - g.start[k]
-    for i in range(count):
-        s.polygon[slot, i] = g.point[g.start[k] + i]
-    s.size[slot] = count
-
-
-@njit(cache=True, nogil=True)
-def beyond(g, s, row, k):
+def beyond(point, start, ball, k, plane, row, count, slack):
     """Whether portal k reaches beyond every plane of a row."""
-    c = g.centre[k]
-    for i in range(s.planes[row]):
-        m = s.plane[row, i]
-        d = m[0] * c[0] + m[1] * c[1] + m[2] * c[2] - m[3]
-        if d > g.slack:
+    c0, c1, c2, radius = ball[k, 0], ball[k, 1], ball[k, 2], ball[k, 3]
+    for i in range(count):
+        n0, n1, n2 = plane[row, i, 0], plane[row, i, 1], plane[row, i, 2]
+        d = n0 * c0 + n1 * c1 + n2 * c2 - plane[row, i, 3]
+        if d > slack:
             continue
-        if d + g.radius[k] <= g.slack:
+        if d + radius <= slack:
             return False
+        floor = plane[row, i, 3] + slack
         found = False
-        for j in range(g.start[k], g.start[k + 1]):
-            x = g.point[j]
-            if m[0] * x[0] + m[1] * x[1] + m[2] * x[2] - m[3] > g.slack:
+        for j in range(start[k], start[k + 1]):
+            if n0 * point[j, 0] + n1 * point[j, 1] + n2 * point[j, 2] > floor:
                 found = True
                 break
         if not found:
@@ -302,24 +319,23 @@ def beyond(g, s, row, k):
 
 
 @njit(cache=True, nogil=True)
-def thin_out(g, s, frame, seen):
+def thin_out(g, might, frame, seen, plane, count):
     """Drops from a frame's possible portals the unseen ones that its separators hide.
 
     Returns (whether an unseen one is left, portals tested).
     """
     left = False
     tested = 0
-    might = s.might[frame]
-    for w in range(len(might)):
-        rest = might[w] & ~seen[w]
+    for w in range(might.shape[1]):
+        rest = might[frame, w] & ~seen[w]
         while rest != ZERO:
             low = rest & (~rest + ONE)
             q = (w << 6) + LOW_BIT[(low * DE_BRUIJN) >> np.uint64(58)]
             tested += 1
-            if beyond(g, s, frame, q >> 1):
+            if beyond(g.point, g.start, g.ball, q >> 1, plane, frame, count, g.slack):
                 left = True
             else:
-                might[w] &= ~low
+                might[frame, w] &= ~low
             rest &= ~low
     return left, tested
 
@@ -333,97 +349,104 @@ def flow(g, s, known, source, budget, seen):
     """
     words = known.shape[1]
     depth = len(s.might)
-    spare_row = depth
-    slack = g.slack
+    polygon, size, plane, planes, distance = s.polygon, s.size, s.plane, s.planes, s.distance
+    might, via, at = s.might, s.via, s.at
+    normal, ball, slack = g.normal, g.ball, g.slack
     k0 = source >> 1
-    n0 = g.normal[k0]
     s0 = 1.0 if source & 1 == 0 else -1.0
     floor = g.low[k0] if source & 1 == 0 else -g.high[k0]
-    load(g, s, 0, k0)
-    s.might[0] = known[source]
-    s.via[0] = source
-    s.at[0] = g.out_start[g.leaf[source]]
-    s.planes[0] = 0
+    load(g.point, g.start, k0, polygon, size, 0)
+    for w in range(words):
+        might[0, w] = known[source, w]
+    via[0] = source
+    at[0] = g.out_start[g.leaf[source]]
+    planes[0] = 0
     f = 0
     ops = 0
     cut = False
     while f >= 0:
-        leaf = g.leaf[s.via[f]]
-        if s.at[f] == g.out_start[leaf + 1]:
+        if at[f] == g.out_start[g.leaf[via[f]] + 1]:
             f -= 1
             continue
-        q = g.out[s.at[f]]
-        s.at[f] += 1
-        word, bit = q >> 6, ONE << np.uint64(q & 63)
-        if not has(s.might, f, q):
+        q = g.out[at[f]]
+        at[f] += 1
+        if not has(might, f, q):
             continue
+        word, bit = q >> 6, ONE << np.uint64(q & 63)
         child = f + 1
         room = child < depth
-        row = child if room else f  # without room the frame's own set stands in for the child's
-        fresh = False
+        fresh = not room
         if room:
             for w in range(words):
-                m = s.might[f, w] & known[q, w]
-                s.might[child, w] = m
-                if m & ~seen[w] != ZERO:
-                    fresh = True
-        else:
-            fresh = True
+                m = might[f, w] & known[q, w]
+                might[child, w] = m
+                fresh |= m & ~seen[w] != ZERO
         if not fresh and seen[word] & bit != ZERO:
             continue
 
+        # What is left of the next portal (slot b), then of the source (slot a).
+        ops += 1
         k = q >> 1
         sq = 1.0 if q & 1 == 0 else -1.0
         a, b = 2 * child, 2 * child + 1
-        load(g, s, b, k)
-        ops += 1
-        if clip(s, b, s0 * n0[0], s0 * n0[1], s0 * n0[2], floor, slack) == EMPTY:
+        load(g.point, g.start, k, polygon, size, b)
+        n0, n1, n2 = s0 * normal[k0, 0], s0 * normal[k0, 1], s0 * normal[k0, 2]
+        if clip(polygon, size, b, distance, n0, n1, n2, floor, slack) == EMPTY:
             continue
-        if f > 0:
-            status, tried = clip_all(s, b, f, slack)
-            ops += tried
-            if status == EMPTY:
+        hidden = False
+        for i in range(planes[f]):
+            n0, n1, n2, c = plane[f, i, 0], plane[f, i, 1], plane[f, i, 2], plane[f, i, 3]
+            if n0 * ball[k, 0] + n1 * ball[k, 1] + n2 * ball[k, 2] - c >= ball[k, 3]:
                 continue
-        count = s.size[2 * f]
-        for i in range(count):
-            s.polygon[a, i] = s.polygon[2 * f, i]
-        s.size[a] = count
-        nq = g.normal[k]
-        ceiling = g.high[k] if q & 1 == 0 else -g.low[k]
+            ops += 1
+            if clip(polygon, size, b, distance, n0, n1, n2, c, slack) == EMPTY:
+                hidden = True
+                break
+        if hidden:
+            continue
+        copy(polygon, size, 2 * f, a, size[2 * f])
         ops += 1
-        status = clip(s, a, -sq * nq[0], -sq * nq[1], -sq * nq[2], -ceiling, slack)
+        n0, n1, n2 = -sq * normal[k, 0], -sq * normal[k, 1], -sq * normal[k, 2]
+        ceiling = g.high[k] if q & 1 == 0 else -g.low[k]
+        status = clip(polygon, size, a, distance, n0, n1, n2, -ceiling, slack)
         if status == EMPTY:
             continue
         if f > 0:
-            last = s.via[f]
-            np_ = g.normal[last >> 1]
+            passed, last = 2 * f + 1, via[f]
             sp = 1.0 if last & 1 == 0 else -1.0
+            last >>= 1
             if status == CUT:
-                separate(s, a, n0, s0, 2 * f + 1, np_, -sp, spare_row, slack)
-                status, tried = clip_all(s, b, spare_row, slack)
-                ops += tried + 1
-                if status == EMPTY:
+                n = separate(
+                    polygon, size, a, k0, s0, passed, last, -sp, normal, plane, depth, slack
+                )
+                ops += n + 1
+                if clip_all(polygon, size, b, distance, plane, depth, n, slack) == EMPTY:
                     continue
-            separate(s, b, nq, -sq, 2 * f + 1, np_, sp, spare_row, slack)
-            status, tried = clip_all(s, a, spare_row, slack)
-            ops += tried + 1
-            if status == EMPTY:
+            n = separate(polygon, size, b, k, -sq, passed, last, sp, normal, plane, depth, slack)
+            ops += n + 1
+            if clip_all(polygon, size, a, distance, plane, depth, n, slack) == EMPTY:
                 continue
         seen[word] |= bit
         if not fresh:
             continue
+
+        row = f
         if room:
-            separate(s, a, n0, s0, b, nq, -sq, child, slack)
-            left, tested = thin_out(g, s, child, seen)
+            row = child
+            planes[child] = separate(
+                polygon, size, a, k0, s0, b, k, -sq, normal, plane, child, slack
+            )
+            left, tested = thin_out(g, might, child, seen, plane, planes[child])
             ops += 1 + (tested >> 3)
             if not left:
                 continue
         if not room or ops >= budget:
+            # Without room the frame's own set stands in for the child's.
             for w in range(words):
-                seen[w] |= s.might[row, w]
+                seen[w] |= might[row, w]
             cut = True
             continue
-        s.via[child] = q
-        s.at[child] = g.out_start[g.leaf[q]]
+        via[child] = q
+        at[child] = g.out_start[g.leaf[q]]
         f = child
     return ops, cut
