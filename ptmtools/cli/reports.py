@@ -1,0 +1,169 @@
+"""The commands that look at what is there: a database, or a `.ptm` file."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ptmtools.cli.common import as_json, database, forced, voiced
+from ptmtools.cli.output import Voice, count, size
+from ptmtools.cli.parameters import options_of, take
+from ptmtools.cli.scenes import figures
+from ptmtools.database import PlotOptions, ValidationReport
+from ptmtools.errors import CheckError
+from ptmtools.pipeline import Artifacts, DatabaseFolder
+from ptmtools.pipeline import validate as check
+
+#: Findings that are shown without ``-v``.
+SHOWN_ISSUES = 20
+
+target = click.argument("target", metavar="FILE|DB", type=click.Path())
+
+
+@click.command("info")
+@target
+@as_json
+@voiced
+def info(voice: Voice, target: str, as_json: bool) -> None:
+    """Say what is in a database or a .ptm file."""
+    if Path(target).is_dir():
+        _info_database(voice, target, as_json)
+    else:
+        _info_ptm(voice, target, as_json)
+
+
+@click.command("validate")
+@target
+@click.option(
+    "--segments",
+    type=click.IntRange(0),
+    default=0,
+    metavar="N",
+    help="Also shoot N random segments: what sees each other must be potentially visible.",
+)
+@click.option("--strict / --no-strict", help="Warnings are errors.")
+@as_json
+@voiced
+def validate(voice: Voice, target: str, segments: int, strict: bool, as_json: bool) -> None:
+    """Check a database or a .ptm file.
+
+    Exits with 8 if it finds an error.
+    """
+    with voice.progress() as progress:
+        report = check(target, progress)
+    missed = _shoot(DatabaseFolder.open(target), segments) if segments else None
+    _tell_findings(voice, target, report, missed, as_json)
+    failed = len(report.errors) + (len(report.warnings) if strict else 0) + bool(missed)
+    if failed:
+        raise CheckError("PTM-C001", f"{count(failed, 'finding')} to be mended", file=target)
+
+
+@click.command("plot")
+@database
+@click.option("-o", "--output", type=click.Path(), required=True, help="The picture, a PNG.")
+@options_of(PlotOptions)
+@forced
+@voiced
+def plot(voice: Voice, db: str, output: str, force: bool, **values: Any) -> None:
+    """Draw the floor plan of DB, storey by storey: cells, portals, and with --cell what it sees."""
+    from ptmtools.database import plot_plan
+
+    options = take(PlotOptions, values)
+    artifacts = Artifacts(DatabaseFolder.open(db))
+    done = artifacts.db.manifest.stages
+    report = plot_plan(
+        artifacts.scene,
+        artifacts.cells,
+        artifacts.pvs if "pvs" in done else None,
+        artifacts.ach if "ach" in done else None,
+        output,
+        options,
+        force=force,
+    )
+    voice.say(f"{output}: the floor plan of {db}, {count(len(report.floors), 'storey')}")
+
+
+def _shoot(db: DatabaseFolder, segments: int) -> int:
+    """How many of the random segments join cells that are not in each other's PVS."""
+    from ptmtools.visibility import check_conservative
+
+    artifacts = Artifacts(db)
+    report = check_conservative(artifacts.scene, artifacts.cells, artifacts.pvs, segments)
+    return len(report.missed)
+
+
+def _tell_findings(
+    voice: Voice, target: str, report: ValidationReport, missed: int | None, as_json: bool
+) -> None:
+    if as_json:
+        segments = {} if missed is None else {"missed_segments": missed}
+        voice.emit_json({**asdict(report), "ok": report.ok and not missed, **segments})
+        return
+    shown = report.issues if voice.verbose else report.issues[:SHOWN_ISSUES]
+    for issue in shown:
+        voice.say(str(issue))
+    if len(shown) < len(report.issues):
+        voice.say(f"{len(report.issues) - len(shown):,} more findings; -v shows them all")
+    if missed is not None:
+        voice.say(f"{target}: {count(missed, 'segment')} seen that the PVS misses")
+    voice.say(
+        f"{target}: {count(report.files, 'file')}, {size(report.bytes)}; "
+        f"{count(len(report.errors), 'error')}, {count(len(report.warnings), 'warning')}"
+    )
+
+
+def _info_database(voice: Voice, target: str, as_json: bool) -> None:
+    db = DatabaseFolder.open(target)
+    stages = db.manifest.stages
+    if as_json:
+        voice.emit_json(
+            {
+                "model": db.manifest.model,
+                "stages": {
+                    name: {
+                        "software": record.software,
+                        "parameters": record.parameters,
+                        "counts": record.counts,
+                        "notes": record.notes,
+                        "files": len(record.outputs),
+                    }
+                    for name, record in stages.items()
+                },
+            }
+        )
+        return
+    voice.say(f"{target}: database of {db.manifest.model}")
+    for name, record in stages.items():
+        voice.say(f"{name:<9} {figures(name, record.counts)}")
+        if voice.verbose:
+            for key, value in record.parameters.items():
+                voice.say(f"{'':<9}   {key} = {value}")
+            for note in record.notes:
+                voice.say(f"{'':<9}   note: {note}")
+
+
+def _info_ptm(voice: Voice, target: str, as_json: bool) -> None:
+    from ptmtools.texture import read_header, read_ptm, whole_levels
+    from ptmtools.texture.images import naming
+
+    data = read_ptm(target)
+    with naming(target):
+        header = read_header(data)
+    whole = whole_levels(header, len(data))
+    if as_json:
+        voice.emit_json({**asdict(header), "file_bytes": len(data), "whole_levels": whole})
+        return
+    voice.say(
+        f"{target}: {header.width} x {header.height}, {count(header.components, 'component')} of "
+        f"{header.kind}, profile {header.profile}, {size(len(data))}"
+    )
+    voice.say("level       size           bytes           up to here   in texture memory")
+    for n, level in enumerate(header.levels):
+        cut = "" if n < whole else "   cut off"
+        extent = f"{level.width} x {level.height}"
+        voice.say(
+            f"{n:>5}   {extent:<14}{level.length:>9,}{level.end:>16,}{level.gpu_bytes:>20,}{cut}"
+        )
