@@ -206,9 +206,7 @@ def load(point, start, k, polygon, size, slot):
 
 
 @njit(cache=True, nogil=True)
-def separators_through(
-    polygon, size, a, n0, n1, n2, sign, b, flip, plane, row, count, slack
-):
+def separators_through(polygon, size, a, n0, n1, n2, sign, b, flip, plane, row, count, slack):
     """Appends to plane row ``row`` the separating planes through the edges of polygon ``a``.
 
     (n0, n1, n2) is a's own normal, counter-clockwise; times ``sign`` it points towards polygon
@@ -273,9 +271,7 @@ def separate(polygon, size, a, k, sign_a, b, j, sign_b, normal, plane, row, slac
     ``sign_b`` times j's towards a. Returns the number of planes.
     """
     n0, n1, n2 = normal[k, 0], normal[k, 1], normal[k, 2]
-    count = separators_through(
-        polygon, size, a, n0, n1, n2, sign_a, b, False, plane, row, 0, slack
-    )
+    count = separators_through(polygon, size, a, n0, n1, n2, sign_a, b, False, plane, row, 0, slack)
     n0, n1, n2 = normal[j, 0], normal[j, 1], normal[j, 2]
     return separators_through(
         polygon, size, b, n0, n1, n2, sign_b, a, True, plane, row, count, slack

@@ -1,0 +1,281 @@
+"""Is a PVS conservative? Random segments against Embree, which knows nothing of portals.
+
+A segment with both ends in cells that no structural triangle blocks is a proof that the two cells
+see each other, so the pair must be in the PVS. The converse proves nothing: the check finds what
+is missing, never what is too much.
+
+Segments come in four kinds, a quarter each, because segments uniform in volume are nearly all
+blocked and say most about the largest cells: ends uniform in volume; ends in leaves drawn with
+equal weight; short ones, log-uniform in length; and ones laid through a random point of a random
+portal, the sharpest kind.
+
+Embree computes in float32 around the middle of the model (3 µm in a building of 50 m), real
+models have cracks between polygons that were meant to touch, and an end may lie on the wrong side
+of a wall by a rounding. A miss is therefore shot again as `COPIES` parallel copies, each displaced
+by the jitter; a copy counts if its own ends lie in cells that do not see each other and nothing
+blocks it. The miss is believed if at least half of the copies count, else it is a hairline. Asking
+for all copies would let a narrow opening that is truly missing pass as a hairline.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.model import Cells
+from ptmtools.errors import InputError
+from ptmtools.progress import Progress, silent
+from ptmtools.tolerance import Tolerance
+from ptmtools.visibility.model import Pvs
+
+#: Segments drawn and shot at a time.
+BATCH = 1 << 17
+#: Parallel copies by which a miss is tried again.
+COPIES = 16
+#: Displacement of the copies in metres (at most a tenth of the width of a cluster of planes).
+JITTER = 1e-3
+#: Lengths of short segments and of those through portals, as shares of the extent.
+SHORTEST, LONGEST = 1e-3, 0.5
+#: Draws for each segment asked for before giving up: ends outside all cells do not count.
+PATIENCE = 8
+
+
+@dataclass(frozen=True)
+class MissedPair:
+    """Two cells that see each other but are not in each other's PVS.
+
+    Attributes
+    ----------
+    cells: the two, the lower first.
+    start, end: (x, y, z) in metres, the ends of an example, in `cells`' order.
+    segments: how many segments showed it.
+    """
+
+    cells: tuple[int, int]
+    start: tuple[float, float, float]
+    end: tuple[float, float, float]
+    segments: int
+
+
+@dataclass(frozen=True)
+class SegmentReport:
+    """What `check_conservative` found.
+
+    Attributes
+    ----------
+    tried: segments with both ends in cells.
+    unoccluded: how many of those nothing blocks.
+    missed: the pairs of cells that the PVS misses, ascending; empty if it is conservative.
+    hairlines: unoccluded segments outside the PVS that did not survive the jitter.
+    """
+
+    tried: int
+    unoccluded: int
+    missed: tuple[MissedPair, ...]
+    hairlines: int
+
+    @property
+    def missed_segments(self) -> int:
+        """Segments that showed a missed pair."""
+        return sum(pair.segments for pair in self.missed)
+
+
+def check_conservative(
+    structural: NDArray[np.float64],
+    cells: Cells,
+    pvs: Pvs,
+    segments: int = 1_000_000,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> SegmentReport:
+    """Shoots random segments and reports the cells that see each other outside the PVS.
+
+    Parameters
+    ----------
+    structural: (T, 3, 3) the triangles that occlude, metres: those from which the cells were made.
+    segments: how many to try; fewer are if too few ends fall into cells.
+
+    Deterministic for a seed. Raises InputError PTM-I403 if the triangles are not (T, 3, 3) or not
+    finite, or if cells and PVS are not of the same subdivision.
+    """
+    structural = np.asarray(structural, dtype=np.float64)
+    if structural.shape[1:] != (3, 3) or not np.isfinite(structural).all():
+        raise InputError("PTM-I403", "the triangles are not finite corners of shape (T, 3, 3)")
+    if pvs.cell_count != cells.cell_count:
+        raise InputError(
+            "PTM-I403",
+            f"the PVS is of {pvs.cell_count} cells, the subdivision has {cells.cell_count}",
+            remedy="compute the PVS again",
+        )
+    if cells.cell_count == 0:
+        return SegmentReport(0, 0, (), 0)
+
+    visible = pvs.to_matrix()
+    draw = Sampler(cells)
+    blockers = Blockers(structural, cells.root_box)
+    tolerance = Tolerance.for_points(cells.root_box)
+    jitter = min(JITTER, tolerance.cluster / 10)
+    tried = unoccluded = hairlines = drawn = batch = 0
+    counts: dict[tuple[int, int], int] = {}
+    example: dict[tuple[int, int], tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
+    while tried < segments and drawn < PATIENCE * segments:
+        rng = np.random.default_rng([seed, batch])
+        size = min(BATCH, PATIENCE * segments - drawn)
+        start, end = draw.segments(rng, size)
+        drawn, batch = drawn + size, batch + 1
+        a, b = cells.locate(start), cells.locate(end)
+        both = np.flatnonzero((a >= 0) & (b >= 0))[: segments - tried]
+        start, end, a, b = start[both], end[both], a[both], b[both]
+        tried += len(both)
+        clear = ~blockers.between(start, end)
+        unoccluded += int(clear.sum())
+        missed = np.flatnonzero(clear & ~visible[a, b])
+        share = np.zeros(len(missed))
+        for _ in range(COPIES):
+            shift = rng.normal(size=(len(missed), 3))
+            shift *= jitter / np.linalg.norm(shift, axis=1, keepdims=True)
+            p, q = start[missed] + shift, end[missed] + shift
+            i, j = cells.locate(p), cells.locate(q)
+            counts_as_miss = (i >= 0) & (j >= 0) & ~visible[i, j]
+            counts_as_miss &= ~blockers.between(p, q)
+            share += counts_as_miss / COPIES
+        hairlines += int((share < 0.5).sum())
+        for m in missed[share >= 0.5]:
+            pair = (int(min(a[m], b[m])), int(max(a[m], b[m])))
+            counts[pair] = counts.get(pair, 0) + 1
+            ends = (start[m], end[m]) if a[m] <= b[m] else (end[m], start[m])
+            example.setdefault(pair, ends)
+        progress(min(tried, segments), segments, "segments")
+    found = tuple(
+        MissedPair(pair, _place(example[pair][0]), _place(example[pair][1]), counts[pair])
+        for pair in sorted(counts)
+    )
+    return SegmentReport(tried, unoccluded, found, hairlines)
+
+
+class Sampler:
+    """Draws segments in and around the cells; the kinds are those of the module's head."""
+
+    def __init__(self, cells: Cells) -> None:
+        tetrahedra, owner = _tetrahedra(cells)
+        edge = tetrahedra[:, 1:] - tetrahedra[:, :1]
+        self.tetrahedra = tetrahedra
+        volume = np.abs(np.linalg.det(edge))
+        self.by_volume = _cumulated(volume)
+        of_leaf = np.bincount(owner, weights=volume, minlength=cells.leaf_count)
+        self.by_leaf = _cumulated(volume / np.maximum(of_leaf, np.finfo(np.float64).tiny)[owner])
+        self.extent = float(np.ptp(cells.root_box, axis=0).max())
+        fans = [cells.portal(k) for k in range(cells.portal_count)]
+        rows = [np.stack([f[:1].repeat(len(f) - 2, 0), f[1:-1], f[2:]], axis=1) for f in fans]
+        self.portals = np.concatenate(rows) if rows else np.zeros((0, 3, 3))
+        area = np.linalg.norm(
+            np.cross(
+                self.portals[:, 1] - self.portals[:, 0], self.portals[:, 2] - self.portals[:, 0]
+            ),
+            axis=1,
+        )
+        of_portal = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
+        total = np.bincount(of_portal, weights=area, minlength=len(rows))
+        self.by_portal = _cumulated(area / np.maximum(total, np.finfo(np.float64).tiny)[of_portal])
+
+    def segments(
+        self, rng: np.random.Generator, count: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(count, 3) starts and ends."""
+        quarter = [count // 4 + (i < count % 4) for i in range(4)]
+        start = [self._inside(rng, self.by_volume, quarter[0])]
+        end = [self._inside(rng, self.by_volume, quarter[0])]
+        start.append(self._inside(rng, self.by_leaf, quarter[1]))
+        end.append(self._inside(rng, self.by_leaf, quarter[1]))
+        start.append(self._inside(rng, self.by_leaf, quarter[2]))
+        end.append(start[2] + self._arm(rng, _direction(rng, quarter[2])))
+        if len(self.portals):
+            middle = self._on_portals(rng, quarter[3])
+            along = _direction(rng, quarter[3])
+            start.append(middle - self._arm(rng, along))
+            end.append(middle + self._arm(rng, along))
+        return np.concatenate(start), np.concatenate(end)
+
+    def _inside(
+        self, rng: np.random.Generator, cumulated: NDArray[np.float64], count: int
+    ) -> NDArray[np.float64]:
+        corner = self.tetrahedra[np.searchsorted(cumulated, rng.random(count), side="right")]
+        weight = rng.exponential(size=(count, 4, 1))
+        mixed: NDArray[np.float64] = (corner * weight).sum(axis=1) / weight.sum(axis=1)
+        return mixed
+
+    def _on_portals(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+        corner = self.portals[np.searchsorted(self.by_portal, rng.random(count), side="right")]
+        weight = rng.exponential(size=(count, 3, 1))
+        mixed: NDArray[np.float64] = (corner * weight).sum(axis=1) / weight.sum(axis=1)
+        return mixed
+
+    def _arm(self, rng: np.random.Generator, along: NDArray[np.float64]) -> NDArray[np.float64]:
+        exponent = rng.uniform(np.log(SHORTEST), np.log(LONGEST), size=(len(along), 1))
+        return along * (np.exp(exponent) * self.extent)
+
+
+class Blockers:
+    """The structural triangles in Embree, brought to the unit cube in float64 first."""
+
+    def __init__(self, structural: NDArray[np.float64], box: NDArray[np.float64]) -> None:
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
+        corners = np.concatenate([structural.reshape(-1, 3), box])
+        self._middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+        self._scale = 1 / Tolerance.for_points(corners).extent
+        self._scene: Any = None
+        if len(structural):
+            self._scene = EmbreeScene(robust=True)
+            TriangleMesh(self._scene, self._local(structural))
+
+    def _local(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
+        local = (points - self._middle) * self._scale
+        return np.ascontiguousarray(local, dtype=np.float32)
+
+    def between(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(n,) whether a triangle blocks the segment between two (n, 3) points."""
+        if self._scene is None or len(start) == 0:
+            return np.zeros(len(start), dtype=np.bool_)
+        origin, along = self._local(start), self._local(end)
+        along -= origin
+        reach = np.ones(len(start), dtype=np.float32)
+        hit = self._scene.run(origin, along, dists=reach, query="OCCLUDED")
+        return np.asarray(hit >= 0, dtype=np.bool_)
+
+
+def _tetrahedra(cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """(n, 4, 3) tetrahedra that fill the leaves, and the (n,) leaf of each."""
+    corners, owner = [np.zeros((0, 4, 3))], [np.zeros(0, np.int64)]
+    for leaf in range(cells.leaf_count):
+        apex = cells.leaf_points(leaf).mean(axis=0)
+        for loop in cells.leaf_faces(leaf):
+            face = cells.leaf_point[loop]
+            fan = np.stack(np.broadcast_arrays(apex[None], face[:1], face[1:-1], face[2:]), axis=1)
+            corners.append(fan)
+            owner.append(np.full(len(fan), leaf, np.int64))
+    return np.concatenate(corners), np.concatenate(owner)
+
+
+def _cumulated(weight: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Cumulated shares for drawing by `searchsorted`; never quite 1 before the end."""
+    total = np.cumsum(weight)
+    if len(total) == 0 or total[-1] <= 0:
+        return np.arange(1, len(weight) + 1) / max(len(weight), 1)
+    shares: NDArray[np.float64] = total / total[-1]
+    return shares
+
+
+def _direction(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+    """(count, 3) unit vectors, uniform on the sphere."""
+    vector = rng.normal(size=(count, 3))
+    unit: NDArray[np.float64] = vector / np.linalg.norm(vector, axis=1, keepdims=True)
+    return unit
+
+
+def _place(point: NDArray[np.float64]) -> tuple[float, float, float]:
+    return float(point[0]), float(point[1]), float(point[2])
