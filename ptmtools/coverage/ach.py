@@ -32,8 +32,6 @@ from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance
 from ptmtools.visibility.model import Pvs
 
-#: Points of a stratum that are tried before the best of them is taken.
-TRIES = 32
 #: The default clearance as a share of the thinnest that a cell may be, so that even such a cell
 #: has usable points.
 CLEARANCE = 0.25
@@ -124,7 +122,7 @@ def choose_eyes(
     eyes: list[Eye] = []
     refused: list[tuple[bool, float, NDArray[np.float64]]] = []
     for part in candidates(cells, cell, options.samples, options.seed):
-        for point in part[:TRIES]:
+        for point in part:
             free = around.clearance(point, clearance)
             inside = around.in_matter(point)
             if free >= clearance and not inside:

@@ -3,9 +3,10 @@
 The paper takes "samples per cell whose COPs are uniformly distributed inside the cell" (§5).
 Position matters far more than resolution, so the points are stratified: the volume is filled with
 a low-discrepancy cloud, the cloud is halved again and again along its longest axis into as many
-parts of equal volume as there are samples, and each part offers its points, those nearest to its
-centroid first. A point that turns out to be unusable is thus replaced by a neighbour, and the
-rest of the cell keeps its share of the samples.
+parts of equal volume as there are samples, and each part is looked at from the point nearest to
+its centroid. Where that turns out to be unusable, another point of the same part takes its place,
+and the rest of the cell keeps its share of the samples. Rejected: independent random points, and
+a random point of each part; both are noisier (docs/coverage.md).
 
 A cell is a union of disjoint convex leaves; a leaf is cut into tetrahedra around its centroid.
 The cloud is a Kronecker sequence in integer arithmetic (Roberts' generalised golden ratio in
@@ -23,6 +24,8 @@ from ptmtools.cells.model import Cells
 #: Points of the cloud for each sample asked for: enough that parts of equal count are parts of
 #: equal volume within a few percent.
 CLOUD = 256
+#: Points that a part of the cell offers, evenly picked from its share of the cloud.
+TRIES = 32
 #: Fractional parts of 1/g, 1/g², 1/g³, 1/g⁴ in units of 2⁻⁶⁴, where g⁵ = g + 1.
 STEPS = np.array(
     [15802862336838869349, 13537915256980136287, 11597591980405560693, 9935365762805847689],
@@ -101,10 +104,10 @@ def strata(points: NDArray[np.float64], parts: int) -> list[NDArray[np.int64]]:
 
 
 def candidates(cells: Cells, cell: int, samples: int, seed: int) -> list[NDArray[np.float64]]:
-    """For each of ``samples`` equal parts of a cell its (CLOUD, 3) points, the best first; empty
-    if the cell has no volume."""
+    """For each of ``samples`` equal parts of a cell (TRIES, 3) points, from its centroid outwards;
+    empty if the cell has no volume."""
     tetra = tetrahedra(cells, cell)
     if len(tetra) == 0:
         return []
     points = cloud(tetra, CLOUD * samples, seed)
-    return [points[group] for group in strata(points, samples)]
+    return [points[group[:: CLOUD // TRIES]] for group in strata(points, samples)]
