@@ -54,9 +54,8 @@ class _Draw:
 
 def read_gltf(path: Path, folder: Folder, findings: Findings) -> Source:
     """Read a glTF model; InputError where it is damaged or needs what is not supported."""
-    document = open_document(path, folder)
     try:
-        return _read(path, document, folder, findings)
+        return _read(path, open_document(path, folder), folder, findings)
     except (
         LookupError,
         TypeError,

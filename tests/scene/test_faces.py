@@ -1,0 +1,84 @@
+"""Which faces are kept, at every size and place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ptmtools.scene.faces import keep_faces
+
+POINTS = np.array(
+    [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0, 0], [1, 0, 0], [np.nan, 0, 0], [9, 9, 9]],
+    dtype=float,
+)
+
+
+def kept(triangles: list[list[int]], points: np.ndarray = POINTS):
+    return keep_faces(points, np.array(triangles, dtype=np.int64))
+
+
+def test_duplicates_of_either_winding() -> None:
+    result = kept([[0, 1, 2], [2, 0, 1], [2, 1, 0], [0, 1, 3], [5, 2, 0], [1, 0, 2]])
+    assert result.source.tolist() == [0, 2, 3]
+    assert result.paired.tolist() == [True, True, False]
+    assert result.also.tolist() == [0, 0, 2, 3, 0, 2]
+    assert len(result.points) == 4
+
+
+def test_degenerate_and_not_finite() -> None:
+    result = kept([[0, 4, 1], [0, 0, 2], [1, 5, 2], [0, 6, 2], [0, 1, 2]])
+    assert (result.degenerate, result.not_finite) == (3, 1)
+    assert result.also.tolist() == [-1, -1, -1, -1, 4]
+
+
+def test_points_are_those_in_use_in_the_order_of_their_use() -> None:
+    result = kept([[3, 2, 5], [1, 2, 0]])
+    assert result.points.tolist() == POINTS[[3, 2, 1, 0]].tolist()
+    assert result.triangles.tolist() == [[0, 1, 2], [2, 1, 3]]
+
+
+def test_minus_zero_is_zero() -> None:
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-0.0, -0.0, 0]])
+    assert kept([[0, 1, 2], [3, 1, 2]], points).source.tolist() == [0]
+
+
+def test_nothing_is_left() -> None:
+    assert len(kept([[0, 0, 0]]).triangles) == 0
+    assert len(kept([[6, 6, 6]]).triangles) == 0
+
+
+@pytest.mark.parametrize("scale", [1e-200, 1e-3, 1.0, 1e6, 1e200])
+@pytest.mark.parametrize("offset", [0.0, 1e6, -3e9])
+def test_the_same_answer_at_every_size_and_place(scale: float, offset: float) -> None:
+    """A grid with a row of collinear faces: exactly those go. Numbers as a file would hold them,
+    so that points on a line are so only within rounding."""
+    rng = np.random.default_rng(1)
+    points = np.round(rng.uniform(0, 10, (30, 3)), 3)
+    line = np.linspace(points[0], points[1], 10)
+    everything = (np.concatenate([points, line]) + offset) * scale
+    faces = [[i, i + 1, i + 2] for i in range(28)] + [[30, 30 + i, 39] for i in range(1, 9)]
+    result = keep_faces(everything, np.array(faces))
+    assert (result.degenerate, len(result.source)) == (8, 28)
+
+
+@given(
+    st.lists(st.tuples(*[st.integers(0, 5)] * 3), min_size=1, max_size=30),
+    st.randoms(use_true_random=False),
+)
+def test_counts_do_not_depend_on_order(faces: list[tuple[int, int, int]], order) -> None:
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 2], [3, 1, 1]], float)
+    # Reference: sets of rotations.
+    seen = set()
+    for a, b, c in faces:
+        if len({a, b, c}) == 3:
+            seen.add(min((a, b, c), (b, c, a), (c, a, b)))
+    result = keep_faces(points, np.array(faces, dtype=np.int64))
+    assert len(result.source) == len(seen)
+    mirrored = {min((a, c, b), (c, b, a), (b, a, c)) for a, b, c in seen}
+    assert result.paired.sum() == len(seen & mirrored)
+    shuffled = list(faces)
+    order.shuffle(shuffled)
+    again = keep_faces(points, np.array(shuffled, dtype=np.int64))
+    assert (len(again.source), again.paired.sum()) == (len(seen), result.paired.sum())
