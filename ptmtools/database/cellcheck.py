@@ -75,9 +75,19 @@ def read_cell(document: Document, file: str, found: Findings) -> ReadCell | None
 
 
 def check_cell(
-    document: Document, cell: ReadCell, file: str, tolerance: Tolerance, found: Findings
+    document: Document,
+    cell: ReadCell,
+    file: str,
+    box: NDArray[np.float64],
+    tolerance: Tolerance,
+    found: Findings,
 ) -> None:
-    """Checks all that needs no other file; ``file`` is relative to the database."""
+    """Checks all that needs no other cell.
+
+    ``file`` is relative to the database; ``box`` (2, 3) holds the hulls of all cells. Geometry
+    beyond a face of that box is in order: a model that is open is subdivided within its walls,
+    and what lies farther out belongs to the cells at the rim.
+    """
     node = document.of_type("PTMCell")[0]
     place = f"line {node.line}"
     planes = _check_hull(cell.hull, node.fields["hullIndex"], tolerance, file, place, found)
@@ -86,13 +96,14 @@ def check_cell(
         if len(start) < 2 or start[0] != 0 or (np.diff([*start, len(points)]) < 4).any():
             found.add("PTM-D685", file, place, "leafStart does not cut leafPoint into leaves")
         _check_inside(planes, points, tolerance, file, place, "a leaf", found)
+    rim = _in_box_face(planes, box, tolerance)
     for shape in document.of_type("Shape"):
         where = f"line {shape.line}" + (f", {shape.name}" if shape.name else "")
         _check_shape(shape, file, where, found)
         coord = _child(shape, "geometry", "coord")
         if coord is not None:
             points = coord.fields.get("point", np.zeros((0, 3)))
-            _check_inside(planes, points, tolerance, file, where, "geometry", found)
+            _check_inside(planes[~rim], points, tolerance, file, where, "geometry", found)
     own = file.rpartition("/")[2]
     if f"{cell.name}.wrl" != own:
         found.add("PTM-D698", file, place, f"cellName is {cell.name!r}")
@@ -244,6 +255,15 @@ def _check_hull(
         found.add("PTM-D683", file, place, "the hull is not convex")
         return none
     return planes
+
+
+def _in_box_face(
+    planes: NDArray[np.float64], box: NDArray[np.float64], tolerance: Tolerance
+) -> NDArray[np.bool_]:
+    """(f,) whether a plane, its normal outwards, is that of a face of the box."""
+    faces = np.concatenate([-planes[:, 3:] - box[1], -planes[:, 3:] + box[0]], axis=1)
+    outwards = np.concatenate([planes[:, :3], -planes[:, :3]], axis=1) >= tolerance.cosine
+    return np.asarray((outwards & (abs(faces) <= tolerance.plane)).any(axis=1))
 
 
 def _outside(planes: NDArray[np.float64], points: NDArray[np.float64]) -> float:

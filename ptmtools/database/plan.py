@@ -19,19 +19,27 @@ from ptmtools.coverage.model import Ach
 from ptmtools.database.model import PlotOptions, PlotReport
 from ptmtools.database.section import area, leaf_section, polygon_section, triangle_section
 from ptmtools.database.storeys import cut_height, storeys
-from ptmtools.errors import InputError, MissingComponentError
+from ptmtools.errors import DatabaseError, InputError, MissingComponentError
 from ptmtools.files import write_bytes
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
 
 _PAPER, _INK = "#ffffff", "#1c2733"
 _CELL_FILL, _CELL_EDGE = "#eaf0f4", "#a9bac6"
-_WALL, _SEE_THROUGH, _PORTAL, _CHOSEN = "#1c2733", "#6fb3d2", "#e4572e", "#0b7a75"
-_SHADES = "YlOrRd"
+_UNSEEN = "#f6f7f8"
+_WALL, _SEE_THROUGH, _PORTAL, _CHOSEN = "#1c2733", "#7d8fd8", "#f0562d", "#b0125b"
+_SHADES = "YlGnBu"
 #: The least share that has a shade of its own; smaller ones look like it.
 _FAINTEST = 1e-4
+#: Cells with a larger share have so dark a shade that their number is white.
+_DARK = 0.02
 #: Numbers are left out of cells narrower than this many points on paper.
 _NARROWEST = 9.0
+#: Inches: around everything, above the panels for title and legend, above each panel, below it
+#: for the scale bar, between panels, and for the colour bar.
+_MARGIN, _HEAD, _CAPTION, _FOOT, _GAP, _BAR = 0.15, 0.5, 0.26, 0.3, 0.25, 0.75
+#: A building deeper than this many times its width is turned by 90°.
+_DEEP = 1.15
 
 
 def plot_plan(
@@ -53,6 +61,7 @@ def plot_plan(
 
     Raises
     ------
+    DatabaseError: PTM-D600 there are no cells.
     InputError: PTM-I601 there is no such cell, or nothing visible is known yet.
     MissingComponentError: PTM-M600 matplotlib is not installed.
     OutputError: PTM-O001 to PTM-O003, see `ptmtools.files`.
@@ -73,11 +82,15 @@ def plot_plan(
         raise MissingComponentError(
             "PTM-M600", "a plan needs matplotlib", remedy="pip install 'ptmtools[plot]'"
         ) from fault
+    if cells.cell_count == 0:
+        raise DatabaseError(
+            "PTM-D600", "there are no cells", remedy="subdivide a model that has rooms"
+        )
     floors = storeys(cells, options.height, options.storey_gap)
     figure = _Plan(scene, cells, pvs, ach, options, floors).draw()
-    canvas = FigureCanvasAgg(figure)
+    FigureCanvasAgg(figure)
     buffer = io.BytesIO()
-    canvas.print_png(buffer, metadata={"Software": None})
+    figure.savefig(buffer, format="png", metadata={"Software": None}, facecolor=_PAPER)
     data = buffer.getvalue()
     write_bytes(out, data, force=force)
     return PlotReport(os.fspath(out), tuple(floors), len(data))
@@ -104,6 +117,12 @@ class _Plan:
             row = pvs.row(options.cell)
             share = np.full(len(row), 1 / len(row)) if ach is None else ach.row(options.cell)
             self._shade = dict(zip(row.tolist(), share.tolist(), strict=True))
+        # Seen from above with X to the right and Z down, or Z to the right and X up.
+        plan = cells.leaf_point[:, [0, 2]]
+        width, depth = np.ptp(plan, axis=0)
+        self._turned = bool(depth > _DEEP * width)
+        shown = self._shown(plan)
+        self._low, self._high = shown.min(axis=0), shown.max(axis=0)
 
     def draw(self) -> Any:
         """The whole figure."""
@@ -111,95 +130,83 @@ class _Plan:
         from matplotlib.colors import LogNorm
         from matplotlib.figure import Figure
 
-        low, high = self._bounds()
-        span = high - low
-        rows, columns = self._grid(span)
-        panel = self._options.width / columns
-        tall = panel * span[1] / span[0] + 0.35
-        head = 0.62
-        size = (self._options.width, rows * tall + head)
-        figure = Figure(figsize=size, dpi=self._options.dpi, facecolor=_PAPER)
-        right = 0.93 if self._shade is not None else 0.99
-        axes = figure.subplots(
-            rows,
-            columns,
-            squeeze=False,
-            gridspec_kw={
-                "left": 0.01,
-                "right": right,
-                "bottom": 0.01,
-                "top": 1 - head / size[1] - 0.25 / size[1],
-                "wspace": 0.03,
-                "hspace": 0.08,
-            },
-        ).ravel()
-        norm = LogNorm(_FAINTEST, 1)
-        shades = ScalarMappable(norm, _SHADES)
-        for i, axis in enumerate(axes):
+        span = self._high - self._low
+        width = self._options.width
+        bar = _BAR if self._shade is not None else 0.0
+        columns = 2 if len(self._floors) > 1 and span[0] < 1.6 * span[1] else 1
+        rows = -(-len(self._floors) // columns)
+        panel = (width - 2 * _MARGIN - bar - (columns - 1) * _GAP) / columns
+        tall = panel * float(span[1] / span[0])
+        height = _HEAD + rows * (_CAPTION + tall + _FOOT) + _MARGIN
+        figure = Figure(figsize=(width, height), dpi=self._options.dpi, facecolor=_PAPER)
+        shades = ScalarMappable(LogNorm(_FAINTEST, 1), _SHADES)
+        for i, floor in enumerate(self._floors):
+            row, column = divmod(i, columns)
+            left = _MARGIN + column * (panel + _GAP)
+            bottom = height - _HEAD - (row + 1) * (_CAPTION + tall + _FOOT) + _FOOT
+            axis = figure.add_axes((left / width, bottom / height, panel / width, tall / height))
             axis.set_axis_off()
-            if i < len(self._floors):
-                axis.set(xlim=(low[0], high[0]), ylim=(high[1], low[1]), aspect="equal")
-                self._storey(axis, i, shades)
+            axis.set(xlim=(self._low[0], self._high[0]), ylim=(self._high[1], self._low[1]))
+            self._storey(axis, floor, shades, panel)
         if self._shade is not None:
-            bar = figure.add_axes((0.945, 0.1, 0.013, 0.7))
-            figure.colorbar(shades, cax=bar)
-            bar.set_title("ACH", fontsize=9, color=_INK, pad=6)
-            bar.tick_params(labelsize=8, colors=_INK, length=2)
-            bar.minorticks_off()
-            bar.spines["outline"].set_visible(False) if "outline" in bar.spines else None
-        self._title(figure, size[1])
+            long = min(0.8 * (height - _HEAD), 4.0)
+            low = height - _HEAD - _CAPTION - long
+            place = (1 - (_MARGIN + 0.58) / width, low / height, 0.14 / width, long / height)
+            self._colour_bar(figure, place, shades)
+        self._title(figure, height)
         return figure
 
-    def _bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        plan = self._cells.leaf_point[:, [0, 2]]
-        if len(plan) == 0:
-            return np.zeros(2), np.ones(2)
-        low, high = plan.min(axis=0), plan.max(axis=0)
-        margin = 0.02 * float((high - low).max()) + 0.1
-        return low - margin, high + margin
+    def _shown(self, plan: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(…, 2) plan coordinates (x, z) as (right, down) on paper."""
+        return np.stack([plan[..., 1], -plan[..., 0]], axis=-1) if self._turned else plan
 
-    def _grid(self, span: NDArray[np.float64]) -> tuple[int, int]:
-        count = max(len(self._floors), 1)
-        columns = min(count, 2) if span[0] < 1.6 * span[1] else 1
-        return -(-count // columns), columns
-
-    def _storey(self, axis: Any, index: int, shades: Any) -> None:
+    def _storey(self, axis: Any, floor: float, shades: Any, panel: float) -> None:
         from matplotlib.collections import LineCollection, PolyCollection
 
-        floor = self._floors[index]
         height = cut_height(self._cells, floor, self._options.height)
         sections = list(self._sections(height))
+        polygons = [self._shown(polygon) for _, polygon in sections]
         fills = [self._fill(cell, shades) for cell, _ in sections]
-        polygons = [polygon for _, polygon in sections]
         axis.add_collection(
             PolyCollection(polygons, facecolors=fills, edgecolors=_CELL_EDGE, linewidths=0.5)
         )
-        chosen = [p for cell, p in sections if cell == self._options.cell]
-        walls = triangle_section(self._corners[self._opaque], height)
         panes = triangle_section(self._corners[~self._opaque], height)
-        portals = self._portals(height)
-        for segments, colour, width, layer in (
-            (panes, _SEE_THROUGH, 1.2, 3),
-            (walls, _WALL, 1.3, 4),
-            (portals, _PORTAL, 2.0, 5),
+        walls = triangle_section(self._corners[self._opaque], height)
+        chosen = [
+            p for p, (cell, _) in zip(polygons, sections, strict=True) if cell == self._options.cell
+        ]
+        axis.add_collection(
+            PolyCollection(
+                chosen, facecolors="none", edgecolors=_CHOSEN, linewidths=5, zorder=2, clip_on=False
+            )
+        )
+        for layer, (segments, colour, width) in enumerate(
+            (
+                (np.array(self._portals(height)), _PORTAL, 2.2),
+                (panes, _SEE_THROUGH, 1.4),
+                (walls, _WALL, 1.2),
+            )
         ):
             axis.add_collection(
                 LineCollection(
-                    list(segments),
+                    [self._shown(s) for s in segments],
                     colors=colour,
                     linewidths=width,
-                    zorder=layer,
-                    capstyle="butt" if colour == _PORTAL else "round",
+                    zorder=3 + layer,
+                    capstyle="butt",
+                    clip_on=False,
                 )
             )
-        axis.add_collection(
-            PolyCollection(chosen, facecolors="none", edgecolors=_CHOSEN, linewidths=2.4, zorder=6)
-        )
-        self._numbers(axis, sections)
+        self._numbers(axis, sections, 72 * panel / float(self._high[0] - self._low[0]))
         self._scale_bar(axis)
         numbers = len({cell for cell, _ in sections})
-        title = f"floor at {floor:+.2f} m, cut at {height:+.2f} m: {numbers} cells"
-        axis.set_title(title, fontsize=9, color=_INK, loc="left", pad=4)
+        axis.set_title(
+            f"floor {floor:+.2f} m, cut at {height:+.2f} m: {numbers} cells",
+            fontsize=9,
+            color=_INK,
+            loc="left",
+            pad=6,
+        )
 
     def _sections(self, height: float) -> Iterator[tuple[int, NDArray[np.float64]]]:
         for leaf in range(self._cells.leaf_count):
@@ -218,82 +225,100 @@ class _Plan:
         if self._shade is None:
             return _CELL_FILL
         share = self._shade.get(cell)
-        return "#f4f5f6" if share is None else shades.to_rgba(max(share, _FAINTEST))
+        return _UNSEEN if share is None else shades.to_rgba(max(share, _FAINTEST))
 
-    def _numbers(self, axis: Any, sections: list[tuple[int, NDArray[np.float64]]]) -> None:
-        """Each cell's number once, in its largest section, if there is room."""
+    def _numbers(
+        self, axis: Any, sections: list[tuple[int, NDArray[np.float64]]], points: float
+    ) -> None:
+        """Each cell's number once, in its largest section, if there is room; ``points`` of paper
+        make a metre."""
         from matplotlib.patheffects import withStroke
 
         largest: dict[int, NDArray[np.float64]] = {}
         for cell, polygon in sections:
             if cell not in largest or area(polygon) > area(largest[cell]):
                 largest[cell] = polygon
-        box = axis.get_position()
-        inches = box.width * self._options.width
-        points = 72 * inches / abs(np.diff(axis.get_xlim())[0])
         for cell, polygon in largest.items():
             text = str(cell)
-            width, depth = np.ptp(polygon, axis=0) * points
+            width, depth = np.ptp(self._shown(polygon), axis=0) * points
             size = min(depth * 0.6, width / (0.65 * len(text)), 8.0)
             if min(width, depth) < _NARROWEST or size < 4.5:
                 continue
-            x, z = _middle(polygon)
+            x, y = self._shown(_middle(polygon))
+            dark = self._shade is not None and self._shade.get(cell, 0.0) > _DARK
+            ink, paper = (_PAPER, _INK) if dark else (_INK, _PAPER)
+            halo = [withStroke(linewidth=1.6, foreground=paper, alpha=0.6)]
             axis.text(
                 x,
-                z,
+                y,
                 text,
                 fontsize=size,
-                color=_INK,
+                color=ink,
                 ha="center",
                 va="center",
                 zorder=7,
-                path_effects=[withStroke(linewidth=1.4, foreground="#ffffffcc")],
+                path_effects=halo,
             )
 
     def _scale_bar(self, axis: Any) -> None:
-        left, right = axis.get_xlim()
-        bottom = axis.get_ylim()[0]
-        length = _round_length((right - left) / 5)
-        x, z = left + 0.02 * (right - left), bottom - 0.012 * (right - left)
-        axis.plot(
-            [x, x + length], [z, z], color=_INK, linewidth=2.2, zorder=8, solid_capstyle="butt"
-        )
-        axis.text(x + length, z, f" {length:g} m", fontsize=8, color=_INK, va="center", zorder=8)
+        length = _round_length(float(self._high[0] - self._low[0]) / 5)
+        share = length / float(self._high[0] - self._low[0])
+        tall = axis.get_position().height * axis.figure.get_figheight()
+        y = -0.16 / tall
+        where = {"transform": axis.transAxes, "clip_on": False, "color": _INK}
+        axis.plot([0, share], [y, y], linewidth=2.2, solid_capstyle="butt", **where)
+        for end in (0, share):
+            axis.plot([end, end], [y - 0.04 / tall, y + 0.04 / tall], linewidth=1, **where)
+        where.pop("clip_on")
+        axis.text(share, y, f"  {length:g} m", fontsize=8, va="center", **where)
 
-    def _title(self, figure: Any, tall: float) -> None:
+    def _colour_bar(self, figure: Any, place: tuple[float, ...], shades: Any) -> None:
+        bar = figure.add_axes(place)
+        drawn = figure.colorbar(shades, cax=bar)
+        drawn.set_ticks([1, 0.1, 0.01, 0.001, _FAINTEST])
+        drawn.set_ticklabels(["100 %", "10 %", "1 %", "0.1 %", "≤ 0.01 %"])
+        drawn.outline.set_visible(False)
+        bar.set_title("ACH", fontsize=9, color=_INK, pad=6)
+        bar.tick_params(labelsize=7, colors=_INK, length=2)
+        bar.minorticks_off()
+
+    def _title(self, figure: Any, height: float) -> None:
+        from matplotlib.lines import Line2D
+
         cells, chosen = self._cells, self._options.cell
         parts = [f"{cells.cell_count} cells", f"{cells.portal_count} portals"]
         if self._pvs is not None:
             parts.append(f"average PVS {100 * self._pvs.average_share:.1f} %")
         if len(self._floors) > 1:
             parts.append(f"{len(self._floors)} storeys")
-        text = ", ".join(parts)
+        place = {"ha": "left", "va": "center", "color": _INK}
+        y = 1 - 0.27 / height
         figure.text(
-            0.01,
-            1 - 0.3 / tall,
-            text,
-            fontsize=13,
-            color=_INK,
-            ha="left",
-            va="center",
+            _MARGIN / self._options.width,
+            y,
+            "  ·  ".join(parts),
+            fontsize=12,
             weight="bold",
+            **place,
         )
-        legend = [(_WALL, "opaque"), (_SEE_THROUGH, "transparent"), (_PORTAL, "portal")]
+        lines = [(_WALL, "opaque"), (_PORTAL, "portal")]
+        if not self._opaque.all():
+            lines.insert(1, (_SEE_THROUGH, "transparent"))
         if chosen is not None and self._shade is not None:
-            seen = f"cell {chosen} sees {len(self._shade)} of {cells.cell_count} cells"
-            legend.append((_CHOSEN, seen))
-        x = 0.99
-        for colour, label in reversed(legend):
-            figure.text(
-                x,
-                1 - 0.3 / tall,
-                f"━ {label}",
-                fontsize=9,
-                color=colour,
-                ha="right",
-                va="center",
-            )
-            x -= (len(label) + 3) * 0.075 / self._options.width + 0.004
+            lines.append((_CHOSEN, f"cell {chosen}, sees {len(self._shade)} cells"))
+        figure.legend(
+            handles=[Line2D([], [], color=c, linewidth=2.5, label=label) for c, label in lines],
+            loc="center right",
+            bbox_to_anchor=(1 - _MARGIN / self._options.width, y),
+            ncols=len(lines),
+            frameon=False,
+            fontsize=9,
+            labelcolor=_INK,
+            handlelength=1.3,
+            columnspacing=1.4,
+            borderpad=0,
+            borderaxespad=0,
+        )
 
 
 def _middle(polygon: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -174,11 +174,13 @@ class _Check:
             cell = read_cell(self._documents[name], name, self.found)
             if cell is not None:
                 self._cells[name.rpartition("/")[2]] = cell
-        points = [c.hull for c in self._cells.values()]
-        tolerance = Tolerance.for_points(np.concatenate(points) if points else np.zeros((0, 3)))
+        hulls = [c.hull for c in self._cells.values() if len(c.hull)]
+        points = np.concatenate(hulls) if hulls else np.zeros((1, 3))
+        box = np.stack([points.min(axis=0), points.max(axis=0)])
+        tolerance = Tolerance.for_points(points)
         for own, cell in self._cells.items():
             name = f"{SERVED}/{CELL_FOLDER}/{own}"
-            check_cell(self._documents[name], cell, name, tolerance, self.found)
+            check_cell(self._documents[name], cell, name, box, tolerance, self.found)
             for url in (
                 *cell.adjacent,
                 *cell.visible,

@@ -15,6 +15,7 @@ see down doorways, but the centre of a hall is as often a table.)
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,8 @@ from ptmtools.tolerance import ROUNDING_SHARE
 _LEAVES = 96
 #: Places tried in a leaf, along each axis of its plan.
 _GRID = 7
+#: Places of a leaf whose view is measured, the freest first.
+_TRIES = 24
 #: Directions tried at a place, and how many to either side make a sector (±15°).
 _DIRECTIONS = 72
 _SECTOR = 3
@@ -200,28 +203,24 @@ def _chosen(
     of the largest leaf."""
     leaves = _largest_leaves(cells)
     opaque = scene.corners[scene.opaque]
-    found: dict[int, tuple[float, NDArray[np.float64], float]] = {}
-    for leaf in leaves:
-        place = _place_in(cells, leaf, ground, opaque, options.avatar_size)
-        cell = int(cells.leaf_cell[leaf])
-        if place is not None and (cell not in found or place[0] > found[cell][0]):
-            found[cell] = place
+    rooms = [room for leaf in leaves if (room := _room(cells, leaf, ground, options)) is not None]
+    found: dict[int, tuple[NDArray[np.float64], float]] = {}
+    for room in sorted(rooms, key=lambda room: (-area(room.section), room.leaf)):
+        cell = int(cells.leaf_cell[room.leaf])
+        if len(found) == options.viewpoint_count:
+            break
+        if cell not in found:
+            place = _place_in(room, cells, ground, opaque, options.avatar_size)
+            if place is not None:
+                found[cell] = place
     if not found:
         middle = cells.leaf_points(leaves[0]).mean(axis=0)
         walls = triangle_section(opaque, float(middle[1]))
         yaw, _ = _longest_view(middle[[0, 2]], walls)
-        found[int(cells.leaf_cell[leaves[0]])] = (0.0, middle, yaw)
-    ranked = sorted(found, key=lambda cell: (-found[cell][0], cell))[: options.viewpoint_count]
+        found[int(cells.leaf_cell[leaves[0]])] = (middle, yaw)
     return [
-        _viewpoint(
-            i,
-            f"Cell {cell}",
-            found[cell][1],
-            _heading(found[cell][2]),
-            options.field_of_view,
-            cell,
-        )
-        for i, cell in enumerate(ranked)
+        _viewpoint(i, f"Cell {cell}", position, _heading(yaw), options.field_of_view, cell)
+        for i, (cell, (position, yaw)) in enumerate(found.items())
     ]
 
 
@@ -230,35 +229,44 @@ def _largest_leaves(cells: Cells) -> list[int]:
     return [int(i) for i in np.argsort(-np.array(boxes), kind="stable")[:_LEAVES]]
 
 
-def _place_in(
-    cells: Cells,
-    leaf: int,
-    ground: _Ground,
-    opaque: NDArray[np.float64],
-    avatar_size: Vector,
-) -> tuple[float, NDArray[np.float64], float] | None:
-    """(m² of the section at eye height, position, yaw) of the best place to stand, or None."""
-    points = cells.leaf_points(leaf)
-    floor = ground.below(points.mean(axis=0))
-    eye = floor + avatar_size[1]
-    section = leaf_section(cells, leaf, eye) if np.isfinite(floor) else np.zeros((0, 2))
-    if len(section) < 3:
+@dataclass(frozen=True)
+class _Room:
+    """A leaf in which one can stand: its floor's height, and its section at the eye's."""
+
+    leaf: int
+    floor: float
+    section: NDArray[np.float64]
+
+
+def _room(cells: Cells, leaf: int, ground: _Ground, options: EmitOptions) -> _Room | None:
+    floor = ground.below(cells.leaf_points(leaf).mean(axis=0))
+    if not np.isfinite(floor):
         return None
-    walls = triangle_section(opaque, eye)
-    places = _grid(section)
-    clearance = np.minimum(_distance(places, walls), _distance(places, _sides(section)))
-    best: tuple[float, NDArray[np.float64], float] | None = None
-    best_view = -1.0
-    for i in np.argsort(-clearance, kind="stable")[: len(places) // 2].tolist():
-        position = np.array([places[i, 0], eye, places[i, 1]])
-        if clearance[i] < avatar_size[0] or abs(ground.below(position) - floor) > avatar_size[2]:
+    section = leaf_section(cells, leaf, floor + options.avatar_size[1])
+    return _Room(leaf, floor, section) if len(section) >= 3 else None
+
+
+def _place_in(
+    room: _Room, cells: Cells, ground: _Ground, opaque: NDArray[np.float64], avatar_size: Vector
+) -> tuple[NDArray[np.float64], float] | None:
+    """(position, yaw) with the longest view among the freest places to stand, or None."""
+    keep_off, eye, step = avatar_size
+    walls = triangle_section(opaque, room.floor + eye)
+    places = _grid(room.section)
+    clearance = np.minimum(_distance(places, walls), _distance(places, _sides(room.section)))
+    best: tuple[NDArray[np.float64], float] | None = None
+    longest, tried = -1.0, 0
+    for i in np.argsort(-clearance, kind="stable").tolist():
+        floor = ground.below(np.array([places[i, 0], room.floor + eye, places[i, 1]]))
+        position = np.array([places[i, 0], floor + eye, places[i, 1]])
+        if clearance[i] < keep_off or tried == _TRIES:
+            break
+        if abs(floor - room.floor) > step or cells.locate_leaf(position)[0] != room.leaf:
             continue
-        position[1] = ground.below(position) + avatar_size[1]
-        if cells.locate_leaf(position)[0] != leaf:
-            continue
+        tried += 1
         yaw, view = _longest_view(places[i], walls)
-        if view > best_view:
-            best, best_view = (area(section), position, yaw), view
+        if view > longest:
+            best, longest = (position, yaw), view
     return best
 
 
@@ -295,20 +303,23 @@ def _distance(points: NDArray[np.float64], segments: NDArray[np.float64]) -> NDA
 def _longest_view(place: NDArray[np.float64], walls: NDArray[np.float64]) -> tuple[float, float]:
     """(yaw in radians, mean free distance of its sector in metres)."""
     yaws = 2 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
-    free = np.array([_free(place, _heading(y)[[0, 2]], walls) for y in yaws])
-    sectors = sum(np.roll(free, k) for k in range(-_SECTOR, _SECTOR + 1)) / (2 * _SECTOR + 1)
-    best = int(np.asarray(sectors).argmax())
-    return float(yaws[best]), float(np.asarray(sectors)[best])
+    free = _free(place, yaws, walls)
+    sector = np.arange(-_SECTOR, _SECTOR + 1)
+    mean = free[(np.arange(_DIRECTIONS)[:, None] + sector) % _DIRECTIONS].mean(axis=1)
+    best = int(mean.argmax())
+    return float(yaws[best]), float(mean[best])
 
 
 def _free(
-    place: NDArray[np.float64], heading: NDArray[np.float64], walls: NDArray[np.float64]
-) -> float:
-    """Metres to the first wall; 0 if there is none."""
+    place: NDArray[np.float64], yaws: NDArray[np.float64], walls: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Metres to the first wall in each direction; 0 where there is none."""
+    x, z = -np.sin(yaws)[:, None], -np.cos(yaws)[:, None]
     a, along = walls[:, 0] - place, walls[:, 1] - walls[:, 0]
-    det = heading[0] * along[:, 1] - heading[1] * along[:, 0]
+    det = x * along[:, 1] - z * along[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         distance = (a[:, 0] * along[:, 1] - a[:, 1] * along[:, 0]) / det
-        share = (a[:, 0] * heading[1] - a[:, 1] * heading[0]) / det
+        share = (a[:, 0] * z - a[:, 1] * x) / det
     hit = (det != 0) & (distance > 0) & (share >= 0) & (share <= 1)
-    return float(distance[hit].min()) if hit.any() else 0.0
+    nearest = np.where(hit, distance, np.inf).min(axis=1, initial=np.inf)
+    return np.where(np.isfinite(nearest), nearest, 0.0)

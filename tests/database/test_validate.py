@@ -110,7 +110,7 @@ FAULTS: list[tuple[str, Damage]] = [
     ("PTM-D682", replaced(C1, r"colorIndex \[ 0", "colorIndex [ 7")),
     ("PTM-D683", replaced(C0, r"(hullIndex [^]]*?)\d+, \d+, \d+, -1, ", r"\1")),
     ("PTM-D683", replaced(C0, r"hullPoint   \[ 0 0 -2", "hullPoint   [ 2 2 0")),
-    ("PTM-D684", replaced(C0, r"point \[ 0 0 ", "point [ -1 0 ")),
+    ("PTM-D684", replaced(C0, r"(point \[ [^]]*?)4 0 ", r"\g<1>5 0 ")),
     ("PTM-D690", replaced(C0, r'visibleUrl  \[ ("\w+.wrl"), ("\w+.wrl")', r"visibleUrl [ \2, \1")),
     ("PTM-D691", replaced(C0, r"ach         \[ [.\d]+, ([.\d]+), [.\d]+", r"ach [ 0.8, \1")),
     ("PTM-D692", replaced(C0, r"\n  ach         \[ [^]]*\]", "\n ach [ 1.5, -0.25, -0.25 ]")),
