@@ -1,0 +1,101 @@
+"""Formats that are read through trimesh and pymeshlab."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ptmtools.errors import MissingComponentError
+from ptmtools.scene import ingest
+
+from .conftest import noise, png
+
+Put = Callable[..., Path]
+
+CORNERS = "0 0 0\n10 0 0\n10 4 0\n0 4 0\n"
+STL = "solid wall\n" + "".join(
+    f"facet normal 0 0 1\nouter loop\n{corners}endloop\nendfacet\n"
+    for corners in (
+        "vertex 0 0 0\nvertex 10 0 0\nvertex 10 4 0\n",
+        "vertex 0 0 0\nvertex 10 4 0\nvertex 0 4 0\n",
+    )
+)
+PLY = (
+    "ply\nformat ascii 1.0\n{more}element vertex 4\nproperty float x\nproperty float y\n"
+    "property float z\nelement face 1\nproperty list uchar int vertex_indices\n{coords}end_header\n"
+)
+MODELS = {
+    "wall.stl": STL + "endsolid wall\n",
+    "wall.off": f"OFF\n4 2 0\n{CORNERS}3 0 1 2\n3 0 2 3\n",
+    "mixed.off": f"OFF\n4 2 0\n{CORNERS}4 0 1 2 3\n3 0 1 2\n",
+    "wall.ply": PLY.format(more="", coords="") + CORNERS + "4 0 1 2 3\n",
+}
+
+
+@pytest.fixture
+def meshlab(require: Callable[[str, str], None]) -> None:
+    try:
+        import pymeshlab  # noqa: F401
+    except ImportError:
+        require("pymeshlab", "pip install pymeshlab; apt install libgl1")
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_wall(put: Put, meshlab: None, name: str) -> None:
+    scene = ingest(put(name, MODELS[name]))
+    assert len(scene.triangles) == 2
+    assert scene.two_sided.all()
+    assert np.ptp(scene.points, axis=0).max() == 10
+    assert sorted(np.ptp(scene.points, axis=0)) == [0, 4, 10]
+    assert scene.materials[0].name in ("default", "material_0")
+
+
+def test_a_textured_ply_keeps_every_image(put: Put, meshlab: None) -> None:
+    put("maps/a.png", png(noise(1)))
+    put("maps/b.png", png(noise(2)))
+    header = PLY.format(
+        more="comment TextureFile maps/a.png\ncomment TextureFile maps/b.png\n",
+        coords="property list uchar float texcoord\nproperty int texnumber\n",
+    ).replace("face 1", "face 2")
+    faces = "3 0 1 2 6 0 0 1 0 1 1 0\n3 0 2 3 6 0 0 1 1 0 1 1\n"
+    scene = ingest(put("wall.ply", header + CORNERS + faces))
+    assert [i.name for i in scene.images] == ["a.png", "b.png"]
+    assert scene.materials[int(scene.triangle_material[1])].image == 1
+    assert scene.uv[0].tolist() == [[0, 0], [1, 0], [1, 1]]
+
+
+DAE = """<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit meter="1" name="meter"/><up_axis>Y_UP</up_axis></asset>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="pa" count="12">0 0 0 10 0 0 10 4 0 0 4 0</float_array>
+<technique_common><accessor source="#pa" count="4" stride="3"><param name="X" type="float"/>
+<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="2"><input semantic="VERTEX" source="#v" offset="0"/>
+<p>0 1 2 0 2 3</p></triangles></mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node id="n"><matrix>1 0 0 5 0 1 0 0 0 0 2 0 0 0 0 1
+</matrix><instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>
+"""
+
+
+def test_collada(put: Put, meshlab: None) -> None:
+    scene = ingest(put("Wand ä.dae", DAE))
+    assert len(scene.triangles) == 2
+    assert sorted(np.ptp(scene.points, axis=0)) == [0, 4, 10]
+
+
+def test_without_pymeshlab(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pymeshlab", None)
+    with pytest.raises(MissingComponentError, match=r"pip install pymeshlab.*PTM-M200"):
+        ingest(put("a.dae", DAE))
+
+
+def test_plain_models_do_not_need_pymeshlab(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pymeshlab", None)
+    assert len(ingest(put("wall.stl", MODELS["wall.stl"])).triangles) == 2
