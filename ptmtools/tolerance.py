@@ -12,18 +12,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-#: On-plane distance as a share of the extent: 0.25 mm in a building of 50 m, well above the
+#: On-plane distance as a share of the extent: 0.4 mm in a building of 50 m, well above the
 #: rounding of the float32 coordinates that model files carry (6e-8 of the extent).
-PLANE_SHARE = 5e-6
+PLANE_SHARE = 8e-6
 #: Parallel planes nearer than this count as one wall, unless the second closes what the first
 #: leaves open: 1 cm in a building of 50 m.
 CLUSTER_SHARE = 2e-4
-#: A cell thinner than this is refused (1 mm in a building of 50 m): it could be flat after rounding
+#: A cell thinner than this is refused (0.5 mm in a building of 50 m): it could be flat after rounding
 #: to float32, and it must be thicker than the on-plane distance.
-THIN_SHARE = 2e-5
-#: A gap between walls narrower than this is a crack of the modelling, not an opening: 0.5 mm in a
+THIN_SHARE = 1e-5
+#: A gap between walls narrower than this is a crack of the modelling, not an opening: 0.4 mm in a
 #: building of 50 m.
-HAIRLINE_SHARE = 1e-5
+HAIRLINE_SHARE = 8e-6
 #: Rounding of float64 arithmetic on coordinates and their intersections, with a margin.
 ROUNDING_SHARE = 1e-10
 
