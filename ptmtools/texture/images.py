@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from PIL import Image
 
 #: Formats whose depth can be told before loading, under Pillow's names.
-FORMATS = ("PNG", "JPEG", "MPO", "TIFF", "TGA", "BMP", "GIF", "WEBP", "PPM", "PCX")
+FORMATS = ("PNG", "JPEG", "TIFF", "TGA", "BMP", "GIF", "WEBP", "PPM", "PCX")
 _READABLE = "PNG, JPEG, TIFF, TGA, BMP, GIF, WebP, PPM or PCX"
 
 

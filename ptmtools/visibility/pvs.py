@@ -77,6 +77,8 @@ def leaf_matrix(
     leaves = portal_leaf.reshape(-1)
     matrix = np.eye(leaf_count, dtype=np.bool_)
     matrix[leaves, enters] = True
+    if not len(leaves):
+        return matrix
     bits = flow.sees.view(np.uint8).reshape(len(leaves), -1)
     for p, row in enumerate(bits):
         seen = np.unpackbits(row, count=len(leaves), bitorder="little")
