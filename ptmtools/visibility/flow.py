@@ -29,6 +29,7 @@ import os
 from collections import deque
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,6 +52,9 @@ DEPTH = 1024
 GROWTH = 24
 #: Bytes that the two bit matrices may take: 60,000 portals.
 MATRIX_BYTES = 1 << 32
+BITS_OF_BYTE = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1).sum(
+    axis=1, dtype=np.uint8
+)
 
 
 @dataclass(frozen=True)
@@ -103,7 +107,7 @@ def portal_flow(
     budget: operations for each directed portal; see the module's head.
     workers: threads; None takes one for each processor. The result is the same for any number.
 
-    Raises InputError PTM-I400 (indices or sizes that do not fit together), PTM-I401 (a coordinate
+    Raises InputError PTM-I400 (arrays that do not fit together), PTM-I401 (a coordinate
     that is not finite); LimitError PTM-L400 (more portals than fit into memory).
     """
     check(portals)
@@ -115,34 +119,25 @@ def portal_flow(
             f"{count // 2:,} portals are too many for the portal flow",
             remedy="subdivide less finely (a greater wall area, fewer cells)",
         )
-    known = np.zeros((count, words), dtype=np.uint64)
     cut = np.zeros(count, dtype=np.bool_)
     if count == 0:
-        return PortalFlow(known, cut, 0)
+        return PortalFlow(np.zeros((0, words), dtype=np.uint64), cut, 0)
 
     from ptmtools.visibility import kernels
 
     g = geometry(portals)
     threads = min(workers or os.cpu_count() or 1, BATCH)
     with ThreadPoolExecutor(threads) as pool:
-        rows = np.array_split(np.arange(count), 4 * threads)
-        front = np.zeros_like(known)
-        spans = [(int(r[0]), int(r[-1]) + 1) for r in rows if len(r)]
-        list(pool.map(lambda span: kernels.fill_ahead(g, *span, front), spans))
-        list(pool.map(lambda span: kernels.flood(g, front, *span, known), spans))
-        del front
-        for _ in range(ROUNDS):
-            kernels.tighten(g, known)
-
+        known = _prepass(g, words, pool, threads)
         storage = [scratch(g, words) for _ in range(threads)]
-        order = np.argsort(np.bitwise_count(known).sum(axis=1), kind="stable")
+        order = np.argsort(BITS_OF_BYTE[known.view(np.uint8)].sum(axis=1), kind="stable")
         operations = 0
         for first in range(0, count, BATCH):
             batch = order[first : first + BATCH]
             seen = np.zeros((len(batch), words), dtype=np.uint64)
             waiting = deque(range(len(batch)))
 
-            def work(
+            def search(
                 s: Scratch,
                 batch: NDArray[np.int64] = batch,
                 seen: NDArray[np.uint64] = seen,
@@ -155,15 +150,31 @@ def portal_flow(
                     except IndexError:
                         return done
                     p = int(batch[i])
-                    ops, cut[p] = kernels.flow(g, s, known, p, budget, seen[i])
-                    done += ops
+                    taken, cut[p] = kernels.flow(g, s, known, p, budget, seen[i])
+                    done += int(taken)
 
-            operations += sum(pool.map(work, storage))
+            operations += sum(pool.map(search, storage))
             known[batch] = seen
             for p in batch:
                 kernels.drop_unreturned(known, p)
             progress(min(first + BATCH, count), count, "portals")
-    return PortalFlow(known, cut.reshape(-1, 2).any(axis=1), operations)
+    return PortalFlow(known, cut[0::2] | cut[1::2], operations)
+
+
+def _prepass(g: Geometry, words: int, pool: ThreadPoolExecutor, threads: int) -> NDArray[np.uint64]:
+    """(2K, W) a first upper bound of what each directed portal sees, from planes and floods."""
+    from ptmtools.visibility import kernels
+
+    count = len(g.leaf)
+    front = np.zeros((count, words), dtype=np.uint64)
+    known = np.zeros((count, words), dtype=np.uint64)
+    ends = np.linspace(0, count, 4 * threads + 1).astype(np.int64)
+    spans = list(pairwise(ends.tolist()))
+    list(pool.map(lambda span: kernels.fill_ahead(g, span[0], span[1], front), spans))
+    list(pool.map(lambda span: kernels.flood(g, front, span[0], span[1], known), spans))
+    for _ in range(ROUNDS):
+        kernels.tighten(g, known)
+    return known
 
 
 def check(portals: Portals) -> None:
@@ -176,6 +187,8 @@ def check(portals: Portals) -> None:
         wrong = "the portals' offsets do not cover their points"
     elif k and (leaf.min() < 0 or leaf.max() >= portals.leaf_count):
         wrong = "a portal names a leaf that does not exist"
+    elif not portals.normal.any(axis=1).all():
+        wrong = "a portal has no normal"
     if wrong:
         raise InputError("PTM-I400", wrong, remedy="build the cells again")
     if not (np.isfinite(portals.point).all() and np.isfinite(portals.normal).all()):
@@ -193,8 +206,7 @@ def geometry(portals: Portals) -> Geometry:
     middle = (portals.point.min(axis=0) + portals.point.max(axis=0)) / 2
     point = portals.point - middle
     owner = np.repeat(np.arange(len(sizes)), sizes)
-    length = np.linalg.norm(portals.normal, axis=1, keepdims=True)
-    normal = portals.normal / np.where(length > 0, length, 1)
+    normal = portals.normal / np.linalg.norm(portals.normal, axis=1, keepdims=True)
 
     # Newell's area vector about the first vertex tells how a polygon is wound.
     within = np.arange(len(point)) - start[owner]

@@ -13,6 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bits = NDArray[np.uint64]
 
 ONE = np.uint64(1)
 ZERO = np.uint64(0)
@@ -28,39 +33,39 @@ EMPTY, WHOLE, CUT = 0, 1, 2
 class Geometry(NamedTuple):
     """Portals ready for the kernels; `flow.geometry` fills it."""
 
-    point: np.ndarray  # (Q, 3) centred on the scene
-    start: np.ndarray  # (K + 1,)
-    normal: np.ndarray  # (K, 3)
-    low: np.ndarray  # (K,) least and
-    high: np.ndarray  # (K,) greatest normal·x over the portal's own points
-    ball: np.ndarray  # (K, 4) centre and radius of a ball around it
-    leaf: np.ndarray  # (2K,) the leaf that a directed portal leads into
-    out_start: np.ndarray  # (L + 1,) CSR over leaves:
-    out: np.ndarray  # (2K,) the directed portals that lead out of a leaf
+    point: Floats  # (Q, 3) centred on the scene
+    start: Ints  # (K + 1,)
+    normal: Floats  # (K, 3)
+    low: Floats  # (K,) least and
+    high: Floats  # (K,) greatest normal·x over the portal's own points
+    ball: Floats  # (K, 4) centre and radius of a ball around it
+    leaf: Ints  # (2K,) the leaf that a directed portal leads into
+    out_start: Ints  # (L + 1,) CSR over leaves:
+    out: Ints  # (2K,) the directed portals that lead out of a leaf
     slack: float  # distances below this are rounding
 
 
 class Scratch(NamedTuple):
     """Working storage of one worker; `flow.scratch` sizes it."""
 
-    polygon: np.ndarray  # (2D + 3, V, 3)
-    size: np.ndarray  # (2D + 3,)
-    plane: np.ndarray  # (D + 1, 2V, 4) normal and offset: kept is where n·x >= offset
-    planes: np.ndarray  # (D + 1,) how many
-    might: np.ndarray  # (D, W) bits
-    via: np.ndarray  # (D,) the directed portal that led into the frame
-    at: np.ndarray  # (D,) next candidate, index into out
-    distance: np.ndarray  # (V,)
+    polygon: Floats  # (2D + 3, V, 3)
+    size: Ints  # (2D + 3,)
+    plane: Floats  # (D + 1, 2V, 4) normal and offset: kept is where n·x >= offset
+    planes: Ints  # (D + 1,) how many
+    might: Bits  # (D, W) bits
+    via: Ints  # (D,) the directed portal that led into the frame
+    at: Ints  # (D,) next candidate, index into out
+    distance: Floats  # (V,)
 
 
 @njit(cache=True, nogil=True)
-def has(rows, p, q):
+def has(rows: Bits, p: int, q: int) -> bool:
     """Whether bit q of row p is set."""
-    return (rows[p, q >> 6] >> np.uint64(q & 63)) & ONE != ZERO
+    return bool((rows[p, q >> 6] >> np.uint64(q & 63)) & ONE)
 
 
 @njit(cache=True, nogil=True)
-def ahead(g, p, q):
+def ahead(g: Geometry, p: int, q: int) -> bool:
     """Whether a straight line may cross directed portal p and then q, by their planes alone."""
     k, j = p >> 1, q >> 1
     if k == j:
@@ -89,7 +94,7 @@ def ahead(g, p, q):
 
 
 @njit(cache=True, nogil=True)
-def fill_ahead(g, first, last, rows):
+def fill_ahead(g: Geometry, first: int, last: int, rows: Bits) -> None:
     """Sets the bits of `ahead` in rows first … last - 1 of ``rows`` (2K, W)."""
     for p in range(first, last):
         for q in range(len(g.leaf)):
@@ -98,7 +103,7 @@ def fill_ahead(g, first, last, rows):
 
 
 @njit(cache=True, nogil=True)
-def flood(g, front, first, last, rows):
+def flood(g: Geometry, front: Bits, first: int, last: int, rows: Bits) -> None:
     """Rows first … last - 1 of ``rows`` become what a flood reaches through ``front``.
 
     A portal is reached when it lies ahead of the source and of the portal before it.
@@ -120,7 +125,7 @@ def flood(g, front, first, last, rows):
 
 
 @njit(cache=True, nogil=True)
-def tighten(g, known):
+def tighten(g: Geometry, known: Bits) -> None:
     """One round of: what p may see, some q behind p's next leaf is or may see; then symmetry."""
     n, words = known.shape
     some = np.empty(words, np.uint64)
@@ -140,7 +145,7 @@ def tighten(g, known):
 
 
 @njit(cache=True, nogil=True)
-def drop_unreturned(known, p):
+def drop_unreturned(known: Bits, p: int) -> None:
     """Where p does not see q, the way back from q does not see the way back from p."""
     back = p ^ 1
     w, keep = back >> 6, ~(ONE << np.uint64(back & 63))
@@ -150,7 +155,17 @@ def drop_unreturned(known, p):
 
 
 @njit(cache=True, nogil=True)
-def clip(polygon, size, slot, distance, n0, n1, n2, c, slack):
+def clip(
+    polygon: Floats,
+    size: Ints,
+    slot: int,
+    distance: Floats,
+    n0: float,
+    n1: float,
+    n2: float,
+    c: float,
+    slack: float,
+) -> int:
     """Keeps what of a polygon lies at n·x >= c, and ``slack`` more; in place.
 
     EMPTY if nothing reaches beyond c + slack. A polygon that would outgrow its slot stays WHOLE.
@@ -164,12 +179,14 @@ def clip(polygon, size, slot, distance, n0, n1, n2, c, slack):
         high = max(high, d)
     if high <= slack:
         return EMPTY
-    if low >= -slack or count + 1 > polygon.shape[1]:
+    if low >= -slack:
         return WHOLE
     spare = len(polygon) - 1
     m = 0
     for i in range(count):
         j = i + 1 if i + 1 < count else 0
+        if m + 2 > polygon.shape[1]:
+            return WHOLE
         d, e = distance[i] + slack, distance[j] + slack
         if d >= 0:
             for a in range(3):
@@ -186,7 +203,7 @@ def clip(polygon, size, slot, distance, n0, n1, n2, c, slack):
 
 
 @njit(cache=True, nogil=True)
-def copy(polygon, size, source, target, count):
+def copy(polygon: Floats, size: Ints, source: int, target: int, count: int) -> None:
     """Puts the first ``count`` vertices of one slot into another."""
     for i in range(count):
         for a in range(3):
@@ -195,7 +212,7 @@ def copy(polygon, size, source, target, count):
 
 
 @njit(cache=True, nogil=True)
-def load(point, start, k, polygon, size, slot):
+def load(point: Floats, start: Ints, k: int, polygon: Floats, size: Ints, slot: int) -> None:
     """Puts the winding of portal k into a slot."""
     first = start[k]
     count = start[k + 1] - first
@@ -206,7 +223,21 @@ def load(point, start, k, polygon, size, slot):
 
 
 @njit(cache=True, nogil=True)
-def separators_through(polygon, size, a, n0, n1, n2, sign, b, flip, plane, row, count, slack):
+def separators_through(
+    polygon: Floats,
+    size: Ints,
+    a: int,
+    n0: float,
+    n1: float,
+    n2: float,
+    sign: float,
+    b: int,
+    flip: bool,
+    plane: Floats,
+    row: int,
+    count: int,
+    slack: float,
+) -> int:
     """Appends to plane row ``row`` the separating planes through the edges of polygon ``a``.
 
     (n0, n1, n2) is a's own normal, counter-clockwise; times ``sign`` it points towards polygon
@@ -264,7 +295,20 @@ def separators_through(polygon, size, a, n0, n1, n2, sign, b, flip, plane, row, 
 
 
 @njit(cache=True, nogil=True)
-def separate(polygon, size, a, k, sign_a, b, j, sign_b, normal, plane, row, slack):
+def separate(
+    polygon: Floats,
+    size: Ints,
+    a: int,
+    k: int,
+    sign_a: float,
+    b: int,
+    j: int,
+    sign_b: float,
+    normal: Floats,
+    plane: Floats,
+    row: int,
+    slack: float,
+) -> int:
     """Plane row ``row`` := all planes that separate a from b; kept is the side of b, and beyond.
 
     Polygon a lies in portal k and b in portal j; ``sign_a`` times k's normal points towards b,
@@ -279,7 +323,16 @@ def separate(polygon, size, a, k, sign_a, b, j, sign_b, normal, plane, row, slac
 
 
 @njit(cache=True, nogil=True)
-def clip_all(polygon, size, slot, distance, plane, row, count, slack):
+def clip_all(
+    polygon: Floats,
+    size: Ints,
+    slot: int,
+    distance: Floats,
+    plane: Floats,
+    row: int,
+    count: int,
+    slack: float,
+) -> int:
     """Clips a polygon by the planes of a row; the status of `clip`."""
     status = WHOLE
     for i in range(count):
@@ -293,7 +346,16 @@ def clip_all(polygon, size, slot, distance, plane, row, count, slack):
 
 
 @njit(cache=True, nogil=True)
-def beyond(point, start, ball, k, plane, row, count, slack):
+def beyond(
+    point: Floats,
+    start: Ints,
+    ball: Floats,
+    k: int,
+    plane: Floats,
+    row: int,
+    count: int,
+    slack: float,
+) -> bool:
     """Whether portal k reaches beyond every plane of a row."""
     c0, c1, c2, radius = ball[k, 0], ball[k, 1], ball[k, 2], ball[k, 3]
     for i in range(count):
@@ -315,7 +377,9 @@ def beyond(point, start, ball, k, plane, row, count, slack):
 
 
 @njit(cache=True, nogil=True)
-def thin_out(g, might, frame, seen, plane, count):
+def thin_out(
+    g: Geometry, might: Bits, frame: int, seen: Bits, plane: Floats, count: int
+) -> tuple[bool, int]:
     """Drops from a frame's possible portals the unseen ones that its separators hide.
 
     Returns (whether an unseen one is left, portals tested).
@@ -337,7 +401,9 @@ def thin_out(g, might, frame, seen, plane, count):
 
 
 @njit(cache=True, nogil=True)
-def flow(g, s, known, source, budget, seen):
+def flow(
+    g: Geometry, s: Scratch, known: Bits, source: int, budget: int, seen: Bits
+) -> tuple[int, bool]:
     """All directed portals that a line through ``source`` may cross after it.
 
     ``known`` (2K, W) is what each portal may see at most; ``seen`` (W,) the zeroed result row.
