@@ -73,7 +73,7 @@ def ingest(
     ----------
     path: an OBJ, GLB, glTF, PLY, STL, OFF, DAE, 3DS, 3MF, X3D, VRML or CTM file.
     options: see `IngestOptions`.
-    progress: called with bytes while reading, then with images.
+    progress: called with bytes while reading, then with materials.
 
     Returns
     -------
