@@ -54,7 +54,7 @@ def subdivide(
     Raises
     ------
     InputError: PTM-I300 if an option is out of range, PTM-I301 if a viewpoint lies in no leaf,
-        PTM-I302 if a name pattern matches nothing.
+        PTM-I302 if a name pattern matches nothing, PTM-I303 if the scene is a single triangle.
     """
     options = options or SubdivideOptions()
     _check(scene, options)
@@ -77,6 +77,12 @@ def subdivide(
 
 
 def _check(scene: Scene, options: SubdivideOptions) -> None:
+    if len(scene.triangles) < 2:
+        raise InputError(
+            "PTM-I303",
+            "a single triangle makes no room",
+            remedy="give a model with floors and walls",
+        )
     if not options.wall_area > 0:
         raise InputError(
             "PTM-I300", f"wall area {options.wall_area:g} m² is not positive", remedy="try 2"
