@@ -1,0 +1,285 @@
+"""What `emit` writes, read back by our own reader and by view3dscene."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ptmtools.database import EmitOptions, GivenViewpoint, TextureRecord, emit, validate_database
+from ptmtools.database.names import DefNames
+from ptmtools.database.wrl import Node, parse
+from ptmtools.errors import DatabaseError, InputError, OutputError
+from ptmtools.scene.model import Material
+
+
+def records() -> tuple[TextureRecord, ...]:
+    return tuple(
+        TextureRecord(i, f"textures/{n}.ptm", f"textures/{n}.png", 1, 1, 3, (), "0" * 64)
+        for i, n in enumerate("ab")
+    )
+
+
+def write(artifacts, out: Path, options: EmitOptions = EmitOptions(), **changes):  # noqa: B008
+    a = replace(artifacts, **changes)
+    return emit(a.scene, a.cells, a.pvs, a.ach, records(), out, options)
+
+
+def triangles(shape: Node) -> np.ndarray:
+    """(m, 3, 3) corners of a shape."""
+    geometry = shape.fields["geometry"]
+    corners = geometry.fields["coordIndex"].reshape(-1, 4)[:, :3]
+    return geometry.fields["coord"].fields["point"][corners]
+
+
+def test_cells_read_back(artifacts, finished: Path) -> None:
+    scene, cells = artifacts.scene, artifacts.cells
+    piece, owner = cells.emitted(scene.two_sided)
+    for c in range(3):
+        document = parse((finished / f"www/cells/c000{c}.wrl").read_bytes())
+        (node,) = document.of_type("PTMCell")
+        assert node.fields["cellName"] == f"c000{c}"
+        assert node.fields["hullPoint"].tolist() == cells.leaf_points(c).tolist()
+        assert node.fields["adjacentUrl"] == tuple(
+            f"c000{n}.wrl" for n in artifacts.cells.adjacent()[c]
+        )
+        assert node.fields["visibleUrl"] == tuple(f"c000{n}.wrl" for n in artifacts.pvs.row(c))
+        np.testing.assert_array_equal(
+            node.fields["ach"].astype(np.float32), artifacts.ach.row(c).astype(np.float32)
+        )
+        written = np.concatenate([triangles(s) for s in document.of_type("Shape")])
+        wanted = cells.vertex[cells.triangle[piece[owner == c]]]
+        assert sorted(written.tolist()) == sorted(wanted.tolist())
+
+
+def test_texture_coordinates_go_with_their_corners(artifacts, finished: Path) -> None:
+    """The fixture maps every quad alike, so a corner's position tells its coordinates."""
+    cells = artifacts.cells
+    known = {
+        (tuple(cells.vertex[i].tolist()), tuple(cells.vertex_uv[i].tolist()))
+        for i in range(len(cells.vertex))
+    }
+    met = 0
+    for c in range(3):
+        for shape in parse((finished / f"www/cells/c000{c}.wrl").read_bytes()).of_type("Shape"):
+            fields = shape.fields["geometry"].fields
+            if "texCoord" not in fields:
+                continue
+            index = fields["texCoordIndex"].reshape(-1, 4)[:, :3]
+            uv = fields["texCoord"].fields["point"][index]
+            for p, t in zip(triangles(shape).reshape(-1, 3), uv.reshape(-1, 2), strict=True):
+                assert (tuple(p.tolist()), tuple(t.tolist())) in known
+                met += 1
+    assert met > 30
+
+
+def test_each_kind_of_material(finished: Path) -> None:
+    """Textured: no Material. Tinted: one Color. See-through: a Material."""
+    kinds = set()
+    for c in range(3):
+        for shape in parse((finished / f"www/cells/c000{c}.wrl").read_bytes()).of_type("Shape"):
+            look, geometry = shape.fields["appearance"].fields, shape.fields["geometry"].fields
+            material = look["material"].fields if "material" in look else {}
+            kinds.add(
+                (
+                    look["texture"].fields["url"][0] if "texture" in look else "",
+                    look["texture"].fields.get("repeatS", True) if "texture" in look else True,
+                    tuple(material["diffuseColor"].tolist()) if material else None,
+                    float(material["transparency"][0]) if "transparency" in material else 0.0,
+                    tuple(geometry["color"].fields["color"].ravel()) if "color" in geometry else (),
+                )
+            )
+    assert kinds == {
+        ("", True, (0.8, 0.8, 0.8), 0.0, ()),
+        ("../textures/a.png", True, None, 0.0, ()),
+        ("../textures/a.png", False, None, 0.0, (1.0, 0.3, 0.3)),
+        ("../textures/b.png", True, (1.0, 1.0, 0.5), 0.75, ()),
+        ("", True, (0.0, 1.0, 0.5), 0.5, ()),
+    }
+
+
+def test_solid_follows_the_sides(artifacts, finished: Path) -> None:
+    sides = set()
+    for c in range(3):
+        for shape in parse((finished / f"www/cells/c000{c}.wrl").read_bytes()).of_type("Shape"):
+            sides.add(shape.fields["geometry"].fields.get("solid", True))
+    assert sides == {True, False}
+
+
+def test_only_the_ptm_without_fallback(artifacts, tmp_path: Path) -> None:
+    write(artifacts, tmp_path / "www", EmitOptions(fallback=False))
+    text = "".join(p.read_text() for p in sorted((tmp_path / "www/cells").iterdir()))
+    assert 'url [ "../textures/a.ptm" ]' in text
+    assert ".png" not in text
+    hints = json.loads((tmp_path / "www/hints.json").read_text())
+    assert [t["fallback"] for t in hints["textures"]] == [None, None]
+
+
+def test_same_bytes_again(artifacts, tmp_path: Path) -> None:
+    first, second = (write(artifacts, tmp_path / n) for n in ("a", "b"))
+    assert first == second
+    for name in first.files:
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+    assert first.bytes == sum((tmp_path / "a" / n).stat().st_size for n in first.files)
+
+
+def test_an_empty_cell_has_a_file(artifacts, tmp_path: Path) -> None:
+    nobody = np.where(artifacts.cells.triangle_cell == 1, -1, artifacts.cells.triangle_cell)
+    write(artifacts, tmp_path / "www", cells=replace(artifacts.cells, triangle_cell=nobody))
+    document = parse((tmp_path / "www/cells/c0001.wrl").read_bytes())
+    assert len(document.of_type("PTMCell")) == 1
+    assert document.of_type("Shape") == []
+
+
+def test_a_cell_of_two_leaves(artifacts, tmp_path: Path) -> None:
+    cells = replace(
+        artifacts.cells,
+        leaf_cell=np.array([0, 0, 1], np.int32),
+        triangle_cell=np.maximum(artifacts.cells.triangle_cell - 1, -1)
+        * (artifacts.cells.triangle_cell > 0)
+        + np.minimum(artifacts.cells.triangle_cell, 0),
+    )
+    pvs = replace(artifacts.pvs, start=np.array([0, 2, 4]), cell=np.array([0, 1, 1, 0], np.int32))
+    ach = replace(
+        artifacts.ach,
+        start=pvs.start,
+        value=np.array([0.75, 0.25, 0.5, 0.5]),
+        missed=np.zeros(2),
+    )
+    write(artifacts, tmp_path / "db/www", cells=cells, pvs=pvs, ach=ach)
+    node = parse((tmp_path / "db/www/cells/c0000.wrl").read_bytes()).of_type("PTMCell")[0]
+    assert node.fields["leafStart"].tolist() == [0, 8]
+    assert node.fields["leafPoint"].tolist() == cells.leaf_point[:16].tolist()
+    assert np.ptp(node.fields["hullPoint"], axis=0).tolist() == [8, 4, 4]
+    assert len(node.fields["hullPoint"]) == 8
+    issues = {i.code for i in validate_database(tmp_path / "db").issues}
+    assert issues == {"PTM-D650", "PTM-D671"}, "no manifest and no textures here, nothing else"
+
+
+def test_viewpoints_stand_on_the_floor(artifacts, finished: Path) -> None:
+    document = parse((finished / "www/root.wrl").read_bytes())
+    views = {v.name: v.fields["position"] for v in document.of_type("Viewpoint")}
+    assert list(views) == ["VP_0", "VP_1", "VP_2"]
+    (info,) = document.of_type("NavigationInfo")
+    assert info.fields["avatarSize"].tolist() == [0.25, 1.6, 0.75]
+    for node in document.of_type("PTMViewpointCell"):
+        position = views.pop(node.fields["viewpoint"])
+        assert position[1] == 1.6
+        cell = int(artifacts.cells.locate(position)[0])
+        assert node.fields["cellUrl"] == (f"cells/c{cell:04d}.wrl",)
+    assert not views
+
+
+def test_def_names() -> None:
+    names = DefNames("C7")
+    given = ["Wände.001", "Wände 001", "wall", "wall", "wall_2", "…", "", "1"]
+    taken = [names.take(n) for n in given]
+    assert taken == [
+        "C7_Wande_001",
+        "C7_Wande_001_2",
+        "C7_wall",
+        "C7_wall_2",
+        "C7_wall_2_2",
+        "C7_shape",
+        "C7_shape_2",
+        "C7_1",
+    ]
+    assert all(re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", t) for t in taken)
+
+
+def test_faults_before_anything_is_written(artifacts, tmp_path: Path) -> None:
+    out = tmp_path / "www"
+    cells, pvs, ach = artifacts.cells, artifacts.pvs, artifacts.ach
+    nothing = replace(cells, leaf_cell=np.zeros(0, np.int32), triangle_source=np.zeros(0, np.int32))
+    for code, changes in {
+        "PTM-D600": {"cells": nothing},
+        "PTM-D604": {"pvs": replace(pvs, start=pvs.start[:-1])},
+    }.items():
+        with pytest.raises(DatabaseError, match=code):
+            write(artifacts, out, **changes)
+    with pytest.raises(DatabaseError, match="PTM-D604"):
+        write(artifacts, out, ach=replace(ach, start=ach.start * 2))
+    with pytest.raises(DatabaseError, match=r"'b\.png'.*PTM-D602"):
+        emit(artifacts.scene, cells, pvs, ach, records()[:1], out)
+    vertex = cells.vertex.copy()
+    vertex[3, 1] = np.nan
+    with pytest.raises(DatabaseError, match="PTM-D601"):
+        write(artifacts, out, cells=replace(cells, vertex=vertex))
+    with pytest.raises(DatabaseError, match="PTM-D601"):
+        write(artifacts, out, cells=replace(cells, vertex=cells.vertex * 1e40))
+    with pytest.raises(InputError, match="PTM-I600"):
+        write(artifacts, out, EmitOptions(viewpoints=(GivenViewpoint((50, 1, 0)),)))
+    assert not out.exists()
+
+
+def test_what_is_there_stays(artifacts, tmp_path: Path) -> None:
+    (tmp_path / "root.wrl").write_text("mine")
+    with pytest.raises(OutputError, match="PTM-O001"):
+        write(artifacts, tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["root.wrl"]
+    a = artifacts
+    emit(a.scene, a.cells, a.pvs, a.ach, records(), tmp_path, force=True)
+    assert (tmp_path / "root.wrl").read_text().startswith("#VRML V2.0 utf8\n")
+
+
+def test_collapsed_pieces_are_counted(artifacts, tmp_path: Path) -> None:
+    """A sliver whose corners are one in float32 is left out, in both cells that it faces."""
+    cells = artifacts.cells
+    vertex, triangle = cells.vertex.copy(), cells.triangle
+    vertex[triangle[0, 1]] = vertex[triangle[0, 0]] + [0, 0, 1e-12]
+    before = write(artifacts, tmp_path / "a")
+    after = write(artifacts, tmp_path / "b", cells=replace(cells, vertex=vertex))
+    assert before.collapsed == 0
+    assert after.collapsed == 1
+    assert after.triangles == before.triangles - 1
+
+
+def test_colours_beyond_the_range_are_held(artifacts, tmp_path: Path) -> None:
+    bright = (Material("bright", (2.0, -1.0, 0.5), opacity=1.5),)
+    scene = replace(
+        artifacts.scene,
+        materials=bright,
+        triangle_material=np.zeros_like(artifacts.scene.triangle_material),
+    )
+    write(artifacts, tmp_path, scene=scene)
+    text = (tmp_path / "cells/c0000.wrl").read_text()
+    assert "material Material { diffuseColor 1 0 0.5 }" in text
+
+
+def log_of_view3dscene(file: Path, home: Path) -> list[str]:
+    """What view3dscene complains of. It exits with 0 for bad files too, and warns of every file
+    that is opened from the command line."""
+    shutil.rmtree(home, ignore_errors=True)
+    home.mkdir()
+    subprocess.run(
+        ["view3dscene", "--write", file],
+        env={**os.environ, "HOME": str(home)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        timeout=60,
+        check=True,
+    )
+    (log,) = home.rglob("view3dscene.log")
+    lines = [line for line in log.read_text().splitlines() if "Warning" in line]
+    return [line for line in lines if "before the Application.OnInitialize was called" not in line]
+
+
+def test_view3dscene_has_nothing_to_say(
+    finished: Path, tmp_path: Path, require: Callable[[str, str], None]
+) -> None:
+    if shutil.which("view3dscene") is None:
+        require("view3dscene", "apt install view3dscene")
+    for file in sorted((finished / "www").rglob("*.wrl")):
+        assert log_of_view3dscene(file, tmp_path / "home") == [], file.name
+    bad = tmp_path / "bad.wrl"
+    text = (finished / "www/cells/c0000.wrl").read_text()
+    bad.write_text(text.replace("coordIndex", "coordIdx", 1))
+    assert log_of_view3dscene(bad, tmp_path / "home"), "the check must be able to fail"
