@@ -14,8 +14,9 @@ from ptmtools.cli.parameters import options_of, take
 from ptmtools.cli.scenes import figures
 from ptmtools.database import PlotOptions, ValidationReport
 from ptmtools.errors import CheckError
-from ptmtools.pipeline import Artifacts, DatabaseFolder
+from ptmtools.pipeline import Artifacts, DatabaseFolder, shoot_segments
 from ptmtools.pipeline import validate as check
+from ptmtools.visibility import SegmentReport
 
 #: Findings that are shown without ``-v``.
 SHOWN_ISSUES = 20
@@ -54,9 +55,10 @@ def validate(voice: Voice, target: str, segments: int, strict: bool, as_json: bo
     """
     with voice.progress() as progress:
         report = check(target, progress)
-    missed = _shoot(DatabaseFolder.open(target), segments) if segments else None
-    _tell_findings(voice, target, report, missed, as_json)
-    failed = len(report.errors) + (len(report.warnings) if strict else 0) + bool(missed)
+        shot = shoot_segments(target, segments, progress) if segments else None
+    _tell_findings(voice, target, report, shot, as_json)
+    failed = len(report.errors) + (len(report.warnings) if strict else 0)
+    failed += len(shot.missed) if shot else 0
     if failed:
         raise CheckError("PTM-C001", f"{count(failed, 'finding')} to be mended", file=target)
 
@@ -86,29 +88,31 @@ def plot(voice: Voice, db: str, output: str, force: bool, **values: Any) -> None
     voice.say(f"{output}: the floor plan of {db}, {count(len(report.floors), 'storey')}")
 
 
-def _shoot(db: DatabaseFolder, segments: int) -> int:
-    """How many of the random segments join cells that are not in each other's PVS."""
-    from ptmtools.visibility import check_conservative
-
-    artifacts = Artifacts(db)
-    report = check_conservative(artifacts.scene, artifacts.cells, artifacts.pvs, segments)
-    return len(report.missed)
-
-
 def _tell_findings(
-    voice: Voice, target: str, report: ValidationReport, missed: int | None, as_json: bool
+    voice: Voice,
+    target: str,
+    report: ValidationReport,
+    shot: SegmentReport | None,
+    as_json: bool,
 ) -> None:
     if as_json:
-        segments = {} if missed is None else {"missed_segments": missed}
-        voice.emit_json({**asdict(report), "ok": report.ok and not missed, **segments})
+        ok = report.ok and not (shot and shot.missed)
+        segments = {"segments": asdict(shot)} if shot else {}
+        voice.emit_json({"ok": ok, **asdict(report), **segments})
         return
     shown = report.issues if voice.verbose else report.issues[:SHOWN_ISSUES]
     for issue in shown:
         voice.say(str(issue))
     if len(shown) < len(report.issues):
         voice.say(f"{len(report.issues) - len(shown):,} more findings; -v shows them all")
-    if missed is not None:
-        voice.say(f"{target}: {count(missed, 'segment')} seen that the PVS misses")
+    if shot:
+        for pair in shot.missed:
+            a, b = pair.cells
+            voice.say(f"{target}: error: cells {a} and {b} see each other outside the PVS")
+        voice.say(
+            f"{target}: {count(shot.tried, 'random segment')}, {shot.unoccluded:,} unoccluded; "
+            f"{shot.missed_segments:,} outside the PVS, {count(shot.hairlines, 'hairline')}"
+        )
     voice.say(
         f"{target}: {count(report.files, 'file')}, {size(report.bytes)}; "
         f"{count(len(report.errors), 'error')}, {count(len(report.warnings), 'warning')}"

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ptmtools.pipeline.folder import DatabaseFolder
     from ptmtools.pipeline.run import Artifacts, StageReport
     from ptmtools.pipeline.textures import TextureOptions
-    from ptmtools.pipeline.validation import validate
+    from ptmtools.pipeline.validation import shoot_segments, validate
 
 _HOME = {
     "Artifacts": "run",
@@ -37,6 +37,7 @@ _HOME = {
     "make_files": "build",
     "make_pvs": "build",
     "make_textures": "build",
+    "shoot_segments": "validation",
     "validate": "validation",
 }
 
@@ -53,6 +54,7 @@ __all__ = [
     "make_files",
     "make_pvs",
     "make_textures",
+    "shoot_segments",
     "validate",
 ]
 

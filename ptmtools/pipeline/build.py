@@ -20,7 +20,7 @@ from ptmtools.database import EmitOptions
 from ptmtools.pipeline.emission import put_files
 from ptmtools.pipeline.folder import DatabaseWriter, sha256
 from ptmtools.pipeline.run import IMAGES, Run, StageReport, peak_memory, work_of
-from ptmtools.pipeline.textures import TextureOptions, check_images, put_textures
+from ptmtools.pipeline.textures import TextureOptions, check_images, check_options, put_textures
 from ptmtools.progress import Progress, silent
 from ptmtools.scene import IngestOptions, Note, Scene, ingest
 from ptmtools.visibility.pvs import PvsOptions, compute_pvs
@@ -95,6 +95,7 @@ def build_scene(
     options = options or BuildOptions()
     workers = _workers(options.workers)
     start = time.perf_counter()
+    check_options(options.textures)
     with DatabaseWriter.open_for_model(db, Path(model).name, force=options.force) as writer:
         run = Run(writer, progress)
         _read_and_cut(run, Path(model), options.ingest, options.subdivide)

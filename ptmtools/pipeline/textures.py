@@ -12,6 +12,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ptmtools.database import TextureLevel, TextureRecord
 from ptmtools.pipeline.run import Run, parameters
 from ptmtools.scene.model import Scene, SourceImage
@@ -33,6 +35,11 @@ class TextureOptions(EncodeOptions):
     """
 
     fallback: bool = True
+
+
+def check_options(options: TextureOptions) -> None:
+    """Raises what `encode` raises for impossible options; tried on the smallest image."""
+    encode(np.zeros((1, 1, 1), dtype=np.uint8), options)
 
 
 def texture_names(images: Iterable[SourceImage]) -> list[str]:
