@@ -1,0 +1,77 @@
+"""The floor plan: drawn, deterministic, and different where the input is."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from ptmtools.database import PlotOptions, plot_plan
+from ptmtools.errors import InputError, MissingComponentError, OutputError
+
+SMALL = PlotOptions(width=6, dpi=60)
+
+
+def draw(artifacts, out: Path, options: PlotOptions = SMALL, **known) -> np.ndarray:
+    a = artifacts
+    known = {"pvs": a.pvs, "ach": a.ach} | known
+    plot_plan(a.scene, a.cells, known["pvs"], known["ach"], out, options, force=True)
+    with Image.open(out) as image:
+        assert image.info.keys() <= {"dpi"}, "no date, no software"
+        return np.asarray(image.convert("RGB")).astype(int)
+
+
+def pixels(picture: np.ndarray, colour: str) -> int:
+    wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+    return int((abs(picture - wanted).sum(axis=2) < 12).sum())
+
+
+def test_same_bytes_again(artifacts, tmp_path: Path) -> None:
+    for name in ("a.png", "b.png"):
+        draw(artifacts, tmp_path / name, PlotOptions(cell=0, width=6, dpi=60))
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def test_what_is_drawn(artifacts, tmp_path: Path) -> None:
+    plain = draw(artifacts, tmp_path / "plain.png")
+    chosen = draw(artifacts, tmp_path / "chosen.png", PlotOptions(cell=1, width=6, dpi=60))
+    assert plain.shape[1] == 360
+    assert pixels(plain, "#f0562d") > 50, "portals"
+    assert pixels(plain, "#1c2733") > 300, "walls"
+    assert pixels(plain, "#eaf0f4") > 10_000, "cells"
+    assert pixels(chosen, "#eaf0f4") < 500, "every cell is shaded"
+    assert pixels(plain, "#b0125b") == 0
+    assert pixels(chosen, "#b0125b") > 200, "the chosen cell's outline"
+
+
+def test_shades_follow_the_coverage(artifacts, tmp_path: Path) -> None:
+    """Cell 0's row is 0.7, 0.2, 0.1: the farther, the brighter."""
+    picture = draw(artifacts, tmp_path / "a.png", PlotOptions(cell=0, width=12, dpi=60))
+    middle = picture[picture.shape[0] // 2 - 25].sum(axis=1)
+    width = 12 * 60 - 0.9 * 60
+    shades = [middle[int(width * share)] for share in (0.08, 0.42, 0.75)]
+    assert shades[0] < shades[1] < shades[2] < 3 * 200
+
+
+def test_before_the_later_stages(artifacts, tmp_path: Path) -> None:
+    draw(artifacts, tmp_path / "a.png", pvs=None, ach=None)
+    draw(artifacts, tmp_path / "b.png", PlotOptions(cell=0, width=6, dpi=60), ach=None)
+    with pytest.raises(InputError, match="PTM-I601"):
+        draw(artifacts, tmp_path / "c.png", PlotOptions(cell=0), pvs=None, ach=None)
+    assert not (tmp_path / "c.png").exists()
+
+
+def test_faults(artifacts, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    a = artifacts
+    for cell in (-1, 3):
+        with pytest.raises(InputError, match="PTM-I601"):
+            draw(a, tmp_path / "a.png", PlotOptions(cell=cell))
+    (tmp_path / "a.png").write_text("mine")
+    with pytest.raises(OutputError, match="PTM-O001"):
+        plot_plan(a.scene, a.cells, a.pvs, a.ach, tmp_path / "a.png", SMALL)
+    monkeypatch.setitem(sys.modules, "matplotlib.backends.backend_agg", None)
+    with pytest.raises(MissingComponentError, match=r"pip install 'ptmtools\[plot\]'.*PTM-M600"):
+        draw(a, tmp_path / "b.png")
