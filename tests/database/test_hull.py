@@ -65,7 +65,7 @@ SOME = st.one_of(
 
 
 @given(st.lists(st.tuples(SOME, SOME, SOME), min_size=4, max_size=10))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_any_points(points: list[tuple[float, float, float]]) -> None:
     array = np.array(points, np.float32)
     a = array[0]
