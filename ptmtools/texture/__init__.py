@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ptmtools.texture.codec import check, decode, encode
+    from ptmtools.texture.codec import check, decode, decode_levels, encode
     from ptmtools.texture.container import read_header, whole_levels
     from ptmtools.texture.images import read_image, read_ptm, write_png
     from ptmtools.texture.model import EncodeOptions, Level, Limits, PtmHeader
@@ -23,6 +23,7 @@ __all__ = [
     "build_pyramid",
     "check",
     "decode",
+    "decode_levels",
     "encode",
     "read_header",
     "read_image",
@@ -39,6 +40,7 @@ _HOME = {
     "build_pyramid": "pyramid",
     "check": "codec",
     "decode": "codec",
+    "decode_levels": "codec",
     "encode": "codec",
     "read_header": "container",
     "read_image": "images",

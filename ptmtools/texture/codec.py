@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from ptmtools.errors import InputError, LimitError
@@ -111,20 +112,22 @@ def decode(data: bytes, level: int | None = None, limits: Limits = _LIMITS) -> N
             place=f"level {level}",
             remedy=f"the last whole level is {whole - 1}" if whole else "no level is whole",
         )
-    target = header.levels[level]
-    if target.width * target.height * header.components > limits.decoded_bytes:
-        raise LimitError(
-            "PTM-L103",
-            f"{target.width} x {target.height} texels of {header.components} bytes are more than "
-            f"the limit of {limits.decoded_bytes} bytes",
-            place=f"level {level}",
-            remedy="ask for a coarser level or raise the limit",
-        )
-    profile = profile_named(header.profile)
-    image = _decode_one(profile, header, data, 0, None)
-    for n in range(1, level + 1):
-        image = _decode_one(profile, header, data, n, image)
+    _check_limit(header, level, limits)
+    *_, image = _refine(header, data, level + 1)
     return image
+
+
+def decode_levels(data: bytes, limits: Limits = _LIMITS) -> Iterator[NDArray[np.uint8]]:
+    """All whole levels of a `.ptm`, coarsest first, each decoded once: as `decode` of each.
+
+    Stops where the file is cut. Raises as `decode`, when the level in question comes up; the
+    limit is that of the finest whole level.
+    """
+    header = read_header(data)
+    whole = whole_levels(header, len(data))
+    if whole:
+        _check_limit(header, whole - 1, limits)
+    yield from _refine(header, data, whole)
 
 
 def check(data: bytes) -> list[str]:
@@ -155,6 +158,27 @@ def check(data: bytes) -> list[str]:
         except InputError as error:
             problems.append(str(error))
     return problems
+
+
+def _check_limit(header: PtmHeader, level: int, limits: Limits) -> None:
+    target = header.levels[level]
+    if target.width * target.height * header.components > limits.decoded_bytes:
+        raise LimitError(
+            "PTM-L103",
+            f"{target.width} x {target.height} texels of {header.components} bytes are more than "
+            f"the limit of {limits.decoded_bytes} bytes",
+            place=f"level {level}",
+            remedy="ask for a coarser level or raise the limit",
+        )
+
+
+def _refine(header: PtmHeader, data: bytes, count: int) -> Iterator[NDArray[np.uint8]]:
+    """The first ``count`` levels."""
+    profile = profile_named(header.profile)
+    image = None
+    for n in range(count):
+        image = _decode_one(profile, header, data, n, image)
+        yield image
 
 
 def _decode_one(

@@ -27,9 +27,13 @@ from ptmtools.texture.profiles.raw import RawProfile, group_length
 from ptmtools.texture.profiles.tables import damaged
 
 STORED, HAAR, DEFLATED, DEFLATED_DIFFERENCES = 0, 1, 2, 3
-#: Deflate is tried where the Haar coder's share of the stored size is outside these: between them
-#: it has never won on a natural image, and it costs more time than everything else.
-DEFLATE_BELOW, DEFLATE_ABOVE = 0.25, 0.7
+#: Deflate is tried on all of a group if a quick try of a piece from its middle, of about so many
+#: bytes, comes within this factor of the Haar coder's share of the stored size. On photographs it
+#: never does, and would cost more time than everything else.
+PROBE_BYTES = 1 << 16
+PROBE_FACTOR = 1.5
+#: The Haar coder writes at least this many bytes and is not tried on smaller groups.
+HAAR_OVERHEAD = 52
 
 _RAW = RawProfile()
 
@@ -56,14 +60,16 @@ class FastProfile:
 
     def encode_group(self, level: NDArray[np.uint8], below: NDArray[np.uint8]) -> bytes:
         """One byte that names the coder, then what it wrote."""
-        candidates = [(HAAR, haar.encode(level, below))]
         length = group_length((level.shape[0], level.shape[1], level.shape[2]))
-        share = len(candidates[0][1]) / length
-        if not DEFLATE_BELOW <= share <= DEFLATE_ABOVE:
+        candidates: list[tuple[int, bytes]] = []
+        if length > HAAR_OVERHEAD:
+            candidates = [(HAAR, haar.encode(level, below))]
+        if not candidates or _repeats(level, below, len(candidates[0][1]) / length):
             stored = _RAW.encode_group(level, below)
             candidates.append((DEFLATED, _deflate(stored)))
             candidates.append((DEFLATED_DIFFERENCES, _deflate(_differences(level, below))))
-            candidates.append((STORED, stored))
+        if all(len(body) > length for _, body in candidates):
+            candidates.append((STORED, _RAW.encode_group(level, below)))
         return _shortest(candidates)
 
     def decode_group(
@@ -81,6 +87,15 @@ class FastProfile:
             edges = shape[0] * shape[1] * shape[2] - 4 * below.size
             return _from_differences(_inflate(body, 4 * below.size + edges), below, shape)
         raise damaged(f"coder {coder} is unknown")
+
+
+def _repeats(level: NDArray[np.uint8], below: NDArray[np.uint8], share: float) -> bool:
+    """Whether deflate may beat a coder that brings the group to ``share`` of its stored size."""
+    bh = below.shape[0]
+    rows = min(bh, 1 + PROBE_BYTES // group_length((2, level.shape[1], level.shape[2])))
+    y = (bh - rows) // 2
+    piece = _RAW.encode_group(level[2 * y : 2 * (y + rows)], below[y : y + rows])
+    return len(_deflate(piece, 1)) < PROBE_FACTOR * share * len(piece)
 
 
 def _differences(level: NDArray[np.uint8], below: NDArray[np.uint8]) -> bytes:
@@ -130,8 +145,8 @@ def _split(data: bytes) -> tuple[int, bytes]:
     return data[0], data[1:]
 
 
-def _deflate(data: bytes) -> bytes:
-    packer = zlib.compressobj(6, zlib.DEFLATED, -15)
+def _deflate(data: bytes, effort: int = 6) -> bytes:
+    packer = zlib.compressobj(effort, zlib.DEFLATED, -15)
     return packer.compress(data) + packer.flush()
 
 

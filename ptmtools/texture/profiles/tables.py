@@ -64,11 +64,11 @@ def built_in() -> NDArray[np.int64]:
 
 
 @cache
-def _built_in_lengths() -> NDArray[np.int64]:
+def _built_in_lengths() -> NDArray[np.float64]:
     """Length (n, 256) in 1/256 bits of every symbol under every built-in table."""
     family = built_in()[1:]
     lengths = _log_table()[family]
-    return np.where(family > 0, lengths, lengths[:, ESCAPE, None] + 16 * 256)
+    return np.where(family > 0, lengths, lengths[:, ESCAPE, None] + 16 * 256).astype(np.float64)
 
 
 @cache
@@ -98,26 +98,24 @@ def choose(counts: NDArray[np.int64]) -> tuple[Frequencies, bytes]:
     The last table has no escape: it is built in only where that holds every symbol that occurs.
     """
     family = built_in()[1:]
-    cost = counts @ _built_in_lengths().T
+    # Integers below 2^53, so exact; float64 only because numpy multiplies such matrices faster.
+    cost = (counts.astype(np.float64) @ _built_in_lengths().T).astype(np.int64)
     cost[-1, (family[:, counts[-1] > 0] == 0).any(axis=1)] = 1 << 62
     exact = normalise(counts)
     exact_cost = (counts * _log_table()[exact]).sum(axis=1)
-    frequency = exact
-    kinds = bytearray()
+    used = _used(exact)
+    nibbles = _nibbles(exact)
+    nibbles[:, :ESCAPE][np.arange(ESCAPE) >= used[:, None]] = 0
+    exact_cost += (nibbles.sum(axis=1) + _nibbles(used)) * 4 * 256
+    best = cost.argmin(axis=1)
+    kind = np.where(exact_cost < cost.min(axis=1), SENT, 1 + best)
+    kind[~exact.any(axis=1)] = UNUSED
+    frequency = np.where((kind == SENT)[:, None], exact, built_in()[np.where(kind < SENT, kind, 0)])
     numbers: list[int] = []
-    for t, best in enumerate(cost.argmin(axis=1).tolist()):
-        sent = _numbers(exact[t])
-        nibbles = sum(max(1, (n.bit_length() + 2) // 3) for n in sent)
-        if not exact[t].any():
-            kinds.append(UNUSED)
-        elif int(exact_cost[t]) + nibbles * 4 * 256 < int(cost[t, best]):
-            kinds.append(SENT)
-            numbers += sent
-        else:
-            kinds.append(1 + best)
-            frequency[t] = family[best]
+    for row, n in zip(exact[kind == SENT], used[kind == SENT], strict=True):
+        numbers += [int(row[ESCAPE]), int(n), *row[:n].tolist()]
     packed = _pack_nibbles(numbers)
-    return frequency, bytes(kinds) + len(packed).to_bytes(2, "little") + packed
+    return frequency, kind.astype(np.uint8).tobytes() + len(packed).to_bytes(2, "little") + packed
 
 
 def parse(data: bytes, tables: int) -> tuple[Frequencies, int]:
@@ -154,11 +152,13 @@ def parse(data: bytes, tables: int) -> tuple[Frequencies, int]:
 def decoding_table(frequency: Frequencies) -> NDArray[np.uint32]:
     """Flat (tables * 2048,) entries symbol << 24 | frequency << 12 | offset."""
     table = np.zeros((len(frequency), TABLE_SIZE), np.uint32)
-    for t, row in enumerate(frequency):
-        if row.any():
-            symbol = np.repeat(np.arange(256), row)
-            offset = np.arange(TABLE_SIZE) - (np.cumsum(row) - row)[symbol]
-            table[t] = symbol << 24 | row[symbol] << 12 | offset
+    used = frequency.any(axis=1)
+    rows = frequency[used].astype(np.uint32)
+    symbol = np.tile(np.arange(256, dtype=np.uint32), len(rows))
+    start = (np.cumsum(rows, axis=1, dtype=np.uint32) - rows).reshape(-1)
+    entry = (symbol << 24 | rows.reshape(-1) << 12) - start
+    slots = np.repeat(entry, rows.reshape(-1)).reshape(-1, TABLE_SIZE)
+    table[used] = slots + np.arange(TABLE_SIZE, dtype=np.uint32)
     return table.reshape(-1)
 
 
@@ -171,11 +171,15 @@ def damaged(what: str) -> InputError:
     )
 
 
-def _numbers(frequency: Frequencies) -> list[int]:
-    """What is sent of a table: frequency of the escape, length of the rest, the rest."""
-    rest = frequency[:ESCAPE]
-    used = int(np.flatnonzero(rest)[-1]) + 1 if rest.any() else 0
-    return [int(frequency[ESCAPE]), used, *rest[:used].tolist()]
+def _used(frequency: Frequencies) -> NDArray[np.int64]:
+    """Per table (t, 256): symbols up to the last below the escape that has a frequency."""
+    occurs = frequency[:, ESCAPE - 1 :: -1] > 0
+    return np.where(occurs.any(axis=1), ESCAPE - occurs.argmax(axis=1), 0)
+
+
+def _nibbles(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+    """How many nibbles `_pack_nibbles` makes of each number."""
+    return 1 + (numbers > 7).astype(np.int64) + (numbers > 63) + (numbers > 511)
 
 
 def _pack_nibbles(numbers: list[int]) -> bytes:

@@ -1,0 +1,258 @@
+"""A decoder of the Haar coder in plain Python, written line by line from ``docs/format-ptm.md``.
+
+It shares nothing with the compiled decoder but the numbers of `layout`. The tests compare the two;
+whoever ports the format can step through it. Thousands of times slower; no damage is looked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.texture.profiles import layout
+from ptmtools.texture.profiles.tables import BUILT_IN_MEANS
+
+Row = list[int]
+Plane = list[Row]
+At = Callable[[int, int], int]
+
+
+def decode_haar(
+    group: bytes, below: NDArray[np.uint8], shape: tuple[int, int, int]
+) -> NDArray[np.uint8]:
+    """The level (h, w, c) that a Haar-coded group (without its first byte) refines ``below`` to."""
+    height, width, components = shape
+    bh, bw = height >> 1, width >> 1
+    flags, at = group[0], 1
+    values: list[Row] = []
+    for c in range(components):
+        bitmap = group[at : at + 32] if flags >> (4 + c) & 1 else bytes(32)
+        at += 32 if flags >> (4 + c) & 1 else 0
+        values.append([v for v in range(256) if bitmap[v >> 3] >> (v & 7) & 1])
+    order = [1, 0, 2, 3][:components] if components > 2 else list(range(components))
+    count = [c if components > 2 and c < 3 else 0 for c in range(components)]
+    weights = [[list(map(int, layout.BUILT_IN_WEIGHTS[n][k])) for k in range(3)] for n in count]
+    if flags & 1:
+        for c, n in enumerate(count):
+            for k in range(3):
+                for i in [*range(5 if k == 2 else 4), *range(5, 5 + n)]:
+                    weights[c][k][i] = int.from_bytes(group[at : at + 2], "little", signed=True)
+                    at += 2
+    tables, at = _read_tables(group, at)
+    symbols = _Symbols(group, at, tables)
+
+    texels = np.zeros(shape, np.int64)
+    v, h, g = ([_zeros(bh, bw) for _ in order] for _ in range(3))
+    residuals = [[_zeros(bh, bw) for _ in order] for _ in range(3)]
+    lower = [_ranked(below[:, :, plane], values[plane]) for plane in order]
+
+    def code_row(k: int, c: int, y: int, out: Plane) -> None:
+        """One row of coefficient k of plane c."""
+        symbols.begin_row()
+        for x in range(bw):
+
+            def i(dx: int, dy: int, x: int = x) -> int:
+                return lower[c][min(max(y + dy, 0), bh - 1)][min(max(x + dx, 0), bw - 1)]
+
+            slope = _outside(v[c][y], x + 1) - _outside(v[c][y], x - 1)
+            under = h[c][min(y + 1, bh - 1)][x]
+            e1 = residuals[k][0][y][x] if count[c] > 0 else 0
+            e2 = residuals[k][1][y][x] if count[c] > 1 else 0
+            f = [_features_v(i), _features_h(i, slope), _features_g(i, h[c][y][x], under, slope)][k]
+            total = sum(a * b for a, b in zip(weights[c][k], [*f, e1, e2], strict=True))
+            prediction = min(max((total + 128) >> 8, -1020), 1020)
+            above = residuals[k][c][y - 1] if y else [0] * bw
+            near = [abs(_outside(above, x + d)) for d in (-1, 0, 1)]
+            activity = [
+                abs(i(1, 0) - i(-1, 0)) + abs(i(0, 1) - i(0, -1)),
+                2 * near[1] + near[0] + near[2],
+                abs(e1),
+                abs(e2),
+                abs(residuals[0][c][y][x]) if k > 0 else 0,
+                abs(residuals[1][c][y][x]) if k > 1 else 0,
+                abs(residuals[1][c][y + 1][x]) if k > 1 and y + 1 < bh else 0,
+            ]
+            factors = map(int, layout.ACTIVITY_WEIGHTS[count[c]][k])
+            a = min(sum(m * n for m, n in zip(factors, activity, strict=True)) >> 6, 1023)
+            klass = sum(bound <= a for bound in layout.CLASS_BOUNDS)
+            z = symbols.next(klass + 14 * (k == 2))
+            e = -((z + 1) >> 1) if z & 1 else z >> 1
+            residuals[k][c][y][x] = e
+            out[y][x] = prediction + e
+
+    for y in range(bh + 1):
+        for c, plane in enumerate(order):
+            if y < bh:
+                code_row(0, c, y, v[c])
+                code_row(1, c, y, h[c])
+            if y:
+                code_row(2, c, y - 1, g[c])
+                for x in range(bw):
+                    block = (v[c][y - 1][x], h[c][y - 1][x], g[c][y - 1][x])
+                    mean = int(below[y - 1, x, plane])
+                    four = _by_rank(*block, mean, values[plane]) or _by_value(*block, mean)
+                    texels[2 * y - 2 : 2 * y, 2 * x : 2 * x + 2, plane] = np.reshape(four, (2, 2))
+    symbols.begin_row()
+    for y, x in _edge(height, width):
+        for plane in range(components):
+            z = symbols.next(28)
+            e = -((z + 1) >> 1) if z & 1 else z >> 1
+            texels[y, x, plane] = (_median(texels[:, :, plane], y, x) + e) & 255
+    return texels.astype(np.uint8)
+
+
+def _features_v(i: At) -> Row:
+    return [
+        i(0, 1) - i(0, -1),
+        i(-1, 1) - i(-1, -1) + i(1, 1) - i(1, -1),
+        i(0, 2) - i(0, 0),
+        i(0, 0) - i(0, -2),
+        0,
+    ]
+
+
+def _features_h(i: At, slope: int) -> Row:
+    return [i(1, 0) - i(-1, 0), i(1, -1) - i(-1, -1), i(1, 1) - i(-1, 1), slope, 0]
+
+
+def _features_g(i: At, h: int, under: int, slope: int) -> Row:
+    return [i(1, 0) - i(-1, 0), i(1, 1) - i(-1, 1), h, under, slope]
+
+
+def _by_value(v: int, h: int, g: int, mean: int) -> Row:
+    t = (v + (v & 1)) >> 1
+    upper = 2 * mean + ((h ^ t) & 1) + t
+    lower = upper - v
+    p = (upper + h) >> 1
+    d = 2 * g + (lower & 1)
+    r = (lower + d) >> 1
+    return [p, p - h, r, r - d]
+
+
+def _by_rank(v: int, h: int, g: int, mean: int, values: Row) -> Row | None:
+    if not values:
+        return None
+    d = 2 * g + ((v ^ h) & 1)
+    a = (d + v + h) >> 1
+    for u in range(len(values)):
+        ranks = [u + a, u + a - h, u + d, u]
+        if min(ranks) >= 0 and max(ranks) < len(values):
+            four = [values[rank] for rank in ranks]
+            if sum(four) >> 2 == mean:
+                return four
+    return None
+
+
+def _ranked(plane: NDArray[np.uint8], values: Row) -> Plane:
+    bounds = [(a + b) >> 1 for a, b in pairwise(values)]
+    rank = [sum(bound < i for bound in bounds) if values else i for i in range(256)]
+    return [[rank[int(i)] for i in row] for row in plane]
+
+
+def _zeros(bh: int, bw: int) -> Plane:
+    return [[0] * bw for _ in range(bh)]
+
+
+def _outside(row: Row, x: int) -> int:
+    return row[x] if 0 <= x < len(row) else 0
+
+
+def _edge(height: int, width: int) -> Iterator[tuple[int, int]]:
+    if width & 1:
+        yield from ((y, width - 1) for y in range(height & ~1))
+    if height & 1:
+        yield from ((height - 1, x) for x in range(width))
+
+
+def _median(plane: NDArray[np.int64], y: int, x: int) -> int:
+    if y == 0:
+        return int(plane[y, x - 1])
+    if x == 0:
+        return int(plane[y - 1, x])
+    w, n = int(plane[y, x - 1]), int(plane[y - 1, x])
+    return sorted((w, n, w + n - int(plane[y - 1, x - 1])))[1]
+
+
+class _Symbols:
+    """The four rANS states over their words, and the escapes."""
+
+    def __init__(self, group: bytes, at: int, tables: list[Row]) -> None:
+        escapes = int.from_bytes(group[at : at + 4], "little")
+        numbers = np.frombuffer(group, "<u2", offset=at + 4).tolist()
+        self._escapes = iter(numbers[:escapes])
+        words = numbers[escapes:]
+        self._states = [words[2 * i] | words[2 * i + 1] << 16 for i in range(4)]
+        self._words = iter(words[8:])
+        self._tables = tables
+        self._i = 0
+
+    def begin_row(self) -> None:
+        self._i = 0
+
+    def next(self, table: int) -> int:
+        lane = self._i & 3
+        self._i += 1
+        state = self._states[lane]
+        slot, start, z = state & 2047, 0, 0
+        f = self._tables[table]
+        while start + f[z] <= slot:
+            start += f[z]
+            z += 1
+        state = f[z] * (state >> 11) + slot - start
+        if state < 1 << 15:
+            state = state << 16 | next(self._words)
+        self._states[lane] = state
+        return next(self._escapes) if z == 255 and table != 28 else z
+
+
+def _read_tables(group: bytes, at: int) -> tuple[list[Row], int]:
+    kinds = group[at : at + 29]
+    size = int.from_bytes(group[at + 29 : at + 31], "little")
+    at += 31
+    numbers: Row = []
+    n, shift = 0, 0
+    for byte in group[at : at + size]:
+        for nibble in (byte & 15, byte >> 4):
+            n |= (nibble & 7) << shift
+            shift += 3
+            if nibble < 8:
+                numbers.append(n)
+                n, shift = 0, 0
+    tables: list[Row] = []
+    sent = iter(numbers)
+    for kind in kinds:
+        table = [0] * 256
+        if kind == 255:
+            table[255] = next(sent)
+            for z in range(next(sent)):
+                table[z] = next(sent)
+        elif kind:
+            table = _built_in(BUILT_IN_MEANS[kind - 1])
+        tables.append(table)
+    return tables, at + size
+
+
+def _built_in(mean: int) -> Row:
+    u = [1 << 24]
+    for z in range(1, 255):
+        u.append(u[-1] * (65536 * mean // (16 + mean)) >> 16 if z & 1 else u[-1])
+    total = sum(u)
+    u = [0 if 4096 * n < total else n for n in u]
+    return normalised([*u, sum(u) >> 10])
+
+
+def normalised(weights: Row) -> Row:
+    """Frequencies that sum to 2048, by the rule of the specification."""
+    total = sum(weights)
+    f = [max(1, (2048 * u + total // 2) // total) if u else 0 for u in weights]
+    while sum(f) > 2048:
+        most = (z for z in range(256) if f[z] > 1)
+        f[min(most, key=lambda z: Fraction(weights[z], 2 * f[z] - 1))] -= 1
+    while sum(f) < 2048:
+        least = (z for z in range(256) if f[z])
+        f[max(least, key=lambda z: Fraction(weights[z], 2 * f[z] + 1))] += 1
+    return f
