@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.tolerance import Tolerance
 from ptmtools.visibility.flow import PortalFlow, Portals, portal_flow
 from ptmtools.visibility.pvs import PvsOptions, leaf_matrix
 
@@ -62,7 +63,8 @@ def arriving(
     """(n,) how many of ``lines`` random lines lead from leaf to leaf, for (n, 2) pairs of leaves.
 
     A line starts at a random point of a portal out of the first leaf, aims at a random point of
-    a portal into the second, and is walked from leaf to leaf by point-in-polygon tests alone.
+    a portal into the second, and is walked from leaf to leaf by point-in-polygon tests alone. One
+    that runs in a portal's plane does not cross it.
     """
     sizes = np.diff(portals.start)
     widest = int(sizes.max())
@@ -72,6 +74,10 @@ def arriving(
     out = np.argsort(leaves, kind="stable")
     out_start = np.searchsorted(leaves[out], np.arange(portals.leaf_count + 1))
     rng = np.random.default_rng(seed)
+    rounding = Tolerance.for_points(portals.point).rounding
+
+    def towards(p: NDArray[np.int64]) -> NDArray[np.float64]:
+        return portals.normal[p >> 1] * np.where(p & 1, -1.0, 1.0)[:, None]
 
     def points(p: NDArray[np.int64]) -> NDArray[np.float64]:
         weight = rng.exponential(size=(len(p), widest)) * (np.arange(widest) < sizes[p >> 1, None])
@@ -82,7 +88,8 @@ def arriving(
         first = rng.choice(np.flatnonzero(leaves == a), lines)
         origin = points(first)
         along = points(rng.choice(np.flatnonzero(enters == b), lines)) - origin
-        at = enters[first]
+        crossing = np.einsum("ij,ij->i", towards(first), along) > rounding
+        origin, along, at = origin[crossing], along[crossing], enters[first[crossing]]
         for _ in range(portals.leaf_count):
             if len(at) == 0:
                 break
@@ -93,10 +100,10 @@ def arriving(
             line = np.repeat(np.arange(len(at)), degree)
             nth = np.arange(len(line)) - np.repeat(np.cumsum(degree) - degree, degree)
             p = out[out_start[at][line] + nth]
-            n = portals.normal[p >> 1] * np.where(p & 1, -1.0, 1.0)[:, None]
+            n = towards(p)
             shape = polygon[p >> 1]
             speed = np.einsum("ij,ij->i", n, along[line])
-            ahead = np.flatnonzero(speed > 0)
+            ahead = np.flatnonzero(speed > rounding)
             line, p, n, shape = line[ahead], p[ahead], n[ahead], shape[ahead]
             reach = np.einsum("ij,ij->i", n, shape[:, 0] - origin[line]) / speed[ahead]
             place = origin[line] + reach[:, None] * along[line]

@@ -35,7 +35,7 @@ from ptmtools.visibility.model import Pvs
 BATCH = 1 << 17
 #: Parallel copies by which a miss is tried again.
 COPIES = 16
-#: Displacement of the copies in metres (at most a tenth of the width of a cluster of planes).
+#: Displacement of the copies in metres; in a small scene the least thickness of a cell.
 JITTER = 1e-3
 #: Lengths of short segments and of those through portals, as shares of the extent.
 SHORTEST, LONGEST = 1e-3, 0.5
@@ -117,17 +117,17 @@ def check_conservative(
     draw = Sampler(cells)
     blockers = Blockers(structural, cells.root_box)
     tolerance = Tolerance.for_points(cells.root_box)
-    jitter = min(JITTER, tolerance.cluster / 10)
+    jitter = min(JITTER, tolerance.thin)
     tried = unoccluded = hairlines = drawn = batch = 0
     counts: dict[tuple[int, int], int] = {}
     example: dict[tuple[int, int], tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
     while tried < segments and drawn < PATIENCE * segments:
         rng = np.random.default_rng([seed, batch])
-        size = min(BATCH, PATIENCE * segments - drawn)
+        size = min(BATCH, segments - tried)
         start, end = draw.segments(rng, size)
         drawn, batch = drawn + size, batch + 1
         a, b = cells.locate(start), cells.locate(end)
-        both = np.flatnonzero((a >= 0) & (b >= 0))[: segments - tried]
+        both = np.flatnonzero((a >= 0) & (b >= 0))
         start, end, a, b = start[both], end[both], a[both], b[both]
         tried += len(both)
         clear = ~blockers.between(start, end)
@@ -148,7 +148,7 @@ def check_conservative(
             counts[pair] = counts.get(pair, 0) + 1
             ends = (start[m], end[m]) if a[m] <= b[m] else (end[m], start[m])
             example.setdefault(pair, ends)
-        progress(min(tried, segments), segments, "segments")
+        progress(tried, segments, "segments")
     found = tuple(
         MissedPair(pair, _place(example[pair][0]), _place(example[pair][1]), counts[pair])
         for pair in sorted(counts)

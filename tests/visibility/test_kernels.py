@@ -1,0 +1,185 @@
+"""The compiled geometry against plain numpy and shapely."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ptmtools.visibility import kernels
+from ptmtools.visibility.flow import GROWTH, Portals, geometry, scratch
+
+SLACK = 1e-12
+Z = np.array([[0.0, 0, 1]])
+RANDOM = st.builds(np.random.default_rng, st.integers(0, 2**32 - 1))
+
+
+def convex_polygon(rng, n):
+    """(n, 2) counter-clockwise, on an ellipse."""
+    angle = np.sort(rng.uniform(0, 2 * np.pi, n))
+    return np.column_stack([np.cos(angle) * rng.uniform(0.2, 3), np.sin(angle)])
+
+
+def slots(*polygons, spare=1):
+    width = max(len(p) for p in polygons) + GROWTH
+    polygon = np.zeros((len(polygons) + spare, width, 3))
+    for i, p in enumerate(polygons):
+        polygon[i, : len(p), : p.shape[1]] = p
+    return polygon, np.array([len(p) for p in polygons] + [0] * spare)
+
+
+@given(rng=RANDOM, n=st.integers(3, 9), c=st.floats(-2, 2))
+@settings(deadline=None)
+def test_clip_is_the_half_plane_intersection(rng, n, c):
+    points = convex_polygon(rng, n)
+    angle = rng.uniform(0, 2 * np.pi)
+    normal = np.array([np.cos(angle), np.sin(angle)])
+    polygon, size = slots(points)
+    status = kernels.clip(polygon, size, 0, np.zeros(polygon.shape[1]), *normal, 0.0, c, SLACK)
+    along = np.array([-normal[1], normal[0]])
+    half = np.array([-1, 1, 1, -1])[:, None] * 50 * along + np.array([0, 0, 1, 1])[:, None] * (
+        50 * normal
+    )
+    expected = shapely.Polygon(points).intersection(shapely.Polygon(half + c * normal)).area
+    kept = 0.0 if status == kernels.EMPTY else shapely.Polygon(polygon[0, : size[0], :2]).area
+    assert kept == pytest.approx(expected, abs=1e-9)
+    assert (status == kernels.WHOLE) == bool((points @ normal >= c - SLACK).all())
+
+
+def test_clip_drops_what_only_touches_and_keeps_a_sliver():
+    square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+    for at, status in ((1.0, kernels.EMPTY), (1 - 1e-9, kernels.CUT), (0.0, kernels.WHOLE)):
+        polygon, size = slots(square)
+        distance = np.zeros(polygon.shape[1])
+        assert kernels.clip(polygon, size, 0, distance, 1.0, 0.0, 0.0, at, SLACK) == status
+
+
+def test_clip_never_overruns_a_slot():
+    # A comb, far from convex: 20 teeth make 40 crossings, more than the slot has room for.
+    teeth = np.array([[i * 0.5, i % 2] for i in range(41)] + [[20, -1], [0, -1]], float)
+    polygon, size = slots(teeth)
+    polygon = np.ascontiguousarray(polygon[:, : len(teeth) + 1])
+    before = polygon[0].copy()
+    status = kernels.clip(polygon, size, 0, np.zeros(50), 0.0, 1.0, 0.0, 0.5, SLACK)
+    assert status == kernels.WHOLE
+    assert np.array_equal(polygon[0], before)
+
+
+def brute_force_separators(a, b):
+    """Every plane through an edge of one polygon and a vertex of the other that has a on its
+    one side and b on the other."""
+    found = []
+    for p, q, sign in ((a, b, 1.0), (b, a, -1.0)):
+        for i in range(len(p)):
+            for v in q:
+                n = np.cross(p[(i + 1) % len(p)] - p[i], v - p[i])
+                if np.linalg.norm(n) < 1e-9:
+                    continue
+                n /= np.linalg.norm(n)
+                for m in (n, -n):
+                    if (a @ m).max() <= (b @ m).min() + 1e-9:
+                        found.append(np.append(m, (b @ m).min() if sign > 0 else (a @ m).max()))
+    return np.array(found).reshape(-1, 4)
+
+
+@given(rng=RANDOM, na=st.integers(3, 6), nb=st.integers(3, 6))
+@settings(deadline=None)
+def test_separators_are_those_of_brute_force(rng, na, nb):
+    flat = [np.column_stack([convex_polygon(rng, n), np.zeros(n)]) for n in (na, nb)]
+    tilt = rng.uniform(-0.4, 0.4)
+    turn = np.array([[np.cos(tilt), 0, -np.sin(tilt)], [0, 1, 0], [np.sin(tilt), 0, np.cos(tilt)]])
+    a, b = flat[0], flat[1] @ turn + [rng.uniform(-2, 2), rng.uniform(-2, 2), 3.0]
+    polygon, size = slots(a, b)
+    plane = np.zeros((1, 2 * polygon.shape[1], 4))
+    normal = np.array([Z[0], Z[0] @ turn])
+    count = kernels.separate(polygon, size, 0, 0, 1.0, 1, 1, -1.0, normal, plane, 0, SLACK)
+    ours, theirs = plane[0, :count], brute_force_separators(a, b)
+    assert count > 0
+    for one, other in ((ours, theirs), (theirs, ours)):
+        for m in one:
+            assert np.abs(other - m).max(axis=1).min() < 1e-6
+
+
+@given(rng=RANDOM)
+@settings(deadline=None)
+def test_no_line_through_both_polygons_leaves_the_separators(rng):
+    a = np.column_stack([convex_polygon(rng, 5), np.zeros(5)])
+    b = np.column_stack([convex_polygon(rng, 4) + rng.uniform(-1, 1, 2), np.full(4, 0.7)])
+    polygon, size = slots(a, b)
+    plane = np.zeros((1, 2 * polygon.shape[1], 4))
+    normal = np.concatenate([Z, Z])
+    count = kernels.separate(polygon, size, 0, 0, 1.0, 1, 1, -1.0, normal, plane, 0, SLACK)
+    p = rng.dirichlet(np.ones(5), 200) @ a
+    q = rng.dirichlet(np.ones(4), 200) @ b
+    beyond = p + rng.uniform(1, 20, (200, 1)) * (q - p)
+    assert (beyond @ plane[0, :count, :3].T >= plane[0, :count, 3] - 1e-9).all()
+
+
+def test_lowest_set_bit_of_every_word():
+    for i in range(64):
+        low = (1 << i) * 0x03F79D71B4CB0A89 % 2**64 >> 58
+        assert kernels.LOW_BIT[low] == i
+
+
+def two_portals(first, second, leaves, normals):
+    point = np.concatenate([first, second]).astype(float)
+    start = np.cumsum([0, len(first), len(second)])
+    return geometry(Portals(4, np.array(leaves, np.int32), np.array(normals, float), point, start))
+
+
+SQUARE = np.array([[0, 0, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1]])
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+def test_ahead(reverse):
+    step = -1 if reverse else 1
+    turned = (SQUARE[::step] + [1, 0, 0]) if reverse else SQUARE + [1, 0, 0]
+    g = two_portals(SQUARE, turned, [[0, 1], [1, 2]], [[1, 0, 0], [1, 0, 0]])
+    # Along +x: first, then second; back: second, then first. Never otherwise, never itself.
+    expected = np.zeros((4, 4), bool)
+    expected[0, 2] = expected[3, 1] = True
+    assert np.array_equal([[kernels.ahead(g, p, q) for q in range(4)] for p in range(4)], expected)
+
+
+def test_ahead_in_one_plane_and_touching():
+    side = two_portals(SQUARE, SQUARE + [0, 1, 0], [[0, 1], [2, 3]], [[1, 0, 0], [1, 0, 0]])
+    assert not any(kernels.ahead(side, p, q) for p in range(4) for q in range(4))
+    wall = SQUARE[:, [1, 0, 2]] + [0, 1, 0]  # in y = 1, x 0 … 1: shares an edge with the first
+    g = two_portals(SQUARE, wall, [[0, 1], [1, 2]], [[1, 0, 0], [0, 1, 0]])
+    assert kernels.ahead(g, 0, 2)
+    assert not kernels.ahead(g, 1, 2)
+
+
+def test_geometry_winds_polygons_about_their_normals():
+    for points in (SQUARE, SQUARE[::-1]):
+        for n in (1.0, -1.0):
+            g = two_portals(
+                points, points + [3, 0, 0], [[0, 1], [1, 2]], [[n, 0, 0], [2 * n, 0, 0]]
+            )
+            p = g.point[:4]
+            assert np.cross(p[1] - p[0], p[2] - p[1]) @ [n, 0, 0] > 0
+            assert np.allclose(g.normal, [n, 0, 0])
+            assert np.allclose(g.low, [-1.5 * n, 1.5 * n])
+            assert (np.linalg.norm(p - g.ball[0, :3], axis=1) <= g.ball[0, 3]).all()
+
+
+def test_a_chain_longer_than_the_scratch_is_accepted_whole(room_row):
+    cells = room_row(12)[1]
+    g = geometry(
+        Portals(
+            12, cells.portal_leaf, cells.portal_plane[:, :3], cells.portal_point, cells.portal_start
+        )
+    )
+    known = np.zeros((22, 1), np.uint64)
+    for p in range(22):  # everything further along in the same direction
+        bits = range(p + 2, 22, 2) if p % 2 == 0 else range(p - 2, 0, -2)
+        known[p, 0] = sum(1 << q for q in bits)
+    whole = scratch(g, 1)
+    short = whole._replace(might=whole.might[:3], polygon=whole.polygon[-9:], plane=whole.plane[:4])
+    for storage, expected_cut in ((whole, False), (short, True)):
+        seen = np.zeros(1, np.uint64)
+        _, cut = kernels.flow(g, storage, known, 0, 10**6, seen)
+        assert cut == expected_cut
+        assert seen[0] == known[0, 0]
