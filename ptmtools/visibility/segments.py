@@ -35,8 +35,9 @@ from ptmtools.visibility.model import Pvs
 BATCH = 1 << 17
 #: Parallel copies by which a miss is tried again.
 COPIES = 16
-#: Displacement of the copies in metres; in a small scene the least thickness of a cell.
-JITTER = 1e-3
+#: Displacement of the copies in widths of a hairline, `Tolerance.hairline`: 1 mm in a building of
+#: 50 m.
+JITTER = 2.5
 #: Lengths of short segments and of those through portals, as shares of the extent.
 SHORTEST, LONGEST = 1e-3, 0.5
 #: Draws for each segment asked for before giving up: ends outside all cells do not count.
@@ -116,8 +117,7 @@ def check_conservative(
     visible = pvs.to_matrix()
     draw = Sampler(cells)
     blockers = Blockers(structural, cells.root_box)
-    tolerance = Tolerance.for_points(cells.root_box)
-    jitter = min(JITTER, tolerance.thin)
+    jitter = JITTER * Tolerance.for_points(cells.root_box).hairline
     tried = unoccluded = hairlines = drawn = batch = 0
     counts: dict[tuple[int, int], int] = {}
     example: dict[tuple[int, int], tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
