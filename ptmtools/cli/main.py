@@ -51,6 +51,8 @@ class Commands(click.Group):
             return super().invoke(ctx)
         except BrokenPipeError:  # Click itself would make an internal error of it
             ctx.exit(BROKEN_PIPE)
+        except KeyboardInterrupt as fault:  # Click itself would print an empty line first
+            raise click.Abort from fault
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
