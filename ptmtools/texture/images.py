@@ -219,8 +219,8 @@ def _texels(image: Image.Image, data: bytes) -> NDArray[np.uint8]:
 
 
 def _full_scale(key: object, image: Image.Image, data: bytes) -> object:
-    """A colour key as texels hold it: Pillow widens grey below 8 bits, but not the key."""
+    """A colour key as texels hold it: Pillow widens grey of 2 or 4 bits, but not the key."""
     depth = data[24] if image.format == "PNG" else 8
-    if isinstance(key, int) and depth < 8:
+    if isinstance(key, int) and image.mode == "L" and depth < 8:
         return key * 255 // ((1 << depth) - 1)
     return key

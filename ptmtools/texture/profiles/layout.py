@@ -7,6 +7,8 @@ and are part of the format.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -62,6 +64,7 @@ def references(components: int) -> NDArray[np.int64]:
     return np.array([reference_count(components, c) for c in range(components)], np.int64)
 
 
+@cache
 def class_of_activity() -> NDArray[np.int64]:
     """Class of each activity 0 … 1023."""
     return np.searchsorted(np.array(CLASS_BOUNDS), np.arange(1024), side="right")

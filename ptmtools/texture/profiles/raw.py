@@ -38,7 +38,7 @@ class RawProfile:
         rows = blocks[0::2] + blocks[1::2]
         # The remainder of a sum by 4 is its two low bits.
         residual = (rows[:, 0::2] + rows[:, 1::2]) & 3
-        return _pack_residuals(residual.astype(np.uint8)) + level[sent(level.shape)].tobytes()
+        return _pack_residuals(residual.astype(np.uint8)) + _partial_level(level)
 
     def decode_group(
         self, data: bytes, below: NDArray[np.uint8], shape: tuple[int, int, int]
@@ -48,8 +48,8 @@ class RawProfile:
         bh, bw, c = below.shape
         packed = -(-below.size // 4)
         residual = _unpack_residuals(data[:packed], below.size).reshape(bh, bw, c)
-        level = np.zeros(shape, np.uint8)
-        level[sent(shape)] = np.frombuffer(data, np.uint8, offset=packed).reshape(-1, c)
+        level = np.empty(shape, np.uint8)
+        _place_partial_level(np.frombuffer(data, np.uint8, offset=packed), level)
         blocks = level[: 2 * bh, : 2 * bw]
         # Modulo 256 the result is right even where the sums are not.
         last = 4 * below + residual - blocks[0::2, 0::2] - blocks[0::2, 1::2] - blocks[1::2, 0::2]
@@ -57,18 +57,33 @@ class RawProfile:
         return level
 
 
-def sent(shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Which texels (h, w) of a level belong to its partial level."""
-    height, width = shape[0], shape[1]
-    mask = np.ones((height, width), np.bool_)
-    mask[1:height:2, 1:width:2] = False
-    return mask
-
-
 def group_length(shape: tuple[int, int, int]) -> int:
     """Bytes of the group of a level (h, w, c) in this profile."""
     blocks = (shape[0] >> 1) * (shape[1] >> 1)
     return -(-blocks * shape[2] // 4) + (shape[0] * shape[1] - blocks) * shape[2]
+
+
+def _partial_level(level: NDArray[np.uint8]) -> bytes:
+    """Rows of even index whole, of the others the columns of even index, in row-major order.
+
+    That leaves out the lower right texel of each block and nothing else: an odd last row or column
+    has an even index.
+    """
+    pairs = level.shape[0] >> 1
+    whole = level[: 2 * pairs : 2].reshape(pairs, -1)
+    half = level[1 : 2 * pairs : 2, ::2].reshape(pairs, -1)
+    return np.concatenate([whole, half], axis=1).tobytes() + level[2 * pairs :].tobytes()
+
+
+def _place_partial_level(data: NDArray[np.uint8], level: NDArray[np.uint8]) -> None:
+    height, width, components = level.shape
+    pairs = height >> 1
+    row = width * components
+    both = row + (width + 1 >> 1) * components
+    rows = data[: pairs * both].reshape(pairs, both)
+    level[: 2 * pairs : 2] = rows[:, :row].reshape(pairs, width, components)
+    level[1 : 2 * pairs : 2, ::2] = rows[:, row:].reshape(pairs, -1, components)
+    level[2 * pairs :] = data[pairs * both :].reshape(-1, width, components)
 
 
 def _pack_residuals(residual: NDArray[np.uint8]) -> bytes:

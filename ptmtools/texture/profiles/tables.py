@@ -97,25 +97,30 @@ def choose(counts: NDArray[np.int64]) -> tuple[Frequencies, bytes]:
 
     The last table has no escape: it is built in only where that holds every symbol that occurs.
     """
-    family = built_in()[1:]
+    occurs = counts.sum(axis=1) > 0
+    rows = counts[occurs]
     # Integers below 2^53, so exact; float64 only because numpy multiplies such matrices faster.
-    cost = (counts.astype(np.float64) @ _built_in_lengths().T).astype(np.int64)
-    cost[-1, (family[:, counts[-1] > 0] == 0).any(axis=1)] = 1 << 62
-    exact = normalise(counts)
-    exact_cost = (counts * _log_table()[exact]).sum(axis=1)
+    cost = (rows.astype(np.float64) @ _built_in_lengths().T).astype(np.int64)
+    if occurs[-1]:
+        lacking = built_in()[1:, rows[-1] > 0] == 0
+        cost[-1, lacking.any(axis=1)] = 1 << 62
+    exact = normalise(rows)
     used = _used(exact)
     nibbles = _nibbles(exact)
     nibbles[:, :ESCAPE][np.arange(ESCAPE) >= used[:, None]] = 0
-    exact_cost += (nibbles.sum(axis=1) + _nibbles(used)) * 4 * 256
-    best = cost.argmin(axis=1)
-    kind = np.where(exact_cost < cost.min(axis=1), SENT, 1 + best)
-    kind[~exact.any(axis=1)] = UNUSED
-    frequency = np.where((kind == SENT)[:, None], exact, built_in()[np.where(kind < SENT, kind, 0)])
+    sent_cost = (rows * _log_table()[exact]).sum(axis=1)
+    sent_cost += (nibbles.sum(axis=1) + _nibbles(used)) * 4 * 256
+    sent = sent_cost < cost.min(axis=1)
+    best = 1 + cost.argmin(axis=1)
+    kind = np.full(len(counts), UNUSED, np.uint8)
+    kind[occurs] = np.where(sent, SENT, best)
+    frequency = np.zeros_like(counts)
+    frequency[occurs] = np.where(sent[:, None], exact, built_in()[best])
     numbers: list[int] = []
-    for row, n in zip(exact[kind == SENT], used[kind == SENT], strict=True):
+    for row, n in zip(exact[sent], used[sent], strict=True):
         numbers += [int(row[ESCAPE]), int(n), *row[:n].tolist()]
     packed = _pack_nibbles(numbers)
-    return frequency, kind.astype(np.uint8).tobytes() + len(packed).to_bytes(2, "little") + packed
+    return frequency, kind.tobytes() + len(packed).to_bytes(2, "little") + packed
 
 
 def parse(data: bytes, tables: int) -> tuple[Frequencies, int]:

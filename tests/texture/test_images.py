@@ -1,0 +1,245 @@
+"""Image files are read exactly or refused, and written whole or not at all."""
+
+from __future__ import annotations
+
+import io
+import os
+import struct
+import zlib
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from ptmtools.errors import InputError, LimitError, OutputError
+from ptmtools.texture import decode, encode, read_image, read_ptm, write_png
+
+RNG = np.random.default_rng(11)
+GREY = RNG.integers(0, 256, (9, 7), dtype=np.uint8)
+RGB = RNG.integers(0, 256, (9, 7, 3), dtype=np.uint8)
+RGBA = RNG.integers(0, 256, (9, 7, 4), dtype=np.uint8)
+
+
+def saved(image: Image.Image, kind: str = "PNG", **options: object) -> bytes:
+    buffer = io.BytesIO()
+    image.save(buffer, kind, **options)
+    return buffer.getvalue()
+
+
+def png(depth: int, colour: int, rows: Iterable[bytes], width: int, *extra: bytes) -> bytes:
+    """A PNG by hand, for what Pillow does not write. Chunks in ``extra`` go before the data."""
+    lines = list(rows)
+
+    def chunk(body: bytes) -> bytes:
+        return struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
+
+    head = b"IHDR" + struct.pack(">IIBBBBB", width, len(lines), depth, colour, 0, 0, 0)
+    data = b"IDAT" + zlib.compress(b"".join(b"\0" + line for line in lines))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(map(chunk, (head, *extra, data, b"IEND")))
+
+
+@pytest.mark.parametrize("kind", ["PNG", "TIFF", "TGA", "BMP", "PPM", "PCX"])
+def test_lossless_formats_are_exact(kind: str) -> None:
+    np.testing.assert_array_equal(read_image(saved(Image.fromarray(RGB), kind)), RGB)
+    np.testing.assert_array_equal(read_image(saved(Image.fromarray(GREY), kind)), GREY[:, :, None])
+
+
+@pytest.mark.parametrize("kind", ["PNG", "TIFF", "TGA", "WEBP"])
+def test_alpha_is_exact(kind: str) -> None:
+    options = {"lossless": True, "exact": True} if kind == "WEBP" else {}
+    np.testing.assert_array_equal(read_image(saved(Image.fromarray(RGBA), kind, **options)), RGBA)
+
+
+def test_grey_and_alpha() -> None:
+    both = RGBA[:, :, :2]
+    np.testing.assert_array_equal(read_image(saved(Image.fromarray(both))), both)
+
+
+def test_one_bit_images_become_black_and_white() -> None:
+    bits = RNG.integers(0, 2, (9, 7)).astype(np.bool_)
+    found = read_image(saved(Image.fromarray(bits)))
+    np.testing.assert_array_equal(found[:, :, 0], np.where(bits, 255, 0))
+
+
+def test_palettes() -> None:
+    index = RNG.integers(0, 5, (9, 7)).astype(np.uint8)
+    colours = RNG.integers(0, 256, (5, 3), dtype=np.uint8)
+    image = Image.fromarray(index, "P")
+    image.putpalette(colours.tobytes())
+    np.testing.assert_array_equal(read_image(saved(image)), colours[index])
+    np.testing.assert_array_equal(read_image(saved(image, "GIF")), colours[index])
+
+    alpha = np.array([0, 9, 255, 128, 77], np.uint8)
+    found = read_image(saved(image, transparency=alpha.tobytes()))
+    np.testing.assert_array_equal(found, np.dstack([colours[index], alpha[index]]))
+    found = read_image(saved(image, transparency=3))
+    np.testing.assert_array_equal(found, np.dstack([colours[index], np.where(index == 3, 0, 255)]))
+
+
+def test_colour_keys() -> None:
+    data = saved(Image.fromarray(RGB), transparency=tuple(RGB[2, 3].tolist()))
+    alpha = np.where((RGB[2, 3] == RGB).all(axis=2), 0, 255)
+    np.testing.assert_array_equal(read_image(data), np.dstack([RGB, alpha]))
+    data = saved(Image.fromarray(GREY), transparency=int(GREY[4, 4]))
+    alpha = np.where(GREY[4, 4] == GREY, 0, 255)
+    np.testing.assert_array_equal(read_image(data), np.dstack([GREY, alpha]))
+
+
+@pytest.mark.parametrize("depth", [1, 2, 4])
+def test_colour_keys_of_shallow_greys(depth: int) -> None:
+    """Pillow widens the texels but not the key."""
+    top = (1 << depth) - 1
+    values = [0, top, top, 0, 0, 0, top, 0][: 8 // depth]
+    packed = sum(value << (8 - depth * (i + 1)) for i, value in enumerate(values))
+    data = png(depth, 0, [bytes([packed])], len(values), b"tRNS" + struct.pack(">H", top))
+    expected = [[255 * (v == top), 0 if v == top else 255] for v in values]
+    assert read_image(data)[0].tolist() == expected
+
+
+def test_jpeg_is_taken_as_it_decodes() -> None:
+    data = saved(Image.fromarray(RGB), "JPEG", quality=90)
+    np.testing.assert_array_equal(
+        read_image(data), np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
+    )
+
+
+def test_orientation_is_not_applied() -> None:
+    exif = Image.Exif()
+    exif[274] = 6
+    data = saved(Image.fromarray(RGB), exif=exif)
+    np.testing.assert_array_equal(read_image(data), RGB)
+
+
+DEEP = RNG.integers(0, 65536, (9, 7), dtype=np.uint16)
+REFUSED = {
+    "16-bit grey PNG": (saved(Image.fromarray(DEEP)), "PTM-I126"),
+    "16-bit RGB PNG": (png(16, 2, [bytes(range(12))] * 3, 2), "PTM-I126"),
+    "16-bit RGBA PNG": (png(16, 6, [bytes(range(16))] * 3, 2), "PTM-I126"),
+    "16-bit grey and alpha PNG": (png(16, 4, [bytes(range(8))] * 3, 2), "PTM-I126"),
+    "16-bit TIFF": (saved(Image.fromarray(DEEP), "TIFF"), "PTM-I126"),
+    "float TIFF": (saved(Image.fromarray(DEEP.astype(np.float32)), "TIFF"), "PTM-I126"),
+    "CMYK JPEG": (saved(Image.fromarray(RGBA, "CMYK"), "JPEG"), "PTM-I126"),
+    "CMYK TIFF": (saved(Image.fromarray(RGBA, "CMYK"), "TIFF"), "PTM-I126"),
+    "YCbCr TIFF": (saved(Image.fromarray(RGB, "YCbCr"), "TIFF"), "PTM-I126"),
+    "Lab TIFF": (saved(Image.fromarray(RGB, "LAB"), "TIFF"), "PTM-I126"),
+    "16-bit PPM": (b"P6 1 1 65535\n" + bytes(6), "PTM-I126"),
+    "PPM of 4 bits": (b"P5 2 1 15\n\1\2", "PTM-I126"),
+    "animated GIF": (
+        saved(
+            Image.fromarray(GREY), "GIF", save_all=True, append_images=[Image.fromarray(255 - GREY)]
+        ),
+        "PTM-I127",
+    ),
+    "animated PNG": (
+        saved(Image.fromarray(RGB), save_all=True, append_images=[Image.fromarray(255 - RGB)]),
+        "PTM-I127",
+    ),
+    "TIFF of two pages": (
+        saved(
+            Image.fromarray(RGB), "TIFF", save_all=True, append_images=[Image.fromarray(255 - RGB)]
+        ),
+        "PTM-I127",
+    ),
+    "empty": (b"", "PTM-I123"),
+    "text": (b"o model\nv 0 0 0\n", "PTM-I124"),
+    "a format not read": (saved(Image.fromarray(RGB), "ICO"), "PTM-I124"),
+    "a .ptm": (encode(RGB), "PTM-I124"),
+    "HP's .ptm": (b"PTM_1.2\nPTM_FORMAT_RGB\n", "PTM-I102"),
+    "truncated PNG": (saved(Image.fromarray(RGB))[:-60], "PTM-I125"),
+    "truncated JPEG": (saved(Image.fromarray(RGB).resize((99, 99)), "JPEG")[:-400], "PTM-I125"),
+    "truncated BMP": (saved(Image.fromarray(RGB), "BMP")[:-60], "PTM-I125"),
+    "damaged PNG": (
+        saved(Image.fromarray(RGB)).replace(b"IDAT", b"IDAT\0\0\0", 1),
+        "PTM-I125",
+    ),
+    "too wide": (png(8, 0, [bytes(65537)], 65537), "PTM-L104"),
+}
+
+
+@pytest.mark.parametrize("case", sorted(REFUSED))
+def test_refused(case: str, tmp_path: Path) -> None:
+    data, code = REFUSED[case]
+    file = tmp_path / "wåll paper.img"
+    file.write_bytes(data)
+    with pytest.raises(InputError, match=code) as caught:
+        read_image(file)
+    error = caught.value
+    assert error.file == str(file)
+    assert error.remedy
+    assert "\n" not in str(error)
+
+
+def test_bombs_are_a_matter_of_limits() -> None:
+    """65,000² texels announced, nothing there: refused by size, before anything is unpacked."""
+    head = b"IHDR" + struct.pack(">IIBBBBB", 65000, 65000, 8, 2, 0, 0, 0)
+    data = b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + head + struct.pack(">I", zlib.crc32(head))
+    data += saved(Image.fromarray(RGB))[33:]
+    with pytest.raises(LimitError, match="PTM-L104"):
+        read_image(data)
+
+
+def test_paths_that_lead_nowhere(tmp_path: Path) -> None:
+    for read in (read_image, read_ptm):
+        with pytest.raises(InputError, match="PTM-I120"):
+            read(tmp_path / "absent.png")
+        with pytest.raises(InputError, match="PTM-I121"):
+            read(tmp_path)
+        with pytest.raises(InputError, match="PTM-I122"):
+            read(f"{tmp_path}/\0")
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="needs permissions that bind")
+def test_a_file_that_may_not_be_read(tmp_path: Path) -> None:
+    file = tmp_path / "a.png"
+    file.touch(0o000)
+    with pytest.raises(InputError, match="PTM-I122"):
+        read_image(file)
+
+
+def test_read_ptm_names_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "a.ptm"
+    file.write_bytes(encode(RGB))
+    np.testing.assert_array_equal(decode(read_ptm(file)), RGB)
+    for data, code in (
+        (b"", "PTM-I101"),
+        (b"PTM_1.1\n", "PTM-I102"),
+        (encode(RGB)[:50], "PTM-I103"),
+    ):
+        file.write_bytes(data)
+        with pytest.raises(InputError, match=code) as caught:
+            read_ptm(file)
+        assert caught.value.file == str(file)
+
+
+@pytest.mark.parametrize("image", [GREY[:, :, None], RGBA[:, :, :2], RGB, RGBA])
+def test_written_png_holds_the_texels(image: NDArray[np.uint8], tmp_path: Path) -> None:
+    write_png(tmp_path / "out.png", image)
+    np.testing.assert_array_equal(read_image(tmp_path / "out.png"), image)
+
+
+def test_png_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
+    write_png(tmp_path / "out.png", RGB)
+    before = (tmp_path / "out.png").read_bytes()
+    with pytest.raises(OutputError, match="PTM-O001"):
+        write_png(tmp_path / "out.png", 255 - RGB)
+    assert (tmp_path / "out.png").read_bytes() == before
+    write_png(tmp_path / "out.png", 255 - RGB, force=True)
+    np.testing.assert_array_equal(read_image(tmp_path / "out.png"), 255 - RGB)
+    for target in (tmp_path, tmp_path / "absent" / "out.png"):
+        with pytest.raises(OutputError, match="PTM-O002"):
+            write_png(target, RGB, force=True)
+    assert [file.name for file in tmp_path.iterdir()] == ["out.png"]
+
+
+def test_importing_the_package_loads_nothing_heavy() -> None:
+    import subprocess
+    import sys
+
+    script = (
+        "import sys, ptmtools.texture; print(sorted({'numpy', 'numba', 'PIL'} & set(sys.modules)))"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True, text=True)
+    assert run.stdout.strip() == "[]"
