@@ -6,7 +6,7 @@ that of all cells of the PVS, so a row sums to 1.
 
 The paper draws "all the objects of its PVS". Here *everything* is drawn, from every cell: only so
 can a pixel fall on a cell outside the PVS, which would be an error of the PVS or a crack in the
-model. Such pixels are left out of the hints and reported as missed mass.
+model. Such pixels are checked with a ray, left out of the hints and reported as missed mass.
 """
 
 from __future__ import annotations
@@ -68,7 +68,9 @@ def compute_ach(
 
     def look(cell: int) -> tuple[NDArray[np.int64], int, int]:
         eyes, rejected = choose_eyes(cells, around, cell, options, clearance)
-        return look_around(renderer, surfaces, eyes), len(eyes), rejected
+        expected = np.zeros(cells.cell_count, dtype=np.bool_)
+        expected[pvs.row(cell)] = True
+        return look_around(renderer, surfaces, eyes, expected), len(eyes), rejected
 
     try:
         pixels = np.zeros(len(pvs.cell), dtype=np.int64)
@@ -136,11 +138,14 @@ def choose_eyes(
     return eyes, len(refused)
 
 
-def look_around(renderer: Renderer, surfaces: Surfaces, eyes: list[Eye]) -> NDArray[np.int64]:
-    """(C + 1,) pixels covered by each cell over all sample points; the last belong to no cell."""
+def look_around(
+    renderer: Renderer, surfaces: Surfaces, eyes: list[Eye], expected: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """(C + 1,) pixels covered by each cell over all sample points; the last belong to no cell.
+    ``expected`` (C,): the PVS."""
     covered = np.zeros(surfaces.cell_count + 1, dtype=np.int64)
     for eye in eyes:
-        covered += sample_coverage(renderer, surfaces, eye.point, eye.near)
+        covered += sample_coverage(renderer, surfaces, eye.point, eye.near, expected)
     return covered
 
 

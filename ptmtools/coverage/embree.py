@@ -43,21 +43,33 @@ class EmbreeRenderer:
 
         return f"Embree (embreex {version('embreex')})"
 
-    def hits(self, point: NDArray[np.float64], near: float) -> NDArray[np.int64]:
-        """See `Renderer.hits`."""
+    def layers(self, point: NDArray[np.float64], near: float) -> NDArray[np.int64]:
+        """See `Renderer.layers`."""
+        return self._cast(point, self._directions)
+
+    def traced(self, point: NDArray[np.float64], pixels: NDArray[np.int64]) -> NDArray[np.int64]:
+        """See `Renderer.traced`."""
+        return self._cast(point, self._directions[pixels])
+
+    def _cast(
+        self, point: NDArray[np.float64], directions: NDArray[np.float32]
+    ) -> NDArray[np.int64]:
+        """(L, n) the triangle of each layer that each of the (n, 3) rays hits, or -1."""
         eye = self._surfaces.normalised(point).astype(np.float32)
-        origins = np.tile(eye, (len(self._directions), 1))
+        origins = np.tile(eye, (len(directions), 1))
         if self._transparent_tree is None:
-            return self._opaque[_first(self._opaque_tree, origins, self._directions)]
-        depth = np.full(len(origins), np.inf, dtype=np.float32)
-        opaque = np.zeros(0, dtype=np.int64)
+            if self._opaque_tree is None:
+                return np.full((1, len(origins)), -1, dtype=np.int64)
+            found = self._opaque_tree.run(origins, directions)
+            return _named(found, self._opaque)[None]
+        limit = np.full(len(origins), np.inf, dtype=np.float32)
+        opaque = np.full(len(origins), -1, dtype=np.int64)
         if self._opaque_tree is not None:
-            found = self._opaque_tree.run(origins, self._directions, output=True)
-            covered = found["primID"] >= 0
-            depth[covered] = found["tfar"][covered] / np.float32(BEFORE)
-            opaque = self._opaque[found["primID"][covered]]
-        panes = _first(self._transparent_tree, origins, self._directions, depth)
-        return np.concatenate([opaque, self._transparent[panes]])
+            hit = self._opaque_tree.run(origins, directions, output=True)
+            opaque = _named(hit["primID"], self._opaque)
+            limit[opaque >= 0] = hit["tfar"][opaque >= 0] / np.float32(BEFORE)
+        panes = self._transparent_tree.run(origins, directions, dists=limit)
+        return np.stack([opaque, _named(panes, self._transparent)])
 
     def close(self) -> None:
         """Drops the trees."""
@@ -78,15 +90,6 @@ def _tree(surfaces: Surfaces, which: NDArray[np.int64]) -> Any:
     return tree
 
 
-def _first(
-    tree: Any,
-    origins: NDArray[np.float32],
-    directions: NDArray[np.float32],
-    limit: NDArray[np.float32] | None = None,
-) -> NDArray[np.int64]:
-    """(n,) the first triangle that each ray hits before its limit; rays that hit none are left
-    out."""
-    if tree is None:
-        return np.zeros(0, dtype=np.int64)
-    found = tree.run(origins, directions, dists=None if limit is None else limit.copy())
-    return np.asarray(found[found >= 0], dtype=np.int64)
+def _named(found: NDArray[np.int32], which: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Numbers within a tree, -1 for a miss, as numbers of the surfaces in it."""
+    return np.append(which, -1)[found]

@@ -133,23 +133,52 @@ class Renderer(Protocol):
     @property
     def name(self) -> str: ...
 
-    def hits(self, point: NDArray[np.float64], near: float) -> NDArray[np.int64]:
-        """The triangle in each covered pixel of the six views from a (3,) point (world metres),
-        background left out, transparent layer after the opaque one; (n,), n <= 12 face². No
-        surface is nearer to the point than ``near`` metres."""
+    def layers(self, point: NDArray[np.float64], near: float) -> NDArray[np.int64]:
+        """(L, 6 face²) the triangle that each pixel of the six views from a (3,) point (world
+        metres) shows, -1 for none, in the order (view, row, column); opaque surfaces first, then
+        the transparent ones before them, if the scene has any. No surface is nearer to the point
+        than ``near`` metres."""
+
+    def traced(self, point: NDArray[np.float64], pixels: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(L, n) what a ray through the centre of each of the (n,) pixels says of its layers."""
 
     def close(self) -> None:
         """Gives back what the backend holds."""
 
 
 def sample_coverage(
-    renderer: Renderer, surfaces: Surfaces, point: NDArray[np.float64], near: float
+    renderer: Renderer,
+    surfaces: Surfaces,
+    point: NDArray[np.float64],
+    near: float,
+    expected: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.int64]:
     """(C + 1,) pixels covered, seen from a (3,) point in world metres, by each of the C cells,
-    and last by what belongs to no cell. ``near``: see `Renderer.hits`."""
-    pixels = np.bincount(renderer.hits(point, near), minlength=len(surfaces.cell))
-    seen = np.flatnonzero(pixels)
-    owner = surfaces.viewer_cell(seen, point)
+    and last by what belongs to no cell. ``near``: see `Renderer.layers`.
+
+    ``expected`` (C,) are the cells that may be seen, if that is known. A pixel that shows another
+    one is not believed before a ray has confirmed it: a rasteriser rounds corners to 1/256 pixel,
+    and past a rounded edge it sees what no straight line reaches.
+    """
+    layers = renderer.layers(point, near)
+    seen, owner = _owners(surfaces, layers, point)
+    if expected is not None:
+        doubted = seen[~np.append(expected, False)[owner]]
+        if len(doubted):
+            pixels = np.flatnonzero(np.isin(layers, doubted).any(axis=0))
+            layers[:, pixels] = renderer.traced(point, pixels)
+            seen, owner = _owners(surfaces, layers, point)
+    pixels_of = np.bincount(layers[layers >= 0], minlength=len(surfaces.cell))
     covered = np.zeros(surfaces.cell_count + 1, dtype=np.int64)
-    np.add.at(covered, owner, pixels[seen])  # -1 is the last
+    np.add.at(covered, owner, pixels_of[seen])  # -1 is the last
     return covered
+
+
+def _owners(
+    surfaces: Surfaces, layers: NDArray[np.int64], point: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """The triangles that show anywhere, ascending, and the cell for which each of them counts."""
+    shows = np.zeros(len(surfaces.cell), dtype=np.bool_)
+    shows[layers[layers >= 0]] = True
+    seen = np.flatnonzero(shows)
+    return seen, surfaces.viewer_cell(seen, point)

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.coverage.embree import EmbreeRenderer
 from ptmtools.coverage.item_buffer import BEFORE, VIEWS, Surfaces
 from ptmtools.errors import MissingComponentError
 
@@ -68,6 +69,7 @@ class OpenGLRenderer:
         self._context = context
         self._surfaces = surfaces
         self._face = face
+        self._rays: EmbreeRenderer | None = None
         opaque = np.flatnonzero(surfaces.opaque)
         transparent = np.flatnonzero(~surfaces.opaque)
         self._order = np.concatenate([opaque, transparent])
@@ -94,10 +96,10 @@ class OpenGLRenderer:
         context.enable_only(moderngl.DEPTH_TEST)
         context.depth_func = "<"
 
-    def hits(self, point: NDArray[np.float64], near: float) -> NDArray[np.int64]:
-        """See `Renderer.hits`."""
+    def layers(self, point: NDArray[np.float64], near: float) -> NDArray[np.int64]:
+        """See `Renderer.layers`."""
         if self._vertices is None:
-            return np.zeros(0, dtype=np.int64)
+            return np.full((1, len(VIEWS) * self._face**2), -1, dtype=np.int64)
         eye = self._surfaces.normalised(point)
         high = eye.astype(np.float32)
         self._program["eye_high"].value = tuple(high.tolist())
@@ -111,12 +113,17 @@ class OpenGLRenderer:
         if len(self._targets) > 1:
             count = len(self._order) - self._split
             found.append(self._draw(1, self._split, count, BEFORE / far))
-        number = np.concatenate(found)
-        return np.asarray(self._order[number[number > 0] - 1], dtype=np.int64)
+        return np.append(-1, self._order)[np.stack(found)]
+
+    def traced(self, point: NDArray[np.float64], pixels: NDArray[np.int64]) -> NDArray[np.int64]:
+        """See `Renderer.traced`; by Embree, whose trees are built at the first call."""
+        if self._rays is None:
+            self._rays = EmbreeRenderer(self._surfaces, self._face)
+        return self._rays.traced(point, pixels)
 
     def _draw(self, layer: int, first: int, count: int, depth_scale: float) -> NDArray[np.int64]:
-        """One layer of the six views, over the depth that is there: (6 face²,) triangles in the
-        order of the upload, from 1; 0 is background."""
+        """One layer of the six views, before the depth that is there: (6 face²,) triangles in the
+        order of the upload, from 1; 0 for none."""
         face, target = self._face, self._targets[layer]
         # OpenGL leaves undefined what clearing does to a target of integers.
         self._items[layer].write(self._background)
@@ -128,13 +135,14 @@ class OpenGLRenderer:
             self._program["view"].value = tuple(view.T.reshape(-1))
             self._vertices.render(vertices=3 * count, first=3 * first)
         target.viewport = (0, 0, len(VIEWS) * face, face)
-        return np.frombuffer(target.read(components=1, dtype="u4"), dtype=np.uint32).astype(
-            np.int64
-        )
+        strip = np.frombuffer(target.read(components=1, dtype="u4"), dtype=np.uint32)
+        views = strip.reshape(face, len(VIEWS), face).transpose(1, 0, 2)
+        return np.asarray(views.reshape(-1), dtype=np.int64)
 
     def close(self) -> None:
         """Gives the context back."""
         self._context.release()
+        self._rays = None
 
 
 def create_context() -> Any:

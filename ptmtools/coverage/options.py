@@ -27,7 +27,7 @@ class AchOptions:
         before a larger face.
     backend: "gl" (OpenGL), "embree" (rays on the processor), or "auto" (see `choose_backend`).
     clearance: metres that a sample point keeps from every surface; None for a quarter of
-        `Tolerance.thin`, 2.5e-5 of the scene's extent.
+        the least thickness of a cell, `Tolerance.thin`.
     seed: which stretch of the sequence of sample points is taken.
     workers: threads of the embree backend, None for one per processor; never changes the result.
     """

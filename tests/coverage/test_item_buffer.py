@@ -10,7 +10,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from ptmtools.coverage.item_buffer import VIEWS, Surfaces, pixel_centres
+from ptmtools.coverage.embree import EmbreeRenderer
+from ptmtools.coverage.item_buffer import VIEWS, Surfaces, pixel_centres, sample_coverage
+from ptmtools.coverage.opengl import OpenGLRenderer, create_context
 
 FACE = 64
 
@@ -225,3 +227,59 @@ def test_backends_agree_anywhere(room_row, coverage_at, has_gl, require, eye, fa
     by_rays = coverage_at("embree", scene, cells, eye, face)
     assert by_gl.sum() == by_rays.sum() == 6 * face**2
     assert np.abs(by_gl - by_rays).max() <= 2 * face
+
+
+class Doubtful:
+    """Rays, but with some pixels shown wrongly, as past a rounded edge."""
+
+    backend, name = "embree", "doubtful"
+
+    def __init__(self, rays, wrong, triangle):
+        self.rays, self.wrong, self.triangle = rays, wrong, triangle
+
+    def layers(self, point, near):
+        found = self.rays.layers(point, near)
+        found[0, self.wrong] = self.triangle
+        return found
+
+    def traced(self, point, pixels):
+        assert set(self.wrong) <= set(pixels)
+        return self.rays.traced(point, pixels)
+
+    def close(self):
+        self.rays.close()
+
+
+def test_an_unexpected_cell_is_believed_only_if_a_ray_confirms_it(room_row):
+    scene, cells = room_row(3)
+    surfaces = Surfaces.of(scene, cells)
+    rays = EmbreeRenderer(surfaces, FACE)
+    eye = np.array([2.0, 1.7, 0.3])
+    truth = sample_coverage(rays, surfaces, eye, 1e-3)
+    assert truth[2] > 0
+    in_room_2 = int(np.flatnonzero((cells.triangle_cell == [2, -1]).all(axis=1))[0])
+    wrong = Doubtful(rays, [5, 77, 1000], in_room_2)
+    fooled = sample_coverage(wrong, surfaces, eye, 1e-3)
+    assert fooled[2] == truth[2] + 3
+    adjacent_only = np.array([True, True, False])
+    assert sample_coverage(wrong, surfaces, eye, 1e-3, adjacent_only).tolist() == truth.tolist()
+    everything = np.ones(3, dtype=bool)
+    assert sample_coverage(wrong, surfaces, eye, 1e-3, everything).tolist() == fooled.tolist()
+
+
+def test_rays_through_some_pixels_are_the_rays_through_all(room_row, furnish, backend):
+    scene, cells = room_row(2)
+    pane = rectangle_across(4.0, (0, 3), (-1, 1))
+    surfaces = Surfaces.of(*furnish(scene, cells, [pane], [(0, 1)], transparent=True))
+    eye = np.array([1.0, 1.7, 0.3])
+    whole = EmbreeRenderer(surfaces, FACE).layers(eye, 1e-3)
+    assert whole.shape == (2, 6 * FACE**2)
+    pixels = np.arange(0, 6 * FACE**2, 7)
+    if backend == "gl":
+        renderer = OpenGLRenderer(create_context(), surfaces, FACE)
+    else:
+        renderer = EmbreeRenderer(surfaces, FACE)
+    assert np.array_equal(renderer.traced(eye, pixels), whole[:, pixels])
+    drawn = renderer.layers(eye, 1e-3)
+    renderer.close()
+    assert np.mean(drawn != whole) < 1e-3  # triangles that share an edge may share its pixels
