@@ -18,8 +18,8 @@ PLANE_SHARE = 8e-6
 #: Parallel planes nearer than this count as one wall, unless the second closes what the first
 #: leaves open: 1 cm in a building of 50 m.
 CLUSTER_SHARE = 2e-4
-#: A cell thinner than this is refused (0.5 mm in a building of 50 m): it could be flat after rounding
-#: to float32, and it must be thicker than the on-plane distance.
+#: A cell thinner than this is refused: it could be flat after rounding to float32, and it must be
+#: thicker than the on-plane distance. 0.5 mm in a building of 50 m.
 THIN_SHARE = 1e-5
 #: A gap between walls narrower than this is a crack of the modelling, not an opening: 0.4 mm in a
 #: building of 50 m.
