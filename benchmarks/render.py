@@ -3,10 +3,13 @@
     python benchmarks/render.py MODEL|DB --eye 2 1.6 3 --look 0 1.6 0 -o out.png
 
 One ray a pixel (``--samples 2`` for 2 × 2) through Embree; texture bilinear from the full image,
-repeated or clamped, times the material's colour, shaded like a VRML browser's headlight: by the
-cosine between the surface and the ray. It shares nothing with the stages but ingest's arrays, so
-that it can be held against what browsers make of the emitted files. Coordinates are the world's:
-metres, Y up, origin at the centre of the model's floor; ``--model-space`` takes the model's own.
+repeated or clamped, times the material's colour; transparent surfaces are looked through.
+``--shading headlight`` darkens all by the cosine between surface and ray, ``browser`` only what
+has no image, as VRML97 browsers do with the emitted files, ``flat`` nothing.
+
+It shares nothing with the stages but ingest's arrays, so that it can be held against what
+browsers make of the emitted files. Coordinates are the world's: metres, Y up, origin at the
+centre of the model's floor; ``--model-space`` takes the model's own.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ import io
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,14 +32,16 @@ SKY = (0.62, 0.74, 0.88)
 #: Transparent surfaces looked through before a ray gives up.
 LAYERS = 12
 Vector = Sequence[float] | NDArray[np.float64]
+Shading = Literal["headlight", "browser", "flat"]
 
 
 def load(path: Path) -> Scene:
     """The scene of a model file, or of a database."""
     if path.is_dir():
-        from ptmtools.pipeline.folder import load_scene
+        from ptmtools.pipeline.folder import DatabaseFolder
+        from ptmtools.pipeline.run import Artifacts
 
-        return load_scene(path)
+        return Artifacts(DatabaseFolder.open(path)).scene
     from ptmtools.scene import ingest
 
     return ingest(path)
@@ -104,7 +110,7 @@ def render(
     width: int = 800,
     height: int = 600,
     samples: int = 1,
-    lit: bool = True,
+    shading: Shading = "headlight",
 ) -> NDArray[np.uint8]:
     """(height, width, 3) picture from ``eye`` (world metres) along ``direction``.
 
@@ -120,6 +126,9 @@ def render(
     images = texels(scene)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+
+    plain = np.array([m.image < 0 for m in scene.materials])[scene.triangle_material]
+    lit = {"headlight": plain | True, "browser": plain, "flat": plain & False}[shading]
 
     rays = camera_rays(direction, up, fov, width * samples, height * samples)
     color = np.zeros((len(rays), 3), dtype=np.float32)
@@ -139,9 +148,8 @@ def render(
         if not len(active):
             break
         rgba = _shaded(scene, images, face, np.stack([1 - u - v, u, v], 1))
-        if lit:
-            facing = np.abs(np.einsum("ij,ij->i", normals[face], rays[active]))
-            rgba[:, :3] *= facing.astype(np.float32)[:, None]
+        facing = np.abs(np.einsum("ij,ij->i", normals[face], rays[active])).astype(np.float32)
+        rgba[:, :3] *= np.where(lit[face], facing, np.float32(1))[:, None]
         color[active] += (left[active] * rgba[:, 3])[:, None] * rgba[:, :3]
         left[active] *= 1 - rgba[:, 3]
         start[active] += rays[active] * (t + nudge)[:, None]
@@ -179,7 +187,7 @@ def main(arguments: list[str] | None = None) -> int:
     add("--fov", type=float, default=60, help="degrees over the smaller side (default 60)")
     add("--size", default="800x600", help="WIDTHxHEIGHT (default 800x600)")
     add("--samples", type=int, default=2, help="rays along a pixel's side (default 2)")
-    add("--unlit", action="store_true", help="no headlight")
+    add("--shading", choices=("headlight", "browser", "flat"), default="headlight")
     add("--model-space", action="store_true", help="eye and look are in the model's coordinates")
     add("-o", "--output", type=Path, required=True)
     given = parser.parse_args(arguments)
@@ -202,7 +210,7 @@ def main(arguments: list[str] | None = None) -> int:
         width=width,
         height=height,
         samples=given.samples,
-        lit=not given.unlit,
+        shading=given.shading,
     )
     Image.fromarray(picture).save(given.output)
     return 0

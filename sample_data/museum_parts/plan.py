@@ -70,7 +70,7 @@ class Plan:
 
 def storeys_for(rooms: int) -> int:
     """Two floors for the usual museum, more for large ones."""
-    if rooms < 2:
+    if rooms < 4:
         return 1
     return 2 if rooms <= 24 else 3 if rooms <= 90 else 4
 
@@ -80,11 +80,12 @@ def make_plan(rooms: int, rng: np.random.Generator, *, windows: bool = True) -> 
     storeys = storeys_for(rooms)
     per_storey = math.ceil(rooms / storeys)
     wings = math.ceil(per_storey / 16)
-    columns = math.ceil(per_storey / (2 * wings))
+    strips = min(2 * wings, per_storey)
+    columns = math.ceil(per_storey / strips)
     # Narrower than this the corridor would have no length beside the stairwell.
     least = math.ceil((STAIRWELL + INNER_WALL + 4000) / columns / 500) * 500
     widths = [max(least, 500 * int(rng.integers(13, 20))) for _ in range(columns)]
-    depths = [500 * int(rng.integers(14, 17)) for _ in range(2 * wings)]
+    depths = [500 * int(rng.integers(14, 17)) for _ in range(strips)]
     length = sum(widths) + INNER_WALL * (columns - 1)
 
     plan = Plan(storeys=storeys)
@@ -94,11 +95,13 @@ def make_plan(rooms: int, rng: np.random.Generator, *, windows: bool = True) -> 
         # The same widths in another order: the block stays, the rooms differ.
         order = [widths[k] for k in rng.permutation(columns)] if storey else widths
         starts = np.cumsum([0, *[w + INNER_WALL for w in order]]).tolist()
-        slots = [(c, s) for c in range(columns) for s in range(2 * wings)][:here]
+        slots = [(c, s) for c in range(columns) for s in range(strips)][:here]
         _storey(plan, storey, number, slots, starts, order, depths, rng, windows)
         number += here
 
-    depth = sum(depths) + wings * (CORRIDOR_WIDTH + 2 * INNER_WALL) + INNER_WALL * (wings - 1)
+    depth = _strip_start(strips - 1, depths) + depths[-1]
+    if strips % 2:
+        depth += INNER_WALL + CORRIDOR_WIDTH
     plan.low = (-OUTER_WALL, -SLAB, -OUTER_WALL)
     plan.high = (length + OUTER_WALL, storeys * STOREY, depth + OUTER_WALL)
     for wing in range(wings):
@@ -131,12 +134,15 @@ def _storey(
     room: dict[tuple[int, int], Box] = {}
     for k, (column, strip) in enumerate(slots):
         z = _strip_start(strip, depths)
+        # The last room of a strip takes what is left of it: no mass of solid that is not wall.
+        last = (column + 1, strip) not in slots
+        end = length if last else starts[column] + widths[column]
         room[column, strip] = Box(
             name=f"room{number + k + 1:02d}",
             kind="room",
             storey=storey,
             low=(starts[column], base, z),
-            high=(starts[column] + widths[column], base + ROOM_HEIGHT, z + depths[strip]),
+            high=(end, base + ROOM_HEIGHT, z + depths[strip]),
             wall=WALLS[(number + k) % len(WALLS)],
             floor=FLOORS[(number + k) % len(FLOORS)],
             ceiling="ceiling",
@@ -144,7 +150,7 @@ def _storey(
     plan.boxes += room.values()
 
     corridors = []
-    for wing in range(len(depths) // 2):
+    for wing in range((len(depths) + 1) // 2):
         z = _strip_start(2 * wing, depths) + depths[2 * wing] + INNER_WALL
         corridors.append(
             Box(
@@ -188,7 +194,7 @@ def _storey(
     if windows:
         for (_, strip), box in room.items():
             if strip in (0, len(depths) - 1):
-                count = 1 + ((box.high[0] - box.low[0]) >= 7000)
+                count = max(1, (box.high[0] - box.low[0]) // 3500)
                 _window(plan, box, 2, 1 if strip else -1, count, 1400)
 
 

@@ -154,6 +154,9 @@ def test_every_room_can_be_walked_to(museum: ModuleType, rooms: int, seed: int) 
         reached = grown
     assert reached[kinds != "window"].all()
     assert np.count_nonzero(kinds == "room") == rooms
+    # Nothing but walls and slabs is solid.
+    block = np.prod(np.subtract(plan.high, plan.low) / 1000)
+    assert np.prod((high - low) / 1000, axis=1).sum() > 0.75 * block
     assert (low >= plan.low).all()
     assert (high <= plan.high).all()
 
