@@ -58,13 +58,11 @@ class Voice:
 
 
 def size(count: int) -> str:
-    """A number of bytes for people: ``97.5 MB`` (MB = 2²⁰ B)."""
-    if count < 1 << 10:
-        return f"{count} B"
-    for power, unit in ((30, "GB"), (20, "MB")):
-        if count >= 1 << power:
-            return f"{count / (1 << power):.1f} {unit}"
-    return f"{count / 1024:.1f} kB"
+    """A number of bytes for people: ``97.5 MB`` (MB = 10⁶ B)."""
+    for power, unit in ((9, "GB"), (6, "MB"), (3, "kB")):
+        if count >= 10**power:
+            return f"{count / 10**power:.1f} {unit}"
+    return f"{count} B"
 
 
 def count(number: int, one: str, many: str | None = None) -> str:
