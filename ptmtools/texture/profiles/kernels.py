@@ -307,7 +307,7 @@ def _write_ranked_blocks(
 @njit(cache=True, nogil=True)
 def _decode_row(
     state: Any, words: Any, at: int, table: Any, starts: Any, activity: Any, n: int, out: Any
-) -> int:
+) -> Any:
     """n symbols, lane x & 3 for symbol x; an entry is symbol << 24 | frequency << 12 | offset."""
     mask = np.uint64(TABLE_SIZE - 1)
     low, bits, sixteen = np.uint64(STATE_LOW), np.uint64(TABLE_BITS), np.uint64(16)
@@ -358,7 +358,8 @@ def _decode_row(
             k += one
         state[lane] = x
         i += one
-    return int(k)
+    # Signed: with a plain integer an unsigned one would become a float.
+    return np.int64(k)
 
 
 @njit(cache=True, nogil=True)
@@ -431,13 +432,16 @@ def haar_pass(
         starts[1, j] = (per_kind + classes[j]) * TABLE_SIZE
         starts[2, j] = 2 * per_kind * TABLE_SIZE
 
-    at, escaped, n = 0, 0, 0
+    # Of one type, or the helpers are compiled once more for the literal 0.
+    zero: Any = np.int64(0)
+    second: Any = np.int64(2)
+    at, escaped, n = zero, zero, zero
     if not encoding:
         for lane in range(4):
             state[lane] = np.uint64(words[2 * lane]) | (
                 np.uint64(words[2 * lane + 1] & 0x7FFF) << np.uint64(16)
             )
-        at = 8
+        at = np.int64(8)
 
     for c in range(nc):
         for y in range(-2, 2):
@@ -471,7 +475,7 @@ def haar_pass(
                     if encoding:
                         _read_differences(level, plane, y, k, ranks[plane], found)
                         _emit(
-                            found, prediction, activity, classes, 0, residual, near, symbols,
+                            found, prediction, activity, classes, zero, residual, near, symbols,
                             contexts, counts, n,
                         )  # fmt: skip
                         n += bw
@@ -492,7 +496,7 @@ def haar_pass(
                     weights[c, 2], activities[c, 2], prediction, activity,
                 )  # fmt: skip
                 if encoding:
-                    _read_differences(level, plane, y - 1, 2, ranks[plane], g)
+                    _read_differences(level, plane, y - 1, second, ranks[plane], g)
                     _emit(
                         g, prediction, activity, classes, per_kind, eg[c], near_g[c], symbols,
                         contexts, counts, n,
