@@ -12,10 +12,14 @@ texture × colour                  ImageTexture and one Color for all faces: unl
                                   letter shows the bare texture.
 texture, opacity < 1              ImageTexture and Material (diffuseColor, transparency): lit,
                                   as only a Material has a transparency
-no texture                        Material (diffuseColor, transparency): lit by the headlight
+no texture                        Material (diffuseColor, transparency): lit by the headlight,
+                                  and a quarter as bright by itself (emissiveColor). A
+                                  headlight alone leaves floors, ceilings and corridor walls
+                                  black, since it shines along them
 ================================  ==================================================
 
-(Tried: baking the colour into a second image. It is not lossless, and costs a texture.)
+(Tried: baking the colour into a second image. It is not lossless, and costs a texture. Ambient
+light in the root file instead of a glow: X_ITE shows none.)
 """
 
 from __future__ import annotations
@@ -36,6 +40,8 @@ from ptmtools.database.numerals import listed, numeral, numerals, quoted, single
 from ptmtools.scene.model import Material, Scene
 
 HEADER = "#VRML V2.0 utf8\n"
+#: How bright an untextured surface is without light, as a share of its colour.
+_GLOW = 0.25
 _FIELDS = (
     '  field SFString cellName    ""\n'
     "  field MFVec3f  hullPoint   [ ]\n"
@@ -168,6 +174,8 @@ class CellWriter:
         text = ""
         if material.image < 0 or material.opacity < 1:
             fields = f"diffuseColor {_color(material)}"
+            if material.image < 0:
+                fields += f" emissiveColor {_color(material, _GLOW)}"
             if material.opacity < 1:
                 fields += f" transparency {numeral(1 - min(max(material.opacity, 0.0), 1.0))}"
             text += f"    material Material {{ {fields} }}\n"
@@ -178,8 +186,8 @@ class CellWriter:
         return text
 
 
-def _color(material: Material) -> str:
-    return " ".join(numeral(min(max(c, 0.0), 1.0)) for c in material.color)
+def _color(material: Material, share: float = 1.0) -> str:
+    return " ".join(numeral(share * min(max(c, 0.0), 1.0)) for c in material.color)
 
 
 def _urls(record: TextureRecord, fallback: bool) -> list[str]:

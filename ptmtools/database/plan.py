@@ -38,6 +38,8 @@ _NARROWEST = 9.0
 #: Inches: around everything, above the panels for title and legend, above each panel, below it
 #: for the scale bar, between panels, and for the colour bar.
 _MARGIN, _HEAD, _CAPTION, _FOOT, _GAP, _BAR = 0.15, 0.5, 0.26, 0.3, 0.25, 0.75
+#: Paper around the cells, as a share of the larger side: lines lie half outside of them.
+_RIM = 0.004
 #: A building deeper than this many times its width is turned by 90°.
 _DEEP = 1.15
 
@@ -122,7 +124,9 @@ class _Plan:
         width, depth = np.ptp(plan, axis=0)
         self._turned = bool(depth > _DEEP * width)
         shown = self._shown(plan)
-        self._low, self._high = shown.min(axis=0), shown.max(axis=0)
+        low, high = shown.min(axis=0), shown.max(axis=0)
+        rim = _RIM * float((high - low).max())
+        self._low, self._high = low - rim, high + rim
 
     def draw(self) -> Any:
         """The whole figure."""
@@ -176,9 +180,7 @@ class _Plan:
             p for p, (cell, _) in zip(polygons, sections, strict=True) if cell == self._options.cell
         ]
         axis.add_collection(
-            PolyCollection(
-                chosen, facecolors="none", edgecolors=_CHOSEN, linewidths=5, zorder=2, clip_on=False
-            )
+            PolyCollection(chosen, facecolors="none", edgecolors=_CHOSEN, linewidths=5, zorder=2)
         )
         for layer, (segments, colour, width) in enumerate(
             (
@@ -194,7 +196,6 @@ class _Plan:
                     linewidths=width,
                     zorder=3 + layer,
                     capstyle="butt",
-                    clip_on=False,
                 )
             )
         self._numbers(axis, sections, 72 * panel / float(self._high[0] - self._low[0]))

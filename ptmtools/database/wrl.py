@@ -31,7 +31,11 @@ NODES: dict[str, dict[str, str]] = {
     "Inline": {"url": "MFString", "bboxCenter": "SFVec3f", "bboxSize": "SFVec3f"},
     "Shape": {"appearance": "Appearance", "geometry": "IndexedFaceSet"},
     "Appearance": {"material": "Material", "texture": "ImageTexture"},
-    "Material": {"diffuseColor": "SFColor", "transparency": "SFFloat"},
+    "Material": {
+        "diffuseColor": "SFColor",
+        "emissiveColor": "SFColor",
+        "transparency": "SFFloat",
+    },
     "ImageTexture": {"url": "MFString", "repeatS": "SFBool", "repeatT": "SFBool"},
     "IndexedFaceSet": {
         "solid": "SFBool",

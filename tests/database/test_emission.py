@@ -251,7 +251,7 @@ def test_colours_beyond_the_range_are_held(artifacts, tmp_path: Path) -> None:
     )
     write(artifacts, tmp_path, scene=scene)
     text = (tmp_path / "cells/c0000.wrl").read_text()
-    assert "material Material { diffuseColor 1 0 0.5 }" in text
+    assert "material Material { diffuseColor 1 0 0.5 emissiveColor 0.25 0 0.125 }" in text
 
 
 def log_of_view3dscene(file: Path, home: Path) -> list[str]:
