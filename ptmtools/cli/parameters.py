@@ -58,7 +58,7 @@ def descriptions(cls: type) -> dict[str, str]:
     text = inspect.cleandoc(cls.__doc__ or "")
     _, _, body = text.partition("Attributes\n----------\n")
     names: list[str] = []
-    for line in body.splitlines():
+    for line in re.split(r"\n\w+\n-+\n", body)[0].splitlines():
         if head := re.match(r"(\w+(?:, \w+)*): (.*)", line):
             names = head[1].split(", ")
             found.update(dict.fromkeys(names, head[2]))

@@ -1,0 +1,158 @@
+"""The command line: generated from the options classes, quick to start, quiet where asked."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import click
+import pytest
+from click.testing import CliRunner
+
+import ptmtools
+from ptmtools.cli.main import COMMANDS, main, ptm
+from ptmtools.cli.output import Voice, count, size
+from ptmtools.cli.parameters import descriptions, options_of, take
+
+
+@dataclass(frozen=True)
+class Base:
+    """A base.
+
+    Attributes
+    ----------
+    depth: how deep,
+        in metres.
+    """
+
+    depth: float = 1.5
+
+
+@dataclass(frozen=True)
+class Options(Base):
+    """Options.
+
+    Attributes
+    ----------
+    kind: of `thing`.
+    names, places: several.
+    quick: or not.
+
+    Raises
+    ------
+    nothing: at all.
+    """
+
+    kind: Literal["a", "b"] = "a"
+    names: tuple[str, ...] = ()
+    places: tuple[tuple[float, float, float], ...] = ()
+    quick: bool = False
+    seed: int | None = field(default=None)
+
+
+def test_help_is_what_the_docstring_says() -> None:
+    assert descriptions(Options) == {
+        "depth": "how deep, in metres.",
+        "kind": "of thing.",
+        "names": "several.",
+        "places": "several.",
+        "quick": "or not.",
+    }
+
+
+@pytest.mark.parametrize(
+    ("arguments", "wanted"),
+    [
+        ([], Options()),
+        (["--kind", "b", "--depth", "2", "--quick"], Options(2.0, "b", quick=True)),
+        (["--names", "x", "--names", "y", "--seed", "7"], Options(names=("x", "y"), seed=7)),
+        (["--places", "1,2,-3.5"], Options(places=((1.0, 2.0, -3.5),))),
+        (["--kind", "c"], None),
+        (["--places", "1,2"], None),
+        (["--places", "1,2,x"], None),
+    ],
+)
+def test_options_come_from_the_class(arguments: list[str], wanted: Options | None) -> None:
+    found = []
+
+    @click.command()
+    @options_of(Options)
+    def command(**values: object) -> None:
+        found.append(take(Options, values))
+
+    result = CliRunner().invoke(command, arguments)
+    assert (result.exit_code, found) == ((0, [wanted]) if wanted else (2, []))
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_option_of_every_command_is_explained(name: str) -> None:
+    command = ptm.get_command(click.Context(ptm), name)
+    assert command is not None
+    assert command.help
+    options = [p for p in command.params if isinstance(p, click.Option)]
+    assert options
+    assert [o.name for o in options if not o.help] == []
+    names = [name for o in options for name in (*o.opts, *o.secondary_opts)]
+    assert len(names) == len(set(names))
+    assert CliRunner().invoke(ptm, [name, "--help"], obj=Voice()).exit_code == 0
+
+
+def test_version_and_help_load_nothing_heavy() -> None:
+    code = (
+        "import sys; from ptmtools.cli.main import main; main(sys.argv[1:]);"
+        "print(*{'numpy', 'numba', 'rich', 'PIL', 'trimesh', 'shapely'} & set(sys.modules))"
+    )
+    for argument in ("--version", "--help"):
+        done = subprocess.run(
+            [sys.executable, "-c", code, argument], capture_output=True, text=True
+        )
+        assert done.stdout.splitlines()[0].startswith(("ptm 0.", "Usage: ptm"))
+        assert done.stdout.splitlines()[-1] == ""
+
+
+def test_importing_the_package_loads_nothing_heavy() -> None:
+    code = "import sys, ptmtools; print('numpy' in sys.modules, 'click' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout == "False False\n"
+
+
+def test_the_public_names_are_there() -> None:
+    for name in ptmtools.__all__:
+        assert getattr(ptmtools, name) is not None
+    with pytest.raises(AttributeError, match="frobnicate"):
+        ptmtools.frobnicate  # noqa: B018
+
+
+def test_numbers_for_people() -> None:
+    assert [size(n) for n in (0, 999, 1000, 97_517_568, 2_000_000_000)] == [
+        "0 B",
+        "999 B",
+        "1.0 kB",
+        "97.5 MB",
+        "2.0 GB",
+    ]
+    assert [count(1, "storey"), count(2, "storey"), count(1234, "cell")] == [
+        "1 storey",
+        "2 storeys",
+        "1,234 cells",
+    ]
+
+
+def test_quiet_says_nothing_and_json_is_json(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from PIL import Image
+
+    Image.new("RGB", (5, 3), (1, 2, 3)).save(tmp_path / "a.png")
+    assert main(["-q", "encode", str(tmp_path / "a.png")]) == 0
+    assert capsys.readouterr() == ("", "")
+    assert main(["encode", str(tmp_path / "a.png"), "--force", "--json"]) == 0
+    (told,) = json.loads(capsys.readouterr().out)
+    assert (told["raw_bytes"], told["levels"]) == (45, 2)
+    assert main(["info", str(tmp_path / "a.ptm"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["width"], told["height"], told["whole_levels"]) == (5, 3, 2)
