@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 #: On-plane distance as a share of the extent: 0.4 mm in a building of 50 m, well above the
 #: rounding of the float32 coordinates that model files carry (6e-8 of the extent).
 PLANE_SHARE = 8e-6
-#: Parallel planes nearer than this count as one wall, unless the second closes what the first
-#: leaves open: 1 cm in a building of 50 m.
-CLUSTER_SHARE = 2e-4
+#: Parallel polygons nearer than this count as one wall (a picture hung on it), unless the second
+#: closes what the first leaves open: 5 cm in a building of 50 m.
+CLUSTER_SHARE = 1e-3
 #: A cell thinner than this is refused: it could be flat after rounding to float32, and it must be
 #: thicker than the on-plane distance. 0.5 mm in a building of 50 m.
 THIN_SHARE = 1e-5

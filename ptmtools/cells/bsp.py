@@ -42,7 +42,7 @@ OCCLUSION_WEIGHT = 0.5
 BALANCE_WEIGHT = 0.3
 SPLIT_WEIGHT = 0.2
 #: A fragment smaller than this share of `SubdivideOptions.wall_area` no longer splits.
-FRAGMENT_SHARE = 0.1
+FRAGMENT_SHARE = 0.01
 
 
 @dataclass(frozen=True)

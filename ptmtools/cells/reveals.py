@@ -12,12 +12,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.cells.polyhedron import Polyhedron
+from ptmtools.cells.polyhedron import BOX_FACE, Polyhedron
 from ptmtools.cells.structure import (
     Frame,
     WallPlane,
     lying_in,
-    parallel_and_near,
+    parallel_gap,
     planes_of,
     unite,
 )
@@ -42,25 +42,22 @@ class Reveals:
 
         ``planes`` are those of the BSP nodes that the tags of the body's faces name.
         """
-        slab = self._slab(body, planes)
+        slab = self._slab(_bounds(body, planes))
         if slab is None:
             return []
-        first, second = planes[slab[0]], planes[slab[1]]
-        key = first.tobytes() + second.tobytes()
+        key = slab[0].tobytes() + slab[1].tobytes()
         if key not in self._known:
-            self._known[key] = self._bridges(first, second)
+            self._known[key] = self._bridges(*slab)
         return self._known[key]
 
-    def _slab(self, body: Polyhedron, planes: list[NDArray[np.float64]]) -> tuple[int, int] | None:
-        """The nearest pair of parallel BSP planes that bound a body within the wall thickness."""
+    def _slab(
+        self, bounds: list[NDArray[np.float64]]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """The nearest pair of parallel planes within the wall thickness."""
         nearest, pair = self._limit, None
-        tags = sorted({tag for tag in body.tags if tag >= 0})
-        for i, a in enumerate(tags):
-            for b in tags[i + 1 :]:
-                turn = float(planes[a][:3] @ planes[b][:3])
-                if abs(turn) < self._tolerance.cosine:
-                    continue
-                gap = abs(float(planes[a][3]) - float(np.sign(turn)) * float(planes[b][3]))
+        for i, a in enumerate(bounds):
+            for b in bounds[i + 1 :]:
+                gap = parallel_gap(a, b, self._tolerance)
                 if gap <= nearest:
                     nearest, pair = gap, (a, b)
         return pair
@@ -79,7 +76,8 @@ class Reveals:
         found: list[WallPlane] = []
         for seed in bridging[np.argsort(-self._areas[bridging], kind="stable")]:
             plane = self._planes[seed]
-            if any(parallel_and_near(plane, w.frame.plane, self._tolerance) for w in found):
+            apart = (parallel_gap(plane, w.frame.plane, self._tolerance) for w in found)
+            if min(apart, default=self._limit) < self._tolerance.thin:
                 continue
             frame = Frame.of(plane)
             flat = inside[lying_in(plane, self._corners[inside], self._tolerance)]
@@ -92,3 +90,15 @@ class Reveals:
                 )
             )
         return found
+
+
+def _bounds(body: Polyhedron, planes: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+    """The planes of a body's faces: those of the BSP, and those of the root box, in which the
+    outer faces of a building lie when the box is clipped to it."""
+    bounds = [planes[tag] for tag in sorted({tag for tag in body.tags if tag != BOX_FACE})]
+    for loop, tag in zip(body.faces, body.tags, strict=True):
+        if tag == BOX_FACE:
+            p = body.points[loop]
+            axis = int(np.argmin(np.ptp(p, axis=0)))
+            bounds.append(np.append(np.eye(3)[axis], -p[0, axis]))
+    return bounds

@@ -215,11 +215,12 @@ def _bins(
     return label, rows
 
 
-def parallel_and_near(
+def parallel_gap(
     plane: NDArray[np.float64], other: NDArray[np.float64], tolerance: Tolerance
-) -> bool:
-    """Whether two planes are close enough to count as one wall."""
+) -> float:
+    """Distance of two parallel (4,) planes in metres, whichever way they face; infinite for planes
+    that are not parallel."""
     turn = float(plane[:3] @ other[:3])
     if abs(turn) < tolerance.cosine:
-        return False
-    return abs(float(plane[3]) - float(np.sign(turn)) * float(other[3])) <= tolerance.cluster
+        return float("inf")
+    return abs(float(plane[3]) - float(np.sign(turn)) * float(other[3]))
