@@ -5,8 +5,8 @@ plane and Haar difference. The normal equations are sums of integers and are sol
 fraction-free elimination, so that every machine finds the same weights; the decoder only reads
 them.
 
-Fixed weights alone cost 0.7 % on photographs but 12 % on other textures (normal maps above all,
-whose components are related in ways of their own).
+With the built-in weights alone, photographs grow by 1.5 % and other textures by 10.7 % (normal maps
+most: their components are related in ways of their own).
 """
 
 from __future__ import annotations

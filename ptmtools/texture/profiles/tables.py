@@ -4,8 +4,7 @@ Each table of a group is either one of a family of two-sided geometric distribut
 byte, or the frequencies counted, in nibbles. Small groups live on the first kind, large ones on
 the second; the encoder takes whichever is shorter, table by table.
 
-Tried and rejected: deflated frequencies (1 % shorter than nibbles, but then the bytes of a file
-would depend on the zlib that wrote it).
+Deflating the frequencies was rejected: the bytes of a file would depend on the zlib that wrote it.
 """
 
 from __future__ import annotations
