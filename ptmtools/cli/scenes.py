@@ -40,8 +40,8 @@ viewpoints = click.option(
     type=Numbers([3, 4]),
     multiple=True,
     metavar="X,Y,Z[,YAW]",
-    help="A place to start from: world metres, and degrees counter-clockwise from -Z. May be "
-    "given several times. What can be reached from there becomes cells.",
+    help="A place to start from, and from which cells are to be reached: world metres; the yaw "
+    "in degrees, counter-clockwise from -Z. May be given several times.",
 )
 
 
