@@ -4,8 +4,9 @@
 
 One ray a pixel (``--samples 2`` for 2 × 2) through Embree; texture bilinear from the full image,
 repeated or clamped, times the material's colour; transparent surfaces are looked through.
-``--shading headlight`` darkens all by the cosine between surface and ray, ``browser`` only what
-has no image, as VRML97 browsers do with the emitted files, ``flat`` nothing.
+``--shading headlight`` darkens all by the cosine between surface and ray; ``browser`` only what
+has no image, by the cosine to the direction of view, as VRML97 browsers do with the emitted
+files; ``flat`` nothing.
 
 It shares nothing with the stages but ingest's arrays, so that it can be held against what
 browsers make of the emitted files. Coordinates are the world's: metres, Y up, origin at the
@@ -81,14 +82,12 @@ def sample(
 
 
 def camera_rays(
-    direction: Vector, up: Vector, fov: float, width: int, height: int
+    ahead: NDArray[np.float64], up: Vector, fov: float, width: int, height: int
 ) -> NDArray[np.float64]:
-    """(height × width, 3) unit directions through pixel centres; ``fov`` in radians.
+    """(height × width, 3) unit directions through pixel centres around the unit vector ``ahead``.
 
-    As VRML97 has it, ``fov`` is the angle over the smaller side of the picture.
+    As VRML97 has it, ``fov`` (radians) is the angle over the smaller side of the picture.
     """
-    ahead = np.asarray(direction, dtype=np.float64)
-    ahead = ahead / np.linalg.norm(ahead)
     right = np.cross(ahead, up)
     right /= np.linalg.norm(right)
     above = np.cross(right, ahead)
@@ -130,7 +129,9 @@ def render(
     plain = np.array([m.image < 0 for m in scene.materials])[scene.triangle_material]
     lit = {"headlight": plain | True, "browser": plain, "flat": plain & False}[shading]
 
-    rays = camera_rays(direction, up, fov, width * samples, height * samples)
+    ahead = np.asarray(direction, dtype=np.float64)
+    ahead = ahead / np.linalg.norm(ahead)
+    rays = camera_rays(ahead, up, fov, width * samples, height * samples)
     color = np.zeros((len(rays), 3), dtype=np.float32)
     left = np.ones(len(rays), dtype=np.float32)
     start = np.zeros_like(rays)
@@ -148,7 +149,8 @@ def render(
         if not len(active):
             break
         rgba = _shaded(scene, images, face, np.stack([1 - u - v, u, v], 1))
-        facing = np.abs(np.einsum("ij,ij->i", normals[face], rays[active])).astype(np.float32)
+        light = ahead if shading == "browser" else rays[active]
+        facing = np.abs((normals[face] * light).sum(axis=1)).astype(np.float32)
         rgba[:, :3] *= np.where(lit[face], facing, np.float32(1))[:, None]
         color[active] += (left[active] * rgba[:, 3])[:, None] * rgba[:, :3]
         left[active] *= 1 - rgba[:, 3]
