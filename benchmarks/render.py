@@ -5,8 +5,8 @@
 One ray a pixel (``--samples 2`` for 2 × 2) through Embree; texture bilinear from the full image,
 repeated or clamped, times the material's colour; transparent surfaces are looked through.
 ``--shading headlight`` darkens all by the cosine between surface and ray; ``browser`` only what
-has no image, by the cosine to the direction of view, as VRML97 browsers do with the emitted
-files; ``flat`` nothing.
+has no image, by the cosine to the direction of view, before a black sky, as VRML97 browsers do
+with the emitted files; ``flat`` nothing.
 
 It shares nothing with the stages but ingest's arrays, so that it can be held against what
 browsers make of the emitted files. Coordinates are the world's: metres, Y up, origin at the
@@ -30,6 +30,8 @@ from ptmtools.errors import PtmError
 from ptmtools.scene.model import Material, Scene, Space
 
 SKY = (0.62, 0.74, 0.88)
+#: What the emitted materials shine by themselves, a share of their colour.
+GLOW = 0.25
 #: Transparent surfaces looked through before a ray gives up.
 LAYERS = 12
 Vector = Sequence[float] | NDArray[np.float64]
@@ -127,6 +129,7 @@ def render(
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
 
     plain = np.array([m.image < 0 for m in scene.materials])[scene.triangle_material]
+    sky, glow = ((0, 0, 0), GLOW) if shading == "browser" else (SKY, 0.0)
     lit = {"headlight": plain | True, "browser": plain, "flat": plain & False}[shading]
 
     ahead = np.asarray(direction, dtype=np.float64)
@@ -143,7 +146,7 @@ def render(
         )
         face = np.asarray(hit["primID"], dtype=np.int64)
         gone = face < 0
-        color[active[gone]] += left[active[gone], None] * np.asarray(SKY, dtype=np.float32)
+        color[active[gone]] += left[active[gone], None] * np.asarray(sky, dtype=np.float32)
         u, v, t = (np.asarray(hit[k], dtype=np.float64)[~gone] for k in ("u", "v", "tfar"))
         active, face = active[~gone], face[~gone]
         if not len(active):
@@ -151,7 +154,7 @@ def render(
         rgba = _shaded(scene, images, face, np.stack([1 - u - v, u, v], 1))
         light = ahead if shading == "browser" else rays[active]
         facing = np.abs((normals[face] * light).sum(axis=1)).astype(np.float32)
-        rgba[:, :3] *= np.where(lit[face], facing, np.float32(1))[:, None]
+        rgba[:, :3] *= np.where(lit[face], facing + np.float32(glow), np.float32(1))[:, None]
         color[active] += (left[active] * rgba[:, 3])[:, None] * rgba[:, :3]
         left[active] *= 1 - rgba[:, 3]
         start[active] += rays[active] * (t + nudge)[:, None]
