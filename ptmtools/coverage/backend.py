@@ -12,8 +12,8 @@ from ptmtools.errors import MissingComponentError
 
 #: What a sample point costs, in µs: Mesa's rasteriser for each triangle (six views of it) and each
 #: pixel, Embree for each ray. Fitted to `benchmarks/ach.py`; only their proportions matter.
-RASTER_TRIANGLE = 0.75
-RASTER_PIXEL = 0.03
+RASTER_TRIANGLE = 1.0
+RASTER_PIXEL = 0.05
 RAY = 0.25
 
 

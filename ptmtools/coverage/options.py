@@ -25,7 +25,7 @@ class AchOptions:
     samples: sample points a cell; the paper uses 8.
     face: pixels a side of each of the six views. Positions matter far more: ask for more samples
         before a larger face.
-    backend: "gl" (OpenGL), "embree" (rays on the processor), or "auto" (see `choose_backend`).
+    backend: "gl" (OpenGL), "embree" (rays on the processor), or "auto" (see `backend.open_renderer`).
     clearance: metres that a sample point keeps from every surface; None for a quarter of
         the least thickness of a cell, `Tolerance.thin`.
     seed: which stretch of the sequence of sample points is taken.
