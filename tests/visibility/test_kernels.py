@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from ptmtools.visibility import kernels
 from ptmtools.visibility.flow import GROWTH, Portals, geometry, scratch
+from ptmtools.visibility.winding import kernels as winding
 
 SLACK = 1e-12
 Z = np.array([[0.0, 0, 1]])
@@ -37,23 +38,23 @@ def test_clip_is_the_half_plane_intersection(rng, n, c):
     angle = rng.uniform(0, 2 * np.pi)
     normal = np.array([np.cos(angle), np.sin(angle)])
     polygon, size = slots(points)
-    status = kernels.clip(polygon, size, 0, np.zeros(polygon.shape[1]), *normal, 0.0, c, SLACK)
+    status = winding.clip(polygon, size, 0, np.zeros(polygon.shape[1]), *normal, 0.0, c, SLACK)
     along = np.array([-normal[1], normal[0]])
     half = np.array([-1, 1, 1, -1])[:, None] * 50 * along + np.array([0, 0, 1, 1])[:, None] * (
         50 * normal
     )
     expected = shapely.Polygon(points).intersection(shapely.Polygon(half + c * normal)).area
-    kept = 0.0 if status == kernels.EMPTY else shapely.Polygon(polygon[0, : size[0], :2]).area
+    kept = 0.0 if status == winding.EMPTY else shapely.Polygon(polygon[0, : size[0], :2]).area
     assert kept == pytest.approx(expected, abs=1e-9)
-    assert (status == kernels.WHOLE) == bool((points @ normal >= c - SLACK).all())
+    assert (status == winding.WHOLE) == bool((points @ normal >= c - SLACK).all())
 
 
 def test_clip_drops_what_only_touches_and_keeps_a_sliver():
     square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
-    for at, status in ((1.0, kernels.EMPTY), (1 - 1e-9, kernels.CUT), (0.0, kernels.WHOLE)):
+    for at, status in ((1.0, winding.EMPTY), (1 - 1e-9, winding.CUT), (0.0, winding.WHOLE)):
         polygon, size = slots(square)
         distance = np.zeros(polygon.shape[1])
-        assert kernels.clip(polygon, size, 0, distance, 1.0, 0.0, 0.0, at, SLACK) == status
+        assert winding.clip(polygon, size, 0, distance, 1.0, 0.0, 0.0, at, SLACK) == status
 
 
 def test_clip_never_overruns_a_slot():
@@ -62,8 +63,8 @@ def test_clip_never_overruns_a_slot():
     polygon, size = slots(teeth)
     polygon = np.ascontiguousarray(polygon[:, : len(teeth) + 1])
     before = polygon[0].copy()
-    status = kernels.clip(polygon, size, 0, np.zeros(50), 0.0, 1.0, 0.0, 0.5, SLACK)
-    assert status == kernels.WHOLE
+    status = winding.clip(polygon, size, 0, np.zeros(50), 0.0, 1.0, 0.0, 0.5, SLACK)
+    assert status == winding.WHOLE
     assert np.array_equal(polygon[0], before)
 
 
@@ -94,7 +95,7 @@ def test_separators_are_those_of_brute_force(rng, na, nb):
     polygon, size = slots(a, b)
     plane = np.zeros((1, 2 * polygon.shape[1], 4))
     normal = np.array([Z[0], Z[0] @ turn])
-    count = kernels.separate(polygon, size, 0, 0, 1.0, 1, 1, -1.0, normal, plane, 0, SLACK)
+    count = winding.separate(polygon, size, 0, 0, 1.0, 1, 1, -1.0, normal, plane, 0, SLACK)
     ours, theirs = plane[0, :count], brute_force_separators(a, b)
     assert count > 0
     for one, other in ((ours, theirs), (theirs, ours)):
@@ -110,7 +111,7 @@ def test_no_line_through_both_polygons_leaves_the_separators(rng):
     polygon, size = slots(a, b)
     plane = np.zeros((1, 2 * polygon.shape[1], 4))
     normal = np.concatenate([Z, Z])
-    count = kernels.separate(polygon, size, 0, 0, 1.0, 1, 1, -1.0, normal, plane, 0, SLACK)
+    count = winding.separate(polygon, size, 0, 0, 1.0, 1, 1, -1.0, normal, plane, 0, SLACK)
     p = rng.dirichlet(np.ones(5), 200) @ a
     q = rng.dirichlet(np.ones(4), 200) @ b
     beyond = p + rng.uniform(1, 20, (200, 1)) * (q - p)
@@ -183,3 +184,29 @@ def test_a_chain_longer_than_the_scratch_is_accepted_whole(room_row):
         _, cut = kernels.flow(g, storage, known, 0, 10**6, seen)
         assert cut == expected_cut
         assert seen[0] == known[0, 0]
+
+
+def test_a_glance_sees_a_straight_corridor_and_nothing_behind_a_corner(room_row, build_rooms):
+    for cells, last in (
+        (room_row(5)[1], 6),
+        (build_rooms(np.arange(5) * 4.0, [0.0, 3.0], [0.0, 4.0], {
+            (0, 0, 0, 0): [(0.0, 2.0, 0.0, 1.0)],
+            (1, 0, 0, 0): [(0.0, 2.0, 3.0, 4.0)],
+            (2, 0, 0, 0): [(0.0, 2.0, 0.0, 1.0)],
+        }).cells, 2),
+    ):  # fmt: skip
+        g = geometry(
+            Portals(
+                cells.leaf_count,
+                cells.portal_leaf,
+                cells.portal_plane[:, :3],
+                cells.portal_point,
+                cells.portal_start,
+            )
+        )
+        n = len(g.leaf)
+        known = np.full((n, 1), (1 << n) - 1, np.uint64)
+        known[0, 0] ^= np.uint64(1)
+        seen = np.zeros(1, np.uint64)
+        assert kernels.glance(g, known, 0, seen) > 0
+        assert seen[0] == sum(1 << q for q in range(2, last + 1, 2))

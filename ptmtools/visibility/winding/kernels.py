@@ -1,0 +1,239 @@
+"""Clipping and separating convex polygons in space, compiled.
+
+Polygons live in numbered slots of one scratch array: ``polygon`` (S, V, 3) and ``size`` (S,); the
+last slot is spare. Planes live in rows, ``plane`` (R, P, 4): a unit normal n and an offset c; kept
+is the side n·x >= c.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+EMPTY, WHOLE, CUT = 0, 1, 2
+
+
+@njit(cache=True, nogil=True)
+def clip(
+    polygon: Floats,
+    size: Ints,
+    slot: int,
+    distance: Floats,
+    n0: float,
+    n1: float,
+    n2: float,
+    c: float,
+    slack: float,
+) -> int:
+    """Keeps what of a polygon lies at n·x >= c, and ``slack`` more; in place.
+
+    EMPTY if nothing reaches beyond c + slack. A polygon that would outgrow its slot stays WHOLE.
+    """
+    count = size[slot]
+    low, high = np.inf, -np.inf
+    for i in range(count):
+        d = n0 * polygon[slot, i, 0] + n1 * polygon[slot, i, 1] + n2 * polygon[slot, i, 2] - c
+        distance[i] = d
+        low = min(low, d)
+        high = max(high, d)
+    if high <= slack:
+        return EMPTY
+    if low >= -slack:
+        return WHOLE
+    spare = len(polygon) - 1
+    m = 0
+    for i in range(count):
+        j = i + 1 if i + 1 < count else 0
+        if m + 2 > polygon.shape[1]:
+            return WHOLE
+        d, e = distance[i] + slack, distance[j] + slack
+        if d >= 0:
+            for a in range(3):
+                polygon[spare, m, a] = polygon[slot, i, a]
+            m += 1
+        if (d > 0 and e < 0) or (d < 0 and e > 0):
+            t = d / (d - e)
+            for a in range(3):
+                x = polygon[slot, i, a]
+                polygon[spare, m, a] = x + t * (polygon[slot, j, a] - x)
+            m += 1
+    copy(polygon, size, spare, slot, m)
+    return CUT
+
+
+@njit(cache=True, nogil=True)
+def copy(polygon: Floats, size: Ints, source: int, target: int, count: int) -> None:
+    """Puts the first ``count`` vertices of one slot into another."""
+    for i in range(count):
+        for a in range(3):
+            polygon[target, i, a] = polygon[source, i, a]
+    size[target] = count
+
+
+@njit(cache=True, nogil=True)
+def load(point: Floats, start: Ints, k: int, polygon: Floats, size: Ints, slot: int) -> None:
+    """Puts the winding of portal k into a slot."""
+    first = start[k]
+    count = start[k + 1] - first
+    for i in range(count):
+        for a in range(3):
+            polygon[slot, i, a] = point[first + i, a]
+    size[slot] = count
+
+
+@njit(cache=True, nogil=True)
+def separators_through(
+    polygon: Floats,
+    size: Ints,
+    a: int,
+    n0: float,
+    n1: float,
+    n2: float,
+    sign: float,
+    b: int,
+    flip: bool,
+    plane: Floats,
+    row: int,
+    count: int,
+    slack: float,
+) -> int:
+    """Appends to plane row ``row`` the separating planes through the edges of polygon ``a``.
+
+    (n0, n1, n2) is a's own normal, counter-clockwise; times ``sign`` it points towards polygon
+    ``b``. The plane through an edge turns about it: outward in a's plane + t · towards b. The
+    least t that has all of b on the far side gives the tightest separator. It is accepted by
+    measuring both polygons against it, so a badly conditioned edge can only cost tightness. With
+    ``flip`` the kept side is a's (a is the nearer to the target), else b's. Returns the number of
+    planes in the row.
+    """
+    size_a, size_b = size[a], size[b]
+    for i in range(size_a):
+        if count == plane.shape[1]:
+            break
+        j = i + 1 if i + 1 < size_a else 0
+        a0, a1, a2 = polygon[a, i, 0], polygon[a, i, 1], polygon[a, i, 2]
+        e0, e1, e2 = polygon[a, j, 0] - a0, polygon[a, j, 1] - a1, polygon[a, j, 2] - a2
+        w0 = e1 * n2 - e2 * n1
+        w1 = e2 * n0 - e0 * n2
+        w2 = e0 * n1 - e1 * n0
+        length = np.sqrt(w0 * w0 + w1 * w1 + w2 * w2)
+        if length <= 0.0:
+            continue
+        length = 1.0 / length
+        w0, w1, w2 = w0 * length, w1 * length, w2 * length
+        t = -np.inf
+        for k in range(size_b):
+            r0, r1, r2 = polygon[b, k, 0] - a0, polygon[b, k, 1] - a1, polygon[b, k, 2] - a2
+            u = w0 * r0 + w1 * r1 + w2 * r2
+            v = sign * (n0 * r0 + n1 * r1 + n2 * r2)
+            if v > slack:
+                t = max(t, -u / v)
+            elif u < -slack:
+                t = np.inf
+                break
+        if not np.isfinite(t):
+            continue
+        scale = 1.0 / np.sqrt(1.0 + t * t)
+        t *= sign
+        m0, m1, m2 = (w0 + t * n0) * scale, (w1 + t * n1) * scale, (w2 + t * n2) * scale
+        near, far = -np.inf, np.inf
+        for k in range(size_a):
+            near = max(near, m0 * polygon[a, k, 0] + m1 * polygon[a, k, 1] + m2 * polygon[a, k, 2])
+        for k in range(size_b):
+            far = min(far, m0 * polygon[b, k, 0] + m1 * polygon[b, k, 1] + m2 * polygon[b, k, 2])
+        if near > far + slack:
+            continue
+        if flip:
+            m0, m1, m2, far = -m0, -m1, -m2, -near
+        plane[row, count, 0] = m0
+        plane[row, count, 1] = m1
+        plane[row, count, 2] = m2
+        plane[row, count, 3] = far
+        count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def separate(
+    polygon: Floats,
+    size: Ints,
+    a: int,
+    k: int,
+    sign_a: float,
+    b: int,
+    j: int,
+    sign_b: float,
+    normal: Floats,
+    plane: Floats,
+    row: int,
+    slack: float,
+) -> int:
+    """Plane row ``row`` := all planes that separate a from b; kept is the side of b, and beyond.
+
+    Polygon a lies in portal k and b in portal j; ``sign_a`` times k's normal points towards b,
+    ``sign_b`` times j's towards a. Returns the number of planes.
+    """
+    n0, n1, n2 = normal[k, 0], normal[k, 1], normal[k, 2]
+    count = separators_through(polygon, size, a, n0, n1, n2, sign_a, b, False, plane, row, 0, slack)
+    n0, n1, n2 = normal[j, 0], normal[j, 1], normal[j, 2]
+    return separators_through(
+        polygon, size, b, n0, n1, n2, sign_b, a, True, plane, row, count, slack
+    )
+
+
+@njit(cache=True, nogil=True)
+def clip_all(
+    polygon: Floats,
+    size: Ints,
+    slot: int,
+    distance: Floats,
+    plane: Floats,
+    row: int,
+    count: int,
+    slack: float,
+) -> int:
+    """Clips a polygon by the planes of a row; the status of `clip`."""
+    status = WHOLE
+    for i in range(count):
+        n0, n1, n2 = plane[row, i, 0], plane[row, i, 1], plane[row, i, 2]
+        now = clip(polygon, size, slot, distance, n0, n1, n2, plane[row, i, 3], slack)
+        if now == EMPTY:
+            return EMPTY
+        if now == CUT:
+            status = CUT
+    return status
+
+
+@njit(cache=True, nogil=True)
+def beyond(
+    point: Floats,
+    start: Ints,
+    ball: Floats,
+    k: int,
+    plane: Floats,
+    row: int,
+    count: int,
+    slack: float,
+) -> bool:
+    """Whether portal k reaches beyond every plane of a row."""
+    c0, c1, c2, radius = ball[k, 0], ball[k, 1], ball[k, 2], ball[k, 3]
+    for i in range(count):
+        n0, n1, n2 = plane[row, i, 0], plane[row, i, 1], plane[row, i, 2]
+        d = n0 * c0 + n1 * c1 + n2 * c2 - plane[row, i, 3]
+        if d > slack:
+            continue
+        if d + radius <= slack:
+            return False
+        floor = plane[row, i, 3] + slack
+        found = False
+        for j in range(start[k], start[k + 1]):
+            if n0 * point[j, 0] + n1 * point[j, 1] + n2 * point[j, 2] > floor:
+                found = True
+                break
+        if not found:
+            return False
+    return True
