@@ -55,15 +55,11 @@ demo: build/museum/.made
 	$(BIN)/ptm build-scene build/museum/museum.obj -o build/museum.db
 	$(BIN)/ptm plot build/museum.db --cell 0 -o build/museum.png --force
 	@echo
-	@echo "The floor plan, with what the first cell sees, is in build/museum.png."
-	@echo "Next:"
-	@echo "  $(BIN)/ptm validate build/museum.db                        check every file"
-	@echo "  $(BIN)/ptm info build/museum.db                            what is in it"
-	@echo "  $(BIN)/python -m http.server -d build/museum.db/www 8000   serve it"
-	@echo "  $(BIN)/ptm build-scene YOUR.obj -o your.db                 your own model"
+	@echo "The floor plan of the museum, with what its first cell sees, is in build/museum.png."
+	@echo "Your own model: $(BIN)/ptm build-scene MODEL.obj -o MODEL.db"
 
 test: $(VENV)/.installed-dev
-	@.ci/system-packages
+	@.ci/test-components
 	$(BIN)/python -m pytest -n $(JOBS) $(PYTEST_ARGS)
 
 lint: $(VENV)/.installed-dev

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import sys
 from collections.abc import Mapping
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import click
@@ -177,12 +181,24 @@ def _tell(voice: Voice, report: BuildReport, as_json: bool) -> None:
     if len(shown) < len(report.notes):
         voice.say(f"note: {len(report.notes) - len(shown):,} more; -v shows them all")
     if any(stage.stage == "emit" for stage in report.stages):
-        db = report.database
+        ptm, db = _invoked(), report.database
         voice.say("")
         voice.say(f"The database is {db}. Next:")
-        voice.say(f"  ptm plot {db} -o plan.png              its floor plan")
-        voice.say(f"  ptm validate {db}                      check every file")
-        voice.say(f"  python3 -m http.server -d {db}/www     serve it; start at root.wrl")
+        for command, told in (
+            (f"{ptm} plot {db} -o plan.png", "its floor plan"),
+            (f"{ptm} validate {db}", "check every file"),
+            (f"python3 -m http.server -d {db}/www", "serve it; start at root.wrl"),
+        ):
+            voice.say(f"  {command:<50} {told}")
+
+
+def _invoked() -> str:
+    """How the user calls this command: by its name, or by a path where it is not on PATH."""
+    called = sys.argv[0]
+    found = shutil.which("ptm")
+    if Path(called).name != "ptm" or (found and Path(found).samefile(called)):
+        return "ptm"
+    return os.path.relpath(called)
 
 
 def figures(stage: str, counts: Mapping[str, Any]) -> str:
