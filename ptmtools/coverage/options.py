@@ -25,9 +25,10 @@ class AchOptions:
     samples: sample points a cell; the paper uses 8.
     face: pixels a side of each of the six views. Positions matter far more: ask for more samples
         before a larger face.
-    backend: "gl" (OpenGL), "embree" (rays on the processor), or "auto" (see `backend.open_renderer`).
-    clearance: metres that a sample point keeps from every surface; None for a quarter of
-        the least thickness of a cell, `Tolerance.thin`.
+    backend: "gl" (OpenGL), "embree" (rays on the processor), or "auto": whichever is there and
+        expected to be faster.
+    clearance: metres that a sample point keeps from every surface; if not given, a quarter of
+        the least thickness that a cell may have.
     seed: which stretch of the sequence of sample points is taken.
     workers: threads of the embree backend, None for one per processor; never changes the result.
     """
