@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 import sys
 from collections.abc import Mapping
@@ -181,7 +182,7 @@ def _tell(voice: Voice, report: BuildReport, as_json: bool) -> None:
     if len(shown) < len(report.notes):
         voice.say(f"note: {len(report.notes) - len(shown):,} more; -v shows them all")
     if any(stage.stage == "emit" for stage in report.stages):
-        ptm, db = _invoked(), report.database
+        ptm, db = _invoked(), shlex.quote(report.database)
         voice.say("")
         voice.say(f"The database is {db}. Next:")
         for command, told in (
@@ -196,9 +197,11 @@ def _invoked() -> str:
     """How the user calls this command: by its name, or by a path where it is not on PATH."""
     called = sys.argv[0]
     found = shutil.which("ptm")
-    if Path(called).name != "ptm" or (found and Path(found).samefile(called)):
+    if Path(called).name != "ptm" or (
+        found and os.path.realpath(found) == os.path.realpath(called)
+    ):
         return "ptm"
-    return os.path.relpath(called)
+    return shlex.quote(called)
 
 
 def figures(stage: str, counts: Mapping[str, Any]) -> str:
