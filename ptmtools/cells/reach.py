@@ -19,6 +19,10 @@ from ptmtools.cells.portals import Portals
 
 #: A surface whose normal leans less than this from the vertical can be stood on (cosine of 45°).
 FLOOR_COSINE = 0.7
+#: The largest floor triangles, this many, stand for the whole floor.
+FLOOR_SAMPLES = 400
+#: Surfaces nearer to one another than this share of the model's height are one surface.
+FLOOR_SHARE = 0.05
 
 
 @dataclass(frozen=True)
@@ -76,17 +80,42 @@ def largest_with_floor(
     return ()
 
 
+def roofed_share(corners: NDArray[np.float64], floor_area: float) -> float:
+    """Share of the floor, by area, that has something over it (1 without any floor).
+
+    Floor is every level triangle of at least a tenth of ``floor_area`` m²; a ceiling is floor that
+    nothing covers, so of the triangles over one another at a place only the lowest is floor.
+    """
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(normal, axis=1) / 2
+    level = np.abs(normal[:, 1]) >= FLOOR_COSINE * 2 * area
+    floor = np.flatnonzero(level & (area >= floor_area / 10))
+    order = floor[np.argsort(-area[floor], kind="stable")][:FLOOR_SAMPLES]
+    apart = FLOOR_SHARE * float(np.ptp(corners[:, :, 1])) if len(corners) else 0.0
+    covered = total = 0.0
+    for triangle in order:
+        heights = _plumb(corners[triangle].mean(axis=0), corners)
+        if not np.any(heights < -apart):
+            total += area[triangle]
+            covered += area[triangle] * bool(np.any(heights > apart))
+    return float(covered / total) if total else 1.0
+
+
 def _floor_below(eye: NDArray[np.float64], corners: NDArray[np.float64]) -> bool:
     """Whether a plumb line from ``eye`` meets a triangle that can be stood on."""
+    return bool(np.any(_plumb(eye, corners) < 0))
+
+
+def _plumb(eye: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Heights above ``eye`` (metres) at which a plumb line meets triangles that can be stood on."""
     flat = corners[:, :, [0, 2]] - eye[[0, 2]]
     turn = flat[:, [1, 2, 0]]
     side = flat[:, :, 0] * turn[:, :, 1] - flat[:, :, 1] * turn[:, :, 0]
     hit = np.flatnonzero(np.all(side >= 0, axis=1) | np.all(side <= 0, axis=1))
     p = corners[hit]
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    steep = np.abs(normal[:, 1]) < FLOOR_COSINE * np.linalg.norm(normal, axis=1)
-    p, normal = p[~steep], normal[~steep]
-    upright = normal[:, 1] != 0
-    p, normal = p[upright], normal[upright]
-    height = np.einsum("ij,ij->i", normal, p[:, 0] - eye) / normal[:, 1]
-    return bool(np.any(height < 0))
+    level = np.abs(normal[:, 1]) >= FLOOR_COSINE * np.linalg.norm(normal, axis=1)
+    level &= normal[:, 1] != 0
+    p, normal = p[level], normal[level]
+    heights: NDArray[np.float64] = np.einsum("ij,ij->i", normal, p[:, 0] - eye) / normal[:, 1]
+    return heights

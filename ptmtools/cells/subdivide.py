@@ -24,7 +24,7 @@ from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import Portals, find_portals
-from ptmtools.cells.reach import Reach, flood, largest_with_floor
+from ptmtools.cells.reach import Reach, flood, largest_with_floor, roofed_share
 from ptmtools.cells.reveals import Reveals
 from ptmtools.cells.structure import WallPlane, find_walls, structural_triangles
 from ptmtools.errors import InputError
@@ -34,6 +34,8 @@ from ptmtools.tolerance import Tolerance
 
 #: How far the first root box stands off the model, as a share of the model's extent.
 BOX_MARGIN = 0.01
+#: A model is open above if less than this share of its floor has something over it.
+ROOFED = 0.5
 
 
 @dataclass(frozen=True)
@@ -62,15 +64,15 @@ def subdivide(
     walls = find_walls(scene, options, tolerance)
     corners = scene.corners[structural_triangles(scene, options)]
     reveals = Reveals(corners, options.wall_thickness, tolerance)
-    used = scene.points[np.unique(scene.triangles)]
-    low, high = used.min(axis=0), used.max(axis=0)
+    low, high = _bounds(scene.corners)
     margin = BOX_MARGIN * tolerance.extent
     wide = np.array([low - margin, high + margin])
     space = _divide(wide, walls, reveals, corners, options, tolerance, progress)
     notes: list[str] = []
     if not space.reach.closed:
-        tight = _clipped_box(walls, low, high, tolerance)
-        notes.append(_open_note(space, tight, low, high))
+        roofed = roofed_share(corners, options.wall_area)
+        tight = _thickened(*_bounds(corners if len(corners) else scene.corners), tolerance)
+        notes.append(_open_note(space, roofed, tight))
         space = _divide(tight, walls, reveals, corners, options, tolerance, progress, whole=True)
     pieces = cut_to_leaves(scene, space.tree, tolerance)
     return _assemble(scene, space, pieces, notes)
@@ -161,25 +163,9 @@ def _viewpoint_leaves(
     return tuple(found)
 
 
-def _clipped_box(
-    walls: list[WallPlane],
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
-    tolerance: Tolerance,
-) -> NDArray[np.float64]:
-    """The bounds of the walls; those of the model along axes in which the walls are flat."""
-    import shapely
-
-    if not walls:
-        return _thickened(low, high, tolerance)
-    points = np.concatenate([w.frame.to_space(shapely.get_coordinates(w.walls)) for w in walls])
-    low_wall, high_wall = points.min(axis=0), points.max(axis=0)
-    flat = high_wall - low_wall < tolerance.thin
-    return _thickened(
-        np.where(flat, low, np.maximum(low, low_wall)),
-        np.where(flat, high, np.minimum(high, high_wall)),
-        tolerance,
-    )
+def _bounds(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    points = corners.reshape(-1, 3)
+    return points.min(axis=0), points.max(axis=0)
 
 
 def _thickened(
@@ -190,19 +176,15 @@ def _thickened(
     return np.array([low, np.where(flat, low + BOX_MARGIN * tolerance.extent, high)])
 
 
-def _open_note(
-    space: _Space,
-    tight: NDArray[np.float64],
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
-) -> str:
-    if not space.reach.start:
-        why = "no room is closed off from the outside (no ceiling, or no outer wall)"
+def _open_note(space: _Space, roofed: float, box: NDArray[np.float64]) -> str:
+    if roofed < ROOFED:
+        what = f"open above: {1 - roofed:.0%} of the floor has no ceiling"
+    elif not space.reach.start:
+        what = "open: no room is closed off from the outside"
     else:
-        why = "the outside can be reached from the rooms (windows, doors or gaps)"
-    size = " × ".join(f"{s:.2f}" for s in tight[1] - tight[0])
-    cropped = "" if np.allclose(tight, [low, high]) else ", lower or narrower than the model"
-    return f"the model is open: {why}; root box clipped to the walls, {size} m{cropped}"
+        what = "open: the outside can be reached from the rooms (windows, doors or gaps)"
+    size = " × ".join(f"{s:.2f}" for s in box[1] - box[0])
+    return f"the model is {what}; root box clipped to the structure, {size} m"
 
 
 def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> Cells:
