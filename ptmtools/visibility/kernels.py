@@ -32,8 +32,8 @@ Bits = NDArray[np.uint64]
 
 ONE = np.uint64(1)
 ZERO = np.uint64(0)
-#: A search glances when it has spent this part of its budget: one in …
-GLANCE_AFTER = 16
+#: Operations after which a search glances, which costs about as much again.
+GLANCE_AFTER = 12_500
 # Index of the lowest set bit: a De Bruijn sequence of order 6 and its inverse.
 DE_BRUIJN = np.uint64(0x03F79D71B4CB0A89)
 LOW_BIT = np.zeros(64, dtype=np.int64)
@@ -306,7 +306,7 @@ def flow(
     cut = False
     looked = False
     while f >= 0:
-        if not looked and ops >= budget // GLANCE_AFTER:
+        if not looked and GLANCE_AFTER <= ops < budget:
             ops += glance(g, known, source, seen)
             looked = True
         if at[f] == g.out_start[g.leaf[via[f]] + 1]:
