@@ -43,9 +43,7 @@ class Body:
     box: NDArray[np.float64]
 
     def contains(self, point: NDArray[np.float64]) -> bool:
-        """Whether a (3,) point is inside: odd crossings along most of the rays."""
-        if np.any(point < self.box[0]) or np.any(point > self.box[1]):
-            return False
+        """Whether a (3,) point in the box is inside: odd crossings along most of the rays."""
         odd = sum(crossings(self.corners - point, d) % 2 for d in DIRECTIONS)
         return 2 * odd > len(DIRECTIONS)
 
@@ -70,7 +68,8 @@ def bodies(scene: Scene, cells: Cells) -> list[Body]:
     _, weld = np.unique(scene.points + 0.0, axis=0, return_inverse=True)  # -0 is 0
     corner = weld.reshape(-1)[scene.triangles]
     group = edge_groups(corner)
-    area = areas(scene.corners)
+    all_corners = scene.corners
+    area = areas(all_corners)
     in_boundary = boundary_area(scene, cells)
     order = np.argsort(group, kind="stable")
     found = []
@@ -78,7 +77,7 @@ def bodies(scene: Scene, cells: Cells) -> list[Body]:
         balance = winding_balance(corner[members])
         if balance is None or 2 * in_boundary[members].sum() > area[members].sum():
             continue
-        corners = scene.corners[members]
+        corners = all_corners[members]
         box = np.array([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
         inwards = balance and signed_volume(corners - box.mean(axis=0)) < 0
         if not inwards:
@@ -143,26 +142,30 @@ class Surroundings:
 
     Attributes
     ----------
-    corners: (M, 3, 3) all surfaces, metres.
-    low, high: (M, 3) their bounding boxes.
+    corners: (T, 3, 3) all surfaces, metres.
+    low, high: (T, 3) their bounding boxes.
     bodies: the closed ones with an inside.
+    boxes: (B, 2, 3) the bounding boxes of the bodies.
     """
 
     corners: NDArray[np.float64]
     low: NDArray[np.float64]
     high: NDArray[np.float64]
     bodies: tuple[Body, ...]
+    boxes: NDArray[np.float64]
 
     @staticmethod
     def of(scene: Scene, cells: Cells) -> Surroundings:
         """The surroundings in a subdivided scene."""
-        corners = cells.vertex[cells.triangle]
+        corners = scene.corners
         found = tuple(bodies(scene, cells))
-        return Surroundings(corners, corners.min(axis=1), corners.max(axis=1), found)
+        boxes = np.array([body.box for body in found]).reshape(-1, 2, 3)
+        return Surroundings(corners, corners.min(axis=1), corners.max(axis=1), found, boxes)
 
     def in_matter(self, point: NDArray[np.float64]) -> bool:
         """Whether a (3,) point is inside a body."""
-        return any(body.contains(point) for body in self.bodies)
+        boxed = np.all((self.boxes[:, 0] <= point) & (point <= self.boxes[:, 1]), axis=1)
+        return any(self.bodies[i].contains(point) for i in np.flatnonzero(boxed))
 
     def clearance(self, point: NDArray[np.float64], enough: float) -> float:
         """Distance in metres from a (3,) point to the nearest surface, at most ``enough``."""

@@ -8,6 +8,7 @@ keeps one image. Both libraries cut polygons as fans.
 
 from __future__ import annotations
 
+import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -96,13 +97,19 @@ def _read_trimesh(path: Path, findings: Findings) -> Source:
 
 
 def _pymeshlab() -> Any:
+    """The module. Without OpenGL it imports, prints a page of complaints and knows no format, so
+    the library is looked for first."""
+    import ctypes
+
     try:
+        if sys.platform == "linux":
+            ctypes.CDLL("libOpenGL.so.0")
         import pymeshlab
-    except ImportError as error:
+    except (ImportError, OSError) as error:
         raise MissingComponentError(
             "PTM-M200",
-            f"pymeshlab cannot be imported ({error})",
-            remedy="pip install pymeshlab; apt install libgl1 libegl1; or convert to GLB",
+            f"pymeshlab cannot be used ({error})",
+            remedy="pip install pymeshlab; apt install libopengl0 libgl1; or convert to GLB",
         ) from None
     return pymeshlab
 

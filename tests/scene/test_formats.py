@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from ctypes.util import find_library
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -38,10 +40,10 @@ MODELS = {
 
 @pytest.fixture
 def meshlab(require: Callable[[str, str], None]) -> None:
-    try:
-        import pymeshlab  # noqa: F401
-    except ImportError:
-        require("pymeshlab", "pip install pymeshlab; apt install libgl1")
+    if "linux" in sys.platform and find_library("OpenGL") is None:
+        require("OpenGL", "apt install libopengl0 libgl1")
+    if find_spec("pymeshlab") is None:
+        require("pymeshlab", "pip install pymeshlab")
 
 
 @pytest.mark.parametrize("name", MODELS)
