@@ -51,11 +51,14 @@ build/museum/.made: $(wildcard sample_data/*.py sample_data/museum_parts/*.py) |
 
 sample: build/museum/.made
 
+# The cell of the first viewpoint.
+FIRST_CELL = $(BIN)/python -c 'import json; hints = json.load(open("build/museum.db/www/hints.json")); print(hints["viewpoints"][0]["cell"])'
+
 demo: build/museum/.made
 	$(BIN)/ptm build-scene build/museum/museum.obj -o build/museum.db
-	$(BIN)/ptm plot build/museum.db --cell 0 -o build/museum.png --force
+	$(BIN)/ptm plot build/museum.db --cell "$$($(FIRST_CELL))" -o build/museum.png --force
 	@echo
-	@echo "The floor plan of the museum, with what its first cell sees, is in build/museum.png."
+	@echo "The floor plan of the museum, with what is seen from the first viewpoint, is in build/museum.png."
 	@echo "Your own model: $(BIN)/ptm build-scene MODEL.obj -o MODEL.db"
 
 test: $(VENV)/.installed-dev

@@ -14,8 +14,9 @@ status    meaning
 5         a database is damaged or of another version (`DatabaseError`)
 6         something that is not installed is needed (`MissingComponentError`)
 7         an input is beyond a limit (`LimitError`)
-8         a check found errors (``ptm validate``; ``--strict``)
+8         a check found errors (``ptm validate``)
 130       interrupted
+141       the reader of the output went away
 ========  ======================================================================
 """
 

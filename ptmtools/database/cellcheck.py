@@ -245,7 +245,8 @@ def _check_hull(
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal, axis=1)
     # A sliver's normal says nothing; its neighbours bound the hull.
-    sound = length > tolerance.plane * np.linalg.norm(c - a, axis=1)
+    longest = np.max(np.linalg.norm([b - a, c - b, a - c], axis=2), axis=0)
+    sound = length > 2 * tolerance.plane * longest
     if not sound.any():
         found.add("PTM-D683", file, place, "the hull is flat")
         return none

@@ -219,6 +219,18 @@ def test_hospital(shared: Path, tmp_path: Path, ptm: Ptm, build: Build) -> None:
     assert ran(build(shared / "scenes/hospital/hospital.obj", db, *quick)) == []
 
 
+def test_gallery_is_one_hall_and_said_to_be(
+    shared: Path, tmp_path: Path, ptm: Ptm, build: Build
+) -> None:
+    db = tmp_path / "gallery.db"
+    report = build(shared / "scenes/gallery/gallery.obj", db, "--samples", 2, "--face", 16)
+    counts = {stage["stage"]: stage["counts"] for stage in report["stages"]}
+    assert counts["pvs"]["average_share"] > 0.7
+    done = ptm("validate", db, "--segments", 100_000)
+    assert done.status == 0, done.out
+    assert "gains little" in ptm("info", db).out + json.dumps(report)
+
+
 def test_progress_is_not_shown_to_a_pipe(tmp_path: Path) -> None:
     environment = {**os.environ, "FORCE_COLOR": "1"}
     done = subprocess.run(
