@@ -18,6 +18,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 JOBS ?= 2
 PYTEST_ARGS ?=
+export PTM_SHARED ?= $(abspath ../shared)
 
 .PHONY: help setup demo test lint bench sample clean
 
@@ -71,7 +72,14 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/mypy
 
 bench: $(VENV)/.installed-dev
-	@for file in benchmarks/*.py; do echo "== $$file"; $(BIN)/python "$$file"; done
+	@mkdir -p build/bench
+	$(BIN)/python benchmarks/codec.py
+	$(BIN)/python benchmarks/cells.py
+	@for map in $(PTM_SHARED)/prt/*.prt; do [ -f "$$map" ] || continue; set -x; \
+	  $(BIN)/python benchmarks/prt.py "$$map" -o "build/bench/$$(basename "$$map" .prt).npz" \
+	    --reference "$${map%.prt}.visible.npz"; { set +x; } 2>/dev/null; done
+	@[ ! -d build/museum.db ] || { set -x; $(BIN)/python benchmarks/false_negatives.py build/museum.db; }
+	$(BIN)/python benchmarks/ach.py
 
 clean:
 	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -6,9 +6,8 @@ united (shapely) and split into connected polygons; those of at least ``wall_are
 
 Merging layers across the building within 1 cm, as the area-weighted mean or as the heaviest one,
 was tried and rejected: real walls of one line differ by millimetres from room to room, the merged
-plane then contains few of them, and what it does not contain cannot block (hospital: 50 % average
-PVS instead of the figure in docs/cells.md). Near-parallel planes are told apart where they meet,
-in the BSP.
+plane then contains few of them, and what it does not contain cannot block. Near-parallel planes are
+told apart where they meet, in the BSP.
 
 A polygon blocks a portal only where it lies in the portal's plane within tolerance (design,
 "Structure"), so the blocking set of a plane is wider than its walls: every opaque structural
