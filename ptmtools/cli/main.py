@@ -109,6 +109,8 @@ def describe(fault: BaseException) -> tuple[int, str]:
     match fault:
         case PtmError():
             return fault.exit_status, str(fault)
+        case click.exceptions.NoArgsIsHelpError():
+            return USAGE, fault.format_message()
         case click.UsageError():
             path = fault.ctx.command_path if fault.ctx else "ptm"
             told = " ".join(fault.format_message().split()).rstrip(".")

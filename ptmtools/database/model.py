@@ -6,8 +6,11 @@ up (design, "Space"); angles are radians unless a name says otherwise.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
+
+from ptmtools.errors import InputError
 
 Vector = tuple[float, float, float]
 
@@ -114,6 +117,17 @@ class EmitOptions:
     viewpoint_count: int = 4
     avatar_size: Vector = (0.25, 1.6, 0.75)
     field_of_view: float = 1.1
+
+    def __post_init__(self) -> None:
+        wrong = None
+        if not 0 < self.field_of_view < math.pi:
+            wrong = f"a field of view of {self.field_of_view:g} is not between 0 and pi radians"
+        elif not all(0 <= size < math.inf for size in self.avatar_size):
+            wrong = "an avatar's sizes are metres of at least 0"
+        elif self.viewpoint_count < 1:
+            wrong = f"at most {self.viewpoint_count} viewpoints is none"
+        if wrong:
+            raise InputError("PTM-I603", wrong, remedy="leave the option out for its default")
 
 
 @dataclass(frozen=True)
