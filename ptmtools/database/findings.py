@@ -12,6 +12,7 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D653": ("warning", "a file is served that no stage wrote"),
     "PTM-D654": ("error", "a file cannot be read"),
     "PTM-D655": ("warning", "the database is not finished: nothing was emitted yet"),
+    "PTM-D656": ("error", "a stage is stale: what it was made from has changed since"),
     "PTM-D660": ("error", "a VRML file is not UTF-8"),
     "PTM-D661": ("error", "a VRML file is not in the emission pattern"),
     "PTM-D662": ("error", "a number in a VRML file is not finite"),

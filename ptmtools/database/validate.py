@@ -126,6 +126,11 @@ class _Check:
                     if posixpath.normpath(name).startswith(("..", "/")) or "\\" in name:
                         raise ValueError(f"the output {name!r} lies outside of the database")
                     self._outputs[str(name)] = str(digest)
+            for stage, record in stages.items():
+                for name, digest in record.get("inputs", {}).items():
+                    if self._outputs.get(name, digest) != digest:
+                        told = f"made from an earlier {name}; run build-scene, or the later stages"
+                        self.found.add("PTM-D656", MANIFEST, str(stage), told)
             return "emit" in stages
         except FileNotFoundError:
             self.found.add("PTM-D650", MANIFEST, "", "missing")

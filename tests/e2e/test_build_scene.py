@@ -219,6 +219,17 @@ def test_hospital(shared: Path, tmp_path: Path, ptm: Ptm, build: Build) -> None:
     assert ran(build(shared / "scenes/hospital/hospital.obj", db, *quick)) == []
 
 
+def test_a_stage_run_alone_leaves_the_later_ones_stale(tmp_path: Path, ptm: Ptm) -> None:
+    db = tmp_path / "a.db"
+    model = TWO_ROOMS / "two_rooms.obj"
+    assert ptm("build-scene", model, "-o", db).status == 0
+    assert ptm("validate", db).status == 0
+    assert ptm("cells", model, "-o", db, "--max-cells", 1).status == 0
+    stale = ptm("validate", db)
+    assert stale.status == 8
+    assert "PTM-D656" in stale.out + stale.err
+
+
 def test_gallery_is_one_hall_and_said_to_be(
     shared: Path, tmp_path: Path, ptm: Ptm, build: Build
 ) -> None:
