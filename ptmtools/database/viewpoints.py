@@ -27,6 +27,8 @@ from ptmtools.errors import InputError
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import ROUNDING_SHARE
 
+#: The narrowest field of view that a camera may keep, radians.
+_NARROWEST = 1e-2
 #: Leaves with the largest volume in which a place to stand is looked for.
 _LEAVES = 96
 #: Places tried in a leaf, along each axis of its plan.
@@ -63,7 +65,7 @@ def place_viewpoints(
         if cell < 0:
             notes.append(f"camera {camera.name!r} lies in no cell and was left out")
             continue
-        field = min(max(camera.field_of_view, 1e-2), _WIDEST)
+        field = min(max(camera.field_of_view, _NARROWEST), _WIDEST)
         name = camera.name or f"Camera {len(placed) + 1}"
         placed.append(
             _viewpoint(len(placed), name, position, np.array(camera.direction), field, cell)
