@@ -12,9 +12,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ptmtools.compiled import kernel
 from ptmtools.visibility.winding.kernels import (
     CUT,
     EMPTY,
@@ -69,13 +69,13 @@ class Scratch(NamedTuple):
     distance: Floats  # (V,)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def has(rows: Bits, p: int, q: int) -> bool:
     """Whether bit q of row p is set."""
     return bool((rows[p, q >> 6] >> np.uint64(q & 63)) & ONE)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def ahead(g: Geometry, p: int, q: int) -> bool:
     """Whether a straight line may cross directed portal p and then q, by their planes alone."""
     k, j = p >> 1, q >> 1
@@ -104,7 +104,7 @@ def ahead(g: Geometry, p: int, q: int) -> bool:
     return False
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def fill_ahead(g: Geometry, first: int, last: int, rows: Bits) -> None:
     """Sets the bits of `ahead` in rows first … last - 1 of ``rows`` (2K, W)."""
     for p in range(first, last):
@@ -113,7 +113,7 @@ def fill_ahead(g: Geometry, first: int, last: int, rows: Bits) -> None:
                 rows[p, q >> 6] |= ONE << np.uint64(q & 63)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def flood(g: Geometry, front: Bits, first: int, last: int, rows: Bits) -> None:
     """Rows first … last - 1 of ``rows`` become what a flood reaches through ``front``.
 
@@ -135,7 +135,7 @@ def flood(g: Geometry, front: Bits, first: int, last: int, rows: Bits) -> None:
                     top += 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def tighten(g: Geometry, known: Bits) -> None:
     """One round of: what p may see, some q behind p's next leaf is or may see; then symmetry."""
     n, words = known.shape
@@ -155,7 +155,7 @@ def tighten(g: Geometry, known: Bits) -> None:
         drop_unreturned(known, p)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def drop_unreturned(known: Bits, p: int) -> None:
     """Where p does not see q, the way back from q does not see the way back from p."""
     back = p ^ 1
@@ -165,7 +165,7 @@ def drop_unreturned(known: Bits, p: int) -> None:
             known[q ^ 1, w] &= keep
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def thin_out(
     g: Geometry, might: Bits, frame: int, seen: Bits, plane: Floats, count: int
 ) -> tuple[bool, int]:
@@ -189,7 +189,7 @@ def thin_out(
     return left, tested
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def draw(state: np.uint64) -> tuple[np.uint64, float]:
     """The next state of a 64-bit xorshift generator (not 0), and a number in [0, 1) from it."""
     x = np.uint64(state)
@@ -199,7 +199,7 @@ def draw(state: np.uint64) -> tuple[np.uint64, float]:
     return x, np.float64(x >> np.uint64(11)) * 2.0**-53
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def place_in(g: Geometry, k: int, state: np.uint64, at: Floats) -> np.uint64:
     """Puts a random point of portal k into ``at`` (3,); returns the generator's next state."""
     first, count = g.start[k], g.start[k + 1] - g.start[k]
@@ -216,7 +216,7 @@ def place_in(g: Geometry, k: int, state: np.uint64, at: Floats) -> np.uint64:
     return state
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def crosses(g: Geometry, q: int, origin: Floats, along: Floats) -> bool:
     """Whether a line crosses directed portal q in its direction."""
     k = q >> 1
@@ -238,7 +238,7 @@ def crosses(g: Geometry, q: int, origin: Floats, along: Floats) -> bool:
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def glance(g: Geometry, known: Bits, source: int, seen: Bits) -> int:
     """Marks in ``seen`` (W,) what one random line to each possible portal crosses on its way.
 
@@ -275,7 +275,7 @@ def glance(g: Geometry, known: Bits, source: int, seen: Bits) -> int:
     return walked
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def flow(
     g: Geometry, s: Scratch, known: Bits, source: int, budget: int, seen: Bits
 ) -> tuple[int, bool]:

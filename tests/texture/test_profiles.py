@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
 from ptmtools.texture import EncodeOptions, build_pyramid, encode, read_header
-from ptmtools.texture.profiles import haar, kernels, layout, tables
+from ptmtools.texture.coders.haar import coder as haar
+from ptmtools.texture.coders.haar import kernels, layout, tables
+from ptmtools.texture.coders.haar.reference import decode_haar, normalised
 from ptmtools.texture.profiles.fast import FastProfile
 from ptmtools.texture.profiles.raw import RawProfile, group_length
-from ptmtools.texture.profiles.reference import decode_haar, normalised
 
 
 def textured(height: int, width: int, components: int, seed: int = 0) -> NDArray[np.uint8]:

@@ -18,13 +18,15 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.profiles import haar
+from ptmtools.texture.coders.haar import coder as haar
+from ptmtools.texture.coders.haar.tables import damaged
+from ptmtools.texture.profiles import Tile
 from ptmtools.texture.profiles.raw import RawProfile, group_length
-from ptmtools.texture.profiles.tables import damaged
 
 STORED, HAAR, DEFLATED, DEFLATED_DIFFERENCES = 0, 1, 2, 3
 #: Deflate is tried on all of a group if a quick try of a piece from its middle, of about so many
@@ -49,14 +51,39 @@ class FastProfile:
         stored = level.tobytes()
         return _shortest([(STORED, stored), (DEFLATED, _deflate(stored))])
 
-    def decode_base(self, data: bytes, shape: tuple[int, int, int]) -> NDArray[np.uint8]:
+    def decode_base(
+        self, data: bytes, shape: tuple[int, int, int], dtype: np.dtype[Any]
+    ) -> NDArray[np.uint8]:
         """The inverse of `encode_base`. Raises InputError PTM-I112."""
         coder, body = _split(data)
         if coder == DEFLATED:
             body = _inflate(body, shape[0] * shape[1] * shape[2])
         elif coder != STORED:
             raise damaged(f"coder {coder} is unknown for the coarsest level")
-        return _RAW.decode_base(body, shape)
+        return _RAW.decode_base(body, shape, dtype)
+
+    def encode_tile(
+        self,
+        level: NDArray[np.uint8],
+        below: NDArray[np.uint8],
+        max_error: int = 0,
+        memory: Any = None,
+        threads: int = 1,
+    ) -> Tile:
+        """One byte that names the coder, then what it wrote."""
+        return Tile(self.encode_group(level, below), level)
+
+    def decode_tile(
+        self,
+        data: bytes,
+        below: NDArray[np.uint8],
+        shape: tuple[int, int, int],
+        max_error: int = 0,
+        memory: Any = None,
+        threads: int = 1,
+    ) -> Tile:
+        """The inverse of `encode_tile`. Raises InputError PTM-I112."""
+        return Tile(b"", self.decode_group(data, below, shape))
 
     def encode_group(self, level: NDArray[np.uint8], below: NDArray[np.uint8]) -> bytes:
         """One byte that names the coder, then what it wrote."""

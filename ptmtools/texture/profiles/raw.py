@@ -9,11 +9,13 @@ sizes open; ``docs/format-ptm.md`` fixes them.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
+from ptmtools.texture.profiles import Tile
 
 
 @dataclass(frozen=True)
@@ -26,10 +28,35 @@ class RawProfile:
         """All texels, row by row."""
         return level.tobytes()
 
-    def decode_base(self, data: bytes, shape: tuple[int, int, int]) -> NDArray[np.uint8]:
+    def decode_base(
+        self, data: bytes, shape: tuple[int, int, int], dtype: np.dtype[Any]
+    ) -> NDArray[np.uint8]:
         """The inverse of `encode_base`. Raises InputError PTM-I112 if the length is wrong."""
         _expect_length(data, shape[0] * shape[1] * shape[2])
         return np.frombuffer(data, np.uint8).reshape(shape).copy()
+
+    def encode_tile(
+        self,
+        level: NDArray[np.uint8],
+        below: NDArray[np.uint8],
+        max_error: int = 0,
+        memory: Any = None,
+        threads: int = 1,
+    ) -> Tile:
+        """Residual array, then partial level."""
+        return Tile(self.encode_group(level, below), level)
+
+    def decode_tile(
+        self,
+        data: bytes,
+        below: NDArray[np.uint8],
+        shape: tuple[int, int, int],
+        max_error: int = 0,
+        memory: Any = None,
+        threads: int = 1,
+    ) -> Tile:
+        """The inverse of `encode_tile`. Raises InputError PTM-I112."""
+        return Tile(b"", self.decode_group(data, below, shape))
 
     def encode_group(self, level: NDArray[np.uint8], below: NDArray[np.uint8]) -> bytes:
         """Residual array, then partial level."""

@@ -8,8 +8,9 @@ is the side n·x >= c.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ptmtools.compiled import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -17,7 +18,7 @@ Ints = NDArray[np.int64]
 EMPTY, WHOLE, CUT = 0, 1, 2
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def clip(
     polygon: Floats,
     size: Ints,
@@ -65,7 +66,7 @@ def clip(
     return CUT
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def copy(polygon: Floats, size: Ints, source: int, target: int, count: int) -> None:
     """Puts the first ``count`` vertices of one slot into another."""
     for i in range(count):
@@ -74,7 +75,7 @@ def copy(polygon: Floats, size: Ints, source: int, target: int, count: int) -> N
     size[target] = count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def load(point: Floats, start: Ints, k: int, polygon: Floats, size: Ints, slot: int) -> None:
     """Puts the winding of portal k into a slot."""
     first = start[k]
@@ -85,7 +86,7 @@ def load(point: Floats, start: Ints, k: int, polygon: Floats, size: Ints, slot: 
     size[slot] = count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def separators_through(
     polygon: Floats,
     size: Ints,
@@ -157,7 +158,7 @@ def separators_through(
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def separate(
     polygon: Floats,
     size: Ints,
@@ -185,7 +186,7 @@ def separate(
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def clip_all(
     polygon: Floats,
     size: Ints,
@@ -208,7 +209,7 @@ def clip_all(
     return status
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def beyond(
     point: Floats,
     start: Ints,

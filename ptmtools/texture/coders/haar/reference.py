@@ -13,8 +13,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.profiles import layout
-from ptmtools.texture.profiles.tables import BUILT_IN_MEANS
+from ptmtools.texture.coders.haar import layout
+from ptmtools.texture.coders.haar.tables import BUILT_IN_MEANS
 
 Row = list[int]
 Plane = list[Row]

@@ -33,7 +33,7 @@ Frequencies = NDArray[np.int64]
 
 def normalise(counts: NDArray[np.int64]) -> Frequencies:
     """Frequencies (t, 256) of the rows of ``counts`` (t, 256): see `kernels.normalise`."""
-    from ptmtools.texture.profiles import kernels
+    from ptmtools.texture.coders.haar import kernels
 
     frequency = np.zeros_like(counts)
     kernels.normalise(counts, frequency)

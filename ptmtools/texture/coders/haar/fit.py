@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.profiles.layout import (
+from ptmtools.texture.coders.haar.layout import (
     BUILT_IN_WEIGHTS,
     WEIGHT_TOP,
     features_used,

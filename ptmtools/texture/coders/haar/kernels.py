@@ -17,7 +17,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+
+from ptmtools.compiled import kernel
 
 i32 = np.int32
 
@@ -87,7 +88,7 @@ def workspace(blocks: int, components: int, edge: int, activities: int) -> Works
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _load_row(below: Any, plane: int, y: int, rank: Any, row: Any) -> None:
     """Ranks of row y into ``row`` (width + 4), both ends and y replicated at the border."""
     height, width = below.shape[0], below.shape[1]
@@ -98,20 +99,20 @@ def _load_row(below: Any, plane: int, y: int, rank: Any, row: Any) -> None:
     row[width + 3] = row[width + 2] = row[width + 1]
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _gradient(above: Any, row: Any, under: Any, out: Any) -> None:
     for x in range(out.size):
         out[x] = i32(abs(i32(row[x + 3] - row[x + 1])) + abs(i32(under[x + 2] - above[x + 2])))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _finish(p: Any, a: Any, x: int, prediction: Any, activity: Any) -> None:
     p = i32(i32(p + 128) >> 8)
     prediction[x] = min(max(p, i32(-PREDICTION_TOP)), i32(PREDICTION_TOP))
     activity[x] = min(i32(a >> 6), i32(ACTIVITY_TOP))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _context_v(
     rows: Any, y: int, gradient: Any, r1: Any, r2: Any, near: Any, w: Any, a: Any,
     prediction: Any, activity: Any,
@@ -140,7 +141,7 @@ def _context_v(
         _finish(p, b, x, prediction, activity)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _context_h(
     rows: Any, y: int, gradient: Any, v: Any, ev: Any, r1: Any, r2: Any, near: Any, w: Any, a: Any,
     prediction: Any, activity: Any,
@@ -168,7 +169,7 @@ def _context_h(
         _finish(p, b, x, prediction, activity)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _context_g(
     rows: Any, y: int, gradient: Any, v: Any, h: Any, h_under: Any, ev: Any, eh: Any, eh_under: Any,
     r1: Any, r2: Any, near: Any, w: Any, a: Any, prediction: Any, activity: Any,
@@ -199,7 +200,7 @@ def _context_g(
         _finish(p, b, x, prediction, activity)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _read_differences(level: Any, plane: int, y: int, k: int, rank: Any, out: Any) -> None:
     """Coefficient k (V, h1, h2') of block row y, from the ranks of the texels."""
     for x in range(out.size - 2):
@@ -213,7 +214,7 @@ def _read_differences(level: Any, plane: int, y: int, k: int, rank: Any, out: An
             out[x + 1] = i32(r - s) >> 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _emit(
     values: Any, prediction: Any, activity: Any, classes: Any, first: int, residual: Any, near: Any,
     symbols: Any, contexts: Any, counts: Any, at: int,
@@ -230,7 +231,7 @@ def _emit(
         counts[t, min(z, ESCAPE)] += 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _absorb(decoded: Any, prediction: Any, residual: Any, near: Any, values: Any) -> None:
     """Decoding: what `_emit` does, the other way round."""
     for x in range(prediction.size):
@@ -241,7 +242,7 @@ def _absorb(decoded: Any, prediction: Any, residual: Any, near: Any, values: Any
         values[x + 1] = i32(e + prediction[x])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _write_blocks(row: Any, v: Any, h: Any, g: Any, level: Any, plane: int, y: int) -> int:
     """Texels of a block row from its differences; returns bits outside a byte, if any were set."""
     stray = i32(0)
@@ -263,7 +264,7 @@ def _write_blocks(row: Any, v: Any, h: Any, g: Any, level: Any, plane: int, y: i
     return int(stray & ~255)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _write_ranked_blocks(
     below: Any, rank: Any, value: Any, top: int, v: Any, h: Any, g: Any, level: Any, plane: int,
     y: int,
@@ -304,7 +305,7 @@ def _write_ranked_blocks(
     return stray
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _decode_row(
     state: Any, words: Any, at: int, table: Any, starts: Any, activity: Any, n: int, out: Any
 ) -> Any:
@@ -362,7 +363,7 @@ def _decode_row(
     return np.int64(k)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _fill_escapes(out: Any, n: int, escapes: Any, at: int) -> int:
     """Escaped symbols replaced by their values; -1 if there are not enough of them."""
     seen = False
@@ -378,7 +379,7 @@ def _fill_escapes(out: Any, n: int, escapes: Any, at: int) -> int:
     return at
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _edge_prediction(level: Any, y: int, x: int, plane: int) -> int:
     """Median of left, upper and left + upper - upper left; what lies outside gives way."""
     if y == 0:
@@ -391,7 +392,7 @@ def _edge_prediction(level: Any, y: int, x: int, plane: int) -> int:
     return max(min(left, up), min(max(left, up), left + up - corner))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def haar_pass(
     encoding: bool, level: Any, below: Any, planes: Any, references: Any, weights: Any,
     activities: Any, classes: Any, ranks: Any, values: Any, tops: Any, symbols: Any,
@@ -546,7 +547,7 @@ def haar_pass(
     return IMPOSSIBLE if stray or at != limit or escaped != escapes.size else OK
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def normalise(counts: Any, frequency: Any) -> None:
     """Frequencies (t, 256) int64 that sum to 2048 in each row of ``counts`` (t, 256) that has any.
 
@@ -583,7 +584,7 @@ def normalise(counts: Any, frequency: Any) -> None:
             left -= step
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def rans_encode(
     symbols: Any, contexts: Any, row: int, edge: int, frequency: Any, start: Any,
     reciprocal: Any, shift: Any, state: Any, words: Any, escapes: Any,

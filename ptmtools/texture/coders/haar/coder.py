@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.profiles import layout, tables
-from ptmtools.texture.profiles.fit import fit_weights
+from ptmtools.texture.coders.haar import layout, tables
+from ptmtools.texture.coders.haar.fit import fit_weights
 
 #: Flag bits: weights are sent; from bit 4 on, component i is coded by rank.
 SENT_WEIGHTS = 1
@@ -45,7 +45,7 @@ def _sparse_values(plane: Bytes) -> NDArray[np.intp] | None:
 
 def encode(level: Bytes, below: Bytes) -> bytes:
     """The group that refines ``below`` (h >> 1, w >> 1, c) to ``level`` (h, w, c)."""
-    from ptmtools.texture.profiles import kernels
+    from ptmtools.texture.coders.haar import kernels
 
     components = level.shape[2]
     sets = [
@@ -93,7 +93,7 @@ def encode(level: Bytes, below: Bytes) -> bytes:
 
 def decode(data: bytes, below: Bytes, shape: tuple[int, int, int]) -> Bytes:
     """The inverse of `encode`. Raises InputError PTM-I112 for what no encoder writes."""
-    from ptmtools.texture.profiles import kernels
+    from ptmtools.texture.coders.haar import kernels
 
     components = shape[2]
     reader = _Reader(data)
@@ -146,7 +146,7 @@ def _pass(
     table: NDArray[np.uint32] | None = None,
 ) -> int:
     """`kernels.haar_pass`, with empty arrays for what a direction does not use."""
-    from ptmtools.texture.profiles import kernels
+    from ptmtools.texture.coders.haar import kernels
 
     components = level.shape[2]
     classes = layout.class_of_activity()

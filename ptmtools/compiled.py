@@ -1,0 +1,61 @@
+"""Loops compiled by numba, and where their machine code is kept between runs.
+
+A cached kernel is stale when *any* kernel it calls has changed. Numba looks at a function's own
+file only, so the folder is named after the contents of all of them: kernels may be spread over
+files and share helpers without ever meeting the machine code of yesterday's helper.
+
+The folder lies in the package's ``__pycache__`` where that can be written, else in the user's
+cache folder; ``NUMBA_CACHE_DIR`` overrides both.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+_PACKAGE = Path(__file__).parent
+#: Files of this name, and this one, make up the machine code.
+_KERNELS = "kernels.py"
+
+
+def kernel(function: Function) -> Function:
+    """``function``, compiled when first called with arguments of these types, without the
+    interpreter's lock, kept for later runs.
+
+    Floating point is strict: no operation is reordered or fused with another, so that results are
+    the same on every machine with IEEE arithmetic.
+    """
+    settings: Any = numba.config
+    before = settings.CACHE_DIR
+    settings.CACHE_DIR = before or _folder()
+    try:
+        compiled: Any = numba.njit(cache=True, nogil=True, fastmath=False)(function)
+    finally:
+        settings.CACHE_DIR = before
+    return cast("Function", compiled)
+
+
+@cache
+def _folder() -> str:
+    digest = sha256()
+    for file in [Path(__file__), *sorted(_PACKAGE.rglob(_KERNELS))]:
+        digest.update(file.read_bytes())
+    name = f"kernels-{digest.hexdigest()[:12]}"
+    caches = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
+    for parent in (_PACKAGE / "__pycache__", caches / "ptmtools"):
+        try:
+            (parent / name).mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=parent / name):
+                return str(parent / name)
+        except OSError:
+            continue
+    return ""

@@ -1,0 +1,1 @@
+"""Haar differences, predicted and coded with rANS: `coder` says how."""
