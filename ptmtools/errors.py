@@ -22,6 +22,8 @@ status    meaning
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from os import PathLike, fspath
 
 
@@ -97,3 +99,20 @@ class CheckError(PtmError):
     """A check that the user asked for found errors. Codes PTM-Cxxx."""
 
     exit_status = 8
+
+
+@contextmanager
+def naming(file: str | PathLike[str] | None = None, *, place: str | None = None) -> Iterator[None]:
+    """Errors that come out of this know which file they are about, and which place in it."""
+    try:
+        yield
+    except PtmError as error:
+        if (file is None or error.file is not None) and (place is None or error.place is not None):
+            raise
+        raise type(error)(
+            error.code,
+            error.message,
+            file=file if error.file is None else error.file,
+            place=place if error.place is None else error.place,
+            remedy=error.remedy,
+        ) from error.__cause__

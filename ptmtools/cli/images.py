@@ -39,9 +39,9 @@ def encode(
     **values: Any,
 ) -> None:
     """Encode images as progressive textures, losslessly."""
+    from ptmtools.errors import naming
     from ptmtools.texture import encode as encode_texels
     from ptmtools.texture import read_header, read_image
-    from ptmtools.texture.images import naming
 
     options = take(EncodeOptions, values)
     targets = _targets(images, output)
@@ -93,9 +93,9 @@ def encode(
 @voiced
 def decode(voice: Voice, file: str, level: int | None, output: str | None, force: bool) -> None:
     """Decode a .ptm file, or its beginning, to PNG."""
+    from ptmtools.errors import naming
     from ptmtools.texture import decode as decode_texels
     from ptmtools.texture import read_ptm, write_png
-    from ptmtools.texture.images import naming
 
     target = Path(output) if output else Path(file).with_suffix(".png")
     if not force:

@@ -150,8 +150,8 @@ def _info_database(voice: Voice, target: str, as_json: bool) -> None:
 
 
 def _info_ptm(voice: Voice, target: str, as_json: bool) -> None:
+    from ptmtools.errors import naming
     from ptmtools.texture import read_header, read_ptm, whole_levels
-    from ptmtools.texture.images import naming
 
     data = read_ptm(target)
     with naming(target):

@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 
 from ptmtools.database import TextureLevel, TextureRecord
+from ptmtools.errors import naming
 from ptmtools.pipeline.run import Run, parameters
 from ptmtools.scene.model import Scene, SourceImage
 from ptmtools.texture import EncodeOptions, decode, encode, read_header, read_image
-from ptmtools.texture.images import naming, png_bytes
+from ptmtools.texture.images import png_bytes
 from ptmtools.version import __version__
 
 SERVED = "www"

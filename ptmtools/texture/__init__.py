@@ -9,22 +9,28 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ptmtools.texture.codec import check, decode, decode_levels, encode
+    from ptmtools.texture.codec import check, decode, decode_levels
     from ptmtools.texture.container import read_header, whole_levels
+    from ptmtools.texture.encoder import encode, encode_to
     from ptmtools.texture.images import read_image, read_ptm, write_png
-    from ptmtools.texture.model import EncodeOptions, Level, Limits, PtmHeader
+    from ptmtools.texture.model import Description, EncodeOptions, Level, Limits, PtmHeader
     from ptmtools.texture.pyramid import build_pyramid
+    from ptmtools.texture.reader import PtmReader, open
 
 __all__ = [
+    "Description",
     "EncodeOptions",
     "Level",
     "Limits",
     "PtmHeader",
+    "PtmReader",
     "build_pyramid",
     "check",
     "decode",
     "decode_levels",
     "encode",
+    "encode_to",
+    "open",
     "read_header",
     "read_image",
     "read_ptm",
@@ -33,15 +39,19 @@ __all__ = [
 ]
 
 _HOME = {
+    "Description": "model",
     "EncodeOptions": "model",
     "Level": "model",
     "Limits": "model",
     "PtmHeader": "model",
+    "PtmReader": "reader",
     "build_pyramid": "pyramid",
     "check": "codec",
     "decode": "codec",
     "decode_levels": "codec",
-    "encode": "codec",
+    "encode": "encoder",
+    "encode_to": "encoder",
+    "open": "reader",
     "read_header": "container",
     "read_image": "images",
     "read_ptm": "images",

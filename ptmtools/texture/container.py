@@ -9,45 +9,78 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from ptmtools.errors import InputError, LimitError
-from ptmtools.texture.model import MAX_COMPONENTS, MAX_LEVELS, MAX_SIDE, Level, PtmHeader
+from ptmtools.texture.model import (
+    MAX_COMPONENTS,
+    MAX_LEVELS,
+    MAX_SIDE,
+    TILE_SIDES,
+    Level,
+    PtmHeader,
+)
 from ptmtools.texture.profiles import PROFILE_NUMBERS
 from ptmtools.texture.pyramid import level_sizes
+from ptmtools.texture.samples import KINDS, KINDS_BY_NUMBER
+from ptmtools.texture.tiling import tile_counts
 
 #: As in PNG: a byte above 127, the name, both line ends and an end-of-file mark.
 MAGIC = b"\x89PTM\r\n\x1a\n"
-VERSION = 1
+#: The version written. Version 1 had neither tiles, errors nor a description.
+VERSION = 2
 #: Magic, version, profile, kind, width, height, components, levels, trimmed, zero, head size.
 _FIXED = struct.Struct("<8sHBBIIBBBBI")
+#: From version 2 on: side of a tile, largest error, length and CRC-32 of the description.
+_MORE = struct.Struct("<IIII")
 #: Offset, length, CRC-32 of a group.
 _ENTRY = struct.Struct("<QQI")
+#: Length and CRC-32 of a tile.
+TILE_ENTRY = struct.Struct("<II")
 _CRC = struct.Struct("<I")
 #: No head is longer, so that many bytes always suffice for `read_header`.
-HEAD_MAX = _FIXED.size + MAX_LEVELS * _ENTRY.size + _CRC.size
+HEAD_MAX = _FIXED.size + _MORE.size + MAX_LEVELS * _ENTRY.size + _CRC.size
+#: No description is longer, bytes.
+DESCRIPTION_MAX = 1 << 24
 
-_KINDS = {0: "uint8"}
 _PROFILES = {number: name for name, number in PROFILE_NUMBERS.items()}
 _ENCODE_AGAIN = "the file is damaged: fetch or encode it again"
 
 
-def assemble(
-    width: int, height: int, components: int, profile: str, trimmed: int, groups: Sequence[bytes]
-) -> bytes:
-    """The bytes of a file: head, then the groups, coarsest first.
+@dataclass(frozen=True)
+class Head:
+    """What stands before the group table, as `pack_head` writes it."""
 
-    width, height: of the original, texels; the finest group is ``trimmed`` halvings smaller.
+    width: int
+    height: int
+    components: int
+    kind: str
+    profile: str
+    trimmed: int
+    tile: int
+    max_error: int
+
+
+def head_size(groups: int) -> int:
+    """Bytes of the head of a file with so many groups."""
+    return _FIXED.size + _MORE.size + groups * _ENTRY.size + _CRC.size
+
+
+def pack_head(head: Head, description: bytes, groups: Sequence[tuple[int, int]]) -> bytes:
+    """The head of a file: the description follows it, then the groups, coarsest first.
+
+    groups: length and CRC-32 of each.
     """
-    size = _FIXED.size + len(groups) * _ENTRY.size + _CRC.size
-    number = PROFILE_NUMBERS[profile]
-    counts = (components, len(groups), trimmed, 0)
-    head = bytearray(_FIXED.pack(MAGIC, VERSION, number, 0, width, height, *counts, size))
-    offset = size
-    for group in groups:
-        head += _ENTRY.pack(offset, len(group), zlib.crc32(group))
-        offset += len(group)
-    head += _CRC.pack(zlib.crc32(head))
-    return b"".join([head, *groups])
+    size = head_size(len(groups))
+    counts = (head.components, len(groups), head.trimmed, 0)
+    numbers = (PROFILE_NUMBERS[head.profile], KINDS[head.kind].number, head.width, head.height)
+    packed = bytearray(_FIXED.pack(MAGIC, VERSION, *numbers, *counts, size))
+    packed += _MORE.pack(head.tile, head.max_error, len(description), zlib.crc32(description))
+    offset = size + len(description)
+    for length, crc32 in groups:
+        packed += _ENTRY.pack(offset, length, crc32)
+        offset += length
+    return bytes(packed + _CRC.pack(zlib.crc32(packed)))
 
 
 def read_header(data: bytes) -> PtmHeader:
@@ -65,24 +98,28 @@ def read_header(data: bytes) -> PtmHeader:
     (_, version, profile, kind, width, height, components, count, trimmed, zero, size) = (
         _FIXED.unpack_from(data)
     )
-    if version != VERSION:
+    if not 1 <= version <= VERSION:
         raise InputError(
             "PTM-I104",
-            f"is of version {version}; this program reads version {VERSION}",
+            f"is of version {version}; this program reads versions 1 to {VERSION}",
             remedy="use a newer ptmtools, or encode the image again",
         )
-    if size != _FIXED.size + count * _ENTRY.size + _CRC.size or count > MAX_LEVELS:
+    table = _FIXED.size + (_MORE.size if version > 1 else 0)
+    if size != table + count * _ENTRY.size + _CRC.size or count > MAX_LEVELS:
         raise _damaged_head("its size does not match its number of levels")
     if len(data) < size:
         raise _cut_head(len(data))
     (crc,) = _CRC.unpack_from(data, size - _CRC.size)
     if crc != zlib.crc32(data[: size - _CRC.size]):
         raise _damaged_head("its checksum is wrong")
-    if profile not in _PROFILES or kind not in _KINDS:
+    if (
+        profile not in _PROFILES
+        or kind not in KINDS_BY_NUMBER
+        or (version == 1 and (profile > 1 or kind))
+    ):
         raise InputError(
             "PTM-I104",
-            f"uses profile {profile} with components of kind {kind}, which this program "
-            "does not know",
+            f"uses profile {profile} with samples of kind {kind}, which this program does not know",
             remedy="use a newer ptmtools, or encode the image again",
         )
     if max(width, height) > MAX_SIDE:
@@ -94,23 +131,38 @@ def read_header(data: bytes) -> PtmHeader:
     sizes = _sizes(width, height, components, count, trimmed)
     if zero:
         raise _damaged_head("a reserved byte is not 0")
-    entries = [_ENTRY.unpack_from(data, _FIXED.size + i * _ENTRY.size) for i in range(count)]
+    tile = max_error = described = crc32 = 0
+    if version > 1:
+        tile, max_error, described, crc32 = _MORE.unpack_from(data, _FIXED.size)
+    low, high = TILE_SIDES
+    if tile and not (low <= tile <= high and tile % 2 == 0):
+        raise _damaged_head(f"tiles of {tile} texels are impossible")
+    samples = KINDS_BY_NUMBER[kind]
+    if max_error > samples.top_error or described > DESCRIPTION_MAX:
+        raise _damaged_head("its largest error or the length of its description is impossible")
+    entries = [_ENTRY.unpack_from(data, table + i * _ENTRY.size) for i in range(count)]
     levels: list[Level] = []
-    expected, texels = size, 0
-    for (w, h), (offset, length, crc32) in zip(sizes, entries, strict=True):
-        if offset != expected or length > 2 * w * h * components + 64:
+    texel_bytes = components * samples.size
+    expected, texels = size + described, 0
+    for number, ((w, h), (offset, length, crc)) in enumerate(zip(sizes, entries, strict=True)):
+        tiles = tile_counts(w, h, tile) if number else (1, 1)
+        # No coder makes a group twice as long as its texels, but for small change.
+        if offset != expected or length > 2 * w * h * texel_bytes + 1024 * tiles[0] * tiles[1]:
             raise _damaged_head(f"the byte range of level {len(levels)} is impossible")
         expected += length
         texels += w * h
-        levels.append(Level(w, h, offset, length, crc32, texels * components))
+        levels.append(Level(w, h, offset, length, crc, tiles, texels * texel_bytes))
     return PtmHeader(
         width=width,
         height=height,
         components=components,
-        kind=_KINDS[kind],
+        kind=samples.name,
         profile=_PROFILES[profile],
         version=version,
         trimmed=trimmed,
+        tile=tile,
+        max_error=max_error,
+        description=(size, described, crc32),
         levels=tuple(levels),
     )
 

@@ -13,12 +13,12 @@ import os
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ptmtools.errors import InputError, LimitError, PtmError
+from ptmtools.errors import InputError, LimitError, PtmError, naming
 from ptmtools.texture.container import HEAD_MAX, MAGIC, read_header
 from ptmtools.texture.model import MAX_SIDE
+from ptmtools.texture.sources import open_file
 
 if TYPE_CHECKING:
     import numpy as np
@@ -94,33 +94,9 @@ def read_ptm(path: str | os.PathLike[str]) -> bytes:
     return data
 
 
-@contextmanager
-def naming(file: str | os.PathLike[str] | None) -> Iterator[None]:
-    """Errors that come out of this know which file they are about."""
-    try:
-        yield
-    except PtmError as error:
-        if file is None or error.file is not None:
-            raise
-        raise type(error)(
-            error.code, error.message, file=file, place=error.place, remedy=error.remedy
-        ) from error.__cause__
-
-
 def _read_file(path: str | os.PathLike[str]) -> bytes:
-    try:
-        return Path(path).read_bytes()
-    except FileNotFoundError:
-        raise InputError("PTM-I120", "there is no such file", file=path) from None
-    except IsADirectoryError:
-        raise InputError(
-            "PTM-I121", "is a folder, not a file", file=path, remedy="name a file in it"
-        ) from None
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(
-            "PTM-I122", f"cannot be read ({reason})", file=path, remedy="check its permissions"
-        ) from None
+    with open_file(path) as file:
+        return file.read()
 
 
 @contextmanager

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
+
+from ptmtools.texture.samples import KINDS
 
 #: Longest side of an image, texels.
 MAX_SIDE = 1 << 16
 #: Largest number of levels: a side of 2^16 halves 16 times.
 MAX_LEVELS = 17
 MAX_COMPONENTS = 4
+#: Sides that tiles may have, texels.
+TILE_SIDES = (16, 1 << 15)
 
 
 @dataclass(frozen=True)
@@ -17,16 +22,27 @@ class EncodeOptions:
 
     Attributes
     ----------
-    profile: "fast" (compressed) or "raw" (the paper's layout, §4.3).
+    profile: "fast" (compressed), "small" (smaller still, and slow), "raw" (the paper's layout,
+        §4.3) or "paper" (the same with lossless JPEG, for comparison).
+    max_error: no sample of any level differs by more than this from that of the exact pyramid; 0 is
+        lossless. For integer samples only.
+    tile: levels with a side of more than twice this many texels are coded in tiles of this side,
+        each by itself: in parallel, in bounded memory and open to random access. 0 means never.
     min_side: levels go down to the last one whose shorter side is at least this, texels. 1 stores
         every level; a client computes the missing ones with the 2×2 mean.
-    max_side: levels whose longer side is above this are left out; None keeps all of them. The
-        levels are renumbered from 0 and the header keeps the original size.
+    max_side: levels whose longer side is above this are left out; 0 keeps all of them.
+    min_level, max_level: the same by number: levels below ``min_level`` and above ``max_level`` are
+        left out, counted from the coarsest of all, 0; -1 is the finest, -2 the next. What is left
+        is renumbered from 0, and the header keeps the size of the original.
     """
 
-    profile: str = "fast"
+    profile: Literal["fast", "small", "raw", "paper"] = "fast"
+    max_error: int = 0
+    tile: int = 512
     min_side: int = 1
-    max_side: int | None = None
+    max_side: int = 0
+    min_level: int = 0
+    max_level: int = -1
 
 
 @dataclass(frozen=True)
@@ -42,6 +58,26 @@ class Limits:
 
 
 @dataclass(frozen=True)
+class Description:
+    """What a file says of its texels besides their numbers; none of it changes a texel.
+
+    Attributes
+    ----------
+    icc: an ICC profile.
+    srgb: rendering intent of sRGB, 0 to 3, as in PNG.
+    gamma: gamma of the image times 100,000, as in PNG.
+    chromaticities: white, red, green, blue, x and y times 100,000 each, as in PNG.
+    orientation: of EXIF, 1 to 8: how the rows as stored are to be shown. 1 is as they are.
+    """
+
+    icc: bytes | None = None
+    srgb: int | None = None
+    gamma: int | None = None
+    chromaticities: tuple[int, ...] | None = None
+    orientation: int = 1
+
+
+@dataclass(frozen=True)
 class Level:
     """One level and the group that refines the level below to it.
 
@@ -49,9 +85,11 @@ class Level:
     ----------
     width, height: texels.
     offset, length: the group's bytes in the file.
-    crc32: of those bytes (ISO 3309, as in PNG and zip).
+    crc32: of those bytes (ISO 3309, as in PNG and zip); where there are several tiles, of their
+        index, which holds a CRC-32 for each of them.
+    tiles: how many tiles it has, across and down.
     gpu_bytes: what the pyramid up to and including this level takes in a client's texture memory,
-        at ``components`` bytes a texel, from the coarsest stored level on.
+        at the size of a texel, from the coarsest stored level on.
     """
 
     width: int
@@ -59,12 +97,18 @@ class Level:
     offset: int
     length: int
     crc32: int
+    tiles: tuple[int, int]
     gpu_bytes: int
 
     @property
     def end(self) -> int:
         """Length of the prefix of the file that holds this level and all below it."""
         return self.offset + self.length
+
+    @property
+    def tiled(self) -> bool:
+        """Whether it has more than one tile."""
+        return self.tiles != (1, 1)
 
 
 @dataclass(frozen=True)
@@ -74,11 +118,14 @@ class PtmHeader:
     Attributes
     ----------
     width, height: size of the original image, texels.
-    components: 1 grey, 2 grey and alpha, 3 RGB, 4 RGB and alpha.
-    kind: type of a component: "uint8".
-    profile: how the groups are coded: "raw", "fast".
+    components: 1 grey, 2 grey and alpha (or any two), 3 RGB, 4 RGB and alpha.
+    kind: of the samples, one of `ptmtools.texture.samples.KINDS`: the name of a numpy type.
+    profile: how the groups are coded.
     version: of the container.
     trimmed: how many of the finest levels of the original were left out on purpose.
+    tile: side of the tiles of a level that has several; 0 if none has.
+    max_error: as in `EncodeOptions`.
+    description: offset, length and CRC-32 of the `Description` in the file.
     levels: from the coarsest, level 0, to the finest stored.
     """
 
@@ -89,7 +136,15 @@ class PtmHeader:
     profile: str
     version: int
     trimmed: int
+    tile: int
+    max_error: int
+    description: tuple[int, int, int]
     levels: tuple[Level, ...]
+
+    @property
+    def texel_bytes(self) -> int:
+        """Bytes of a texel, decoded."""
+        return self.components * KINDS[self.kind].size
 
     @property
     def file_size(self) -> int:

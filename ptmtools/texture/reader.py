@@ -1,0 +1,328 @@
+"""A `.ptm` becomes levels again, coarse to fine, reading no more of the file than it needs.
+
+Of a tiled level only the tiles that are asked for are read and decoded, and of the levels below it
+only what lies under those: a window of a level costs about its own size, whatever the level's.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from ptmtools.errors import InputError, LimitError, naming
+from ptmtools.texture.container import HEAD_MAX, TILE_ENTRY, read_header, whole_levels
+from ptmtools.texture.description import parse_description
+from ptmtools.texture.model import Description, Level, Limits, PtmHeader
+from ptmtools.texture.parallel import ordered
+from ptmtools.texture.profiles import Profile, profile_named
+from ptmtools.texture.sources import Ranges, Source, ranges_of
+from ptmtools.texture.tiling import Box, tiles_under
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Samples = NDArray[Any]
+
+_LIMITS = Limits()
+
+
+def open(source: Source, *, limits: Limits = _LIMITS, threads: int = 1) -> PtmReader:
+    """A `.ptm` to take levels from; its head is read, and nothing else yet.
+
+    Parameters
+    ----------
+    source: a path; bytes; an open file (read from its beginning, not closed); or a function
+        ``read(offset, length)`` that gives that range of the file, shorter only where it ends.
+    threads: how many work at once on the tiles of a level. A function is then called from several.
+
+    Raises
+    ------
+    InputError: PTM-I120 to PTM-I122 for a path; those of `read_header`.
+    LimitError: those of `read_header`.
+    """
+    ranges = ranges_of(source)
+    try:
+        with naming(ranges.name):
+            return PtmReader(ranges, limits, threads)
+    except BaseException:
+        ranges.close()
+        raise
+
+
+class PtmReader:
+    """An open `.ptm`; see `open`. Use it in a ``with``, or call `close`.
+
+    Damage is never passed over: a group whose checksum is wrong is an error.
+    """
+
+    def __init__(self, ranges: Ranges, limits: Limits, threads: int) -> None:
+        self._ranges = ranges
+        self._limits = limits
+        self._threads = threads
+        self.header: PtmHeader = read_header(ranges.read(0, HEAD_MAX))
+        self._profile: Profile = profile_named(self.header.profile)
+
+    def __enter__(self) -> PtmReader:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Closes the file, if it was opened by this."""
+        self._ranges.close()
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Of the samples."""
+        import numpy as np
+
+        return np.dtype(self.header.kind)
+
+    @property
+    def whole(self) -> int:
+        """How many levels are whole, as far as the length of the file tells."""
+        size = self._ranges.size()
+        return len(self.header.levels) if size is None else whole_levels(self.header, size)
+
+    def description(self) -> Description:
+        """Colour and orientation. Raises InputError PTM-I107, PTM-I108, PTM-I113."""
+        offset, length, crc32 = self.header.description
+        with naming(self._ranges.name):
+            data = self._ranges.read(offset, length)
+            if len(data) < length:
+                raise self._cut("description")
+            if zlib.crc32(data) != crc32:
+                raise _wrong_checksum("description")
+            return parse_description(data)
+
+    def level(self, number: int | None = None) -> Samples:
+        """Level ``number``, (h, w, c), rows from the top; None is the finest that is whole.
+
+        Raises
+        ------
+        InputError: PTM-I106 no such level, PTM-I107 the level is not whole in the file (the
+            message names the last one that is), PTM-I108 wrong checksum, PTM-I112 a group that no
+            encoder writes.
+        LimitError: PTM-L103 the level is larger than the limits allow.
+        """
+        with naming(self._ranges.name):
+            number = self._number(number)
+            level = self.header.levels[number]
+            return self._window(number, Box(0, 0, level.width, level.height))
+
+    def window(self, number: int, x: int, y: int, width: int, height: int) -> Samples:
+        """The texels (height, width, c) of a level from column ``x`` and row ``y`` on.
+
+        Raises as `level`; InputError PTM-I106 also where the window leaves the level. The limit is
+        that of the window.
+        """
+        with naming(self._ranges.name):
+            box = Box(x, y, x + width, y + height)
+            return self._window(self._number(number, box), box)
+
+    def levels(self) -> Iterator[Samples]:
+        """All whole levels, coarsest first, each decoded once: as `level` of each."""
+        with naming(self._ranges.name):
+            whole = self.whole
+            if whole:
+                finest = self.header.levels[whole - 1]
+                self._check_limit(whole - 1, Box(0, 0, finest.width, finest.height))
+            state = None
+            for number in range(whole):
+                level = self.header.levels[number]
+                state = self._step(number, Box(0, 0, level.width, level.height), state)
+                yield state.texels
+
+    def wrong_checksums(self) -> list[str]:
+        """One line for every whole level or tile whose checksum is wrong; nothing is decoded."""
+        wrong = []
+        for number in range(self.whole):
+            level = self.header.levels[number]
+            pieces = [(level.offset, level.length, level.crc32, f"level {number}")]
+            if level.tiled:
+                try:
+                    index = self._index(level, f"level {number}")
+                except InputError as error:
+                    wrong.append(str(error))
+                    continue
+                pieces = [(*entry, f"level {number}, tile {i}") for i, entry in enumerate(index)]
+            for offset, length, crc32, place in pieces:
+                try:
+                    self._checked(offset, length, crc32, place)
+                except InputError as error:
+                    wrong.append(str(error))
+        return wrong
+
+    def _number(self, number: int | None, window: Box | None = None) -> int:
+        """The number of a level that may be decoded. Raises as `level`."""
+        header = self.header
+        whole = self.whole
+        if number is None:
+            # Nothing whole: asking for level 0 gives the error for that.
+            number = max(0, whole - 1)
+        if not 0 <= number < len(header.levels):
+            raise InputError(
+                "PTM-I106",
+                f"there is no level {number}",
+                place=f"level {number}",
+                remedy=f"it has levels 0 to {len(header.levels) - 1}",
+            )
+        level = header.levels[number]
+        box = window or Box(0, 0, level.width, level.height)
+        if not (0 <= box.x0 < box.x1 <= level.width and 0 <= box.y0 < box.y1 <= level.height):
+            raise InputError(
+                "PTM-I106",
+                f"columns {box.x0} to {box.x1} and rows {box.y0} to {box.y1} are not within it",
+                place=f"level {number}",
+                remedy=f"it is {level.width} x {level.height} texels",
+            )
+        if number >= whole:
+            raise self._cut(f"level {number}", whole)
+        return number
+
+    def _window(self, number: int, box: Box) -> Samples:
+        """A rectangle of a level, by way of those under it."""
+        boxes = [box]
+        for n in range(number, -1, -1):
+            covered = self._covering(n, boxes[-1])
+            self._check_limit(n, covered)
+            boxes.append(covered.below)
+        boxes.pop()
+        state = None
+        for n, part in enumerate(reversed(boxes)):
+            state = self._step(n, part, state)
+        assert state is not None
+        return state.texels
+
+    def _covering(self, number: int, box: Box) -> Box:
+        """The rectangle of all tiles of a level that share a texel with ``box``."""
+        level = self.header.levels[number]
+        if not level.tiled:
+            return Box(0, 0, level.width, level.height)
+        boxes = [area for _, area in tiles_under(level.width, level.height, self.header.tile, box)]
+        return Box(boxes[0].x0, boxes[0].y0, boxes[-1].x1, boxes[-1].y1)
+
+    def _check_limit(self, number: int, box: Box) -> None:
+        width, height, limit = box.x1 - box.x0, box.y1 - box.y0, self._limits.decoded_bytes
+        if width * height * self.header.texel_bytes > limit:
+            raise LimitError(
+                "PTM-L103",
+                f"{width} x {height} texels of {self.header.texel_bytes} bytes are more than the "
+                f"limit of {limit} bytes",
+                place=f"level {number}",
+                remedy="ask for a coarser level or raise the limit",
+            )
+
+    def _step(self, number: int, box: Box, below: _State | None) -> _State:
+        """The texels of a level within ``box``, given at least what lies under its tiles."""
+        import numpy as np
+
+        header, level = self.header, self.header.levels[number]
+        shape = (level.height, level.width, header.components)
+        place = f"level {number}"
+        if below is None:
+            data = self._checked(level.offset, level.length, level.crc32, place)
+            with naming(place=place):
+                texels = self._profile.decode_base(data, shape, self.dtype)
+            return _State(texels[box.slices], box, None)
+        if not level.tiled:
+            data = self._checked(level.offset, level.length, level.crc32, place)
+            with naming(place=place):
+                tile = self._profile.decode_tile(
+                    data, below.texels, shape, header.max_error, below.memory, self._threads
+                )
+            return _State(tile.texels[box.slices], box, tile.memory)
+        index = self._index(level, place)
+        texels = np.empty((box.y1 - box.y0, box.x1 - box.x0, header.components), self.dtype)
+
+        def decoded(job: tuple[int, Box]) -> tuple[Box, Samples]:
+            tile_number, area = job
+            where = f"{place}, tile {tile_number}"
+            under = np.ascontiguousarray(below.texels[area.below.within(below.box).slices])
+            data = self._checked(*index[tile_number], where)
+            size = (area.y1 - area.y0, area.x1 - area.x0, header.components)
+            with naming(place=where):
+                tile = self._profile.decode_tile(data, under, size, header.max_error, below.memory)
+            return area, tile.texels
+
+        jobs = tiles_under(level.width, level.height, header.tile, box)
+        for area, part in ordered(decoded, jobs, self._threads):
+            shared = Box(
+                max(area.x0, box.x0),
+                max(area.y0, box.y0),
+                min(area.x1, box.x1),
+                min(area.y1, box.y1),
+            )
+            texels[shared.within(box).slices] = part[shared.within(area).slices]
+        return _State(texels, box, below.memory)
+
+    def _index(self, level: Level, place: str) -> list[tuple[int, int, int]]:
+        """Offset, length and CRC-32 of every tile of a level."""
+        count = level.tiles[0] * level.tiles[1]
+        size = count * TILE_ENTRY.size
+        if size > level.length:
+            raise _contradiction(place)
+        data = self._checked(level.offset, size, level.crc32, place)
+        index = []
+        offset = level.offset + size
+        for length, crc32 in TILE_ENTRY.iter_unpack(data):
+            index.append((offset, length, crc32))
+            offset += length
+        if offset != level.end:
+            raise _contradiction(place)
+        return index
+
+    def _checked(self, offset: int, length: int, crc32: int, place: str) -> bytes:
+        data = self._ranges.read(offset, length)
+        if len(data) < length:
+            raise self._cut(place)
+        if zlib.crc32(data) != crc32:
+            raise _wrong_checksum(place)
+        return data
+
+    def _cut(self, place: str, whole: int | None = None) -> InputError:
+        size = self._ranges.size()
+        of = f" after {size} of {self.header.file_size} bytes" if size is not None else ""
+        remedy = None
+        if whole is not None:
+            remedy = f"the last whole level is {whole - 1}" if whole else "no level is whole"
+        return InputError(
+            "PTM-I107", f"is cut{of}, inside or before this", place=place, remedy=remedy
+        )
+
+
+@dataclass(frozen=True)
+class _State:
+    """What is decoded so far: a rectangle of a level, and what the profile has learned."""
+
+    texels: Samples
+    box: Box
+    memory: Any
+
+
+def _wrong_checksum(place: str) -> InputError:
+    return InputError(
+        "PTM-I108",
+        "the checksum is wrong",
+        place=place,
+        remedy="the file is damaged: fetch or encode it again; coarser levels may be intact",
+    )
+
+
+def _contradiction(place: str) -> InputError:
+    return InputError(
+        "PTM-I112",
+        "the index of its tiles contradicts its length",
+        place=place,
+        remedy="the file is damaged or was not written by a conforming encoder; encode it again",
+    )
