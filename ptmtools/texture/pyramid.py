@@ -1,17 +1,27 @@
-"""Mipmap levels by the floor of the 2×2 mean (paper Eq. 1), for any size.
+"""Mipmap levels by the mean of 2×2 blocks (paper Eq. 1), for any size and kind of sample.
 
 Level n-1 is max(1, side >> 1) wide and high, as in OpenGL and WebGPU, so that a decoded level can
 be uploaded as it is. An odd last row or column belongs to no 2×2 block and does not reach the
 level below.
+
+Integers: the floor of the mean. Floats: the sum of the four as float64, in the order
+(p + q) + (r + s), times ¼, rounded once to the stored type. No sum of finite samples overflows in
+float64 and none underflows: the largest is below 2^130 and every float32 is a whole multiple of
+2^-149. So the mean of finite samples is finite. The sum is exact unless magnitudes in a block
+differ by more than 2^26 (float32; never for float16); it is then off by a few units of float64's
+last place, the same on every machine. The mean over a NaN, or over both infinities, is the quiet
+NaN 0x7E00 or 0x7FC00000.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
+
+#: About so many samples are averaged at a time: scratch memory is a small multiple of it.
+STRIP_SAMPLES = 1 << 18
 
 
 def level_sizes(width: int, height: int, min_side: int = 1) -> list[tuple[int, int]]:
@@ -26,21 +36,50 @@ def level_sizes(width: int, height: int, min_side: int = 1) -> list[tuple[int, i
     return sizes[::-1]
 
 
-def build_pyramid(image: NDArray[np.uint8], min_side: int = 1) -> list[NDArray[np.uint8]]:
-    """Levels of an (h, w, c) or (h, w) uint8 image, coarsest first, the image itself last."""
-    levels = [image]
+def build_pyramid(source: Any, min_side: int = 1) -> list[NDArray[Any]]:
+    """Levels of an (h, w, c) or (h, w) image, coarsest first, the image itself last.
+
+    ``source`` needs a ``shape``, a ``dtype`` (uint8, uint16, float16 or float32) and rows that can
+    be sliced: an array, a memory-mapped file, or something that makes rows when asked. It is read
+    once, from top to bottom, a strip at a time.
+    """
+    levels = [source]
     while min(levels[-1].shape[:2]) >> 1 >= max(1, min_side):
         levels.append(mean_below(levels[-1]))
     return levels[::-1]
 
 
-def mean_below(level: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The level below: floor of the mean of every whole 2×2 block (paper Eq. 1)."""
+def mean_below(level: Any) -> NDArray[Any]:
+    """The level below: the mean of every whole 2×2 block (paper Eq. 1). See `build_pyramid`."""
     import numpy as np
 
-    height, width = level.shape[0] & ~1, level.shape[1] & ~1
-    rows = level[0:height:2, :width].astype(np.uint16)
-    rows += level[1:height:2, :width]
-    total = rows[:, 0::2] + rows[:, 1::2]
-    total >>= 2
-    return total.astype(np.uint8)
+    height, width = level.shape[0] >> 1, level.shape[1] >> 1
+    below = np.empty((height, width, *level.shape[2:]), level.dtype)
+    per_row = max(1, 2 * int(np.prod(level.shape[1:])))
+    strip = max(1, STRIP_SAMPLES // per_row)
+    for y in range(0, height, strip):
+        rows = np.asarray(level[2 * y : 2 * min(y + strip, height)])
+        below[y : y + strip] = _means(rows[:, : 2 * width])
+    return below
+
+
+def _means(blocks: NDArray[Any]) -> NDArray[Any]:
+    """Means of the blocks of an even number of rows and columns."""
+    import numpy as np
+
+    from ptmtools.texture.samples import round_to
+
+    if blocks.dtype.kind == "u":
+        wide = np.uint16 if blocks.dtype.itemsize == 1 else np.uint32
+        rows: NDArray[Any] = blocks[0::2].astype(wide)
+        rows += blocks[1::2]
+        total: NDArray[Any] = rows[:, 0::2] + rows[:, 1::2]
+        total >>= 2
+        return total.astype(blocks.dtype)
+    with np.errstate(all="ignore"):
+        real = blocks.astype(np.float64)
+        upper, lower = real[0::2], real[1::2]
+        mean = upper[:, 0::2] + upper[:, 1::2]
+        mean += lower[:, 0::2] + lower[:, 1::2]
+        mean *= 0.25
+    return round_to(mean, blocks.dtype)
