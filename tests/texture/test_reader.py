@@ -1,0 +1,180 @@
+"""Levels and windows from files, bytes and ranges; tiles; only what is needed is read."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+import ptmtools.texture as texture
+from ptmtools.errors import InputError, LimitError
+from ptmtools.texture import Description, EncodeOptions, Limits, build_pyramid, encode
+
+TILED = EncodeOptions("raw", tile=16)
+
+
+def picture(height: int = 75, width: int = 101) -> NDArray[np.uint8]:
+    y, x = np.mgrid[:height, :width]
+    return np.stack([(x * 7 + y * 5 * c) % 251 for c in range(3)], axis=2).astype(np.uint8)
+
+
+class Recorder:
+    """A range reader that remembers what it was asked for."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+        self.asked: list[tuple[int, int]] = []
+
+    def __call__(self, offset: int, length: int) -> bytes:
+        self.asked.append((offset, length))
+        return self.data[offset : offset + length]
+
+    @property
+    def bytes_read(self) -> int:
+        return sum(min(length, len(self.data) - offset) for offset, length in self.asked)
+
+
+def test_every_kind_of_source(tmp_path: Path) -> None:
+    data = encode(picture(), TILED)
+    path = tmp_path / "a.ptm"
+    path.write_bytes(data)
+    with path.open("rb") as file:
+        for source in (path, str(path), data, memoryview(data), io.BytesIO(data), file):
+            with texture.open(source) as ptm:
+                np.testing.assert_array_equal(ptm.level(), picture())
+        assert not file.closed
+    with texture.open(Recorder(data)) as ptm:
+        assert ptm.whole == len(ptm.header.levels)
+        np.testing.assert_array_equal(ptm.level(), picture())
+
+
+def test_errors_name_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.ptm"
+    path.write_bytes(encode(picture())[:-1])
+    with texture.open(path) as ptm:
+        assert ptm.whole == len(ptm.header.levels) - 1
+        with pytest.raises(InputError, match=r"a\.ptm: level 6: is cut.*PTM-I107"):
+            ptm.level(6)
+    with pytest.raises(InputError, match=r"b\.ptm: there is no such file.*PTM-I120"):
+        texture.open(tmp_path / "b.ptm")
+
+
+def test_a_level_costs_the_bytes_up_to_it() -> None:
+    reader = Recorder(encode(picture(), TILED))
+    with texture.open(reader) as ptm:
+        head = reader.bytes_read
+        level = ptm.header.levels[3]
+        np.testing.assert_array_equal(ptm.level(3), build_pyramid(picture())[3])
+    assert max(offset + length for offset, length in reader.asked[1:]) == level.end
+    assert reader.bytes_read - head == level.end - ptm.header.levels[0].offset
+
+
+def test_a_window_costs_the_tiles_over_it() -> None:
+    image = np.tile(picture(64, 64), (8, 8, 1))
+    reader = Recorder(encode(image, EncodeOptions("raw", tile=32)))
+    with texture.open(reader) as ptm:
+        finest = len(ptm.header.levels) - 1
+        np.testing.assert_array_equal(ptm.window(finest, 200, 300, 5, 6), image[300:306, 200:205])
+        total = ptm.header.file_size
+    assert reader.bytes_read < total / 20
+
+
+@settings(deadline=None, max_examples=150)
+@given(data=st.data())
+def test_any_window_of_any_level(data: st.DataObject) -> None:
+    height, width = data.draw(st.integers(1, 90)), data.draw(st.integers(1, 90))
+    image = picture(height, width)
+    pyramid = build_pyramid(image)
+    encoded = encode(image, EncodeOptions("raw", tile=data.draw(st.sampled_from([0, 16, 18, 40]))))
+    with texture.open(encoded) as ptm:
+        number = data.draw(st.integers(0, len(pyramid) - 1))
+        level = pyramid[number]
+        x0 = data.draw(st.integers(0, level.shape[1] - 1))
+        y0 = data.draw(st.integers(0, level.shape[0] - 1))
+        w = data.draw(st.integers(1, level.shape[1] - x0))
+        h = data.draw(st.integers(1, level.shape[0] - y0))
+        np.testing.assert_array_equal(
+            ptm.window(number, x0, y0, w, h), level[y0 : y0 + h, x0 : x0 + w]
+        )
+
+
+@pytest.mark.parametrize("window", [(-1, 0, 2, 2), (0, 0, 0, 1), (100, 0, 2, 1), (0, 70, 1, 6)])
+def test_windows_outside(window: tuple[int, int, int, int]) -> None:
+    with texture.open(encode(picture(), TILED)) as ptm, pytest.raises(InputError, match="PTM-I106"):
+        ptm.window(6, *window)
+
+
+@pytest.mark.parametrize("profile", ["raw", "fast"])
+def test_tiles_with_any_number_of_threads(profile: str) -> None:
+    options = EncodeOptions(profile, tile=16)  # type: ignore[arg-type]
+    data = encode(picture(), options)
+    assert {encode(picture(), options, threads=n) for n in (2, 5)} == {data}
+    header = texture.read_header(data)
+    assert header.levels[-1].tiles == (6, 4)
+    for threads in (1, 2, 7):
+        with texture.open(data, threads=threads) as ptm:
+            for level, expected in zip(ptm.levels(), build_pyramid(picture()), strict=True):
+                np.testing.assert_array_equal(level, expected)
+
+
+def test_a_damaged_tile_spares_the_others() -> None:
+    data = bytearray(encode(picture(), TILED))
+    header = texture.read_header(bytes(data))
+    data[-1] ^= 1
+    finest = len(header.levels) - 1
+    with texture.open(bytes(data)) as ptm:
+        np.testing.assert_array_equal(ptm.window(finest, 0, 0, 20, 20), picture()[:20, :20])
+        with pytest.raises(InputError, match=r"level 6, tile 23: the checksum.*PTM-I108"):
+            ptm.level()
+    assert len(texture.check(bytes(data))) == 1
+
+
+def test_the_limit_is_that_of_what_is_decoded() -> None:
+    image = np.tile(picture(64, 64), (8, 8, 1))
+    data = encode(image, EncodeOptions("raw", tile=32))
+    with texture.open(data, limits=Limits(64 * 64 * 3)) as ptm:
+        finest = len(ptm.header.levels) - 1
+        assert ptm.window(finest, 40, 40, 20, 20).shape == (20, 20, 3)
+        with pytest.raises(LimitError, match="PTM-L103"):
+            ptm.level()
+    whole = encode(image, EncodeOptions("raw", tile=0))
+    with (
+        texture.open(whole, limits=Limits(64 * 64 * 3)) as ptm,
+        pytest.raises(LimitError, match="PTM-L103"),
+    ):
+        ptm.window(finest, 40, 40, 20, 20)
+
+
+DESCRIBED = Description(
+    icc=b"a profile" * 100,
+    srgb=1,
+    gamma=45455,
+    chromaticities=(31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000),
+    orientation=6,
+)
+
+
+@pytest.mark.parametrize("description", [Description(), Description(orientation=3), DESCRIBED])
+def test_a_description_comes_back(description: Description) -> None:
+    data = encode(picture(), description=description)
+    with texture.open(data) as ptm:
+        assert ptm.description() == description
+        np.testing.assert_array_equal(ptm.level(), picture())
+
+
+def test_a_damaged_description_is_found() -> None:
+    data = bytearray(encode(picture(), description=DESCRIBED))
+    offset, length, _ = texture.read_header(bytes(data)).description
+    data[offset + length - 1] ^= 1
+    with texture.open(bytes(data)) as ptm, pytest.raises(InputError, match="PTM-I108"):
+        ptm.description()
+    assert texture.check(bytes(data)) == [
+        problem for problem in texture.check(bytes(data)) if "description" in problem
+    ]
+    with texture.open(bytes(data[: offset + 5])) as ptm, pytest.raises(InputError, match="I107"):
+        ptm.description()
