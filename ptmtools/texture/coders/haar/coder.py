@@ -9,8 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.haar import layout, tables
+from ptmtools.texture.coders.damage import damaged
+from ptmtools.texture.coders.haar import layout
 from ptmtools.texture.coders.haar.fit import fit_weights
+from ptmtools.texture.coders.rans import tables
+from ptmtools.texture.coders.rans.stream import encode_symbols, read_stream
 
 #: Flag bits: weights are sent; from bit 4 on, component i is coded by rank.
 SENT_WEIGHTS = 1
@@ -39,14 +42,13 @@ class _Ranks:
 def _sparse_values(plane: Bytes) -> NDArray[np.intp] | None:
     """The distinct values of a plane, if they are few for their range; else None."""
     values = np.flatnonzero(np.bincount(plane.reshape(-1), minlength=256))
-    few = 100 * len(values) <= 88 * (values[-1] - values[0] + 1)
-    return values if len(values) > 1 and few and plane.size >= 64 * len(values) else None
+    if len(values) < 2 or plane.size < 64 * len(values):
+        return None
+    return values if 100 * len(values) <= 88 * (values[-1] - values[0] + 1) else None
 
 
 def encode(level: Bytes, below: Bytes) -> bytes:
     """The group that refines ``below`` (h >> 1, w >> 1, c) to ``level`` (h, w, c)."""
-    from ptmtools.texture.coders.haar import kernels
-
     components = level.shape[2]
     sets = [
         _sparse_values(level[: 2 * below.shape[0], : 2 * below.shape[1], c])
@@ -59,23 +61,7 @@ def encode(level: Bytes, below: Bytes) -> bytes:
     contexts = np.zeros(n, np.uint8)
     counts = np.zeros((layout.TABLES, 256), np.int64)
     _pass(True, level, below, sent, ranks, symbols, contexts, counts)
-    frequency, packed_tables = tables.choose(counts)
-    words = np.zeros(n + 16, np.uint16)
-    escapes = np.zeros(n, np.uint16)
-    start = np.cumsum(frequency, axis=1) - frequency
-    first, escaped = kernels.rans_encode(
-        symbols,
-        contexts,
-        below.shape[1],
-        n - 3 * below.size,
-        frequency,
-        start,
-        np.zeros(counts.shape, np.uint64),
-        np.zeros(counts.shape, np.uint64),
-        np.zeros(4, np.uint64),
-        words,
-        escapes,
-    )
+    frequency, packed_tables = tables.choose(counts, layout.EDGE_TABLE)
     flags = SENT_WEIGHTS if sent is not None else 0
     flags |= sum(RANKED << c for c in range(components) if sets[c] is not None)
     return b"".join(
@@ -84,22 +70,25 @@ def encode(level: Bytes, below: Bytes) -> bytes:
             *(_bitmap(used) for used in sets if used is not None),
             b"" if sent is None else sent[_sent_mask(components)].astype("<i2").tobytes(),
             packed_tables,
-            (n - escaped).to_bytes(4, "little"),
-            escapes[escaped:].astype("<u2").tobytes(),
-            words[first:].astype("<u2").tobytes(),
+            encode_symbols(symbols, contexts, frequency, layout.EDGE_TABLE),
         ]
     )
 
 
-def decode(data: bytes, below: Bytes, shape: tuple[int, int, int]) -> Bytes:
-    """The inverse of `encode`. Raises InputError PTM-I112 for what no encoder writes."""
+def decode(
+    data: bytes, below: Bytes, shape: tuple[int, int, int], version_1: bool = False
+) -> Bytes:
+    """The inverse of `encode`, or the decoder of files of version 1.
+
+    Raises InputError PTM-I112 for what no encoder writes.
+    """
     from ptmtools.texture.coders.haar import kernels
 
     components = shape[2]
     reader = _Reader(data)
     flags = reader.take(1)[0]
     if flags & ~(SENT_WEIGHTS | RANKED * ((1 << components) - 1)):
-        raise tables.damaged(f"flags {flags} are unknown")
+        raise damaged(f"flags {flags} are unknown")
     sets = [_bits(reader.take(32)) if flags >> 4 + c & 1 else None for c in range(components)]
     sent = None
     if flags & SENT_WEIGHTS:
@@ -107,27 +96,21 @@ def decode(data: bytes, below: Bytes, shape: tuple[int, int, int]) -> Bytes:
         sent = np.zeros(mask.shape, np.int32)
         sent[mask] = np.frombuffer(reader.take(2 * int(mask.sum())), "<i2")
         if int(np.abs(sent).max()) > layout.WEIGHT_TOP:
-            raise tables.damaged("a weight is out of range")
-    frequency, used = tables.parse(reader.rest(), layout.TABLES)
+            raise damaged("a weight is out of range")
+    parse = tables.parse_version_1 if version_1 else tables.parse
+    frequency, used = parse(reader.rest(), layout.TABLES)
     reader.take(used)
-    escaped = int.from_bytes(reader.take(4), "little")
-    escapes = np.frombuffer(reader.take(2 * escaped), "<u2").astype(np.uint16)
-    stream = reader.rest()
-    if len(stream) < 16 or len(stream) % 2:
-        raise tables.damaged("its stream has no whole number of words")
     level = np.zeros(shape, np.uint8)
     edge = level.size - 4 * below.size
-    limit = len(stream) // 2
-    words = np.zeros(limit + max(below.shape[1], edge) + 8, np.uint16)
-    words[:limit] = np.frombuffer(stream, "<u2")
+    stream = read_stream(reader.rest(), max(below.shape[1], edge))
     result = _pass(
-        False, level, below, sent, _Ranks(sets), words=words, limit=limit, escapes=escapes,
-        table=tables.decoding_table(frequency),
+        False, level, below, sent, _Ranks(sets), words=stream.words, limit=stream.limit,
+        escapes=stream.escapes, table=tables.decoding_table(frequency), turning=not version_1,
     )  # fmt: skip
     if result == kernels.TRUNCATED:
-        raise tables.damaged("its stream ends early")
+        raise damaged("its stream ends early")
     if result != kernels.OK:
-        raise tables.damaged("its stream leads to impossible texels")
+        raise damaged("its stream leads to impossible texels")
     return level
 
 
@@ -144,6 +127,7 @@ def _pass(
     limit: int = 0,
     escapes: NDArray[np.uint16] | None = None,
     table: NDArray[np.uint32] | None = None,
+    turning: bool = True,
 ) -> int:
     """`kernels.haar_pass`, with empty arrays for what a direction does not use."""
     from ptmtools.texture.coders.haar import kernels
@@ -156,6 +140,7 @@ def _pass(
     return int(
         kernels.haar_pass(
             encoding,
+            turning,
             level,
             below,
             np.array(layout.plane_order(components), np.int64),
@@ -196,7 +181,7 @@ def _bitmap(values: NDArray[np.intp]) -> bytes:
 def _bits(bitmap: bytes) -> NDArray[np.intp]:
     values = np.flatnonzero(np.unpackbits(np.frombuffer(bitmap, np.uint8), bitorder="little"))
     if len(values) < 2:
-        raise tables.damaged("a rank bitmap has fewer than two values")
+        raise damaged("a rank bitmap has fewer than two values")
     return values
 
 
@@ -209,7 +194,7 @@ class _Reader:
 
     def take(self, n: int) -> bytes:
         if self._at + n > len(self._data):
-            raise tables.damaged("it is cut short")
+            raise damaged("it is cut short")
         self._at += n
         return self._data[self._at - n : self._at]
 

@@ -1,4 +1,4 @@
-"""Compiled loops of the `fast` profile: the Haar pass over one group, and the rANS encoder.
+"""Compiled loops of the `fast` profile: the Haar pass over one group.
 
 One pass serves both directions, so that encoder and decoder cannot disagree about a prediction:
 it walks the block rows of a level, predicts the three Haar differences of every block from what
@@ -7,8 +7,7 @@ and writes the texels (decoding). A whole row of one coefficient is predicted be
 residual is needed, which lets the compiler use vector instructions and keeps four rANS lanes busy.
 The arithmetic is exact in 32-bit integers; the format is specified in ``docs/format-ptm.md``.
 
-All kernels are in one file: numba's cache notices a change of a function's own file only, and the
-helpers are compiled into the pass. Allocating scratch arrays inside the pass was rejected: it
+Allocating scratch arrays inside the pass was rejected: it
 added half to the time to compile it.
 """
 
@@ -19,6 +18,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ptmtools.compiled import kernel
+from ptmtools.texture.coders.rans.kernels import (
+    ESCAPE,
+    STATE_LOW,
+    TABLE_SIZE,
+    decode_row,
+    fill_escapes,
+    rotate_states,
+    start_states,
+)
 
 i32 = np.int32
 
@@ -26,14 +34,6 @@ i32 = np.int32
 ACTIVITY_TOP = 1023
 #: Predictions stay within the range of V, so that every residual fits in 16 bits.
 PREDICTION_TOP = 1020
-#: Symbols at or above this escape to a 16-bit value.
-ESCAPE = 255
-#: Bits of a rANS frequency table.
-TABLE_BITS = 11
-TABLE_SIZE = 1 << TABLE_BITS
-#: A rANS state stays at or above this and below 2^31.
-STATE_LOW = 1 << 15
-
 OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2
 
 
@@ -306,80 +306,6 @@ def _write_ranked_blocks(
 
 
 @kernel
-def _decode_row(
-    state: Any, words: Any, at: int, table: Any, starts: Any, activity: Any, n: int, out: Any
-) -> Any:
-    """n symbols, lane x & 3 for symbol x; an entry is symbol << 24 | frequency << 12 | offset."""
-    mask = np.uint64(TABLE_SIZE - 1)
-    low, bits, sixteen = np.uint64(STATE_LOW), np.uint64(TABLE_BITS), np.uint64(16)
-    twelve, part = np.uint64(12), np.uint64(4095)
-    zero, one, four = np.uint64(0), np.uint64(1), np.uint64(4)
-    x0, x1, x2, x3 = state[0], state[1], state[2], state[3]
-    i, k = zero, np.uint64(at)
-    whole = np.uint64(n & ~3)
-    while i < whole:
-        e0 = np.uint64(table[starts[activity[i]] + (x0 & mask)])
-        e1 = np.uint64(table[starts[activity[i + one]] + (x1 & mask)])
-        e2 = np.uint64(table[starts[activity[i + np.uint64(2)]] + (x2 & mask)])
-        e3 = np.uint64(table[starts[activity[i + np.uint64(3)]] + (x3 & mask)])
-        x0 = ((e0 >> twelve) & part) * (x0 >> bits) + (e0 & part)
-        x1 = ((e1 >> twelve) & part) * (x1 >> bits) + (e1 & part)
-        x2 = ((e2 >> twelve) & part) * (x2 >> bits) + (e2 & part)
-        x3 = ((e3 >> twelve) & part) * (x3 >> bits) + (e3 & part)
-        out[i] = e0 >> np.uint64(24)
-        out[i + one] = e1 >> np.uint64(24)
-        out[i + np.uint64(2)] = e2 >> np.uint64(24)
-        out[i + np.uint64(3)] = e3 >> np.uint64(24)
-        refill = x0 < low
-        word = np.uint64(words[k])
-        x0 = (x0 << sixteen) | word if refill else x0
-        k += one if refill else zero
-        refill = x1 < low
-        word = np.uint64(words[k])
-        x1 = (x1 << sixteen) | word if refill else x1
-        k += one if refill else zero
-        refill = x2 < low
-        word = np.uint64(words[k])
-        x2 = (x2 << sixteen) | word if refill else x2
-        k += one if refill else zero
-        refill = x3 < low
-        word = np.uint64(words[k])
-        x3 = (x3 << sixteen) | word if refill else x3
-        k += one if refill else zero
-        i += four
-    state[0], state[1], state[2], state[3] = x0, x1, x2, x3
-    while i < np.uint64(n):
-        lane = i & np.uint64(3)
-        x = state[lane]
-        e = np.uint64(table[starts[activity[i]] + (x & mask)])
-        x = ((e >> twelve) & part) * (x >> bits) + (e & part)
-        out[i] = e >> np.uint64(24)
-        if x < low:
-            x = (x << sixteen) | np.uint64(words[k])
-            k += one
-        state[lane] = x
-        i += one
-    # Signed: with a plain integer an unsigned one would become a float.
-    return np.int64(k)
-
-
-@kernel
-def _fill_escapes(out: Any, n: int, escapes: Any, at: int) -> int:
-    """Escaped symbols replaced by their values; -1 if there are not enough of them."""
-    seen = False
-    for x in range(n):
-        seen |= out[x] == ESCAPE
-    if seen:
-        for x in range(n):
-            if out[x] == ESCAPE:
-                if at == escapes.size:
-                    return -1
-                out[x] = escapes[at]
-                at += 1
-    return at
-
-
-@kernel
 def _edge_prediction(level: Any, y: int, x: int, plane: int) -> int:
     """Median of left, upper and left + upper - upper left; what lies outside gives way."""
     if y == 0:
@@ -394,8 +320,8 @@ def _edge_prediction(level: Any, y: int, x: int, plane: int) -> int:
 
 @kernel
 def haar_pass(
-    encoding: bool, level: Any, below: Any, planes: Any, references: Any, weights: Any,
-    activities: Any, classes: Any, ranks: Any, values: Any, tops: Any, symbols: Any,
+    encoding: bool, turning: bool, level: Any, below: Any, planes: Any, references: Any,
+    weights: Any, activities: Any, classes: Any, ranks: Any, values: Any, tops: Any, symbols: Any,
     contexts: Any, counts: Any, words: Any, limit: int, escapes: Any, table: Any, work: Any,
 ) -> int:  # fmt: skip
     """One group in either direction.
@@ -404,6 +330,8 @@ def haar_pass(
     ----------
     encoding: True reads ``level`` and fills ``symbols``, ``contexts`` and ``counts``; False reads
         ``words``, ``escapes`` and ``table`` and fills ``level``.
+    turning: the states take turns from row to row; False in version 1, where each row begins with
+        the first.
     level: (h, w, c) uint8. below: (h >> 1, w >> 1, c) uint8, the level below.
     planes: (c,) int64, the components in coding order.
     references: (c,) int64, how many of the planes coded first each plane's residuals refer to.
@@ -438,13 +366,10 @@ def haar_pass(
     second: Any = np.int64(2)
     at, escaped, n = zero, zero, zero
     if not encoding:
-        for lane in range(4):
-            state[lane] = np.uint64(words[2 * lane]) | (
-                np.uint64(words[2 * lane + 1] & 0x7FFF) << np.uint64(16)
-            )
+        start_states(words, state)
         at = np.int64(8)
 
-    for c in range(nc):
+    for c in range(nc if below.size else 0):
         for y in range(-2, 2):
             _load_row(below, planes[c], y, ranks[planes[c]], rows[c, y & 7])
     stray = 0
@@ -481,8 +406,10 @@ def haar_pass(
                         )  # fmt: skip
                         n += bw
                     else:
-                        at = _decode_row(state, words, at, table, starts[0], activity, bw, decoded)
-                        escaped = _fill_escapes(decoded, bw, escapes, escaped)
+                        at = decode_row(state, words, at, table, starts[0], activity, bw, decoded)
+                        if turning:
+                            rotate_states(state, bw)
+                        escaped = fill_escapes(decoded, bw, escapes, escaped)
                         if at > limit or escaped < 0:
                             return TRUNCATED
                         _absorb(decoded, prediction, residual, near, found)
@@ -504,8 +431,10 @@ def haar_pass(
                     )  # fmt: skip
                     n += bw
                 else:
-                    at = _decode_row(state, words, at, table, starts[1], activity, bw, decoded)
-                    escaped = _fill_escapes(decoded, bw, escapes, escaped)
+                    at = decode_row(state, words, at, table, starts[1], activity, bw, decoded)
+                    if turning:
+                        rotate_states(state, bw)
+                    escaped = fill_escapes(decoded, bw, escapes, escaped)
                     if at > limit or escaped < 0:
                         return TRUNCATED
                     _absorb(decoded, prediction, eg[c], near_g[c], g)
@@ -522,7 +451,7 @@ def haar_pass(
     if edge:
         # The odd last column, then the odd last row: modulo 256, so nothing can escape.
         if not encoding:
-            at = _decode_row(state, words, at, table, starts[2], work.zeros, edge, decoded)
+            at = decode_row(state, words, at, table, starts[2], work.zeros, edge, decoded)
             if at > limit:
                 return TRUNCATED
         i = 0
@@ -545,92 +474,3 @@ def haar_pass(
     for lane in range(4):
         stray |= state[lane] != STATE_LOW
     return IMPOSSIBLE if stray or at != limit or escaped != escapes.size else OK
-
-
-@kernel
-def normalise(counts: Any, frequency: Any) -> None:
-    """Frequencies (t, 256) int64 that sum to 2048 in each row of ``counts`` (t, 256) that has any.
-
-    Rounds, at least 1 where a count is positive; then moves single units where the length changes
-    least, which is by about count / (frequency ± ½). Ties go to the lower symbol.
-    """
-    for t in range(counts.shape[0]):
-        total = 0
-        for s in range(256):
-            total += counts[t, s]
-        if total == 0:
-            continue
-        left = TABLE_SIZE
-        for s in range(256):
-            n = counts[t, s]
-            if n > 0:
-                frequency[t, s] = max(1, (n * TABLE_SIZE + total // 2) // total)
-                left -= frequency[t, s]
-        step = 1 if left > 0 else -1
-        while left != 0:
-            best = -1
-            for s in range(256):
-                n, f = counts[t, s], frequency[t, s]
-                if f == 0 or f + step == 0:
-                    continue
-                if best < 0:
-                    best = s
-                    continue
-                mine = n * (2 * frequency[t, best] + step)
-                yours = counts[t, best] * (2 * f + step)
-                if (mine > yours) if step > 0 else (mine < yours):
-                    best = s
-            frequency[t, best] += step
-            left -= step
-
-
-@kernel
-def rans_encode(
-    symbols: Any, contexts: Any, row: int, edge: int, frequency: Any, start: Any,
-    reciprocal: Any, shift: Any, state: Any, words: Any, escapes: Any,
-) -> tuple[int, int]:  # fmt: skip
-    """Code ``symbols`` from the last to the first, so that the decoder goes forwards.
-
-    frequency, start: (tables, 256) int64. A symbol without a frequency escapes. Words and escapes
-    are written from the ends of their arrays; returns where each begins. reciprocal, shift:
-    (tables, 256) uint64 and state: (4,) uint64 are overwritten.
-    """
-    tables = frequency.shape[0]
-    for t in range(tables):
-        for s in range(256):
-            f = frequency[t, s]
-            if f > 0:
-                bits = 0
-                while (1 << bits) < f:
-                    bits += 1
-                # x // f == x * reciprocal >> shift for every x below 2^31.
-                shift[t, s] = bits + 31
-                reciprocal[t, s] = ((1 << (bits + 31)) + f - 1) // f
-    for lane in range(4):
-        state[lane] = STATE_LOW
-    at, escaped = words.size, escapes.size
-    i = symbols.size
-    left = edge if edge else row
-    while i > 0:
-        for x in range(left - 1, -1, -1):
-            i -= 1
-            t = contexts[i]
-            z = symbols[i]
-            if t != tables - 1 and (z >= ESCAPE or frequency[t, z] == 0):
-                escaped -= 1
-                escapes[escaped] = z
-                z = ESCAPE
-            f = np.uint64(frequency[t, z])
-            s = state[x & 3]
-            if s >= f << np.uint64(20):
-                at -= 1
-                words[at] = s & np.uint64(0xFFFF)
-                s >>= np.uint64(16)
-            q = (s * reciprocal[t, z]) >> shift[t, z]
-            state[x & 3] = (q << np.uint64(TABLE_BITS)) + (s - q * f) + np.uint64(start[t, z])
-        left = row
-    for lane in range(3, -1, -1):
-        at -= 2
-        words[at] = state[lane] & np.uint64(0xFFFF)
-        words[at + 1] = state[lane] >> np.uint64(16)
-    return at, escaped

@@ -19,6 +19,8 @@ CLASS_BOUNDS = (1, 3, 7, 12, 20, 32, 50, 76, 115, 170, 250, 370, 560)
 CLASSES = len(CLASS_BOUNDS) + 1
 #: One table for each class of V and h1, one for each class of h2', one for the edge texels.
 TABLES = 2 * CLASSES + 1
+#: The table of the edge texels, which alone has no escape.
+EDGE_TABLE = TABLES - 1
 
 #: Weights in 1/256 for a plane with 0, 1, 2 references: V, h1, h2' by seven features.
 BUILT_IN_WEIGHTS = np.array(

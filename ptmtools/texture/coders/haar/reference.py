@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.texture.coders.haar import layout
-from ptmtools.texture.coders.haar.tables import BUILT_IN_MEANS
+from ptmtools.texture.coders.rans.tables import BUILT_IN_MEANS
 
 Row = list[int]
 Plane = list[Row]
@@ -22,7 +22,7 @@ At = Callable[[int, int], int]
 
 
 def decode_haar(
-    group: bytes, below: NDArray[np.uint8], shape: tuple[int, int, int]
+    group: bytes, below: NDArray[np.uint8], shape: tuple[int, int, int], version_1: bool = False
 ) -> NDArray[np.uint8]:
     """The level (h, w, c) that a Haar-coded group (without its first byte) refines ``below`` to."""
     height, width, components = shape
@@ -42,8 +42,8 @@ def decode_haar(
                 for i in [*range(5 if k == 2 else 4), *range(5, 5 + n)]:
                     weights[c][k][i] = int.from_bytes(group[at : at + 2], "little", signed=True)
                     at += 2
-    tables, at = _read_tables(group, at)
-    symbols = _Symbols(group, at, tables)
+    tables, at = _read_tables(group, at, version_1)
+    symbols = _Symbols(group, at, tables, version_1)
 
     texels = np.zeros(shape, np.int64)
     v, h, g = ([_zeros(bh, bw) for _ in order] for _ in range(3))
@@ -180,7 +180,7 @@ def _median(plane: NDArray[np.int64], y: int, x: int) -> int:
 class _Symbols:
     """The four rANS states over their words, and the escapes."""
 
-    def __init__(self, group: bytes, at: int, tables: list[Row]) -> None:
+    def __init__(self, group: bytes, at: int, tables: list[Row], version_1: bool) -> None:
         escapes = int.from_bytes(group[at : at + 4], "little")
         numbers = np.frombuffer(group, "<u2", offset=at + 4).tolist()
         self._escapes = iter(numbers[:escapes])
@@ -188,10 +188,12 @@ class _Symbols:
         self._states = [words[2 * i] | words[2 * i + 1] << 16 for i in range(4)]
         self._words = iter(words[8:])
         self._tables = tables
+        self._version_1 = version_1
         self._i = 0
 
     def begin_row(self) -> None:
-        self._i = 0
+        if self._version_1:
+            self._i = 0
 
     def next(self, table: int) -> int:
         lane = self._i & 3
@@ -209,10 +211,13 @@ class _Symbols:
         return next(self._escapes) if z == 255 and table != 28 else z
 
 
-def _read_tables(group: bytes, at: int) -> tuple[list[Row], int]:
-    kinds = group[at : at + 29]
-    size = int.from_bytes(group[at + 29 : at + 31], "little")
-    at += 31
+def _read_tables(group: bytes, at: int, version_1: bool) -> tuple[list[Row], int]:
+    kinds: Row = []
+    if version_1:
+        kinds = list(group[at : at + 29])
+        at += 29
+    size = int.from_bytes(group[at : at + 2], "little")
+    at += 2
     numbers: Row = []
     n, shift = 0, 0
     for byte in group[at : at + size]:
@@ -224,6 +229,16 @@ def _read_tables(group: bytes, at: int) -> tuple[list[Row], int]:
                 n, shift = 0, 0
     tables: list[Row] = []
     sent = iter(numbers)
+    last = 4
+    while len(kinds) < 29:
+        number = next(sent)
+        if number == 0:
+            kinds += [0] * (1 + next(sent))
+        elif number == 1:
+            kinds.append(255)
+        else:
+            last += -(number - 1) // 2 if number & 1 else (number - 2) // 2
+            kinds.append(last)
     for kind in kinds:
         table = [0] * 256
         if kind == 255:

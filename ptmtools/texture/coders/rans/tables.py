@@ -1,8 +1,9 @@
-"""Symbol frequencies of the `fast` profile: built in or sent, always in integers.
+"""Symbol frequencies of the static coders: built in or sent, always in integers.
 
-Each table of a group is either one of a family of two-sided geometric distributions, named by one
-byte, or the frequencies counted, in nibbles. Small groups live on the first kind, large ones on
-the second; the encoder takes whichever is shorter, table by table.
+Each table of a group is either one of a family of two-sided geometric distributions, named by its
+number, or the frequencies counted. Small groups live on the first kind, large ones on the second;
+the encoder takes whichever is shorter, table by table. All of it is written as numbers of groups of
+three bits, so that the tables of a nearly empty group take a few bytes.
 
 Deflating the frequencies was rejected: the bytes of a file would depend on the zlib that wrote it.
 """
@@ -14,7 +15,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import InputError
+from ptmtools.texture.coders.damage import damaged
 
 #: Bits of a table and its size: the frequencies of a table in use sum to this.
 TABLE_BITS = 11
@@ -27,13 +28,15 @@ BUILT_IN_MEANS = (
 )  # fmt: skip
 UNUSED = 0
 SENT = 255
+#: The first kind is told as the change from this one.
+_FIRST_KIND = 4
 
 Frequencies = NDArray[np.int64]
 
 
 def normalise(counts: NDArray[np.int64]) -> Frequencies:
     """Frequencies (t, 256) of the rows of ``counts`` (t, 256): see `kernels.normalise`."""
-    from ptmtools.texture.coders.haar import kernels
+    from ptmtools.texture.coders.rans import kernels
 
     frequency = np.zeros_like(counts)
     kernels.normalise(counts, frequency)
@@ -91,18 +94,20 @@ def _log_table() -> NDArray[np.int64]:
     return table
 
 
-def choose(counts: NDArray[np.int64]) -> tuple[Frequencies, bytes]:
+def choose(counts: NDArray[np.int64], plain: int) -> tuple[Frequencies, bytes]:
     """Tables (t, 256) for the symbol counts (t, 256) of a group, and their serialised form.
 
-    The last table has no escape: it is built in only where that holds every symbol that occurs.
+    Tables from number ``plain`` on have no escape: one that is built in is used only where it holds
+    every symbol that occurs.
     """
-    occurs = counts.sum(axis=1) > 0
+    occurs = np.flatnonzero(counts.any(axis=1))
     rows = counts[occurs]
     # Integers below 2^53, so exact; float64 only because numpy multiplies such matrices faster.
     cost = (rows.astype(np.float64) @ _built_in_lengths().T).astype(np.int64)
-    if occurs[-1]:
-        lacking = built_in()[1:, rows[-1] > 0] == 0
-        cost[-1, lacking.any(axis=1)] = 1 << 62
+    for row, t in enumerate(occurs):
+        if t >= plain:
+            lacking = built_in()[1:, rows[row] > 0] == 0
+            cost[row, lacking.any(axis=1)] = 1 << 62
     exact = normalise(rows)
     used = _used(exact)
     nibbles = _nibbles(exact)
@@ -111,15 +116,15 @@ def choose(counts: NDArray[np.int64]) -> tuple[Frequencies, bytes]:
     sent_cost += (nibbles.sum(axis=1) + _nibbles(used)) * 4 * 256
     sent = sent_cost < cost.min(axis=1)
     best = 1 + cost.argmin(axis=1)
-    kind = np.full(len(counts), UNUSED, np.uint8)
-    kind[occurs] = np.where(sent, SENT, best)
     frequency = np.zeros_like(counts)
     frequency[occurs] = np.where(sent[:, None], exact, built_in()[best])
-    numbers: list[int] = []
+    kinds = np.zeros(len(counts), np.int64)
+    kinds[occurs] = np.where(sent, SENT, best)
+    numbers = _kind_numbers(kinds.tolist())
     for row, n in zip(exact[sent], used[sent], strict=True):
         numbers += [int(row[ESCAPE]), int(n), *row[:n].tolist()]
     packed = _pack_nibbles(numbers)
-    return frequency, kind.tobytes() + len(packed).to_bytes(2, "little") + packed
+    return frequency, len(packed).to_bytes(2, "little") + packed
 
 
 def parse(data: bytes, tables: int) -> tuple[Frequencies, int]:
@@ -127,17 +132,74 @@ def parse(data: bytes, tables: int) -> tuple[Frequencies, int]:
 
     Raises InputError PTM-I112 for tables that no encoder writes.
     """
-    kinds = data[:tables]
-    size = int.from_bytes(data[tables : tables + 2], "little")
-    end = tables + 2 + size
+    end = 2 + int.from_bytes(data[:2], "little")
     if len(data) < end:
         raise damaged("its tables are cut short")
-    numbers = _unpack_nibbles(data[tables + 2 : end])
-    frequency = np.zeros((tables, 256), np.int64)
+    numbers = _unpack_nibbles(data[2:end]).tolist()
+    kinds, at = _kinds(numbers, tables)
+    return _frequencies(kinds, numbers[at:]), end
+
+
+def parse_version_1(data: bytes, tables: int) -> tuple[Frequencies, int]:
+    """As `parse`, of files of version 1: a byte for each table names its kind."""
+    end = tables + 2 + int.from_bytes(data[tables : tables + 2], "little")
+    if len(data) < end:
+        raise damaged("its tables are cut short")
+    return _frequencies(list(data[:tables]), _unpack_nibbles(data[tables + 2 : end]).tolist()), end
+
+
+def _kind_numbers(kinds: list[int]) -> list[int]:
+    """0 and the number of further unused tables; 1 where sent; else 2 + change of kind, zigzag."""
+    numbers: list[int] = []
+    t, last = 0, _FIRST_KIND
+    while t < len(kinds):
+        if kinds[t] == UNUSED:
+            begin = t
+            while t + 1 < len(kinds) and kinds[t + 1] == UNUSED:
+                t += 1
+            numbers += [0, t - begin]
+        elif kinds[t] == SENT:
+            numbers.append(1)
+        else:
+            change = kinds[t] - last
+            numbers.append(2 + (2 * change if change >= 0 else -2 * change - 1))
+            last = kinds[t]
+        t += 1
+    return numbers
+
+
+def _kinds(numbers: list[int], tables: int) -> tuple[list[int], int]:
+    """The inverse of `_kind_numbers`, and how many numbers were used."""
+    kinds: list[int] = []
+    at, last = 0, _FIRST_KIND
+    padded = [*numbers, 0, tables]
+    while len(kinds) < tables:
+        if at >= len(numbers):
+            raise damaged("its tables are cut short")
+        n = padded[at]
+        at += 1
+        if n == 0:
+            kinds += [UNUSED] * min(1 + padded[at], tables + 1)
+            at += 1
+        elif n == 1:
+            kinds.append(SENT)
+        else:
+            last += -(n - 1) // 2 if n & 1 else (n - 2) // 2
+            if not 1 <= last <= len(BUILT_IN_MEANS):
+                raise damaged(f"table {len(kinds)} is of an unknown kind, {last}")
+            kinds.append(last)
+    if len(kinds) > tables:
+        raise damaged("it has too many tables")
+    return kinds, at
+
+
+def _frequencies(kinds: list[int], numbers: list[int]) -> Frequencies:
+    """The tables of these kinds; the sent ones from ``numbers``."""
+    frequency = np.zeros((len(kinds), 256), np.int64)
     at = 0
     for t, kind in enumerate(kinds):
         if kind == SENT:
-            used = int(numbers[at + 1]) if at + 1 < len(numbers) else 256
+            used = numbers[at + 1] if at + 1 < len(numbers) else 256
             row = numbers[at + 2 : at + 2 + used]
             if used >= 256 or len(row) < used:
                 raise damaged(f"table {t} is cut short")
@@ -150,7 +212,7 @@ def parse(data: bytes, tables: int) -> tuple[Frequencies, int]:
             frequency[t] = built_in()[kind]
         if kind != UNUSED and int(frequency[t].sum()) != TABLE_SIZE:
             raise damaged(f"table {t} does not sum to {TABLE_SIZE}")
-    return frequency, end
+    return frequency
 
 
 def decoding_table(frequency: Frequencies) -> NDArray[np.uint32]:
@@ -164,15 +226,6 @@ def decoding_table(frequency: Frequencies) -> NDArray[np.uint32]:
     slots = np.repeat(entry, rows.reshape(-1)).reshape(-1, TABLE_SIZE)
     table[used] = slots + np.arange(TABLE_SIZE, dtype=np.uint32)
     return table.reshape(-1)
-
-
-def damaged(what: str) -> InputError:
-    """The error for a group whose contents contradict each other."""
-    return InputError(
-        "PTM-I112",
-        f"the group cannot be decoded: {what}",
-        remedy="the file is damaged or was not written by a conforming encoder; encode it again",
-    )
 
 
 def _used(frequency: Frequencies) -> NDArray[np.int64]:

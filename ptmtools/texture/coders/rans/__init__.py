@@ -1,0 +1,1 @@
+"""Static entropy coding of symbols of many contexts: `tables` chooses, `stream` codes."""

@@ -1,0 +1,222 @@
+"""Compiled loops of the static entropy coder: interleaved rANS, and normalised frequencies.
+
+rANS (Duda, "Asymmetric numeral systems", arXiv:1311.2540), four states that take turns, renewed by
+16-bit words, tables of 11 bits: everything fits in unsigned 32-bit integers. The decoder works on
+a row of symbols at a time, whose tables are all known before; so four chains of table look-ups are
+under way at once.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ptmtools.compiled import kernel
+
+#: Symbols of this number escape to a 16-bit value, but for tables without escape.
+ESCAPE = 255
+#: Bits of a frequency table.
+TABLE_BITS = 11
+TABLE_SIZE = 1 << TABLE_BITS
+#: A state stays at or above this and below 2^31.
+STATE_LOW = 1 << 15
+#: Words that must be readable behind the last one of a stream, besides the length of a row.
+PADDING = 8
+
+_MASK = np.uint64(TABLE_SIZE - 1)
+_LOW = np.uint64(STATE_LOW)
+_BITS = np.uint64(TABLE_BITS)
+
+
+@kernel
+def start_states(words: Any, state: Any) -> None:
+    """The four states (uint64) from the first eight words."""
+    for lane in range(4):
+        state[lane] = np.uint64(words[2 * lane]) | (
+            np.uint64(words[2 * lane + 1] & 0x7FFF) << np.uint64(16)
+        )
+
+
+@kernel
+def decode_row(
+    state: Any, words: Any, at: int, table: Any, starts: Any, contexts: Any, n: int, out: Any
+) -> Any:
+    """Decode n symbols into ``out``; symbol i uses state i & 3. Returns the next word's index.
+
+    Parameters
+    ----------
+    state: (4,) uint64. words: uint16, with n + `PADDING` words behind the last that may be read.
+    table: uint32 from `tables.decoding_table`: symbol << 24 | frequency << 12 | offset.
+    starts: uint64, where in ``table`` the table of each context begins. contexts: of each symbol.
+    """
+    sixteen, twelve, part = np.uint64(16), np.uint64(12), np.uint64(4095)
+    zero, one, two, three = np.uint64(0), np.uint64(1), np.uint64(2), np.uint64(3)
+    x0, x1, x2, x3 = state[0], state[1], state[2], state[3]
+    i, k = zero, np.uint64(at)
+    whole = np.uint64(n & ~3)
+    while i < whole:
+        e0 = np.uint64(table[starts[contexts[i]] + (x0 & _MASK)])
+        e1 = np.uint64(table[starts[contexts[i + one]] + (x1 & _MASK)])
+        e2 = np.uint64(table[starts[contexts[i + two]] + (x2 & _MASK)])
+        e3 = np.uint64(table[starts[contexts[i + three]] + (x3 & _MASK)])
+        x0 = ((e0 >> twelve) & part) * (x0 >> _BITS) + (e0 & part)
+        x1 = ((e1 >> twelve) & part) * (x1 >> _BITS) + (e1 & part)
+        x2 = ((e2 >> twelve) & part) * (x2 >> _BITS) + (e2 & part)
+        x3 = ((e3 >> twelve) & part) * (x3 >> _BITS) + (e3 & part)
+        out[i] = e0 >> np.uint64(24)
+        out[i + one] = e1 >> np.uint64(24)
+        out[i + two] = e2 >> np.uint64(24)
+        out[i + three] = e3 >> np.uint64(24)
+        refill = x0 < _LOW
+        word = np.uint64(words[k])
+        x0 = (x0 << sixteen) | word if refill else x0
+        k += one if refill else zero
+        refill = x1 < _LOW
+        word = np.uint64(words[k])
+        x1 = (x1 << sixteen) | word if refill else x1
+        k += one if refill else zero
+        refill = x2 < _LOW
+        word = np.uint64(words[k])
+        x2 = (x2 << sixteen) | word if refill else x2
+        k += one if refill else zero
+        refill = x3 < _LOW
+        word = np.uint64(words[k])
+        x3 = (x3 << sixteen) | word if refill else x3
+        k += one if refill else zero
+        i += np.uint64(4)
+    state[0], state[1], state[2], state[3] = x0, x1, x2, x3
+    while i < np.uint64(n):
+        lane = i & three
+        x = state[lane]
+        e = np.uint64(table[starts[contexts[i]] + (x & _MASK)])
+        x = ((e >> twelve) & part) * (x >> _BITS) + (e & part)
+        out[i] = e >> np.uint64(24)
+        if x < _LOW:
+            x = (x << sixteen) | np.uint64(words[k])
+            k += one
+        state[lane] = x
+        i += one
+    # Signed: with a plain integer an unsigned one would become a float.
+    return np.int64(k)
+
+
+@kernel
+def rotate_states(state: Any, n: int) -> None:
+    """After a row of n symbols: the state of the next symbol becomes the first."""
+    for _ in range(n & 3):
+        first = state[0]
+        state[0], state[1], state[2] = state[1], state[2], state[3]
+        state[3] = first
+
+
+@kernel
+def fill_escapes(out: Any, n: int, escapes: Any, at: int) -> int:
+    """Escaped symbols replaced by their values; returns the next one's index.
+
+    -1 if there are not enough of them.
+    """
+    seen = False
+    for x in range(n):
+        seen |= out[x] == ESCAPE
+    if seen:
+        for x in range(n):
+            if out[x] == ESCAPE:
+                if at == escapes.size:
+                    return -1
+                out[x] = escapes[at]
+                at += 1
+    return at
+
+
+@kernel
+def normalise(counts: Any, frequency: Any) -> None:
+    """Frequencies (t, 256) int64 that sum to 2048 in each row of ``counts`` (t, 256) that has any.
+
+    Rounds, at least 1 where a count is positive; then moves single units where the length changes
+    least, which is by about count / (frequency ± ½). Ties go to the lower symbol.
+    """
+    for t in range(counts.shape[0]):
+        total = 0
+        for s in range(256):
+            total += counts[t, s]
+        if total == 0:
+            continue
+        left = TABLE_SIZE
+        for s in range(256):
+            n = counts[t, s]
+            if n > 0:
+                frequency[t, s] = max(1, (n * TABLE_SIZE + total // 2) // total)
+                left -= frequency[t, s]
+        step = 1 if left > 0 else -1
+        while left != 0:
+            best = -1
+            for s in range(256):
+                n, f = counts[t, s], frequency[t, s]
+                if f == 0 or f + step == 0:
+                    continue
+                if best < 0:
+                    best = s
+                    continue
+                mine = n * (2 * frequency[t, best] + step)
+                yours = counts[t, best] * (2 * f + step)
+                if (mine > yours) if step > 0 else (mine < yours):
+                    best = s
+            frequency[t, best] += step
+            left -= step
+
+
+@kernel
+def encode(
+    symbols: Any, contexts: Any, plain: int, frequency: Any, work: Any, state: Any, words: Any,
+    escapes: Any,
+) -> tuple[int, int]:  # fmt: skip
+    """Code ``symbols`` from the last to the first, so that the decoder goes forwards.
+
+    Parameters
+    ----------
+    symbols: (n,) uint16. contexts: (n,) uint8, the table of each. Symbol i uses state i & 3.
+    plain: tables from this on have no escape: all their symbols have a frequency.
+    frequency: (tables, 256) int64. A symbol without one, or from 255 on, escapes.
+    work: (tables, 256, 3) and state: (4,), uint64, overwritten.
+    words, escapes: uint16 of n + 8 and of n, filled from the end; returns where each begins.
+    """
+    for t in range(frequency.shape[0]):
+        start = 0
+        for s in range(256):
+            f = frequency[t, s]
+            if f > 0:
+                bits = 0
+                while (1 << bits) < f:
+                    bits += 1
+                # x // f == x * reciprocal >> (bits + 31) for every x below 2^31.
+                work[t, s, 0] = ((1 << (bits + 31)) + f - 1) // f
+                work[t, s, 1] = bits + 31
+                work[t, s, 2] = f << 12 | start
+                start += f
+            else:
+                work[t, s, 2] = 0
+    for lane in range(4):
+        state[lane] = _LOW
+    at, escaped = words.size, escapes.size
+    for j in range(symbols.size):
+        i = symbols.size - 1 - j
+        t, z = contexts[i], symbols[i]
+        if t < plain and (z >= ESCAPE or frequency[t, z] == 0):
+            escaped -= 1
+            escapes[escaped] = z
+            z = ESCAPE
+        x = state[i & 3]
+        both = work[t, z, 2]
+        f = both >> np.uint64(12)
+        if x >= f << np.uint64(20):
+            at -= 1
+            words[at] = x & np.uint64(0xFFFF)
+            x >>= np.uint64(16)
+        q = (x * work[t, z, 0]) >> work[t, z, 1]
+        state[i & 3] = (q << _BITS) + (x - q * f) + (both & np.uint64(4095))
+    for lane in range(3, -1, -1):
+        at -= 2
+        words[at] = state[lane] & np.uint64(0xFFFF)
+        words[at + 1] = state[lane] >> np.uint64(16)
+    return at, escaped
