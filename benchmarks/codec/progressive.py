@@ -1,0 +1,173 @@
+"""Bytes until a level can be shown, beside other ways of sending coarse before fine.
+
+    python benchmarks/codec/progressive.py [--images 6] [-o build/bench/progressive.png]
+
+For every k: the bytes that must have arrived before the level k halvings below the finest is whole,
+summed over images of both sets of textures, over the bytes of Pillow's PNG of the finest alone.
+
+- `.ptm`: the end of the level's group.
+- PNG mip chain, WebP mip chain: a file for each level, coarsest first.
+- Adam7: passes 1, 3, 5 and 7 complete a half, with an aliased picture: texels picked, not averaged.
+  Each pass is counted as Pillow compresses it alone, without its head, as no encoder at hand
+  interlaces; coarser levels than an eighth do not exist.
+- JPEG 2000: the shortest prefix of the code stream that decodes, at that reduction, to what the
+  whole stream does (found by bisection); as many resolutions as the format's default, six.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from images import OUTPUT, sets
+from numpy.typing import NDArray
+from PIL import Image, ImageFile
+
+from ptmtools.texture import EncodeOptions, build_pyramid, encode, read_header, read_image
+from ptmtools.texture.images import png_bytes
+
+#: A PNG without any texel.
+PNG_OVERHEAD = 57
+RESOLUTIONS = 6
+
+
+def by_ptm(profile: str) -> Callable[[NDArray[Any]], list[int]]:
+    """Bytes until each level, finest first."""
+
+    def sizes(image: NDArray[Any]) -> list[int]:
+        header = read_header(encode(image, EncodeOptions(profile)))  # type: ignore[arg-type]
+        return [level.end for level in header.levels[::-1]]
+
+    return sizes
+
+
+def chain(single: Callable[[NDArray[Any]], bytes]) -> Callable[[NDArray[Any]], list[int]]:
+    """The same for a file per level."""
+
+    def sizes(image: NDArray[Any]) -> list[int]:
+        return [int(n) for n in np.cumsum([len(single(i)) for i in build_pyramid(image)])[::-1]]
+
+    return sizes
+
+
+def webp(image: NDArray[Any]) -> bytes:
+    """Lossless WebP."""
+    buffer = io.BytesIO()
+    texels = np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image
+    Image.fromarray(texels).save(buffer, "WEBP", lossless=True, method=4, exact=True)
+    return buffer.getvalue()
+
+
+def by_adam7(image: NDArray[Any]) -> list[int]:
+    """Bytes until passes 7, 5, 3 and 1."""
+    passes = [
+        (slice(0, None, 8), slice(0, None, 8)),
+        (slice(0, None, 8), slice(4, None, 8)),
+        (slice(4, None, 8), slice(0, None, 4)),
+        (slice(0, None, 4), slice(2, None, 4)),
+        (slice(2, None, 4), slice(0, None, 2)),
+        (slice(0, None, 2), slice(1, None, 2)),
+        (slice(1, None, 2), slice(0, None, 1)),
+    ]
+    sizes = [len(png_bytes(np.ascontiguousarray(image[p]))) - PNG_OVERHEAD for p in passes]
+    until = PNG_OVERHEAD + np.cumsum(sizes)
+    return [int(until[n - 1]) for n in (7, 5, 3, 1)]
+
+
+def by_jpeg2000(image: NDArray[Any]) -> list[int]:
+    """Bytes until each resolution, finest first."""
+    buffer = io.BytesIO()
+    texels = image[:, :, 0] if image.shape[2] == 1 else image
+    Image.fromarray(texels).save(
+        buffer, "JPEG2000", irreversible=False, num_resolutions=RESOLUTIONS, no_jp2=True,
+        progression="RLCP",
+    )  # fmt: skip
+    data = buffer.getvalue()
+
+    def at(reduction: int, length: int) -> NDArray[Any] | None:
+        ImageFile.LOAD_TRUNCATED_IMAGES = True
+        try:
+            with Image.open(io.BytesIO(data[:length])) as file:
+                file.reduce = reduction  # type: ignore[assignment, method-assign]
+                return np.asarray(file)
+        except (OSError, SyntaxError):
+            return None
+        finally:
+            ImageFile.LOAD_TRUNCATED_IMAGES = False
+
+    until = [len(data)]
+    for reduction in range(1, RESOLUTIONS):
+        wanted = at(reduction, len(data))
+        low, high = 0, until[-1]
+        while high - low > max(8, high // 200):
+            middle = (low + high) // 2
+            found = at(reduction, middle)
+            if found is not None and wanted is not None and np.array_equal(found, wanted):
+                high = middle
+            else:
+                low = middle
+        until.append(high)
+    return until
+
+
+WAYS: dict[str, Callable[[NDArray[Any]], list[int]]] = {
+    "ptm fast": by_ptm("fast"),
+    "ptm small": by_ptm("small"),
+    "ptm raw": by_ptm("raw"),
+    "PNG mip chain": chain(png_bytes),
+    "WebP mip chain": chain(webp),
+    "Adam7 (aliased)": by_adam7,
+    "JPEG 2000": by_jpeg2000,
+}
+
+
+def draw(shares: dict[str, list[float]], output: Path) -> None:
+    """The table as a picture."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(figsize=(8, 5))
+    for way, found in shares.items():
+        axes.plot(range(len(found)), found, marker="o", markersize=4, label=way)
+    axes.set(
+        xlabel="halvings below the finest level",
+        ylabel="bytes until that level, over PNG of the finest",
+        yscale="log",
+    )
+    axes.grid(alpha=0.3)
+    axes.legend()
+    output.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(output, dpi=120, bbox_inches="tight")
+
+
+def main() -> None:
+    """Prints the table and draws it."""
+    parser = argparse.ArgumentParser(description="Bytes until each level.")
+    parser.add_argument("--images", type=int, default=6)
+    parser.add_argument("-o", "--output", type=Path, default=OUTPUT / "progressive.png")
+    given = parser.parse_args()
+    found = sets()
+    files = [*found["Kodak"][: (given.images + 1) // 2], *found["textures"][: given.images // 2]]
+    images = [read_image(file) for file in files]
+    png = sum(len(png_bytes(image)) for image in images)
+    deepest = min(len(build_pyramid(image)) for image in images)
+    print(f"{len(images)} images: {', '.join(file.name for file in files)}")
+    print(f"{'halvings below the finest':26}" + "".join(f"{k:9}" for k in range(deepest)))
+    shares: dict[str, list[float]] = {}
+    for way, sizes in WAYS.items():
+        until = [sizes(image) for image in images]
+        depth = min(deepest, *(len(one) for one in until))
+        shares[way] = [sum(one[k] for one in until) / png for k in range(depth)]
+        print(f"{way:26}" + "".join(f"{share:9.5f}" for share in shares[way]), flush=True)
+    draw(shares, given.output)
+    print(f"drawn in {given.output}")
+
+
+if __name__ == "__main__":
+    main()
