@@ -34,11 +34,24 @@ def kernel(function: Function) -> Function:
     Floating point is strict: no operation is reordered or fused with another, so that results are
     the same on every machine with IEEE arithmetic.
     """
+    return _compiled(function)
+
+
+def plain_kernel(function: Function) -> Function:
+    """As `kernel`, for functions that allocate nothing: no references to arrays are counted.
+
+    Where small kernels hand arrays to each other in an inner loop, counting (an atomic operation
+    for every array that is passed, unpacked or viewed) takes several times as long as the work.
+    """
+    return _compiled(function, _nrt=False)
+
+
+def _compiled(function: Function, **options: bool) -> Function:
     settings: Any = numba.config
     before = settings.CACHE_DIR
     settings.CACHE_DIR = before or _folder()
     try:
-        compiled: Any = numba.njit(cache=True, nogil=True, fastmath=False)(function)
+        compiled: Any = numba.njit(cache=True, nogil=True, fastmath=False, **options)(function)
     finally:
         settings.CACHE_DIR = before
     return cast("Function", compiled)
