@@ -12,7 +12,14 @@ if TYPE_CHECKING:
     from ptmtools.texture.codec import check, decode, decode_levels
     from ptmtools.texture.container import read_header, whole_levels
     from ptmtools.texture.encoder import encode, encode_to
-    from ptmtools.texture.images import read_image, read_ptm, write_png
+    from ptmtools.texture.images import (
+        Picture,
+        load_image,
+        read_image,
+        read_ptm,
+        write_image,
+        write_png,
+    )
     from ptmtools.texture.model import Description, EncodeOptions, Level, Limits, PtmHeader
     from ptmtools.texture.pyramid import build_pyramid
     from ptmtools.texture.reader import PtmReader, open
@@ -22,6 +29,7 @@ __all__ = [
     "EncodeOptions",
     "Level",
     "Limits",
+    "Picture",
     "PtmHeader",
     "PtmReader",
     "build_pyramid",
@@ -30,11 +38,13 @@ __all__ = [
     "decode_levels",
     "encode",
     "encode_to",
+    "load_image",
     "open",
     "read_header",
     "read_image",
     "read_ptm",
     "whole_levels",
+    "write_image",
     "write_png",
 ]
 
@@ -43,6 +53,7 @@ _HOME = {
     "EncodeOptions": "model",
     "Level": "model",
     "Limits": "model",
+    "Picture": "images",
     "PtmHeader": "model",
     "PtmReader": "reader",
     "build_pyramid": "pyramid",
@@ -51,11 +62,13 @@ _HOME = {
     "decode_levels": "codec",
     "encode": "encoder",
     "encode_to": "encoder",
+    "load_image": "images",
     "open": "reader",
     "read_header": "container",
     "read_image": "images",
     "read_ptm": "images",
     "whole_levels": "container",
+    "write_image": "images",
     "write_png": "images",
 }
 

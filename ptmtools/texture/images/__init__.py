@@ -1,0 +1,28 @@
+"""Image files in and out, without ever changing a texel silently.
+
+What a format can hold beyond what is asked for, or less, is an error that says so; nothing is
+scaled, rounded or converted on the way. Colour and orientation are *kept*, never applied: texels
+are taken as numbers, in the order of the file's rows, and what the file says of them goes into a
+`ptmtools.texture.Description`. The exception is TIFF, whose orientation says how its rows are
+stored: it is applied.
+"""
+
+from __future__ import annotations
+
+from ptmtools.texture.images.picture import Picture
+from ptmtools.texture.images.png import png_bytes
+from ptmtools.texture.images.reading import SUFFIXES, load_image, read_image, read_ptm
+from ptmtools.texture.images.writing import WRITTEN, write_image, write_png, write_to
+
+__all__ = [
+    "SUFFIXES",
+    "WRITTEN",
+    "Picture",
+    "load_image",
+    "png_bytes",
+    "read_image",
+    "read_ptm",
+    "write_image",
+    "write_png",
+    "write_to",
+]

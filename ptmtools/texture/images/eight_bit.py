@@ -1,0 +1,88 @@
+"""Images of 8 bits a component or less, through Pillow.
+
+Pillow keeps RGB in four bytes a texel. A second copy, as numpy wants it, is made a strip at a time
+only, so that an image of 16,384² RGB takes 1.3 times its raw size.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ptmtools.errors import InputError
+from ptmtools.texture.images.opening import described, load
+from ptmtools.texture.images.picture import Picture, Strips, check_size, unsupported
+from ptmtools.texture.model import Limits
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from PIL.Image import Image
+    from PIL.ImageFile import ImageFile
+
+_COMPONENTS = {"1": 1, "L": 1, "LA": 2, "P": 3, "PA": 4, "RGB": 3, "RGBA": 4}
+
+
+def read(image: ImageFile, limits: Limits, depth: int) -> Picture:
+    """An opened image, texels exactly as stored; ``depth`` is that of its samples, bits.
+
+    Raises InputError PTM-I126, LimitError PTM-L104, and what Pillow raises.
+    """
+    import numpy as np
+
+    if image.mode not in _COMPONENTS:
+        raise unsupported(f"the colour model {image.mode}")
+    check_size(*image.size, _COMPONENTS[image.mode], limits)
+    # Before loading: Pillow drops or rewrites some of it while converting.
+    key = _full_scale(image.info.get("transparency"), image, depth)
+    load(image)
+    components = _COMPONENTS[image.mode]
+    if image.mode == "P":
+        has_alpha = key is not None
+        has_alpha |= image.palette is not None and image.palette.mode == "RGBA"
+        components += has_alpha
+        key = None
+    keyed = key is not None and components in (1, 3)
+
+    def strip(y0: int, y1: int) -> NDArray[Any]:
+        texels = _texels(image.crop((0, y0, image.width, y1)), components)
+        return with_key(texels, key) if keyed else texels
+
+    shape = (image.height, image.width, components + keyed)
+    return Picture(Strips(shape, np.dtype(np.uint8), strip), described(image))
+
+
+def one_frame(image: ImageFile) -> None:
+    """Raise InputError PTM-I127 for an image of several."""
+    frames = getattr(image, "n_frames", 1)
+    if frames > 1:
+        raise InputError(
+            "PTM-I127",
+            f"holds {frames} frames or pages; a texture is one image",
+            remedy="export the one you want as PNG",
+        )
+
+
+def with_key(texels: NDArray[Any], key: object) -> NDArray[Any]:
+    """An alpha of 0 where the texels are the key, of all bits elsewhere."""
+    import numpy as np
+
+    opaque = (texels != np.array(key)).any(axis=2)
+    alpha = np.where(opaque, np.iinfo(texels.dtype).max, 0).astype(texels.dtype)
+    return np.concatenate([texels, alpha[:, :, None]], axis=2)
+
+
+def _texels(strip: Image, components: int) -> NDArray[Any]:
+    import numpy as np
+
+    if strip.mode in ("P", "PA"):
+        strip = strip.convert("RGBA" if components == 4 else "RGB")
+    elif strip.mode == "1":
+        strip = strip.convert("L")
+    texels = np.asarray(strip, np.uint8)
+    return texels if texels.ndim == 3 else texels[:, :, None]
+
+
+def _full_scale(key: object, image: ImageFile, depth: int) -> object:
+    """A colour key as texels hold it: Pillow widens grey of 2 or 4 bits, but not the key."""
+    if isinstance(key, int) and image.mode == "L" and depth < 8:
+        return key * 255 // ((1 << depth) - 1)
+    return key

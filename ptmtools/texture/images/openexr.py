@@ -1,0 +1,106 @@
+"""OpenEXR files, through the library of that name (an optional component)."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from ptmtools.errors import InputError, MissingComponentError, OutputError
+from ptmtools.texture.images.picture import Picture, check_size, damaged_image, unsupported
+from ptmtools.texture.model import Limits
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+MAGIC = b"v/1\x01"
+#: Channels of the images that are read, in the order of the texel's components.
+_CHANNELS = {1: ["Y"], 2: ["Y", "A"], 3: ["R", "G", "B"], 4: ["R", "G", "B", "A"]}
+
+
+def read_exr(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
+    """An OpenEXR file of one part, its data window; (h, w, c) of float16 or float32.
+
+    Raises InputError PTM-I125 to PTM-I127, LimitError PTM-L104, MissingComponentError PTM-M101.
+    """
+    import numpy as np
+
+    library = _library()
+    if path is None:
+        return _from_memory(file, limits)
+    try:
+        # First the head alone: the size is checked before texels are unpacked.
+        with library.File(path, header_only=True) as exr:
+            head = exr.parts[0].header
+            parts = len(exr.parts)
+            low, high = head["dataWindow"]
+            names = {channel.name for channel in head["channels"]}
+            sampled = any((c.xSampling, c.ySampling) != (1, 1) for c in head["channels"])
+    except Exception as error:  # its errors have no class in common
+        raise damaged_image(error) from None
+    if parts > 1:
+        raise InputError(
+            "PTM-I127",
+            f"holds {parts} parts; a texture is one image",
+            remedy="export the one you want alone",
+        )
+    wanted = next((order for order in _CHANNELS.values() if set(order) == names), None)
+    if wanted is None or sampled:
+        raise unsupported(f"the channels {', '.join(sorted(names))}")
+    check_size(int(high[0] - low[0]) + 1, int(high[1] - low[1]) + 1, 4 * len(wanted), limits)
+    try:
+        with library.File(path, separate_channels=True) as exr:
+            planes = [exr.channels()[name].pixels for name in wanted]
+    except Exception as error:
+        raise damaged_image(error) from None
+    types = {plane.dtype.name for plane in planes}
+    if len(types) != 1 or not types <= {"float16", "float32"}:
+        raise unsupported(f"channels of {', '.join(sorted(types))}")
+    return Picture(np.stack(planes, axis=2))
+
+
+def exr_bytes(texels: NDArray[Any]) -> bytes:
+    """(h, w, c) float16 or float32 as an OpenEXR file, ZIP-compressed.
+
+    Raises MissingComponentError PTM-M101, OutputError PTM-O102.
+    """
+    import numpy as np
+
+    if texels.dtype.kind != "f":
+        raise OutputError(
+            "PTM-O102",
+            f"a .exr does not hold {texels.dtype} samples",
+            remedy="name the output .png, .npy or .tif",
+        )
+    library = _library()
+    names = _CHANNELS[texels.shape[2]]
+    channels = {name: np.ascontiguousarray(texels[:, :, i]) for i, name in enumerate(names)}
+    head = {"compression": library.ZIP_COMPRESSION, "type": library.scanlineimage}
+    handle, name = tempfile.mkstemp(suffix=".exr")
+    os.close(handle)
+    try:
+        with library.File(head, channels) as exr:
+            exr.write(name)
+        return Path(name).read_bytes()
+    finally:
+        Path(name).unlink()
+
+
+def _from_memory(file: BinaryIO, limits: Limits) -> Picture:
+    """The library reads files that have a name."""
+    file.seek(0)
+    with tempfile.NamedTemporaryFile(suffix=".exr") as named:
+        named.write(file.read())
+        named.flush()
+        return read_exr(file, named.name, limits)
+
+
+def _library() -> Any:
+    try:
+        import OpenEXR
+    except ImportError:
+        raise MissingComponentError(
+            "PTM-M101", "OpenEXR files need OpenEXR", remedy="pip install 'ptmtools[exr]'"
+        ) from None
+    return OpenEXR

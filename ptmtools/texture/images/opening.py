@@ -1,0 +1,107 @@
+"""Image files opened by Pillow, each with the one plug-in that its first bytes name.
+
+`PIL.Image.open` would import all plug-ins for it, and refuses by a number of texels that is a
+variable of the whole process; what is refused here follows from `ptmtools.texture.Limits`.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, BinaryIO, cast
+
+from ptmtools.errors import InputError, LimitError, PtmError
+from ptmtools.texture.images.picture import damaged_image
+from ptmtools.texture.model import Description
+
+if TYPE_CHECKING:
+    from PIL.ImageFile import ImageFile
+
+#: First bytes → module and class of Pillow's.
+_PLUGINS = (
+    (b"\x89PNG\r\n\x1a\n", "PngImagePlugin", "PngImageFile"),
+    (b"\xff\xd8\xff", "JpegImagePlugin", "JpegImageFile"),
+    (b"II*\0", "TiffImagePlugin", "TiffImageFile"),
+    (b"MM\0*", "TiffImagePlugin", "TiffImageFile"),
+    (b"II+\0", "TiffImagePlugin", "TiffImageFile"),
+    (b"MM\0+", "TiffImagePlugin", "TiffImageFile"),
+    (b"RIFF", "WebPImagePlugin", "WebPImageFile"),
+    (b"BM", "BmpImagePlugin", "BmpImageFile"),
+    (b"GIF8", "GifImagePlugin", "GifImageFile"),
+    (b"P", "PpmImagePlugin", "PpmImageFile"),
+    (b"\n", "PcxImagePlugin", "PcxImageFile"),
+    # A Targa file begins with anything; its own checks decide.
+    (b"", "TgaImagePlugin", "TgaImageFile"),
+)
+READABLE = "PNG, JPEG, TIFF, TGA, BMP, GIF, WebP, PPM, PCX, Radiance, OpenEXR or .npy"
+#: The tag of EXIF and TIFF.
+ORIENTATION = 0x0112
+
+
+def opened(file: BinaryIO) -> ImageFile:
+    """An image whose header is read, and no texel yet. Raises what Pillow raises."""
+    file.seek(0)
+    first = file.read(8)
+    file.seek(0)
+    _, module, name = next(plugin for plugin in _PLUGINS if first.startswith(plugin[0]))
+    with warnings.catch_warnings():
+        # Its limits are not ours.
+        warnings.simplefilter("ignore")
+        return cast("ImageFile", getattr(import_module(f"PIL.{module}"), name)(file))
+
+
+def load(image: ImageFile) -> None:
+    """Its texels are unpacked. Raises what Pillow raises."""
+    if image.format == "TIFF":
+        # What this makes is not made, and its size not questioned, a second time.
+        from PIL import Image
+
+        core: Any = Image.core  # type: ignore[attr-defined]
+        image.im = core.new(image.mode, getattr(image, "_tile_size", image.size))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        image.load()
+
+
+@contextmanager
+def pillow_faults() -> Iterator[None]:
+    """Whatever Pillow raises inside becomes one of our errors."""
+    from PIL import Image
+
+    try:
+        yield
+    except PtmError:
+        raise
+    except SyntaxError:  # what a plug-in says of a file that is none of its own
+        raise InputError(
+            "PTM-I124", "is not an image that can be read", remedy=f"it must be {READABLE}"
+        ) from None
+    except (Image.DecompressionBombError, MemoryError) as error:
+        raise LimitError(
+            "PTM-L104", f"has too many texels ({error})", remedy="scale it down first"
+        ) from None
+    except Exception as error:  # a damaged file can make its parsers raise nearly anything
+        raise damaged_image(error or type(error).__name__) from None
+
+
+def described(image: ImageFile) -> Description:
+    """Colour and orientation of an image that is loaded (PNG has some of it behind the texels)."""
+    info = image.info
+    points, gamma = info.get("chromaticity"), info.get("gamma")
+    orientation = image.getexif().get(ORIENTATION, 1) if _has_exif(image) else 1
+    srgb = info.get("srgb")
+    return Description(
+        icc=info.get("icc_profile") or None,
+        srgb=srgb if srgb in (0, 1, 2, 3) else None,
+        gamma=None if gamma is None else round(gamma * 100_000),
+        chromaticities=None if points is None else tuple(round(p * 100_000) for p in points),
+        orientation=orientation if orientation in range(1, 9) else 1,
+    )
+
+
+def _has_exif(image: ImageFile) -> bool:
+    return any(
+        key in image.info for key in ("exif", "Raw profile type exif", "xmp", "XML:com.adobe.xmp")
+    )

@@ -1,0 +1,131 @@
+"""An image as it was read: its rows, and what its file says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from ptmtools.errors import InputError, LimitError
+from ptmtools.texture.model import MAX_SIDE, Description, Limits
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ptmtools.texture.encoder import Rows
+
+    Samples = NDArray[Any]
+
+#: About so many texels are taken from an image at a time.
+_STRIP_TEXELS = 1 << 18
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An image that can be encoded.
+
+    Attributes
+    ----------
+    texels: rows from the top, (h, w, c) of uint8, uint16, float16 or float32: an array, or what
+        makes one when it is sliced.
+    description: colour and orientation, as the file has them.
+    """
+
+    texels: Rows
+    description: Description = Description()  # noqa: RUF009  # frozen
+
+    def array(self) -> Samples:
+        """All texels, (h, w, c)."""
+        height, width, *components = self.texels.shape
+        whole = self.texels[0:height]
+        return whole if components else whole.reshape(height, width, 1)
+
+    def upright(self) -> Picture:
+        """The orientation applied to the texels; they are then all in memory."""
+        if self.description.orientation == 1:
+            return self
+        texels = oriented(self.array(), self.description.orientation)
+        return Picture(texels, replace(self.description, orientation=1))
+
+
+def oriented(texels: Samples, orientation: int) -> Samples:
+    """Texels as they are to be shown, given EXIF's orientation, 1 to 8; a view."""
+    if orientation in (5, 6, 7, 8):
+        texels = texels.swapaxes(0, 1)
+    if orientation in (2, 3, 6, 7):
+        texels = texels[:, ::-1]
+    if orientation in (3, 4, 7, 8):
+        texels = texels[::-1]
+    return texels
+
+
+class Strips:
+    """Rows that are made when they are asked for, a strip at a time.
+
+    Parameters
+    ----------
+    shape, dtype: of the whole.
+    make: ``make(y0, y1)`` gives those rows, (y1 - y0, w, c).
+    """
+
+    def __init__(
+        self,
+        shape: tuple[int, int, int],
+        dtype: np.dtype[Any],
+        make: Callable[[int, int], Samples],
+    ) -> None:
+        self.shape = shape
+        self.dtype = dtype
+        self._make = make
+
+    def __getitem__(self, rows: slice) -> Samples:
+        import numpy as np
+
+        height, width, components = self.shape
+        start, stop, _ = rows.indices(height)
+        found = np.empty((max(0, stop - start), width, components), self.dtype)
+        step = max(1, _STRIP_TEXELS // width)
+        for y in range(start, stop, step):
+            end = min(y + step, stop)
+            found[y - start : end - start] = self._make(y, end)
+        return found
+
+
+def check_size(width: int, height: int, texel_bytes: int, limits: Limits | None) -> None:
+    """Raise LimitError PTM-L104 for what cannot be stored or is more than may be decoded.
+
+    limits: None for what takes no memory.
+    """
+    if max(width, height) > MAX_SIDE:
+        raise LimitError(
+            "PTM-L104",
+            f"is {width} x {height} texels; {MAX_SIDE} a side can be stored",
+            remedy="scale it down first",
+        )
+    if limits and width * height * texel_bytes > limits.decoded_bytes:
+        raise LimitError(
+            "PTM-L104",
+            f"is {width} x {height} texels of {texel_bytes} bytes, more than the limit of "
+            f"{limits.decoded_bytes} bytes",
+            remedy="raise the limit (--limit), or scale it down",
+        )
+
+
+def damaged_image(what: object) -> InputError:
+    """The error for a file that ends too early or contradicts itself."""
+    return InputError(
+        "PTM-I125",
+        f"is damaged or cut short ({what})",
+        remedy="fetch or export it again",
+    )
+
+
+def unsupported(what: str) -> InputError:
+    """The error for what no kind of sample holds exactly."""
+    return InputError(
+        "PTM-I126",
+        f"has {what}; grey and RGB of 8 or 16 bits or of 16- or 32-bit floats are read, with or "
+        "without alpha",
+        remedy="convert it yourself, so that you see what that changes",
+    )

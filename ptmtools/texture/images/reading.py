@@ -1,0 +1,159 @@
+"""Which reader an image file gets, by its first bytes."""
+
+from __future__ import annotations
+
+import io
+import os
+from typing import TYPE_CHECKING, Any, BinaryIO, cast
+
+from ptmtools.errors import InputError, naming
+from ptmtools.texture.container import HEAD_MAX, MAGIC, read_header
+from ptmtools.texture.images import openexr, radiance
+from ptmtools.texture.images.picture import Picture, check_size, damaged_image, unsupported
+from ptmtools.texture.model import Limits
+from ptmtools.texture.samples import KINDS
+from ptmtools.texture.sources import open_file
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+#: Of the files that are taken for images where a folder is named.
+SUFFIXES = (
+    *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".tga", ".bmp", ".gif", ".webp", ".pcx"),
+    *(".ppm", ".pgm", ".pbm", ".pnm", ".hdr", ".exr", ".npy"),
+)
+_LIMITS = Limits()
+_PNG = b"\x89PNG\r\n\x1a\n"
+_TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+_NPY = b"\x93NUMPY"
+
+
+def load_image(source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS) -> Picture:
+    """An image file to encode: texels exactly as stored, and what the file says of them.
+
+    8 bits: PNG, JPEG (as it decodes), TIFF, TGA, BMP, GIF, WebP, PPM, PCX. 16 bits: PNG, TIFF,
+    PPM and PGM, .npy. Floats: TIFF, Radiance .hdr (float32), OpenEXR, .npy. TIFFs of several
+    components deeper than 8 bits need imagecodecs, OpenEXR files need OpenEXR.
+
+    1 component for grey (1-bit images become 0 and 255), 2 with alpha; 3 for RGB and palettes, 4
+    with alpha. A colour key (PNG tRNS) becomes an alpha of 0 or all bits. An .npy is (h, w) or
+    (h, w, c) of a type that a `.ptm` holds; it and 16-bit PPMs are mapped, not read.
+
+    Parameters
+    ----------
+    source: a path, or the bytes of a file.
+    limits: ``decoded_bytes`` is the most that the texels may take in memory, told by the head
+        of the file.
+
+    Raises
+    ------
+    InputError: PTM-I120 no such file, PTM-I121 a folder, PTM-I122 not readable, PTM-I123 empty,
+        PTM-I124 not an image, PTM-I125 damaged or truncated, PTM-I126 samples or a colour model
+        that cannot be held exactly, PTM-I127 several frames.
+    LimitError: PTM-L104 more texels than are read.
+    MissingComponentError: PTM-M100, PTM-M101 a library that is not installed is needed.
+    """
+    if isinstance(source, bytes):
+        return _load(cast("BinaryIO", io.BytesIO(source)), None, limits)
+    path = os.fspath(source)
+    with open_file(path) as file, naming(path):
+        return _load(file, path, limits)
+
+
+def read_image(source: str | os.PathLike[str] | bytes) -> NDArray[np.uint8]:
+    """An image file of 8 bits a component as (h, w, c) uint8, rows from the top.
+
+    As `load_image`, for those who have a use for nothing else.
+
+    Raises what `load_image` raises; InputError PTM-I126 also for deeper samples.
+    """
+    picture = load_image(source)
+    with naming(None if isinstance(source, bytes) else source):
+        if picture.texels.dtype.name != "uint8":
+            raise InputError(
+                "PTM-I126",
+                f"has {picture.texels.dtype.name} samples; only 8-bit images are used here",
+                remedy="convert it to 8-bit RGB yourself, so that you see what that changes",
+            )
+        return picture.array()
+
+
+def read_ptm(path: str | os.PathLike[str]) -> bytes:
+    """The bytes of a `.ptm`, of which the head has been found good.
+
+    Raises InputError: PTM-I120 to PTM-I122 as `load_image`; what `read_header` raises.
+    """
+    with open_file(path) as file:
+        data = file.read()
+    with naming(path):
+        read_header(data[:HEAD_MAX])
+    return data
+
+
+def _load(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
+    first = file.read(HEAD_MAX)
+    if not first:
+        raise InputError("PTM-I123", "is empty", remedy="fetch or export it again")
+    if first.startswith((MAGIC, b"PTM_1")):
+        read_header(first)  # says so if it is HP's format
+        raise InputError(
+            "PTM-I124",
+            "is a progressive texture map already, not an image",
+            remedy="use ptm decode to get an image from it",
+        )
+    if first.startswith(_NPY):
+        return _npy(file, path)
+    if first.startswith(radiance.MAGIC):
+        return radiance.read_hdr(file, limits)
+    if first.startswith(openexr.MAGIC):
+        return openexr.read_exr(file, path, limits)
+    return _through_pillow(file, path, first, limits)
+
+
+def _through_pillow(file: BinaryIO, path: str | None, first: bytes, limits: Limits) -> Picture:
+    from ptmtools.texture.images import deep, eight_bit
+    from ptmtools.texture.images.opening import opened, pillow_faults
+
+    with pillow_faults():
+        if first.startswith((b"P5", b"P6")) and (picture := deep.read_ppm(file, path)):
+            return picture
+        if first.startswith(_TIFF) and (layout := deep.tiff_layout(file)).deep:
+            return deep.read_tiff(file, layout, limits)
+        image = opened(file)
+        eight_bit.one_frame(image)
+        depth = 8
+        if first.startswith(_PNG):
+            depth, colour = first[24], first[25]
+            if depth == 16:
+                return deep.read_png(file, image, colour, limits)
+        elif image.format == "PPM" and _rescaled(image.tile):
+            raise unsupported("samples that do not fill their bits")
+        return eight_bit.read(image, limits, depth)
+
+
+def _rescaled(tiles: list[Any]) -> bool:
+    """Whether Pillow scales the samples of a PPM: a maximum of other than 255 and 1."""
+    arguments = tiles[0].args if tiles else ()
+    maximum = arguments[1] if isinstance(arguments, tuple) and len(arguments) > 1 else 0
+    return maximum not in (0, 255)
+
+
+def _npy(file: BinaryIO, path: str | None) -> Picture:
+    import numpy as np
+
+    file.seek(0)
+    try:
+        if path is not None:
+            texels = np.load(path, mmap_mode="r", allow_pickle=False)
+        else:
+            texels = np.lib.format.read_array(file, allow_pickle=False)
+    except Exception as error:  # objects, a head that is no literal, too few bytes
+        raise damaged_image(error) from None
+    components = texels.shape[2] if texels.ndim == 3 else 1
+    if texels.ndim not in (2, 3) or not 1 <= components <= 4 or texels.dtype.name not in KINDS:
+        raise unsupported(f"an array of shape {texels.shape} and type {texels.dtype}")
+    check_size(texels.shape[1], texels.shape[0], 0, None)
+    if 0 in texels.shape:
+        raise damaged_image("no texels")
+    return Picture(texels)

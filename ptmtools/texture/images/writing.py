@@ -1,0 +1,127 @@
+"""Texels into image files; the suffix decides which, and only what is exact is written."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import PurePath
+from typing import IO, TYPE_CHECKING, Any
+
+from ptmtools.errors import OutputError, naming
+from ptmtools.texture.images.png import png_bytes
+from ptmtools.texture.model import Description
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Samples = NDArray[Any]
+
+_PLAIN = Description()
+_LOSSY = (".jpg", ".jpeg", ".jxl", ".webp", ".avif", ".heic", ".gif")
+
+
+def write_image(
+    path: str | os.PathLike[str],
+    texels: Samples,
+    description: Description = _PLAIN,
+    force: bool = False,
+) -> None:
+    """Write (h, w, c) texels, 1 to 4 components, as an image file, whole or not at all.
+
+    By suffix: .png uint8 and uint16; .npy and .tif anything; .hdr and .exr floats, .hdr only what
+    it holds exactly (levels of a Radiance picture below the finest are seldom that). PNG and TIFF
+    keep the description, the others keep none of it.
+
+    Raises
+    ------
+    OutputError: PTM-O101 another suffix, PTM-O102 a format that does not hold these samples, and
+        those of `ptmtools.files.write_with`.
+    MissingComponentError: PTM-M101 OpenEXR is not installed.
+    """
+    from ptmtools.files import refuse_existing, write_with
+
+    suffix = PurePath(path).suffix
+    with naming(path):
+        writer(suffix)
+        if not force:
+            refuse_existing(path)
+        write_with(path, lambda file: write_to(file, suffix, texels, description), force=force)
+
+
+def write_to(
+    file: IO[bytes], suffix: str, texels: Samples, description: Description = _PLAIN
+) -> None:
+    """As `write_image`, into an open file."""
+    writer(suffix)(file, texels, description)
+
+
+def write_png(path: str | os.PathLike[str], image: NDArray[np.uint8], force: bool = False) -> None:
+    """Write (h, w, c) uint8 or uint16, 1 to 4 components, as a PNG, whole or not at all.
+
+    Raises OutputError (see `ptmtools.files.write_bytes`).
+    """
+    from ptmtools.files import write_bytes
+
+    write_bytes(path, png_bytes(image), force=force)
+
+
+Writer = Callable[[IO[bytes], "Samples", Description], object]
+
+
+def writer(suffix: str) -> Writer:
+    """What writes files of that suffix. Raises OutputError PTM-O101."""
+    found = WRITTEN.get(suffix.lower())
+    if found is None:
+        why = "would change the texels" if suffix.lower() in _LOSSY else "is not written"
+        raise OutputError(
+            "PTM-O101",
+            f"the suffix {suffix!r} {why}",
+            remedy=f"use one of {', '.join(WRITTEN)}",
+        )
+    return found
+
+
+def _png(file: IO[bytes], texels: Samples, description: Description) -> None:
+    if texels.dtype.kind == "f":
+        raise OutputError(
+            "PTM-O102",
+            f"a .png does not hold {texels.dtype} samples",
+            remedy="name the output .npy, .tif or .exr",
+        )
+    file.write(png_bytes(texels, description))
+
+
+def _npy(file: IO[bytes], texels: Samples, description: Description) -> None:
+    import numpy as np
+
+    np.lib.format.write_array(file, np.ascontiguousarray(texels), allow_pickle=False)
+
+
+def _tiff(file: IO[bytes], texels: Samples, description: Description) -> None:
+    from ptmtools.texture.images.tiff import tiff_bytes
+
+    file.write(tiff_bytes(texels, description))
+
+
+def _hdr(file: IO[bytes], texels: Samples, description: Description) -> None:
+    from ptmtools.texture.images.radiance import hdr_bytes
+
+    file.write(hdr_bytes(texels))
+
+
+def _exr(file: IO[bytes], texels: Samples, description: Description) -> None:
+    from ptmtools.texture.images.openexr import exr_bytes
+
+    file.write(exr_bytes(texels))
+
+
+#: What writes files of each suffix.
+WRITTEN: dict[str, Writer] = {
+    ".png": _png,
+    ".npy": _npy,
+    ".tif": _tiff,
+    ".tiff": _tiff,
+    ".hdr": _hdr,
+    ".exr": _exr,
+}
