@@ -67,10 +67,15 @@ def built_in() -> NDArray[np.int64]:
 
 @cache
 def _built_in_lengths() -> NDArray[np.float64]:
-    """Length (n, 256) in 1/256 bits of every symbol under every built-in table."""
-    family = built_in()[1:]
-    lengths = _log_table()[family]
-    return np.where(family > 0, lengths, lengths[:, ESCAPE, None] + 16 * 256).astype(np.float64)
+    """`_lengths` of the built-in tables."""
+    return _lengths(built_in())
+
+
+def _lengths(family: Frequencies) -> NDArray[np.float64]:
+    """Length (n, 256) in 1/256 bits of every symbol under every table but the empty first."""
+    lengths = _log_table()[family[1:]]
+    escaped = lengths[:, ESCAPE, None] + 16 * 256
+    return np.where(family[1:] > 0, lengths, escaped).astype(np.float64)
 
 
 @cache
@@ -94,19 +99,23 @@ def _log_table() -> NDArray[np.int64]:
     return table
 
 
-def choose(counts: NDArray[np.int64], plain: int) -> tuple[Frequencies, bytes]:
+def choose(
+    counts: NDArray[np.int64], plain: int, family: Frequencies | None = None
+) -> tuple[Frequencies, bytes]:
     """Tables (t, 256) for the symbol counts (t, 256) of a group, and their serialised form.
 
     Tables from number ``plain`` on have no escape: one that is built in is used only where it holds
-    every symbol that occurs.
+    every symbol that occurs. ``family``: other tables in place of `built_in`, an empty one first.
     """
+    lengths = _built_in_lengths() if family is None else _lengths(family)
+    family = built_in() if family is None else family
     occurs = np.flatnonzero(counts.any(axis=1))
     rows = counts[occurs]
     # Integers below 2^53, so exact; float64 only because numpy multiplies such matrices faster.
-    cost = (rows.astype(np.float64) @ _built_in_lengths().T).astype(np.int64)
+    cost = (rows.astype(np.float64) @ lengths.T).astype(np.int64)
     for row, t in enumerate(occurs):
         if t >= plain:
-            lacking = built_in()[1:, rows[row] > 0] == 0
+            lacking = family[1:, rows[row] > 0] == 0
             cost[row, lacking.any(axis=1)] = 1 << 62
     exact = normalise(rows)
     used = _used(exact)
@@ -117,7 +126,7 @@ def choose(counts: NDArray[np.int64], plain: int) -> tuple[Frequencies, bytes]:
     sent = sent_cost < cost.min(axis=1)
     best = 1 + cost.argmin(axis=1)
     frequency = np.zeros_like(counts)
-    frequency[occurs] = np.where(sent[:, None], exact, built_in()[best])
+    frequency[occurs] = np.where(sent[:, None], exact, family[best])
     kinds = np.zeros(len(counts), np.int64)
     kinds[occurs] = np.where(sent, SENT, best)
     numbers = _kind_numbers(kinds.tolist())
@@ -127,7 +136,7 @@ def choose(counts: NDArray[np.int64], plain: int) -> tuple[Frequencies, bytes]:
     return frequency, len(packed).to_bytes(2, "little") + packed
 
 
-def parse(data: bytes, tables: int) -> tuple[Frequencies, int]:
+def parse(data: bytes, tables: int, family: Frequencies | None = None) -> tuple[Frequencies, int]:
     """The inverse of `choose`: frequencies (tables, 256), and how many bytes they took.
 
     Raises InputError PTM-I112 for tables that no encoder writes.
@@ -136,8 +145,9 @@ def parse(data: bytes, tables: int) -> tuple[Frequencies, int]:
     if len(data) < end:
         raise damaged("its tables are cut short")
     numbers = _unpack_nibbles(data[2:end]).tolist()
-    kinds, at = _kinds(numbers, tables)
-    return _frequencies(kinds, numbers[at:]), end
+    family = built_in() if family is None else family
+    kinds, at = _kinds(numbers, tables, len(family) - 1)
+    return _frequencies(kinds, numbers[at:], family), end
 
 
 def parse_version_1(data: bytes, tables: int) -> tuple[Frequencies, int]:
@@ -145,7 +155,8 @@ def parse_version_1(data: bytes, tables: int) -> tuple[Frequencies, int]:
     end = tables + 2 + int.from_bytes(data[tables : tables + 2], "little")
     if len(data) < end:
         raise damaged("its tables are cut short")
-    return _frequencies(list(data[:tables]), _unpack_nibbles(data[tables + 2 : end]).tolist()), end
+    numbers = _unpack_nibbles(data[tables + 2 : end]).tolist()
+    return _frequencies(list(data[:tables]), numbers, built_in()), end
 
 
 def _kind_numbers(kinds: list[int]) -> list[int]:
@@ -168,8 +179,8 @@ def _kind_numbers(kinds: list[int]) -> list[int]:
     return numbers
 
 
-def _kinds(numbers: list[int], tables: int) -> tuple[list[int], int]:
-    """The inverse of `_kind_numbers`, and how many numbers were used."""
+def _kinds(numbers: list[int], tables: int, top: int) -> tuple[list[int], int]:
+    """The inverse of `_kind_numbers` for kinds 1 … ``top``, and how many numbers were used."""
     kinds: list[int] = []
     at, last = 0, _FIRST_KIND
     padded = [*numbers, 0, tables]
@@ -185,7 +196,7 @@ def _kinds(numbers: list[int], tables: int) -> tuple[list[int], int]:
             kinds.append(SENT)
         else:
             last += -(n - 1) // 2 if n & 1 else (n - 2) // 2
-            if not 1 <= last <= len(BUILT_IN_MEANS):
+            if not 1 <= last <= top:
                 raise damaged(f"table {len(kinds)} is of an unknown kind, {last}")
             kinds.append(last)
     if len(kinds) > tables:
@@ -193,7 +204,7 @@ def _kinds(numbers: list[int], tables: int) -> tuple[list[int], int]:
     return kinds, at
 
 
-def _frequencies(kinds: list[int], numbers: list[int]) -> Frequencies:
+def _frequencies(kinds: list[int], numbers: list[int], family: Frequencies) -> Frequencies:
     """The tables of these kinds; the sent ones from ``numbers``."""
     frequency = np.zeros((len(kinds), 256), np.int64)
     at = 0
@@ -207,9 +218,9 @@ def _frequencies(kinds: list[int], numbers: list[int]) -> Frequencies:
             frequency[t, ESCAPE] = numbers[at]
             at += 2 + used
         elif kind != UNUSED:
-            if kind > len(BUILT_IN_MEANS):
+            if kind >= len(family):
                 raise damaged(f"table {t} is of an unknown kind, {kind}")
-            frequency[t] = built_in()[kind]
+            frequency[t] = family[kind]
         if kind != UNUSED and int(frequency[t].sum()) != TABLE_SIZE:
             raise damaged(f"table {t} does not sum to {TABLE_SIZE}")
     return frequency
