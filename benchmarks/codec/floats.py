@@ -1,10 +1,10 @@
 """16-bit and float images: exact, how large, and how far the paper's formula is off.
 
-    python benchmarks/codec/floats.py [IMAGE.hdr …]
+    python benchmarks/codec/floats.py [IMAGE …]
 
 Images are made (random bit patterns; magnitudes from 1e-38 to 1e38; a lit room with highlights;
-a depth map; a height field in 16 bits) and read: any Radiance file that is named, and the one that
-`make bench-codec` fetches. Beside the whole pyramid in our profiles: zstd of the raw finest
+a depth map; a height field in 16 bits) and read: those that are named, or those that
+`fetch_hdr.py` has fetched. Beside the whole pyramid in our profiles: zstd of the raw finest
 level, and of it with the bytes of samples apart, at level 19; 16-bit PNG where it applies; OpenEXR
 (ZIP) if the module is at hand. Bytes of the raw finest level = 1.
 
@@ -118,7 +118,7 @@ def main() -> None:
     parser.add_argument("images", nargs="*", type=Path)
     given = parser.parse_args()
     images = made()
-    for file in given.images or sorted((OUTPUT / "hdr").glob("*.hdr")):
+    for file in given.images or sorted((OUTPUT / "hdr").glob("*.*")):
         images[file.name] = read_image(file)
     exact(next(iter(images.values()))[:64, :64], "fast")
     for name, image in images.items():
