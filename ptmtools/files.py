@@ -1,7 +1,9 @@
 """Writing a file so that it is, at any moment, either as it was before or whole.
 
-The bytes go to a temporary file beside the target, are flushed to the disk, and take the target's
-name in one step. Whatever goes wrong, the temporary file is removed and the target is untouched.
+The bytes go to a temporary file in the target's folder, are flushed to the disk, and take the
+target's name in one step. Whatever goes wrong, the temporary file is removed and the target is
+untouched. Where the system can, the temporary file has no name until it is whole, so that not even
+a killed process leaves one; elsewhere a killed process leaves a hidden ``.part`` file.
 """
 
 from __future__ import annotations
@@ -29,7 +31,10 @@ def write_bytes(path: str | os.PathLike[str], data: bytes, *, force: bool = Fals
 def write_with(
     path: str | os.PathLike[str], write: Callable[[IO[bytes]], object], *, force: bool = False
 ) -> None:
-    """As `write_bytes`, for what ``write`` puts into the open binary file it is given."""
+    """As `write_bytes`, for what ``write`` puts into the open binary file it is given.
+
+    The file can be read and can seek.
+    """
     target = Path(path)
     if target.exists() and not target.is_file():  # renaming would replace a device
         kind = "a folder" if target.is_dir() else "a device"
@@ -41,14 +46,34 @@ def write_with(
     temporary = target.with_name(f".{target.name[:200]}.{secrets.token_hex(6)}.part")
     with writing(target):
         try:
-            with open(temporary, "xb") as file:
+            with _temporary(temporary) as (file, named):
                 write(file)
                 file.flush()
                 os.fsync(file.fileno())
+                if not named:
+                    # With a folder's descriptor, although it is not looked at: else Python makes
+                    # a call that would link the link in /proc.
+                    descriptor = file.fileno()
+                    os.link(f"/proc/self/fd/{descriptor}", temporary, src_dir_fd=descriptor)
             os.replace(temporary, target)
         finally:
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def _temporary(path: Path) -> Iterator[tuple[IO[bytes], bool]]:
+    """A new file, and whether it has the name ``path`` or, so far, none."""
+    try:
+        flags = os.O_TMPFILE | os.O_RDWR | os.O_CLOEXEC
+        os.stat("/proc/self/fd")
+        descriptor = os.open(path.parent, flags, 0o666)
+    except (AttributeError, OSError):  # another system, another kind of disk, or a real fault
+        with open(path, "x+b") as file:
+            yield file, True
+        return
+    with open(descriptor, "w+b") as file:
+        yield file, False
 
 
 @contextlib.contextmanager

@@ -259,38 +259,45 @@ class _Tiled:
         return box, self._profile.encode_tile(level, below, self._options.max_error, self._memory)
 
 
-def _checked(options: EncodeOptions, image: _Image) -> Profile:
-    """The profile of the options. Raises InputError PTM-I111 for what cannot be."""
-
-    def impossible(what: str, remedy: str | None = None) -> InputError:
-        return InputError("PTM-I111", what, remedy=remedy)
-
+def check_options(options: EncodeOptions) -> None:
+    """Raises InputError PTM-I111 for what no image can be encoded with."""
     if options.profile not in PROFILE_NUMBERS:
-        raise impossible(
+        raise _impossible(
             f"there is no profile {options.profile!r}", f"use one of {', '.join(PROFILE_NUMBERS)}"
         )
     if options.min_side < 1 or options.max_side < 0:
-        raise impossible(
+        raise _impossible(
             "the least or largest side of a level is impossible",
             "min_side must be at least 1; max_side at least 1, or 0 for no limit",
         )
     low, high = TILE_SIDES
     if options.tile and not (low <= options.tile <= high and options.tile % 2 == 0):
-        raise impossible(
+        raise _impossible(
             f"tiles of {options.tile} texels are impossible",
             f"use an even number from {low} to {high}, or 0 for none",
         )
+    if options.max_error < 0:
+        raise _impossible("an error below 0 is impossible", "use 0 for none")
+    if options.max_error and options.profile in ("raw", "paper"):
+        raise _impossible(
+            f"profile {options.profile!r} is always exact", "use fast or small with an error"
+        )
+
+
+def _checked(options: EncodeOptions, image: _Image) -> Profile:
+    """The profile of the options. Raises InputError PTM-I111 for what cannot be."""
+    check_options(options)
     top = KINDS[image.dtype.name].top_error
-    if not 0 <= options.max_error <= top:
-        raise impossible(
+    if options.max_error > top:
+        raise _impossible(
             f"an error of {options.max_error} cannot be allowed for {image.dtype.name} samples",
             f"use a number from 0 to {top}" if top else "use 0: floats are kept exactly",
         )
-    if options.max_error and options.profile in ("raw", "paper"):
-        raise impossible(
-            f"profile {options.profile!r} is always exact", "use fast or small with an error"
-        )
     return profile_named(options.profile)
+
+
+def _impossible(what: str, remedy: str) -> InputError:
+    return InputError("PTM-I111", what, remedy=remedy)
 
 
 def _kept_levels(width: int, height: int, options: EncodeOptions) -> list[int]:
