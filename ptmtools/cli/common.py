@@ -54,6 +54,26 @@ def workers(function: Command) -> Command:
     )(function)
 
 
+def limited(function: Command) -> Command:
+    """Adds ``--limit`` as ``limits``."""
+
+    @click.option(
+        "--limit",
+        type=click.IntRange(1, 1 << 20),
+        default=1024,
+        show_default=True,
+        metavar="MIB",
+        help="Refuse an image whose texels would take more memory than this, MiB.",
+    )
+    @wraps(function)
+    def command(*arguments: Any, limit: int, **values: Any) -> Any:
+        from ptmtools.texture.model import Limits
+
+        return function(*arguments, limits=Limits(decoded_bytes=limit << 20), **values)
+
+    return command
+
+
 def database(function: Command) -> Command:
     """Adds the argument ``DB``."""
     return click.argument("db", type=click.Path())(function)

@@ -7,17 +7,15 @@ Each command lives in a module that is imported when it is called, so that ``ptm
 
 from __future__ import annotations
 
-import errno
 import importlib
 import os
 import sys
-import traceback
 from collections.abc import Sequence
 
 import click
 
+from ptmtools.cli.failures import BROKEN_PIPE, report
 from ptmtools.cli.output import Voice
-from ptmtools.errors import PtmError
 from ptmtools.version import __version__
 
 #: command → (module, function, what `ptm --help` says).
@@ -33,14 +31,12 @@ COMMANDS = {
     "textures": ("scenes", "textures", "Encode the model's images as progressive textures."),
     "emit": ("scenes", "emit", "Write the VRML97 files and hints.json."),
     "validate": ("reports", "validate", "Check a database or a .ptm file."),
-    "info": ("reports", "info", "Say what is in a database or a .ptm file."),
+    "info": ("information", "info", "Say what is in a database or a .ptm file."),
     "plot": ("reports", "plot", "Draw the floor plan of a database."),
     "encode": ("images", "encode", "Encode images as .ptm files."),
-    "decode": ("images", "decode", "Decode a .ptm file to PNG."),
+    "decode": ("images", "decode", "Decode .ptm files to images."),
+    "compare": ("comparing", "compare", "Compare .ptm with other image formats: size and speed."),
 }
-
-#: Exit statuses beside those of the error classes; see `ptmtools.errors`.
-INTERNAL, USAGE, INTERRUPTED, BROKEN_PIPE = 1, 2, 130, 141
 
 
 class Commands(click.Group):
@@ -93,54 +89,11 @@ def main(arguments: Sequence[str]) -> int:
         sys.stdout.flush()
         return status if isinstance(status, int) else 0
     except BaseException as fault:
-        status, line = describe(fault)
-        if line:
-            print(f"ptm: {line}", file=sys.stderr)
-        if voice.verbose and not isinstance(fault, click.ClickException | SystemExit):
-            traceback.print_exception(fault)
+        status = report(fault, voice.verbose)
         if status == BROKEN_PIPE:
             # Python flushes stdout once more as it ends; there is nobody left to read it.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return status
-
-
-def describe(fault: BaseException) -> tuple[int, str]:
-    """(exit status, one line) for whatever ended a command; an empty line says nothing."""
-    match fault:
-        case PtmError():
-            return fault.exit_status, str(fault)
-        case click.exceptions.NoArgsIsHelpError():
-            return USAGE, fault.format_message()
-        case click.UsageError():
-            path = fault.ctx.command_path if fault.ctx else "ptm"
-            told = " ".join(fault.format_message().split()).rstrip(".")
-            return USAGE, f"{told}; see `{path} --help` [PTM-U001]"
-        case click.exceptions.Exit():
-            return fault.exit_code, ""
-        case KeyboardInterrupt() | click.Abort():
-            return INTERRUPTED, "interrupted; run the same command again to resume [PTM-X130]"
-        case BrokenPipeError():
-            return BROKEN_PIPE, ""
-        case MemoryError():
-            return 7, (
-                "not enough memory; use smaller images, fewer cells (--max-cells) or fewer "
-                "workers (-j 1) [PTM-L099]"
-            )
-        case OSError(errno=errno.ENOSPC | errno.EDQUOT):
-            return 4, f"{_file_of(fault)}the disk is full; free some space and run again [PTM-O003]"
-        case OSError(errno=int()):
-            return 3, f"{_file_of(fault)}{fault.strerror}; check the path and its rights [PTM-I099]"
-        case SystemExit():
-            return fault.code if isinstance(fault.code, int) else INTERNAL, ""
-    told = " ".join(str(fault).split())
-    return INTERNAL, (
-        f"internal error, {type(fault).__name__}: {told}; please report it, "
-        "run with -v for the traceback [PTM-X001]"
-    )
-
-
-def _file_of(fault: OSError) -> str:
-    return f"{fault.filename}: " if fault.filename else ""
 
 
 def run() -> None:

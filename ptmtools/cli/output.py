@@ -19,19 +19,23 @@ if TYPE_CHECKING:
 
 @dataclass
 class Voice:
-    """How much to say: `quiet` nothing but errors, `verbose` every note and tracebacks."""
+    """How much to say: `quiet` nothing but errors, `verbose` every note and tracebacks.
+
+    With `aside`, stdout carries a file, and what is said goes to stderr.
+    """
 
     quiet: bool = False
     verbose: bool = False
+    aside: bool = False
 
     def say(self, text: str) -> None:
         """A line of the result, on stdout."""
         if not self.quiet:
-            click.echo(text)
+            click.echo(text, err=self.aside)
 
     def emit_json(self, document: Any) -> None:
         """The result as JSON on stdout; ``--quiet`` does not silence what was asked for."""
-        click.echo(json.dumps(document, indent=1, ensure_ascii=False))
+        click.echo(json.dumps(document, indent=1, ensure_ascii=False), err=self.aside)
 
     @contextmanager
     def progress(self) -> Iterator[Progress]:

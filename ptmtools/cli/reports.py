@@ -1,9 +1,8 @@
-"""The commands that look at what is there: a database, or a `.ptm` file."""
+"""The commands that check a database or a `.ptm` file, and that draw a database."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import click
@@ -11,7 +10,6 @@ import click
 from ptmtools.cli.common import as_json, database, forced, voiced
 from ptmtools.cli.output import Voice, count, size
 from ptmtools.cli.parameters import options_of, take
-from ptmtools.cli.scenes import figures
 from ptmtools.database import PlotOptions, ValidationReport
 from ptmtools.errors import CheckError
 from ptmtools.pipeline import Artifacts, DatabaseFolder, shoot_segments
@@ -22,18 +20,6 @@ from ptmtools.visibility import SegmentReport
 SHOWN_ISSUES = 20
 
 target = click.argument("target", metavar="FILE|DB", type=click.Path())
-
-
-@click.command("info")
-@target
-@as_json
-@voiced
-def info(voice: Voice, target: str, as_json: bool) -> None:
-    """Say what is in a database or a .ptm file."""
-    if Path(target).is_dir():
-        _info_database(voice, target, as_json)
-    else:
-        _info_ptm(voice, target, as_json)
 
 
 @click.command("validate")
@@ -117,57 +103,3 @@ def _tell_findings(
         f"{target}: {count(report.files, 'file')}, {size(report.bytes)}; "
         f"{count(len(report.errors), 'error')}, {count(len(report.warnings), 'warning')}"
     )
-
-
-def _info_database(voice: Voice, target: str, as_json: bool) -> None:
-    db = DatabaseFolder.open(target)
-    stages = db.manifest.stages
-    if as_json:
-        voice.emit_json(
-            {
-                "model": db.manifest.model,
-                "stages": {
-                    name: {
-                        "software": record.software,
-                        "parameters": record.parameters,
-                        "counts": record.counts,
-                        "notes": record.notes,
-                        "files": len(record.outputs),
-                    }
-                    for name, record in stages.items()
-                },
-            }
-        )
-        return
-    voice.say(f"{target}: database of {db.manifest.model}")
-    for name, record in stages.items():
-        voice.say(f"{name:<9} {figures(name, record.counts)}")
-        if voice.verbose:
-            for key, value in record.parameters.items():
-                voice.say(f"{'':<9}   {key} = {value}")
-            for note in record.notes:
-                voice.say(f"{'':<9}   note: {note}")
-
-
-def _info_ptm(voice: Voice, target: str, as_json: bool) -> None:
-    from ptmtools.errors import naming
-    from ptmtools.texture import read_header, read_ptm, whole_levels
-
-    data = read_ptm(target)
-    with naming(target):
-        header = read_header(data)
-    whole = whole_levels(header, len(data))
-    if as_json:
-        voice.emit_json({**asdict(header), "file_bytes": len(data), "whole_levels": whole})
-        return
-    voice.say(
-        f"{target}: {header.width} x {header.height}, {count(header.components, 'component')} of "
-        f"{header.kind}, profile {header.profile}, {size(len(data))}"
-    )
-    voice.say("level       size           bytes           up to here   in texture memory")
-    for n, level in enumerate(header.levels):
-        cut = "" if n < whole else "   cut off"
-        extent = f"{level.width} x {level.height}"
-        voice.say(
-            f"{n:>5}   {extent:<14}{level.length:>9,}{level.end:>16,}{level.gpu_bytes:>20,}{cut}"
-        )

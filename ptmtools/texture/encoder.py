@@ -11,7 +11,7 @@ from __future__ import annotations
 import io
 import zlib
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
+from typing import IO, TYPE_CHECKING, Any, Protocol
 
 from ptmtools.errors import InputError, LimitError
 from ptmtools.texture.container import (
@@ -86,7 +86,7 @@ def encode(
 
 
 def encode_to(
-    file: BinaryIO,
+    file: IO[bytes],
     image: Rows,
     options: EncodeOptions = _DEFAULTS,
     *,
@@ -212,7 +212,7 @@ class _Tiled:
         self._counts = tile_counts(width, height, options.tile)
         self.texels: Samples | None = None
 
-    def write(self, file: BinaryIO, threads: int, keep: bool) -> tuple[int, int]:
+    def write(self, file: IO[bytes], threads: int, keep: bool) -> tuple[int, int]:
         """Writes index and tiles; length of the group and CRC-32 of the index.
 
         ``keep``: the next level needs ``texels``.

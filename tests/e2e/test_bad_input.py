@@ -7,6 +7,7 @@ database (`db`) and what the case adds or damages. Afterwards the folder must be
 from __future__ import annotations
 
 import errno
+import io
 import json
 import os
 import re
@@ -101,6 +102,16 @@ def deep_png(name: str) -> Prepare:
     return prepare
 
 
+def array(kind: str) -> bytes:
+    buffer = io.BytesIO()
+    np.save(buffer, np.ones((4, 4, 3), kind))
+    return buffer.getvalue()
+
+
+def empty_folder(folder: Path) -> None:
+    (folder / "empty").mkdir()
+
+
 def cut_png(folder: Path) -> None:
     changed("model/floor.png", lambda d: d[:-30])(folder)
 
@@ -111,6 +122,13 @@ def noise(folder: Path) -> None:
 
     texels = np.random.default_rng(1).integers(0, 256, (32, 32, 3), np.uint8)
     (folder / "a.ptm").write_bytes(encode(texels))
+
+
+def floats(folder: Path) -> None:
+    from ptmtools.texture import EncodeOptions, encode
+
+    texels = np.ones((4, 4, 3), np.float32)
+    (folder / "a.ptm").write_bytes(encode(texels, EncodeOptions("raw")))
 
 
 def damaged_ptm(at: int) -> Prepare:
@@ -187,7 +205,7 @@ CASES: dict[str, tuple[Prepare, str, int, str]] = {
     "impossible unit": (nothing, BUILD + " --unit 0", 3, "I"),
     "unit that makes it a planet": (nothing, BUILD + " --unit 1e12", 7, "L201"),
     "unknown axis": (nothing, BUILD + " --up x", 2, "U001"),
-    "unknown profile for a scene": (nothing, BUILD + " --profile tiny", 3, "I111"),
+    "unknown profile for a scene": (nothing, BUILD + " --profile tiny", 2, "U001"),
     "no samples": (nothing, BUILD + " --samples 0", 3, "I500"),
     "viewpoint of two numbers": (nothing, BUILD + " --viewpoint 1,2", 2, "U001"),
     "viewpoint outside": (nothing, BUILD + " --viewpoint 900,900,900", 3, "I"),
@@ -210,15 +228,22 @@ CASES: dict[str, tuple[Prepare, str, int, str]] = {
     "flipped byte in the database": (flipped(TEXTURE, 150), "validate db -q", 8, "C001"),
     "missing cell file": (without("db/www/cells/c0000.wrl"), "validate db -q", 8, "C001"),
     "no such image": (nothing, "encode a.png", 3, "I120"),
-    "a folder as image": (nothing, "encode model -o a.ptm", 3, "I121"),
+    "a folder to one file": (nothing, "encode model -o a.ptm", 2, "U001"),
+    "a folder without images": (empty_folder, "encode empty", 3, "I128"),
+    "a folder without textures": (nothing, "decode model", 3, "I128"),
     "empty image": (file("a.png", b""), "encode a.png", 3, "I123"),
     "not an image": (file("a.png", b"I am text\n"), "encode a.png", 3, "I124"),
     "truncated PNG": (cut_png, "encode model/floor.png", 3, "I125"),
-    "PNG of 16 bits": (deep_png("a.png"), "encode a.png", 3, "I126"),
+    "64-bit array": (file("a.npy", array(">f8")), "encode a.npy", 3, "I126"),
     "CMYK JPEG": (image("a.jpg", "CMYK", "JPEG"), "encode a.jpg", 3, "I126"),
     "PNG that promises the moon": (file("a.png", png(2**31 - 1)), "encode a.png", 7, "L104"),
     "PNG beyond memory": (file("a.png", png(60_000)), "encode a.png", 7, "L104"),
-    "unknown profile": (nothing, "encode model/floor.png --profile tiny", 3, "I111"),
+    "unknown profile": (nothing, "encode model/floor.png --profile tiny", 2, "U001"),
+    "no side at all": (nothing, "encode model/floor.png --min-side 0", 3, "I111"),
+    "error for floats": (file("a.npy", array("<f4")), "encode a.npy --max-error 1", 3, "I111"),
+    "PNG beyond the limit": (image("a.png", "RGB", "PNG", (600, 600)), "encode a.png --limit 1", 7, "L104"),
+    "two files to stdout": (nothing, TWO + " -o -", 2, "U001"),
+    "stdin and a file": (nothing, "encode - model/floor.png", 2, "U001"),
     "output exists": (file("model/floor.ptm", b"mine"), "encode model/floor.png", 4, "O001"),
     "output in no folder": (nothing, "encode model/floor.png -o no/a.ptm", 4, "O002"),
     "output where nobody may write": (nothing, "encode model/floor.png -o /proc/a.ptm", 4, "O002"),
@@ -238,6 +263,13 @@ CASES: dict[str, tuple[Prepare, str, int, str]] = {
     "no such command": (nothing, "frobnicate", 2, "U001"),
     "no such option": (nothing, "decode a.ptm --colour", 2, "U001"),
     "no argument": (nothing, "decode", 2, "U001"),
+    "output that would be lossy": (noise, "decode a.ptm -o a.jpg", 4, "O101"),
+    "output of no kind": (noise, "decode a.ptm -o a", 4, "O101"),
+    "floats as PNG": (floats, "decode a.ptm -o a.png", 4, "O102"),
+    "window outside": (noise, "decode a.ptm --window 30,30,3,3", 3, "I106"),
+    "window of no size": (noise, "decode a.ptm --window 3,3,0,3", 3, "I106"),
+    "window of fractions": (noise, "decode a.ptm --window 3,3,0.5,3", 2, "U001"),
+    "window of three": (noise, "decode a.ptm --window 3,3,3", 2, "U001"),
 }  # fmt: skip
 
 
@@ -318,8 +350,7 @@ def test_a_bug_is_told_in_one_line_and_status_1(
     def broken(*arguments: object) -> None:
         raise RuntimeError("two\nlines")
 
-    monkeypatch.setattr("ptmtools.texture.images.read_image", broken)
-    monkeypatch.setattr("ptmtools.texture.read_image", broken, raising=False)
+    monkeypatch.setattr("ptmtools.texture.images.load_image", broken)
     outcome = ptm("encode", folder / "model/floor.png")
     assert LINE.fullmatch(outcome.err), outcome.err
     assert "internal error, RuntimeError: two lines" in outcome.err
@@ -347,7 +378,7 @@ def test_what_the_system_refuses(
     def refused(*arguments: object) -> None:
         raise fault
 
-    monkeypatch.setattr("ptmtools.texture.read_image", refused, raising=False)
+    monkeypatch.setattr("ptmtools.texture.images.load_image", refused)
     outcome = ptm("encode", folder / "model/floor.png")
     lines = outcome.err.strip().splitlines()
     assert len(lines) == 1

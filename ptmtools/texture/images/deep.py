@@ -57,7 +57,9 @@ def read_png(file: BinaryIO, image: ImageFile, colour: int, limits: Limits) -> P
     keyed = key is not None and components in (1, 3)
 
     def strip(y0: int, y1: int) -> NDArray[Any]:
-        parts: list[NDArray[Any]] = [np.asarray(half.crop((0, y0, half.width, y1))) for half in halves]
+        parts: list[NDArray[Any]] = [
+            np.asarray(half.crop((0, y0, half.width, y1))) for half in halves
+        ]
         if len(parts) == 2:
             texels = parts[0].astype(np.uint16) << np.uint16(8)
             texels |= parts[1]

@@ -1,0 +1,126 @@
+"""`ptm compare`: the profiles beside other image formats."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ptmtools.cli.batch import expanded
+from ptmtools.cli.common import as_json, limited, voiced
+from ptmtools.cli.output import Voice, count, size
+from ptmtools.errors import naming
+from ptmtools.texture.profiles import PROFILE_NUMBERS
+
+if TYPE_CHECKING:
+    from ptmtools.texture.comparison import Measured
+    from ptmtools.texture.model import Limits
+
+
+class _Profiles(click.ParamType):  # type: ignore[type-arg]  # generic only in newer Clicks
+    """Names of profiles, separated by commas."""
+
+    name = "profiles"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, ...]:
+        names = tuple(str(value).split(","))
+        for name in names:
+            if name not in PROFILE_NUMBERS:
+                self.fail(f"{name!r} is none of {', '.join(PROFILE_NUMBERS)}", param, ctx)
+        return names
+
+
+@click.command("compare")
+@click.argument("images", metavar="IMAGE...", nargs=-1, required=True, type=click.Path())
+@click.option(
+    "--profiles",
+    type=_Profiles(),
+    default=",".join(PROFILE_NUMBERS),
+    show_default=True,
+    metavar="NAME,...",
+    help="Which profiles.",
+)
+@click.option(
+    "--repeat",
+    type=click.IntRange(1, 100),
+    default=1,
+    show_default=True,
+    metavar="N",
+    help="Code each image so many times; the shortest time counts.",
+)
+@limited
+@as_json
+@voiced
+def compare(
+    voice: Voice,
+    images: tuple[str, ...],
+    profiles: tuple[str, ...],
+    repeat: int,
+    limits: Limits,
+    as_json: bool,
+) -> None:
+    """Say how large images get, and how fast, as .ptm and in other lossless formats.
+
+    An IMAGE may be a pattern or a folder (all images in it). Speeds are of one thread, in megabytes
+    of the finest level, decoded, a second.
+    """
+    from ptmtools.texture.comparison import codecs, measure, total
+    from ptmtools.texture.images import SUFFIXES, load_image
+
+    contenders = codecs(profiles)
+    sources = expanded(images, SUFFIXES)
+    measured = []
+    for source in sources:
+        with naming(source):
+            texels = load_image(source, limits).array()
+            measured.append(measure(texels, contenders, repeat))
+        if not as_json:
+            height, width, components = texels.shape
+            what = f"{width} x {height}, {count(components, 'component')} of {texels.dtype}"
+            _tell(voice, f"{source}: {what}, {size(texels.nbytes)}", measured[-1])
+    sums = total(measured)
+    if as_json:
+        voice.emit_json(
+            {
+                "images": [
+                    {"image": source, "codecs": [asdict(one) for one in found]}
+                    for source, found in zip(sources, measured, strict=True)
+                ],
+                "total": [asdict(one) for one in sums],
+            }
+        )
+    elif len(sources) > 1:
+        voice.say("")
+        _tell(voice, f"all {len(sources)} images", sums)
+
+
+def _tell(voice: Voice, title: str, found: list[Measured]) -> None:
+    """A table, sizes as they are and over that of the finest level as PNG."""
+    png = next((one.finest_bytes for one in found if one.codec == "PNG"), None)
+    voice.say(title)
+    voice.say(
+        f"{'':<20}{'finest level':>14}{'/ PNG':>8}{'all levels':>14}{'/ PNG':>8}"
+        f"{'encode':>12}{'decode':>12}"
+    )
+    for one in found:
+        if one.problem:
+            voice.say(f"{one.codec:<20}{one.problem}")
+            continue
+        finest = "–" if one.finest_bytes is None else f"{one.finest_bytes:,}"
+        voice.say(
+            f"{one.codec:<20}{finest:>14}{_ratio(one.finest_bytes, png):>8}"
+            f"{one.all_bytes:>14,}{_ratio(one.all_bytes, png):>8}"
+            f"{_speed(one.raw_bytes, one.encode_seconds):>12}"
+            f"{_speed(one.raw_bytes, one.decode_seconds):>12}"
+        )
+
+
+def _ratio(part: int | None, whole: int | None) -> str:
+    return f"{part / whole:.3f}" if part and whole else "–"
+
+
+def _speed(done: int, seconds: float) -> str:
+    return f"{done / 1e6 / max(seconds, 1e-9):.1f} MB/s"

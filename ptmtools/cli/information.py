@@ -1,0 +1,167 @@
+"""`ptm info`: what is in a database or a `.ptm` file."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ptmtools.cli.batch import STANDARD, standard_input
+from ptmtools.cli.common import as_json, voiced
+from ptmtools.cli.output import Voice, count, size
+from ptmtools.errors import InputError, naming
+from ptmtools.texture.model import Description, PtmHeader
+
+#: Components that a texel has in the memory of most graphics processors: RGB is filled up.
+_PADDED = {1: 1, 2: 2, 3: 4, 4: 4}
+
+
+@click.command("info")
+@click.argument("target", metavar="FILE|DB", type=click.Path())
+@as_json
+@voiced
+def info(voice: Voice, target: str, as_json: bool) -> None:
+    """Say what is in a database or a .ptm file (- for stdin), level by level.
+
+    Of a .ptm no more than its head is read.
+    """
+    if target != STANDARD and Path(target).is_dir():
+        _info_database(voice, target, as_json)
+    else:
+        _info_ptm(voice, target, as_json)
+
+
+def _info_database(voice: Voice, target: str, as_json: bool) -> None:
+    from ptmtools.cli.scenes import figures
+    from ptmtools.pipeline import DatabaseFolder
+
+    db = DatabaseFolder.open(target)
+    stages = db.manifest.stages
+    if as_json:
+        voice.emit_json(
+            {
+                "model": db.manifest.model,
+                "stages": {
+                    name: {
+                        "software": record.software,
+                        "parameters": record.parameters,
+                        "counts": record.counts,
+                        "notes": record.notes,
+                        "files": len(record.outputs),
+                    }
+                    for name, record in stages.items()
+                },
+            }
+        )
+        return
+    voice.say(f"{target}: database of {db.manifest.model}")
+    for name, record in stages.items():
+        voice.say(f"{name:<9} {figures(name, record.counts)}")
+        if voice.verbose:
+            for key, value in record.parameters.items():
+                voice.say(f"{'':<9}   {key} = {value}")
+            for note in record.notes:
+                voice.say(f"{'':<9}   note: {note}")
+
+
+def _info_ptm(voice: Voice, target: str, as_json: bool) -> None:
+    from ptmtools.texture.container import HEAD_MAX, read_header, whole_levels
+    from ptmtools.texture.sources import open_file
+
+    with (
+        io.BytesIO(standard_input()) if target == STANDARD else open_file(target) as file,
+        naming(target),
+    ):
+        header = read_header(file.read(HEAD_MAX))
+        bytes_there = file.seek(0, io.SEEK_END)
+        offset, length, crc32 = header.description
+        file.seek(offset)
+        description = _description(file.read(length), crc32)
+    whole = whole_levels(header, bytes_there)
+    levels = _levels(header)
+    if as_json:
+        told = None if description is None else _told(description)
+        voice.emit_json(
+            {
+                **asdict(header),
+                "description": told,
+                "levels": levels,
+                "file_bytes": bytes_there,
+                "whole_levels": whole,
+            }
+        )
+        return
+    exact = "lossless" if not header.max_error else f"errors up to {header.max_error}"
+    trimmed = f", {count(header.trimmed, 'finer level')} left out" if header.trimmed else ""
+    voice.say(
+        f"{target}: {header.width} x {header.height}, {count(header.components, 'component')} of "
+        f"{header.kind}, profile {header.profile}, {exact}{trimmed}, {size(bytes_there)}"
+    )
+    if description is None:
+        voice.say("its description is damaged or cut off")
+    elif told := _told(description):
+        voice.say("; ".join(f"{name} {value}" for name, value in told.items()))
+    voice.say(
+        "level       size       tiles         bytes   share  bits/texel      up to here"
+        "   in GPU memory  RGB as RGBA"
+    )
+    for n, level in enumerate(levels):
+        extent = f"{level['width']} x {level['height']}"
+        across, down = level["tiles"]
+        tiles = f"{across} x {down}" if across * down > 1 else "1"
+        cut = "" if n < whole else "   cut off"
+        voice.say(
+            f"{n:>5}  {extent:>14} {tiles:>8} {level['length']:>13,} {level['share']:>7.2%} "
+            f"{level['bits_per_texel']:>11.2f} {level['end']:>15,} {level['gpu_bytes']:>15,} "
+            f"{level['gpu_bytes_padded']:>12,}{cut}"
+        )
+
+
+def _levels(header: PtmHeader) -> list[dict[str, Any]]:
+    """What is said of each level; bytes up to and including it are those of `end` and `gpu_…`."""
+    per_texel = _PADDED[header.components] * header.texel_bytes // header.components
+    told, texels = [], 0
+    for level in header.levels:
+        here = level.width * level.height
+        texels += here
+        told.append(
+            {
+                **asdict(level),
+                "end": level.end,
+                "share": level.length / header.file_size,
+                "bits_per_texel": 8 * level.length / here,
+                "texel_bytes": header.texel_bytes * here,
+                "gpu_bytes_padded": per_texel * texels,
+            }
+        )
+    return told
+
+
+def _description(data: bytes, crc32: int) -> Description | None:
+    import zlib
+
+    from ptmtools.texture.description import parse_description
+
+    try:
+        return parse_description(data) if zlib.crc32(data) == crc32 else None
+    except InputError:
+        return None
+
+
+def _told(description: Description) -> dict[str, Any]:
+    """What a description says, without what it does not."""
+    found: dict[str, Any] = {}
+    if description.icc is not None:
+        found["icc_bytes"] = len(description.icc)
+    if description.srgb is not None:
+        found["srgb_intent"] = description.srgb
+    if description.gamma is not None:
+        found["gamma"] = description.gamma / 100_000
+    if description.chromaticities is not None:
+        found["chromaticities"] = [value / 100_000 for value in description.chromaticities]
+    if description.orientation != 1:
+        found["orientation"] = description.orientation
+    return found

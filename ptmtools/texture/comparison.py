@@ -1,0 +1,290 @@
+"""Size and speed of the profiles beside other lossless formats, on the same texels in one run.
+
+A `.ptm` holds all levels; the others hold one image, so for them the finest level alone is told as
+well as all levels in a file each, which is what a client that streams mipmaps would have to fetch.
+Speeds count the bytes of the finest level, raw: of the finest level alone for the others, of all
+levels for `.ptm`. What comes back is compared with what went in. Only ratios within one run mean
+something.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from ptmtools.errors import PtmError
+from ptmtools.texture.model import EncodeOptions
+from ptmtools.texture.profiles import PROFILE_NUMBERS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Samples = NDArray[Any]
+
+_PILLOW = "pip install --force-reinstall pillow"
+_CODECS = "pip install 'ptmtools[codecs]'"
+#: Before it is timed a codec sees a corner of so many texels a side, so that what is compiled or
+#: loaded when first used is not counted.
+_CORNER = 96
+_LENGTH = struct.Struct("<I")
+
+
+@dataclass(frozen=True)
+class Codec:
+    """A way to make an image a string of bytes, and back.
+
+    Attributes
+    ----------
+    name: what it is called in a table.
+    encode, decode: of (h, w, c) texels. Either may raise anything for what it cannot hold.
+    pyramid: whether one string holds all levels.
+    remedy: what to install where it is not there; None where it is.
+    """
+
+    name: str
+    encode: Callable[[Samples], bytes]
+    decode: Callable[[bytes, tuple[int, ...]], Samples]
+    pyramid: bool = False
+    remedy: str | None = None
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One codec on one image, or on several.
+
+    Attributes
+    ----------
+    codec: its name.
+    finest_bytes: of the finest level alone; None for a `.ptm`, which has all of them.
+    all_bytes: of all levels.
+    raw_bytes: of the finest level, decoded.
+    encode_seconds, decode_seconds: of the finest level; for a `.ptm` of all levels.
+    problem: why there are no figures, if there are none.
+    """
+
+    codec: str
+    finest_bytes: int | None = None
+    all_bytes: int = 0
+    raw_bytes: int = 0
+    encode_seconds: float = 0.0
+    decode_seconds: float = 0.0
+    problem: str | None = None
+
+
+def codecs(profiles: Iterable[str] = PROFILE_NUMBERS) -> list[Codec]:
+    """The profiles, then the other formats: PNG first, then WebP, JPEG XL, JPEG 2000, JPEG-LS."""
+    return [*map(_profile, profiles), *_rivals()]
+
+
+def measure(image: Samples, contenders: Sequence[Codec], repeat: int = 1) -> list[Measured]:
+    """What each codec makes of (h, w, c) texels; times are the best of ``repeat``."""
+    import numpy as np
+
+    from ptmtools.texture.pyramid import build_pyramid
+
+    levels = [np.ascontiguousarray(level) for level in build_pyramid(image)]
+    return [_measured(levels, codec, repeat) for codec in contenders]
+
+
+def total(measured: Sequence[Sequence[Measured]]) -> list[Measured]:
+    """Sums over images; a codec that failed on one has no figures."""
+    sums = []
+    for column in zip(*measured, strict=True):
+        bad = next((one for one in column if one.problem), None)
+        if bad:
+            sums.append(bad)
+            continue
+        finest = [one.finest_bytes for one in column if one.finest_bytes is not None]
+        sums.append(
+            Measured(
+                column[0].codec,
+                sum(finest) if finest else None,
+                sum(one.all_bytes for one in column),
+                sum(one.raw_bytes for one in column),
+                sum(one.encode_seconds for one in column),
+                sum(one.decode_seconds for one in column),
+            )
+        )
+    return sums
+
+
+def _measured(levels: list[Samples], codec: Codec, repeat: int) -> Measured:
+    import numpy as np
+
+    image = levels[-1]
+    none = Measured(codec.name)
+    if codec.remedy:
+        return replace(none, problem=f"not installed: {codec.remedy}")
+    try:
+        corner = np.ascontiguousarray(image[:_CORNER, :_CORNER])
+        codec.decode(codec.encode(corner), corner.shape)
+        encoding, data = _best(lambda: codec.encode(image), repeat)
+        decoding, back = _best(lambda: codec.decode(data, image.shape), repeat)
+        if back.dtype != image.dtype or back.tobytes() != image.tobytes():
+            return replace(none, problem=f"does not give back {image.dtype} texels exactly")
+        rest = 0 if codec.pyramid else sum(len(codec.encode(level)) for level in levels[:-1])
+    except PtmError as error:
+        return replace(none, problem=str(error))
+    except Exception as error:  # other libraries raise whatever they like
+        reason = " ".join(str(error).split()) or type(error).__name__
+        height, width, components = image.shape
+        what = f"{width} x {height}, {components} components of {image.dtype}"
+        return replace(none, problem=f"does not hold {what} ({reason})")
+    return Measured(
+        codec.name,
+        None if codec.pyramid else len(data),
+        len(data) + rest,
+        image.nbytes,
+        encoding,
+        decoding,
+    )
+
+
+def _best(action: Callable[[], Any], repeat: int) -> tuple[float, Any]:
+    shortest, result = float("inf"), None
+    for _ in range(repeat):
+        start = time.perf_counter()
+        result = action()
+        shortest = min(shortest, time.perf_counter() - start)
+    return shortest, result
+
+
+def _profile(name: str) -> Codec:
+    from ptmtools.texture.codec import decode
+    from ptmtools.texture.encoder import encode
+
+    options = EncodeOptions(name)  # type: ignore[arg-type]
+    return Codec(
+        f"ptm {name}",
+        lambda image: encode(image, options),
+        lambda data, shape: decode(data),
+        pyramid=True,
+    )
+
+
+def _rivals() -> list[Codec]:
+    from PIL import features
+
+    imagecodecs: Any
+    try:
+        import imagecodecs
+    except ImportError:
+        imagecodecs = None
+    webp = features.check("webp")
+    found = [
+        Codec("PNG", _png, _by_pillow),
+        Codec("WebP lossless", _webp, _by_pillow, remedy=None if webp else _PILLOW),
+    ]
+    jxl = imagecodecs is not None and imagecodecs.JPEGXL.available
+    found += [_jpeg_xl(effort, None if jxl else _CODECS) for effort in (1, 3, 7)]
+    j2k = features.check("jpg_2000")
+    found.append(Codec("JPEG 2000", _jpeg_2000, _by_pillow, remedy=None if j2k else _PILLOW))
+    jls = imagecodecs is not None and imagecodecs.JPEGLS.available
+    remedy = None if jls else _CODECS
+    found.append(Codec("JPEG-LS, less green", _jpeg_ls, _from_jpeg_ls, remedy=remedy))
+    return found
+
+
+def _jpeg_xl(effort: int, remedy: str | None) -> Codec:
+    def encode(image: Samples) -> bytes:
+        import imagecodecs
+
+        return bytes(imagecodecs.jpegxl_encode(_plain(image), lossless=True, effort=effort))
+
+    def decode(data: bytes, shape: tuple[int, ...]) -> Samples:
+        import imagecodecs
+
+        return imagecodecs.jpegxl_decode(data).reshape(shape)
+
+    return Codec(f"JPEG XL effort {effort}", encode, decode, remedy=remedy)
+
+
+def _plain(image: Samples) -> Samples:
+    """Without the axis of components if there is one only."""
+    return image[:, :, 0] if image.shape[2] == 1 else image
+
+
+def _png(image: Samples) -> bytes:
+    from ptmtools.texture.images import png_bytes
+
+    if image.dtype.kind == "f":
+        raise ValueError("it has integers only")
+    return png_bytes(image)
+
+
+def _webp(image: Samples) -> bytes:
+    from PIL import Image
+
+    if image.dtype.name != "uint8":
+        raise ValueError("it has 8 bits only")
+    buffer = io.BytesIO()
+    Image.fromarray(_plain(image)).save(buffer, "WEBP", lossless=True, method=4, exact=True)
+    return buffer.getvalue()
+
+
+def _jpeg_2000(image: Samples) -> bytes:
+    from PIL import Image
+
+    if image.dtype.kind == "f":
+        raise ValueError("it has integers only")
+    buffer = io.BytesIO()
+    # Six resolutions, the default, are too many for tiny images.
+    resolutions = min(6, min(image.shape[:2]).bit_length())
+    colour_transform = int(image.shape[2] > 2)
+    Image.fromarray(_plain(image)).save(
+        buffer,
+        "JPEG2000",
+        irreversible=False,
+        num_resolutions=resolutions,
+        mct=colour_transform,
+    )
+    return buffer.getvalue()
+
+
+def _by_pillow(data: bytes, shape: tuple[int, ...]) -> Samples:
+    """What Pillow decodes, or for PNGs of 16 bits `load_image`."""
+    import numpy as np
+    from PIL import Image
+
+    if data[1:4] == b"PNG" and data[24] == 16:
+        from ptmtools.texture.images import load_image
+
+        return load_image(data).array()
+    with Image.open(io.BytesIO(data), formats=("PNG", "WEBP", "JPEG2000")) as image:
+        texels = np.asarray(image)
+    if texels.ndim == 3 and texels.shape[2] > shape[2]:
+        # WebP has no grey: all three are the same.
+        texels = texels[:, :, [0, -1]] if shape[2] == 2 else texels[:, :, : shape[2]]
+    return texels.reshape(shape)
+
+
+def _jpeg_ls(image: Samples) -> bytes:
+    """Each plane by itself, red and blue less green: JPEG-LS has no colour transform."""
+    import imagecodecs
+    import numpy as np
+
+    if image.dtype.kind == "f":
+        raise ValueError("it has integers only")
+    planes = [np.ascontiguousarray(image[:, :, c]) for c in range(image.shape[2])]
+    if len(planes) > 2:
+        planes[0], planes[2] = planes[0] - planes[1], planes[2] - planes[1]
+    coded = [imagecodecs.jpegls_encode(plane) for plane in planes]
+    return b"".join(_LENGTH.pack(len(part)) + part for part in coded)
+
+
+def _from_jpeg_ls(data: bytes, shape: tuple[int, ...]) -> Samples:
+    import imagecodecs
+    import numpy as np
+
+    planes, at = [], 0
+    while at < len(data):
+        (length,) = _LENGTH.unpack_from(data, at)
+        at += _LENGTH.size + length
+        planes.append(imagecodecs.jpegls_decode(data[at - length : at]))
+    if len(planes) > 2:
+        planes[0], planes[2] = planes[0] + planes[1], planes[2] + planes[1]
+    return np.stack(planes, axis=2)
