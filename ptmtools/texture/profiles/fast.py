@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ptmtools.texture.coders.damage import damaged
 from ptmtools.texture.coders.haar import coder as haar
+from ptmtools.texture.coders.repeats import coder as repeats
 from ptmtools.texture.profiles import Tile
 from ptmtools.texture.profiles.raw import RawProfile, group_length
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from ptmtools.texture.profiles import Samples, Shape
 
 #: Coders 1 to 3 are those of files of version 1.
-STORED, HAAR_1, DEFLATED_1, DIFFERENCES_1, HAAR, PYRAMID = range(6)
+STORED, HAAR_1, DEFLATED_1, DIFFERENCES_1, HAAR, REPEATS, PYRAMID = range(7)
 #: Bytes of the length of a level in a coarsest level that is a pyramid.
 _LENGTH = 4
 
@@ -49,8 +50,8 @@ class FastProfile:
             return _RAW.decode_base(body, shape, dtype)
         if coder == PYRAMID:
             return self._decode_pyramid(body, shape)
-        if coder == HAAR:
-            return haar.decode(body, _nothing(shape), shape)
+        if coder in (HAAR, REPEATS):
+            return _decode_bytes(data, _nothing(shape), shape)
         if coder == DEFLATED_1:
             from ptmtools.texture.coders.deflated import inflate
 
@@ -112,15 +113,19 @@ def _encode_base(level: Bytes) -> bytes:
 
 def _encode_bytes(level: Bytes, below: Bytes) -> bytes:
     """Any level, of 8 bits, without error."""
-    coded = haar.encode(level, below)
     shape = (level.shape[0], level.shape[1], level.shape[2])
-    if len(coded) <= group_length(shape):
-        return bytes([HAAR]) + coded
+    coded = _shorter(
+        bytes([HAAR]) + haar.encode(level, below), bytes([REPEATS]) + repeats.encode(level, below)
+    )
+    if len(coded) <= 1 + group_length(shape):
+        return coded
     return bytes([STORED]) + _RAW.encode_tile(level, below).data
 
 
 def _decode_bytes(data: bytes, below: Bytes, shape: Shape) -> Bytes:
     coder, body = _split(data)
+    if coder == REPEATS:
+        return repeats.decode(body, below, shape)
     if coder in (HAAR, HAAR_1):
         return haar.decode(body, below, shape, coder == HAAR_1)
     if coder == DIFFERENCES_1:

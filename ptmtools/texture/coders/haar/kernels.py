@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ptmtools.compiled import kernel
+from ptmtools.compiled import plain_kernel as kernel
 from ptmtools.texture.coders.rans.kernels import (
     ESCAPE,
     STATE_LOW,
@@ -308,14 +308,17 @@ def _write_ranked_blocks(
 @kernel
 def _edge_prediction(level: Any, y: int, x: int, plane: int) -> int:
     """Median of left, upper and left + upper - upper left; what lies outside gives way."""
-    if y == 0:
-        return int(level[y, x - 1, plane])
-    up = int(level[y - 1, x, plane])
+    left, up, corner = i32(0), i32(0), i32(0)
+    if x > 0:
+        left = i32(level[y, x - 1, plane])
+    if y > 0:
+        up = i32(level[y - 1, x, plane])
     if x == 0:
         return up
-    left = int(level[y, x - 1, plane])
-    corner = int(level[y - 1, x - 1, plane])
-    return max(min(left, up), min(max(left, up), left + up - corner))
+    if y == 0:
+        return left
+    corner = i32(level[y - 1, x - 1, plane])
+    return max(min(left, up), min(max(left, up), i32(left + up - corner)))
 
 
 @kernel
@@ -460,13 +463,13 @@ def haar_pass(
             for plane in range(nc):
                 guess = _edge_prediction(level, y, x, plane)
                 if encoding:
-                    e = ((int(level[y, x, plane]) - guess + 128) & 255) - 128
-                    z = (e << 1) ^ (e >> 31)
+                    e = i32(i32(i32(i32(level[y, x, plane]) - guess + 128) & 255) - 128)
+                    z = i32(i32(e << 1) ^ i32(e >> 31))
                     symbols[n + i] = z
                     contexts[n + i] = 2 * per_kind
                     counts[2 * per_kind, z] += 1
                 else:
-                    z = int(decoded[i])
+                    z = decoded[i]
                     level[y, x, plane] = (guess + ((z >> 1) ^ -(z & 1))) & 255
                 i += 1
     if encoding:

@@ -170,7 +170,7 @@ def _edge(height: int, width: int) -> Iterator[tuple[int, int]]:
 
 def _median(plane: NDArray[np.int64], y: int, x: int) -> int:
     if y == 0:
-        return int(plane[y, x - 1])
+        return int(plane[y, x - 1]) if x else 0
     if x == 0:
         return int(plane[y - 1, x])
     w, n = int(plane[y, x - 1]), int(plane[y - 1, x])

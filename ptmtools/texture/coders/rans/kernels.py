@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.compiled import kernel
+from ptmtools.compiled import plain_kernel as kernel
 
 #: Symbols of this number escape to a 16-bit value, but for tables without escape.
 ESCAPE = 255

@@ -1,0 +1,1 @@
+"""What repeats: flat areas, patterns, few colours. `coder` says how."""
