@@ -17,6 +17,7 @@ from ptmtools.texture.images.picture import damaged_image
 from ptmtools.texture.model import Description
 
 if TYPE_CHECKING:
+    from PIL.Image import Image
     from PIL.ImageFile import ImageFile
 
 #: First bytes → module and class of Pillow's.
@@ -56,9 +57,9 @@ def load(image: ImageFile) -> None:
     """Its texels are unpacked. Raises what Pillow raises."""
     if image.format == "TIFF":
         # What this makes is not made, and its size not questioned, a second time.
-        from PIL import Image
+        import PIL.Image
 
-        core: Any = Image.core  # type: ignore[attr-defined]
+        core: Any = PIL.Image.core  # type: ignore[attr-defined]
         image.im = core.new(image.mode, getattr(image, "_tile_size", image.size))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -68,7 +69,7 @@ def load(image: ImageFile) -> None:
 @contextmanager
 def pillow_faults() -> Iterator[None]:
     """Whatever Pillow raises inside becomes one of our errors."""
-    from PIL import Image
+    from PIL.Image import DecompressionBombError
 
     try:
         yield
@@ -78,7 +79,7 @@ def pillow_faults() -> Iterator[None]:
         raise InputError(
             "PTM-I124", "is not an image that can be read", remedy=f"it must be {READABLE}"
         ) from None
-    except (Image.DecompressionBombError, MemoryError) as error:
+    except (DecompressionBombError, MemoryError) as error:
         raise LimitError(
             "PTM-L104", f"has too many texels ({error})", remedy="scale it down first"
         ) from None
@@ -86,11 +87,12 @@ def pillow_faults() -> Iterator[None]:
         raise damaged_image(error or type(error).__name__) from None
 
 
-def described(image: ImageFile) -> Description:
+def described(image: Image) -> Description:
     """Colour and orientation of an image that is loaded (PNG has some of it behind the texels)."""
     info = image.info
     points, gamma = info.get("chromaticity"), info.get("gamma")
-    orientation = image.getexif().get(ORIENTATION, 1) if _has_exif(image) else 1
+    # Pillow has applied that of a TIFF.
+    orientation = 1 if hasattr(image, "tag_v2") else image.getexif().get(ORIENTATION, 1)
     srgb = info.get("srgb")
     return Description(
         icc=info.get("icc_profile") or None,
@@ -98,10 +100,4 @@ def described(image: ImageFile) -> Description:
         gamma=None if gamma is None else round(gamma * 100_000),
         chromaticities=None if points is None else tuple(round(p * 100_000) for p in points),
         orientation=orientation if orientation in range(1, 9) else 1,
-    )
-
-
-def _has_exif(image: ImageFile) -> bool:
-    return any(
-        key in image.info for key in ("exif", "Raw profile type exif", "xmp", "XML:com.adobe.xmp")
     )
