@@ -41,7 +41,7 @@ class FastProfile:
 
     def encode_base(self, level: Samples) -> bytes:
         """One byte that names the coder, then what it wrote."""
-        return _shorter(_encode_base(level), bytes([STORED]) + _RAW.encode_base(level))
+        return _shorter(self._encode_pyramid(level), bytes([STORED]) + _RAW.encode_base(level))
 
     def decode_base(self, data: bytes, shape: Shape, dtype: np.dtype[Any]) -> Samples:
         """The inverse of `encode_base`. Raises InputError PTM-I112."""
@@ -49,9 +49,7 @@ class FastProfile:
         if coder == STORED:
             return _RAW.decode_base(body, shape, dtype)
         if coder == PYRAMID:
-            return self._decode_pyramid(body, shape)
-        if coder in (HAAR, REPEATS):
-            return _decode_bytes(data, _nothing(shape), shape)
+            return self._decode_pyramid(body, shape, dtype)
         if coder == DEFLATED_1:
             from ptmtools.texture.coders.deflated import inflate
 
@@ -68,7 +66,12 @@ class FastProfile:
         threads: int = 1,
     ) -> Tile:
         """One byte that names the coder, then what it wrote."""
-        return Tile(_encode_bytes(level, below), level)
+        if level.dtype == np.uint8 and max_error == 0:
+            return Tile(_encode_bytes(level, below), level)
+        from ptmtools.texture.coders.texel import coder as texel
+
+        data, texels = texel.encode(level, below, max_error)
+        return Tile(data, texels)
 
     def decode_tile(
         self,
@@ -80,35 +83,39 @@ class FastProfile:
         threads: int = 1,
     ) -> Tile:
         """The inverse of `encode_tile`. Raises InputError PTM-I112."""
-        return Tile(b"", _decode_bytes(data, below, shape))
+        if below.dtype == np.uint8 and max_error == 0:
+            return Tile(b"", _decode_bytes(data, below, shape))
+        from ptmtools.texture.coders.texel import coder as texel
 
-    def _decode_pyramid(self, data: bytes, shape: Shape) -> Bytes:
+        return Tile(b"", texel.decode(data, below, shape, below.dtype, max_error))
+
+    def _encode_pyramid(self, level: Samples) -> bytes:
+        from ptmtools.texture.pyramid import build_pyramid
+
+        levels = build_pyramid(level)
+        below = _nothing(levels[0].shape, level.dtype)
+        parts = [bytes([PYRAMID])]
+        for one in levels:
+            group = self.encode_tile(one, below).data
+            parts += [len(group).to_bytes(_LENGTH, "little"), group]
+            below = one
+        return b"".join(parts)
+
+    def _decode_pyramid(self, data: bytes, shape: Shape, dtype: np.dtype[Any]) -> Samples:
         shapes = [shape]
         while min(shapes[-1][:2]) > 1:
             shapes.append((shapes[-1][0] >> 1, shapes[-1][1] >> 1, shape[2]))
-        level = _nothing(shapes[-1])
+        level = _nothing(shapes[-1], dtype)
         for one in reversed(shapes):
             length = int.from_bytes(data[:_LENGTH], "little")
             end = _LENGTH + length
             if len(data) < end:
                 raise damaged("it is cut short")
-            level = _decode_bytes(data[_LENGTH:end], level, one)
+            level = self.decode_tile(data[_LENGTH:end], level, one).texels
             data = data[end:]
         if data:
             raise damaged("it is too long")
         return level
-
-
-def _encode_base(level: Bytes) -> bytes:
-    from ptmtools.texture.pyramid import build_pyramid
-
-    levels = build_pyramid(level)
-    if len(levels) == 1:
-        return _encode_bytes(level, _nothing(level.shape))
-    groups = [_encode_bytes(levels[0], _nothing(levels[0].shape))]
-    groups += [_encode_bytes(levels[n], levels[n - 1]) for n in range(1, len(levels))]
-    parts = (len(group).to_bytes(_LENGTH, "little") + group for group in groups)
-    return bytes([PYRAMID]) + b"".join(parts)
 
 
 def _encode_bytes(level: Bytes, below: Bytes) -> bytes:
@@ -141,9 +148,9 @@ def _decode_bytes(data: bytes, below: Bytes, shape: Shape) -> Bytes:
     return _RAW.decode_tile(body, below, shape).texels
 
 
-def _nothing(shape: tuple[int, ...]) -> Bytes:
+def _nothing(shape: tuple[int, ...], dtype: np.dtype[Any]) -> Samples:
     """What lies below a level whose shorter side is 1."""
-    return np.zeros((shape[0] >> 1, shape[1] >> 1, shape[2]), np.uint8)
+    return np.zeros((shape[0] >> 1, shape[1] >> 1, shape[2]), dtype)
 
 
 def _shorter(one: bytes, other: bytes) -> bytes:

@@ -167,6 +167,90 @@ def normalise(counts: Any, frequency: Any) -> None:
 
 
 @kernel
+def _number(packed: Any, at: Any) -> int:
+    """The next number from nibbles of three bits and a flag; at: (2,) next nibble, error."""
+    n, shift = 0, 0
+    while True:
+        i = at[0]
+        if i >= 2 * packed.size or shift > 9:
+            at[1] = 1
+            return 0
+        at[0] = i + 1
+        nibble = int(packed[i >> 1]) >> (4 * (i & 1))
+        n |= (nibble & 7) << shift
+        shift += 3
+        if nibble & 8 == 0:
+            return n
+
+
+@kernel
+def read_tables(
+    packed: Any, named: bool, kinds: Any, first_kind: int, sent: int, family: Any, frequency: Any,
+    at: Any,
+) -> int:  # fmt: skip
+    """Tables (t, 256) int64, zeros before, from their serialised form; 0 or what is wrong.
+
+    packed: uint8. named: ``kinds`` (t,) int64 are given; else they stand first.
+    family: (kinds + 1, 256) int64, the built-in tables. at: (2,) int64, zeros.
+    """
+    tables = frequency.shape[0]
+    t, last = 0, first_kind
+    while not named and t < tables:
+        n = _number(packed, at)
+        if n == 0:
+            t += 1 + _number(packed, at)
+        else:
+            if n == 1:
+                kinds[t] = sent
+            else:
+                last += -((n - 1) >> 1) if n & 1 else (n - 2) >> 1
+                if last < 1 or last >= family.shape[0]:
+                    return 2
+                kinds[t] = last
+            t += 1
+        if at[1] != 0:
+            return 1
+    if t > tables:
+        return 3
+    for t in range(tables):
+        kind = kinds[t]
+        if kind == sent:
+            frequency[t, ESCAPE] = _number(packed, at)
+            used = _number(packed, at)
+            if used > ESCAPE:
+                return 1
+            total = frequency[t, ESCAPE]
+            for z in range(used):
+                n = _number(packed, at)
+                frequency[t, z] = n
+                total += n
+            if at[1] != 0:
+                return 1
+            if total != TABLE_SIZE:
+                return 4
+        elif kind != 0:
+            if kind >= family.shape[0]:
+                return 2
+            for z in range(256):
+                frequency[t, z] = family[kind, z]
+    return 0
+
+
+@kernel
+def fill_decoding_table(frequency: Any, table: Any) -> None:
+    """symbol << 24 | frequency << 12 | offset for every slot of every table that is in use."""
+    for t in range(frequency.shape[0]):
+        at = t * TABLE_SIZE
+        for z in range(256):
+            f = frequency[t, z]
+            if f > 0:
+                entry = z << 24 | f << 12
+                for j in range(f):
+                    table[at + j] = entry + j
+                at += f
+
+
+@kernel
 def encode(
     symbols: Any, contexts: Any, plain: int, frequency: Any, work: Any, state: Any, words: Any,
     escapes: Any,

@@ -30,6 +30,13 @@ UNUSED = 0
 SENT = 255
 #: The first kind is told as the change from this one.
 _FIRST_KIND = 4
+#: What `kernels.read_tables` finds wrong.
+_ERRORS = {
+    1: "its tables are cut short or hold a number above 4095",
+    2: "a table is of an unknown kind",
+    3: "it has too many tables",
+    4: f"a table does not sum to {TABLE_SIZE}",
+}
 
 Frequencies = NDArray[np.int64]
 
@@ -144,10 +151,8 @@ def parse(data: bytes, tables: int, family: Frequencies | None = None) -> tuple[
     end = 2 + int.from_bytes(data[:2], "little")
     if len(data) < end:
         raise damaged("its tables are cut short")
-    numbers = _unpack_nibbles(data[2:end]).tolist()
-    family = built_in() if family is None else family
-    kinds, at = _kinds(numbers, tables, len(family) - 1)
-    return _frequencies(kinds, numbers[at:], family), end
+    kinds = np.zeros(tables, np.int64)
+    return _read(data[2:end], False, kinds, built_in() if family is None else family), end
 
 
 def parse_version_1(data: bytes, tables: int) -> tuple[Frequencies, int]:
@@ -155,8 +160,20 @@ def parse_version_1(data: bytes, tables: int) -> tuple[Frequencies, int]:
     end = tables + 2 + int.from_bytes(data[tables : tables + 2], "little")
     if len(data) < end:
         raise damaged("its tables are cut short")
-    numbers = _unpack_nibbles(data[tables + 2 : end]).tolist()
-    return _frequencies(list(data[:tables]), numbers, built_in()), end
+    kinds = np.frombuffer(data, np.uint8, tables).astype(np.int64)
+    return _read(data[tables + 2 : end], True, kinds, built_in()), end
+
+
+def _read(packed: bytes, named: bool, kinds: NDArray[np.int64], family: Frequencies) -> Frequencies:
+    from ptmtools.texture.coders.rans import kernels
+
+    frequency = np.zeros((len(kinds), 256), np.int64)
+    numbers = np.array(bytearray(packed), np.uint8)
+    state = np.zeros(2, np.int64)
+    error = kernels.read_tables(numbers, named, kinds, _FIRST_KIND, SENT, family, frequency, state)
+    if error:
+        raise damaged(_ERRORS[error])
+    return frequency
 
 
 def _kind_numbers(kinds: list[int]) -> list[int]:
@@ -179,64 +196,13 @@ def _kind_numbers(kinds: list[int]) -> list[int]:
     return numbers
 
 
-def _kinds(numbers: list[int], tables: int, top: int) -> tuple[list[int], int]:
-    """The inverse of `_kind_numbers` for kinds 1 … ``top``, and how many numbers were used."""
-    kinds: list[int] = []
-    at, last = 0, _FIRST_KIND
-    padded = [*numbers, 0, tables]
-    while len(kinds) < tables:
-        if at >= len(numbers):
-            raise damaged("its tables are cut short")
-        n = padded[at]
-        at += 1
-        if n == 0:
-            kinds += [UNUSED] * min(1 + padded[at], tables + 1)
-            at += 1
-        elif n == 1:
-            kinds.append(SENT)
-        else:
-            last += -(n - 1) // 2 if n & 1 else (n - 2) // 2
-            if not 1 <= last <= top:
-                raise damaged(f"table {len(kinds)} is of an unknown kind, {last}")
-            kinds.append(last)
-    if len(kinds) > tables:
-        raise damaged("it has too many tables")
-    return kinds, at
-
-
-def _frequencies(kinds: list[int], numbers: list[int], family: Frequencies) -> Frequencies:
-    """The tables of these kinds; the sent ones from ``numbers``."""
-    frequency = np.zeros((len(kinds), 256), np.int64)
-    at = 0
-    for t, kind in enumerate(kinds):
-        if kind == SENT:
-            used = numbers[at + 1] if at + 1 < len(numbers) else 256
-            row = numbers[at + 2 : at + 2 + used]
-            if used >= 256 or len(row) < used:
-                raise damaged(f"table {t} is cut short")
-            frequency[t, :used] = row
-            frequency[t, ESCAPE] = numbers[at]
-            at += 2 + used
-        elif kind != UNUSED:
-            if kind >= len(family):
-                raise damaged(f"table {t} is of an unknown kind, {kind}")
-            frequency[t] = family[kind]
-        if kind != UNUSED and int(frequency[t].sum()) != TABLE_SIZE:
-            raise damaged(f"table {t} does not sum to {TABLE_SIZE}")
-    return frequency
-
-
 def decoding_table(frequency: Frequencies) -> NDArray[np.uint32]:
     """Flat (tables * 2048,) entries symbol << 24 | frequency << 12 | offset."""
-    table = np.zeros((len(frequency), TABLE_SIZE), np.uint32)
-    used = frequency.any(axis=1)
-    rows = frequency[used].astype(np.uint32)
-    symbol = np.tile(np.arange(256, dtype=np.uint32), len(rows))
-    start = (np.cumsum(rows, axis=1, dtype=np.uint32) - rows).reshape(-1)
-    entry = (symbol << 24 | rows.reshape(-1) << 12) - start
-    slots = np.repeat(entry, rows.reshape(-1)).reshape(-1, TABLE_SIZE)
-    table[used] = slots + np.arange(TABLE_SIZE, dtype=np.uint32)
-    return table.reshape(-1)
+    from ptmtools.texture.coders.rans import kernels
+
+    table = np.zeros(len(frequency) * TABLE_SIZE, np.uint32)
+    kernels.fill_decoding_table(frequency, table)
+    return table
 
 
 def _used(frequency: Frequencies) -> NDArray[np.int64]:
@@ -262,17 +228,3 @@ def _pack_nibbles(numbers: list[int]) -> bytes:
         nibbles.append(0)
     pairs = np.array(nibbles, np.uint8).reshape(-1, 2)
     return (pairs[:, 0] | pairs[:, 1] << 4).tobytes()
-
-
-def _unpack_nibbles(data: bytes) -> NDArray[np.int64]:
-    pairs = np.frombuffer(data, np.uint8)
-    nibbles = np.stack([pairs & 15, pairs >> 4], axis=1).reshape(-1).astype(np.int64)
-    ends = nibbles < 8
-    number: NDArray[np.int64] = np.cumsum(ends) - ends
-    first = np.searchsorted(number, number)
-    shift = 3 * (np.arange(len(nibbles)) - first)
-    if len(shift) and int(shift.max()) > 9:
-        raise damaged("a table holds a number above 4095")
-    out = np.zeros(int(ends.sum()) + 1, np.int64)
-    np.add.at(out, number, (nibbles & 7) << shift)
-    return out[:-1]
