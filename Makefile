@@ -2,6 +2,7 @@
 # make test    everything the tests need, then the tests
 # make lint    ruff and mypy
 # make bench   the benchmarks, on the data at hand
+# make bench-codec   only those of the texture codec, beside other formats (about an hour)
 # make sample  only the sample museum
 # make setup   only the virtual environment
 # make clean   remove what was built, except the virtual environment
@@ -20,7 +21,7 @@ JOBS ?= 2
 PYTEST_ARGS ?=
 export PTM_SHARED ?= $(abspath ../shared)
 
-.PHONY: help setup demo test lint bench sample clean
+.PHONY: help setup demo test lint bench bench-codec sample clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -71,9 +72,20 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
+bench-codec: $(VENV)/.installed-dev
+	@mkdir -p build/bench
+	-@$(BIN)/python benchmarks/codec/fetch_hdr.py
+	$(BIN)/python benchmarks/codec/sizes.py
+	$(BIN)/python benchmarks/codec/progressive.py
+	$(BIN)/python benchmarks/codec/floats.py
+	$(BIN)/python benchmarks/codec/near_lossless.py
+	$(BIN)/python benchmarks/codec/huge.py
+	$(BIN)/python benchmarks/codec/startup.py
+	$(BIN)/python benchmarks/codec/fuzz.py
+
 bench: $(VENV)/.installed-dev
 	@mkdir -p build/bench
-	$(BIN)/python benchmarks/codec.py
+	$(BIN)/python benchmarks/codec/sizes.py --only-png --profiles raw,fast
 	$(BIN)/python benchmarks/cells.py
 	@for map in $(PTM_SHARED)/prt/*.prt; do [ -f "$$map" ] || continue; set -x; \
 	  $(BIN)/python benchmarks/prt.py "$$map" -o "build/bench/$$(basename "$$map" .prt).npz" \
