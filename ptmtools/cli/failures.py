@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import sys
-import traceback
 
 import click
 
@@ -20,6 +19,8 @@ def report(fault: BaseException, verbose: bool) -> int:
     if line:
         print(f"ptm: {line}", file=sys.stderr)
     if verbose and not isinstance(fault, click.ClickException | SystemExit):
+        import traceback
+
         traceback.print_exception(fault)
     return status
 

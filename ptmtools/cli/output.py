@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -35,6 +34,8 @@ class Voice:
 
     def emit_json(self, document: Any) -> None:
         """The result as JSON on stdout; ``--quiet`` does not silence what was asked for."""
+        import json
+
         click.echo(json.dumps(document, indent=1, ensure_ascii=False), err=self.aside)
 
     @contextmanager

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -73,6 +72,8 @@ def exr_bytes(texels: NDArray[Any]) -> bytes:
             f"a .exr does not hold {texels.dtype} samples",
             remedy="name the output .png, .npy or .tif",
         )
+    import tempfile
+
     library = _library()
     names = _CHANNELS[texels.shape[2]]
     channels = {name: np.ascontiguousarray(texels[:, :, i]) for i, name in enumerate(names)}
@@ -89,6 +90,8 @@ def exr_bytes(texels: NDArray[Any]) -> bytes:
 
 def _from_memory(file: BinaryIO, limits: Limits) -> Picture:
     """The library reads files that have a name."""
+    import tempfile
+
     file.seek(0)
     with tempfile.NamedTemporaryFile(suffix=".exr") as named:
         named.write(file.read())
