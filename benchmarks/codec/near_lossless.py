@@ -86,7 +86,7 @@ def webp(images: list[Samples], setting: int) -> Sums:
             texels = np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image
             Image.fromarray(texels).save(source)
             subprocess.run(
-                ["cwebp", "-quiet", "-exact", "-near_lossless", str(setting), str(source), "-o",
+                ["cwebp", "-quiet", "-near_lossless", str(setting), str(source), "-o",
                  str(target)],
                 check=True,
             )  # fmt: skip

@@ -10,8 +10,8 @@ summed over images of both sets of textures, over the bytes of Pillow's PNG of t
 - Adam7: passes 1, 3, 5 and 7 complete a half, with an aliased picture: texels picked, not averaged.
   Each pass is counted as Pillow compresses it alone, without its head, as no encoder at hand
   interlaces; coarser levels than an eighth do not exist.
-- JPEG 2000: the shortest prefix of the code stream that decodes, at that reduction, to what the
-  whole stream does (found by bisection); as many resolutions as the format's default, six.
+- JPEG 2000: the end of the last packet of the resolution, in resolution-major order; as many
+  resolutions as the format's default, six.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from images import OUTPUT, sets
 from numpy.typing import NDArray
-from PIL import Image, ImageFile
+from PIL import Image
 
 from ptmtools.texture import EncodeOptions, build_pyramid, encode, read_header, read_image
 from ptmtools.texture.images import png_bytes
@@ -33,6 +33,8 @@ from ptmtools.texture.images import png_bytes
 #: A PNG without any texel.
 PNG_OVERHEAD = 57
 RESOLUTIONS = 6
+#: Markers of JPEG 2000: SOD, PLT, EOC.
+START_OF_DATA, PACKET_LENGTHS, END_OF_CODESTREAM = b"\xff\x93", b"\xff\x58", b"\xff\xd9"
 
 
 def by_ptm(profile: str) -> Callable[[NDArray[Any]], list[int]]:
@@ -84,34 +86,31 @@ def by_jpeg2000(image: NDArray[Any]) -> list[int]:
     texels = image[:, :, 0] if image.shape[2] == 1 else image
     Image.fromarray(texels).save(
         buffer, "JPEG2000", irreversible=False, num_resolutions=RESOLUTIONS, no_jp2=True,
-        progression="RLCP",
+        progression="RLCP", plt=True, mct=int(image.shape[2] > 2),
     )  # fmt: skip
     data = buffer.getvalue()
+    lengths = packet_lengths(data)
+    # One quality layer and one precinct: a packet for every component of every resolution.
+    assert len(lengths) == RESOLUTIONS * image.shape[2]
+    start = len(data) - sum(lengths) - len(END_OF_CODESTREAM)
+    ends = start + np.cumsum(np.reshape(lengths, (RESOLUTIONS, -1)).sum(axis=1))
+    return [int(end) for end in ends[::-1]]
 
-    def at(reduction: int, length: int) -> NDArray[Any] | None:
-        ImageFile.LOAD_TRUNCATED_IMAGES = True
-        try:
-            with Image.open(io.BytesIO(data[:length])) as file:
-                file.reduce = reduction  # type: ignore[assignment, method-assign]
-                return np.asarray(file)
-        except (OSError, SyntaxError):
-            return None
-        finally:
-            ImageFile.LOAD_TRUNCATED_IMAGES = False
 
-    until = [len(data)]
-    for reduction in range(1, RESOLUTIONS):
-        wanted = at(reduction, len(data))
-        low, high = 0, until[-1]
-        while high - low > max(8, high // 200):
-            middle = (low + high) // 2
-            found = at(reduction, middle)
-            if found is not None and wanted is not None and np.array_equal(found, wanted):
-                high = middle
-            else:
-                low = middle
-        until.append(high)
-    return until
+def packet_lengths(data: bytes) -> list[int]:
+    """What the marker segments PLT of the only tile say: numbers of 7 bits a byte, high ones first."""
+    lengths, at = [], 2
+    while (marker := data[at : at + 2]) != START_OF_DATA:
+        size = int.from_bytes(data[at + 2 : at + 4], "big")
+        if marker == PACKET_LENGTHS:
+            value = 0
+            for byte in data[at + 5 : at + 2 + size]:
+                value = value << 7 | byte & 127
+                if byte < 128:
+                    lengths.append(value)
+                    value = 0
+        at += 2 + size
+    return lengths
 
 
 WAYS: dict[str, Callable[[NDArray[Any]], list[int]]] = {
