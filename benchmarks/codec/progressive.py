@@ -98,7 +98,7 @@ def by_jpeg2000(image: NDArray[Any]) -> list[int]:
 
 
 def packet_lengths(data: bytes) -> list[int]:
-    """What the marker segments PLT of the only tile say: numbers of 7 bits a byte, high ones first."""
+    """What the markers PLT of the only tile say: numbers of 7 bits a byte, high ones first."""
     lengths, at = [], 2
     while (marker := data[at : at + 2]) != START_OF_DATA:
         size = int.from_bytes(data[at + 2 : at + 4], "big")
