@@ -86,7 +86,7 @@ def put_textures(run: Run, options: TextureOptions, workers: int) -> None:
             files = held() if held else _encoded(name, image, options)
             header = read_header(files[0][1])
             finest = header.levels[-1]
-            raw = finest.width * finest.height * header.components
+            raw = finest.width * finest.height * header.texel_bytes
             return files, raw, len(files[0][1])
 
         raw = stored = 0
@@ -118,7 +118,7 @@ def texture_records(run: Run) -> tuple[TextureRecord, ...]:
                 height=level.height,
                 offset=level.offset,
                 length=level.length,
-                gpu_bytes=level.width * level.height * header.components,
+                gpu_bytes=level.width * level.height * header.texel_bytes,
             )
             for level in header.levels
         )
@@ -147,7 +147,7 @@ def _encoded(name: str, image: SourceImage, options: TextureOptions) -> Files:
         data = encode(texels, options)
     files = [(f"{SERVED}/{FOLDER}/{name}.ptm", data)]
     if options.fallback:
-        if read_header(data).trimmed:
+        if options.max_error or read_header(data).trimmed:
             twin = png_bytes(decode(data))
         elif source.startswith(PNG_MAGIC):
             twin = bare_png(source)

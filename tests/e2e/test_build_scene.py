@@ -13,8 +13,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from ptmtools.texture import decode, read_header, read_image, read_ptm
 from tests.e2e.conftest import TWO_ROOMS, Ptm, listing
 
 SCRIPT = Path(sys.executable).with_name("ptm")
@@ -85,6 +87,21 @@ def test_stage_by_stage_is_the_same_as_all_at_once(tmp_path: Path, ptm: Ptm) -> 
         assert (outcome.status, outcome.err) == (0, "")
     assert ptm("build-scene", model, "-o", tmp_path / "b.db").status == 0
     assert listing(db) == listing(tmp_path / "b.db")
+
+
+def test_textures_within_an_error_have_twins_of_the_same_texels(
+    tmp_path: Path, ptm: Ptm, build: Build
+) -> None:
+    db = tmp_path / "a.db"
+    options = ("--profile", "small", "--max-error", 3, "--max-level", -2)
+    build(TWO_ROOMS / "two_rooms.obj", db, *options)
+    assert ptm("validate", db, "--strict").status == 0
+    files = sorted((db / "www/textures").glob("*.ptm"))
+    assert files
+    for file in files:
+        header = read_header(read_ptm(file))
+        assert (header.profile, header.max_error, header.trimmed) == ("small", 3, 1)
+        np.testing.assert_array_equal(decode(file), read_image(file.with_suffix(".png")))
 
 
 def test_only_what_changed_is_done_again(tmp_path: Path, ptm: Ptm, build: Build) -> None:
