@@ -11,6 +11,7 @@ cache folder; ``NUMBA_CACHE_DIR`` overrides both.
 from __future__ import annotations
 
 import os
+import sys
 import tempfile
 from collections.abc import Callable
 from functools import cache
@@ -18,7 +19,20 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-import numba
+# As it loads, numba asks for SciPy's BLAS, for products of matrices, of which no kernel has any.
+# Where SciPy happens to be installed that takes longer than everything else that `ptm encode` of a
+# small image imports but numba itself (0.2 s), and where little memory is left OpenBLAS tries for
+# ever to get some.
+_SCIPY = "scipy.linalg"
+_hidden = _SCIPY not in sys.modules
+if _hidden:
+    sys.modules[_SCIPY] = None  # type: ignore[assignment]
+try:
+    import numba
+    import numba.np.arraymath
+finally:
+    if _hidden:
+        del sys.modules[_SCIPY]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
