@@ -182,7 +182,7 @@ def _rivals() -> list[Codec]:
     jxl = imagecodecs is not None and imagecodecs.JPEGXL.available
     found += [_jpeg_xl(effort, None if jxl else _CODECS) for effort in (1, 3, 7)]
     j2k = features.check("jpg_2000")
-    found.append(Codec("JPEG 2000", _jpeg_2000, _by_pillow, remedy=None if j2k else _PILLOW))
+    found.append(Codec("JPEG 2000", _jpeg_2000, _from_jpeg_2000, remedy=None if j2k else _PILLOW))
     jls = imagecodecs is not None and imagecodecs.JPEGLS.available
     remedy = None if jls else _CODECS
     found.append(Codec("JPEG-LS, less green", _jpeg_ls, _from_jpeg_ls, remedy=remedy))
@@ -231,6 +231,12 @@ def _jpeg_2000(image: Samples) -> bytes:
 
     if image.dtype.kind == "f":
         raise ValueError("it has integers only")
+    if image.dtype.itemsize > 1:
+        import imagecodecs
+
+        return bytes(
+            imagecodecs.jpeg2k_encode(_plain(image), level=0, reversible=True, codecformat="j2k")
+        )
     buffer = io.BytesIO()
     # Six resolutions, the default, are too many for tiny images.
     resolutions = min(6, min(image.shape[:2]).bit_length())
@@ -243,6 +249,15 @@ def _jpeg_2000(image: Samples) -> bytes:
         mct=colour_transform,
     )
     return buffer.getvalue()
+
+
+def _from_jpeg_2000(data: bytes, shape: tuple[int, ...]) -> Samples:
+    """By what encoded it: Pillow for 8 bits, imagecodecs for 16."""
+    if data.startswith(b"\0\0\0\x0cjP  "):
+        return _by_pillow(data, shape)
+    import imagecodecs
+
+    return imagecodecs.jpeg2k_decode(data).reshape(shape)
 
 
 def _by_pillow(data: bytes, shape: tuple[int, ...]) -> Samples:

@@ -11,7 +11,7 @@ import io
 import struct
 import zlib
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from ptmtools.texture.images.opening import ORIENTATION
 from ptmtools.texture.model import Description
@@ -30,10 +30,17 @@ _PLAIN = Description()
 
 def png_bytes(image: NDArray[Any], description: Description = _PLAIN) -> bytes:
     """(h, w, c) uint8 or uint16, 1 to 4 components, as the bytes of a PNG."""
-    return _deep(image, description) if image.dtype.itemsize > 1 else _shallow(image, description)
+    buffer = io.BytesIO()
+    save_png(buffer, image, description)
+    return buffer.getvalue()
 
 
-def _shallow(image: NDArray[np.uint8], description: Description) -> bytes:
+def save_png(file: IO[bytes], image: NDArray[Any], description: Description = _PLAIN) -> None:
+    """As `png_bytes`, into an open file."""
+    (_save_deep if image.dtype.itemsize > 1 else _save_shallow)(file, image, description)
+
+
+def _save_shallow(file: IO[bytes], image: NDArray[np.uint8], description: Description) -> None:
     from PIL import Image
     from PIL.PngImagePlugin import PngInfo
 
@@ -46,26 +53,28 @@ def _shallow(image: NDArray[np.uint8], description: Description) -> bytes:
         settings["icc_profile"] = description.icc
     if description.orientation != 1:
         settings["exif"] = _exif(description.orientation)
-    buffer = io.BytesIO()
-    Image.fromarray(image[:, :, 0] if image.shape[2] == 1 else image).save(
-        buffer, "PNG", **settings
-    )
-    return buffer.getvalue()
+    flat = image[:, :, 0] if image.shape[2] == 1 else image
+    Image.fromarray(flat).save(file, "PNG", **settings)
 
 
-def _deep(image: NDArray[np.uint16], description: Description) -> bytes:
+def _save_deep(file: IO[bytes], image: NDArray[np.uint16], description: Description) -> None:
+    def put(kind: bytes, data: bytes) -> None:
+        file.write(struct.pack(">I", len(data)) + kind + data)
+        file.write(struct.pack(">I", zlib.crc32(kind + data)))
+
     height, width, components = image.shape
-    head = struct.pack(">IIBBBBB", width, height, 16, _COLOUR[components], 0, 0, 0)
-    chunks = [(b"IHDR", head), *_colour_chunks(description)]
+    file.write(_MAGIC)
+    put(b"IHDR", struct.pack(">IIBBBBB", width, height, 16, _COLOUR[components], 0, 0, 0))
+    for kind, data in _colour_chunks(description):
+        put(kind, data)
     if description.orientation != 1:
-        chunks.append((b"eXIf", _exif(description.orientation)[6:]))
+        put(b"eXIf", _exif(description.orientation).removeprefix(b"Exif\0\0"))
     packer = zlib.compressobj(_DEFLATE_LEVEL, zlib.DEFLATED, 15, 9)
-    packed = [packer.compress(strip) for strip in _filtered(image)]
-    chunks += [(b"IDAT", b"".join([*packed, packer.flush()])), (b"IEND", b"")]
-    return _MAGIC + b"".join(
-        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-        for kind, data in chunks
-    )
+    for strip in _filtered(image):
+        if packed := packer.compress(strip):
+            put(b"IDAT", packed)
+    put(b"IDAT", packer.flush())
+    put(b"IEND", b"")
 
 
 def _filtered(image: NDArray[np.uint16]) -> Iterator[bytes]:

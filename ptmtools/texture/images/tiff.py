@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from ptmtools.errors import OutputError
 from ptmtools.texture.model import Description
@@ -15,12 +15,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _STRIP_BYTES = 1 << 20
+#: Magic, and where the directory is.
+_HEAD = struct.Struct("<4sI")
 _SHORT, _LONG, _BYTES = 3, 4, 7
 _SIZES = {_SHORT: ("H", 2), _LONG: ("I", 4), _BYTES: ("B", 1)}
 
 
-def tiff_bytes(texels: NDArray[Any], description: Description) -> bytes:
-    """(h, w, c) of any kind, 1 to 4 components, as the bytes of a little-endian TIFF.
+def save_tiff(file: IO[bytes], texels: NDArray[Any], description: Description) -> None:
+    """(h, w, c) of any kind, 1 to 4 components, as a little-endian TIFF, in an empty file.
 
     The second of two components and the fourth of four are alpha, not premultiplied.
 
@@ -31,16 +33,18 @@ def tiff_bytes(texels: NDArray[Any], description: Description) -> bytes:
     height, width, components = texels.shape
     row = texels[:1].nbytes
     per_strip = max(1, _STRIP_BYTES // row)
-    body = bytearray(b"II*\0\0\0\0\0")
+    file.write(_HEAD.pack(b"II*\0", 0))
+    end = _HEAD.size
     offsets, lengths = [], []
     for y in range(0, height, per_strip):
         part = np.ascontiguousarray(texels[y : y + per_strip])
         packed = zlib.compress(part.astype(part.dtype.newbyteorder("<"), copy=False).data)
-        offsets.append(len(body))
+        offsets.append(end)
         lengths.append(len(packed))
-        body += packed
+        file.write(packed)
+        end += len(packed)
     icc = description.icc or b""
-    if len(body) + len(icc) + 8 * len(offsets) + 1024 > 1 << 32:
+    if end + len(icc) + 8 * len(offsets) + 1024 > 1 << 32:
         raise OutputError(
             "PTM-O102", "a .tif holds no more than 4 GiB", remedy="name the output .npy"
         )
@@ -61,16 +65,16 @@ def tiff_bytes(texels: NDArray[Any], description: Description) -> bytes:
         *([(34675, _BYTES, icc)] if icc else []),
     ]
     entries = bytearray()
+    body = bytearray(end & 1)
     for tag, kind, values in tags:
         letter, size = _SIZES[kind]
         packed = struct.pack(f"<{len(values)}{letter}", *values)
+        place = packed.ljust(4, b"\0")
         if len(packed) > 4:
-            body += bytes(len(body) & 1)
-            place = struct.pack("<I", len(body))
-            body += packed
-        else:
-            place = packed.ljust(4, b"\0")
+            place = struct.pack("<I", end + len(body))
+            body += packed + bytes(len(packed) & 1)
         entries += struct.pack("<HHI", tag, kind, len(packed) // size) + place
-    body += bytes(len(body) & 1)
-    body[4:8] = struct.pack("<I", len(body))
-    return bytes(body + struct.pack("<H", len(tags)) + entries + bytes(4))
+    file.write(body + struct.pack("<H", len(tags)) + entries + bytes(4))
+    file.seek(0)
+    file.write(_HEAD.pack(b"II*\0", end + len(body)))
+    file.seek(0, 2)

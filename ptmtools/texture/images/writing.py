@@ -8,7 +8,7 @@ from pathlib import PurePath
 from typing import IO, TYPE_CHECKING, Any
 
 from ptmtools.errors import OutputError, naming
-from ptmtools.texture.images.png import png_bytes
+from ptmtools.texture.images.png import save_png
 from ptmtools.texture.model import Description
 
 if TYPE_CHECKING:
@@ -61,9 +61,9 @@ def write_png(path: str | os.PathLike[str], image: NDArray[np.uint8], force: boo
 
     Raises OutputError (see `ptmtools.files.write_bytes`).
     """
-    from ptmtools.files import write_bytes
+    from ptmtools.files import write_with
 
-    write_bytes(path, png_bytes(image), force=force)
+    write_with(path, lambda file: save_png(file, image), force=force)
 
 
 Writer = Callable[[IO[bytes], "Samples", Description], object]
@@ -89,7 +89,7 @@ def _png(file: IO[bytes], texels: Samples, description: Description) -> None:
             f"a .png does not hold {texels.dtype} samples",
             remedy="name the output .npy, .tif or .exr",
         )
-    file.write(png_bytes(texels, description))
+    save_png(file, texels, description)
 
 
 def _npy(file: IO[bytes], texels: Samples, description: Description) -> None:
@@ -99,9 +99,9 @@ def _npy(file: IO[bytes], texels: Samples, description: Description) -> None:
 
 
 def _tiff(file: IO[bytes], texels: Samples, description: Description) -> None:
-    from ptmtools.texture.images.tiff import tiff_bytes
+    from ptmtools.texture.images.tiff import save_tiff
 
-    file.write(tiff_bytes(texels, description))
+    save_tiff(file, texels, description)
 
 
 def _hdr(file: IO[bytes], texels: Samples, description: Description) -> None:
