@@ -1,0 +1,313 @@
+"""A decoder of the texel coder in plain Python, written line by line from ``docs/format-kinds.md``.
+
+It shares nothing with the compiled decoder but the numbers of `layout`. The tests compare the two;
+whoever ports the format can step through it. Thousands of times slower; no damage is looked for.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from bisect import bisect_left
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.texture.coders.haar.reference import normalised
+from ptmtools.texture.coders.texel import layout
+
+CLASSES, NARROW, GRID, TABLES = 36, 216, 232, 236
+
+
+def decode_texels(
+    group: bytes, below: NDArray[Any], shape: tuple[int, int, int], max_error: int = 0
+) -> NDArray[Any]:
+    """The level (h, w, c) that a coded group (with its first byte, 2 or 3) refines ``below`` to."""
+    return _Decoder(group, below, shape, max_error).level()
+
+
+class _Bytes:
+    """Bytes from the front."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+        self.at = 0
+
+    def take(self, n: int) -> int:
+        self.at += n
+        return int.from_bytes(self.data[self.at - n : self.at], "little")
+
+    def varint(self) -> int:
+        number, shift = 0, 0
+        while True:
+            byte = self.take(1)
+            number |= (byte & 127) << shift
+            shift += 7
+            if byte < 128:
+                return number
+
+
+class _Decoder:
+    def __init__(
+        self, group: bytes, below: NDArray[Any], shape: tuple[int, int, int], max_error: int
+    ) -> None:
+        self.shape, self.max_error, self.dtype = shape, max_error, below.dtype
+        self.letter = {"float16": "e", "float32": "f"}.get(below.dtype.name, "")
+        self.bits = 8 * below.dtype.itemsize
+        read = _Bytes(group)
+        sent = read.take(1) == 3
+        components = shape[2]
+        kinds = read.take(1)
+        self.grids = [0] * components
+        self.values: list[Sequence[int]] = [range(1 << self.bits)] * components
+        for c in range(components):
+            kind = kinds >> 2 * c & 3
+            if kind == 1:
+                offset, step, top = read.varint(), read.varint(), read.varint()
+                self.values[c] = range(offset, offset + step * top + 1, step)
+            elif kind == 2:
+                gaps = [read.varint() for _ in range(read.varint() + 1)]
+                self.values[c] = np.cumsum(gaps).tolist()
+            elif kind == 3:
+                self.grids[c] = read.varint()
+        self.order = [1, 0, 2, 3][:components] if components > 2 else list(range(components))
+        self.references = [c if components > 2 and c < 3 else 0 for c in range(components)]
+        self.weights = [layout.BUILT_IN_WEIGHTS[n].tolist() for n in self.references]
+        if sent:
+            for c, n in enumerate(self.references):
+                for k in range(4):
+                    for i in range(10 + n):
+                        w = read.take(2)
+                        self.weights[c][k][i] = w - 65536 if w > 32767 else w
+        self.tables = _read_tables(read)
+        size = read.take(4)
+        self.plain = read.take(size)
+        escaped = read.take(4)
+        self.escapes = [read.take(2) for _ in range(escaped)]
+        self.words = _Bytes(group[read.at :])
+        self.states = [self.words.take(4) for _ in range(4)]
+        self.count = 0
+        self.means = [[[self._ordered(v) for v in texel] for texel in row] for row in below]
+
+    def level(self) -> NDArray[Any]:
+        height, width, components = self.shape
+        numbers = [[[0] * width for _ in range(height)] for _ in range(components)]
+        known = [[[False] * width for _ in range(height)] for _ in range(components)]
+        errors = [[[0] * width for _ in range(height)] for _ in range(components)]
+        off = [0] * components
+        for y in range((height + 1) // 2):
+            for x in range((width + 1) // 2):
+                signed = [[0] * 4 for _ in range(components)]
+                for c, plane in enumerate(self.order):
+                    for k in range(4):
+                        ty, tx = 2 * y + k // 2, 2 * x + k % 2
+                        if ty >= height or tx >= width:
+                            continue
+
+                        def look(dy: int, dx: int, y: int = y, x: int = x, c: int = plane) -> int:
+                            """Number at that place from p, or of the texel below it."""
+                            v, u = 2 * y + dy, 2 * x + dx
+                            if 0 <= v < height and 0 <= u < width and known[c][v][u]:
+                                return numbers[c][v][u]
+                            rows, columns = height // 2, width // 2
+                            v, u = (
+                                min(max(a >> 1, 0), b - 1) for a, b in ((v, rows), (u, columns))
+                            )
+                            return self._nearest(self.means[v][u][c], c)
+
+                        def error(v: int, u: int, c: int = plane) -> int:
+                            inside = 0 <= v < height and 0 <= u < width
+                            return errors[c][v][u] if inside else 0
+
+                        base = look(k // 2, k % 2)
+                        f = [look(*place) - base for place in layout.NEIGHBOURS[k]]
+                        n = self.references[c]
+                        e = [signed[0][k] if n > 0 else 0, signed[1][k] if n > 1 else 0]
+                        total = sum(a * b for a, b in zip(self.weights[c][k], f + e, strict=True))
+                        top = len(self.values[plane]) - 1
+                        guess = min(max(base + ((total + 2048) >> 12), 0), top)
+                        slope = sum(map(abs, f[:6]))
+                        west = error(ty, tx - 1)
+                        east = error(ty - 1, tx + 1) if k < 3 else west
+                        around = 2 * (west + error(ty - 1, tx)) + error(ty - 1, tx - 1) + east
+                        activity = [
+                            16 * around + 2 * slope,
+                            8 * around + slope + 16 * abs(e[0]),
+                            8 * around + slope + 8 * abs(e[0]) + 24 * abs(e[1]),
+                        ][n] >> ((2 * self.max_error + 1).bit_length() - 1)
+                        low, high, target = 0, top, guess
+                        last = k == 3 and not self.max_error
+                        if last:
+                            three = [
+                                numbers[plane][2 * y + i // 2][2 * x + i % 2] for i in range(3)
+                            ]
+                            low, high = self._range(plane, three, self.means[y][x][plane])
+                            target = min(max(guess, low), high)
+                        shift = self.grids[plane]
+                        if shift:
+                            lowest, highest = -(-low >> shift), high >> shift
+                            before = 2 * off[plane] + (off[self.order[0]] if c > 0 else 0)
+                            off[plane] = self._symbol(GRID + before) if lowest <= highest else 1
+                            if off[plane]:
+                                shift = 0
+                            else:
+                                target = (target + ((1 << shift) - 1 >> 1)) >> shift
+                                low, high, activity = lowest, highest, activity >> shift
+                                target = min(max(target, low), high)
+                        if last and high - low < 16:
+                            grade = min(((activity >> 4).bit_length() + 1) // 2, 3)
+                            table = NARROW + 4 * ((high - low).bit_length() - 1) + grade
+                        else:
+                            table = min(activity.bit_length(), CLASSES - 1)
+                            table += CLASSES * (2 * n + (k > 0))
+                        z = self._number(table) if high > low else 0
+                        change = -(z + 1) // 2 if z & 1 else z // 2
+                        if self.max_error:
+                            number = target + change * (2 * self.max_error + 1)
+                            number = min(max(number, 0), top)
+                        else:
+                            near = min(target - low, high - target)
+                            if z > 2 * near:
+                                change = z - near if target - low == near else near - z
+                            number = (target + change) << shift
+                        numbers[plane][ty][tx] = number
+                        known[plane][ty][tx] = True
+                        signed[c][k] = number - guess
+                        errors[plane][ty][tx] = abs(number - guess)
+        out = np.empty(self.shape, f"u{self.bits // 8}")
+        for c in range(components):
+            for ty in range(height):
+                out[ty, :, c] = [self._bits(self.values[c][i]) for i in numbers[c][ty]]
+        return out.view(self.dtype)
+
+    def _range(self, c: int, numbers: list[int], mean: int) -> tuple[int, int]:
+        """Lowest and highest number of s."""
+        p, q, r = (self.values[c][i] for i in numbers)
+        low, high = 4 * mean - p - q - r, 4 * mean - p - q - r + 3
+        if self.letter:
+            low, high = 0, (1 << self.bits) - 1
+            a, b, d, m = (self._real(v) for v in (p, q, r, mean))
+            value = 4.0 * m - ((a + b) + d)
+            if math.isfinite(value):
+                mantissa, least = (10, -14) if self.letter == "e" else (23, -126)
+                unit = 2.0 ** (max(math.frexp(m)[1] - 1, least) - mantissa)
+                wide = 4.0 * abs(m) + ((abs(a) + abs(b)) + abs(d))
+                margin = 2.0 * unit + wide * 2.0**-50
+                low, high = (self._rounded(v) for v in (value - margin, value + margin))
+        first = bisect_left(self.values[c], low)
+        return first, bisect_left(self.values[c], high + 1) - 1
+
+    def _nearest(self, value: int, c: int) -> int:
+        values = self.values[c]
+        if isinstance(values, range):
+            number = (value - values.start + values.step // 2) // values.step
+            return min(max(number, 0), len(values) - 1)
+        middles = [a + b >> 1 for a, b in pairwise(values)]
+        return bisect_left(middles, value)
+
+    def _real(self, ordered: int) -> float:
+        bits = self._bits(ordered).to_bytes(self.bits // 8, "little")
+        return float(struct.unpack("<" + self.letter, bits)[0])
+
+    def _rounded(self, value: float) -> int:
+        try:
+            data = struct.pack("<" + self.letter, value)
+        except OverflowError:
+            data = struct.pack("<" + self.letter, math.copysign(math.inf, value))
+        return self._ordered_bits(int.from_bytes(data, "little"))
+
+    def _ordered(self, sample: Any) -> int:
+        bits = int.from_bytes(sample.tobytes(), "little")
+        return self._ordered_bits(bits) if self.letter else bits
+
+    def _ordered_bits(self, bits: int) -> int:
+        sign = 1 << (self.bits - 1)
+        return bits ^ (2 * sign - 1) if bits & sign else bits | sign
+
+    def _bits(self, ordered: int) -> int:
+        sign = 1 << (self.bits - 1)
+        if not self.letter:
+            return ordered
+        return ordered ^ sign if ordered & sign else ordered ^ (2 * sign - 1)
+
+    def _number(self, table: int) -> int:
+        token = self._symbol(table)
+        if token < 16:
+            return token
+        bits = (token - 16 >> 2) + 2
+        rest = self.plain & ((1 << bits) - 1)
+        self.plain >>= bits
+        return (4 + (token & 3)) << bits | rest
+
+    def _symbol(self, table: int) -> int:
+        lane = self.count & 3
+        self.count += 1
+        state = self.states[lane]
+        slot, start, symbol = state & 2047, 0, 0
+        while not start <= slot < start + self.tables[table][symbol]:
+            start += self.tables[table][symbol]
+            symbol += 1
+        state = self.tables[table][symbol] * (state >> 11) + slot - start
+        if state < 1 << 15:
+            state = state << 16 | self.words.take(2)
+        self.states[lane] = state
+        return self.escapes.pop(0) if symbol == 255 else symbol
+
+
+def _read_tables(read: _Bytes) -> list[list[int]]:
+    numbers: list[int] = []
+    n, shift = 0, 0
+    for _ in range(read.take(2)):
+        byte = read.take(1)
+        for nibble in (byte & 15, byte >> 4):
+            n |= (nibble & 7) << shift
+            shift += 3
+            if nibble < 8:
+                numbers.append(n)
+                n, shift = 0, 0
+    following = iter(numbers)
+    kinds: list[int] = []
+    last = 4
+    while len(kinds) < TABLES:
+        number = next(following)
+        if number == 0:
+            kinds += [0] * (1 + next(following))
+        elif number == 1:
+            kinds.append(255)
+        else:
+            last += -(number - 1) // 2 if number & 1 else (number - 2) // 2
+            kinds.append(last)
+    out = []
+    for kind in kinds:
+        table = [0] * 256
+        if kind == 255:
+            table[255] = next(following)
+            for z in range(next(following)):
+                table[z] = next(following)
+        elif kind:
+            table = built_in(kind)
+        out.append(table)
+    return out
+
+
+def built_in(kind: int) -> list[int]:
+    """Built-in table number ``kind``, from 1."""
+    even = (2, 3, 4, 5, 6, 9, 16)
+    if kind <= len(even):
+        weights = [1] * even[kind - 1]
+    else:
+        i = kind - len(even) - 1
+        mean = 1 if i == 0 else (2 + (i - 1) % 2) << (i - 1) // 2
+        weights = []
+        for token in range(132):
+            bits = 0 if token < 16 else (token - 16 >> 2) + 2
+            first = token if token < 16 else (4 + (token & 3)) << bits
+            magnitude = 8 * (2 * first + (1 << bits))
+            weights.append((mean**4 << bits + 40) // (mean + magnitude) ** 4)
+    total = sum(weights)
+    scaled = [(w << 24) // total for w in weights]
+    kept = [w if w >= 1 << 12 else 0 for w in scaled]
+    return normalised([*kept, *[0] * (255 - len(kept)), sum(kept) >> 10])

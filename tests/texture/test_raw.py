@@ -1,0 +1,155 @@
+"""Profile `raw`: by hand, and exactly for every bit pattern of every kind."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numpy.typing import NDArray
+
+from ptmtools.errors import InputError
+from ptmtools.texture.profiles.raw import RawProfile, group_length
+from ptmtools.texture.pyramid import build_pyramid, mean_below
+from ptmtools.texture.samples import KINDS
+
+RAW = RawProfile()
+DTYPES = [np.dtype(name) for name in KINDS]
+
+
+def assert_exact(image: NDArray) -> None:
+    """Every level, bit by bit."""
+    coarsest, *levels = build_pyramid(image)
+    base = RAW.decode_base(RAW.encode_base(coarsest), coarsest.shape, coarsest.dtype)
+    assert base.tobytes() == np.ascontiguousarray(coarsest).tobytes()
+    below = coarsest
+    for level in levels:
+        tile = RAW.encode_tile(level, below)
+        found = RAW.decode_tile(tile.data, below, level.shape).texels
+        assert found.tobytes() == np.ascontiguousarray(level).tobytes()
+        below = level
+
+
+@settings(deadline=None, max_examples=120)
+@given(data=st.data(), dtype=st.sampled_from(DTYPES))
+def test_any_bit_pattern_at_every_level(data: st.DataObject, dtype: np.dtype) -> None:
+    shape = st.tuples(st.integers(1, 20), st.integers(1, 20), st.integers(1, 4))
+    assert_exact(data.draw(arrays(np.dtype(f"u{dtype.itemsize}"), shape)).view(dtype))
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    exponents=st.tuples(st.integers(-44, 38), st.integers(-44, 38)),
+    seed=st.integers(0, 2**32 - 1),
+    signed=st.booleans(),
+    dtype=st.sampled_from([np.dtype(np.float16), np.dtype(np.float32)]),
+)
+def test_any_range_of_floats(
+    exponents: tuple[int, int], seed: int, signed: bool, dtype: np.dtype
+) -> None:
+    rng = np.random.default_rng(seed)
+    values = 10.0 ** rng.uniform(min(exponents), max(exponents), (18, 21, 3))
+    values *= np.where(signed & (rng.random(values.shape) < 0.5), -1, 1)
+    with np.errstate(over="ignore"):
+        assert_exact(values.astype(dtype))
+
+
+@pytest.mark.parametrize("dtype", DTYPES, ids=str)
+@pytest.mark.parametrize("shape", [(1, 5, 1), (5, 1, 2), (1, 1, 4), (3, 2, 1)])
+def test_tiles_with_nothing_below(dtype: np.dtype, shape: tuple[int, int, int]) -> None:
+    level = np.arange(int(np.prod(shape))).reshape(shape).astype(dtype)
+    below = mean_below(level)
+    tile = RAW.encode_tile(level, below)
+    np.testing.assert_array_equal(RAW.decode_tile(tile.data, below, shape).texels, level)
+
+
+def test_sixteen_bits_by_hand() -> None:
+    """Two blocks and an odd column: remainders, then little-endian samples without s."""
+    level = np.array([[1, 2, 300, 65535, 7], [4, 4, 65535, 65535, 8]], np.uint16)[:, :, None]
+    below = mean_below(level)
+    assert below.reshape(-1).tolist() == [2, (300 + 3 * 65535) // 4]
+    residuals = 11 % 4 | (300 + 3 * 65535) % 4 << 2
+    samples = struct.pack("<8H", 1, 2, 300, 65535, 7, 4, 65535, 8)
+    assert RAW.encode_tile(level, below).data == bytes([residuals]) + samples
+
+
+def test_floats_by_hand() -> None:
+    """s as the formula says; one unit above it; three below it, which is an escape."""
+    one, unit = 1.0, 2.0**-23
+    below = np.ones((1, 3, 1), np.float32)
+    level = np.ones((2, 6, 1), np.float32)
+    level[1, 3] = one + unit
+    level[1, 5] = one - 3 * unit / 2
+    samples = struct.pack("<9f", *[1.0] * 9)
+    data = RAW.encode_tile(level, below).data
+    # Codes 0, 2 (+1), 3 (escape); -3 is 5 in zigzag, of which 3 is told by the code.
+    assert data == bytes([0 | 2 << 2 | 3 << 4]) + samples + bytes([5 - 3])
+    np.testing.assert_array_equal(RAW.decode_tile(data, below, level.shape).texels, level)
+
+
+def test_where_the_formula_is_no_number_the_texel_to_the_left_stands_in() -> None:
+    level = np.array([[np.inf, 5], [2, 2]], np.float16)[:, :, None]
+    level[0, 1] = np.nan
+    data = RAW.encode_tile(level, mean_below(level)).data
+    assert data[0] == 0
+    assert len(data) == 7
+
+
+@pytest.mark.parametrize(
+    ("name", "share"), [("uint8", 12), ("uint16", 24)], ids=["eight bits", "sixteen bits"]
+)
+def test_what_residuals_cost(name: str, share: int) -> None:
+    """1/12 of an image of 8 bits (the paper's 6 % of the pyramid), 1/24 of one of 16."""
+    image = np.zeros((256, 256, 3), name)
+    coarsest, *levels = build_pyramid(image)
+    total = len(RAW.encode_base(coarsest))
+    below = coarsest
+    for level in levels:
+        data = RAW.encode_tile(level, below).data
+        assert len(data) == group_length(level.shape, level.dtype)
+        total += len(data)
+        below = level
+    assert 0 <= total - image.nbytes * (1 + 1 / share) <= 16
+
+
+def test_floats_of_like_magnitude_cost_little_more_than_three_bits_a_block() -> None:
+    level = np.random.default_rng(1).uniform(1, 4, (128, 128, 1)).astype(np.float32)
+    data = RAW.encode_tile(level, mean_below(level)).data
+    extra = 8 * (len(data) - 3 * level.nbytes / 4) / (64 * 64)
+    assert 2 < extra < 3.4
+
+
+@settings(deadline=None, max_examples=200)
+@given(
+    dtype=st.sampled_from(DTYPES),
+    position=st.floats(0, 1, exclude_max=True),
+    value=st.integers(0, 255),
+    change=st.integers(-3, 3),
+)
+def test_a_damaged_group_is_an_error_or_an_image(
+    dtype: np.dtype, position: float, value: int, change: int
+) -> None:
+    level = (np.arange(11 * 10 * 2).reshape(11, 10, 2) * 37 % 101).astype(dtype)
+    below = mean_below(level)
+    data = bytearray(RAW.encode_tile(level, below).data)
+    data[int(position * len(data))] = value
+    data = data[:change] if change < 0 else data + bytes(change)
+    codes, found = [], None
+    try:
+        found = RAW.decode_tile(bytes(data), below, level.shape).texels
+    except InputError as error:
+        codes.append(error.code)
+    assert codes == ["PTM-I112"] or (found is not None and found.shape == level.shape)
+    if change and dtype.kind == "u":
+        assert codes
+
+
+@pytest.mark.parametrize("escapes", [b"\xff\xff\xff\xff\xff\xff\x7f", b"\x88", b"\x11\x11", b""])
+def test_impossible_escapes_are_refused(escapes: bytes) -> None:
+    below = np.ones((1, 1, 1), np.float32)
+    data = bytes([3]) + struct.pack("<3f", 1, 1, 1)
+    with pytest.raises(InputError, match="PTM-I112"):
+        RAW.decode_tile(data + escapes, below, (2, 2, 1))
