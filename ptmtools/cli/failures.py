@@ -12,6 +12,11 @@ from ptmtools.errors import PtmError
 #: Exit statuses beside those of the error classes; see `ptmtools.errors`.
 INTERNAL, USAGE, INTERRUPTED, BROKEN_PIPE = 1, 2, 130, 141
 
+_MEMORY = (
+    "not enough memory; use smaller images, fewer cells (--max-cells) or fewer workers (-j 1) "
+    "[PTM-L099]"
+)
+
 
 def report(fault: BaseException, verbose: bool) -> int:
     """Says what went wrong, with ``verbose`` where; returns the exit status."""
@@ -43,10 +48,9 @@ def describe(fault: BaseException) -> tuple[int, str]:
         case BrokenPipeError():
             return BROKEN_PIPE, ""
         case MemoryError():
-            return 7, (
-                "not enough memory; use smaller images, fewer cells (--max-cells) or fewer "
-                "workers (-j 1) [PTM-L099]"
-            )
+            return 7, _MEMORY
+        case ImportError() if "failed to map segment" in str(fault):  # no room for a library
+            return 7, _MEMORY
         case OSError(errno=errno.ENOSPC | errno.EDQUOT):
             return 4, f"{_file_of(fault)}the disk is full; free some space and run again [PTM-O003]"
         case OSError(errno=int()):

@@ -1,0 +1,241 @@
+"""`ptm encode`, `decode`, `info` and `compare`: which files are meant, and where results go."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ptmtools.cli.main import main
+from ptmtools.texture import (
+    Description,
+    EncodeOptions,
+    build_pyramid,
+    decode,
+    encode,
+    load_image,
+    read_header,
+    write_image,
+)
+from ptmtools.texture import (
+    open as open_ptm,
+)
+from ptmtools.texture.images.png import png_bytes
+
+RGB = np.random.default_rng(8).integers(0, 256, (21, 34, 3), np.uint8)
+RAW = EncodeOptions("raw")
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.png", "b.PNG", "sub/c.png"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(png_bytes(RGB))
+    (tmp_path / "notes.txt").write_text("no image")
+    return tmp_path
+
+
+@pytest.fixture
+def through(
+    monkeypatch: pytest.MonkeyPatch, capfdbinary: pytest.CaptureFixture[bytes]
+) -> Callable[..., tuple[int, bytes, str]]:
+    """``through(data, "encode", "-")``: status, stdout and stderr, given stdin."""
+
+    def run(data: bytes, *arguments: str) -> tuple[int, bytes, str]:
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data)))
+        status = main(arguments)
+        out, err = capfdbinary.readouterr()
+        return status, out, err.decode()
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("named", "made"),
+    [
+        (["a.png"], ["a.ptm"]),
+        (["*.png"], ["a.ptm"]),
+        (["?.[pP]*"], ["a.ptm", "b.ptm"]),
+        (["**/*.png"], ["a.ptm", "sub/c.ptm"]),
+        (["."], ["a.ptm", "b.ptm"]),
+        (["sub", "a.png"], ["a.ptm", "sub/c.ptm"]),
+    ],
+)
+def test_which_images_are_meant(named: list[str], made: list[str], folder: Path) -> None:
+    assert main(["-q", "encode", *named, "--profile", "raw", "-j", "2"]) == 0
+    found = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.ptm"))
+    assert found == made
+    for name in made:
+        np.testing.assert_array_equal(decode(folder / name), RGB)
+
+
+def test_a_name_with_brackets_is_a_name(folder: Path) -> None:
+    (folder / "a.png").rename("a[b].png")
+    assert main(["-q", "encode", "a[b].png", "--profile", "raw"]) == 0
+    assert Path("a[b].ptm").exists()
+
+
+def test_good_images_are_encoded_in_spite_of_bad_ones(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "aa.png").write_bytes(b"nonsense")
+    (folder / "b.ptm").write_bytes(b"mine")
+    assert main(["encode", "absent.png", ".", "--profile", "raw"]) == 3
+    out, err = capsys.readouterr()
+    assert [line[-10:] for line in err.splitlines()] == ["[PTM-I120]", "[PTM-I124]", "[PTM-O001]"]
+    assert [line.partition(":")[0] for line in out.splitlines()] == ["a.ptm"]
+    assert (folder / "b.ptm").read_bytes() == b"mine"
+    assert main(["-q", "encode", "b.PNG", "aa.png", "--profile", "raw"]) == 4
+    assert sorted(path.name for path in folder.iterdir() if path.name.startswith(".")) == []
+
+
+def test_stdin_and_stdout(folder: Path, through: Callable[..., Any]) -> None:
+    status, data, err = through(png_bytes(RGB), "encode", "-", "--profile", "raw")
+    assert (status, data) == (0, encode(RGB, RAW))
+    assert err.startswith("-: 5 levels")
+    assert through(data, "decode", "-", "-q") == (0, png_bytes(RGB), "")
+    status, found, _ = through(data, "decode", "-", "--level", "2", "-o", "-")
+    np.testing.assert_array_equal(load_image(found).array(), build_pyramid(RGB)[2])
+    assert through(data, "decode", "-", "-o", "x.png", "-q") == (0, b"", "")
+    np.testing.assert_array_equal(load_image("x.png").array(), RGB)
+    (folder / "a.ptm").write_bytes(data)
+    assert through(b"", "decode", "a.ptm", "-o", "-", "-q") == (0, png_bytes(RGB), "")
+    status, told, _ = through(data, "info", "-", "--json")
+    assert json.loads(told)["whole_levels"] == 5
+    status, _, err = through(b"", "encode", "-")
+    assert (status, err[:7], err.strip()[-10:]) == (3, "ptm: -:", "[PTM-I123]")
+
+
+@pytest.mark.parametrize("kind", ["uint8", "uint16", "float16", "float32"])
+def test_the_suffix_follows_the_samples(kind: str, folder: Path) -> None:
+    texels = RGB.astype(kind)
+    (folder / "x.ptm").write_bytes(encode(texels, RAW))
+    assert main(["-q", "decode", "x.ptm"]) == 0
+    made = "x.npy" if kind.startswith("f") else "x.png"
+    found = load_image(made).array()
+    assert found.dtype == texels.dtype
+    np.testing.assert_array_equal(found, texels)
+    assert main(["-q", "encode", made, "--profile", "raw", "-o", "y.ptm"]) == 0
+    assert (folder / "y.ptm").read_bytes() == (folder / "x.ptm").read_bytes()
+
+
+def test_decoding_several_into_a_folder(folder: Path) -> None:
+    for name in ("a", "sub/c"):
+        (folder / f"{name}.ptm").write_bytes(encode(RGB, RAW))
+    (folder / "out").mkdir()
+    assert main(["-q", "decode", "**/*.ptm", "-o", "out", "--level", "3", "-j", "2"]) == 0
+    assert sorted(path.name for path in (folder / "out").iterdir()) == ["a.png", "c.png"]
+    np.testing.assert_array_equal(load_image("out/c.png").array(), build_pyramid(RGB)[3])
+    assert main(["-q", "decode", "a.ptm", "sub/c.ptm", "-o", "x.png"]) == 2
+
+
+def test_a_window(folder: Path) -> None:
+    (folder / "a.ptm").write_bytes(encode(np.tile(RGB, (9, 9, 1)), EncodeOptions("raw", tile=32)))
+    assert main(["-q", "decode", "a.ptm", "--window", "30,7,50,41", "-o", "w.png"]) == 0
+    wanted = np.tile(RGB, (9, 9, 1))[7:48, 30:80]
+    np.testing.assert_array_equal(load_image("w.png").array(), wanted)
+    assert (
+        main(["-q", "decode", "a.ptm", "--level", "2", "--window", "1,2,3,1", "-o", "v.npy"]) == 0
+    )
+    np.testing.assert_array_equal(np.load("v.npy"), decode("a.ptm", 2)[2:3, 1:4])
+
+
+def test_colour_and_orientation_come_back(folder: Path) -> None:
+    said = Description(b"a profile", None, 45455, None, 6)
+    (folder / "x.png").write_bytes(png_bytes(RGB, said))
+    assert main(["-q", "encode", "x.png", "--profile", "raw"]) == 0
+    assert main(["-q", "decode", "x.ptm", "-o", "y.png"]) == 0
+    picture = load_image("y.png")
+    assert picture.description == said
+    np.testing.assert_array_equal(picture.array(), RGB)
+    assert main(["-q", "encode", "x.png", "--profile", "raw", "--orient", "--force"]) == 0
+    with open_ptm("x.ptm") as ptm:
+        assert ptm.description().orientation == 1
+        assert ptm.description().icc == b"a profile"
+        np.testing.assert_array_equal(ptm.level(), np.rot90(RGB, -1))
+
+
+def test_info_counts(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = Description(b"a profile", 1, 45455, None, 6)
+    texels = np.tile(RGB, (3, 3, 1)).astype(np.uint16)
+    data = encode(texels, EncodeOptions("raw", tile=16, max_level=-2), description=said)
+    header = read_header(data)
+    (folder / "x.ptm").write_bytes(data[: header.levels[-1].end - 1])
+    assert main(["info", "x.ptm", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["width"], told["kind"], told["profile"], told["trimmed"]) == (
+        102,
+        "uint16",
+        "raw",
+        1,
+    )
+    assert told["description"] == {
+        "icc_bytes": 9,
+        "srgb_intent": 1,
+        "gamma": 0.45455,
+        "orientation": 6,
+    }
+    assert told["whole_levels"] == len(header.levels) - 1
+    assert told["file_bytes"] == len(data) - 1
+    finest, one = told["levels"][-1], told["levels"][0]
+    assert finest["tiles"] == [3, 1]
+    assert finest["length"] == header.levels[-1].length
+    assert finest["bits_per_texel"] == 8 * finest["length"] / (51 * 31)
+    assert finest["end"] == header.levels[-1].end
+    assert sum(level["length"] for level in told["levels"]) <= header.file_size
+    assert (one["gpu_bytes"], one["gpu_bytes_padded"]) == (3 * 1 * 6, 3 * 1 * 8)
+    assert finest["gpu_bytes_padded"] * 3 == finest["gpu_bytes"] * 4
+    assert main(["info", "x.ptm"]) == 0
+    out = capsys.readouterr().out
+    assert "1 finer level left out" in out
+    assert out.splitlines()[-1].endswith("cut off")
+    assert "orientation 6" in out
+
+
+def test_info_reads_the_head_only(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    data = encode(RGB, RAW)
+    damaged = data[: read_header(data).levels[0].offset] + b"\xff" * 999
+    (folder / "x.ptm").write_bytes(damaged)
+    assert main(["info", "x.ptm"]) == 0
+    assert "34 x 21" in capsys.readouterr().out
+
+
+def test_compare(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "a.png", "b.PNG", "--profiles", "raw", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [image["image"] for image in told["images"]] == ["a.png", "b.PNG"]
+    by_name = {one["codec"]: one for one in told["images"][0]["codecs"]}
+    assert by_name["ptm raw"]["all_bytes"] == len(encode(RGB, RAW))
+    assert by_name["ptm raw"]["finest_bytes"] is None
+    png = by_name["PNG"]
+    assert png["finest_bytes"] == len(png_bytes(RGB))
+    assert png["all_bytes"] == sum(len(png_bytes(level)) for level in build_pyramid(RGB))
+    assert png["raw_bytes"] == RGB.size
+    for one in by_name.values():
+        assert one["problem"] is None or one["problem"].startswith("not installed: pip install")
+    totals = {one["codec"]: one for one in told["total"]}
+    assert totals["PNG"]["all_bytes"] == 2 * png["all_bytes"]
+    assert main(["compare", "a.png", "b.PNG", "--profiles", "raw"]) == 0
+    out = capsys.readouterr().out
+    assert out.count("ptm raw") == 3
+    assert "all 2 images" in out
+    assert main(["compare", "a.png", "--profiles", "raw,tiny"]) == 2
+
+
+def test_compare_says_what_cannot_be(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "imagecodecs", None)
+    write_image("f.npy", RGB.astype(np.float32))
+    assert main(["compare", "f.npy", "--profiles", "raw"]) == 0
+    lines = {line[:20].strip(): line[20:] for line in capsys.readouterr().out.splitlines()}
+    assert lines["JPEG XL effort 7"] == "not installed: pip install 'ptmtools[codecs]'"
+    assert "does not hold 34 x 21, 3 components of float32" in lines["PNG"]
+    assert "MB/s" in lines["ptm raw"]
