@@ -130,38 +130,38 @@ def fill_escapes(out: Any, n: int, escapes: Any, at: int) -> int:
 
 
 @kernel
-def normalise(counts: Any, frequency: Any) -> None:
+def normalise(counts: Any, frequency: Any, used: Any) -> None:
     """Frequencies (t, 256) int64 that sum to 2048 in each row of ``counts`` (t, 256) that has any.
 
     Rounds, at least 1 where a count is positive; then moves single units where the length changes
     least, which is by about count / (frequency ± ½). Ties go to the lower symbol.
+    ``used``: (256,) int64, overwritten.
     """
     for t in range(counts.shape[0]):
         total = 0
+        many = 0
         for s in range(256):
-            total += counts[t, s]
-        if total == 0:
-            continue
-        left = TABLE_SIZE
-        for s in range(256):
-            n = counts[t, s]
-            if n > 0:
-                frequency[t, s] = max(1, (n * TABLE_SIZE + total // 2) // total)
-                left -= frequency[t, s]
+            if counts[t, s] > 0:
+                total += counts[t, s]
+                used[many] = s
+                many += 1
+        left = TABLE_SIZE if many > 0 else 0
+        for i in range(many):
+            s = used[i]
+            f = max(1, (counts[t, s] * TABLE_SIZE + total // 2) // total)
+            frequency[t, s] = f
+            left -= f
         step = 1 if left > 0 else -1
         while left != 0:
-            best = -1
-            for s in range(256):
-                n, f = counts[t, s], frequency[t, s]
-                if f == 0 or f + step == 0:
+            best, n, f = -1, 0, 0
+            for i in range(many):
+                s = used[i]
+                mine, own = counts[t, s], frequency[t, s]
+                if own + step == 0:
                     continue
-                if best < 0:
-                    best = s
-                    continue
-                mine = n * (2 * frequency[t, best] + step)
-                yours = counts[t, best] * (2 * f + step)
-                if (mine > yours) if step > 0 else (mine < yours):
-                    best = s
+                one, other = n * (2 * own + step), mine * (2 * f + step)
+                if best < 0 or ((one < other) if step > 0 else (one > other)):
+                    best, n, f = s, mine, own
             frequency[t, best] += step
             left -= step
 

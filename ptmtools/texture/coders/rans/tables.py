@@ -46,7 +46,7 @@ def normalise(counts: NDArray[np.int64]) -> Frequencies:
     from ptmtools.texture.coders.rans import kernels
 
     frequency = np.zeros_like(counts)
-    kernels.normalise(counts, frequency)
+    kernels.normalise(counts, frequency, np.empty(256, np.int64))
     return frequency
 
 

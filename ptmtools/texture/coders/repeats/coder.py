@@ -12,17 +12,8 @@ from ptmtools.texture.coders.damage import damaged
 from ptmtools.texture.coders.rans import tables
 from ptmtools.texture.coders.rans.stream import encode_symbols, read_stream
 
-#: Weights in 1/64 of W, N, NW, NE, the means to the east and to the south, each less the block's
-#: mean, and of the error of green; for p, q and r of a block and for texels outside of blocks.
-WEIGHTS = np.array(
-    [
-        [20, 24, -10, -7, -2, -4, 38],
-        [2, 27, -12, -2, 3, -4, 38],
-        [13, -7, -6, -39, -2, 0, 42],
-        [48, 48, -32, 0, 0, 0, 48],
-    ],
-    np.int64,
-)
+#: Weights in 1/64 of W, N, NW and NE, each less the block's mean, in predictions of p, q and r.
+WEIGHTS = np.array([[20, 24, -10, -7], [2, 27, -12, -2], [13, -7, -6, -39]], np.int64)
 
 Bytes = NDArray[np.uint8]
 
@@ -83,6 +74,8 @@ def _pass(encoding, level, below, components, limit, numbers, words, state):
         np.zeros((5, 1 << bits), np.uint32),
         np.zeros(1 << bits, np.uint32),
         np.zeros(below.shape[1] + 1, np.int64),
+        np.zeros(4, np.uint64),
+        np.zeros(8, np.uint64),
         32 - bits,
         limit,
         numbers,

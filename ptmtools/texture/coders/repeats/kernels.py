@@ -18,17 +18,26 @@ from ptmtools.texture.coders.rans.kernels import ESCAPE, STATE_LOW, TABLE_BITS
 
 OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2
 
-#: First table of each sort of symbol: is the block the first guess; which guess is it; which guess
-#: is the texel; remainder of the sum; sample.
-FIRST, GUESS, TEXEL, REMAINDER, SAMPLE = 0, 16, 32, 92, 95
-#: Classes of activity of samples; tables for a first texel and the others, without and with a
-#: reference.
-CLASSES = 8
-TABLES = SAMPLE + 4 * CLASSES
+#: First table of each sort of symbol: is the block the first guess; which guess it is; which guess
+#: a texel is, by position; the samples of texels that belong to no block; Haar differences; samples
+#: of other texels; remainders of the sum.
+FIRST, GUESS, TEXEL, EDGE, HAAR, SAMPLE, REMAINDER = 0, 12, 24, 84, 85, 145, 177
+#: Answers to "which guess": after those that name one, `TEXELS`, one by one, and `DIFFERENCES`.
+GUESSES, TEXELS, DIFFERENCES = 3, 3, 4
+#: A block is coded texel by texel if so many of p, q and r are among the guesses, or if its texels
+#: differ so much.
+SMOOTH_KNOWN, ROUGH = 1, 48
+#: Classes of activity of Haar differences; tables for V, h and g, without and with a reference.
+CLASSES = 10
+#: Of samples; tables for p and for q and r, without and with a reference.
+SAMPLE_CLASSES = 8
+TABLES = REMAINDER + 3
 #: No block takes more symbols, so that words need to be counted once a block only.
 MOST_SYMBOLS = 24
 
 _MASK32 = np.uint64(0xFFFFFFFF)
+#: Stands for a texel that is none of the guesses.
+_OTHER = np.uint64(1 << 32)
 _SLOT = np.uint64((1 << TABLE_BITS) - 1)
 _HIGH = np.uint64(0x80808080)
 _LOW7 = np.uint64(0x7F7F7F7F)
@@ -91,70 +100,73 @@ def _plus(a: Any, b: Any) -> Any:
 
 @kernel
 def _samples(
-    encoding: bool, texel: Any, mean: Any, w: Any, n: Any, nw: Any, ne: Any, east: Any, south: Any,
-    position: int, order: Any, weights: Any, numbers: Any, words: Any, state: Any,
+    encoding: bool, texel: Any, mean: Any, w: Any, n: Any, nw: Any, ne: Any, position: int,
+    order: Any, weights: Any, numbers: Any, words: Any, state: Any,
 ) -> Any:  # fmt: skip
-    """A texel, component by component, each predicted from its surroundings less the mean."""
+    """p, q or r of a block, sample by sample, each predicted from its surroundings."""
     out = np.uint64(0)
     reference = np.int64(0)
-    k = weights[position]
+    byte = np.uint64(255)
     for c in range(order.size):
-        shift = np.uint64(8 * order[c])
-        byte = np.uint64(255)
-        i = np.int64((mean >> shift) & byte)
-        fw, fn = np.int64((w >> shift) & byte) - i, np.int64((n >> shift) & byte) - i
-        fnw, fne = np.int64((nw >> shift) & byte) - i, np.int64((ne >> shift) & byte) - i
-        fe, fs = np.int64((east >> shift) & byte) - i, np.int64((south >> shift) & byte) - i
+        at = np.uint64(8 * order[c])
+        i = np.int64((mean >> at) & byte)
+        fw, fn = np.int64((w >> at) & byte) - i, np.int64((n >> at) & byte) - i
+        fnw, fne = np.int64((nw >> at) & byte) - i, np.int64((ne >> at) & byte) - i
         guess = i + (
-            (k[0] * fw + k[1] * fn + k[2] * fnw + k[3] * fne + k[4] * fe + k[5] * fs + 32) >> 6
-        )
+            (weights[position, 0] * fw + weights[position, 1] * fn + weights[position, 2] * fnw
+             + weights[position, 3] * fne + 32) >> 6
+        )  # fmt: skip
         activity = abs(fw - fn) + abs(fn - fne) + abs(fw) + abs(fn)
-        referring = c > 0 and c < 3 and order.size > 2
-        if referring:
-            guess += (k[6] * reference + 32) >> 6
+        context = SAMPLE
+        if position > 0:
+            context += SAMPLE_CLASSES
+        if c > 0 and c < 3 and order.size > 2:
+            guess += reference
             activity = (activity >> 2) + 4 * abs(reference)
+            context += 2 * SAMPLE_CLASSES
         guess = min(max(guess, 0), 255)
         level = 0
-        while level < CLASSES - 1 and activity >= (3 << level):
+        while level < SAMPLE_CLASSES - 1 and activity >= (3 << level):
             level += 1
-        context = SAMPLE + level
-        if referring:
-            context += 2 * CLASSES
-        if position > 0:
-            context += CLASSES
-        e = ((np.int64((texel >> shift) & byte) - guess + 128) & 255) - 128
-        z = _symbol(encoding, (e << 1) ^ (e >> 63), context, numbers, words, state)
-        e = (z >> 1) ^ -(z & 1)
-        value = (guess + e) & 255
+        e = ((np.int64((texel >> at) & byte) - guess + 128) & 255) - 128
+        z = _symbol(encoding, (e << 1) ^ (e >> 63), context + level, numbers, words, state)
+        value = (guess + ((z >> 1) ^ -(z & 1))) & 255
         if c == 0:
             reference = value - guess
-        out |= np.uint64(value) << shift
+        elif c == 1:
+            reference += (value - guess) >> 1
+        out |= np.uint64(value) << at
     return out
 
 
 @kernel
-def _fits(sum_wanted: Any, p: Any, q: Any, r: Any, s: Any, components: int) -> bool:
-    """Whether p + q + r + s is the sum of a block of this mean in every component."""
-    fits = True
-    for c in range(components):
-        shift = np.uint64(8 * c)
-        byte = np.uint64(255)
-        total = (
-            ((p >> shift) & byte) + ((q >> shift) & byte) + ((r >> shift) & byte)
-            + ((s >> shift) & byte)
-        )  # fmt: skip
-        fits &= (total >> np.uint64(2)) == ((sum_wanted >> shift) & byte)
-    return fits
+def _remainders(
+    encoding: bool, s: Any, mean: Any, p: Any, q: Any, r: Any, order: Any, numbers: Any,
+    words: Any, state: Any,
+) -> Any:  # fmt: skip
+    """s of a block by the remainder of the sum in each component."""
+    out = np.uint64(0)
+    byte = np.uint64(255)
+    for c in range(order.size):
+        at = np.uint64(8 * order[c])
+        a, b = np.int64((q >> at) & byte), np.int64((r >> at) & byte)
+        corner = np.int64((p >> at) & byte)
+        base = 4 * np.int64((mean >> at) & byte) - a - b - corner
+        guess = max(min(a, b), min(max(a, b), a + b - corner)) - base
+        kind = 0 if guess < 0 else 1 if guess < 4 else 2
+        guess = min(max(guess, 0), 3)
+        value = np.int64((s >> at) & byte) - base
+        z = _symbol(encoding, (value - guess) & 3, REMAINDER + kind, numbers, words, state)
+        value = base + ((z + guess) & 3)
+        if value < 0 or value > 255:
+            state[_STRAY] = 1
+        out |= np.uint64(value & 255) << at
+    return out
 
 
 @kernel
-def _texel(
-    encoding: bool, texel: Any, mean: Any, w: Any, n: Any, nw: Any, ne: Any, east: Any, south: Any,
-    position: int, near: int, order: Any, weights: Any, seen: Any, shift: Any, numbers: Any, words: Any, state: Any,
-) -> Any:  # fmt: skip
-    """One of the first three texels of a block, or (position 4) one that belongs to no block."""
-    slot = _slot(mean * _K0 + w * _K2 + n * _K3 + nw * _K4 + ne * _K5 + np.uint64(position), shift)
-    last = np.uint64(seen[slot])
+def _known(texel: Any, seen: Any, w: Any, n: Any, nw: Any, ne: Any) -> int:
+    """Number of the first guess that is the texel; 5 for none."""
     found = 4 if texel == ne else 5
     if texel == nw:
         found = 3
@@ -162,16 +174,36 @@ def _texel(
         found = 2
     if texel == w:
         found = 1
-    if texel == last:
-        found = 0
-    context = TEXEL + 12 * position + 4 * near
+    return 0 if texel == seen else found
+
+
+@kernel
+def _range(p: Any, q: Any, r: Any, s: Any, components: int) -> int:
+    """The largest difference between texels of a block, over the components."""
+    most = 0
+    for c in range(components):
+        at = np.uint64(8 * c)
+        byte = np.uint64(255)
+        a, b = np.int64((p >> at) & byte), np.int64((q >> at) & byte)
+        d, e = np.int64((r >> at) & byte), np.int64((s >> at) & byte)
+        most = max(most, max(max(a, b), max(d, e)) - min(min(a, b), min(d, e)))
+    return most
+
+
+@kernel
+def _texel(
+    encoding: bool, texel: Any, seen: Any, w: Any, n: Any, nw: Any, ne: Any, context: int,
+    numbers: Any, words: Any, state: Any,
+) -> Any:  # fmt: skip
+    """A texel that is one of five guesses, or `_OTHER`."""
+    found = _known(texel, seen, w, n, nw, ne)
     if w == n:
         context += 1
-    if last == w or last == n:
+    if seen in (w, n):
         context += 2
     found = _symbol(encoding, found, context, numbers, words, state)
     if found == 0:
-        texel = last
+        texel = seen
     elif found == 1:
         texel = w
     elif found == 2:
@@ -181,76 +213,153 @@ def _texel(
     elif found == 4:
         texel = ne
     else:
-        texel = _samples(
-            encoding, texel, mean, w, n, nw, ne, east, south, min(position, 3), order, weights,
-            numbers, words,
-            state,
-        )  # fmt: skip
-    seen[slot] = texel
+        texel = _OTHER
     return texel
 
 
 @kernel
-def _last_texel(
-    encoding: bool, texel: Any, mean: Any, p: Any, q: Any, r: Any, west: Any, near: int,
-    order: Any, seen: Any, shift: Any, numbers: Any, words: Any, state: Any,
-) -> Any:  # fmt: skip
-    """The fourth texel of a block: one of five that the mean allows, or remainders of the sum."""
-    components = order.size
-    slot = _slot(mean * _K0 + p * _K3 + q * _K4 + r * _K5 + np.uint64(3), shift)
-    last = np.uint64(seen[slot])
-    index = 0
-    found, chosen = -1, np.uint64(0)
-    choices = (last, r, q, p, west)
-    possible = 0
+def _fits(mean: Any, p: Any, q: Any, r: Any, s: Any) -> bool:
+    """Whether a block has this mean in every component."""
+    even = np.uint64(0x00FF00FF)
+    eight = np.uint64(8)
+    low = (p & even) + (q & even) + (r & even) + (s & even)
+    high = (
+        ((p >> eight) & even) + ((q >> eight) & even) + ((r >> eight) & even)
+        + ((s >> eight) & even)
+    )  # fmt: skip
+    return ((low >> np.uint64(2)) & even) == (mean & even) and ((high >> np.uint64(2)) & even) == (
+        (mean >> eight) & even
+    )
+
+
+@kernel
+def _choices(mean: Any, p: Any, q: Any, r: Any, seen: Any, west: Any, wanted: Any, nth: int) -> Any:
+    """Fourth texels that the mean allows: their number, the place of ``wanted``, the ``nth``."""
+    choices = (seen, r, q, p, west)
+    possible, place, chosen = 0, -1, seen
     for i in range(5):
         one = choices[i]
         fresh = True
         for j in range(i):
             fresh &= choices[j] != one
-        if fresh and _fits(mean, p, q, r, one, components):
+        if fresh and _fits(mean, p, q, r, one):
+            if one == wanted:
+                place = possible
+            if possible == nth:
+                chosen = one
             possible += 1
-            if found < 0 and one == texel:
-                found = possible - 1
-    context = TEXEL + 36 + 4 * near + min(possible, 3)
-    if possible > 0:
-        found = _symbol(encoding, found if found >= 0 else possible, context, numbers, words, state)
-    else:
-        found = 0
-    if found < possible:
-        for i in range(5):
-            one = choices[i]
-            fresh = True
-            for j in range(i):
-                fresh &= choices[j] != one
-            if fresh and _fits(mean, p, q, r, one, components):
-                if index == found:
-                    chosen = one
-                index += 1
-    else:
-        byte = np.uint64(255)
-        for c in range(components):
-            at = np.uint64(8 * order[c])
-            a, b = np.int64((q >> at) & byte), np.int64((r >> at) & byte)
-            corner = np.int64((p >> at) & byte)
-            base = 4 * np.int64((mean >> at) & byte) - a - b - corner
-            guess = max(min(a, b), min(max(a, b), a + b - corner)) - base
-            kind = 0 if guess < 0 else 1 if guess < 4 else 2
-            guess = min(max(guess, 0), 3)
-            value = np.int64((texel >> at) & byte) - base
-            z = _symbol(encoding, (value - guess) & 3, REMAINDER + kind, numbers, words, state)
-            value = base + ((z + guess) & 3)
-            if value < 0 or value > 255:
-                state[_STRAY] = 1
-            chosen |= np.uint64(value & 255) << at
-    seen[slot] = chosen
-    return chosen
+    return possible, place, chosen
+
+
+@kernel
+def _difference(
+    encoding: bool, value: Any, guess: Any, activity: Any, kind: int, reference: Any,
+    referring: bool, numbers: Any, words: Any, state: Any,
+) -> Any:  # fmt: skip
+    """The residual of a Haar difference."""
+    context = HAAR + kind * CLASSES
+    if referring:
+        context += 3 * CLASSES
+        activity = (activity >> 2) + 3 * abs(reference)
+    level = 0
+    while level < CLASSES - 1 and activity >= (2 << level):
+        level += 1
+    e = value - guess
+    z = _symbol(encoding, (e << 1) ^ (e >> 63), context + level, numbers, words, state)
+    return (z >> 1) ^ -(z & 1)
+
+
+@kernel
+def _differences(
+    encoding: bool, block: Any, mean: Any, around: Any, order: Any, numbers: Any, words: Any,
+    state: Any,
+) -> None:  # fmt: skip
+    """The four texels of ``block`` by their Haar differences, component by component.
+
+    around: w0, w1, n0, n1 and the means to the east, south, south-west and south-east.
+    """
+    ev, eh, eg = np.int64(0), np.int64(0), np.int64(0)
+    byte = np.uint64(255)
+    out0, out1, out2, out3 = np.uint64(0), np.uint64(0), np.uint64(0), np.uint64(0)
+    for c in range(order.size):
+        at = np.uint64(8 * order[c])
+        i = np.int64((mean >> at) & byte)
+        w0, w1 = np.int64((around[0] >> at) & byte), np.int64((around[1] >> at) & byte)
+        n0, n1 = np.int64((around[2] >> at) & byte), np.int64((around[3] >> at) & byte)
+        east, south = np.int64((around[4] >> at) & byte), np.int64((around[5] >> at) & byte)
+        tilt = np.int64((around[7] >> at) & byte) - np.int64((around[6] >> at) & byte)
+        p, q = np.int64((block[0] >> at) & byte), np.int64((block[1] >> at) & byte)
+        r, s = np.int64((block[2] >> at) & byte), np.int64((block[3] >> at) & byte)
+        referring = c > 0 and c < 3 and order.size > 2
+        if not referring:
+            ev, eh, eg = np.int64(0), np.int64(0), np.int64(0)
+        north, west = n0 + n1 - 2 * i, w0 + w1 - 2 * i
+        across, down = n0 - n1, w0 - w1
+        east -= i
+        south -= i
+        calm = abs(north) + abs(west) + abs(across) + abs(down)
+
+        guess = (88 * north - 50 * south + 176 * down + 220 * ev + 128) >> 8
+        e = _difference(
+            encoding, p + q - r - s, guess, calm + abs(south), 0, ev, referring, numbers, words,
+            state,
+        )  # fmt: skip
+        v = guess + e
+        own_v = e
+        guess = (46 * west - 22 * east + 93 * across + 240 * eh + 128) >> 8
+        e = _difference(
+            encoding, p - q, guess, calm + abs(east), 1, eh, referring, numbers, words, state
+        )
+        h = guess + e
+        own_h = e
+        guess = (20 * west - 8 * east - 2 * tilt + 47 * h + 235 * eg + 128) >> 8
+        e = _difference(
+            encoding, (r - s) >> 1, guess, calm + abs(tilt), 2, eg, referring, numbers, words, state
+        )
+        g = guess + e
+        if c == 0:
+            ev, eh, eg = own_v, own_h, e
+
+        half = (v + (v & 1)) >> 1
+        top = 2 * i + ((h ^ half) & 1) + half
+        bottom = top - v
+        p = (top + h) >> 1
+        q = p - h
+        d = 2 * g + (bottom & 1)
+        r = (bottom + d) >> 1
+        s = r - d
+        if (p | q | r | s) & ~255:
+            state[_STRAY] = 1
+        out0 |= np.uint64(p & 255) << at
+        out1 |= np.uint64(q & 255) << at
+        out2 |= np.uint64(r & 255) << at
+        out3 |= np.uint64(s & 255) << at
+    block[0], block[1], block[2], block[3] = out0, out1, out2, out3
+
+
+@kernel
+def _edge_samples(
+    encoding: bool, texel: Any, w: Any, n: Any, nw: Any, components: int, numbers: Any, words: Any,
+    state: Any,
+) -> Any:  # fmt: skip
+    """A texel that belongs to no block, sample by sample, less the median of W, N, W + N - NW."""
+    out = np.uint64(0)
+    byte = np.uint64(255)
+    for c in range(components):
+        at = np.uint64(8 * c)
+        a, b = np.int64((w >> at) & byte), np.int64((n >> at) & byte)
+        guess = max(min(a, b), min(max(a, b), a + b - np.int64((nw >> at) & byte)))
+        e = ((np.int64((texel >> at) & byte) - guess + 128) & 255) - 128
+        z = _symbol(encoding, (e << 1) ^ (e >> 63), EDGE, numbers, words, state)
+        out |= np.uint64((guess + ((z >> 1) ^ -(z & 1))) & 255) << at
+    return out
 
 
 @kernel
 def repeats_pass(
-    encoding: bool, level: Any, flat: Any, below: Any, order: Any, weights: Any, slots: Any, seen: Any,
-    outcome: Any, shift: int, limit: int, numbers: Any, words: Any, state: Any,
+    encoding: bool, level: Any, flat: Any, below: Any, order: Any, weights: Any, slots: Any,
+    seen: Any, outcome: Any, block: Any, around: Any, shift: int, limit: int, numbers: Any,
+    words: Any, state: Any,
 ) -> int:  # fmt: skip
     """One group in either direction.
 
@@ -259,9 +368,9 @@ def repeats_pass(
     encoding: True reads ``level`` and fills ``numbers`` with symbol | context << 16; False fills
         ``level`` from ``words``.
     level: (h, w) uint32, texels with component c in bits 8 c to 8 c + 7. below: (h >> 1, w >> 1).
-    order: (c,) int64, components in coding order. weights: (4, 7) int64, by position.
+    order: (c,) int64, components in coding order. weights: (3, 4) int64, of p, q and r.
     slots: (5, 2^b) and seen: (2^b,) uint32, zeros; shift: 32 - b.
-    outcome: (w // 2 + 1,) int64, zeros.
+    outcome: (w // 2 + 1,) int64, zeros. block: (4,) and around: (8,) uint64, overwritten.
     limit: index of the word behind the last.
     numbers: uint32; decoding, the flat table of `tables.decoding_table`.
     words: uint16, the escapes and behind them the words, with room for `MOST_SYMBOLS` more.
@@ -344,7 +453,7 @@ def repeats_pass(
                 + _minus(w1, mean) * _K4 + _minus(east, mean) * _K5 + _minus(south, mean) * _K1,
                 down,
             )  # fmt: skip
-            found = 3
+            found = DIFFERENCES
             context = GUESS + 4 * near
             guesses = (slots[1, b], slots[2, c], slots[3, d])
             if guesses[0] > 0:
@@ -352,6 +461,17 @@ def repeats_pass(
             if guesses[1] > 0:
                 context += 2
             change = _minus(mean, np.uint64(slots[4, d]))
+            slot_p = _slot(mean * _K0 + w0 * _K2 + n0 * _K3 + nw * _K4 + n1 * _K5, down)
+            slot_q, slot_r, slot_s = slot_p, slot_p, slot_p
+            if encoding:
+                slot_q = _slot(mean * _K1 + p * _K2 + n1 * _K3 + n0 * _K4 + ne * _K5, down)
+                slot_r = _slot(mean * _K2 + w1 * _K3 + p * _K4 + w0 * _K5 + q * _K0, down)
+                slot_s = _slot(mean * _K3 + p * _K4 + q * _K5 + r * _K0, down)
+                known = 1 if _known(p, np.uint64(seen[slot_p]), w0, n0, nw, n1) < 5 else 0
+                known += 1 if _known(q, np.uint64(seen[slot_q]), p, n1, n0, ne) < 5 else 0
+                known += 1 if _known(r, np.uint64(seen[slot_r]), w1, p, w0, q) < 5 else 0
+                if known >= SMOOTH_KNOWN or _range(p, q, r, s, order.size) >= ROUGH:
+                    found = TEXELS
             if encoding:
                 for k in range(2, -1, -1):
                     g0, g1, g2, g3 = mean, mean, mean, mean
@@ -369,7 +489,7 @@ def repeats_pass(
             slots[2, c] = here + one
             slots[3, d] = here + one
             slots[4, d] = mean
-            if found < 3:
+            if found < GUESSES:
                 before = 0
                 outcome[x] = 0
                 if not encoding and guesses[found] > 0:
@@ -382,24 +502,66 @@ def repeats_pass(
             else:
                 before = 1
                 outcome[x] = 1
-                p = _texel(
-                    encoding, p, mean, w0, n0, nw, n1, east, south, 0, near, order, weights, seen,
-                    down, numbers, words,
-            state,
-                )  # fmt: skip
-                q = _texel(
-                    encoding, q, mean, p, n1, n0, ne, east, south, 1, near, order, weights, seen,
-                    down, numbers, words,
-            state,
-                )  # fmt: skip
-                r = _texel(
-                    encoding, r, mean, w1, p, w0, q, east, south, 2, near, order, weights, seen,
-                    down, numbers, words,
-            state,
-                )  # fmt: skip
-                s = _last_texel(
-                    encoding, s, mean, p, q, r, w1, near, order, seen, down, numbers, words, state
-                )
+                if found == TEXELS:
+                    context = TEXEL + 4 * near
+                    kept = p
+                    p = _texel(
+                        encoding, p, np.uint64(seen[slot_p]), w0, n0, nw, n1, context, numbers,
+                        words, state,
+                    )  # fmt: skip
+                    if p == _OTHER:
+                        p = _samples(
+                            encoding, kept, mean, w0, n0, nw, n1, 0, order, weights, numbers, words,
+                            state,
+                        )  # fmt: skip
+                    slot_q = _slot(mean * _K1 + p * _K2 + n1 * _K3 + n0 * _K4 + ne * _K5, down)
+                    kept = q
+                    q = _texel(
+                        encoding, q, np.uint64(seen[slot_q]), p, n1, n0, ne, context + 12, numbers,
+                        words, state,
+                    )  # fmt: skip
+                    if q == _OTHER:
+                        q = _samples(
+                            encoding, kept, mean, p, n1, n0, ne, 1, order, weights, numbers, words,
+                            state,
+                        )  # fmt: skip
+                    slot_r = _slot(mean * _K2 + w1 * _K3 + p * _K4 + w0 * _K5 + q * _K0, down)
+                    kept = r
+                    r = _texel(
+                        encoding, r, np.uint64(seen[slot_r]), w1, p, w0, q, context + 24, numbers,
+                        words, state,
+                    )  # fmt: skip
+                    if r == _OTHER:
+                        r = _samples(
+                            encoding, kept, mean, w1, p, w0, q, 2, order, weights, numbers, words,
+                            state,
+                        )  # fmt: skip
+                    slot_s = _slot(mean * _K3 + p * _K4 + q * _K5 + r * _K0, down)
+                    last = np.uint64(seen[slot_s])
+                    possible, place, _ = _choices(mean, p, q, r, last, w1, s, 0)
+                    if place < 0:
+                        place = possible
+                    if possible > 0:
+                        context += 36 + min(possible - 1, 3)
+                        place = _symbol(encoding, place, context, numbers, words, state)
+                    else:
+                        place = 0
+                    if place >= possible:
+                        s = _remainders(encoding, s, mean, p, q, r, order, numbers, words, state)
+                    elif not encoding:
+                        _, _, s = _choices(mean, p, q, r, last, w1, s, place)
+                else:
+                    block[0], block[1], block[2], block[3] = p, q, r, s
+                    around[0], around[1], around[2], around[3] = w0, w1, n0, n1
+                    around[4], around[5] = east, south
+                    around[6] = np.uint64(below[under, left])
+                    around[7] = np.uint64(below[under, right])
+                    _differences(encoding, block, mean, around, order, numbers, words, state)
+                    p, q, r, s = block[0], block[1], block[2], block[3]
+                    slot_q = _slot(mean * _K1 + p * _K2 + n1 * _K3 + n0 * _K4 + ne * _K5, down)
+                    slot_r = _slot(mean * _K2 + w1 * _K3 + p * _K4 + w0 * _K5 + q * _K0, down)
+                    slot_s = _slot(mean * _K3 + p * _K4 + q * _K5 + r * _K0, down)
+                seen[slot_p], seen[slot_q], seen[slot_r], seen[slot_s] = p, q, r, s
             if not encoding:
                 level[y0, x0], level[y0, x1] = p, q
                 level[y1, x0], level[y1, x1] = r, s
@@ -412,26 +574,14 @@ def repeats_pass(
         w = np.uint64(level[y, x - 1]) if x > 0 else np.uint64(level[y - 1, x] if y > 0 else 0)
         n = np.uint64(level[y - 1, x]) if y > 0 else w
         nw = np.uint64(level[y - 1, x - 1]) if y > 0 and x > 0 else n
-        level[y, x] = _texel(
-            encoding,
-            texel,
-            w,
-            w,
-            n,
-            nw,
-            nw,
-            w,
-            w,
-            4,
-            0,
-            order,
-            weights,
-            seen,
-            down,
-            numbers,
-            words,
-            state,
-        )
+        slot_p = _slot(w * _K4 + n * _K3 + nw * _K2, down)
+        last = np.uint64(seen[slot_p])
+        kept = texel
+        texel = _texel(encoding, texel, last, w, n, nw, nw, TEXEL + 48, numbers, words, state)
+        if texel == _OTHER:
+            texel = _edge_samples(encoding, kept, w, n, nw, order.size, numbers, words, state)
+        seen[slot_p] = texel
+        level[y, x] = texel
         if not encoding and state[_WORD] > limit:
             return TRUNCATED
     if encoding:
