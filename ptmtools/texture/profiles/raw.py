@@ -62,7 +62,7 @@ class RawProfile:
     ) -> Tile:
         """Residual array, partial level, escapes."""
         residual, escapes = residuals(level, below)
-        return Tile(_pack_pairs(residual) + sample_bytes(*_partial_level(level)) + escapes, level)
+        return Tile(pack_pairs(residual) + sample_bytes(*_partial_level(level)) + escapes, level)
 
     def decode_tile(
         self,
@@ -80,7 +80,7 @@ class RawProfile:
         packed = -(-below.size // 4)
         level = np.empty(shape, below.dtype)
         _place_partial_level(samples_from(data[packed:length], below.dtype), level)
-        residual = _unpack_pairs(data[:packed], below.size).reshape(below.shape)
+        residual = unpack_pairs(data[:packed], below.size).reshape(below.shape)
         place_last(level, below, residual, data[length:])
         return Tile(b"", level)
 
@@ -177,14 +177,15 @@ def _place_partial_level(data: Samples, level: Samples) -> None:
     level[2 * pairs :] = data[pairs * both :].reshape(height & 1, width, components)
 
 
-def _pack_pairs(codes: NDArray[np.uint8]) -> bytes:
+def pack_pairs(codes: NDArray[np.uint8]) -> bytes:
     """Four codes of two bits to a byte, the first in the lowest bits."""
     flat = codes.reshape(-1)
     four = np.pad(flat, (0, -len(flat) % 4)).reshape(-1, 4)
     return (four[:, 0] | four[:, 1] << 2 | four[:, 2] << 4 | four[:, 3] << 6).tobytes()
 
 
-def _unpack_pairs(data: bytes, n: int) -> NDArray[np.uint8]:
+def unpack_pairs(data: bytes, n: int) -> NDArray[np.uint8]:
+    """The inverse of `pack_pairs`: n codes."""
     packed = np.frombuffer(data, np.uint8)
     return np.stack([packed >> shift & 3 for shift in (0, 2, 4, 6)], axis=1).reshape(-1)[:n]
 

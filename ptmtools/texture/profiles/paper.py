@@ -1,0 +1,192 @@
+"""Profile `paper`: the layout of the paper with each partial level in lossless JPEG (§4.3).
+
+For comparison. The residuals stay as they are in `raw`; the texels p of all blocks, those of q and
+those of r are three images of half the size, each in lossless JPEG (ITU-T T.81, process 14) as
+libjpeg-turbo writes it; edge texels are stored. Predictor 7, and 4 for 16 bits, where libjpeg-turbo
+3.1 does not decode what XX
+
+The bytes depend on the libjpeg-turbo in use; what they decode to does not. Integers only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ptmtools.errors import InputError, MissingComponentError
+from ptmtools.texture.coders.damage import damaged
+from ptmtools.texture.profiles import Tile
+from ptmtools.texture.profiles.raw import (
+    RawProfile,
+    corners,
+    expect_length,
+    pack_pairs,
+    place_last,
+    residuals,
+    sample_bytes,
+    samples_from,
+    unpack_pairs,
+)
+
+if TYPE_CHECKING:
+    from ptmtools.texture.profiles import Samples, Shape
+
+#: Forms of a group: as in `raw`, where JPEG is longer or there are no blocks; with JPEGs.
+RAW, JPEG = 0, 1
+#: Predictors by bytes of a sample.
+PREDICTORS = {1: 7, 2: 4}
+#: Bytes of the length of a JPEG.
+_LENGTH = 4
+
+_RAW = RawProfile()
+
+
+@dataclass(frozen=True)
+class PaperProfile:
+    """Lossless JPEG inside the paper's layout; see the module.
+
+    All methods raise MissingComponentError (PTM-M102) where imagecodecs is not installed, and
+    InputError (PTM-I111) for floats. Always exact: an error that is allowed is not made.
+    """
+
+    name: str = "paper"
+
+    def encode_base(self, level: Samples) -> bytes:
+        """All texels, row by row."""
+        _codecs(level.dtype)
+        return _RAW.encode_base(level)
+
+    def decode_base(self, data: bytes, shape: Shape, dtype: np.dtype[Any]) -> Samples:
+        """The inverse of `encode_base`. Raises InputError PTM-I112."""
+        _codecs(dtype)
+        return _RAW.decode_base(data, shape, dtype)
+
+    def encode_tile(
+        self,
+        level: Samples,
+        below: Samples,
+        max_error: int = 0,
+        memory: Any = None,
+        threads: int = 1,
+    ) -> Tile:
+        """One byte that names the form; residual array, edge texels, three JPEGs."""
+        codecs = _codecs(level.dtype)
+        raw = bytes([RAW]) + _RAW.encode_tile(level, below).data
+        if not below.size:
+            return Tile(raw, level)
+        codes, _ = residuals(level, below)
+        parts = [bytes([JPEG]), pack_pairs(codes), sample_bytes(*_edges(level))]
+        for texels in corners(level, below)[:3]:
+            jpeg = codecs.jpeg8_encode(
+                _plain(texels),
+                lossless=True,
+                predictor=PREDICTORS[level.dtype.itemsize],
+                bitspersample=8 * level.dtype.itemsize,
+            )
+            found = codecs.jpeg8_decode(jpeg).reshape(texels.shape)
+            if not np.array_equal(found, texels):
+                return Tile(raw, level)
+            parts += [len(jpeg).to_bytes(_LENGTH, "little"), bytes(jpeg)]
+        coded = b"".join(parts)
+        return Tile(min(raw, coded, key=len), level)
+
+    def decode_tile(
+        self,
+        data: bytes,
+        below: Samples,
+        shape: Shape,
+        max_error: int = 0,
+        memory: Any = None,
+        threads: int = 1,
+    ) -> Tile:
+        """The inverse of `encode_tile`. Raises InputError PTM-I112."""
+        codecs = _codecs(below.dtype)
+        if data[:1] == bytes([RAW]):
+            return _RAW.decode_tile(data[1:], below, shape)
+        if data[:1] != bytes([JPEG]) or not below.size:
+            raise damaged("its form is unknown")
+        level = np.empty(shape, below.dtype)
+        packed = -(-below.size // 4)
+        at = 1 + packed
+        for edge in _edges(level):
+            piece = data[at : at + edge.nbytes]
+            expect_length(piece, edge.nbytes)
+            edge[:] = samples_from(piece, below.dtype).reshape(edge.shape)
+            at += edge.nbytes
+        for texels in corners(level, below)[:3]:
+            end = at + _LENGTH + int.from_bytes(data[at : at + _LENGTH], "little")
+            texels[:] = _decoded(codecs, data[at + _LENGTH : end], texels)
+            at = end
+        expect_length(data, at)
+        codes = unpack_pairs(data[1 : 1 + packed], below.size).reshape(below.shape)
+        place_last(level, below, codes, b"")
+        return Tile(b"", level)
+
+
+def _codecs(dtype: np.dtype[Any]) -> ModuleType:
+    """imagecodecs, for samples that lossless JPEG has."""
+    if dtype.kind != "u":
+        raise InputError(
+            "PTM-I111",
+            f"profile paper has no samples of type {dtype.name}",
+            remedy="use another profile; this one is for integers of 8 and 16 bits",
+        )
+    try:
+        import imagecodecs
+    except ImportError:
+        raise MissingComponentError(
+            "PTM-M102",
+            "profile paper needs imagecodecs",
+            remedy="pip install 'ptmtools[codecs]'",
+        ) from None
+    module: ModuleType = imagecodecs
+    return module
+
+
+def _edges(level: Samples) -> tuple[Samples, Samples]:
+    """The texels of no block: the odd last column down to the last block, the odd last row."""
+    height, width = level.shape[0] & ~1, level.shape[1] & ~1
+    return level[:height, width:], level[height:]
+
+
+def _plain(texels: Samples) -> Samples:
+    """A copy as the JPEG encoder takes it: without an axis of one component."""
+    copy: Samples = texels.copy(order="C")
+    return copy[:, :, 0] if copy.shape[2] == 1 else copy
+
+
+def _decoded(codecs: ModuleType, jpeg: bytes, like: Samples) -> Samples:
+    """The image in a JPEG, which has to have this size and type. Raises InputError PTM-I112."""
+    _check_frame(jpeg, like)
+    try:
+        found: Samples = codecs.jpeg8_decode(jpeg)
+    except (RuntimeError, ValueError) as error:
+        raise damaged(f"its JPEG is damaged ({error})") from None
+    if found.dtype != like.dtype or found.size != like.size:
+        raise damaged("its JPEG is of another size")
+    return found.reshape(like.shape)
+
+
+def _check_frame(jpeg: bytes, like: Samples) -> None:
+    """Before it is decoded: has the JPEG one lossless frame of one scan, of the right size?"""
+    height, width, components = like.shape
+    at = 2
+    while jpeg[:2] == b"\xff\xd8" and jpeg[at : at + 1] == b"\xff":
+        marker = jpeg[at + 1 : at + 2]
+        size = int.from_bytes(jpeg[at + 2 : at + 4], "big")
+        if marker == b"\xc3":
+            frame = jpeg[at + 4 : at + 10]
+            sides = height.to_bytes(2, "big") + width.to_bytes(2, "big")
+            wanted = bytes([8 * like.dtype.itemsize]) + sides + bytes([components])
+            # Every further scan would go through the whole image again.
+            if frame != wanted or jpeg.count(b"\xff\xda") != 1 or jpeg.count(b"\xff\xc3") != 1:
+                break
+            return
+        # Tables and application data may come before the frame.
+        if marker != b"\xc4" and not b"\xe0" <= marker <= b"\xef":
+            break
+        at += 2 + size
+    raise damaged("its JPEG is not the one that was expected")

@@ -1,0 +1,116 @@
+"""Profile `paper`: exact, shorter than `raw`, and strict about what a JPEG says it is."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from ptmtools.errors import InputError, MissingComponentError
+from ptmtools.texture.profiles import paper
+from ptmtools.texture.profiles.paper import PaperProfile
+from ptmtools.texture.profiles.raw import RawProfile
+from ptmtools.texture.pyramid import build_pyramid, mean_below
+
+PAPER = PaperProfile()
+
+
+@pytest.fixture(autouse=True)
+def _needs_imagecodecs() -> None:
+    pytest.importorskip("imagecodecs", reason="pip install 'ptmtools[codecs]'")
+
+
+def image(height: int, width: int, components: int, dtype: str) -> NDArray:
+    y, x = np.mgrid[:height, :width]
+    noise = np.random.default_rng(1).integers(0, 4, (height, width, components))
+    planes = np.stack([2 * x + (c + 1) * y for c in range(components)], axis=2) + noise
+    return (planes * (1 if dtype == "uint8" else 131)).astype(dtype)
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "uint16"])
+@pytest.mark.parametrize("components", [1, 2, 3, 4])
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (2, 2), (33, 20), (64, 65)])
+def test_every_level_is_exact(dtype: str, components: int, shape: tuple[int, int]) -> None:
+    rng = np.random.default_rng(2)
+    noise = rng.integers(0, np.iinfo(dtype).max + 1, (*shape, components)).astype(dtype)
+    for level in (image(*shape, components, dtype), noise):
+        coarsest, *levels = build_pyramid(level)
+        base = PAPER.encode_base(coarsest)
+        below = PAPER.decode_base(base, coarsest.shape, coarsest.dtype)
+        np.testing.assert_array_equal(below, coarsest)
+        for one in levels:
+            data = PAPER.encode_tile(one, below).data
+            found = PAPER.decode_tile(data, below, one.shape).texels
+            np.testing.assert_array_equal(found, one)
+            assert len(data) <= 1 + len(RawProfile().encode_tile(one, below).data)
+            below = found
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "uint16"])
+def test_it_is_shorter_than_raw(dtype: str) -> None:
+    level = image(128, 129, 3, dtype)
+    below = mean_below(level)
+    data = PAPER.encode_tile(level, below).data
+    assert data[0] == paper.JPEG
+    assert len(data) < 0.8 * len(RawProfile().encode_tile(level, below).data)
+
+
+def test_floats_are_refused() -> None:
+    level = np.zeros((4, 4, 1), np.float32)
+    for attempt in (
+        lambda: PAPER.encode_base(level),
+        lambda: PAPER.encode_tile(level, level[::2, ::2]),
+        lambda: PAPER.decode_tile(b"", level, (8, 8, 1)),
+    ):
+        with pytest.raises(InputError, match="PTM-I111"):
+            attempt()
+
+
+def test_without_imagecodecs_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "imagecodecs", None)
+    with pytest.raises(MissingComponentError, match=r"ptmtools\[codecs\].*PTM-M102"):
+        PAPER.encode_base(np.zeros((1, 1, 1), np.uint8))
+
+
+LEVEL = image(35, 38, 3, "uint8")
+BELOW = mean_below(LEVEL)
+
+
+@settings(deadline=None, max_examples=300)
+@given(
+    changes=st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), max_size=3),
+    cut=st.floats(0, 1) | st.just(1.0),
+)
+def test_a_damaged_group_is_an_error_or_an_image(
+    changes: list[tuple[float, int]], cut: float
+) -> None:
+    group = bytearray(PAPER.encode_tile(LEVEL, BELOW).data)
+    for position, value in changes:
+        group[int(position * len(group))] = value
+    del group[int(cut * len(group)) :]
+    codes, found = [], None
+    try:
+        found = PAPER.decode_tile(bytes(group), BELOW, LEVEL.shape).texels
+    except InputError as error:
+        codes.append(error.code)
+    assert codes == ["PTM-I112"] or (found is not None and found.shape == LEVEL.shape)
+
+
+def test_another_size_is_refused_before_it_is_decoded(monkeypatch: pytest.MonkeyPatch) -> None:
+    import imagecodecs
+
+    huge = imagecodecs.jpeg8_encode(np.zeros((60000, 4, 3), np.uint8), lossless=True)
+    texels = LEVEL[:34:2, ::2].copy()
+    twice = imagecodecs.jpeg8_encode(texels, lossless=True)
+    lossy = imagecodecs.jpeg8_encode(texels, 90)
+    begin = -(-BELOW.size // 4) + 1 + LEVEL[34:].nbytes
+    prefix = PAPER.encode_tile(LEVEL, BELOW).data[:begin]
+    monkeypatch.delattr(imagecodecs, "jpeg8_decode")
+    for jpeg in (huge, twice + twice[2:], lossy, b""):
+        data = prefix + len(jpeg).to_bytes(4, "little") + bytes(jpeg)
+        with pytest.raises(InputError, match="PTM-I112"):
+            PAPER.decode_tile(data, BELOW, LEVEL.shape)
