@@ -139,7 +139,9 @@ def _solve(f: Array, target: Array, least: int) -> Array:
     found = [(one * n + determinant) // (2 * determinant) for n in numerators]
     weights = np.clip(found, -WEIGHT_TOP, WEIGHT_TOP).astype(np.int64)
     total = int(np.abs(weights).sum())
-    return weights if total <= WEIGHT_SUM else weights * WEIGHT_SUM // total
+    if total <= WEIGHT_SUM:
+        return weights
+    return np.sign(weights) * (np.abs(weights) * WEIGHT_SUM // total)
 
 
 def _continuations(used: int) -> list[Array]:
