@@ -65,7 +65,8 @@ def _compiled(function: Function, **options: bool) -> Function:
     before = settings.CACHE_DIR
     settings.CACHE_DIR = before or _folder()
     try:
-        compiled: Any = numba.njit(cache=True, nogil=True, fastmath=False, **options)(function)
+        compile_: Any = numba.njit
+        compiled: Any = compile_(cache=True, nogil=True, fastmath=False, **options)(function)
     finally:
         settings.CACHE_DIR = before
     return cast("Function", compiled)

@@ -1,0 +1,1 @@
+"""The context mixing coder: the `small` profile's way with 8-bit levels."""

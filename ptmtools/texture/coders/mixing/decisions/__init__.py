@@ -1,0 +1,1 @@
+"""Binary decisions: adaptive probabilities, the mixer, the arithmetic coder."""

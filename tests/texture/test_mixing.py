@@ -1,0 +1,128 @@
+"""The context mixing coder and the profile `small`."""
+
+import numpy as np
+import pytest
+
+from ptmtools.errors import InputError
+from ptmtools.texture.coders.mixing.coder import decode_mixing, encode_mixing
+from ptmtools.texture.profiles.small import SmallProfile
+from ptmtools.texture.pyramid import build_pyramid
+
+
+def _image(height, width, components, seed=1):
+    """Smooth shades, an edge, a little noise; components alike but not the same."""
+    y, x = np.mgrid[:height, :width]
+    noise = np.random.default_rng(seed).integers(0, 6, (height, width, components))
+    shade = 90 + 60 * np.sin(x / 9)[..., None] + y[..., None] * np.arange(1, components + 1) / 3
+    return (shade + 40 * (x + y > 25)[..., None] + noise).clip(0, 255).astype(np.uint8)
+
+
+def _pyramid_sizes(image, max_error=0, threads=1):
+    """Encodes and decodes all levels; the sizes of the groups."""
+    profile = SmallProfile()
+    levels = build_pyramid(image)
+    base = profile.encode_base(levels[0])
+    seen = read = profile.decode_base(base, levels[0].shape, image.dtype)
+    learned = known = None
+    sizes = [len(base)]
+    for level in levels[1:]:
+        tile = profile.encode_tile(level, seen, max_error, learned, threads)
+        back = profile.decode_tile(tile.data, read, level.shape, max_error, known, threads)
+        assert np.array_equal(tile.texels, back.texels)
+        assert np.abs(back.texels.astype(int) - level).max() <= max_error
+        seen, read, learned, known = tile.texels, back.texels, tile.memory, back.memory
+        sizes.append(len(tile.data))
+    return sizes
+
+
+@pytest.mark.parametrize("components", [1, 2, 3, 4])
+@pytest.mark.parametrize("size", [(1, 2), (2, 1), (2, 2), (3, 3), (5, 17), (17, 4), (16, 15)])
+def test_all_sizes_come_back(size, components):
+    _pyramid_sizes(_image(*size, components))
+
+
+def test_every_small_size_comes_back():
+    for height in range(1, 18):
+        for width in range(1, 18):
+            level = _image(height, width, 1 + (height + width) % 4, height)
+            below = np.full((height >> 1, width >> 1, level.shape[2]), 128, np.uint8)
+            if below.size:
+                below = level[: height & ~1, : width & ~1].astype(int)
+                below = below[::2, ::2] + below[1::2, ::2] + below[::2, 1::2] + below[1::2, 1::2]
+                below = (below >> 2).astype(np.uint8)
+            data, _, _ = encode_mixing(level, below)
+            assert np.array_equal(decode_mixing(data, below, level.shape)[0], level)
+
+
+@pytest.mark.parametrize("components", [1, 3])
+@pytest.mark.parametrize("max_error", [1, 3, 20, 255])
+def test_an_allowed_error_is_kept_and_saves_bytes(max_error, components):
+    image = _image(40, 33, components)
+    assert sum(_pyramid_sizes(image, max_error)) < sum(_pyramid_sizes(image))
+
+
+@pytest.mark.parametrize("components", [3, 4])
+def test_threads_change_no_byte(components):
+    level = _image(70, 202, components)
+    below = build_pyramid(level)[-2]
+    data, _, memory = encode_mixing(level, below)
+    for threads in (2, 4):
+        again, _, same = encode_mixing(level, below, threads=threads)
+        assert again == data
+        assert all(
+            np.array_equal(a, b)
+            for one, two in zip(memory.planes, same.planes, strict=True)
+            for a, b in zip(one, two, strict=True)
+        )
+        assert np.array_equal(decode_mixing(data, below, level.shape, threads=threads)[0], level)
+
+
+def test_memory_is_not_changed_and_makes_a_difference():
+    level = _image(48, 48, 3)
+    below = build_pyramid(level)[-2]
+    fresh, _, memory = encode_mixing(level, below)
+    first = encode_mixing(level, below, memory=memory)[0]
+    assert encode_mixing(level, below, memory=memory)[0] == first
+    assert len(first) < len(fresh)
+
+
+def test_flat_images_are_tiny():
+    sizes = _pyramid_sizes(np.full((128, 96, 3), 77, np.uint8))
+    assert sum(sizes) <= 3 + 12 * len(sizes)
+
+
+def test_noise_costs_one_percent():
+    image = np.random.default_rng(3).integers(0, 256, (128, 128, 3), np.uint8)
+    assert sum(_pyramid_sizes(image)) <= 1.03 * image.nbytes
+
+
+@pytest.mark.parametrize("width", [40, 140])
+def test_damage_is_an_error_or_an_image(width):
+    level = _image(30, width, 3)
+    below = build_pyramid(level)[-2]
+    data, _, _ = encode_mixing(level, below)
+    rng = np.random.default_rng(5)
+    wrong = 0
+    for i in range(120):
+        damaged = bytearray(data)
+        if i % 3 == 0:
+            damaged = damaged[: rng.integers(len(data))]
+        elif i % 3 == 1:
+            damaged[rng.integers(len(data))] ^= 1 << int(rng.integers(8))
+        else:
+            damaged = bytearray(rng.integers(0, 256, rng.integers(2 * len(data)), np.uint8))
+        try:
+            assert decode_mixing(bytes(damaged), below, level.shape)[0].shape == level.shape
+        except InputError:
+            wrong += 1
+    assert wrong > 100
+
+
+def test_the_profile_refuses_what_is_not_its_own():
+    profile = SmallProfile()
+    below = np.zeros((2, 2, 1), np.uint8)
+    for data in (b"", b"\x09", b"\x02abc", b"\x01abc", b"\x01" + bytes(17), b"\x00\x00"):
+        with pytest.raises(InputError):
+            profile.decode_tile(data, below, (4, 4, 1))
+    with pytest.raises(InputError):
+        profile.decode_base(b"\x01\x02", (4, 4, 1), np.dtype(np.uint8))
