@@ -141,7 +141,7 @@ def _solve(f: Array, target: Array, least: int) -> Array:
     total = int(np.abs(weights).sum())
     if total <= WEIGHT_SUM:
         return weights
-    return np.sign(weights) * (np.abs(weights) * WEIGHT_SUM // total)
+    return np.asarray(np.sign(weights) * (np.abs(weights) * WEIGHT_SUM // total))
 
 
 def _continuations(used: int) -> list[Array]:
