@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 from ptmtools.errors import InputError, LimitError, PtmError
-from ptmtools.texture.images.picture import damaged_image
+from ptmtools.texture.images.picture import damaged_image, unsupported
 from ptmtools.texture.model import Description
 
 if TYPE_CHECKING:
@@ -46,11 +46,18 @@ def opened(file: BinaryIO) -> ImageFile:
     file.seek(0)
     first = file.read(8)
     file.seek(0)
-    _, module, name = next(plugin for plugin in _PLUGINS if first.startswith(plugin[0]))
-    with warnings.catch_warnings():
-        # Its limits are not ours.
-        warnings.simplefilter("ignore")
-        return cast("ImageFile", getattr(import_module(f"PIL.{module}"), name)(file))
+    magic, module, name = next(plugin for plugin in _PLUGINS if first.startswith(plugin[0]))
+    try:
+        with warnings.catch_warnings():
+            # Its limits are not ours.
+            warnings.simplefilter("ignore")
+            return cast("ImageFile", getattr(import_module(f"PIL.{module}"), name)(file))
+    except SyntaxError as error:
+        if "pixel mode" in str(error):
+            raise unsupported("a combination of samples that is not read") from None
+        if len(magic) > 1:
+            raise damaged_image(error) from None
+        raise
 
 
 def load(image: ImageFile) -> None:
