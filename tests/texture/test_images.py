@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ptmtools.errors import InputError, LimitError, OutputError
-from ptmtools.texture import decode, encode, read_image, read_ptm, write_png
+from ptmtools.texture import decode, encode, load_image, read_image, read_ptm, write_png
 
 RNG = np.random.default_rng(11)
 GREY = RNG.integers(0, 256, (9, 7), dtype=np.uint8)
@@ -88,6 +88,23 @@ def test_colour_keys() -> None:
     np.testing.assert_array_equal(read_image(data), np.dstack([GREY, alpha]))
 
 
+def test_what_is_converted_strip_by_strip() -> None:
+    """Images of more than a strip: Pillow must not lose palette or key on the way."""
+    index = RNG.integers(0, 256, (700, 600), dtype=np.uint8)
+    image = Image.fromarray(index, "P")
+    image.putpalette(RNG.integers(0, 256, 768, dtype=np.uint8).tobytes())
+    for given in ({}, {"transparency": bytes(range(256))}, {"transparency": 77}):
+        data = saved(image, **given)
+        mode = "RGBA" if given else "RGB"
+        wanted = np.asarray(Image.open(io.BytesIO(data)).convert(mode))
+        np.testing.assert_array_equal(read_image(data), wanted)
+        np.testing.assert_array_equal(load_image(data).texels[431:440], wanted[431:440])
+    found = read_image(saved(Image.fromarray(index), transparency=5))
+    np.testing.assert_array_equal(found[:, :, 1], np.where(index == 5, 0, 255))
+    bits = index > 99
+    np.testing.assert_array_equal(read_image(saved(Image.fromarray(bits)))[:, :, 0], bits * 255)
+
+
 @pytest.mark.parametrize("depth", [1, 2, 4])
 def test_colour_keys_of_shallow_greys(depth: int) -> None:
     """Pillow widens the texels but not the key."""
@@ -126,6 +143,12 @@ REFUSED = {
     "YCbCr TIFF": (saved(Image.fromarray(RGB, "YCbCr"), "TIFF"), "PTM-I126"),
     "Lab TIFF": (saved(Image.fromarray(RGB, "LAB"), "TIFF"), "PTM-I126"),
     "16-bit PPM": (b"P6 1 1 65535\n" + bytes(6), "PTM-I126"),
+    "TIFF of odd bits": (
+        saved(Image.fromarray(GREY), "TIFF").replace(
+            struct.pack("<HHII", 258, 3, 1, 8), struct.pack("<HHII", 258, 3, 1, 7)
+        ),
+        "PTM-I126",
+    ),
     "PPM of 4 bits": (b"P5 2 1 15\n\1\2", "PTM-I126"),
     "animated GIF": (
         saved(

@@ -3,7 +3,8 @@
 Pillow reads most of them, but keeps only the upper bytes of 16-bit RGB, without a word. It can be
 made to keep the lower bytes instead: the unpacker for samples of the other byte order takes the
 second byte of each. So a 16-bit PNG is unpacked twice, once for each half, in compiled code and
-without another library (pypng, in pure Python, is 60 times slower).
+without another library: 29 MB/s, where imagecodecs (libpng) reaches 50 and pypng, in pure Python,
+1.7.
 """
 
 from __future__ import annotations
