@@ -28,6 +28,16 @@ STORED, HAAR_1, DEFLATED_1, DIFFERENCES_1, HAAR, REPEATS, PYRAMID = range(7)
 #: Bytes of the length of a level in a coarsest level that is a pyramid.
 _LENGTH = 4
 
+#: A group of fewer blocks is coded by both coders; of others an eighth is looked at first.
+PROBED_BLOCKS = 16 * 16
+#: Share of new texels up to which repeats is taken, and from which Haar is; between them both are
+#: tried, and with one or two components wherever repeats is not taken at once.
+BOTH_FROM, BOTH_TO = 0.4, 0.55
+#: Haar decodes faster: repeats has to be smaller than this share of it.
+WORTH = 0.97
+#: Texels are counted in 30 bits by `coders.repeats`.
+TOO_MANY_BLOCKS = 1 << 27
+
 _RAW = RawProfile()
 
 Bytes = NDArray[np.uint8]
@@ -120,13 +130,36 @@ class FastProfile:
 
 def _encode_bytes(level: Bytes, below: Bytes) -> bytes:
     """Any level, of 8 bits, without error."""
-    shape = (level.shape[0], level.shape[1], level.shape[2])
-    coded = _shorter(
-        bytes([HAAR]) + haar.encode(level, below), bytes([REPEATS]) + repeats.encode(level, below)
-    )
-    if len(coded) <= 1 + group_length(shape):
+    coded = _encode_best(level, below)
+    if len(coded) <= 1 + group_length((level.shape[0], level.shape[1], level.shape[2])):
         return coded
     return bytes([STORED]) + _RAW.encode_tile(level, below).data
+
+
+def _encode_best(level: Bytes, below: Bytes) -> bytes:
+    blocks = below.shape[0] * below.shape[1]
+    if blocks > TOO_MANY_BLOCKS:
+        return bytes([HAAR]) + haar.encode(level, below)
+    new = BOTH_FROM
+    if blocks >= PROBED_BLOCKS:
+        piece, under = _probe(level, below)
+        new = repeats.find(piece, under).new / (3 * under.shape[0] * under.shape[1])
+    if new > BOTH_TO and level.shape[2] > 2:
+        return bytes([HAAR]) + haar.encode(level, below)
+    repeated = bytes([REPEATS]) + repeats.write(repeats.find(level, below))
+    if new < BOTH_FROM:
+        return repeated
+    coded = bytes([HAAR]) + haar.encode(level, below)
+    return repeated if len(repeated) < WORTH * len(coded) else coded
+
+
+def _probe(level: Bytes, below: Bytes) -> tuple[Bytes, Bytes]:
+    """Four strips, together an eighth of the block rows, as one smaller group."""
+    height = below.shape[0]
+    rows = -(-height // 32)
+    starts = [(2 * i + 1) * height // 8 - rows // 2 for i in range(4)]
+    piece = np.concatenate([level[2 * y : 2 * (y + rows), : 2 * below.shape[1]] for y in starts])
+    return piece, np.concatenate([below[y : y + rows] for y in starts])
 
 
 def _decode_bytes(data: bytes, below: Bytes, shape: Shape) -> Bytes:

@@ -25,7 +25,7 @@ from ptmtools.texture.coders.haar.layout import (
 #: Groups of fewer blocks use the built-in weights: sending others would not pay.
 FEWEST_BLOCKS = 32 * 32
 #: About so many block rows are sampled.
-SAMPLED_ROWS = 32
+SAMPLED_ROWS = 12
 
 Array = NDArray[np.int32]
 

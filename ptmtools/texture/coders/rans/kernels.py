@@ -167,6 +167,62 @@ def normalise(counts: Any, frequency: Any, used: Any) -> None:
 
 
 @kernel
+def _nibbles(n: Any) -> int:
+    """How many nibbles a number takes in the serialised form."""
+    return 1 + (1 if n > 7 else 0) + (1 if n > 63 else 0) + (1 if n > 511 else 0)
+
+
+@kernel
+def choose_kinds(
+    counts: Any, exact: Any, family: Any, lengths: Any, logs: Any, plain: int, sent: int, kinds: Any
+) -> None:
+    """The kind of each table (t,) that makes table and symbols shortest.
+
+    counts, exact: (t, 256) int64, and the frequencies they normalise to. family: (n, 256) int64,
+    an empty table first. lengths: (n - 1, 256) int64, in 1/256 bits, of each symbol under each kind
+    from 1 on. logs: (2049,) int64, of each frequency. plain: tables from this on have no escape.
+    """
+    for t in range(counts.shape[0]):
+        used, total, size = 0, 0, 0
+        for s in range(256):
+            n = counts[t, s]
+            if n > 0:
+                total += n
+                size += n * logs[exact[t, s]]
+                if s < ESCAPE:
+                    used = s + 1
+        if total == 0:
+            continue
+        nibbles = _nibbles(used) + _nibbles(exact[t, ESCAPE])
+        for s in range(used):
+            nibbles += _nibbles(exact[t, s])
+        size += nibbles * 4 * 256
+        least, kind = np.int64(1) << 62, sent
+        for k in range(1, family.shape[0]):
+            cost = np.int64(0)
+            for s in range(256):
+                if counts[t, s] > 0:
+                    cost += counts[t, s] * lengths[k - 1, s]
+                    if t >= plain and family[k, s] == 0:
+                        cost = np.int64(1) << 62
+                if cost >= least:
+                    break
+            if cost < least:
+                least, kind = cost, k
+        kinds[t] = sent if size < least else kind
+
+
+@kernel
+def split_numbers(numbers: Any, symbols: Any, contexts: Any, counts: Any) -> None:
+    """symbol | context << 16 taken apart, and counted; all above 254 count as 255."""
+    for i in range(numbers.size):
+        z, t = numbers[i] & 0xFFFF, numbers[i] >> 16
+        symbols[i] = z
+        contexts[i] = t
+        counts[t, min(z, ESCAPE)] += 1
+
+
+@kernel
 def _number(packed: Any, at: Any) -> int:
     """The next number from nibbles of three bits and a flag; at: (2,) next nibble, error."""
     n, shift = 0, 0

@@ -73,16 +73,16 @@ def built_in() -> NDArray[np.int64]:
 
 
 @cache
-def _built_in_lengths() -> NDArray[np.float64]:
+def _built_in_lengths() -> NDArray[np.int64]:
     """`_lengths` of the built-in tables."""
     return _lengths(built_in())
 
 
-def _lengths(family: Frequencies) -> NDArray[np.float64]:
+def _lengths(family: Frequencies) -> NDArray[np.int64]:
     """Length (n, 256) in 1/256 bits of every symbol under every table but the empty first."""
     lengths = _log_table()[family[1:]]
     escaped = lengths[:, ESCAPE, None] + 16 * 256
-    return np.where(family[1:] > 0, lengths, escaped).astype(np.float64)
+    return np.where(family[1:] > 0, lengths, escaped)
 
 
 @cache
@@ -114,31 +114,20 @@ def choose(
     Tables from number ``plain`` on have no escape: one that is built in is used only where it holds
     every symbol that occurs. ``family``: other tables in place of `built_in`, an empty one first.
     """
+    from ptmtools.texture.coders.rans import kernels
+
     lengths = _built_in_lengths() if family is None else _lengths(family)
     family = built_in() if family is None else family
-    occurs = np.flatnonzero(counts.any(axis=1))
-    rows = counts[occurs]
-    # Integers below 2^53, so exact; float64 only because numpy multiplies such matrices faster.
-    cost = (rows.astype(np.float64) @ lengths.T).astype(np.int64)
-    for row, t in enumerate(occurs):
-        if t >= plain:
-            lacking = family[1:, rows[row] > 0] == 0
-            cost[row, lacking.any(axis=1)] = 1 << 62
-    exact = normalise(rows)
-    used = _used(exact)
-    nibbles = _nibbles(exact)
-    nibbles[:, :ESCAPE][np.arange(ESCAPE) >= used[:, None]] = 0
-    sent_cost = (rows * _log_table()[exact]).sum(axis=1)
-    sent_cost += (nibbles.sum(axis=1) + _nibbles(used)) * 4 * 256
-    sent = sent_cost < cost.min(axis=1)
-    best = 1 + cost.argmin(axis=1)
-    frequency = np.zeros_like(counts)
-    frequency[occurs] = np.where(sent[:, None], exact, family[best])
+    exact = normalise(counts)
     kinds = np.zeros(len(counts), np.int64)
-    kinds[occurs] = np.where(sent, SENT, best)
+    kernels.choose_kinds(counts, exact, family, lengths, _log_table(), plain, SENT, kinds)
+    frequency = exact.copy()
+    named = (kinds != UNUSED) & (kinds != SENT)
+    frequency[named] = family[kinds[named]]
     numbers = _kind_numbers(kinds.tolist())
-    for row, n in zip(exact[sent], used[sent], strict=True):
-        numbers += [int(row[ESCAPE]), int(n), *row[:n].tolist()]
+    for row in exact[kinds == SENT]:
+        used = int(np.flatnonzero(row[:ESCAPE])[-1]) + 1 if row[:ESCAPE].any() else 0
+        numbers += [int(row[ESCAPE]), used, *row[:used].tolist()]
     packed = _pack_nibbles(numbers)
     return frequency, len(packed).to_bytes(2, "little") + packed
 
@@ -203,17 +192,6 @@ def decoding_table(frequency: Frequencies) -> NDArray[np.uint32]:
     table = np.zeros(len(frequency) * TABLE_SIZE, np.uint32)
     kernels.fill_decoding_table(frequency, table)
     return table
-
-
-def _used(frequency: Frequencies) -> NDArray[np.int64]:
-    """Per table (t, 256): symbols up to the last below the escape that has a frequency."""
-    occurs = frequency[:, ESCAPE - 1 :: -1] > 0
-    return np.where(occurs.any(axis=1), ESCAPE - occurs.argmax(axis=1), 0)
-
-
-def _nibbles(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-    """How many nibbles `_pack_nibbles` makes of each number."""
-    return 1 + (numbers > 7).astype(np.int64) + (numbers > 63) + (numbers > 511)
 
 
 def _pack_nibbles(numbers: list[int]) -> bytes:

@@ -5,6 +5,8 @@ Layout of a coded group: the frequency tables; the stream of `rans.stream`.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,31 +17,71 @@ from ptmtools.texture.coders.rans.stream import encode_symbols, read_stream
 #: Weights in 1/64 of W, N, NW and NE, each less the block's mean, in predictions of p, q and r.
 WEIGHTS = np.array([[20, 24, -10, -7], [2, 27, -12, -2], [13, -7, -6, -39]], np.int64)
 
+#: Activity below which lies class 0, 1, 2 …
+CLASS_BOUNDS = (2, 4, 8, 16, 32, 64, 128, 256, 512)
+
 Bytes = NDArray[np.uint8]
 
 
-def encode(level: Bytes, below: Bytes) -> bytes:
-    """The group that refines ``below`` (h >> 1, w >> 1, c) to ``level`` (h, w, c)."""
+@dataclass(frozen=True)
+class Symbols:
+    """What the pass makes of a group, before it is written.
+
+    Attributes
+    ----------
+    symbols: (n,) uint16. contexts: (n,) uint8, the table of each.
+    counts: (tables, 256) int64, how often each occurs; all above 254 count as 255.
+    """
+
+    symbols: NDArray[np.uint16]
+    contexts: NDArray[np.uint8]
+    counts: NDArray[np.int64]
+
+    @property
+    def hits(self) -> int:
+        """Blocks that were the first guess."""
+        from ptmtools.texture.coders.repeats import kernels
+
+        return int(self.counts[kernels.FIRST : kernels.GUESS, 0].sum())
+
+    @property
+    def new(self) -> int:
+        """Texels that were not among the guesses, of the first three of each block."""
+        from ptmtools.texture.coders.repeats import kernels
+
+        blocks = self.counts[kernels.GUESS : kernels.TEXEL, kernels.DIFFERENCES].sum()
+        texels = self.counts[kernels.TEXEL : kernels.TEXEL + 36, 5].sum()
+        return int(3 * blocks + texels)
+
+
+def find(level: Bytes, below: Bytes) -> Symbols:
+    """The symbols that refine ``below`` (h >> 1, w >> 1, c) to ``level`` (h, w, c)."""
+    from ptmtools.texture.coders.rans.kernels import split_numbers
     from ptmtools.texture.coders.repeats import kernels
 
     blocks = below.shape[0] * below.shape[1]
     edge = level.shape[0] * level.shape[1] - 4 * blocks
-    most = kernels.MOST_SYMBOLS * blocks + 5 * edge
-    numbers = np.empty(most, np.uint32)
+    numbers = np.empty(kernels.MOST_SYMBOLS * blocks + 5 * edge, np.uint32)
     state = np.zeros(9, np.int64)
     nothing = np.zeros(0, np.uint16)
     _pass(True, _packed(level), _packed(below), level.shape[2], 0, numbers, nothing, state)
     numbers = numbers[: state[4]]
-    symbols = (numbers & 0xFFFF).astype(np.uint16)
-    contexts = (numbers >> 16).astype(np.uint8)
-    keys = contexts.astype(np.int64) << 8 | np.minimum(symbols, tables.ESCAPE)
-    counts = np.bincount(keys, minlength=256 * kernels.TABLES).reshape(-1, 256)
-    frequency, packed = tables.choose(counts, kernels.TABLES)
-    return packed + encode_symbols(symbols, contexts, frequency, kernels.TABLES)
+    symbols = np.empty(len(numbers), np.uint16)
+    contexts = np.empty(len(numbers), np.uint8)
+    counts = np.zeros((kernels.TABLES, 256), np.int64)
+    split_numbers(numbers, symbols, contexts, counts)
+    return Symbols(symbols, contexts, counts)
+
+
+def write(found: Symbols) -> bytes:
+    """The group of these symbols."""
+    plain = len(found.counts)
+    frequency, packed = tables.choose(found.counts, plain)
+    return packed + encode_symbols(found.symbols, found.contexts, frequency, plain)
 
 
 def decode(data: bytes, below: Bytes, shape: tuple[int, int, int]) -> Bytes:
-    """The inverse of `encode`. Raises InputError PTM-I112 for what no encoder writes."""
+    """The inverse of `find` and `write`. Raises InputError PTM-I112 for what no encoder writes."""
     from ptmtools.texture.coders.repeats import kernels
 
     frequency, used = tables.parse(data, kernels.TABLES)
@@ -59,18 +101,29 @@ def decode(data: bytes, below: Bytes, shape: tuple[int, int, int]) -> Bytes:
     return _unpacked(level, shape[2])
 
 
-def _pass(encoding, level, below, components, limit, numbers, words, state):
+def _pass(
+    encoding: bool,
+    level: NDArray[np.uint32],
+    below: NDArray[np.uint32],
+    components: int,
+    limit: int,
+    numbers: NDArray[np.uint32],
+    words: NDArray[np.uint16],
+    state: NDArray[np.int64],
+) -> int:
+    """`kernels.repeats_pass`, with the tables that it fills."""
     from ptmtools.texture.coders.haar.layout import plane_order
     from ptmtools.texture.coders.repeats import kernels
 
     bits = min(max(below.size.bit_length(), 6), 16)
-    return kernels.repeats_pass(
+    result = kernels.repeats_pass(
         encoding,
         level,
         level.reshape(-1),
         below,
         np.array(plane_order(components), np.int64),
         WEIGHTS,
+        np.searchsorted(CLASS_BOUNDS, np.arange(1024), side="right").astype(np.uint8),
         np.zeros((5, 1 << bits), np.uint32),
         np.zeros(1 << bits, np.uint32),
         np.zeros(below.shape[1] + 1, np.int64),
@@ -82,6 +135,7 @@ def _pass(encoding, level, below, components, limit, numbers, words, state):
         words,
         state,
     )
+    return int(result)
 
 
 def _packed(level: Bytes) -> NDArray[np.uint32]:

@@ -21,16 +21,15 @@ OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2
 #: First table of each sort of symbol: is the block the first guess; which guess it is; which guess
 #: a texel is, by position; the samples of texels that belong to no block; Haar differences; samples
 #: of other texels; remainders of the sum.
-FIRST, GUESS, TEXEL, EDGE, HAAR, SAMPLE, REMAINDER = 0, 12, 24, 84, 85, 145, 177
+FIRST, GUESS, TEXEL, EDGE, HAAR, SAMPLE, REMAINDER = 0, 12, 24, 84, 85, 145, 185
 #: Answers to "which guess": after those that name one, `TEXELS`, one by one, and `DIFFERENCES`.
 GUESSES, TEXELS, DIFFERENCES = 3, 3, 4
-#: A block is coded texel by texel if so many of p, q and r are among the guesses, or if its texels
-#: differ so much.
-SMOOTH_KNOWN, ROUGH = 1, 48
+#: A block is coded texel by texel if so many samples of p, q and r are among the guesses, or if its
+#: texels differ so much.
+SMOOTH_KNOWN, ROUGH = 3, 48
 #: Classes of activity of Haar differences; tables for V, h and g, without and with a reference.
 CLASSES = 10
-#: Of samples; tables for p and for q and r, without and with a reference.
-SAMPLE_CLASSES = 8
+LARGEST_ACTIVITY = 1023
 TABLES = REMAINDER + 3
 #: No block takes more symbols, so that words need to be counted once a block only.
 MOST_SYMBOLS = 24
@@ -64,11 +63,11 @@ def _symbol(encoding: bool, z: Any, context: Any, numbers: Any, words: Any, stat
     x = ((e >> np.uint64(12)) & np.uint64(4095)) * (x >> np.uint64(TABLE_BITS)) + (
         e & np.uint64(4095)
     )
-    if x < np.uint64(STATE_LOW):
-        at = np.uint64(state[_WORD])
-        x = (x << np.uint64(16)) | np.uint64(words[at])
-        state[_WORD] = at + np.uint64(1)
-    state[lane] = x
+    # Without a branch, which would be guessed wrong half of the time.
+    at = np.uint64(state[_WORD])
+    refill = x < np.uint64(STATE_LOW)
+    state[_WORD] = at + (np.uint64(1) if refill else np.uint64(0))
+    state[lane] = (x << np.uint64(16)) | np.uint64(words[at]) if refill else x
     z = np.int64(e >> np.uint64(24))
     if z == ESCAPE:
         at = np.uint64(state[_NEXT_ESCAPE])
@@ -101,7 +100,7 @@ def _plus(a: Any, b: Any) -> Any:
 @kernel
 def _samples(
     encoding: bool, texel: Any, mean: Any, w: Any, n: Any, nw: Any, ne: Any, position: int,
-    order: Any, weights: Any, numbers: Any, words: Any, state: Any,
+    order: Any, weights: Any, classes: Any, numbers: Any, words: Any, state: Any,
 ) -> Any:  # fmt: skip
     """p, q or r of a block, sample by sample, each predicted from its surroundings."""
     out = np.uint64(0)
@@ -119,15 +118,13 @@ def _samples(
         activity = abs(fw - fn) + abs(fn - fne) + abs(fw) + abs(fn)
         context = SAMPLE
         if position > 0:
-            context += SAMPLE_CLASSES
+            context += CLASSES
         if c > 0 and c < 3 and order.size > 2:
             guess += reference
             activity = (activity >> 2) + 4 * abs(reference)
-            context += 2 * SAMPLE_CLASSES
+            context += 2 * CLASSES
         guess = min(max(guess, 0), 255)
-        level = 0
-        while level < SAMPLE_CLASSES - 1 and activity >= (3 << level):
-            level += 1
+        level = np.int64(classes[np.uint64(min(activity, LARGEST_ACTIVITY))])
         e = ((np.int64((texel >> at) & byte) - guess + 128) & 255) - 128
         z = _symbol(encoding, (e << 1) ^ (e >> 63), context + level, numbers, words, state)
         value = (guess + ((z >> 1) ^ -(z & 1))) & 255
@@ -254,25 +251,23 @@ def _choices(mean: Any, p: Any, q: Any, r: Any, seen: Any, west: Any, wanted: An
 @kernel
 def _difference(
     encoding: bool, value: Any, guess: Any, activity: Any, kind: int, reference: Any,
-    referring: bool, numbers: Any, words: Any, state: Any,
+    referring: bool, classes: Any, numbers: Any, words: Any, state: Any,
 ) -> Any:  # fmt: skip
     """The residual of a Haar difference."""
     context = HAAR + kind * CLASSES
     if referring:
         context += 3 * CLASSES
         activity = (activity >> 2) + 3 * abs(reference)
-    level = 0
-    while level < CLASSES - 1 and activity >= (2 << level):
-        level += 1
     e = value - guess
+    level = np.int64(classes[np.uint64(min(activity, LARGEST_ACTIVITY))])
     z = _symbol(encoding, (e << 1) ^ (e >> 63), context + level, numbers, words, state)
     return (z >> 1) ^ -(z & 1)
 
 
 @kernel
 def _differences(
-    encoding: bool, block: Any, mean: Any, around: Any, order: Any, numbers: Any, words: Any,
-    state: Any,
+    encoding: bool, block: Any, mean: Any, around: Any, order: Any, classes: Any, numbers: Any,
+    words: Any, state: Any,
 ) -> None:  # fmt: skip
     """The four texels of ``block`` by their Haar differences, component by component.
 
@@ -301,20 +296,40 @@ def _differences(
 
         guess = (88 * north - 50 * south + 176 * down + 220 * ev + 128) >> 8
         e = _difference(
-            encoding, p + q - r - s, guess, calm + abs(south), 0, ev, referring, numbers, words,
-            state,
+            encoding, p + q - r - s, guess, calm + abs(south), 0, ev, referring, classes, numbers,
+            words, state,
         )  # fmt: skip
         v = guess + e
         own_v = e
         guess = (46 * west - 22 * east + 93 * across + 240 * eh + 128) >> 8
         e = _difference(
-            encoding, p - q, guess, calm + abs(east), 1, eh, referring, numbers, words, state
+            encoding,
+            p - q,
+            guess,
+            calm + abs(east),
+            1,
+            eh,
+            referring,
+            classes,
+            numbers,
+            words,
+            state,
         )
         h = guess + e
         own_h = e
         guess = (20 * west - 8 * east - 2 * tilt + 47 * h + 235 * eg + 128) >> 8
         e = _difference(
-            encoding, (r - s) >> 1, guess, calm + abs(tilt), 2, eg, referring, numbers, words, state
+            encoding,
+            (r - s) >> 1,
+            guess,
+            calm + abs(tilt),
+            2,
+            eg,
+            referring,
+            classes,
+            numbers,
+            words,
+            state,
         )
         g = guess + e
         if c == 0:
@@ -357,9 +372,9 @@ def _edge_samples(
 
 @kernel
 def repeats_pass(
-    encoding: bool, level: Any, flat: Any, below: Any, order: Any, weights: Any, slots: Any,
-    seen: Any, outcome: Any, block: Any, around: Any, shift: int, limit: int, numbers: Any,
-    words: Any, state: Any,
+    encoding: bool, level: Any, flat: Any, below: Any, order: Any, weights: Any, classes: Any,
+    slots: Any, seen: Any, outcome: Any, block: Any, around: Any, shift: int, limit: int,
+    numbers: Any, words: Any, state: Any,
 ) -> int:  # fmt: skip
     """One group in either direction.
 
@@ -369,6 +384,7 @@ def repeats_pass(
         ``level`` from ``words``.
     level: (h, w) uint32, texels with component c in bits 8 c to 8 c + 7. below: (h >> 1, w >> 1).
     order: (c,) int64, components in coding order. weights: (3, 4) int64, of p, q and r.
+    classes: (1024,) uint8, class of an activity.
     slots: (5, 2^b) and seen: (2^b,) uint32, zeros; shift: 32 - b.
     outcome: (w // 2 + 1,) int64, zeros. block: (4,) and around: (8,) uint64, overwritten.
     limit: index of the word behind the last.
@@ -470,7 +486,7 @@ def repeats_pass(
                 known = 1 if _known(p, np.uint64(seen[slot_p]), w0, n0, nw, n1) < 5 else 0
                 known += 1 if _known(q, np.uint64(seen[slot_q]), p, n1, n0, ne) < 5 else 0
                 known += 1 if _known(r, np.uint64(seen[slot_r]), w1, p, w0, q) < 5 else 0
-                if known >= SMOOTH_KNOWN or _range(p, q, r, s, order.size) >= ROUGH:
+                if known * order.size >= SMOOTH_KNOWN or _range(p, q, r, s, order.size) >= ROUGH:
                     found = TEXELS
             if encoding:
                 for k in range(2, -1, -1):
@@ -511,8 +527,8 @@ def repeats_pass(
                     )  # fmt: skip
                     if p == _OTHER:
                         p = _samples(
-                            encoding, kept, mean, w0, n0, nw, n1, 0, order, weights, numbers, words,
-                            state,
+                            encoding, kept, mean, w0, n0, nw, n1, 0, order, weights, classes, numbers,
+                            words, state,
                         )  # fmt: skip
                     slot_q = _slot(mean * _K1 + p * _K2 + n1 * _K3 + n0 * _K4 + ne * _K5, down)
                     kept = q
@@ -522,8 +538,8 @@ def repeats_pass(
                     )  # fmt: skip
                     if q == _OTHER:
                         q = _samples(
-                            encoding, kept, mean, p, n1, n0, ne, 1, order, weights, numbers, words,
-                            state,
+                            encoding, kept, mean, p, n1, n0, ne, 1, order, weights, classes, numbers,
+                            words, state,
                         )  # fmt: skip
                     slot_r = _slot(mean * _K2 + w1 * _K3 + p * _K4 + w0 * _K5 + q * _K0, down)
                     kept = r
@@ -533,8 +549,8 @@ def repeats_pass(
                     )  # fmt: skip
                     if r == _OTHER:
                         r = _samples(
-                            encoding, kept, mean, w1, p, w0, q, 2, order, weights, numbers, words,
-                            state,
+                            encoding, kept, mean, w1, p, w0, q, 2, order, weights, classes, numbers,
+                            words, state,
                         )  # fmt: skip
                     slot_s = _slot(mean * _K3 + p * _K4 + q * _K5 + r * _K0, down)
                     last = np.uint64(seen[slot_s])
@@ -556,7 +572,9 @@ def repeats_pass(
                     around[4], around[5] = east, south
                     around[6] = np.uint64(below[under, left])
                     around[7] = np.uint64(below[under, right])
-                    _differences(encoding, block, mean, around, order, numbers, words, state)
+                    _differences(
+                        encoding, block, mean, around, order, classes, numbers, words, state
+                    )
                     p, q, r, s = block[0], block[1], block[2], block[3]
                     slot_q = _slot(mean * _K1 + p * _K2 + n1 * _K3 + n0 * _K4 + ne * _K5, down)
                     slot_r = _slot(mean * _K2 + w1 * _K3 + p * _K4 + w0 * _K5 + q * _K0, down)
