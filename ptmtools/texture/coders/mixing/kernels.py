@@ -408,12 +408,27 @@ def _texel(
         notes[2] = _hash(80 + final, guess, w, size >> 3)
         bend = (_five(w - nw) * 9 + _five(n - nw)) * 9 + _five(ne - n if k == 1 else east - mean)
         notes[3] = _hash(40 + k, bend, size >> 1, fraction)
-    notes[4] = _hash(90 + final, guess, size >> 3, 0)
-
-    notes[WHERE] = _hash(7, (w * 256 + n) * 256 + mean, (nw * 256 + v1) * 256 + v2, k)
+    # Where the neighbours' values, shifted as the reference shifts, lie from the prediction.
+    left, over = w - guess, n - guess
     if refs > 0:
-        notes[WHERE + 1] = _hash(17, v1 * 256 + v2, (mean * 256 + v1w) * 256 + w, k)
-        notes[WHERE + 2] = _hash(27, v1 * 256 + v2, mean, 0)
+        left, over = left + v1 - v1w, over + v1 - cells[t + place.first - stride]
+    left, over = min(max(left, -20), 20), min(max(over, -20), 20)
+    notes[4] = _hash(90 + k, left * 41 + over, size >> 2, 0)
+
+    far_w, far_n = nw - guess, ne - guess
+    if refs > 1:
+        far_w = w + v2 - cells[t + place.second - 1] - guess
+        far_n = n + v2 - cells[t + place.second - stride] - guess
+    elif refs > 0:
+        far_w += v1 - cells[t + place.first - stride - 1]
+        far_n += v1 - cells[t + place.first - stride + 1]
+    far_w, far_n = min(max(far_w, -20), 20), min(max(far_n, -20), 20)
+    notes[5] = _hash(110 + k, far_w * 41 + far_n, left * 41 + over, 0)
+
+    notes[WHERE] = _hash(7, (w * 256 + n) * 256 + ne, (nw * 256 + v1) * 256 + v2, 0)
+    if refs > 0:
+        notes[WHERE + 1] = _hash(17, v1 * 256 + v2, v1w * 256 + w, 0)
+        notes[WHERE + 2] = _hash(27, v1 * 256 + v2, 0, 0)
     else:
         first = t - (k >> 1) * stride - (k & 1)
         sides = wide(cells[first - 1]) * 256 + cells[first - stride]

@@ -42,7 +42,7 @@ def _fresh_state() -> State:
     scale = np.zeros((POSITIONS, tables.MAGNITUDES, SECOND, 2), np.int32)
     scale[..., 0] = (lowest * 16384 + 41500)[None, :, None]
     weights = np.zeros(decisions.INPUTS, np.int32)
-    weights[: decisions.CONSTANT] = 42600, 19661, 9830, 3277, 3277, 3277, 13107, 13107, 13107
+    weights[: decisions.CONSTANT] = 42600, 19661, 9830, 3277, 3277, 3277, 3277, 13107, 13107, 13107
     cells = tables.squash()[np.minimum(np.arange(decisions.CELLS) * 256, 2 * tables.LOGIT_TOP)]
     chances = np.full(decisions.CHANCES, 49152, np.int32)
     chances[: decisions.TRUST] = np.tile(cells, decisions.NODE_ROWS)

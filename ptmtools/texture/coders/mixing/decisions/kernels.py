@@ -27,7 +27,7 @@ RATE = tables.rates()
 LOGIT_TOP = tables.LOGIT_TOP
 #: Opinions: the predicted distribution, counters by context, matches, a constant; the rest is 0.
 INPUTS = 16
-COUNTERS = 5
+COUNTERS = 6
 MATCHES = 3
 FIRST_COUNTER = 1
 FIRST_MATCH = FIRST_COUNTER + COUNTERS
@@ -39,10 +39,10 @@ TAG = 15
 #: A counter: 22 bits of probability, 10 of how often it has been used, at most so often.
 FRESH = np.uint32(1 << 31)
 COUNT_TOP = 120
-FLAT_COUNT_TOP = 1000
+FLAT_COUNT_TOP = 250
 #: Weights of the mixer, 16 fractional bits: their limit; the learning rate in units of 2^-20.
 MIX_TOP = (8 << 16) - 1
-MIX_RATE = 64
+MIX_RATE = 100
 #: Kinds of decisions: is the residual 0; its sign; its magnitude; the last texel's search.
 KINDS = 4
 #: How far a match may have been confirmed.
