@@ -40,6 +40,10 @@ FEWEST_BLOCKS = 24 * 24
 #: Groups shorter than so many times their weights are tried without them too.
 LIGHT = 8
 
+#: The activity where texels differ as they mostly do has this class; the highest window; rows
+#: looked at.
+WINDOW_USUAL, WINDOW_TOP, WINDOW_ROWS = 12, 40, 64
+
 Numbers = NDArray[np.uint32]
 Weights = NDArray[np.int64]
 _RAW = RawProfile()
@@ -140,9 +144,11 @@ def _coding(group: _Group, weights: Weights | None) -> _Coded | None:
     counts = np.zeros((kernels.TABLES, 256), np.int64)
     plain, limits = np.zeros(n + 2, np.uint32), np.zeros(2, np.int64)
     numbers = group.numbers.copy() if group.max_error else group.numbers
+    window = _window(group)
     result = _pass(
         True, numbers, group.means, group.work.copy(), group.max_error, kind_of(group.level.dtype),
-        group.numbering, weights, plain, limits, symbols=symbols, contexts=contexts, counts=counts,
+        group.numbering, weights, window, plain, limits, symbols=symbols, contexts=contexts,
+        counts=counts,
     )  # fmt: skip
     if result != kernels.OK:
         return None
@@ -153,6 +159,7 @@ def _coding(group: _Group, weights: Weights | None) -> _Coded | None:
     body = b"".join(
         [
             group.numbering.packed(),
+            bytes([window]),
             sent,
             packed,
             size.to_bytes(4, "little"),
@@ -164,6 +171,17 @@ def _coding(group: _Group, weights: Weights | None) -> _Coded | None:
     return _Coded(CODED if weights is None else CODED_WITH_WEIGHTS, body, texels)
 
 
+def _window(group: _Group) -> int:
+    """How many doublings of activity are one class, so that usual ones have their own."""
+    step = max(1, group.numbers.shape[0] // WINDOW_ROWS)
+    rows = group.numbers[::step].astype(np.int64)
+    if rows.shape[1] < 2:
+        return 0
+    changes = np.abs(np.diff(rows, axis=1)) >> group.numbering.grids
+    usual = 96 * int(changes.sum()) // changes.size // (2 * group.max_error + 1)
+    return min(max(usual.bit_length() - WINDOW_USUAL, 0), WINDOW_TOP)
+
+
 def _decode(data: bytes, below: Samples, shape: Shape, max_error: int, sent: bool) -> Samples:
     from ptmtools.texture.coders.texel import kernels
 
@@ -172,6 +190,10 @@ def _decode(data: bytes, below: Samples, shape: Shape, max_error: int, sent: boo
     numbering, at = read_numbering(data, shape[2], kind.top)
     if max_error and not numbering.plain:
         raise damaged("values are numbered although an error is allowed")
+    window = int.from_bytes(data[at : at + 1], "little")
+    if not at < len(data) or window > WINDOW_TOP:
+        raise damaged("its window is impossible")
+    at += 1
     weights = None
     if sent:
         weights, at = _read_weights(data, at, shape[2])
@@ -188,7 +210,7 @@ def _decode(data: bytes, below: Samples, shape: Shape, max_error: int, sent: boo
     numbers = np.zeros(shape, np.uint32)
     work = _enlarged(numbering.nearest(means), shape)
     result = _pass(
-        False, numbers, means, work, max_error, kind, numbering, weights, plain,
+        False, numbers, means, work, max_error, kind, numbering, weights, window, plain,
         np.array([read.limit, 8 * size], np.int64), words=read.words, escapes=read.escapes,
         table=tables.decoding_table(frequency),
     )  # fmt: skip
@@ -234,6 +256,7 @@ def _pass(
     kind: SampleKind,
     numbering: Numbering,
     weights: Weights | None,
+    window: int,
     plain: Numbers,
     limits: NDArray[np.int64],
     symbols: NDArray[np.uint16] | None = None,
@@ -269,6 +292,7 @@ def _pass(
             numbering.lists,
             numbering.tops,
             numbering.grids,
+            window,
             none if symbols is None else symbols,
             np.zeros(0, np.uint8) if contexts is None else contexts,
             np.zeros((0, 256), np.int64) if counts is None else counts,

@@ -38,12 +38,12 @@ FEATURES = 10
 #: Weights are in so many bits behind the point.
 WEIGHT_BITS = 12
 HALF_WEIGHT = 1 << (WEIGHT_BITS - 1)
-#: Classes of activity, one for each doubling.
-CLASSES = 36
-#: Tables: for planes of no, one, two references those of p, then those of q, r and s; then those of
-#: a fourth texel of few possible values, by how many and by four grades of activity; those of
+#: Classes of activity: none, then one for each doubling.
+CLASSES = 18
+#: Tables: for planes of no, one, two references those of p, of q, of r, of s; then those of a
+#: fourth texel of few possible values, by how many and by four grades of activity; those of
 #: whether low bits are 0, by the answers before.
-NARROW = 6 * CLASSES
+NARROW = 12 * CLASSES
 GRID = NARROW + 16
 TABLES = GRID + 4
 #: Ranges of at most so many values are narrow.
@@ -218,8 +218,8 @@ def _next_symbol(state: Any, n: Any, words: Any, at: Any, table: Any, context: A
 def texel_pass(
     encoding: bool, level: Any, means: Any, work: Any, stride: int, near: Any, kind: int,
     largest: Any, planes: Any, references: Any, weights: Any, around: Any, steps: Any,
-    offsets: Any, lists: Any, tops: Any, grids: Any, symbols: Any, contexts: Any, counts: Any,
-    plain: Any, limits: Any, words: Any, escapes: Any, table: Any, space: Any,
+    offsets: Any, lists: Any, tops: Any, grids: Any, window: Any, symbols: Any, contexts: Any,
+    counts: Any, plain: Any, limits: Any, words: Any, escapes: Any, table: Any, space: Any,
 ) -> int:  # fmt: skip
     """One group in either direction.
 
@@ -238,6 +238,7 @@ def texel_pass(
     around: (4 * 10,) uint64, offsets in ``work`` of the neighbours of p, q, r, s, modulo 2^64.
     steps, offsets, tops: (c,) int64 and lists: (c, n) int64, by component: value i is
         ``offset + i * step`` for i up to ``top``, or where ``step`` is 0 stands in the list.
+    window: doublings of activity that are one class at the low end.
     symbols: uint16, contexts: uint8, of n or with grids 2 * n, counts: (TABLES, 256) int64.
     plain: uint32 words of plain bits, with padding for a row of blocks.
     limits: (2,) int64, decoding: numbers of words and of plain bits.
@@ -357,8 +358,10 @@ def texel_pass(
                         grade = min((_bit_length(activity >> 4) + 1) >> 1, np.int64(3))
                         context = NARROW + 4 * (_bit_length(high - low) - 1) + grade
                     else:
-                        context = min(_bit_length(activity), np.int64(CLASSES - 1))
-                        context += CLASSES * (2 * count + (1 if k > 0 else 0))
+                        context = CLASSES * (4 * count + k)
+                        if activity > 0:
+                            octave = _bit_length(activity) - window
+                            context += min(max(octave, np.int64(1)), np.int64(CLASSES - 1))
                     z = np.int64(0)
                     if high > low and encoding:
                         number = np.int64(level[py, px, plane]) >> shift

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ptmtools.texture.coders.haar.reference import normalised
 from ptmtools.texture.coders.texel import layout
 
-CLASSES, NARROW, GRID, TABLES = 36, 216, 232, 236
+CLASSES, NARROW, GRID, TABLES = 18, 216, 232, 236
 
 
 def decode_texels(
@@ -73,6 +73,7 @@ class _Decoder:
                 self.values[c] = np.cumsum(gaps).tolist()
             elif kind == 3:
                 self.grids[c] = read.varint()
+        self.window = read.take(1)
         self.order = [1, 0, 2, 3][:components] if components > 2 else list(range(components))
         self.references = [c if components > 2 and c < 3 else 0 for c in range(components)]
         self.weights = [layout.BUILT_IN_WEIGHTS[n].tolist() for n in self.references]
@@ -161,8 +162,9 @@ class _Decoder:
                             grade = min(((activity >> 4).bit_length() + 1) // 2, 3)
                             table = NARROW + 4 * ((high - low).bit_length() - 1) + grade
                         else:
-                            table = min(activity.bit_length(), CLASSES - 1)
-                            table += CLASSES * (2 * n + (k > 0))
+                            octave = activity.bit_length() - self.window
+                            table = min(max(octave, 1), CLASSES - 1) if activity else 0
+                            table += CLASSES * (4 * n + k)
                         z = self._number(table) if high > low else 0
                         change = -(z + 1) // 2 if z & 1 else z // 2
                         if self.max_error:
