@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from ptmtools.errors import InputError
-from ptmtools.texture.coders.mixing.coder import decode_mixing, encode_mixing
+from ptmtools.texture.coders.mixing.coder import _split, decode_mixing, encode_mixing
+from ptmtools.texture.coders.mixing.reference import ReferenceState, decode_reference
 from ptmtools.texture.profiles.small import SmallProfile
 from ptmtools.texture.pyramid import build_pyramid
 
@@ -126,3 +127,24 @@ def test_the_profile_refuses_what_is_not_its_own():
             profile.decode_tile(data, below, (4, 4, 1))
     with pytest.raises(InputError):
         profile.decode_base(b"\x01\x02", (4, 4, 1), np.dtype(np.uint8))
+
+
+@pytest.mark.parametrize(
+    ("height", "width", "components", "max_error"),
+    [(24, 20, 3, 0), (21, 15, 4, 0), (20, 22, 1, 0), (13, 24, 2, 2), (6, 130, 2, 0)],
+)
+def test_the_reference_decoder_agrees(height, width, components, max_error):
+    image = _image(height, width, components)
+    image[: height // 2, : width // 2] = 200
+    levels = build_pyramid(image)
+    seen, memory = levels[0], None
+    states = [ReferenceState() for _ in range(components)]
+    for level in levels[1:]:
+        data, texels, memory = encode_mixing(level, seen, max_error, memory)
+        streams = _split(data, components if level.shape[1] >= 66 else 1)
+        back = decode_reference(streams, seen, level.shape, max_error, states)
+        assert np.array_equal(back, texels)
+        seen = texels
+    for plane, state in zip(memory.planes, states, strict=True):
+        assert plane.weights.tolist() == state.weights
+        assert plane.bias.tolist() == state.bias

@@ -132,7 +132,8 @@ def decide(
     mask = slots.shape[1] - 1
     for i in range(COUNTERS):
         s = (notes[i] ^ group) & mask
-        tag = np.uint32(notes[i] >> 8)
+        # Never 0, the tag of a slot that was never used.
+        tag = np.uint32((notes[i] >> 8) | (1 << 24))
         if slots[i, s, TAG] != tag:
             for j in range(TAG):
                 slots[i, s, j] = FRESH
