@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -40,9 +40,8 @@ class TextureOptions(EncodeOptions):
 
 
 def check_options(options: TextureOptions) -> None:
-    """Raises what `encode` raises for impossible options; tried on the smallest image, which has
-    one level only."""
-    encode(np.zeros((1, 1, 1), dtype=np.uint8), replace(options, min_level=0, max_level=-1))
+    """Raises what `encode` raises for impossible options; tried on the smallest image."""
+    encode(np.zeros((1, 1, 1), dtype=np.uint8), options)
 
 
 def texture_names(images: Iterable[SourceImage]) -> list[str]:

@@ -270,6 +270,9 @@ def check_options(options: EncodeOptions) -> None:
             "the least or largest side of a level is impossible",
             "min_side must be at least 1; max_side at least 1, or 0 for no limit",
         )
+    first, last = options.min_level, options.max_level
+    if (first < 0) == (last < 0) and first > last:
+        raise _impossible(f"levels {first} to {last} are none", "min_level is the coarser one")
     low, high = TILE_SIDES
     if options.tile and not (low <= options.tile <= high and options.tile % 2 == 0):
         raise _impossible(
@@ -301,17 +304,15 @@ def _impossible(what: str, remedy: str) -> InputError:
 
 
 def _kept_levels(width: int, height: int, options: EncodeOptions) -> list[int]:
-    """Numbers, in the complete pyramid, of the levels to store. Raises InputError PTM-I111."""
+    """Numbers, in the complete pyramid, of the levels to store; there is always one."""
     sizes = level_sizes(width, height)
     count = len(sizes)
-    first, last = (n + count if n < 0 else n for n in (options.min_level, options.max_level))
-    if not 0 <= first <= last or first >= count:
-        raise InputError(
-            "PTM-I111",
-            f"levels {options.min_level} to {options.max_level} are none",
-            remedy=f"this image has levels 0 to {count - 1}",
-        )
-    last = min(last, count - 1)
+
+    def number(asked: int) -> int:
+        return min(max(asked + count if asked < 0 else asked, 0), count - 1)
+
+    last = number(options.max_level)
+    first = min(number(options.min_level), last)
     kept = [n for n in range(first, last + 1) if min(sizes[n]) >= options.min_side] or [last]
     small = [n for n in kept if not options.max_side or max(sizes[n]) <= options.max_side]
     return small or kept[:1]

@@ -33,7 +33,8 @@ class EncodeOptions:
     max_side: levels whose longer side is above this are left out; 0 keeps all of them.
     min_level, max_level: the same by number: levels below ``min_level`` and above ``max_level`` are
         left out, counted from the coarsest of all, 0; -1 is the finest, -2 the next. What is left
-        is renumbered from 0, and the header keeps the size of the original.
+        is renumbered from 0, and the header keeps the size of the original. An image without such a
+        level keeps the nearest that it has.
     """
 
     profile: Literal["fast", "small", "raw", "paper"] = "fast"
