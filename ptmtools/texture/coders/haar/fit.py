@@ -23,7 +23,7 @@ from ptmtools.texture.coders.haar.layout import (
 )
 
 #: Groups of fewer blocks use the built-in weights: sending others would not pay.
-FEWEST_BLOCKS = 32 * 32
+FEWEST_BLOCKS = 96 * 96
 #: About so many block rows are sampled.
 SAMPLED_ROWS = 12
 

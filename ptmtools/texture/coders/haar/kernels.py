@@ -92,9 +92,9 @@ def workspace(blocks: int, components: int, edge: int, activities: int) -> Works
 def _load_row(below: Any, plane: int, y: int, rank: Any, row: Any) -> None:
     """Ranks of row y into ``row`` (width + 4), both ends and y replicated at the border."""
     height, width = below.shape[0], below.shape[1]
-    y = min(max(y, 0), height - 1)
+    samples = below[min(max(y, 0), height - 1)]
     for x in range(width):
-        row[x + 2] = rank[below[y, x, plane]]
+        row[np.uint64(x + 2)] = rank[np.uint64(samples[np.uint64(x), np.uint64(plane)])]
     row[0] = row[1] = row[2]
     row[width + 3] = row[width + 2] = row[width + 1]
 
@@ -203,9 +203,12 @@ def _context_g(
 @kernel
 def _read_differences(level: Any, plane: int, y: int, k: int, rank: Any, out: Any) -> None:
     """Coefficient k (V, h1, h2') of block row y, from the ranks of the texels."""
+    upper, lower = level[2 * y], level[2 * y + 1]
+    c = np.uint64(plane)
     for x in range(out.size - 2):
-        p, q = rank[level[2 * y, 2 * x, plane]], rank[level[2 * y, 2 * x + 1, plane]]
-        r, s = rank[level[2 * y + 1, 2 * x, plane]], rank[level[2 * y + 1, 2 * x + 1, plane]]
+        left, right = np.uint64(2 * x), np.uint64(2 * x + 1)
+        p, q = rank[np.uint64(upper[left, c])], rank[np.uint64(upper[right, c])]
+        r, s = rank[np.uint64(lower[left, c])], rank[np.uint64(lower[right, c])]
         if k == 0:
             out[x + 1] = i32(p + q - r - s)
         elif k == 1:
@@ -225,10 +228,10 @@ def _emit(
         residual[x + 1] = e
         near[x + 1] = abs(e)
         z = i32(i32(e << 1) ^ i32(e >> 31))
-        t = first + classes[activity[x]]
+        t = first + classes[np.uint64(activity[x])]
         symbols[at + x] = z
         contexts[at + x] = t
-        counts[t, min(z, ESCAPE)] += 1
+        counts[np.uint64(t), np.uint64(z if z < ESCAPE else ESCAPE)] += 1
 
 
 @kernel
@@ -243,10 +246,14 @@ def _absorb(decoded: Any, prediction: Any, residual: Any, near: Any, values: Any
 
 
 @kernel
-def _write_blocks(row: Any, v: Any, h: Any, g: Any, level: Any, plane: int, y: int) -> int:
+def _write_blocks(
+    row: Any, v: Any, h: Any, g: Any, texels: Any, level: Any, plane: int, y: int
+) -> int:
     """Texels of a block row from its differences; returns bits outside a byte, if any were set."""
     stray = i32(0)
-    for x in range(row.size - 4):
+    n = row.size - 4
+    # Two loops: the first works on several blocks at once.
+    for x in range(n):
         vx, hx = v[x + 1], h[x + 1]
         t = i32(i32(vx + (vx & 1)) >> 1)
         top = i32(2 * row[x + 2] + ((hx ^ t) & 1) + t)
@@ -257,10 +264,16 @@ def _write_blocks(row: Any, v: Any, h: Any, g: Any, level: Any, plane: int, y: i
         r = i32(i32(bottom + d) >> 1)
         s = i32(r - d)
         stray |= p | q | r | s
-        level[2 * y, 2 * x, plane] = p
-        level[2 * y, 2 * x + 1, plane] = q
-        level[2 * y + 1, 2 * x, plane] = r
-        level[2 * y + 1, 2 * x + 1, plane] = s
+        texels[x] = i32((p & 255) | i32((q & 255) << 8) | i32((r & 255) << 16) | i32(s << 24))
+    upper, lower = level[2 * y], level[2 * y + 1]
+    c = np.uint64(plane)
+    for x in range(n):
+        four = np.uint32(texels[x])
+        left, right = np.uint64(2 * x), np.uint64(2 * x + 1)
+        upper[left, c] = four & np.uint32(255)
+        upper[right, c] = (four >> np.uint32(8)) & np.uint32(255)
+        lower[left, c] = (four >> np.uint32(16)) & np.uint32(255)
+        lower[right, c] = four >> np.uint32(24)
     return int(stray & ~255)
 
 
@@ -306,7 +319,7 @@ def _write_ranked_blocks(
 
 
 @kernel
-def _edge_prediction(level: Any, y: int, x: int, plane: int) -> int:
+def _edge_prediction(level: Any, y: int, x: int, plane: int) -> Any:
     """Median of left, upper and left + upper - upper left; what lies outside gives way."""
     left, up, corner = i32(0), i32(0), i32(0)
     if x > 0:
@@ -448,8 +461,8 @@ def haar_pass(
                         )  # fmt: skip
                     else:
                         stray |= _write_blocks(
-                            rows[c, (y - 1) & 7], v[c, before], h[c, before], g, level, plane,
-                            y - 1,
+                            rows[c, (y - 1) & 7], v[c, before], h[c, before], g, activity, level,
+                            plane, y - 1,
                         )  # fmt: skip
     if edge:
         # The odd last column, then the odd last row: modulo 256, so nothing can escape.

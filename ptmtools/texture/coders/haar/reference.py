@@ -7,14 +7,13 @@ whoever ports the format can step through it. Thousands of times slower; no dama
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.texture.coders.haar import layout
-from ptmtools.texture.coders.rans.tables import BUILT_IN_MEANS
+from ptmtools.texture.coders.rans.reference import Symbols, read_tables
 
 Row = list[int]
 Plane = list[Row]
@@ -42,8 +41,8 @@ def decode_haar(
                 for i in [*range(5 if k == 2 else 4), *range(5, 5 + n)]:
                     weights[c][k][i] = int.from_bytes(group[at : at + 2], "little", signed=True)
                     at += 2
-    tables, at = _read_tables(group, at, version_1)
-    symbols = _Symbols(group, at, tables, version_1)
+    tables, at = read_tables(group, at, 29, version_1)
+    symbols = Symbols(group, at, tables, 28, version_1)
 
     texels = np.zeros(shape, np.int64)
     v, h, g = ([_zeros(bh, bw) for _ in order] for _ in range(3))
@@ -175,99 +174,3 @@ def _median(plane: NDArray[np.int64], y: int, x: int) -> int:
         return int(plane[y - 1, x])
     w, n = int(plane[y, x - 1]), int(plane[y - 1, x])
     return sorted((w, n, w + n - int(plane[y - 1, x - 1])))[1]
-
-
-class _Symbols:
-    """The four rANS states over their words, and the escapes."""
-
-    def __init__(self, group: bytes, at: int, tables: list[Row], version_1: bool) -> None:
-        escapes = int.from_bytes(group[at : at + 4], "little")
-        numbers = np.frombuffer(group, "<u2", offset=at + 4).tolist()
-        self._escapes = iter(numbers[:escapes])
-        words = numbers[escapes:]
-        self._states = [words[2 * i] | words[2 * i + 1] << 16 for i in range(4)]
-        self._words = iter(words[8:])
-        self._tables = tables
-        self._version_1 = version_1
-        self._i = 0
-
-    def begin_row(self) -> None:
-        if self._version_1:
-            self._i = 0
-
-    def next(self, table: int) -> int:
-        lane = self._i & 3
-        self._i += 1
-        state = self._states[lane]
-        slot, start, z = state & 2047, 0, 0
-        f = self._tables[table]
-        while start + f[z] <= slot:
-            start += f[z]
-            z += 1
-        state = f[z] * (state >> 11) + slot - start
-        if state < 1 << 15:
-            state = state << 16 | next(self._words)
-        self._states[lane] = state
-        return next(self._escapes) if z == 255 and table != 28 else z
-
-
-def _read_tables(group: bytes, at: int, version_1: bool) -> tuple[list[Row], int]:
-    kinds: Row = []
-    if version_1:
-        kinds = list(group[at : at + 29])
-        at += 29
-    size = int.from_bytes(group[at : at + 2], "little")
-    at += 2
-    numbers: Row = []
-    n, shift = 0, 0
-    for byte in group[at : at + size]:
-        for nibble in (byte & 15, byte >> 4):
-            n |= (nibble & 7) << shift
-            shift += 3
-            if nibble < 8:
-                numbers.append(n)
-                n, shift = 0, 0
-    tables: list[Row] = []
-    sent = iter(numbers)
-    last = 4
-    while len(kinds) < 29:
-        number = next(sent)
-        if number == 0:
-            kinds += [0] * (1 + next(sent))
-        elif number == 1:
-            kinds.append(255)
-        else:
-            last += -(number - 1) // 2 if number & 1 else (number - 2) // 2
-            kinds.append(last)
-    for kind in kinds:
-        table = [0] * 256
-        if kind == 255:
-            table[255] = next(sent)
-            for z in range(next(sent)):
-                table[z] = next(sent)
-        elif kind:
-            table = _built_in(BUILT_IN_MEANS[kind - 1])
-        tables.append(table)
-    return tables, at + size
-
-
-def _built_in(mean: int) -> Row:
-    u = [1 << 24]
-    for z in range(1, 255):
-        u.append(u[-1] * (65536 * mean // (16 + mean)) >> 16 if z & 1 else u[-1])
-    total = sum(u)
-    u = [0 if 4096 * n < total else n for n in u]
-    return normalised([*u, sum(u) >> 10])
-
-
-def normalised(weights: Row) -> Row:
-    """Frequencies that sum to 2048, by the rule of the specification."""
-    total = sum(weights)
-    f = [max(1, (2048 * u + total // 2) // total) if u else 0 for u in weights]
-    while sum(f) > 2048:
-        most = (z for z in range(256) if f[z] > 1)
-        f[min(most, key=lambda z: Fraction(weights[z], 2 * f[z] - 1))] -= 1
-    while sum(f) < 2048:
-        least = (z for z in range(256) if f[z])
-        f[max(least, key=lambda z: Fraction(weights[z], 2 * f[z] + 1))] += 1
-    return f

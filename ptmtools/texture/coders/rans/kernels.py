@@ -56,10 +56,10 @@ def decode_row(
     i, k = zero, np.uint64(at)
     whole = np.uint64(n & ~3)
     while i < whole:
-        e0 = np.uint64(table[starts[contexts[i]] + (x0 & _MASK)])
-        e1 = np.uint64(table[starts[contexts[i + one]] + (x1 & _MASK)])
-        e2 = np.uint64(table[starts[contexts[i + two]] + (x2 & _MASK)])
-        e3 = np.uint64(table[starts[contexts[i + three]] + (x3 & _MASK)])
+        e0 = np.uint64(table[starts[np.uint64(contexts[i])] + (x0 & _MASK)])
+        e1 = np.uint64(table[starts[np.uint64(contexts[i + one])] + (x1 & _MASK)])
+        e2 = np.uint64(table[starts[np.uint64(contexts[i + two])] + (x2 & _MASK)])
+        e3 = np.uint64(table[starts[np.uint64(contexts[i + three])] + (x3 & _MASK)])
         x0 = ((e0 >> twelve) & part) * (x0 >> _BITS) + (e0 & part)
         x1 = ((e1 >> twelve) & part) * (x1 >> _BITS) + (e1 & part)
         x2 = ((e2 >> twelve) & part) * (x2 >> _BITS) + (e2 & part)
@@ -89,7 +89,7 @@ def decode_row(
     while i < np.uint64(n):
         lane = i & three
         x = state[lane]
-        e = np.uint64(table[starts[contexts[i]] + (x & _MASK)])
+        e = np.uint64(table[starts[np.uint64(contexts[i])] + (x & _MASK)])
         x = ((e >> twelve) & part) * (x >> _BITS) + (e & part)
         out[i] = e >> np.uint64(24)
         if x < _LOW:
@@ -167,7 +167,7 @@ def normalise(counts: Any, frequency: Any, used: Any) -> None:
 
 
 @kernel
-def _nibbles(n: Any) -> int:
+def _nibbles(n: Any) -> Any:
     """How many nibbles a number takes in the serialised form."""
     return 1 + (1 if n > 7 else 0) + (1 if n > 63 else 0) + (1 if n > 511 else 0)
 
@@ -223,7 +223,7 @@ def split_numbers(numbers: Any, symbols: Any, contexts: Any, counts: Any) -> Non
 
 
 @kernel
-def _number(packed: Any, at: Any) -> int:
+def _number(packed: Any, at: Any) -> Any:
     """The next number from nibbles of three bits and a flag; at: (2,) next nibble, error."""
     n, shift = 0, 0
     while True:

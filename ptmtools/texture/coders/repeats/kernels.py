@@ -81,7 +81,8 @@ def _symbol(encoding: bool, z: Any, context: Any, numbers: Any, words: Any, stat
 
 @kernel
 def _slot(h: Any, shift: Any) -> Any:
-    h = (h ^ (h >> np.uint64(15))) & _MASK32
+    h &= _MASK32
+    h ^= h >> np.uint64(15)
     return ((h * _K1) & _MASK32) >> shift
 
 
@@ -95,6 +96,11 @@ def _minus(a: Any, b: Any) -> Any:
 def _plus(a: Any, b: Any) -> Any:
     """a + b, byte by byte."""
     return ((a & _LOW7) + (b & _LOW7)) ^ ((a ^ b) & _HIGH)
+
+
+@kernel
+def _index(activity: Any) -> Any:
+    return np.uint64(activity if activity < LARGEST_ACTIVITY else LARGEST_ACTIVITY)
 
 
 @kernel
@@ -124,7 +130,7 @@ def _samples(
             activity = (activity >> 2) + 4 * abs(reference)
             context += 2 * CLASSES
         guess = min(max(guess, 0), 255)
-        level = np.int64(classes[np.uint64(min(activity, LARGEST_ACTIVITY))])
+        level = np.int64(classes[_index(activity)])
         e = ((np.int64((texel >> at) & byte) - guess + 128) & 255) - 128
         z = _symbol(encoding, (e << 1) ^ (e >> 63), context + level, numbers, words, state)
         value = (guess + ((z >> 1) ^ -(z & 1))) & 255
@@ -149,7 +155,7 @@ def _remainders(
         a, b = np.int64((q >> at) & byte), np.int64((r >> at) & byte)
         corner = np.int64((p >> at) & byte)
         base = 4 * np.int64((mean >> at) & byte) - a - b - corner
-        guess = max(min(a, b), min(max(a, b), a + b - corner)) - base
+        guess: Any = max(min(a, b), min(max(a, b), a + b - corner)) - base
         kind = 0 if guess < 0 else 1 if guess < 4 else 2
         guess = min(max(guess, 0), 3)
         value = np.int64((s >> at) & byte) - base
@@ -175,9 +181,9 @@ def _known(texel: Any, seen: Any, w: Any, n: Any, nw: Any, ne: Any) -> int:
 
 
 @kernel
-def _range(p: Any, q: Any, r: Any, s: Any, components: int) -> int:
+def _range(p: Any, q: Any, r: Any, s: Any, components: int) -> Any:
     """The largest difference between texels of a block, over the components."""
-    most = 0
+    most: Any = 0
     for c in range(components):
         at = np.uint64(8 * c)
         byte = np.uint64(255)
@@ -215,7 +221,7 @@ def _texel(
 
 
 @kernel
-def _fits(mean: Any, p: Any, q: Any, r: Any, s: Any) -> bool:
+def _fits(mean: Any, p: Any, q: Any, r: Any, s: Any) -> Any:
     """Whether a block has this mean in every component."""
     even = np.uint64(0x00FF00FF)
     eight = np.uint64(8)
@@ -259,7 +265,7 @@ def _difference(
         context += 3 * CLASSES
         activity = (activity >> 2) + 3 * abs(reference)
     e = value - guess
-    level = np.int64(classes[np.uint64(min(activity, LARGEST_ACTIVITY))])
+    level = np.int64(classes[_index(activity)])
     z = _symbol(encoding, (e << 1) ^ (e >> 63), context + level, numbers, words, state)
     return (z >> 1) ^ -(z & 1)
 
@@ -527,8 +533,8 @@ def repeats_pass(
                     )  # fmt: skip
                     if p == _OTHER:
                         p = _samples(
-                            encoding, kept, mean, w0, n0, nw, n1, 0, order, weights, classes, numbers,
-                            words, state,
+                            encoding, kept, mean, w0, n0, nw, n1, 0, order, weights, classes,
+                            numbers, words, state,
                         )  # fmt: skip
                     slot_q = _slot(mean * _K1 + p * _K2 + n1 * _K3 + n0 * _K4 + ne * _K5, down)
                     kept = q
@@ -538,8 +544,8 @@ def repeats_pass(
                     )  # fmt: skip
                     if q == _OTHER:
                         q = _samples(
-                            encoding, kept, mean, p, n1, n0, ne, 1, order, weights, classes, numbers,
-                            words, state,
+                            encoding, kept, mean, p, n1, n0, ne, 1, order, weights, classes,
+                            numbers, words, state,
                         )  # fmt: skip
                     slot_r = _slot(mean * _K2 + w1 * _K3 + p * _K4 + w0 * _K5 + q * _K0, down)
                     kept = r
@@ -549,8 +555,8 @@ def repeats_pass(
                     )  # fmt: skip
                     if r == _OTHER:
                         r = _samples(
-                            encoding, kept, mean, w1, p, w0, q, 2, order, weights, classes, numbers,
-                            words, state,
+                            encoding, kept, mean, w1, p, w0, q, 2, order, weights, classes,
+                            numbers, words, state,
                         )  # fmt: skip
                     slot_s = _slot(mean * _K3 + p * _K4 + q * _K5 + r * _K0, down)
                     last = np.uint64(seen[slot_s])

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.haar.reference import normalised
+from ptmtools.texture.coders.rans.reference import normalised
 from ptmtools.texture.coders.texel import layout
 
 CLASSES, NARROW, GRID, TABLES = 18, 216, 232, 236

@@ -1,0 +1,109 @@
+"""Frequency tables and rANS: the compiled loops against plain Python and the specification."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ptmtools.errors import InputError
+from ptmtools.texture.coders.rans import kernels, tables
+from ptmtools.texture.coders.rans.reference import Symbols, normalised, read_tables
+from ptmtools.texture.coders.rans.stream import encode_symbols, read_stream
+
+TABLES = 29
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    counts=st.lists(
+        st.integers(0, 5) | st.integers(0, 10**6) | st.integers(0, 2**40), min_size=1, max_size=256
+    ).filter(any)
+)
+def test_normalised_frequencies(counts: list[int]) -> None:
+    row = [*counts, *[0] * (256 - len(counts))]
+    found = tables.normalise(np.array([row], np.int64))[0]
+    assert found.tolist() == normalised(row)
+    assert int(found.sum()) == tables.TABLE_SIZE
+    assert ((found > 0) == (np.array(row) > 0)).all()
+
+
+def test_built_in_tables_are_those_of_the_specification() -> None:
+    for row, mean in zip(tables.built_in()[1:], tables.BUILT_IN_MEANS, strict=True):
+        ratio = 65536 * mean // (16 + mean)
+        weights = [1 << 24]
+        for z in range(1, 255):
+            weights.append(weights[-1] * ratio >> 16 if z % 2 else weights[-1])
+        total = sum(weights)
+        weights = [0 if 4096 * weight < total else weight for weight in weights]
+        assert row.tolist() == normalised([*weights, sum(weights) >> 10])
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.lists(st.lists(st.integers(0, 2000), min_size=256, max_size=256), max_size=4))
+def test_tables_survive_their_serialised_form(rows: list[list[int]]) -> None:
+    counts = np.zeros((TABLES, 256), np.int64)
+    for t, row in enumerate(rows):
+        counts[7 * t] = row
+    frequency, packed = tables.choose(counts, TABLES - 1)
+    parsed, used = tables.parse(packed + b"more", TABLES)
+    np.testing.assert_array_equal(parsed, frequency)
+    assert used == len(packed)
+    expected, end = read_tables(packed, 0, TABLES)
+    assert expected == frequency.tolist()
+    assert end == used
+
+
+def test_the_length_table_is_a_logarithm() -> None:
+    """Only tables are chosen by it; it must not be far off."""
+    f = np.arange(1, tables.TABLE_SIZE + 1)
+    exact = 256 * (tables.TABLE_BITS - np.log2(f))
+    assert np.abs(tables._log_table()[1:] - exact).max() <= 1.5
+
+
+def test_symbols_come_back_row_by_row() -> None:
+    rng = np.random.default_rng(5)
+    symbols = rng.geometric(0.2, 1000).astype(np.uint16) * rng.integers(0, 12, 1000, np.uint16)
+    contexts = rng.integers(0, 3, 1000, np.uint8)
+    symbols[7] = 40_000
+    counts = np.zeros((3, 256), np.int64)
+    np.add.at(counts, (contexts, np.minimum(symbols, tables.ESCAPE)), 1)
+    frequency, _ = tables.choose(counts, 3)
+    data = encode_symbols(symbols, contexts, frequency, 3)
+
+    plain = Symbols(data, 0, frequency.tolist())
+    assert [plain.next(int(t)) for t in contexts] == symbols.tolist()
+
+    stream = read_stream(data, 301)
+    state = np.zeros(4, np.uint64)
+    kernels.start_states(stream.words, state)
+    table = tables.decoding_table(frequency)
+    starts = np.arange(3, dtype=np.uint64) * tables.TABLE_SIZE
+    at, escaped, found = 8, 0, []
+    for row in (slice(0, 301), slice(301, 303), slice(303, 600), slice(600, 1000)):
+        n = row.stop - row.start
+        out = np.zeros(n, np.int32)
+        at = kernels.decode_row(
+            state, stream.words, at, table, starts, contexts[row].astype(np.int32), n, out
+        )
+        kernels.rotate_states(state, n)
+        escaped = kernels.fill_escapes(out, n, stream.escapes, escaped)
+        found += out.tolist()
+    assert found == symbols.tolist()
+    assert at == stream.limit
+    assert escaped == len(stream.escapes)
+    assert (state == kernels.STATE_LOW).all()
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"\0", b"\5\0abc", b"\1\0\7", b"\1\0\x81", b"\2\0\x21\x10", b"\2\0\xf0\xff"]
+)
+def test_impossible_tables_are_refused(data: bytes) -> None:
+    with pytest.raises(InputError, match="PTM-I112"):
+        tables.parse(data, TABLES)
+
+
+def test_two_words_for_the_same_numbers_agree() -> None:
+    assert kernels.TABLE_BITS == tables.TABLE_BITS
+    assert kernels.ESCAPE == tables.ESCAPE

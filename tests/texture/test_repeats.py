@@ -1,0 +1,104 @@
+"""The repeats coder: what repeats costs nothing; the compiled pass against its reference."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from ptmtools.errors import InputError
+from ptmtools.texture import build_pyramid
+from ptmtools.texture.coders.repeats import coder as repeats
+from ptmtools.texture.coders.repeats import kernels
+from ptmtools.texture.coders.repeats.reference import decode_repeats
+
+
+def zoo() -> dict[str, NDArray[np.uint8]]:
+    """Images of 40 × 44 texels in which something repeats, and some in which nothing does."""
+    rng = np.random.default_rng(2)
+    y, x = np.mgrid[:40, :44]
+    smooth = np.stack([x * 3 + y, 2 * y + 40, x + y], axis=2)
+    palette = rng.integers(0, 256, (5, 3))
+    blobs = (x // 7 * 3 + y // 5 * 5 + (x - 20) ** 2 // 90) % 5
+    lines = np.where((x + 2 * y) % 17 == 0, 200, np.where(x % 13 == 0, 90, 20))
+    cutout = np.dstack([smooth, 255 * (np.hypot(x - 20, y - 20) < 15)])
+    cutout[cutout[:, :, 3] == 0] = 0
+    found = {
+        "flat": np.full((40, 44, 3), 9),
+        "tiled": np.tile(rng.integers(0, 256, (10, 11, 3)), (4, 4, 1)),
+        "ramp": smooth,
+        "photo": smooth + rng.integers(-6, 7, smooth.shape),
+        "noise": rng.integers(0, 256, (40, 44, 3)),
+        "few colours": palette[blobs],
+        "lines": lines[:, :, None],
+        "checks": np.dstack([(x ^ y) & 1, (x // 4 ^ y // 4) & 1]) * 255,
+        "cut-out": cutout,
+    }
+    return {name: np.clip(image, 0, 255).astype(np.uint8) for name, image in found.items()}
+
+
+def below_of(level: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    empty = np.zeros((level.shape[0] >> 1, level.shape[1] >> 1, level.shape[2]), np.uint8)
+    return build_pyramid(level)[-2] if empty.size else empty
+
+
+def encode(level: NDArray[np.uint8]) -> bytes:
+    return repeats.write(repeats.find(level, below_of(level)))
+
+
+@pytest.mark.parametrize("name", list(zoo()))
+@pytest.mark.parametrize(
+    ("height", "width"), [(40, 44), (39, 43), (1, 20), (21, 1), (2, 2), (3, 2), (1, 1)]
+)
+def test_compiled_pass_agrees_with_the_reference(name: str, height: int, width: int) -> None:
+    level = np.ascontiguousarray(zoo()[name][:height, :width])
+    below = below_of(level)
+    group = encode(level)
+    np.testing.assert_array_equal(repeats.decode(group, below, level.shape), level)
+    np.testing.assert_array_equal(decode_repeats(group, below, level.shape), level)
+
+
+def test_between_them_the_images_use_every_sort_of_symbol() -> None:
+    counts = np.zeros((kernels.TABLES, 256), np.int64)
+    for image in zoo().values():
+        level = image[:39, :43]
+        counts += repeats.find(np.ascontiguousarray(level), below_of(level)).counts
+    assert (counts[kernels.GUESS : kernels.TEXEL].sum(axis=0)[:5] > 0).all()
+    assert (counts[kernels.TEXEL : kernels.EDGE].sum(axis=0)[:6] > 0).all()
+    firsts = [kernels.FIRST, kernels.EDGE, kernels.HAAR, kernels.SAMPLE, kernels.REMAINDER]
+    assert all(counts[first : first + 10].sum() > 0 for first in firsts)
+
+
+def test_what_repeats_costs_next_to_nothing() -> None:
+    images = zoo()
+    tiled = np.tile(images["noise"], (4, 4, 1))
+    once = len(encode(images["noise"]))
+    assert len(encode(tiled)) < 1.1 * once
+    assert len(encode(np.tile(images["flat"], (8, 8, 1)))) < 60
+
+
+@settings(deadline=None, max_examples=200)
+@given(
+    name=st.sampled_from(["cut-out", "few colours", "photo", "lines"]),
+    position=st.floats(0, 1, exclude_max=True),
+    value=st.integers(0, 255),
+    cut=st.booleans(),
+)
+def test_a_damaged_group_is_an_error_or_an_image(
+    name: str, position: float, value: int, cut: bool
+) -> None:
+    level = np.ascontiguousarray(zoo()[name][:39, :43])
+    below = below_of(level)
+    group = bytearray(encode(level))
+    at = int(position * len(group))
+    group[at] = value
+    if cut:
+        del group[at:]
+    codes, found = [], None
+    try:
+        found = repeats.decode(bytes(group), below, level.shape)
+    except InputError as error:
+        codes.append(error.code)
+    assert codes == ["PTM-I112"] or (found is not None and found.shape == level.shape)
