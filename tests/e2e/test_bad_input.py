@@ -241,7 +241,12 @@ CASES: dict[str, tuple[Prepare, str, int, str]] = {
     "unknown profile": (nothing, "encode model/floor.png --profile tiny", 2, "U001"),
     "no side at all": (nothing, "encode model/floor.png --min-side 0", 3, "I111"),
     "error for floats": (file("a.npy", array("<f4")), "encode a.npy --max-error 1", 3, "I111"),
-    "beyond the limit": (image("a.png", "RGB", "PNG", (600, 600)), "encode a.png --limit 1", 7, "L104"),
+    "beyond the limit": (
+        image("a.png", "RGB", "PNG", (600, 600)),
+        "encode a.png --limit 1",
+        7,
+        "L104",
+    ),
     "two files to stdout": (nothing, TWO + " -o -", 2, "U001"),
     "stdin and a file": (nothing, "encode - model/floor.png", 2, "U001"),
     "output exists": (file("model/floor.ptm", b"mine"), "encode model/floor.png", 4, "O001"),
