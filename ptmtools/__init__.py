@@ -2,7 +2,8 @@
 
 The functions here are the commands of `ptm`: `build_scene` builds a database from a model,
 `ingest`, `subdivide`, `compute_pvs`, `compute_ach` and `emit` are its stages, `encode` and
-`decode` turn one image into a `.ptm` and back, `open` reads one level by level, `validate` and `plot_plan` look at the result.
+`decode` turn one image into a `.ptm` and back, `open` reads one level by level, `validate` and
+`plot_plan` look at the result.
 Each has a frozen class of options, which holds the defaults. Whatever a user can cause raises a
 `PtmError`.
 
