@@ -270,13 +270,14 @@ def texel_pass(
             whole = y < bh and x < bw
             for c in range(nc):
                 plane = planes[c]
+                pu = np.uint64(plane)
                 count = references[c]
-                place = np.uint64(plane) * size
+                place = pu * size
                 place += np.uint64((2 * y + BEFORE) * stride + 2 * x + BEFORE)
                 own = np.uint64(4 * c)
                 first = zero if count > 0 else np.uint64(4 * nc)
                 second = np.uint64(4) if count > 1 else np.uint64(4 * nc)
-                top = tops[plane]
+                top, grid = tops[pu], grids[pu]
                 for k in range(4):
                     py, px = 2 * y + (k >> 1), 2 * x + (k & 1)
                     if not whole and (py >= height or px >= width):
@@ -321,25 +322,27 @@ def texel_pass(
                             _value(p, plane, steps, offsets, lists),
                             _value(q, plane, steps, offsets, lists),
                             _value(work[here - one], plane, steps, offsets, lists),
-                            np.int64(means[y, x, plane]), kind, largest, plane, steps, offsets,
-                            lists, top, space.range,
+                            np.int64(means[np.uint64(y), np.uint64(x), pu]), kind, largest, plane,
+                            steps, offsets, lists, top, space.range,
                         )  # fmt: skip
                         low, high = space.range[0], space.range[1]
                         if low > high:
                             return IMPOSSIBLE
                         target = min(max(guess, low), high)
                     shift = np.int64(0)
-                    if grids[plane] > 0:
+                    if grid > 0:
                         # Is it a whole multiple? Then all that follows is of multiples.
-                        shift = grids[plane]
+                        shift = grid
                         rest = (np.int64(1) << shift) - 1
                         context = (
-                            GRID + 2 * space.grid[plane] + (space.grid[planes[0]] if c > 0 else 0)
+                            GRID + 2 * space.grid[pu] + (space.grid[planes[0]] if c > 0 else 0)
                         )
                         off = np.int64(1)
                         if (low + rest) >> shift <= high >> shift:
                             if encoding:
-                                off = np.int64(1 if level[py, px, plane] & rest else 0)
+                                off = np.int64(
+                                    1 if level[np.uint64(py), np.uint64(px), pu] & rest else 0
+                                )
                                 symbols[n] = off
                                 contexts[n] = context
                                 counts[context, off] += 1
@@ -347,7 +350,7 @@ def texel_pass(
                                 off, at = _next_symbol(state, n, words, at, table, context)
                                 off &= 1
                             n += one
-                        space.grid[plane] = off
+                        space.grid[pu] = off
                         if off:
                             shift = np.int64(0)
                         else:
@@ -364,7 +367,7 @@ def texel_pass(
                             context += min(max(octave, np.int64(1)), np.int64(CLASSES - 1))
                     z = np.int64(0)
                     if high > low and encoding:
-                        number = np.int64(level[py, px, plane]) >> shift
+                        number = np.int64(level[np.uint64(py), np.uint64(px), pu]) >> shift
                         if near > 0:
                             e = number - target
                             e = (e + near) // step if e >= 0 else -((near - e) // step)
@@ -414,7 +417,7 @@ def texel_pass(
                             return IMPOSSIBLE
                         number <<= shift
                     if near > 0 or not encoding:
-                        level[py, px, plane] = number
+                        level[np.uint64(py), np.uint64(px), pu] = number
                     work[here] = number
                     residual[own + ku] = number - guess
                     errors[row + two] = abs(number - guess)
