@@ -87,14 +87,25 @@ def test_memory_is_not_changed_and_makes_a_difference():
     assert len(first) < len(fresh)
 
 
+def test_learning_from_texels_is_what_reading_leaves():
+    levels = build_pyramid(_image(40, 44, 3))
+    profile, seen, memory = SmallProfile(), levels[0], None
+    for level in levels[1:]:
+        data = profile.encode_tile(level, seen, memory=memory).data
+        tile = profile.decode_tile(data, seen, level.shape, memory=memory)
+        seen, memory = tile.texels, tile.memory
+    for one, two in zip(profile.learn(levels).planes, memory.planes, strict=True):
+        assert all(np.array_equal(a, b) for a, b in zip(one, two, strict=True))
+
+
 def test_flat_images_are_tiny():
     sizes = _pyramid_sizes(np.full((128, 96, 3), 77, np.uint8))
     assert sum(sizes) <= 3 + 12 * len(sizes)
 
 
 def test_noise_costs_one_percent():
-    image = np.random.default_rng(3).integers(0, 256, (128, 128, 3), np.uint8)
-    assert sum(_pyramid_sizes(image)) <= 1.03 * image.nbytes
+    image = np.random.default_rng(3).integers(0, 256, (129, 254, 3), np.uint8)
+    assert sum(_pyramid_sizes(image)) <= 1.01 * image.nbytes
 
 
 @pytest.mark.parametrize("width", [40, 140])
@@ -104,7 +115,7 @@ def test_damage_is_an_error_or_an_image(width):
     data, _, _ = encode_mixing(level, below)
     rng = np.random.default_rng(5)
     wrong = 0
-    for i in range(120):
+    for i in range(60):
         damaged = bytearray(data)
         if i % 3 == 0:
             damaged = damaged[: rng.integers(len(data))]
@@ -116,7 +127,7 @@ def test_damage_is_an_error_or_an_image(width):
             assert decode_mixing(bytes(damaged), below, level.shape)[0].shape == level.shape
         except InputError:
             wrong += 1
-    assert wrong > 100
+    assert wrong > 50
 
 
 def test_the_profile_refuses_what_is_not_its_own():

@@ -2,7 +2,7 @@
 
 Images of 8 bits by the context mixing coder (`coders.mixing`), which adapts from level to level;
 other kinds by the texel coder of `fast`, which does not. A coarsest level of any size is coded as
-the pyramid of its own. Noise is *stored* where that is shorter.
+the pyramid of its own. Noise is coded *evenly*: all blocks with the right mean are equally likely.
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from ptmtools.texture.profiles import Samples, Shape
 
 #: The first byte of a group.
-MIXED, STORED, TEXEL = range(3)
+MIXED, STORED, TEXEL, EVEN = range(4)
+#: Streams beyond this share of the texels, in 1/16, are compared with what noise costs.
+_NOISY = 11
 #: Bytes of the length of a level in a coarsest level.
 _LENGTH = 4
 
@@ -78,9 +80,23 @@ class SmallProfile:
         from ptmtools.texture.coders.mixing import coder as mixing
 
         stream, texels, learned = mixing.encode_mixing(level, below, max_error, memory, threads)
+        if max_error == 0 and (stream is None or 16 * len(stream) > _NOISY * level.nbytes):
+            even = mixing.encode_even(level, below)
+            if stream is None or len(even) < len(stream):
+                return Tile(bytes([EVEN]) + even, level, memory)
         if stream is None or len(stream) > level.nbytes:
             return Tile(bytes([STORED]) + level.tobytes(), level, memory)
         return Tile(bytes([MIXED]) + stream, texels, learned)
+
+    def learn(self, levels: list[Samples]) -> Any:
+        """The memory of a decoder that has read ``levels``, coarsest first, without error.
+
+        For random access: a level's texels tell all that was learned up to it.
+        """
+        memory = None
+        for below, level in pairwise(levels):
+            memory = self.encode_tile(level, below, memory=memory).memory
+        return memory
 
     def decode_tile(
         self,
@@ -104,6 +120,10 @@ class SmallProfile:
             from ptmtools.texture.coders.texel import coder as texel
 
             return Tile(b"", texel.decode(data, below, shape, below.dtype, max_error))
+        if coder == EVEN and max_error == 0 and below.dtype == np.uint8:
+            from ptmtools.texture.coders.mixing import coder as mixing
+
+            return Tile(b"", mixing.decode_even(data, below, shape), memory)
         if coder == MIXED and below.dtype == np.uint8:
             from ptmtools.texture.coders.mixing import coder as mixing
 

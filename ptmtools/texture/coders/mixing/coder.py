@@ -9,6 +9,7 @@ planes run after each other in a pipeline, on as many threads as there are plane
 from __future__ import annotations
 
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,6 +51,56 @@ def decode_mixing(
     coded.run(threads)
     coded.check()
     return coded.texels(), coded.memory
+
+
+def encode_even(level: Level, below: Level) -> bytes:
+    """``level`` as if all blocks with the same mean were equally likely: the coder for noise."""
+    height, width, components = level.shape
+    coder, buffer = _coder(None), np.zeros(2 * level.size + 64, np.uint8)
+    _even(True, level, below, (height, width, components), coder, buffer)
+    return _closed(coder, buffer)
+
+
+def decode_even(data: bytes, below: Level, shape: tuple[int, int, int]) -> Level:
+    """The inverse of `encode_even`. Raises InputError PTM-I112 for what no encoder writes."""
+    buffer = np.frombuffer(bytearray(data), np.uint8)
+    coder = _coder(buffer)
+    level = _even(False, None, below, shape, coder, buffer)
+    _check(coder, buffer)
+    return level
+
+
+def _even(
+    encoding: bool,
+    level: Level | None,
+    below: Level,
+    shape: tuple[int, int, int],
+    coder: NDArray[np.int64],
+    buffer: NDArray[np.uint8],
+) -> Level:
+    from ptmtools.texture.coders.mixing.even.kernels import code_even
+
+    height, width, components = shape
+    order = list(range(components))
+    canvas, places = _canvas(level, below, height, width, order)
+    for place in places:
+        code_even(
+            encoding, height, width, place, canvas.cells, canvas.parents, canvas.goal, _ways(),
+            coder, buffer,
+        )  # fmt: skip
+    return _cropped(canvas, places, order, shape)
+
+
+@cache
+def _ways() -> NDArray[np.int64]:
+    """See `even.kernels.code_even`."""
+    ways = np.zeros((4, 772), np.int64)
+    sums = np.ones(1, np.int64)
+    for left in range(4):
+        ends = np.convolve(sums, np.ones(4, np.int64))
+        ways[left, 1 : 1 + len(ends)] = ends
+        sums = np.convolve(sums, np.ones(256, np.int64))
+    return np.cumsum(ways, axis=1)
 
 
 class _Pass:
@@ -117,31 +168,29 @@ class _Pass:
         )  # fmt: skip
 
     def stream(self) -> bytes | None:
-        parts = []
-        for coder, buffer in zip(self.coders, self.buffers, strict=True):
-            if coder[3] > buffer.size:
-                return None
-            tail = _final(coder).to_bytes(4, "big")
-            parts.append((buffer[: int(coder[3])].tobytes() + tail).rstrip(b"\0"))
-        lengths = b"".join(_varint(len(part)) for part in parts[:-1])
-        return lengths + b"".join(parts)
+        if any(c[3] > b.size for c, b in zip(self.coders, self.buffers, strict=True)):
+            return None
+        parts = [_closed(c, b) for c, b in zip(self.coders, self.buffers, strict=True)]
+        return b"".join([*(_varint(len(part)) for part in parts[:-1]), *parts])
 
     def check(self) -> None:
         for coder, buffer in zip(self.coders, self.buffers, strict=True):
-            if buffer.size > coder[3] or coder[2] != _final(coder):
-                raise damaged("its stream does not end with its last texel")
-            if buffer.size and buffer[-1] == 0:
-                raise damaged("its stream ends with zeros")
+            _check(coder, buffer)
 
     def texels(self) -> Level:
-        height, width, components = self.shape
-        level = np.empty(self.shape, np.uint8)
-        across = self.places[0].stride
-        size = self.places[0].errors // components
-        for c, plane in enumerate(self.order):
-            cells = self.canvas.cells[c * size : (c + 1) * size].reshape(-1, across)
-            level[:, :, plane] = cells[PAD : PAD + height, PAD : PAD + width]
-        return level
+        return _cropped(self.canvas, self.places, self.order, self.shape)
+
+
+def _cropped(
+    canvas: Canvas, places: list[Place], order: list[int], shape: tuple[int, int, int]
+) -> Level:
+    height, width, components = shape
+    level = np.empty(shape, np.uint8)
+    size = places[0].errors // components
+    for c, plane in enumerate(order):
+        cells = canvas.cells[c * size : (c + 1) * size].reshape(-1, places[0].stride)
+        level[:, :, plane] = cells[PAD : PAD + height, PAD : PAD + width]
+    return level
 
 
 def _canvas(
@@ -194,14 +243,26 @@ def _coder(buffer: Any) -> NDArray[np.int64]:
     return np.array([0, 0xFFFFFFFF, window, 0 if buffer is None else 4], np.int64)
 
 
-def _final(coder: NDArray[np.int64]) -> int:
-    """The value in low … high that ends in the most zero bytes."""
+def _final(coder: NDArray[np.int64]) -> tuple[int, int]:
+    """The value in low … high that needs the fewest bytes if zeros follow, and how many."""
     low, high = int(coder[0]), int(coder[1])
-    for zeros in (32, 24, 16, 8):
+    for size in range(4):
+        zeros = 32 - 8 * size
         value = -(-low >> zeros) << zeros
         if value <= high:
-            return value
-    return low
+            return value, size
+    return low, 4
+
+
+def _closed(coder: NDArray[np.int64], buffer: NDArray[np.uint8]) -> bytes:
+    value, size = _final(coder)
+    return buffer[: int(coder[3])].tobytes() + value.to_bytes(4, "big")[:size]
+
+
+def _check(coder: NDArray[np.int64], buffer: NDArray[np.uint8]) -> None:
+    value, size = _final(coder)
+    if coder[2] != value or coder[3] - 4 + size != buffer.size:
+        raise damaged("its stream does not end with its last texel")
 
 
 def _varint(n: int) -> bytes:

@@ -10,6 +10,8 @@ Numbers in the *logit* domain, x = ln(p / (1 - p)), have 8 fractional bits and l
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import cache
+from math import isqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +67,7 @@ def _rounded(value: int, bits: int) -> int:
     return (value + (1 << (shift - 1))) >> shift
 
 
+@cache
 def squash() -> Table:
     """1 / (1 + e^-x) with 16 fractional bits, for x = -3072 … 3072 in units of 1/256."""
     upper = []
@@ -96,7 +99,7 @@ def survival() -> Table:
     """
     half = _exponentials(2)[1]
     # e^(-1/512): the square root of e^(-1/256), by integers.
-    root = _square_root(half)
+    root = isqrt(half << _PRECISION)
     out = []
     for e in _exponentials(LOGIT_TOP + 1):
         middle = e * root >> _PRECISION
@@ -104,12 +107,7 @@ def survival() -> Table:
     return np.array(out, np.int32)
 
 
-def _square_root(value: int) -> int:
-    from math import isqrt
-
-    return isqrt(value << _PRECISION)
-
-
+@cache
 def magnitude() -> Table:
     """Level 0 … 23 of a magnitude 0 … 1023: 2.4 log2(1 + ¾ a), rounded, at most 23."""
     # 2.4 log2(y) >= L - ½ with y = (4 + 3a) / 4 is (4 + 3a)^24 >= 2^(10 L + 43).

@@ -1,0 +1,1 @@
+"""Blocks that could be anything with the right mean."""
