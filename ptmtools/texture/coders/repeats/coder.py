@@ -129,6 +129,7 @@ def _pass(
         np.zeros(below.shape[1] + 1, np.int64),
         np.zeros(4, np.uint64),
         np.zeros(8, np.uint64),
+        np.zeros(3, np.int64),
         32 - bits,
         limit,
         numbers,

@@ -255,31 +255,14 @@ def _choices(mean: Any, p: Any, q: Any, r: Any, seen: Any, west: Any, wanted: An
 
 
 @kernel
-def _difference(
-    encoding: bool, value: Any, guess: Any, activity: Any, kind: int, reference: Any,
-    referring: bool, classes: Any, numbers: Any, words: Any, state: Any,
-) -> Any:  # fmt: skip
-    """The residual of a Haar difference."""
-    context = HAAR + kind * CLASSES
-    if referring:
-        context += 3 * CLASSES
-        activity = (activity >> 2) + 3 * abs(reference)
-    e = value - guess
-    level = np.int64(classes[_index(activity)])
-    z = _symbol(encoding, (e << 1) ^ (e >> 63), context + level, numbers, words, state)
-    return (z >> 1) ^ -(z & 1)
-
-
-@kernel
 def _differences(
-    encoding: bool, block: Any, mean: Any, around: Any, order: Any, classes: Any, numbers: Any,
-    words: Any, state: Any,
+    encoding: bool, block: Any, mean: Any, around: Any, errors: Any, order: Any, classes: Any,
+    numbers: Any, words: Any, state: Any,
 ) -> None:  # fmt: skip
     """The four texels of ``block`` by their Haar differences, component by component.
 
     around: w0, w1, n0, n1 and the means to the east, south, south-west and south-east.
     """
-    ev, eh, eg = np.int64(0), np.int64(0), np.int64(0)
     byte = np.uint64(255)
     out0, out1, out2, out3 = np.uint64(0), np.uint64(0), np.uint64(0), np.uint64(0)
     for c in range(order.size):
@@ -293,53 +276,41 @@ def _differences(
         r, s = np.int64((block[2] >> at) & byte), np.int64((block[3] >> at) & byte)
         referring = c > 0 and c < 3 and order.size > 2
         if not referring:
-            ev, eh, eg = np.int64(0), np.int64(0), np.int64(0)
+            errors[0] = errors[1] = errors[2] = 0
         north, west = n0 + n1 - 2 * i, w0 + w1 - 2 * i
         across, down = n0 - n1, w0 - w1
         east -= i
         south -= i
         calm = abs(north) + abs(west) + abs(across) + abs(down)
 
-        guess = (88 * north - 50 * south + 176 * down + 220 * ev + 128) >> 8
-        e = _difference(
-            encoding, p + q - r - s, guess, calm + abs(south), 0, ev, referring, classes, numbers,
-            words, state,
-        )  # fmt: skip
-        v = guess + e
-        own_v = e
-        guess = (46 * west - 22 * east + 93 * across + 240 * eh + 128) >> 8
-        e = _difference(
-            encoding,
-            p - q,
-            guess,
-            calm + abs(east),
-            1,
-            eh,
-            referring,
-            classes,
-            numbers,
-            words,
-            state,
-        )
-        h = guess + e
-        own_h = e
-        guess = (20 * west - 8 * east - 2 * tilt + 47 * h + 235 * eg + 128) >> 8
-        e = _difference(
-            encoding,
-            (r - s) >> 1,
-            guess,
-            calm + abs(tilt),
-            2,
-            eg,
-            referring,
-            classes,
-            numbers,
-            words,
-            state,
-        )
-        g = guess + e
-        if c == 0:
-            ev, eh, eg = own_v, own_h, e
+        v, h, g = np.int64(0), np.int64(0), np.int64(0)
+        for kind in range(3):
+            if kind == 0:
+                value, reference, activity = p + q - r - s, errors[0], calm + abs(south)
+                guess = 88 * north - 50 * south + 176 * down + 220 * reference
+            elif kind == 1:
+                value, reference, activity = p - q, errors[1], calm + abs(east)
+                guess = 46 * west - 22 * east + 93 * across + 240 * reference
+            else:
+                value, reference, activity = (r - s) >> 1, errors[2], calm + abs(tilt)
+                guess = 20 * west - 8 * east - 2 * tilt + 47 * h + 235 * reference
+            guess = (guess + 128) >> 8
+            context = HAAR + kind * CLASSES
+            if referring:
+                context += 3 * CLASSES
+                activity = (activity >> 2) + 3 * abs(reference)
+            e = value - guess
+            context += np.int64(classes[_index(activity)])
+            z = _symbol(encoding, (e << 1) ^ (e >> 63), context, numbers, words, state)
+            e = (z >> 1) ^ -(z & 1)
+            if kind == 0:
+                v = guess + e
+            elif kind == 1:
+                h = guess + e
+            else:
+                g = guess + e
+            if c == 0:
+                errors[kind] = e
 
         half = (v + (v & 1)) >> 1
         top = 2 * i + ((h ^ half) & 1) + half
@@ -379,8 +350,8 @@ def _edge_samples(
 @kernel
 def repeats_pass(
     encoding: bool, level: Any, flat: Any, below: Any, order: Any, weights: Any, classes: Any,
-    slots: Any, seen: Any, outcome: Any, block: Any, around: Any, shift: int, limit: int,
-    numbers: Any, words: Any, state: Any,
+    slots: Any, seen: Any, outcome: Any, block: Any, around: Any, errors: Any, shift: int,
+    limit: int, numbers: Any, words: Any, state: Any,
 ) -> int:  # fmt: skip
     """One group in either direction.
 
@@ -392,7 +363,8 @@ def repeats_pass(
     order: (c,) int64, components in coding order. weights: (3, 4) int64, of p, q and r.
     classes: (1024,) uint8, class of an activity.
     slots: (5, 2^b) and seen: (2^b,) uint32, zeros; shift: 32 - b.
-    outcome: (w // 2 + 1,) int64, zeros. block: (4,) and around: (8,) uint64, overwritten.
+    outcome: (w // 2 + 1,) int64, zeros. block: (4,), around: (8,) uint64 and errors: (3,)
+        int64, overwritten.
     limit: index of the word behind the last.
     numbers: uint32; decoding, the flat table of `tables.decoding_table`.
     words: uint16, the escapes and behind them the words, with room for `MOST_SYMBOLS` more.
@@ -526,38 +498,28 @@ def repeats_pass(
                 outcome[x] = 1
                 if found == TEXELS:
                     context = TEXEL + 4 * near
-                    kept = p
-                    p = _texel(
-                        encoding, p, np.uint64(seen[slot_p]), w0, n0, nw, n1, context, numbers,
-                        words, state,
-                    )  # fmt: skip
-                    if p == _OTHER:
-                        p = _samples(
-                            encoding, kept, mean, w0, n0, nw, n1, 0, order, weights, classes,
+                    block[0], block[1], block[2], block[3] = p, q, r, s
+                    for j in range(3):
+                        west, north, corner, other = w0, n0, nw, n1
+                        key = mean * _K0 + w0 * _K2 + n0 * _K3 + nw * _K4 + n1 * _K5
+                        if j == 1:
+                            west, north, corner, other = block[0], n1, n0, ne
+                            key = mean * _K1 + block[0] * _K2 + n1 * _K3 + n0 * _K4 + ne * _K5
+                        if j == 2:
+                            west, north, corner, other = w1, block[0], w0, block[1]
+                            key = mean * _K2 + w1 * _K3 + block[0] * _K4 + w0 * _K5 + block[1] * _K0
+                        last = np.uint64(seen[_slot(key, down)])
+                        texel = _texel(
+                            encoding, block[j], last, west, north, corner, other, context + 12 * j,
                             numbers, words, state,
                         )  # fmt: skip
-                    slot_q = _slot(mean * _K1 + p * _K2 + n1 * _K3 + n0 * _K4 + ne * _K5, down)
-                    kept = q
-                    q = _texel(
-                        encoding, q, np.uint64(seen[slot_q]), p, n1, n0, ne, context + 12, numbers,
-                        words, state,
-                    )  # fmt: skip
-                    if q == _OTHER:
-                        q = _samples(
-                            encoding, kept, mean, p, n1, n0, ne, 1, order, weights, classes,
-                            numbers, words, state,
-                        )  # fmt: skip
-                    slot_r = _slot(mean * _K2 + w1 * _K3 + p * _K4 + w0 * _K5 + q * _K0, down)
-                    kept = r
-                    r = _texel(
-                        encoding, r, np.uint64(seen[slot_r]), w1, p, w0, q, context + 24, numbers,
-                        words, state,
-                    )  # fmt: skip
-                    if r == _OTHER:
-                        r = _samples(
-                            encoding, kept, mean, w1, p, w0, q, 2, order, weights, classes,
-                            numbers, words, state,
-                        )  # fmt: skip
+                        if texel == _OTHER:
+                            texel = _samples(
+                                encoding, block[j], mean, west, north, corner, other, j, order,
+                                weights, classes, numbers, words, state,
+                            )  # fmt: skip
+                        block[j] = texel
+                    p, q, r = block[0], block[1], block[2]
                     slot_s = _slot(mean * _K3 + p * _K4 + q * _K5 + r * _K0, down)
                     last = np.uint64(seen[slot_s])
                     possible, place, _ = _choices(mean, p, q, r, last, w1, s, 0)
@@ -579,12 +541,12 @@ def repeats_pass(
                     around[6] = np.uint64(below[under, left])
                     around[7] = np.uint64(below[under, right])
                     _differences(
-                        encoding, block, mean, around, order, classes, numbers, words, state
+                        encoding, block, mean, around, errors, order, classes, numbers, words, state
                     )
                     p, q, r, s = block[0], block[1], block[2], block[3]
-                    slot_q = _slot(mean * _K1 + p * _K2 + n1 * _K3 + n0 * _K4 + ne * _K5, down)
-                    slot_r = _slot(mean * _K2 + w1 * _K3 + p * _K4 + w0 * _K5 + q * _K0, down)
-                    slot_s = _slot(mean * _K3 + p * _K4 + q * _K5 + r * _K0, down)
+                slot_q = _slot(mean * _K1 + p * _K2 + n1 * _K3 + n0 * _K4 + ne * _K5, down)
+                slot_r = _slot(mean * _K2 + w1 * _K3 + p * _K4 + w0 * _K5 + q * _K0, down)
+                slot_s = _slot(mean * _K3 + p * _K4 + q * _K5 + r * _K0, down)
                 seen[slot_p], seen[slot_q], seen[slot_r], seen[slot_s] = p, q, r, s
             if not encoding:
                 level[y0, x0], level[y0, x1] = p, q
