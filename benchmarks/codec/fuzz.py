@@ -23,6 +23,7 @@ import time
 import zlib
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -41,6 +42,7 @@ FIELDS = ((8, 2), (10, 1), (11, 1), (12, 4), (16, 4), (20, 1), (21, 1), (22, 1),
           (28, 4), (32, 4), (36, 4), (44, 8), (52, 8), (64, 8), (72, 8))  # fmt: skip
 
 
+@cache
 def seeds() -> list[tuple[str, bytes]]:
     """A file of every profile, kind and way of coding."""
     rng = np.random.default_rng(7)
