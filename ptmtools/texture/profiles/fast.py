@@ -1,9 +1,23 @@
-"""Profile `fast`: static entropy coding; each tile by the shorter of two coders.
+"""Profile `fast`: static entropy coding; each tile by the coder that suits it.
 
-Images of 8 bits, without error, by the *Haar* coder (`coders.haar`), which leaves out what repeats
-(`coders.repeats`). Where that does not help (noise) the group is *stored* as in `raw`, so that it
-is never longer than that and one byte. A coarsest level of any size is coded as the pyramid of its
-own.
+Images of 8 bits, without error:
+
+- *Haar* (photographs, most textures; `coders.haar`) predicts the three Haar differences of every
+  block, row by row. It decodes fastest.
+- *Repeats* (flat areas, patterns, drawings, few colours, and atlases that mix these with
+  photographs; `coders.repeats`) first asks whether blocks or texels were seen before. A sixteenth of
+  the blocks tells which of the two to try; trying both everywhere, and taking repeats where it is 3 %
+  smaller, gained 0.7 % on photographs and 5 % on models' textures and took twice the time or more.
+- *Stored* (noise): as in `raw`, so that no group is longer than that and one byte.
+- A coarsest level of any size is coded as the *pyramid* of its own.
+
+Other kinds of sample and near-lossless images are coded by `coders.texel`.
+
+Whole pyramids over PNG of the finest level alone: 12 Kodak images 0.735, 7 textures of 1024² 0.815,
+17 textures of architectural models 0.81; the largest of any file 1.02. With deflate in the place of
+repeats the last two were 0.871 and 1.104. Mapping repeats first and decoding what is new by rows
+afterwards, which would be faster, finds too little: surroundings have to be known texel by texel
+(office atlas 2.2 instead of 0.68).
 """
 
 from __future__ import annotations
@@ -28,7 +42,7 @@ STORED, HAAR_1, DEFLATED_1, DIFFERENCES_1, HAAR, REPEATS, PYRAMID = range(7)
 #: Bytes of the length of a level in a coarsest level that is a pyramid.
 _LENGTH = 4
 
-#: A group of fewer blocks is coded by both coders; of others an eighth is looked at first.
+#: A group of fewer blocks is coded by both coders; of others a sixteenth is looked at first.
 PROBED_BLOCKS = 16 * 16
 #: Share of new texels up to which repeats is taken, and from which Haar is; between them both are
 #: tried, and with one or two components wherever repeats is not taken at once.
@@ -154,9 +168,9 @@ def _encode_best(level: Bytes, below: Bytes) -> bytes:
 
 
 def _probe(level: Bytes, below: Bytes) -> tuple[Bytes, Bytes]:
-    """Four strips, together an eighth of the block rows, as one smaller group."""
+    """Four strips, together a sixteenth of the block rows, as one smaller group."""
     height = below.shape[0]
-    rows = -(-height // 32)
+    rows = -(-height // 64)
     starts = [(2 * i + 1) * height // 8 - rows // 2 for i in range(4)]
     piece = np.concatenate([level[2 * y : 2 * (y + rows), : 2 * below.shape[1]] for y in starts])
     return piece, np.concatenate([below[y : y + rows] for y in starts])

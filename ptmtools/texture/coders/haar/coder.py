@@ -100,7 +100,7 @@ def decode(
     parse = tables.parse_version_1 if version_1 else tables.parse
     frequency, used = parse(reader.rest(), layout.TABLES)
     reader.take(used)
-    level = np.zeros(shape, np.uint8)
+    level = np.empty(shape, np.uint8)
     edge = level.size - 4 * below.size
     stream = read_stream(reader.rest(), max(below.shape[1], edge))
     result = _pass(
@@ -189,14 +189,15 @@ class _Reader:
     """Bytes from the front; asking for more than there are is an error of the file."""
 
     def __init__(self, data: bytes) -> None:
-        self._data = data
+        # A view: slices of it copy nothing.
+        self._data = memoryview(data)
         self._at = 0
 
     def take(self, n: int) -> bytes:
         if self._at + n > len(self._data):
             raise damaged("it is cut short")
         self._at += n
-        return self._data[self._at - n : self._at]
+        return bytes(self._data[self._at - n : self._at])
 
-    def rest(self) -> bytes:
+    def rest(self) -> memoryview:
         return self._data[self._at :]

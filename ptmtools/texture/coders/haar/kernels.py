@@ -7,8 +7,7 @@ and writes the texels (decoding). A whole row of one coefficient is predicted be
 residual is needed, which lets the compiler use vector instructions and keeps four rANS lanes busy.
 The arithmetic is exact in 32-bit integers; the format is specified in ``docs/format-ptm.md``.
 
-Allocating scratch arrays inside the pass was rejected: it
-added half to the time to compile it.
+Allocating scratch arrays inside the pass was rejected: it added half to the time to compile it.
 """
 
 from __future__ import annotations

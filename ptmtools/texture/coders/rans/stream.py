@@ -55,7 +55,7 @@ def encode_symbols(
     )
 
 
-def read_stream(data: bytes, longest_row: int) -> Stream:
+def read_stream(data: bytes | memoryview, longest_row: int) -> Stream:
     """The stream in ``data``, to be decoded in rows of at most ``longest_row`` symbols.
 
     Raises InputError PTM-I112 if the bytes are none.
@@ -67,7 +67,8 @@ def read_stream(data: bytes, longest_row: int) -> Stream:
     if len(data) < begin + 16 or len(data) % 2:
         raise damaged("its stream has no whole number of words")
     limit = (len(data) - begin) // 2
-    words = np.zeros(limit + longest_row + kernels.PADDING, np.uint16)
+    words = np.empty(limit + longest_row + kernels.PADDING, np.uint16)
+    words[limit:] = 0
     words[:limit] = np.frombuffer(data, "<u2", offset=begin)
     escapes = np.frombuffer(data, "<u2", escaped, 4).astype(np.uint16)
     return Stream(words, limit, escapes)

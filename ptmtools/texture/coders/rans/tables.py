@@ -132,7 +132,9 @@ def choose(
     return frequency, len(packed).to_bytes(2, "little") + packed
 
 
-def parse(data: bytes, tables: int, family: Frequencies | None = None) -> tuple[Frequencies, int]:
+def parse(
+    data: bytes | memoryview, tables: int, family: Frequencies | None = None
+) -> tuple[Frequencies, int]:
     """The inverse of `choose`: frequencies (tables, 256), and how many bytes they took.
 
     Raises InputError PTM-I112 for tables that no encoder writes.
@@ -144,7 +146,7 @@ def parse(data: bytes, tables: int, family: Frequencies | None = None) -> tuple[
     return _read(data[2:end], False, kinds, built_in() if family is None else family), end
 
 
-def parse_version_1(data: bytes, tables: int) -> tuple[Frequencies, int]:
+def parse_version_1(data: bytes | memoryview, tables: int) -> tuple[Frequencies, int]:
     """As `parse`, of files of version 1: a byte for each table names its kind."""
     end = tables + 2 + int.from_bytes(data[tables : tables + 2], "little")
     if len(data) < end:
@@ -153,11 +155,13 @@ def parse_version_1(data: bytes, tables: int) -> tuple[Frequencies, int]:
     return _read(data[tables + 2 : end], True, kinds, built_in()), end
 
 
-def _read(packed: bytes, named: bool, kinds: NDArray[np.int64], family: Frequencies) -> Frequencies:
+def _read(
+    packed: bytes | memoryview, named: bool, kinds: NDArray[np.int64], family: Frequencies
+) -> Frequencies:
     from ptmtools.texture.coders.rans import kernels
 
     frequency = np.zeros((len(kinds), 256), np.int64)
-    numbers = np.array(bytearray(packed), np.uint8)
+    numbers = np.frombuffer(packed, np.uint8).copy()
     state = np.zeros(2, np.int64)
     error = kernels.read_tables(numbers, named, kinds, _FIRST_KIND, SENT, family, frequency, state)
     if error:

@@ -85,7 +85,7 @@ def decode(data: bytes, below: Bytes, shape: tuple[int, int, int]) -> Bytes:
     from ptmtools.texture.coders.repeats import kernels
 
     frequency, used = tables.parse(data, kernels.TABLES)
-    stream = read_stream(data[used:], kernels.MOST_SYMBOLS)
+    stream = read_stream(memoryview(data)[used:], kernels.MOST_SYMBOLS)
     escaped = len(stream.escapes)
     state = np.zeros(9, np.int64)
     state[7] = escaped

@@ -1,10 +1,17 @@
 """Compiled loop of the repeats coder: blocks, texels and samples that were seen before.
 
 One pass serves both directions. It goes through the 2×2 blocks in row-major order. For each it asks
-tables of the last block seen in the same surroundings; if none of these is the one, it goes through
-the four texels and asks neighbours and a table of the last texel in the same surroundings; if none
-of those is the one, the samples of the texel are predicted. A texel is one 32-bit number, so that
-components cost nothing while something repeats. ``docs/format-ptm.md`` specifies it.
+tables of the last block seen in the same surroundings. If none of these is the one, smooth blocks
+are coded by their Haar differences, rough ones texel by texel: each is a neighbour, or the last
+texel seen in the same surroundings, or new, and then its samples are predicted. A texel is one
+32-bit number, so that components cost nothing while something repeats. There is no search: encoder
+and decoder take the same time, in proportion to the blocks. ``docs/format-ptm.md`` specifies it.
+
+Tried, in sizes relative to PNG on an atlas of an office / a page of small text in colour: asking by
+the mean alone 1.35 / 3.37; by the neighbouring texels 1.31 / 1.36; by the means all around 2.22 /
+2.39; by all of these, as here, 0.68 / 1.35. New blocks always by Haar differences: 0.84 / 1.61;
+never: 0.67 / 1.35, but photographs 3 % larger. Samples that refer to green with a weight of 38/64,
+which suits photographs, instead of 64/64: a lightmap with grey edges a sixth larger.
 """
 
 from __future__ import annotations
@@ -294,8 +301,8 @@ def _differences(
             else:
                 value, reference, activity = (r - s) >> 1, errors[2], calm + abs(tilt)
                 guess = 20 * west - 8 * east - 2 * tilt + 47 * h + 235 * reference
-            guess = (guess + 128) >> 8
-            context = HAAR + kind * CLASSES
+            guess = np.int64((guess + 128) >> 8)
+            context: Any = HAAR + kind * CLASSES
             if referring:
                 context += 3 * CLASSES
                 activity = (activity >> 2) + 3 * abs(reference)
