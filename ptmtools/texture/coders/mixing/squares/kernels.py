@@ -64,13 +64,15 @@ def learn(
     if count < (EARLY_BATCH if early else BATCH):
         return
     seen[k, 1] = 0
-    _accumulate(normal[k], pending[k], count, early, left, right)
+    _accumulate(normal[k], pending[k], count, early, features, left, right)
     if seen[k, 0] < OFTEN or seen[k, 0] % (2 * BATCH) == 0:
         _solve(normal[k], weights[k], features, left, right[0])
 
 
 @plain_kernel
-def _accumulate(A: Any, pending: Any, count: int, early: bool, left: Any, right: Any) -> None:
+def _accumulate(
+    A: Any, pending: Any, count: int, early: bool, features: int, left: Any, right: Any
+) -> None:
     """A += Σ ω f fᵀ over the pending samples, on and above the diagonal."""
     for n in range(count):
         w = float(pending[n, FEATURES])
@@ -79,7 +81,7 @@ def _accumulate(A: Any, pending: Any, count: int, early: bool, left: Any, right:
             right[n, i] = f
             left[n, i] = f * w
     forget = 0.0 if early else FORGET
-    for i in range(FEATURES):
+    for i in range(features):
         row = A[i]
         for j in range(FEATURES):
             row[j] -= np.floor(row[j] * forget)
