@@ -5,9 +5,10 @@ Images of 8 bits, without error:
 - *Haar* (photographs, most textures; `coders.haar`) predicts the three Haar differences of every
   block, row by row. It decodes fastest.
 - *Repeats* (flat areas, patterns, drawings, few colours, and atlases that mix these with
-  photographs; `coders.repeats`) first asks whether blocks or texels were seen before. A sixteenth of
-  the blocks tells which of the two to try; trying both everywhere, and taking repeats where it is 3 %
-  smaller, gained 0.7 % on photographs and 5 % on models' textures and took twice the time or more.
+  photographs; `coders.repeats`) first asks whether blocks or texels were seen before. A sixteenth
+  of the blocks tells which of the two to try; trying both everywhere, and taking repeats where it
+  is 3 % smaller, gained 0.7 % on photographs and 5 % on the textures of models and took twice the
+  time or more.
 - *Stored* (noise): as in `raw`, so that no group is longer than that and one byte.
 - A coarsest level of any size is coded as the *pyramid* of its own.
 
