@@ -37,6 +37,8 @@ _MORE = struct.Struct("<IIII")
 _ENTRY = struct.Struct("<QQI")
 #: Length and CRC-32 of a tile.
 TILE_ENTRY = struct.Struct("<II")
+#: First byte of every tile of a file with an allowed error: whether the tile makes use of it.
+EXACT, WITHIN = 0, 1
 _CRC = struct.Struct("<I")
 #: No head is longer, so that many bytes always suffice for `read_header`.
 HEAD_MAX = _FIXED.size + _MORE.size + MAX_LEVELS * _ENTRY.size + _CRC.size

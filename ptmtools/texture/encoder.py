@@ -11,12 +11,15 @@ from __future__ import annotations
 import io
 import zlib
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import IO, TYPE_CHECKING, Any, Protocol
 
 from ptmtools.errors import InputError, LimitError
 from ptmtools.texture.container import (
     DESCRIPTION_MAX,
+    EXACT,
     TILE_ENTRY,
+    WITHIN,
     Head,
     head_size,
     pack_head,
@@ -30,8 +33,8 @@ from ptmtools.texture.model import (
     EncodeOptions,
 )
 from ptmtools.texture.parallel import ordered
-from ptmtools.texture.profiles import PROFILE_NUMBERS, Profile, profile_named
-from ptmtools.texture.pyramid import build_pyramid, level_sizes
+from ptmtools.texture.profiles import PROFILE_NUMBERS, Profile, Tile, profile_named
+from ptmtools.texture.pyramid import build_pyramid, level_sizes, mean_below
 from ptmtools.texture.samples import KINDS
 from ptmtools.texture.tiling import Box, tile_box, tile_counts
 
@@ -40,6 +43,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Samples = NDArray[Any]
+
+#: A tile is coded without error, though one is allowed, if that takes at most so many times the
+#: bytes, and so many more: flat images take fewer at the fine levels, which can be exact only if
+#: those below them are.
+EXACT_FACTOR, EXACT_MORE = 1.2, 32
 
 _DEFAULTS = EncodeOptions()
 _PLAIN = Description()
@@ -129,7 +137,7 @@ def encode_to(
             continue
         across, down = tile_counts(level.shape[1], level.shape[0], options.tile)
         if (across, down) == (1, 1):
-            tile = profile.encode_tile(_whole(level), below, options.max_error, memory, threads)
+            tile = _code(profile, options, _whole(level), below, memory, threads)
             memory = tile.memory
             file.write(tile.data)
             groups.append((len(tile.data), zlib.crc32(tile.data)))
@@ -256,7 +264,29 @@ class _Tiled:
         box, strip = job
         level = np.ascontiguousarray(strip[:, box.x0 : box.x1])
         below = np.ascontiguousarray(self._below[box.below.slices])
-        return box, self._profile.encode_tile(level, below, self._options.max_error, self._memory)
+        return box, _code(self._profile, self._options, level, below, self._memory)
+
+
+def _code(
+    profile: Profile,
+    options: EncodeOptions,
+    level: Samples,
+    below: Samples,
+    memory: object,
+    threads: int = 1,
+) -> Tile:
+    """One tile; with an allowed error, exactly if that takes hardly more bytes than with it."""
+    if not options.max_error:
+        return profile.encode_tile(level, below, 0, memory, threads)
+    import numpy as np
+
+    within = profile.encode_tile(level, below, options.max_error, memory, threads)
+    # Profiles that know the mean of a block can be exact only where it is the mean.
+    if np.array_equal(mean_below(level), below):
+        exact = profile.encode_tile(level, below, 0, memory, threads)
+        if len(exact.data) <= EXACT_FACTOR * len(within.data) + EXACT_MORE:
+            return replace(exact, data=bytes([EXACT]) + exact.data)
+    return replace(within, data=bytes([WITHIN]) + within.data)
 
 
 def check_options(options: EncodeOptions) -> None:

@@ -13,11 +13,19 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from ptmtools.errors import InputError, LimitError, naming
-from ptmtools.texture.container import HEAD_MAX, TILE_ENTRY, read_header, whole_levels
+from ptmtools.texture.coders.damage import damaged
+from ptmtools.texture.container import (
+    EXACT,
+    HEAD_MAX,
+    TILE_ENTRY,
+    WITHIN,
+    read_header,
+    whole_levels,
+)
 from ptmtools.texture.description import parse_description
 from ptmtools.texture.model import Description, Level, Limits, PtmHeader
 from ptmtools.texture.parallel import ordered
-from ptmtools.texture.profiles import Profile, profile_named
+from ptmtools.texture.profiles import Profile, Tile, profile_named
 from ptmtools.texture.sources import Ranges, Source, ranges_of
 from ptmtools.texture.tiling import Box, tiles_under
 
@@ -238,9 +246,7 @@ class PtmReader:
         if not level.tiled:
             data = self._checked(level.offset, level.length, level.crc32, place)
             with naming(place=place):
-                tile = self._profile.decode_tile(
-                    data, below.texels, shape, header.max_error, below.memory, self._threads
-                )
+                tile = self._decode(data, below.texels, shape, below.memory, self._threads)
             return _State(tile.texels[box.slices], box, tile.memory)
         index = self._index(level, place)
         texels = np.empty((box.y1 - box.y0, box.x1 - box.x0, header.components), self.dtype)
@@ -252,7 +258,7 @@ class PtmReader:
             data = self._checked(*index[tile_number], where)
             size = (area.y1 - area.y0, area.x1 - area.x0, header.components)
             with naming(place=where):
-                tile = self._profile.decode_tile(data, under, size, header.max_error, below.memory)
+                tile = self._decode(data, under, size, below.memory)
             return area, tile.texels
 
         jobs = tiles_under(level.width, level.height, header.tile, box)
@@ -265,6 +271,23 @@ class PtmReader:
             )
             texels[shared.within(box).slices] = part[shared.within(area).slices]
         return _State(texels, box, below.memory)
+
+    def _decode(
+        self,
+        data: bytes,
+        below: Samples,
+        shape: tuple[int, int, int],
+        memory: Any,
+        threads: int = 1,
+    ) -> Tile:
+        """One tile, by way of the byte that says whether it makes use of an allowed error."""
+        max_error = self.header.max_error
+        if max_error:
+            if data[:1] not in (bytes([EXACT]), bytes([WITHIN])):
+                raise damaged("it is neither exact nor within the error")
+            max_error = max_error if data[0] == WITHIN else 0
+            data = data[1:]
+        return self._profile.decode_tile(data, below, shape, max_error, memory, threads)
 
     def _index(self, level: Level, place: str) -> list[tuple[int, int, int]]:
         """Offset, length and CRC-32 of every tile of a level."""

@@ -75,3 +75,15 @@ def test_foreign_byte_order_is_no_other_image() -> None:
     deep = IMAGE.astype(np.uint16) * 200
     raw = EncodeOptions("raw")
     assert encode(deep.astype(">u2"), raw) == encode(deep.astype("<u2"), raw)
+
+
+@pytest.mark.parametrize("profile", ["fast", "small"])
+def test_an_allowed_error_never_costs_much(profile: str) -> None:
+    """Flat images are smaller without error; noise with it."""
+    flat = np.kron(np.arange(48).reshape(6, 8) * 37 % 5 * 50, np.ones((15, 13)))
+    for image in (flat.astype(np.uint8), IMAGE):
+        exact, within = (
+            len(encode(image, EncodeOptions(profile, max_error=error)))  # type: ignore[arg-type]
+            for error in (0, 3)
+        )
+        assert within <= exact + 20
