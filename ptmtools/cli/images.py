@@ -56,8 +56,9 @@ def encode(
     and the others are encoded.
     """
     from ptmtools.texture.container import HEAD_MAX, read_header
-    from ptmtools.texture.encoder import check_options, encode_to
+    from ptmtools.texture.encoder import encode_to
     from ptmtools.texture.images import SUFFIXES, load_image
+    from ptmtools.texture.options import check_options
 
     options = take(EncodeOptions, values)
     check_options(options)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ptmtools.texture.encoder import Rows
+    from ptmtools.texture.rows import Rows
 
     Samples = NDArray[Any]
 
