@@ -75,7 +75,7 @@ def _compiled(function: Function, **options: bool) -> Function:
 @cache
 def _folder() -> str:
     digest = sha256()
-    for file in [Path(__file__), *sorted(_PACKAGE.rglob(_KERNELS))]:
+    for file in [Path(__file__), *_kernel_files()]:
         digest.update(file.read_bytes())
     name = f"kernels-{digest.hexdigest()[:12]}"
     caches = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
@@ -87,3 +87,12 @@ def _folder() -> str:
         except OSError:
             continue
     return ""
+
+
+def _kernel_files() -> list[Path]:
+    """All of them, in order. Not by `Path.rglob`, which looks into the folders of machine code."""
+    found = []
+    for folder, folders, files in os.walk(_PACKAGE):
+        folders[:] = [name for name in folders if name != "__pycache__"]
+        found += [Path(folder) / name for name in files if name == _KERNELS]
+    return sorted(found)

@@ -1,0 +1,65 @@
+"""Where machine code is kept: a folder for every state of all kernels together."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import ptmtools
+from ptmtools import compiled
+
+PROGRAM = """
+from pkg.one.kernels import outer
+print(outer(1))
+"""
+OUTER = """
+from ptmtools.compiled import kernel
+from pkg.two.kernels import inner
+
+@kernel
+def outer(x):
+    return inner(x) + 1
+"""
+INNER = """
+from ptmtools.compiled import kernel
+
+@kernel
+def inner(x):
+    return x * {}
+"""
+
+
+def test_a_changed_kernel_changes_those_that_call_it(tmp_path: Path) -> None:
+    """Numba alone would run the machine code of yesterday's inner kernel."""
+    package = tmp_path / "pkg"
+    for name in ("one", "two"):
+        (package / name).mkdir(parents=True)
+        (package / name / "__init__.py").touch()
+    (package / "__init__.py").touch()
+    (package / "one" / "kernels.py").write_text(OUTER)
+    # A copy of the module that looks at the kernels of this package.
+    (tmp_path / "ptmtools").mkdir()
+    (tmp_path / "ptmtools" / "__init__.py").touch()
+    source = Path(compiled.__file__).read_text()
+    changed = source.replace(
+        "_PACKAGE = Path(__file__).parent", f"_PACKAGE = Path({str(package)!r})"
+    )
+    assert changed != source
+    (tmp_path / "ptmtools" / "compiled.py").write_text(changed)
+    for factor in (10, 20):
+        (package / "two" / "kernels.py").write_text(INNER.format(factor))
+        for _ in range(2):
+            told = subprocess.run(
+                [sys.executable, "-c", PROGRAM], cwd=tmp_path, check=True, capture_output=True
+            )
+            assert int(told.stdout) == factor + 1
+    folders = list((package / "__pycache__").glob("kernels-*"))
+    assert len(folders) == 2
+    shutil.rmtree(package)
+
+
+def test_all_kernels_are_found() -> None:
+    root = Path(ptmtools.__file__).parent
+    assert compiled._kernel_files() == sorted(root.rglob("kernels.py"))
