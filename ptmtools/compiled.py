@@ -28,7 +28,9 @@ _hidden = _SCIPY not in sys.modules
 if _hidden:
     sys.modules[_SCIPY] = None  # type: ignore[assignment]
 try:
+    import llvmlite.ir  # type: ignore[import-untyped]
     import numba
+    import numba.extending
     import numba.np.arraymath
 finally:
     if _hidden:
@@ -60,6 +62,33 @@ def plain_kernel(function: Function) -> Function:
     return _compiled(function, _nrt=False)
 
 
+def inlined_kernel(function: Function) -> Function:
+    """As `plain_kernel`, for a kernel that one other calls, in one place: it becomes part of that.
+
+    A call hands over seven words for every array, those of tuples included.
+    """
+    return _compiled(function, _nrt=False, forceinline=True)
+
+
+def _prefetch(_: Any, array: Any, index: Any) -> Any:
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        ir: Any = llvmlite.ir
+        data = context.make_array(array)(context, builder, arguments[0]).data
+        byte, word = ir.IntType(8).as_pointer(), ir.IntType(32)
+        kind = ir.FunctionType(ir.VoidType(), [byte, word, word, word])
+        function = builder.module.declare_intrinsic("llvm.prefetch", [byte], kind)
+        place = builder.bitcast(builder.gep(data, [arguments[1]]), byte)
+        builder.call(function, [place, word(0), word(3), word(1)])
+        return context.get_dummy_value()
+
+    return numba.types.void(array, index), build
+
+
+#: ``prefetch(array, index)`` in a kernel: the line of the cache with ``array[index]`` (of one
+#: dimension, an int64 within it) will be wanted soon. Does not wait, and changes nothing.
+prefetch: Any = numba.extending.intrinsic(_prefetch)
+
+
 def _compiled(function: Function, **options: bool) -> Function:
     settings: Any = numba.config
     before = settings.CACHE_DIR
@@ -75,7 +104,7 @@ def _compiled(function: Function, **options: bool) -> Function:
 @cache
 def _folder() -> str:
     digest = sha256()
-    for file in [Path(__file__), *_kernel_files()]:
+    for file in [Path(__file__), *sorted(_PACKAGE.rglob(_KERNELS))]:
         digest.update(file.read_bytes())
     name = f"kernels-{digest.hexdigest()[:12]}"
     caches = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
@@ -87,12 +116,3 @@ def _folder() -> str:
         except OSError:
             continue
     return ""
-
-
-def _kernel_files() -> list[Path]:
-    """All of them, in order. Not by `Path.rglob`, which looks into the folders of machine code."""
-    found = []
-    for folder, folders, files in os.walk(_PACKAGE):
-        folders[:] = [name for name in folders if name != "__pycache__"]
-        found += [Path(folder) / name for name in files if name == _KERNELS]
-    return sorted(found)

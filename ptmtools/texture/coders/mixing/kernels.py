@@ -15,10 +15,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ptmtools.compiled import plain_kernel
+from ptmtools.compiled import inlined_kernel, plain_kernel, prefetch
 from ptmtools.texture.coders.mixing import tables
 from ptmtools.texture.coders.mixing.decisions.kernels import (
     CONFIRMED,
+    COUNTERS,
     EXPECTED,
     FOUND,
     KINDS,
@@ -27,12 +28,16 @@ from ptmtools.texture.coders.mixing.decisions.kernels import (
     NODE_ROWS,
     NODES,
     RATE,
+    SLOT,
     SQUASH,
     STRETCH,
     SURE,
+    TAG,
     WHERE,
     decide,
     decide_flat,
+    look_up,
+    open_slots,
 )
 from ptmtools.texture.coders.mixing.squares.kernels import (
     FEATURES,
@@ -52,6 +57,8 @@ EDGE = 4
 BUCKETS = np.array([1, 2, 3, 5, 9, 17, 33, 65, 129, 257, 513], np.int64)
 #: First node for the bits within a bucket.
 WITHIN = np.array([0, 0, 0, 1, 4, 11, 14, 17, 20, 20], np.int64)
+#: Slot in which the counters of a node lie.
+GROUP = np.arange(NODES) // TAG
 SOFT_PLUS = tables.soft_plus()
 SURVIVAL = tables.survival()
 MAGNITUDE = tables.magnitude()
@@ -129,9 +136,9 @@ class State(NamedTuple):
 class Tables(NamedTuple):
     """What a plane learns of one level only, and scratch space."""
 
-    slots: Any  # (5, 2^n, 16) uint32: counters by hashed context
-    values: Any  # (3, 2^n) int32: last value by hashed context | times confirmed << 8
-    notes: Any  # (17,) int64
+    slots: Any  # (6 * 2^n * 16,) uint32: counters by hashed context
+    values: Any  # (3 * 2^n,) int32: last value by hashed context | times confirmed << 8
+    notes: Any  # (23,) int64
     x: Any  # (16,) int32
     left: Any  # (24, 24) float64
     right: Any  # (24, 24) float64
@@ -187,7 +194,7 @@ def _halves(length: int, boundary: int, inverse: int) -> Any:
     return min(max(x, -LOGIT_TOP), LOGIT_TOP)
 
 
-@plain_kernel
+@inlined_kernel
 def _quantised(e: int, step: int) -> Any:
     """e / step, rounded, halves away from 0 (there are none: steps are odd)."""
     if step == 1:
@@ -196,11 +203,11 @@ def _quantised(e: int, step: int) -> Any:
     return (e + half) // step if e >= 0 else -((half - e) // step)
 
 
-@plain_kernel
+@inlined_kernel
 def _residual(
     encoding: bool, goal: int, m: int, mu: int, inverse: int, lo: int, hi: int, step: int,
     last: bool, node_row: int, near_row: int, notes: Any, x: Any, mix: Any, chances: Any,
-    slots: Any, coder: Any, buffer: Any,
+    slots: Any, mask: int, coder: Any, buffer: Any,
 ) -> Any:  # fmt: skip
     """Codes one texel between lo and hi: returns its value.
 
@@ -216,6 +223,8 @@ def _residual(
     phase, kind, node, sign, d = 0, 0, 0, 1, 0
     bucket, path, most, below, above = 0, 0, 0, 0, 0
     low, high = 0, 0
+    group = 0
+    open_slots(0, notes, slots, mask)
     if last:
         phase, kind, above = 4, 3, hi - lo
     while True:
@@ -240,14 +249,18 @@ def _residual(
                 node = (16 if sign > 0 else 40) + deep
             d = (below + above + 1) >> 1
             x[0] = _halves((above - below + 1) * span, d * span - half + sign * off, inverse)
+        # Fifteen nodes share a slot.
+        if GROUP[node] != group:
+            group = GROUP[node]
+            open_slots(group, notes, slots, mask)
         bit = _answer(phase, g, sign, d)
         for i in range(MATCHES):
             e = _quantised(notes[FOUND + i] - origin, step)
             notes[EXPECTED + i] = _answer(phase, e, sign, d)
 
         bit = decide(
-            encoding, bit, kind, node, node_row + node, near_row + kind * 9, notes, x, mix,
-            chances, slots, coder, buffer,
+            encoding, bit, kind, node - TAG * group, node_row + node, near_row + kind * 9, notes,
+            x, mix, chances, slots, coder, buffer,
         )  # fmt: skip
 
         if phase >= 3:
@@ -276,7 +289,7 @@ def _residual(
             return min(max(origin + sign * below * step, 0), 255)
 
 
-@plain_kernel
+@inlined_kernel
 def _answer(phase: int, e: int, sign: int, d: int) -> Any:
     """The bit of a decision if the residual is e."""
     if phase == 0:
@@ -286,7 +299,7 @@ def _answer(phase: int, e: int, sign: int, d: int) -> Any:
     return 1 if e * sign >= d else 0
 
 
-@plain_kernel
+@inlined_kernel
 def _gather(
     k: int, t: int, block: int, base: int, refs: int, place: Any, cells: Any, parents: Any,
     offsets: Any, pending: Any, n: int,
@@ -312,7 +325,7 @@ def _gather(
     return count
 
 
-@plain_kernel
+@inlined_kernel
 def _texel(
     encoding: bool, k: int, t: int, block: int, step: int, refs: int, place: Any,
     cells: Any, parents: Any, goal: Any, offsets: Any, state: Any, tables_: Any, coder: Any,
@@ -320,15 +333,18 @@ def _texel(
 ) -> None:  # fmt: skip
     """Codes texel t, at position k of its block, and learns from it."""
     notes, slots, values = tables_.notes, tables_.slots, tables_.values
+    mask, places = slots.size // (SLOT * COUNTERS) - 1, values.size // MATCHES
     stride, up = place.stride, block - place.across
     mean = wide(parents[block])
     w, n = wide(cells[t - 1]), wide(cells[t - stride])
     nw, ne = wide(cells[t - stride - 1]), wide(cells[t - stride + 1])
     base = mean if k < 3 else w
-    waiting = state.seen[k, 1]
-    features = _gather(
-        k, t, block, base, refs, place, cells, parents, offsets, state.pending, waiting
-    )
+    east, south = wide(parents[block + 1]), wide(parents[block + place.across])
+    v1, v2, v1w = wide(0), wide(0), wide(0)
+    if refs > 0:
+        v1, v1w = wide(cells[t + place.first]), wide(cells[t + place.first - 1])
+    if refs > 1:
+        v2 = wide(cells[t + place.second])
 
     # What the parent's sum leaves.
     lo, hi, known = wide(0), wide(255), wide(0)
@@ -342,6 +358,23 @@ def _texel(
             known = nw + n + w
         rest = 4 * mean - known
         lo, hi = max(rest - 255 * (3 - k), 0), min(rest + 3, 255)
+
+    notes[WHERE] = _hash(7, (w * 256 + n) * 256 + ne, (nw * 256 + v1) * 256 + v2, 0)
+    if refs > 0:
+        notes[WHERE + 1] = _hash(17, v1 * 256 + v2, v1w * 256 + w, 0)
+        notes[WHERE + 2] = _hash(27, v1 * 256 + v2, 0, 0)
+    else:
+        first = t - (k >> 1) * stride - (k & 1)
+        sides = wide(cells[first - 1]) * 256 + cells[first - stride]
+        notes[WHERE + 1] = _hash(17, mean * 65536 + sides, east * 256 + south, k * 131 + known * 4)
+        notes[WHERE + 2] = _hash(27, w * 256 + n, ne, k)
+    for i in range(MATCHES):
+        notes[WHERE + i] = i * places + (notes[WHERE + i] & (places - 1))
+        prefetch(values, notes[WHERE + i])
+    waiting = state.seen[k, 1]
+    features = _gather(
+        k, t, block, base, refs, place, cells, parents, offsets, state.pending, waiting
+    )
 
     # Residuals around, and those of other planes here.
     e = t + place.errors
@@ -357,8 +390,6 @@ def _texel(
     else:
         activity = 2 * near + far + abs(cells[e - 2]) + abs(cells[e - 2 * stride])
     e1, e2 = wide(0), wide(0)
-    v1, v2, v1w = wide(0), wide(0), wide(0)
-    east, south = wide(parents[block + 1]), wide(parents[block + place.across])
     if refs == 0:
         slope = (
             abs(east - mean) + abs(south - mean)
@@ -366,14 +397,11 @@ def _texel(
         )  # fmt: skip
         s1, s2 = _level(activity), _level(2 * slope) >> 1
     else:
-        t1 = t + place.first
-        v1, v1w = wide(cells[t1]), wide(cells[t1 - 1])
-        t1 += place.errors
+        t1 = t + place.first + place.errors
         e1 = wide(cells[t1])
         here = 2 * abs(e1)
         if refs > 1:
-            t2 = t + place.second
-            v2, e2 = wide(cells[t2]), wide(cells[t2 + place.errors])
+            e2 = wide(cells[t + place.second + place.errors])
             here = abs(e1) + abs(e2)
         around = (
             abs(cells[t1 - 1]) + abs(cells[t1 - stride])
@@ -425,19 +453,10 @@ def _texel(
     far_w, far_n = min(max(far_w, -20), 20), min(max(far_n, -20), 20)
     notes[5] = _hash(110 + k, far_w * 41 + far_n, left * 41 + over, 0)
 
-    notes[WHERE] = _hash(7, (w * 256 + n) * 256 + ne, (nw * 256 + v1) * 256 + v2, 0)
-    if refs > 0:
-        notes[WHERE + 1] = _hash(17, v1 * 256 + v2, v1w * 256 + w, 0)
-        notes[WHERE + 2] = _hash(27, v1 * 256 + v2, 0, 0)
-    else:
-        first = t - (k >> 1) * stride - (k & 1)
-        sides = wide(cells[first - 1]) * 256 + cells[first - stride]
-        notes[WHERE + 1] = _hash(17, mean * 65536 + sides, east * 256 + south, k * 131 + known * 4)
-        notes[WHERE + 2] = _hash(27, w * 256 + n, ne, k)
+    look_up(notes, slots, mask)
     matched = 0
     for i in range(MATCHES):
-        notes[WHERE + i] &= values.shape[1] - 1
-        entry = wide(values[i, notes[WHERE + i]])
+        entry = wide(values[notes[WHERE + i]])
         v, times = entry & 255, entry >> 8
         notes[SURE + i] = times
         if times == 0 or v < lo or v > hi:
@@ -449,7 +468,7 @@ def _texel(
     v = _residual(
         encoding, wide(goal[t]), m, mu, inverse, lo, hi, step, last, k * NODES,
         NODE_ROWS + s1 * KINDS * 9 + matched, notes, tables_.x, state.mix, state.chances, slots,
-        coder, buffer,
+        mask, coder, buffer,
     )  # fmt: skip
 
     cells[t] = v
@@ -462,12 +481,12 @@ def _texel(
         state.bias[tilt] += ((v * 256 - mu) * 655) >> 8
     for i in range(MATCHES):
         at = notes[WHERE + i]
-        entry = wide(values[i, at])
+        entry = wide(values[at])
         times = entry >> 8
         if entry & 255 == v and times > 0:
-            values[i, at] = v | min(times + 1, CONFIRMED - 1) << 8
+            values[at] = v | min(times + 1, CONFIRMED - 1) << 8
         else:
-            values[i, at] = v | (1 if times < 2 else times >> 2) << 8
+            values[at] = v | (1 if times < 2 else times >> 2) << 8
     state.pending[k, waiting, TARGET] = v - base
     state.pending[k, waiting, FEATURES] = IMPORTANCE[min(scale >> 13, 2047)]
     learn(
@@ -513,8 +532,12 @@ def code_strip(
     cells, parents, flats = canvas.cells, canvas.parents, canvas.flats
     goal, offsets = canvas.goal, canvas.offsets
     stride = place.stride
-    for by in range(height >> 1):
-        for bx in range(first, end):
+    across, blocks = end - first, (end - first) * (height >> 1)
+    column = height & ~1 if width & 1 else 0
+    edges = column + (width if height & 1 else 0) if 2 * end >= width - 1 else 0
+    for i in range(blocks + edges):
+        if i < blocks:
+            by, bx = i // across, first + i % across
             block = place.parents + by * place.across + bx
             corner = place.texels + 2 * by * stride + 2 * bx
             context = _flat_context(block, refs, place, parents, flats)
@@ -523,18 +546,15 @@ def code_strip(
                 if encoding:
                     flat = _is_flat(corner, parents[block], step, stride, goal)
                 flats[block] = decide_flat(encoding, flat, state.flat, context, coder, buffer)
-            if flats[block] == 0:
-                for k in range(4):
-                    _texel(
-                        encoding, k, corner + (k >> 1) * stride + (k & 1), block, step, refs,
-                        place, cells, parents, goal, offsets, state, tables_, coder, buffer,
-                    )  # fmt: skip
-    if 2 * end < width - 1:
-        return
-    column = height & ~1 if width & 1 else 0
-    for i in range(column + (width if height & 1 else 0)):
-        y, x = (i, width - 1) if i < column else (height - 1, i - column)
-        _texel(
-            encoding, EDGE, place.texels + y * stride + x, place.parents, step, refs, place, cells,
-            parents, goal, offsets, state, tables_, coder, buffer,
-        )  # fmt: skip
+            begin, stop = (0, 4) if flats[block] == 0 else (0, 0)
+        else:
+            edge = i - blocks
+            y, x = (edge, width - 1) if edge < column else (height - 1, edge - column)
+            block, corner = place.parents, place.texels + y * stride + x
+            begin, stop = EDGE, EDGE + 1
+        for k in range(begin, stop):
+            t = corner + (k >> 1) * stride + (k & 1) if k < EDGE else corner
+            _texel(
+                encoding, k, t, block, step, refs, place, cells, parents, goal, offsets, state,
+                tables_, coder, buffer,
+            )  # fmt: skip

@@ -67,8 +67,8 @@ def level_tables(texels: int) -> Tables:
 
     slots, values = table_bits(texels)
     return Tables(
-        slots=np.zeros((decisions.COUNTERS, 1 << slots, decisions.SLOT), np.uint32),
-        values=np.zeros((decisions.MATCHES, 1 << values), np.int32),
+        slots=np.zeros((decisions.COUNTERS << slots) * decisions.SLOT, np.uint32),
+        values=np.zeros(decisions.MATCHES << values, np.int32),
         notes=np.zeros(decisions.NOTES, np.int64),
         x=np.zeros(decisions.INPUTS, np.int32),
         left=np.zeros((FEATURES, FEATURES)),

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.compiled import plain_kernel
+from ptmtools.compiled import inlined_kernel, plain_kernel, prefetch
 from ptmtools.texture.coders.mixing import tables
 
 i32 = np.int32
@@ -63,7 +63,33 @@ FOUND = COUNTERS
 SURE = FOUND + MATCHES
 EXPECTED = SURE + MATCHES
 WHERE = EXPECTED + MATCHES
-NOTES = WHERE + MATCHES
+#: Where the slots of the contexts begin, those with the counters of the current nodes.
+SLOTS = WHERE + MATCHES
+NOTES = SLOTS + COUNTERS
+
+
+@inlined_kernel
+def look_up(notes: Any, slots: Any, mask: int) -> None:
+    """Where the slots of the first nodes lie, of all contexts of a texel."""
+    for i in range(COUNTERS):
+        at = (i * (mask + 1) + (notes[i] & mask)) * SLOT
+        notes[SLOTS + i] = at
+        prefetch(slots, at)
+
+
+@plain_kernel
+def open_slots(group: int, notes: Any, slots: Any, mask: int) -> None:
+    """Finds the slots of all contexts for a group of nodes; those of other contexts begin anew."""
+    for i in range(COUNTERS):
+        notes[SLOTS + i] = (i * (mask + 1) + ((notes[i] ^ (group * 0x5D4D)) & mask)) * SLOT
+    for i in range(COUNTERS):
+        at = np.uint64(notes[SLOTS + i])
+        # Never 0, the tag of a slot that was never used.
+        tag = np.uint32((notes[i] >> 8) | (1 << 24))
+        if slots[at + np.uint64(TAG)] != tag:
+            for j in range(TAG):
+                slots[at + np.uint64(j)] = FRESH
+            slots[at + np.uint64(TAG)] = tag
 
 
 @plain_kernel
@@ -115,30 +141,21 @@ def decide_flat(encoding: bool, bit: int, flat: Any, context: int, coder: Any, b
     return bit
 
 
-@plain_kernel
+@inlined_kernel
 def decide(
-    encoding: bool, bit: int, kind: int, node: int, node_row: int, near_row: int,
+    encoding: bool, bit: int, kind: int, place: int, node_row: int, near_row: int,
     notes: Any, x: Any, mix: Any, chances: Any, slots: Any, coder: Any, buffer: Any,
 ) -> Any:  # fmt: skip
     """One decision; returns the bit.
 
-    node: 0 … 63, node_row: that of the texel's position; near_row: in the second set of weights.
-    notes: (17,) int64, see above; a proposal that turns out wrong is withdrawn. x: (16,) int32,
+    place: of the counters in their slots; node_row, near_row: in the two sets of weights.
+    notes: (23,) int64, see above; a proposal that turns out wrong is withdrawn. x: (16,) int32,
     of which x[0], the distribution's opinion, is given. mix: (rows, 16) int32; chances: (n,) int32;
-    slots: (5, 2^n, 16) uint32.
+    slots: (6 * 2^n * 16,) uint32.
     """
-    group = (node // TAG) * 0x5D4D
-    place = node % TAG
-    mask = slots.shape[1] - 1
     for i in range(COUNTERS):
-        s = (notes[i] ^ group) & mask
-        # Never 0, the tag of a slot that was never used.
-        tag = np.uint32((notes[i] >> 8) | (1 << 24))
-        if slots[i, s, TAG] != tag:
-            for j in range(TAG):
-                slots[i, s, j] = FRESH
-            slots[i, s, TAG] = tag
-        x[FIRST_COUNTER + i] = STRETCH[slots[i, s, place] >> 20]
+        counter = slots[np.uint64(notes[SLOTS + i] + place)]
+        x[FIRST_COUNTER + i] = STRETCH[counter >> np.uint32(20)]
     for i in range(MATCHES):
         opinion = i32(0)
         if notes[FOUND + i] >= 0:
@@ -173,8 +190,8 @@ def decide(
     cell += share >> 7
     chances[cell] += ((bit * 65535 - chances[cell]) * 5) >> 8
     for i in range(COUNTERS):
-        s = (notes[i] ^ group) & mask
-        slots[i, s, place] = counted(slots[i, s, place], bit, COUNT_TOP)
+        at = np.uint64(notes[SLOTS + i] + place)
+        slots[at] = counted(slots[at], bit, COUNT_TOP)
     for i in range(MATCHES):
         if notes[FOUND + i] >= 0:
             e = notes[EXPECTED + i]

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.compiled import plain_kernel
+from ptmtools.compiled import inlined_kernel
 
 i32 = np.int32
 
@@ -47,7 +47,7 @@ WEIGHT_BITS = 16
 WEIGHT_TOP = 4 << WEIGHT_BITS
 
 
-@plain_kernel
+@inlined_kernel
 def learn(
     normal: Any, pending: Any, weights: Any, seen: Any, k: int, features: int,
     left: Any, right: Any,
@@ -69,7 +69,7 @@ def learn(
         _solve(normal[k], weights[k], features, left, right[0])
 
 
-@plain_kernel
+@inlined_kernel
 def _accumulate(
     A: Any, pending: Any, count: int, early: bool, features: int, left: Any, right: Any
 ) -> None:
@@ -93,7 +93,7 @@ def _accumulate(
                 )
 
 
-@plain_kernel
+@inlined_kernel
 def _solve(A: Any, weights: Any, n: int, U: Any, inverse: Any) -> None:
     """weights[:n] = (A + ridge)⁻¹ b, rounded, by symmetric elimination without pivoting."""
     for i in range(n):
@@ -121,7 +121,7 @@ def _solve(A: Any, weights: Any, n: int, U: Any, inverse: Any) -> None:
         weights[j] = i32(min(max(scaled, -float(WEIGHT_TOP)), float(WEIGHT_TOP)))
 
 
-@plain_kernel
+@inlined_kernel
 def predict(pending: Any, weights: Any, k: int, at: int) -> Any:
     """Σ w f, with 16 fractional bits, in 32-bit integers: |f| < 256 and |w| <= 4 leave room."""
     total = i32(0)
