@@ -39,10 +39,18 @@ class _Ranks:
                 self.tops[c] = len(used) - 1
 
 
-def _sparse_values(plane: Bytes) -> NDArray[np.intp] | None:
-    """The distinct values of a plane, if they are few for their range; else None."""
-    values = np.flatnonzero(np.bincount(plane.reshape(-1), minlength=256))
-    if len(values) < 2 or plane.size < 64 * len(values):
+def _sparse_values(blocks: Bytes) -> list[NDArray[np.intp] | None]:
+    """For each component its distinct values, if they are few for their range; else None."""
+    from ptmtools.texture.coders.haar import kernels
+
+    components = blocks.shape[2]
+    used = np.zeros((components, 256), np.uint8)
+    kernels.mark_values(blocks, used)
+    return [_if_sparse(np.flatnonzero(one), blocks.size // components) for one in used]
+
+
+def _if_sparse(values: NDArray[np.intp], samples: int) -> NDArray[np.intp] | None:
+    if len(values) < 2 or samples < 64 * len(values):
         return None
     return values if 100 * len(values) <= 88 * (values[-1] - values[0] + 1) else None
 
@@ -50,10 +58,7 @@ def _sparse_values(plane: Bytes) -> NDArray[np.intp] | None:
 def encode(level: Bytes, below: Bytes) -> bytes:
     """The group that refines ``below`` (h >> 1, w >> 1, c) to ``level`` (h, w, c)."""
     components = level.shape[2]
-    sets = [
-        _sparse_values(level[: 2 * below.shape[0], : 2 * below.shape[1], c])
-        for c in range(components)
-    ]
+    sets = _sparse_values(level[: 2 * below.shape[0], : 2 * below.shape[1]])
     ranks = _Ranks(sets)
     sent = fit_weights(level, below, ranks.ranks)
     n = level.size - below.size

@@ -174,21 +174,25 @@ def _nibbles(n: Any) -> Any:
 
 @kernel
 def choose_kinds(
-    counts: Any, exact: Any, family: Any, lengths: Any, logs: Any, plain: int, sent: int, kinds: Any
-) -> None:
+    counts: Any, exact: Any, family: Any, lengths: Any, logs: Any, plain: int, sent: int,
+    kinds: Any, occurring: Any,
+) -> None:  # fmt: skip
     """The kind of each table (t,) that makes table and symbols shortest.
 
     counts, exact: (t, 256) int64, and the frequencies they normalise to. family: (n, 256) int64,
     an empty table first. lengths: (n - 1, 256) int64, in 1/256 bits, of each symbol under each kind
     from 1 on. logs: (2049,) int64, of each frequency. plain: tables from this on have no escape.
+    occurring: (256,) int64, overwritten.
     """
     for t in range(counts.shape[0]):
-        used, total, size = 0, 0, 0
+        used, total, size, many = 0, 0, 0, 0
         for s in range(256):
             n = counts[t, s]
             if n > 0:
                 total += n
                 size += n * logs[exact[t, s]]
+                occurring[many] = s
+                many += 1
                 if s < ESCAPE:
                     used = s + 1
         if total == 0:
@@ -200,11 +204,11 @@ def choose_kinds(
         least, kind = np.int64(1) << 62, sent
         for k in range(1, family.shape[0]):
             cost = np.int64(0)
-            for s in range(256):
-                if counts[t, s] > 0:
-                    cost += counts[t, s] * lengths[k - 1, s]
-                    if t >= plain and family[k, s] == 0:
-                        cost = np.int64(1) << 62
+            for i in range(many):
+                s = occurring[i]
+                cost += counts[t, s] * lengths[k - 1, s]
+                if t >= plain and family[k, s] == 0:
+                    cost = np.int64(1) << 62
                 if cost >= least:
                     break
             if cost < least:
@@ -318,45 +322,47 @@ def encode(
     symbols: (n,) uint16. contexts: (n,) uint8, the table of each. Symbol i uses state i & 3.
     plain: tables from this on have no escape: all their symbols have a frequency.
     frequency: (tables, 256) int64. A symbol without one, or from 255 on, escapes.
-    work: (tables, 256, 3) and state: (4,), uint64, overwritten.
+    work: (tables, 256) and state: (4,), uint64, overwritten.
     words, escapes: uint16 of n + 8 and of n, filled from the end; returns where each begins.
     """
     for t in range(frequency.shape[0]):
         start = 0
         for s in range(256):
             f = frequency[t, s]
+            entry = np.uint64(0)
             if f > 0:
                 bits = 0
                 while (1 << bits) < f:
                     bits += 1
-                # x // f == x * reciprocal >> (bits + 31) for every x below 2^31.
-                work[t, s, 0] = ((1 << (bits + 31)) + f - 1) // f
-                work[t, s, 1] = bits + 31
-                work[t, s, 2] = f << 12 | start
+                # x // f == x * reciprocal >> (bits + 31) for every x below 2^31. All that is to be
+                # known of a symbol in 59 bits: reciprocal, frequency, start, bits.
+                entry = np.uint64(((1 << (bits + 31)) + f - 1) // f) << np.uint64(27)
+                entry |= np.uint64(f << 15 | start << 4 | bits)
                 start += f
-            else:
-                work[t, s, 2] = 0
-    for lane in range(4):
-        state[lane] = _LOW
+            work[t, s] = entry
+    for last in range(4):
+        state[last] = _LOW
     at, escaped = words.size, escapes.size
     for j in range(symbols.size):
         i = symbols.size - 1 - j
-        t, z = contexts[i], symbols[i]
-        if t < plain and (z >= ESCAPE or frequency[t, z] == 0):
+        context, z = np.uint64(contexts[i]), np.uint64(symbols[i])
+        symbol = work[context, min(z, np.uint64(ESCAPE))]
+        if context < np.uint64(plain) and (z >= np.uint64(ESCAPE) or symbol == 0):
             escaped -= 1
             escapes[escaped] = z
-            z = ESCAPE
-        x = state[i & 3]
-        both = work[t, z, 2]
-        f = both >> np.uint64(12)
-        if x >= f << np.uint64(20):
-            at -= 1
-            words[at] = x & np.uint64(0xFFFF)
-            x >>= np.uint64(16)
-        q = (x * work[t, z, 0]) >> work[t, z, 1]
-        state[i & 3] = (q << _BITS) + (x - q * f) + (both & np.uint64(4095))
-    for lane in range(3, -1, -1):
+            symbol = work[context, np.uint64(ESCAPE)]
+        lane = np.uint64(i & 3)
+        x = state[lane]
+        share = (symbol >> np.uint64(15)) & np.uint64(4095)
+        # Without a branch, which would be guessed wrong often: the word is written in any case.
+        full = x >= share << np.uint64(20)
+        words[at - 1] = x & np.uint64(0xFFFF)
+        at -= 1 if full else 0
+        x = x >> np.uint64(16) if full else x
+        q = (x * (symbol >> np.uint64(27))) >> ((symbol & np.uint64(15)) + np.uint64(31))
+        state[lane] = (q << _BITS) + (x - q * share) + ((symbol >> np.uint64(4)) & _MASK)
+    for last in range(3, -1, -1):
         at -= 2
-        words[at] = state[lane] & np.uint64(0xFFFF)
-        words[at + 1] = state[lane] >> np.uint64(16)
+        words[at] = state[last] & np.uint64(0xFFFF)
+        words[at + 1] = state[last] >> np.uint64(16)
     return at, escaped

@@ -42,7 +42,7 @@ def encode_symbols(
 
     words = np.empty(len(symbols) + 8, np.uint16)
     escapes = np.empty(len(symbols), np.uint16)
-    work = np.empty((len(frequency), 256, 3), np.uint64)
+    work = np.empty((len(frequency), 256), np.uint64)
     first, escaped = kernels.encode(
         symbols, contexts, plain, frequency, work, np.empty(4, np.uint64), words, escapes
     )

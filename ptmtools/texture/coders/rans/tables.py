@@ -120,7 +120,9 @@ def choose(
     family = built_in() if family is None else family
     exact = normalise(counts)
     kinds = np.zeros(len(counts), np.int64)
-    kernels.choose_kinds(counts, exact, family, lengths, _log_table(), plain, SENT, kinds)
+    kernels.choose_kinds(
+        counts, exact, family, lengths, _log_table(), plain, SENT, kinds, np.empty(256, np.int64)
+    )
     frequency = exact.copy()
     named = (kinds != UNUSED) & (kinds != SENT)
     frequency[named] = family[kinds[named]]
