@@ -58,12 +58,12 @@ if TYPE_CHECKING:
         encode,
         encode_to,
         load_image,
-        open,
         read_header,
         read_image,
         write_image,
         write_png,
     )
+    from ptmtools.texture.reader import open as open
     from ptmtools.visibility.model import Pvs
     from ptmtools.visibility.pvs import PvsOptions, compute_pvs
 
@@ -166,7 +166,6 @@ __all__ = [
     "make_files",
     "make_pvs",
     "make_textures",
-    "open",
     "plot_plan",
     "read_header",
     "read_image",

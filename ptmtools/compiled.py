@@ -45,7 +45,7 @@ _KERNELS = "kernels.py"
 
 def kernel(function: Function) -> Function:
     """``function``, compiled when first called with arguments of these types, without the
-    interpreter's lock, kept for later runs.
+    interpreter's lock, kept for later runs if there is a place to keep it.
 
     Floating point is strict: no operation is reordered or fused with another, so that results are
     the same on every machine with IEEE arithmetic.
@@ -95,7 +95,9 @@ def _compiled(function: Function, **options: bool) -> Function:
     settings.CACHE_DIR = before or _folder()
     try:
         compile_: Any = numba.njit
-        compiled: Any = compile_(cache=True, nogil=True, fastmath=False, **options)(function)
+        compiled: Any = compile_(
+            cache=bool(settings.CACHE_DIR), nogil=True, fastmath=False, **options
+        )(function)
     finally:
         settings.CACHE_DIR = before
     return cast("Function", compiled)
@@ -104,10 +106,11 @@ def _compiled(function: Function, **options: bool) -> Function:
 @cache
 def _folder() -> str:
     digest = sha256()
-    for file in [Path(__file__), *sorted(_PACKAGE.rglob(_KERNELS))]:
+    for file in [Path(__file__), *_kernel_files()]:
         digest.update(file.read_bytes())
     name = f"kernels-{digest.hexdigest()[:12]}"
-    caches = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
+    # Not Path.expanduser, which raises for a user without a home.
+    caches = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
     for parent in (_PACKAGE / "__pycache__", caches / "ptmtools"):
         try:
             (parent / name).mkdir(parents=True, exist_ok=True)
@@ -116,3 +119,12 @@ def _folder() -> str:
         except OSError:
             continue
     return ""
+
+
+def _kernel_files() -> list[Path]:
+    """All of them, in order. Not by `Path.rglob`, which looks into the folders of machine code."""
+    found = []
+    for folder, folders, files in os.walk(_PACKAGE):
+        folders[:] = [name for name in folders if name != "__pycache__"]
+        found += [Path(folder) / name for name in files if name == _KERNELS]
+    return sorted(found)

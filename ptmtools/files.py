@@ -54,10 +54,22 @@ def write_with(
                     # a call that would link the link in /proc.
                     descriptor = file.fileno()
                     os.link(f"/proc/self/fd/{descriptor}", temporary, src_dir_fd=descriptor)
+            if not force:
+                _claim(temporary, target)
             os.replace(temporary, target)
         finally:
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
+
+
+def _claim(temporary: Path, target: Path) -> None:
+    """Gives the file its name unless something has come to bear it meanwhile, PTM-O001."""
+    try:
+        os.link(temporary, target)
+    except FileExistsError:
+        refuse_existing(target)
+    except OSError:  # a disk without links: a moment remains
+        refuse_existing(target)
 
 
 @contextlib.contextmanager

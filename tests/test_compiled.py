@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -58,6 +59,23 @@ def test_a_changed_kernel_changes_those_that_call_it(tmp_path: Path) -> None:
     folders = list((package / "__pycache__").glob("kernels-*"))
     assert len(folders) == 2
     shutil.rmtree(package)
+
+
+def test_without_a_place_to_keep_it_code_still_runs(tmp_path: Path) -> None:
+    """As a user without a home, of a package that is not theirs."""
+    environment = {k: v for k, v in os.environ.items() if k not in ("HOME", "NUMBA_CACHE_DIR")}
+    (tmp_path / "file").touch()
+    environment["XDG_CACHE_HOME"] = str(tmp_path / "file")
+    program = (
+        "from pathlib import Path; from ptmtools import compiled; "
+        f"compiled._PACKAGE = Path({str(tmp_path / 'file')!r}); "
+        "assert compiled._folder() == ''; "
+        "print(compiled.kernel(lambda x: x + 1)(41))"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", program], env=environment, check=True, capture_output=True
+    )
+    assert int(told.stdout) == 42
 
 
 def test_all_kernels_are_found() -> None:

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     )
     from ptmtools.texture.model import Description, EncodeOptions, Level, Limits, PtmHeader
     from ptmtools.texture.pyramid import build_pyramid
-    from ptmtools.texture.reader import PtmReader, open
+    from ptmtools.texture.reader import PtmReader
+    from ptmtools.texture.reader import open as open
 
 __all__ = [
     "Description",
@@ -39,7 +40,6 @@ __all__ = [
     "encode",
     "encode_to",
     "load_image",
-    "open",
     "read_header",
     "read_image",
     "read_ptm",

@@ -20,7 +20,7 @@ from ptmtools.texture.model import (
     Level,
     PtmHeader,
 )
-from ptmtools.texture.profiles import PROFILE_NUMBERS
+from ptmtools.texture.profiles import EXACT_PROFILES, PROFILE_NUMBERS
 from ptmtools.texture.pyramid import level_sizes
 from ptmtools.texture.samples import KINDS, KINDS_BY_NUMBER
 from ptmtools.texture.tiling import tile_counts
@@ -140,7 +140,8 @@ def read_header(data: bytes) -> PtmHeader:
     if tile and not (low <= tile <= high and tile % 2 == 0):
         raise _damaged_head(f"tiles of {tile} texels are impossible")
     samples = KINDS_BY_NUMBER[kind]
-    if max_error > samples.top_error or described > DESCRIPTION_MAX:
+    exact_only = _PROFILES[profile] in EXACT_PROFILES
+    if max_error > (0 if exact_only else samples.top_error) or described > DESCRIPTION_MAX:
         raise _damaged_head("its largest error or the length of its description is impossible")
     entries = [_ENTRY.unpack_from(data, table + i * _ENTRY.size) for i in range(count)]
     levels: list[Level] = []

@@ -17,7 +17,8 @@ _CHROMATICITIES = struct.Struct("<8I")
 
 
 def pack_description(description: Description) -> bytes:
-    """Its bytes; none if it says nothing."""
+    """Its bytes; none if it says nothing. Raises InputError PTM-I111 for impossible values."""
+    _check(description)
     values: list[tuple[bytes, bytes]] = []
     if description.icc is not None:
         values.append((b"ICCP", description.icc))
@@ -34,7 +35,10 @@ def pack_description(description: Description) -> bytes:
 
 def parse_description(data: bytes) -> Description:
     """The inverse of `pack_description`. Raises InputError PTM-I113 for impossible values."""
-    found = dict(_values(data))
+    values = list(_values(data))
+    found = dict(values)
+    if len(found) < len(values):
+        raise _impossible("a tag is repeated")
     srgb, gamma = found.get(b"SRGB"), found.get(b"GAMA")
     points, orientation = found.get(b"CHRM"), found.get(b"ORIE", b"\1")
     if (
@@ -52,6 +56,26 @@ def parse_description(data: bytes) -> Description:
         chromaticities=None if points is None else _CHROMATICITIES.unpack(points),
         orientation=orientation[0],
     )
+
+
+def _check(description: Description) -> None:
+    """Raises for values that no file can hold."""
+
+    def within(value: int | None, low: int, high: int) -> bool:
+        return value is None or (isinstance(value, int) and low <= value <= high)
+
+    points = description.chromaticities
+    if not (
+        within(description.srgb, 0, 3)
+        and within(description.gamma, 0, (1 << 32) - 1)
+        and within(description.orientation, 1, 8)
+        and (points is None or (len(points) == 8 and all(within(p, 0, 2**32 - 1) for p in points)))
+    ):
+        raise InputError(
+            "PTM-I111",
+            f"what is said of colour and orientation cannot be: {description!r:.200}",
+            remedy="see ptmtools.texture.Description for the ranges",
+        )
 
 
 def _values(data: bytes) -> Iterator[tuple[bytes, bytes]]:

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import IO, TYPE_CHECKING, Any
 
-from ptmtools.errors import LimitError
+from ptmtools.errors import LimitError, OutputError
 from ptmtools.texture.container import (
     DESCRIPTION_MAX,
     EXACT,
@@ -86,7 +86,16 @@ def encode_to(
     """As `encode`, into a file that can seek, from where it stands.
 
     The rows of ``image`` are read twice from top to bottom, a few at a time.
+
+    Raises also OutputError PTM-O004 if the file is open for appending.
     """
+    if "a" in str(getattr(file, "mode", "")):
+        raise OutputError(
+            "PTM-O004",
+            "is open for appending, but its head is written last",
+            file=str(getattr(file, "name", "")) or None,
+            remedy="open it for writing",
+        )
     rows = ImageRows(image)
     profile = checked_profile(options, rows)
     described = pack_description(description)

@@ -34,7 +34,7 @@ class EncodeOptions:
     min_level, max_level: the same by number: levels below ``min_level`` and above ``max_level`` are
         left out, counted from the coarsest of all, 0; -1 is the finest, -2 the next. What is left
         is renumbered from 0, and the header keeps the size of the original. An image without such a
-        level keeps the nearest that it has.
+        level keeps the nearest that it has, and so it is with sides.
     """
 
     profile: Literal["fast", "small", "raw", "paper"] = "fast"

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 from ptmtools.errors import InputError
 from ptmtools.texture.model import TILE_SIDES, EncodeOptions
-from ptmtools.texture.profiles import PROFILE_NUMBERS, Profile, profile_named
+from ptmtools.texture.profiles import EXACT_PROFILES, PROFILE_NUMBERS, Profile, profile_named
 from ptmtools.texture.pyramid import level_sizes
 from ptmtools.texture.rows import ImageRows
 from ptmtools.texture.samples import KINDS
@@ -12,6 +14,10 @@ from ptmtools.texture.samples import KINDS
 
 def check_options(options: EncodeOptions) -> None:
     """Raises InputError PTM-I111 for what no image can be encoded with."""
+    for field in fields(options):
+        value = getattr(options, field.name)
+        if isinstance(field.default, int) and type(value) is not type(field.default):
+            raise _impossible(f"{field.name} is {value!r}", "it must be a whole number")
     if options.profile not in PROFILE_NUMBERS:
         raise _impossible(
             f"there is no profile {options.profile!r}", f"use one of {', '.join(PROFILE_NUMBERS)}"
@@ -32,7 +38,7 @@ def check_options(options: EncodeOptions) -> None:
         )
     if options.max_error < 0:
         raise _impossible("an error below 0 is impossible", "use 0 for none")
-    if options.max_error and options.profile in ("raw", "paper"):
+    if options.max_error and options.profile in EXACT_PROFILES:
         raise _impossible(
             f"profile {options.profile!r} is always exact", "use fast or small with an error"
         )

@@ -71,6 +71,8 @@ class PtmReader:
         self._ranges = ranges
         self._limits = limits
         self._threads = threads
+        #: Where the file ends, once a source of unknown size has come to its end.
+        self._end: int | None = None
         self.header: PtmHeader = read_header(ranges.read(0, HEAD_MAX))
         self._profile: Profile = profile_named(self.header.profile)
 
@@ -99,19 +101,19 @@ class PtmReader:
     @property
     def whole(self) -> int:
         """How many levels are whole, as far as the length of the file tells."""
-        size = self._ranges.size()
+        size = self._size
         return len(self.header.levels) if size is None else whole_levels(self.header, size)
+
+    @property
+    def _size(self) -> int | None:
+        size = self._ranges.size()
+        return self._end if size is None else size
 
     def description(self) -> Description:
         """Colour and orientation. Raises InputError PTM-I107, PTM-I108, PTM-I113."""
         offset, length, crc32 = self.header.description
         with naming(self._ranges.name):
-            data = self._ranges.read(offset, length)
-            if len(data) < length:
-                raise self._cut("description")
-            if zlib.crc32(data) != crc32:
-                raise _wrong_checksum("description")
-            return parse_description(data)
+            return parse_description(self._checked(offset, length, crc32, "description"))
 
     def level(self, number: int | None = None) -> Samples:
         """Level ``number``, (h, w, c), rows from the top; None is the finest that is whole.
@@ -124,9 +126,15 @@ class PtmReader:
         LimitError: PTM-L103 the level is larger than the limits allow.
         """
         with naming(self._ranges.name):
-            number = self._number(number)
-            level = self.header.levels[number]
-            return self._window(number, Box(0, 0, level.width, level.height))
+            while True:
+                chosen = self._number(number)
+                level = self.header.levels[chosen]
+                try:
+                    return self._window(chosen, Box(0, 0, level.width, level.height))
+                except InputError:
+                    # A source of unknown size may have come to its end: there is less.
+                    if number is not None or chosen < self.whole:
+                        raise
 
     def window(self, number: int, x: int, y: int, width: int, height: int) -> Samples:
         """The texels (height, width, c) of a level from column ``x`` and row ``y`` on.
@@ -148,7 +156,12 @@ class PtmReader:
             state = None
             for number in range(whole):
                 level = self.header.levels[number]
-                state = self._step(number, Box(0, 0, level.width, level.height), state)
+                try:
+                    state = self._step(number, Box(0, 0, level.width, level.height), state)
+                except InputError:
+                    if number >= self.whole:
+                        return
+                    raise
                 yield state.texels
 
     def wrong_checksums(self) -> list[str]:
@@ -308,13 +321,14 @@ class PtmReader:
     def _checked(self, offset: int, length: int, crc32: int, place: str) -> bytes:
         data = self._ranges.read(offset, length)
         if len(data) < length:
+            self._end = offset + len(data)
             raise self._cut(place)
         if zlib.crc32(data) != crc32:
             raise _wrong_checksum(place)
         return data
 
     def _cut(self, place: str, whole: int | None = None) -> InputError:
-        size = self._ranges.size()
+        size = self._size
         of = f" after {size} of {self.header.file_size} bytes" if size is not None else ""
         remedy = None
         if whole is not None:

@@ -36,6 +36,12 @@ class ImageRows:
     def __init__(self, image: Rows) -> None:
         import numpy as np
 
+        if not (hasattr(image, "shape") and hasattr(image, "dtype")):
+            raise InputError(
+                "PTM-I110",
+                f"{type(image).__name__} is not an array",
+                remedy="use numpy.asarray(image)",
+            )
         self._rows = image
         shape, dtype = tuple(image.shape), np.dtype(image.dtype)
         fits = len(shape) in (2, 3) and 0 not in shape and dtype.name in KINDS

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from threading import Lock
 from typing import BinaryIO, Protocol
@@ -37,7 +39,8 @@ class Bytes:
     name: str | None = None
 
     def __init__(self, data: bytes | bytearray | memoryview) -> None:
-        self._data = memoryview(data).cast("B")
+        view = memoryview(data)
+        self._data = (view if view.c_contiguous else memoryview(bytes(view))).cast("B")
 
     def read(self, offset: int, length: int) -> bytes:
         """See `Ranges`."""
@@ -62,19 +65,22 @@ class File:
 
     def read(self, offset: int, length: int) -> bytes:
         """See `Ranges`. Raises InputError PTM-I122."""
-        try:
-            with self._lock:
-                self._file.seek(offset)
-                return self._file.read(length)
-        except OSError as error:
-            raise InputError(
-                "PTM-I122", f"cannot be read ({error.strerror or error})", file=self.name
-            ) from None
+        with self._lock, self._refusing():
+            self._file.seek(offset)
+            return self._file.read(length)
 
     def size(self) -> int:
-        """See `Ranges`."""
-        with self._lock:
+        """See `Ranges`. Raises InputError PTM-I122."""
+        with self._lock, self._refusing():
             return self._file.seek(0, os.SEEK_END)
+
+    @contextlib.contextmanager
+    def _refusing(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, ValueError) as error:  # ValueError: it is closed
+            reason = getattr(error, "strerror", None) or error
+            raise InputError("PTM-I122", f"cannot be read ({reason})", file=self.name) from None
 
     def close(self) -> None:
         """See `Ranges`."""
@@ -91,8 +97,14 @@ class Callback:
         self._read = read
 
     def read(self, offset: int, length: int) -> bytes:
-        """See `Ranges`."""
-        return self._read(offset, length)
+        """See `Ranges`. Raises InputError PTM-I122 if no bytes are given."""
+        found: object = self._read(offset, length)
+        if not isinstance(found, bytes | bytearray | memoryview):
+            raise InputError(
+                "PTM-I122", f"what reads ranges gave {type(found).__name__} instead of bytes"
+            )
+        # More than was asked for is no harm: some servers send all there is.
+        return bytes(found)[:length]
 
     def size(self) -> None:
         """See `Ranges`."""
@@ -104,7 +116,10 @@ class Callback:
 def ranges_of(source: Source) -> Ranges:
     """``source`` as something to read ranges from.
 
-    Raises InputError: PTM-I120 no such file, PTM-I121 a folder, PTM-I122 not readable.
+    Raises
+    ------
+    InputError: PTM-I120 no such file, PTM-I121 a folder, PTM-I122 not readable.
+    TypeError: for what is none of the kinds of `Source`; text files are not.
     """
     if isinstance(source, bytes | bytearray | memoryview):
         return Bytes(source)
@@ -112,15 +127,26 @@ def ranges_of(source: Source) -> Ranges:
         return File(open_file(source), os.fspath(source), own=True)
     if callable(source):
         return Callback(source)
+    unknown: object = source
+    if isinstance(unknown, io.TextIOBase) or not hasattr(source, "read"):
+        raise TypeError(
+            "a .ptm is read from a path, bytes, a file opened in binary mode or a function that "
+            f"reads ranges, not from {type(source).__name__}"
+        )
     if not (hasattr(source, "seekable") and source.seekable()):
         return Bytes(source.read())
     return File(source)
 
 
 def open_file(path: str | os.PathLike[str]) -> BinaryIO:
-    """A file opened for reading; raises as `ranges_of`."""
+    """A file opened for reading, that can seek: a pipe is read whole. Raises as `ranges_of`."""
     try:
-        return Path(path).open("rb")
+        with contextlib.ExitStack() as stack:
+            file = stack.enter_context(Path(path).open("rb"))
+            if not file.seekable():
+                return io.BytesIO(file.read())
+            stack.pop_all()
+            return file
     except FileNotFoundError:
         raise InputError("PTM-I120", "there is no such file", file=path) from None
     except IsADirectoryError:

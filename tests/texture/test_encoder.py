@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import ptmtools.texture as texture
+from ptmtools.errors import InputError, OutputError
 from ptmtools.texture import EncodeOptions, build_pyramid, decode_levels, encode, encode_to
 
 IMAGE = np.random.default_rng(1).integers(0, 256, (100, 37, 3), dtype=np.uint8)
@@ -87,3 +89,23 @@ def test_an_allowed_error_never_costs_much(profile: str) -> None:
             for error in (0, 3)
         )
         assert within <= exact + 20
+
+
+def test_a_file_open_for_appending_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.ptm"
+    path.write_bytes(b"before")
+    with path.open("ab") as file, pytest.raises(OutputError, match=r"a\.ptm.*PTM-O004"):
+        encode_to(file, IMAGE)
+    assert path.read_bytes() == b"before"
+
+
+@pytest.mark.parametrize("options", [{"tile": 64.0}, {"tile": "a"}, {"max_error": True}])
+def test_options_of_another_type(options: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match="PTM-I111"):
+        encode(IMAGE, EncodeOptions("raw", **options))
+
+
+@pytest.mark.parametrize("image", [[[1, 2], [3, 4]], None, b"abc"])
+def test_what_is_no_array(image: Any) -> None:
+    with pytest.raises(InputError, match="PTM-I110"):
+        encode(image)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -178,3 +180,72 @@ def test_a_damaged_description_is_found() -> None:
     ]
     with texture.open(bytes(data[: offset + 5])) as ptm, pytest.raises(InputError, match="I107"):
         ptm.description()
+
+
+def test_a_source_of_unknown_size_that_ends() -> None:
+    data = encode(picture(), TILED)
+    header = texture.read_header(data)
+    pyramid = build_pyramid(picture())
+    for cut, whole in ((header.levels[3].end, 4), (header.levels[5].end + 70, 6)):
+        with texture.open(Recorder(data[:cut])) as ptm:
+            np.testing.assert_array_equal(ptm.level(), pyramid[whole - 1])
+            assert ptm.whole == whole
+        with texture.open(Recorder(data[:cut])) as ptm:
+            assert len(list(ptm.levels())) == whole
+        with (
+            texture.open(Recorder(data[:cut])) as ptm,
+            pytest.raises(InputError, match=f"level {whole}: is cut after {cut} of .*PTM-I107"),
+        ):
+            ptm.level(6)
+
+
+def test_a_reader_of_ranges_may_give_more_but_not_something_else() -> None:
+    data = encode(picture(), TILED)
+    with texture.open(lambda offset, length: memoryview(data)[offset : offset + length + 9]) as ptm:
+        np.testing.assert_array_equal(ptm.level(), picture())
+    with pytest.raises(InputError, match=r"NoneType.*PTM-I122"):
+        texture.open(lambda offset, length: None)  # type: ignore[arg-type, return-value]
+
+
+def test_what_is_no_source() -> None:
+    for source in (5, None, io.StringIO("x")):
+        with pytest.raises(TypeError, match="binary mode"):
+            texture.open(source)  # type: ignore[arg-type]
+    every_other = memoryview(bytes(2 * len(encode(picture()))))[::2]
+    with pytest.raises(InputError, match="PTM-I101"):
+        texture.open(every_other)
+
+
+def test_a_closed_reader_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "a.ptm"
+    path.write_bytes(encode(picture()))
+    ptm = texture.open(path)
+    ptm.close()
+    with pytest.raises(InputError, match=r"a\.ptm.*PTM-I122"):
+        ptm.level()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"orientation": 0},
+        {"orientation": 9},
+        {"srgb": 4},
+        {"gamma": -1},
+        {"gamma": 1 << 40},
+        {"chromaticities": (1, 2)},
+        {"chromaticities": (-1,) * 8},
+    ],
+)
+def test_descriptions_that_cannot_be(changes: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match="PTM-I111"):
+        encode(picture(), description=Description(**changes))
+
+
+def test_an_allowed_error_in_an_exact_profile_is_damage() -> None:
+    data = bytearray(encode(picture(), EncodeOptions("raw")))
+    end = texture.read_header(bytes(data)).description[0]
+    data[32] = 5
+    data[end - 4 : end] = zlib.crc32(data[: end - 4]).to_bytes(4, "little")
+    with pytest.raises(InputError, match="PTM-I105"):
+        texture.read_header(bytes(data))

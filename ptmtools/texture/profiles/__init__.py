@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 #: Profiles by name, with the number that stands for each in a file.
 PROFILE_NUMBERS = {"raw": 0, "fast": 1, "small": 2, "paper": 3}
 
+#: Those that cannot make use of an allowed error.
+EXACT_PROFILES = ("raw", "paper")
+
 
 @dataclass(frozen=True)
 class Tile:

@@ -3,7 +3,7 @@
 For comparison. The residuals stay as they are in `raw`; the texels p of all blocks, those of q and
 those of r are three images of half the size, each in lossless JPEG (ITU-T T.81, process 14) as
 libjpeg-turbo writes it; edge texels are stored. Predictor 7, and 4 for 16 bits, where libjpeg-turbo
-3.1 does not decode what XX
+3.1 does not decode what it has written with predictors 5, 6 and 7.
 
 The bytes depend on the libjpeg-turbo in use; what they decode to does not. Integers only.
 """
