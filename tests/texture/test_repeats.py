@@ -35,6 +35,7 @@ def zoo() -> dict[str, NDArray[np.uint8]]:
         "lines": lines[:, :, None],
         "checks": np.dstack([(x ^ y) & 1, (x // 4 ^ y // 4) & 1]) * 255,
         "cut-out": cutout,
+        "specks": np.where((3 * x + 7 * y) % 61 == 0, 122, 120)[:, :, None],
     }
     return {name: np.clip(image, 0, 255).astype(np.uint8) for name, image in found.items()}
 
@@ -69,6 +70,9 @@ def test_between_them_the_images_use_every_sort_of_symbol() -> None:
     assert (counts[kernels.TEXEL : kernels.EDGE].sum(axis=0)[:6] > 0).all()
     firsts = [kernels.FIRST, kernels.EDGE, kernels.HAAR, kernels.SAMPLE, kernels.REMAINDER]
     assert all(counts[first : first + 10].sum() > 0 for first in firsts)
+    runs = counts[kernels.RUN :]
+    assert runs[:, 0].sum() > 0
+    assert runs[:, 1:].sum() > 0
 
 
 def test_what_repeats_costs_next_to_nothing() -> None:

@@ -1,6 +1,7 @@
 """Compiled loop of the repeats coder: blocks, texels and samples that were seen before.
 
-One pass serves both directions. It goes through the 2×2 blocks in row-major order. For each it asks
+One pass serves both directions. It goes through the 2×2 blocks in row-major order. Runs of blocks
+that are flat like all around them are one symbol. For each other block it asks
 tables of the last block seen in the same surroundings. If none of these is the one, smooth blocks
 are coded by their Haar differences, rough ones texel by texel: each is a neighbour, or the last
 texel seen in the same surroundings, or new, and then its samples are predicted. A texel is one
@@ -27,8 +28,8 @@ OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2
 
 #: First table of each sort of symbol: is the block the first guess; which guess it is; which guess
 #: a texel is, by position; the samples of texels that belong to no block; Haar differences; samples
-#: of other texels; remainders of the sum.
-FIRST, GUESS, TEXEL, EDGE, HAAR, SAMPLE, REMAINDER = 0, 12, 24, 84, 85, 145, 185
+#: of other texels; remainders of the sum; how much of a run is not flat.
+FIRST, GUESS, TEXEL, EDGE, HAAR, SAMPLE, REMAINDER, RUN = 0, 12, 24, 84, 85, 145, 185, 188
 #: Answers to "which guess": after those that name one, `TEXELS`, one by one, and `DIFFERENCES`.
 GUESSES, TEXELS, DIFFERENCES = 3, 3, 4
 #: A block is coded texel by texel if so many samples of p, q and r are among the guesses, or if its
@@ -37,7 +38,9 @@ SMOOTH_KNOWN, ROUGH = 3, 48
 #: Classes of activity of Haar differences; tables for V, h and g, without and with a reference.
 CLASSES = 10
 LARGEST_ACTIVITY = 1023
-TABLES = REMAINDER + 3
+TABLES = RUN + 8
+#: A run is of at most so many blocks, so that no symbol of it escapes.
+LONGEST_RUN = 254
 #: No block takes more symbols, so that words need to be counted once a block only.
 MOST_SYMBOLS = 24
 
@@ -392,7 +395,11 @@ def repeats_pass(
     for y in range(bh):
         y0, y1 = 2 * y, 2 * y + 1
         before = 0
-        for x in range(bw):
+        # The block that ends a run: it is known not to be flat.
+        after = -1
+        x = -1
+        while x + 1 < bw:
+            x += 1
             x0, x1 = 2 * x, 2 * x + 1
             mean = np.uint64(below[y, x])
             n0, n1, nw, ne = mean, mean, mean, mean
@@ -404,6 +411,45 @@ def repeats_pass(
                 n0, n1 = np.uint64(level[y0 - 1, x0]), np.uint64(level[y0 - 1, x1])
                 nw = np.uint64(level[y0 - 1, x0 - 1]) if x > 0 else n0
                 ne = np.uint64(level[y0 - 1, x1 + 1]) if x + 1 < bw else n1
+            even = n0 == mean and n1 == mean and w0 == mean and w1 == mean
+            if y > 0 and x != after and even:
+                many = 1
+                while (
+                    many < LONGEST_RUN and x + many < bw and np.uint64(below[y, x + many]) == mean
+                    and np.uint64(level[y0 - 1, x0 + 2 * many]) == mean
+                    and np.uint64(level[y0 - 1, x1 + 2 * many]) == mean
+                ):  # fmt: skip
+                    many += 1
+                size = 0
+                while many >> (size + 1):
+                    size += 1
+                plain = 0
+                if encoding:
+                    while plain < many and (
+                        np.uint64(level[y0, x0 + 2 * plain]) == mean
+                        and np.uint64(level[y0, x1 + 2 * plain]) == mean
+                        and np.uint64(level[y1, x0 + 2 * plain]) == mean
+                        and np.uint64(level[y1, x1 + 2 * plain]) == mean
+                    ):
+                        plain += 1
+                rest = _symbol(encoding, many - plain, RUN + size, numbers, words, state)
+                if rest > many:
+                    return IMPOSSIBLE
+                if not encoding:
+                    plain = many - rest
+                    for j in range(x0, x0 + 2 * plain):
+                        level[y0, j] = mean
+                        level[y1, j] = mean
+                    if state[_WORD] > limit:
+                        return TRUNCATED
+                for j in range(x, x + plain):
+                    outcome[j] = 0
+                if rest > 0:
+                    after = x + plain
+                if plain > 0:
+                    before = 0
+                    x += plain - 1
+                    continue
             p, q, r, s = mean, mean, mean, mean
             if encoding:
                 p, q = np.uint64(level[y0, x0]), np.uint64(level[y0, x1])

@@ -26,7 +26,7 @@ def decode_repeats(
     group: bytes, below: NDArray[np.uint8], shape: tuple[int, int, int]
 ) -> NDArray[np.uint8]:
     """The level (h, w, c) that a group (without its first byte) refines ``below`` to."""
-    tables, at = read_tables(group, 0, 188)
+    tables, at = read_tables(group, 0, 196)
     return _Level(below, shape, Symbols(group, at, tables)).decode()
 
 
@@ -43,7 +43,7 @@ class _Level:
         self.order = [1, 0, 2, 3][: self.components]
         if self.components < 3:
             self.order = list(range(self.components))
-        self.bits: int = min(max((self.bh * self.bw).bit_length(), 6), 16)
+        self.bits: int = min(max((self.bh * self.bw).bit_length(), 6), 13)
         # Where in the level the last block with a key was; how often it was right.
         self.first: dict[int, tuple[int, int, int]] = {}
         self.guesses: list[dict[int, tuple[int, int]]] = [{}, {}, {}]
@@ -52,13 +52,40 @@ class _Level:
     def decode(self) -> NDArray[np.uint8]:
         missed_above = [0] * self.bw
         for y in range(self.bh):
-            missed = 0
-            for x in range(self.bw):
-                missed = self.block(y, x, missed + missed_above[x])
-                missed_above[x] = missed
+            missed = x = 0
+            ended = False
+            while x < self.bw:
+                run = 0 if ended else self.run(y, x)
+                flat = run - self.symbols.next(188 + run.bit_length() - 1) if run else 0
+                ended = flat < run
+                if flat:
+                    for i in range(x, x + flat):
+                        self.put(y, i, (self.below[y][i],) * 4)
+                        missed_above[i] = 0
+                    missed = 0
+                    x += flat
+                else:
+                    missed = self.block(y, x, missed + missed_above[x])
+                    missed_above[x] = missed
+                    ended = False
+                    x += 1
         for y, x in self.edge():
             self.edge_texel(y, x)
         return np.array(self.texels, np.uint8).reshape(self.height, self.width, self.components)
+
+    def run(self, y: int, x: int) -> int:
+        """How many blocks from here on, 254 at most, would be flat if they were like all around."""
+        mean = self.below[y][x]
+        if y == 0 or set(self.around(y, x, mean)[:4]) != {mean}:
+            return 0
+        many = 1
+        while (
+            many < min(254, self.bw - x)
+            and self.below[y][x + many] == mean
+            and set(self.texels[2 * y - 1][2 * (x + many) : 2 * (x + many) + 2]) == {mean}
+        ):
+            many += 1
+        return many
 
     def block(self, y: int, x: int, near: int) -> int:
         """Decodes a block; 1 if it was not found as a whole, else 0."""
