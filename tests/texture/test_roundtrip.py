@@ -61,9 +61,11 @@ def canvas() -> NDArray[np.uint8]:
 @pytest.mark.parametrize("profile", ["raw", "fast"])
 @pytest.mark.parametrize("quarter", range(4))
 def test_all_sizes_to_67(profile: str, quarter: int) -> None:
-    """Every size; the number of components goes round with it."""
+    """Every size, of large ones a third; the number of components goes round with it."""
     for height in range(1 + quarter, SIDES + 1, 4):
         for width in range(1, SIDES + 1):
+            if min(height, width) > 24 and (height + width) % 3:
+                continue
             components = 1 + (height // 4 + width) % 4
             assert_every_level(canvas()[:height, :width, :components], profile)
 
