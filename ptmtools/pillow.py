@@ -16,12 +16,14 @@ float32, float16 (widened)  1           F
 ==========================  ==========  =======================================================
 
 Pillow has no mode for the rest; `ptmtools.texture.open` reads them. Saved are the modes 1, L, LA,
-P, RGB, RGBA, I;16 and F; 1 becomes L, P becomes RGB, or RGBA where it is transparent.
+P, RGB, RGBA, I;16 and F; 1 becomes L, P becomes RGB, or RGBA where it is transparent. A colour key
+(``info["transparency"]``) becomes alpha.
 
 A file cut short opens, and decodes up to its last whole level. A finer one raises OSError when it
 is loaded, unless ``PIL.ImageFile.LOAD_TRUNCATED_IMAGES`` is set: then it is the finest whole level,
 each texel repeated.
 
+Where profile and orientation are damaged, that is a warning, and texels are decoded without them.
 Errors have Pillow's classes, and the code of ours in the message. HP's Polynomial Texture Maps,
 which share the suffix, are not taken for ours.
 """
@@ -29,16 +31,18 @@ which share the suffix, are not taken for ours.
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Mapping
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, replace
 from typing import IO, TYPE_CHECKING, Any, cast
 
 from PIL import Image, ImageFile
 
-from ptmtools.errors import PtmError
+from ptmtools.errors import InputError, PtmError
 from ptmtools.texture.container import MAGIC
-from ptmtools.texture.images.opening import ORIENTATION, described
+from ptmtools.texture.images.eight_bit import with_key
+from ptmtools.texture.images.opening import ORIENTATION, described, orientation_of
 from ptmtools.texture.images.picture import Strips
 from ptmtools.texture.model import Description, EncodeOptions, Limits, PtmHeader
 from ptmtools.texture.reader import PtmReader
@@ -80,7 +84,7 @@ class PtmImageFile(ImageFile.ImageFile):
         with _pillow_errors():
             self._ptm = PtmReader(File(cast("Any", self.fp)), everything, 1)
             header = self._ptm.header
-            description = self._ptm.description()
+            description = self._description()
         mode = _MODES.get((header.kind, header.components))
         if mode is None:
             raise OSError(
@@ -103,6 +107,14 @@ class PtmImageFile(ImageFile.ImageFile):
             exif = Image.Exif()
             exif[ORIENTATION] = description.orientation
             self.info["exif"] = exif.tobytes()
+
+    def _description(self) -> Description:
+        """None of it if it is damaged: the texels may be intact."""
+        try:
+            return self._ptm.description()
+        except InputError as error:
+            warnings.warn(f"{error}; colour and orientation are not known", stacklevel=2)
+            return Description()
 
     @property
     def levels(self) -> list[tuple[int, int]]:
@@ -142,10 +154,12 @@ class PtmImageFile(ImageFile.ImageFile):
 
     @property
     def reduce(self) -> Any:
-        """Set before loading: how many of the finest levels to leave out, as for JPEG 2000. The
-        method of that name once something is loaded, or nothing was set."""
+        """Set before loading: how many of the finest levels to leave out, as for JPEG 2000. It
+        can be called all the same, and is then Pillow's method of that name."""
         left_out = len(self._header.levels) - 1 - self._chosen
-        return left_out if left_out and self._im is None else super().reduce
+        if left_out and self._im is None:
+            return _LeftOut(left_out, super().reduce)
+        return super().reduce
 
     @reduce.setter
     def reduce(self, levels: int) -> None:
@@ -178,6 +192,20 @@ class PtmImageFile(ImageFile.ImageFile):
         rows = np.minimum(np.arange(height) >> steps, texels.shape[0] - 1)
         columns = np.minimum(np.arange(width) >> steps, texels.shape[1] - 1)
         return cast("NDArray[Any]", texels[rows[:, None], columns])
+
+
+class _LeftOut(int):
+    """A number of levels that can be called as the method that its name hides."""
+
+    def __new__(cls, levels: int, method: Callable[..., Image.Image]) -> _LeftOut:
+        found = super().__new__(cls, levels)
+        found.method = method
+        return found
+
+    method: Callable[..., Image.Image]
+
+    def __call__(self, *arguments: Any, **named: Any) -> Image.Image:
+        return self.method(*arguments, **named)
 
 
 def register() -> None:
@@ -229,12 +257,16 @@ def _description(im: Image.Image, given: Mapping[str, Any]) -> Description:
     if "icc_profile" in given:
         kept = replace(kept, icc=given["icc_profile"] or None)
     if "exif" in given:
-        exif = given["exif"]
-        if not isinstance(exif, Image.Exif):
-            data, exif = exif or b"", Image.Exif()
-            exif.load(data)
-        kept = replace(kept, orientation=exif.get(ORIENTATION, 1))
+        kept = replace(kept, orientation=orientation_of(lambda: _exif(given["exif"])))
     return kept
+
+
+def _exif(given: Image.Exif | bytes | None) -> Image.Exif:
+    if isinstance(given, Image.Exif):
+        return given
+    exif = Image.Exif()
+    exif.load(given or b"")
+    return exif
 
 
 def _rows(im: Image.Image) -> Strips:
@@ -247,12 +279,25 @@ def _rows(im: Image.Image) -> Strips:
         transparent |= im.palette is not None and im.palette.mode == "RGBA"
         im = im.convert("RGBA" if transparent else "RGB")
     components = len(im.getbands())
+    key = _colour_key(im)
+    keyed = key is not None
 
     def strip(y0: int, y1: int) -> NDArray[Any]:
-        return np.asarray(im.crop((0, y0, im.width, y1))).reshape(-1, im.width, components)
+        texels = np.asarray(im.crop((0, y0, im.width, y1))).reshape(-1, im.width, components)
+        return with_key(texels, key) if keyed else texels
 
     dtype = {"F": "float32", "I": "uint16"}.get(im.mode[0], "uint8")
-    return Strips((im.height, im.width, components), np.dtype(dtype), strip)
+    return Strips((im.height, im.width, components + keyed), np.dtype(dtype), strip)
+
+
+def _colour_key(im: Image.Image) -> tuple[int, ...] | None:
+    """The colour that stands for what is not there, as PNG and GIF have it."""
+    key = im.info.get("transparency")
+    if im.mode not in ("L", "RGB") and not im.mode.startswith("I;16"):
+        return None
+    key = key if isinstance(key, tuple | list) else (key,)
+    whole = all(isinstance(value, int) for value in key)
+    return tuple(key) if whole and len(key) == len(im.getbands()) else None
 
 
 @contextmanager

@@ -147,6 +147,30 @@ def test_16_bit_ppm(components: int, tmp_path: Path) -> None:
             load_image(cut)
 
 
+@pytest.mark.parametrize("components", [1, 3])
+def test_plain_16_bit_ppm(components: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    texels = random("u2", components)
+    head = b"P%d # made by hand\n7\t9\n65535\n" % (2 if components == 1 else 3)
+    body = b"\n".join(b"  ".join(b"%d" % v for v in row.ravel()) for row in texels)
+    for block in (1, 7, 1 << 20):
+        monkeypatch.setattr("ptmtools.texture.images.deep._BLOCK", block)
+        same(load_image(head + body).array(), texels)
+        same(load_image(head + body + b"\n").array(), texels)
+    last = body.rindex(b" ")
+    for bad in (
+        body[:last],
+        body[:last] + b" 65536",
+        body[:last] + b" -1",
+        body[:last] + b" x",
+        body[:last] + b" " + b"0" * 11,
+        b"",
+    ):
+        with pytest.raises(InputError, match="PTM-I125"):
+            load_image(head + bad)
+    with pytest.raises(LimitError, match="PTM-L104"):
+        load_image(b"P2 60000 60000 65535 1")
+
+
 @pytest.mark.parametrize("shape", [(9, 7), (9, 7, 1), (9, 7, 4)])
 @pytest.mark.parametrize("kind", ["u1", "<u2", ">u2", "<f2", ">f4"])
 def test_npy_is_mapped(kind: str, shape: tuple[int, ...], tmp_path: Path) -> None:
@@ -168,6 +192,9 @@ def npy(texels: object) -> bytes:
 
 
 WHOLE = npy(np.zeros((9, 7, 3), np.uint16))
+VAST = npy(np.zeros((3, 4, 4), np.float32)).replace(
+    b"(3, 4, 4), }" + 8 * b" ", b"(60000, 60000, 4), }"
+)
 
 
 @pytest.mark.parametrize(
@@ -190,6 +217,24 @@ def test_npy_that_is_no_image(data: bytes, code: str, tmp_path: Path) -> None:
     for source in (data, tmp_path / "a.npy"):
         with pytest.raises(InputError, match=code):
             load_image(source)
+
+
+def test_npy_that_is_too_large(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Refused by its head: no memory is taken for it."""
+    assert b"60000" in VAST
+    monkeypatch.setattr(np, "ndarray", None)
+    with pytest.raises(LimitError, match="PTM-L104"):
+        load_image(VAST)
+    monkeypatch.setattr(np, "memmap", None)
+    (tmp_path / "a.npy").write_bytes(VAST)
+    with pytest.raises(InputError, match="PTM-I125"):  # what is mapped takes none
+        load_image(tmp_path / "a.npy")
+
+
+@pytest.mark.parametrize("shape", [(), (9,), (9, 7, 0), (9, 7, 5), (1, 9, 7, 3)])
+def test_npy_of_another_shape(shape: tuple[int, ...]) -> None:
+    with pytest.raises(InputError, match=r"\(height, width, 1 to 4 components\).*PTM-I126"):
+        load_image(npy(np.zeros(shape, np.uint8)))
 
 
 def hdr(body: bytes, size: str = "-Y 2 +X 9", kind: str = "32-bit_rle_rgbe") -> bytes:

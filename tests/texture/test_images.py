@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import struct
+import threading
 import zlib
 from collections.abc import Iterable
 from pathlib import Path
@@ -15,7 +16,15 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from ptmtools.errors import InputError, LimitError, OutputError
-from ptmtools.texture import decode, encode, load_image, read_image, read_ptm, write_png
+from ptmtools.texture import (
+    decode,
+    encode,
+    load_image,
+    read_image,
+    read_ptm,
+    write_image,
+    write_png,
+)
 
 RNG = np.random.default_rng(11)
 GREY = RNG.integers(0, 256, (9, 7), dtype=np.uint8)
@@ -130,6 +139,43 @@ def test_orientation_is_not_applied() -> None:
     np.testing.assert_array_equal(read_image(data), RGB)
 
 
+@pytest.mark.parametrize(("kind", "block"), [("PNG", b"garbage"), ("WEBP", b"Exif\0\0garbage!")])
+def test_a_malformed_exif_block_says_nothing(kind: str, block: bytes) -> None:
+    picture = load_image(saved(Image.fromarray(RGB), kind, exif=block, lossless=True))
+    assert picture.description.orientation == 1
+    np.testing.assert_array_equal(picture.array(), RGB)
+
+
+@pytest.mark.parametrize("cut", range(1, 25))
+def test_a_png_without_its_end_is_cut(cut: int) -> None:
+    with pytest.raises(InputError, match="PTM-I125"):
+        read_image(saved(Image.fromarray(RGB))[:-cut])
+
+
+def test_checksums_of_a_png() -> None:
+    """Those that texels depend on: Pillow does not look at that of the data."""
+    data = saved(Image.fromarray(RGB), dpi=(72, 72))
+    at = data.index(b"IEND") - 5  # the last byte of the checksum of the data
+    with pytest.raises(InputError, match="PTM-I125"):
+        read_image(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
+    np.testing.assert_array_equal(read_image(data + b"whatever follows"), RGB)
+    end = data.index(b"IEND") - 4
+    text = struct.pack(">I", 3) + b"tEXta\0b" + b"none"  # of no consequence
+    np.testing.assert_array_equal(read_image(data[:end] + text + data[end:]), RGB)
+
+
+def bmp_of_16_bits(*masks: int) -> bytes:
+    texels = np.arange(32, dtype="<u2").tobytes()
+    head = struct.pack("<IiiHHIIiiII", 40, 8, 4, 1, 16, 3 if masks else 0, len(texels), 0, 0, 0, 0)
+    head += struct.pack(f"<{len(masks)}I", *masks)
+    return b"BM" + struct.pack("<IHHI", 78, 0, 0, 14 + len(head)) + head + texels
+
+
+TGA_16 = bytes([0, 0, 2, *bytes(9)]) + struct.pack("<HHBB", 4, 2, 16, 0x20) + bytes(16)
+#: Eight texels, four colours of 16 bits.
+TGA_PALETTE_16 = bytes([0, 1, 1]) + struct.pack("<HHB", 0, 4, 16) + bytes(4)
+TGA_PALETTE_16 += struct.pack("<HHBB", 4, 2, 8, 0x20) + bytes(range(8)) + bytes(8)
+
 DEEP = RNG.integers(0, 65536, (9, 7), dtype=np.uint16)
 REFUSED = {
     "16-bit grey PNG": (saved(Image.fromarray(DEEP)), "PTM-I126"),
@@ -149,6 +195,11 @@ REFUSED = {
         ),
         "PTM-I126",
     ),
+    "BMP of 5 and 6 bits": (bmp_of_16_bits(0xF800, 0x7E0, 0x1F), "PTM-I126"),
+    "BMP of 5 bits": (bmp_of_16_bits(0x7C00, 0x3E0, 0x1F), "PTM-I126"),
+    "BMP of 16 bits a texel": (bmp_of_16_bits(), "PTM-I126"),
+    "TGA of 16 bits a texel": (TGA_16, "PTM-I126"),
+    "TGA with a palette of 5 bits": (TGA_PALETTE_16, "PTM-I126"),
     "PPM of 4 bits": (b"P5 2 1 15\n\1\2", "PTM-I126"),
     "animated GIF": (
         saved(
@@ -202,6 +253,28 @@ def test_bombs_are_a_matter_of_limits() -> None:
     data += saved(Image.fromarray(RGB))[33:]
     with pytest.raises(LimitError, match="PTM-L104"):
         read_image(data)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes that have a name")
+@pytest.mark.parametrize("kind", ["png", "npy", "ppm", "exr"])
+def test_pipes(kind: str, tmp_path: Path) -> None:
+    """They cannot seek, nor be mapped, nor be opened twice."""
+    if kind == "exr":
+        pytest.importorskip("OpenEXR", reason="pip install 'ptmtools[exr]'")
+    texels = RGB.astype({"npy": np.uint16, "ppm": np.uint16, "exr": np.float32}.get(kind, np.uint8))
+    plain = tmp_path / f"plain.{kind}"
+    if kind == "ppm":
+        plain.write_bytes(b"P6 7 9 65535\n" + texels.astype(">u2").tobytes())
+    else:
+        write_image(plain, texels)
+    os.mkfifo(tmp_path / "pipe")
+    writer = threading.Thread(
+        target=(tmp_path / "pipe").write_bytes, args=[plain.read_bytes()], daemon=True
+    )
+    writer.start()
+    found = load_image(tmp_path / "pipe").array()
+    writer.join()
+    np.testing.assert_array_equal(found, texels)
 
 
 def test_paths_that_lead_nowhere(tmp_path: Path) -> None:

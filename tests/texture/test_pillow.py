@@ -19,6 +19,7 @@ from ptmtools.texture import (
     build_pyramid,
     decode,
     encode,
+    load_image,
     read_header,
 )
 from ptmtools.texture import (
@@ -130,6 +131,13 @@ def test_reduce_and_level() -> None:
     assert image.size == SIZES[-3]
     np.testing.assert_array_equal(np.asarray(image), LEVELS[-3])
     assert image.reduce(2).size == (9, 6)  # Pillow's, rounding up
+    image = opened(encode(RGB, RAW))
+    image.reduce = 2
+    assert image.reduce == 2
+    assert image.reduce(2).size == (9, 6)
+    image = opened(encode(RGB, RAW))
+    image.reduce = 2
+    assert image.resize((5, 5), reducing_gap=1.0).size == (5, 5)
     with pytest.raises(ValueError, match="is loaded"):
         image.level = 0
     image = opened(encode(RGB, RAW))
@@ -165,6 +173,48 @@ def test_colour_and_orientation() -> None:
     png = io.BytesIO()
     image.save(png, "PNG")
     assert Image.open(png).info["icc_profile"] == b"profile"
+
+
+@pytest.mark.parametrize("value", [0, 9, 300, "x", -1, 2.5, None])
+def test_an_impossible_orientation_is_none(value: object) -> None:
+    exif = Image.Exif()
+    exif[0x0112] = value
+    data = saved(Image.fromarray(RGB), exif=exif)
+    assert open_ptm(data).description() == Description()
+    image = Image.fromarray(RGB)
+    image.getexif()[0x0112] = value
+    np.testing.assert_array_equal(decode(saved(image)), RGB)
+    np.testing.assert_array_equal(decode(saved(image, exif=b"garbage")), RGB)
+
+
+def test_a_damaged_description_is_a_warning() -> None:
+    data = bytearray(encode(RGB, RAW, description=Description(b"a profile", orientation=6)))
+    data[data.index(b"a profile")] ^= 1
+    with pytest.warns(UserWarning, match="PTM-I108"):
+        image = opened(bytes(data))
+    assert "icc_profile" not in image.info
+    assert image.getexif().get(0x0112, 1) == 1
+    np.testing.assert_array_equal(np.asarray(image), RGB)
+
+
+@pytest.mark.parametrize("mode", ["1", "L", "RGB", "I;16"])
+def test_a_colour_key_becomes_alpha(mode: str, tmp_path: Path) -> None:
+    grey = RNG.integers(0, 2, (9, 7), np.uint8) * 255
+    texels = {"1": grey > 0, "L": grey, "RGB": RGB, "I;16": grey.astype(np.uint16) * 257}[mode]
+    key = tuple(RGB[2, 3].tolist()) if mode == "RGB" else int(texels.max())
+    Image.fromarray(texels).save(tmp_path / "a.png", transparency=key)
+    with Image.open(tmp_path / "a.png") as image:
+        assert image.mode == mode
+        found = decode(saved(image))
+    np.testing.assert_array_equal(found, load_image(tmp_path / "a.png").array())
+    assert 0 < (found[:, :, -1] == 0).sum() < found[:, :, -1].size
+
+
+def test_what_is_no_colour_key() -> None:
+    image = Image.fromarray(RGB)
+    for key in (3, b"123", (1, 2), (1, 2, "x")):
+        image.info["transparency"] = key
+        np.testing.assert_array_equal(decode(saved(image)), RGB)
 
 
 def test_options_of_saving() -> None:

@@ -34,8 +34,10 @@ if TYPE_CHECKING:
 _HALVES = {"RGB": ("RGB;16B", "RGB;16L"), "RGBA": ("RGBA;16B", "RGBA;16L")}
 _GREY_ALPHA = 4
 #: Magic, width, height, largest sample of a PPM or PGM, with comments between.
-_PPM = re.compile(rb"P([56])" + rb"(?:\s|#[^\n]*\n)+(\d+)" * 3 + rb"\s")
+_PPM = re.compile(rb"P([2356])" + rb"(?:\s|#[^\n]*\n)+(\d+)" * 3 + rb"\s")
 _ICC = 34675
+#: So much of a plain PPM is read at a time, and so many digits are the most that a number has.
+_BLOCK, _DIGITS_MAX = 1 << 20, 10
 
 
 def read_png(file: BinaryIO, image: ImageFile, colour: int, limits: Limits) -> Picture:
@@ -183,26 +185,64 @@ def read_tiff(file: BinaryIO, layout: TiffLayout, limits: Limits) -> Picture:
     return Picture(oriented(texels, layout.orientation), Description(icc=layout.icc))
 
 
-def read_ppm(file: BinaryIO, path: str | None) -> Picture | None:
-    """A binary PPM or PGM of 16 bits a sample, mapped if it is a file; None for others."""
+def read_ppm(file: BinaryIO, path: str | None, limits: Limits) -> Picture | None:
+    """A PPM or PGM of 16 bits a sample; None for others. A binary one is mapped if it is a file.
+
+    Raises InputError PTM-I125, LimitError PTM-L104, and for what is no number ValueError.
+    """
     import numpy as np
 
     file.seek(0)
     head = _PPM.match(file.read(4096))
     if head is None or int(head[4]) != 0xFFFF:
         return None
-    width, height, components = int(head[2]), int(head[3]), 1 if head[1] == b"5" else 3
-    check_size(width, height, 2 * components, None)
+    plain = head[1] in b"23"
+    width, height, components = int(head[2]), int(head[3]), 1 if head[1] in b"25" else 3
+    check_size(width, height, 2 * components, limits if plain or path is None else None)
+    if 0 in (width, height):
+        raise damaged_image("no texels")
+    if plain:
+        file.seek(head.end())
+        samples = _plain_samples(file, width * height * components)
+        return Picture(samples.reshape(height, width, components))
     texels: np.ndarray[Any, Any]
     if path is not None:
         file.seek(0, 2)
-        if file.tell() < head.end() + 2 * width * height * components or 0 in (width, height):
+        if file.tell() < head.end() + 2 * width * height * components:
             raise damaged_image(f"after {file.tell()} bytes")
         texels = np.memmap(path, ">u2", "r", head.end(), (height, width, components))
     else:
         file.seek(head.end())
         data = file.read(2 * width * height * components)
-        if len(data) < 2 * width * height * components or not data:
+        if len(data) < 2 * width * height * components:
             raise damaged_image(f"after {head.end() + len(data)} bytes")
         texels = np.frombuffer(data, ">u2").reshape(height, width, components)
     return Picture(texels)
+
+
+def _plain_samples(file: BinaryIO, count: int) -> NDArray[np.uint16]:
+    """So many samples (count,) from decimal numbers. Raises InputError PTM-I125, ValueError."""
+    import numpy as np
+
+    # Before memory is taken: each has a digit, and all but the last something after it.
+    start, end = file.tell(), file.seek(0, 2)
+    if end - start < 2 * count - 1:
+        raise damaged_image(f"after {end} bytes")
+    file.seek(start)
+    samples = np.empty(count, np.uint16)
+    have, rest = 0, b""
+    while have < count:
+        block = file.read(_BLOCK)
+        words = (rest + block).split()
+        # The last may go on in the next block.
+        rest = words.pop() if words and block and not block[-1:].isspace() else b""
+        if max(map(len, [*words, rest]), default=0) > _DIGITS_MAX:
+            raise damaged_image("a number is too long")
+        numbers = np.array([int(word) for word in words[: count - have]], np.int64)
+        if numbers.size and not 0 <= numbers.min() <= numbers.max() <= 0xFFFF:
+            raise damaged_image("a sample is out of range")
+        samples[have : have + numbers.size] = numbers
+        have += numbers.size
+        if not block and have < count:
+            raise damaged_image(f"after {have} of {count} samples")
+    return samples

@@ -6,8 +6,9 @@ variable of the whole process; what is refused here follows from `ptmtools.textu
 
 from __future__ import annotations
 
+import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
@@ -17,7 +18,7 @@ from ptmtools.texture.images.picture import damaged_image, unsupported
 from ptmtools.texture.model import Description
 
 if TYPE_CHECKING:
-    from PIL.Image import Image
+    from PIL.Image import Exif, Image
     from PIL.ImageFile import ImageFile
 
 #: First bytes → module and class of Pillow's.
@@ -39,6 +40,8 @@ _PLUGINS = (
 READABLE = "PNG, JPEG, TIFF, TGA, BMP, GIF, WebP, PPM, PCX, Radiance, OpenEXR or .npy"
 #: The tag of EXIF and TIFF.
 ORIENTATION = 0x0112
+#: What Pillow calls layouts of 5 and 6 bits a sample, which it scales to 8.
+_HIGH_COLOUR = re.compile(r"BGRA?;(5|1[56])Z?")
 
 
 def opened(file: BinaryIO) -> ImageFile:
@@ -73,6 +76,14 @@ def load(image: ImageFile) -> None:
         image.load()
 
 
+def high_colour(image: ImageFile) -> bool:
+    """Whether an image that is not loaded has samples, or a palette, of 5 or 6 bits."""
+    arguments = [tile.args for tile in image.tile]
+    raw = [args[0] if isinstance(args, tuple) and args else args for args in arguments]
+    raw.append(getattr(image.palette, "rawmode", None))
+    return any(isinstance(mode, str) and _HIGH_COLOUR.fullmatch(mode) for mode in raw)
+
+
 @contextmanager
 def pillow_faults() -> Iterator[None]:
     """Whatever Pillow raises inside becomes one of our errors."""
@@ -98,13 +109,22 @@ def described(image: Image) -> Description:
     """Colour and orientation of an image that is loaded (PNG has some of it behind the texels)."""
     info = image.info
     points, gamma = info.get("chromaticity"), info.get("gamma")
-    # Pillow has applied that of a TIFF.
-    orientation = 1 if hasattr(image, "tag_v2") else image.getexif().get(ORIENTATION, 1)
     srgb = info.get("srgb")
     return Description(
         icc=info.get("icc_profile") or None,
         srgb=srgb if srgb in (0, 1, 2, 3) else None,
         gamma=None if gamma is None else round(gamma * 100_000),
         chromaticities=None if points is None else tuple(round(p * 100_000) for p in points),
-        orientation=orientation if orientation in range(1, 9) else 1,
+        # Pillow has applied that of a TIFF.
+        orientation=1 if hasattr(image, "tag_v2") else orientation_of(image.getexif),
     )
+
+
+def orientation_of(exif: Callable[[], Exif]) -> int:
+    """The orientation, 1 to 8, in what ``exif`` makes; 1 where it has none, or an impossible one
+    (some cameras write 0), or cannot be parsed: the texels are no worse for it."""
+    try:
+        found = exif().get(ORIENTATION, 1)
+        return int(found) if found in range(1, 9) else 1
+    except Exception:  # a malformed block can make Pillow's parser raise nearly anything
+        return 1

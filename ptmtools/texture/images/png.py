@@ -11,9 +11,10 @@ import io
 import struct
 import zlib
 from collections.abc import Iterator
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, BinaryIO
 
 from ptmtools.texture.images.opening import ORIENTATION
+from ptmtools.texture.images.picture import damaged_image
 from ptmtools.texture.model import Description
 
 if TYPE_CHECKING:
@@ -75,6 +76,31 @@ def _save_deep(file: IO[bytes], image: NDArray[np.uint16], description: Descript
             put(b"IDAT", packed)
     put(b"IDAT", packer.flush())
     put(b"IEND", b"")
+
+
+def check_chunks(file: BinaryIO) -> None:
+    """Every chunk is there up to the last, IEND, and those that texels depend on are as they were
+    written. Pillow looks at neither once it has all rows.
+
+    Raises InputError PTM-I125.
+    """
+    file.seek(len(_MAGIC))
+    kind = b""
+    while kind != b"IEND":
+        head = file.read(8)
+        kind, left = head[4:], int.from_bytes(head[:4], "big")
+        if kind[:1].islower():  # what texels do not depend on
+            file.seek(left + 4, 1)
+            continue
+        checksum = zlib.crc32(kind)
+        while left and (part := file.read(min(left, _STRIP_BYTES))):
+            checksum = zlib.crc32(part, checksum)
+            left -= len(part)
+        told = file.read(4)
+        if len(told) < 4:
+            raise damaged_image("it ends before its chunk IEND")
+        if told != checksum.to_bytes(4, "big"):
+            raise damaged_image(f"the checksum of {kind!r} before byte {file.tell()} is wrong")
 
 
 def _filtered(image: NDArray[np.uint16]) -> Iterator[bytes]:

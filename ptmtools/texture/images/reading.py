@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any, BinaryIO, cast
 from ptmtools.errors import InputError, naming
 from ptmtools.texture.container import HEAD_MAX, MAGIC, read_header
 from ptmtools.texture.images import openexr, radiance
-from ptmtools.texture.images.picture import Picture, check_size, damaged_image, unsupported
+from ptmtools.texture.images.npy import MAGIC as NPY_MAGIC
+from ptmtools.texture.images.npy import read_npy
+from ptmtools.texture.images.picture import Picture, unsupported
+from ptmtools.texture.images.png import check_chunks
 from ptmtools.texture.model import Limits
-from ptmtools.texture.samples import KINDS
 from ptmtools.texture.sources import open_file
 
 if TYPE_CHECKING:
@@ -26,7 +28,7 @@ SUFFIXES = (
 _LIMITS = Limits()
 _PNG = b"\x89PNG\r\n\x1a\n"
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-_NPY = b"\x93NUMPY"
+_PPM = (b"P2", b"P3", b"P5", b"P6")
 
 
 def load_image(source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS) -> Picture:
@@ -38,7 +40,8 @@ def load_image(source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS)
 
     1 component for grey (1-bit images become 0 and 255), 2 with alpha; 3 for RGB and palettes, 4
     with alpha. A colour key (PNG tRNS) becomes an alpha of 0 or all bits. An .npy is (h, w) or
-    (h, w, c) of a type that a `.ptm` holds; it and 16-bit PPMs are mapped, not read.
+    (h, w, c) of a type that a `.ptm` holds; it and binary 16-bit PPMs are mapped, not read, but
+    from a pipe, which is read whole.
 
     Parameters
     ----------
@@ -58,7 +61,8 @@ def load_image(source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS)
         return _load(cast("BinaryIO", io.BytesIO(source)), None, limits)
     path = os.fspath(source)
     with open_file(path) as file, naming(path):
-        return _load(file, path, limits)
+        # What was a pipe cannot be opened, or mapped, by its name once more.
+        return _load(file, None if isinstance(file, io.BytesIO) else path, limits)
 
 
 def read_image(source: str | os.PathLike[str] | bytes) -> NDArray[np.uint8]:
@@ -102,8 +106,8 @@ def _load(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
             "is a progressive texture map already, not an image",
             remedy="use ptm decode to get an image from it",
         )
-    if first.startswith(_NPY):
-        return _npy(file, path)
+    if first.startswith(NPY_MAGIC):
+        return read_npy(file, path, limits)
     if first.startswith(radiance.MAGIC):
         return radiance.read_hdr(file, limits)
     if first.startswith(openexr.MAGIC):
@@ -113,11 +117,13 @@ def _load(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
 
 def _through_pillow(file: BinaryIO, path: str | None, first: bytes, limits: Limits) -> Picture:
     from ptmtools.texture.images import deep, eight_bit
-    from ptmtools.texture.images.opening import opened, pillow_faults
+    from ptmtools.texture.images.opening import high_colour, opened, pillow_faults
 
     with pillow_faults():
-        if first.startswith((b"P5", b"P6")) and (picture := deep.read_ppm(file, path)):
+        if first.startswith(_PPM) and (picture := deep.read_ppm(file, path, limits)):
             return picture
+        if first.startswith(_PNG):
+            check_chunks(file)
         if first.startswith(_TIFF) and (layout := deep.tiff_layout(file)).deep:
             return deep.read_tiff(file, layout, limits)
         image = opened(file)
@@ -129,6 +135,8 @@ def _through_pillow(file: BinaryIO, path: str | None, first: bytes, limits: Limi
                 return deep.read_png(file, image, colour, limits)
         elif image.format == "PPM" and _rescaled(image.tile):
             raise unsupported("samples that do not fill their bits")
+        elif high_colour(image):
+            raise unsupported("samples of 5 or 6 bits")
         return eight_bit.read(image, limits, depth)
 
 
@@ -137,23 +145,3 @@ def _rescaled(tiles: list[Any]) -> bool:
     arguments = tiles[0].args if tiles else ()
     maximum = arguments[1] if isinstance(arguments, tuple) and len(arguments) > 1 else 0
     return maximum not in (0, 255)
-
-
-def _npy(file: BinaryIO, path: str | None) -> Picture:
-    import numpy as np
-
-    file.seek(0)
-    try:
-        if path is not None:
-            texels = np.load(path, mmap_mode="r", allow_pickle=False)
-        else:
-            texels = np.lib.format.read_array(file, allow_pickle=False)
-    except Exception as error:  # objects, a head that is no literal, too few bytes
-        raise damaged_image(error) from None
-    components = texels.shape[2] if texels.ndim == 3 else 1
-    if texels.ndim not in (2, 3) or not 1 <= components <= 4 or texels.dtype.name not in KINDS:
-        raise unsupported(f"an array of shape {texels.shape} and type {texels.dtype}")
-    check_size(texels.shape[1], texels.shape[0], 0, None)
-    if 0 in texels.shape:
-        raise damaged_image("no texels")
-    return Picture(texels)

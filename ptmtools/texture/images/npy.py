@@ -1,0 +1,66 @@
+"""numpy's `.npy`, of which the head is judged before any memory is taken for the texels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from ptmtools.errors import InputError
+from ptmtools.texture.images.picture import Picture, check_size, damaged_image, unsupported
+from ptmtools.texture.model import Limits
+from ptmtools.texture.samples import KINDS
+
+if TYPE_CHECKING:
+    import numpy as np
+
+MAGIC = b"\x93NUMPY"
+
+
+def read_npy(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
+    """An array (h, w) or (h, w, 1 to 4), mapped if it is a file.
+
+    Raises InputError PTM-I125, PTM-I126, LimitError PTM-L104.
+    """
+    import numpy as np
+
+    shape, in_columns, dtype = _head(file)
+    components = shape[2] if len(shape) == 3 else 1
+    if len(shape) not in (2, 3) or not 1 <= components <= 4:
+        raise InputError(
+            "PTM-I126",
+            f"holds an array of shape {shape}; an image has the shape (height, width) or "
+            "(height, width, 1 to 4 components)",
+            remedy="reshape it",
+        )
+    if dtype.name not in KINDS:
+        raise unsupported(f"samples of type {dtype}")
+    height, width = shape[:2]
+    if height < 1 or width < 1:
+        raise damaged_image("no texels")
+    texel_bytes = components * dtype.itemsize
+    check_size(width, height, texel_bytes, None if path is not None else limits)
+    start, end = file.tell(), file.seek(0, 2)
+    size = height * width * texel_bytes
+    if end - start < size:
+        raise damaged_image(f"after {end} of {start + size} bytes")
+    order: Any = "F" if in_columns else "C"
+    texels: np.ndarray[Any, Any]
+    if path is not None:
+        texels = np.memmap(path, dtype, "r", start, shape, order)
+    else:
+        file.seek(start)
+        texels = np.ndarray(shape, dtype, file.read(size), order=order)
+    return Picture(texels)
+
+
+def _head(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Shape, whether columns come first, type; the file then stands at the samples."""
+    from numpy.lib import format as npy
+
+    file.seek(0)
+    try:
+        version = npy.read_magic(file)
+        # The third version differs in the names of fields only, and texels have none.
+        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+        return read(file)
+    except Exception as error:  # a head that is no literal, or ends too early
+        raise damaged_image(error) from None
