@@ -126,11 +126,13 @@ def choose(
     frequency = exact.copy()
     named = (kinds != UNUSED) & (kinds != SENT)
     frequency[named] = family[kinds[named]]
-    numbers = _kind_numbers(kinds.tolist())
-    for row in exact[kinds == SENT]:
-        used = int(np.flatnonzero(row[:ESCAPE])[-1]) + 1 if row[:ESCAPE].any() else 0
-        numbers += [int(row[ESCAPE]), used, *row[:used].tolist()]
-    packed = _pack_nibbles(numbers)
+    numbers = [np.array(_kind_numbers(kinds.tolist()), np.int64)]
+    rows = exact[kinds == SENT]
+    occurs = rows[:, :ESCAPE] > 0
+    most = np.where(occurs.any(axis=1), ESCAPE - occurs[:, ::-1].argmax(axis=1), 0)
+    for row, head, used in zip(rows, np.stack([rows[:, ESCAPE], most], 1), most, strict=True):
+        numbers += [head, row[:used]]
+    packed = _pack_nibbles(np.concatenate(numbers))
     return frequency, len(packed).to_bytes(2, "little") + packed
 
 
@@ -200,15 +202,11 @@ def decoding_table(frequency: Frequencies) -> NDArray[np.uint32]:
     return table
 
 
-def _pack_nibbles(numbers: list[int]) -> bytes:
+def _pack_nibbles(numbers: NDArray[np.int64]) -> bytes:
     """Numbers as nibbles of 3 bits, low ones first, 8 added where more follow; low nibble first."""
-    nibbles: list[int] = []
-    for n in numbers:
-        while n > 7:
-            nibbles.append(8 | (n & 7))
-            n >>= 3
-        nibbles.append(n)
-    if len(nibbles) % 2:
-        nibbles.append(0)
-    pairs = np.array(nibbles, np.uint8).reshape(-1, 2)
-    return (pairs[:, 0] | pairs[:, 1] << 4).tobytes()
+    digits = numbers[:, None] >> np.arange(0, 12, 3)
+    more = digits > 7
+    nibbles = ((digits & 7) | more << 3)[digits + (np.arange(4) == 0) > 0].astype(np.uint8)
+    pairs = np.append(nibbles, np.zeros(len(nibbles) % 2, np.uint8)).reshape(-1, 2)
+    packed: NDArray[np.uint8] = pairs[:, 0] | pairs[:, 1] << 4
+    return packed.tobytes()

@@ -145,15 +145,16 @@ def _pass(
 
 def _packed(level: Bytes) -> NDArray[np.uint32]:
     """Texels (h, w, c) as one number each."""
-    height, width, components = level.shape
-    if components == 4:
-        return level.view("<u4").reshape(height, width).astype(np.uint32)
-    out = np.zeros((height, width, 4), np.uint8)
-    out[:, :, :components] = level
-    return out.view("<u4").reshape(height, width).astype(np.uint32, copy=False)
+    from ptmtools.texture.coders.repeats import kernels
+
+    texels = np.empty(level.shape[:2], np.uint32)
+    kernels.move_texels(True, np.ascontiguousarray(level), texels)
+    return texels
 
 
 def _unpacked(texels: NDArray[np.uint32], components: int) -> Bytes:
-    height, width = texels.shape
-    parts = texels.astype("<u4", copy=False).view(np.uint8).reshape(height, width, 4)
-    return np.ascontiguousarray(parts[:, :, :components])
+    from ptmtools.texture.coders.repeats import kernels
+
+    level = np.empty((*texels.shape, components), np.uint8)
+    kernels.move_texels(False, level, texels)
+    return level

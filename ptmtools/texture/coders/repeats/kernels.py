@@ -358,6 +358,24 @@ def _edge_samples(
 
 
 @kernel
+def move_texels(packing: bool, level: Any, texels: Any) -> None:
+    """(h, w, c) uint8 to (h, w) uint32, or back: component c in bits 8 c to 8 c + 7."""
+    components = level.shape[2]
+    for y in range(texels.shape[0]):
+        row, packed = level[y], texels[y]
+        for x in range(packed.size):
+            if packing:
+                texel = np.uint32(0)
+                for c in range(components):
+                    texel |= np.uint32(row[x, c]) << np.uint32(8 * c)
+                packed[x] = texel
+            else:
+                texel = packed[x]
+                for c in range(components):
+                    row[x, c] = texel >> np.uint32(8 * c)
+
+
+@kernel
 def repeats_pass(
     encoding: bool, level: Any, flat: Any, below: Any, order: Any, weights: Any, classes: Any,
     slots: Any, seen: Any, outcome: Any, block: Any, around: Any, errors: Any, shift: int,
