@@ -15,7 +15,7 @@ Images of 8 bits, without error:
 Other kinds of sample and near-lossless images are coded by `coders.texel`.
 
 Whole pyramids over PNG of the finest level alone: 12 Kodak images 0.733, 7 textures of 1024² 0.818,
-17 textures of architectural models 0.822; the largest of any file 1.03. With deflate in the place of
+17 textures of architectural models 0.82; the largest of any file 1.03. With deflate in the place of
 repeats the last two were 0.871 and 1.104. Mapping repeats first and decoding what is new by rows
 afterwards, which would be faster, finds too little: surroundings have to be known texel by texel
 (office atlas 2.2 instead of 0.68).
