@@ -34,6 +34,7 @@ from ptmtools.texture.coders.mixing.decisions.kernels import (
     SURE,
     TAG,
     WHERE,
+    code_bit,
     decide,
     decide_flat,
     look_up,
@@ -55,6 +56,8 @@ POSITIONS = 5
 EDGE = 4
 #: Least magnitude of every bucket: 1, 2, 3-4, 5-8, …
 BUCKETS = np.array([1, 2, 3, 5, 9, 17, 33, 65, 129, 257, 513], np.int64)
+#: From this bucket on, the bits within are coded by the density alone.
+DEEP = 2
 #: First node for the bits within a bucket.
 WITHIN = np.array([0, 0, 0, 1, 4, 11, 14, 17, 20, 20], np.int64)
 #: Slot in which the counters of a node lie.
@@ -206,7 +209,7 @@ def _quantised(e: int, step: int) -> Any:
 @inlined_kernel
 def _residual(
     encoding: bool, goal: int, m: int, mu: int, inverse: int, lo: int, hi: int, step: int,
-    last: bool, node_row: int, near_row: int, notes: Any, x: Any, mix: Any, chances: Any,
+    last: bool, deep: int, node_row: int, near_row: int, notes: Any, x: Any, mix: Any, chances: Any,
     slots: Any, mask: int, coder: Any, buffer: Any,
 ) -> Any:  # fmt: skip
     """Codes one texel between lo and hi: returns its value.
@@ -245,10 +248,27 @@ def _residual(
         else:
             node = path
             if phase == 3:
-                deep = WITHIN[bucket] + path if bucket <= 4 or path < 3 else 21
-                node = (16 if sign > 0 else 40) + deep
+                inside = WITHIN[bucket] + path if bucket <= 4 or path < 3 else 21
+                node = (16 if sign > 0 else 40) + inside
             d = (below + above + 1) >> 1
             x[0] = _halves((above - below + 1) * span, d * span - half + sign * off, inverse)
+        # Large residuals that no match foresees: contexts know no more than the density, but in
+        # the first plane, where they often do.
+        if (
+            phase == 3
+            and deep <= bucket
+            and max(notes[FOUND], notes[FOUND + 1], notes[FOUND + 2]) < 0
+        ):
+            p = min(max(_squash(x[0]), 1), 65535)
+            bit = code_bit(encoding, _answer(phase, g, sign, d), p, coder, buffer)
+            if bit:
+                below = d
+            else:
+                above = d - 1
+            path = 2 * path + 1 + bit
+            if below >= above:
+                return min(max(origin + sign * below * step, 0), 255)
+            continue
         # Fifteen nodes share a slot.
         if GROUP[node] != group:
             group = GROUP[node]
@@ -465,8 +485,9 @@ def _texel(
             matched += (1 if i == 0 else 3) * (2 if times > 3 else 1)
         notes[FOUND + i] = v
 
+    deep = DEEP if refs > 0 else len(BUCKETS)
     v = _residual(
-        encoding, wide(goal[t]), m, mu, inverse, lo, hi, step, last, k * NODES,
+        encoding, wide(goal[t]), m, mu, inverse, lo, hi, step, last, deep, k * NODES,
         NODE_ROWS + s1 * KINDS * 9 + matched, notes, tables_.x, state.mix, state.chances, slots,
         mask, coder, buffer,
     )  # fmt: skip

@@ -353,7 +353,7 @@ def _texel(
 
     times = [t for _, t in matches]
     near_row = 320 + s1 * 36 + matched
-    decide = _decider(own, context, found, times, k * 64, near_row)
+    decide = _decider(own, context, found, times, k * 64, near_row, bool(refs))
     v = _value(decide, m, mu, inverse, lo, hi, step, last)
 
     own.texel[y, x] = v
@@ -376,10 +376,11 @@ def _texel(
 def _value(
     decide: Any, m: int, mu: int, inverse: int, lo: int, hi: int, step: int, last: bool
 ) -> int:
-    """The texel, by decisions: ``decide(kind, node, opinion, answer)`` returns a bit."""
+    """The texel, by decisions: ``decide(kind, node, opinion, answer, plain)`` returns a bit."""
     if lo >= hi:
         return lo
     origin = lo if last else m
+    bucket = 0
     off, half, span = origin * 256 - mu, step * 128, step * 256
 
     def steps(v: int) -> int:
@@ -400,6 +401,7 @@ def _value(
                 node(path),
                 clamp(x, -3072, 3072),
                 lambda v, d=d: int(steps(v) * sign >= d),
+                kind == 2 and bucket >= 2,
             )
             below, above = (d, above) if bit else (below, d - 1)
             path = 2 * path + 1 + bit
@@ -419,7 +421,6 @@ def _value(
         sign = 1 if m < hi else -1
     beyond = soft_plus(up if sign > 0 else down)
     most = ((hi - m if sign > 0 else m - lo) + (step >> 1)) // step
-    bucket = 0
     while BUCKETS[bucket + 1] <= most:
         d = BUCKETS[bucket + 1]
         further = soft_plus(at(d, sign))
@@ -438,11 +439,21 @@ def _value(
 
 
 def _decider(
-    own: _Plane, context: list[int], found: list[int], times: list[int], row: int, near_row: int
+    own: _Plane,
+    context: list[int],
+    found: list[int],
+    times: list[int],
+    row: int,
+    near_row: int,
+    deep: bool,
 ) -> Any:
     state = own.state
 
-    def decide(kind: int, node: int, opinion: int, answer: Callable[[int], int]) -> int:
+    def decide(
+        kind: int, node: int, opinion: int, answer: Callable[[int], int], plain: bool = False
+    ) -> int:
+        if plain and deep and max(found) < 0:
+            return own.bits.bit(clamp(squash(opinion), 1, 65535))
         group, place = node // 15, node % 15
         slots = []
         for i, h in enumerate(context):
