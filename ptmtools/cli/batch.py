@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import glob
 import os
+import stat
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TypeVar
 
@@ -13,9 +16,9 @@ import click
 
 from ptmtools.cli.failures import report
 from ptmtools.cli.output import Voice
-from ptmtools.errors import InputError
+from ptmtools.errors import InputError, OutputError, PtmError
+from ptmtools.files import writing
 
-Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 #: As a file name: standard input or output.
@@ -51,33 +54,110 @@ def expanded(names: Iterable[str], suffixes: Sequence[str]) -> list[str]:
     return found
 
 
-def targets(
+@dataclass(frozen=True)
+class Job:
+    """One file that a command works on.
+
+    Attributes
+    ----------
+    source: its name; - is standard input.
+    target: where the result goes; None is standard output.
+    fault: why nothing can be done with it.
+    """
+
+    source: str
+    target: Path | None = None
+    fault: PtmError | None = None
+
+    @property
+    def to_stdout(self) -> bool:
+        """Whether standard output carries the result."""
+        return self.target is None and self.fault is None
+
+
+def jobs_for(
     sources: Sequence[str], output: str | None, given: Sequence[str], suffix: str
-) -> list[Path | None]:
-    """Where each result goes; None is stdout. ``given`` is what the user named the sources.
+) -> list[Job]:
+    """What is to be done, each file once. ``given`` is what the user named the sources.
+
+    Different sources of which the results would lie in one place are one job, a fault.
 
     Raises click.UsageError.
     """
+    if output == "":
+        raise click.BadParameter("the name is empty", None, None, "-o")
     if STANDARD in sources and len(sources) > 1:
         raise click.UsageError("standard input (-) is to be the only file")
-    if output == STANDARD or (output is None and STANDARD in sources):
-        if len(sources) > 1:
+    found = _once(sources)
+    named = [name for name in found if name]
+    if output == STANDARD or (output is None and any(map(_streams, named))):
+        if len(named) > 1:
             raise click.UsageError("only one file can go to standard output")
-        return [None]
-    beside = [Path("stdin" if name == STANDARD else name).with_suffix(suffix) for name in sources]
-    if output is None:
-        found = beside
-    elif Path(output).is_dir():
-        found = [Path(output) / path.name for path in beside]
-    elif len(sources) == 1 and not Path(given[0]).is_dir():
-        found = [Path(output)]
+        return [Job(name, fault=None if name else no_name()) for name in found]
+    if output is None or os.path.isdir(output):
+        folder = None if output is None else Path(output)
+        beside = [_beside(name, folder, suffix) for name in named]
+    elif len(named) == 1 and not os.path.isdir(given[0]):
+        beside = [Path(output)]
     else:
         raise click.BadParameter(
             "for several files it must be a folder that exists", None, None, "-o"
         )
-    if len(set(found)) < len(found):
-        raise click.UsageError("two of the files would be written to the same place")
-    return list(found)
+    nameless = [Job(name, fault=no_name()) for name in found if not name]
+    return nameless + _apart(dict(zip(named, beside, strict=True)))
+
+
+def no_name() -> InputError:
+    """The error for an empty name."""
+    return InputError(
+        "PTM-I120", "there is no file without a name", remedy="is a variable of the shell empty?"
+    )
+
+
+def _once(sources: Iterable[str]) -> list[str]:
+    """Without those that name a file of the same folder again. Links are files of their own."""
+    found: dict[str, str] = {}
+    for name in sources:
+        folder, file = os.path.split(name)
+        key = os.path.join(os.path.realpath(folder), file) if file else name
+        found.setdefault(os.path.normcase(key), name)
+    return list(found.values())
+
+
+def _streams(name: str) -> bool:
+    """Whether it is standard input, or a pipe that has a name; nothing can lie beside those."""
+    if name == STANDARD or os.path.dirname(name) in ("/dev", "/dev/fd"):
+        return True
+    try:
+        return stat.S_ISFIFO(os.stat(name).st_mode)
+    except OSError:
+        return False
+
+
+def _beside(name: str, folder: Path | None, suffix: str) -> Path:
+    path = Path("stdin" if name == STANDARD else name).with_suffix(suffix)
+    return folder / path.name if folder else path
+
+
+def _apart(targets: dict[str, Path]) -> list[Job]:
+    """A job for each target that one source has."""
+    places: dict[str, list[str]] = {}
+    for name, target in targets.items():
+        places.setdefault(os.path.normcase(os.path.realpath(target)), []).append(name)
+    jobs = []
+    for names in places.values():
+        target = targets[names[0]]
+        fault = None
+        if len({os.path.realpath(name) for name in names}) > 1:
+            both = "both" if len(names) == 2 else "all"
+            fault = OutputError(
+                "PTM-O103",
+                f"{', '.join(names[:-1])} and {names[-1]} would {both} be written to it",
+                file=target,
+                remedy="name one of them alone, or write them into different folders",
+            )
+        jobs.append(Job(names[0], target, fault))
+    return jobs
 
 
 def for_each(
@@ -99,6 +179,8 @@ def for_each(
     at_once = min(workers, len(jobs))
 
     def guarded(job: Job) -> Result | Exception:
+        if job.fault:
+            return job.fault
         try:
             return work(job, max(1, workers // at_once))
         except Exception as fault:
@@ -122,12 +204,27 @@ def standard_input() -> bytes:
 
 
 def to_standard_output(write: Callable[[IO[bytes]], object]) -> None:
-    """What ``write`` puts into the file it is given, which can seek, goes to stdout."""
+    """What ``write`` puts into the file it is given, which can seek, goes to stdout.
+
+    Raises OutputError PTM-O002, PTM-O003; BrokenPipeError if nobody reads it.
+    """
     import shutil
     import tempfile
 
     with tempfile.TemporaryFile() as file:
-        write(file)
-        file.seek(0)
-        shutil.copyfileobj(file, sys.stdout.buffer)
-        sys.stdout.buffer.flush()
+        with writing(tempfile.gettempdir()):
+            write(file)
+            file.seek(0)
+        try:
+            shutil.copyfileobj(file, sys.stdout.buffer)
+            sys.stdout.buffer.flush()
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+            raise OutputError(
+                "PTM-O003" if full else "PTM-O002",
+                "the disk is full" if full else f"cannot be written ({error.strerror})",
+                file="standard output",
+                remedy="what was written is not whole",
+            ) from error

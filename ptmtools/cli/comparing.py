@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ptmtools.cli.batch import expanded
+from ptmtools.cli.batch import expanded, no_name
 from ptmtools.cli.common import as_json, limited, voiced
 from ptmtools.cli.output import Voice, count, size
 from ptmtools.errors import naming
@@ -74,6 +74,8 @@ def compare(
     sources = expanded(images, SUFFIXES)
     measured = []
     for source in sources:
+        if not source:
+            raise no_name()
         with naming(source):
             texels = load_image(source, limits).array()
             measured.append(measure(texels, contenders, repeat))

@@ -8,14 +8,14 @@ from typing import IO, TYPE_CHECKING, Any
 
 import click
 
-from ptmtools.cli.batch import STANDARD, expanded, for_each, standard_input, targets
+from ptmtools.cli.batch import STANDARD, Job, expanded, for_each, jobs_for, standard_input
 from ptmtools.cli.batch import to_standard_output as to_stdout
 from ptmtools.cli.common import as_json, forced, limited, voiced, workers
 from ptmtools.cli.output import Voice, count, size
 from ptmtools.cli.parameters import Numbers, options_of, take
-from ptmtools.errors import naming
+from ptmtools.errors import InputError, OutputError, naming
 from ptmtools.files import refuse_existing, write_with
-from ptmtools.texture.model import EncodeOptions
+from ptmtools.texture.model import Description, EncodeOptions
 
 if TYPE_CHECKING:
     from ptmtools.texture.model import Limits
@@ -63,12 +63,14 @@ def encode(
     options = take(EncodeOptions, values)
     check_options(options)
     sources = expanded(images, SUFFIXES)
-    jobs = list(zip(sources, targets(sources, output, images, ".ptm"), strict=True))
-    voice.aside = jobs[0][1] is None
+    jobs = jobs_for(sources, output, images, ".ptm")
+    voice.aside = any(job.to_stdout for job in jobs)
+    if output and not os.path.isdir(output):
+        _refuse_image_suffix(output)
     told: list[dict[str, object]] = []
 
-    def work(job: tuple[str, Path | None], threads: int) -> dict[str, object]:
-        source, target = job
+    def work(job: Job, threads: int) -> dict[str, object]:
+        source, target = job.source, job.target
         if target and not force:
             refuse_existing(target)
         report: dict[str, object] = {
@@ -119,7 +121,7 @@ def encode(
 )
 @click.option(
     "--window",
-    type=Numbers([4]),
+    type=Numbers([4], int),
     metavar="X,Y,W,H",
     help="Only these texels of the level: from column X and row Y on, W wide and H high.",
 )
@@ -133,16 +135,18 @@ def encode(
 @limited
 @workers
 @forced
+@as_json
 @voiced
 def decode(
     voice: Voice,
     files: tuple[str, ...],
     level: int | None,
-    window: tuple[float, ...] | None,
+    window: tuple[int, int, int, int] | None,
     output: str | None,
     limits: Limits,
     workers: int,
     force: bool,
+    as_json: bool,
 ) -> int:
     """Decode .ptm files, or their beginnings, to images.
 
@@ -154,17 +158,17 @@ def decode(
     from ptmtools.texture.reader import open
 
     sources = expanded(files, (".ptm",))
-    jobs = list(zip(sources, targets(sources, output, files, ""), strict=True))
-    voice.aside = jobs[0][1] is None
+    jobs = jobs_for(sources, output, files, "")
+    voice.aside = any(job.to_stdout for job in jobs)
     # One name is an image's; what goes into a folder, or beside its file, gets a suffix.
     named = output is not None and output != STANDARD and not Path(output).is_dir()
     if named:
         with naming(output):
             writer(Path(str(output)).suffix)
-    box = _whole_numbers(window)
+    told: list[dict[str, object]] = []
 
-    def work(job: tuple[str, Path | None], threads: int) -> str:
-        source, target = job
+    def work(job: Job, threads: int) -> dict[str, Any]:
+        source, target = job.source, job.target
         where = standard_input() if source == STANDARD else source
         with naming(source), open(where, limits=limits, threads=threads) as ptm:
             suffix = ".npy" if ptm.dtype.kind == "f" else ".png"
@@ -174,12 +178,14 @@ def decode(
                 target = target.with_name(target.name + suffix)
             if target and not force:
                 refuse_existing(target)
-            if box:
-                number = max(0, ptm.whole - 1) if level is None else level
-                texels = ptm.window(number, *box)
-            else:
-                texels = ptm.level(level)
-            description = ptm.description()
+            # The sizes of files and of stdin are known, and so is what is whole.
+            number = max(0, ptm.whole - 1) if level is None else level
+            texels = ptm.window(number, *window) if window else ptm.level(number)
+            description, warning = Description(), None
+            try:
+                description = ptm.description()
+            except InputError as error:  # the texels are intact
+                warning = error
 
         def write(file: IO[bytes]) -> None:
             write_to(file, suffix, texels, description)
@@ -190,18 +196,46 @@ def decode(
         else:
             to_stdout(write)
         height, width, components = texels.shape
-        kind = "" if texels.dtype.itemsize == 1 else f" of {texels.dtype}"
-        name = target or STANDARD
-        return f"{name}: {width} x {height}, {count(components, 'component')}{kind}"
+        return {
+            "file": source,
+            "image": os.fspath(target) if target else STANDARD,
+            "level": number,
+            "width": width,
+            "height": height,
+            "components": components,
+            "kind": texels.dtype.name,
+            "warning": warning and f"{warning.message} [{warning.code}]",
+        }
 
-    return for_each(voice, jobs, work, voice.say, workers, "files")
+    def tell(report: dict[str, Any]) -> None:
+        told.append(report)
+        if report["warning"]:
+            voice.warn(
+                f"{report['file']}: written without colour and orientation: {report['warning']}"
+            )
+        if not as_json:
+            kind = "" if report["kind"] == "uint8" else f" of {report['kind']}"
+            voice.say(
+                f"{report['image']}: {report['width']} x {report['height']}, "
+                f"{count(report['components'], 'component')}{kind}"
+            )
+
+    status = for_each(voice, jobs, work, tell, workers, "files")
+    if as_json:
+        voice.emit_json(told)
+    return status
 
 
-def _whole_numbers(window: tuple[float, ...] | None) -> tuple[int, int, int, int] | None:
-    """The window in texels. Raises click.BadParameter."""
-    if window is None:
-        return None
-    if not all(number.is_integer() for number in window):
-        raise click.BadParameter("it must be four whole numbers", None, None, "--window")
-    x, y, width, height = map(int, window)
-    return x, y, width, height
+def _refuse_image_suffix(output: str) -> None:
+    """Raise OutputError PTM-O101 if what is written would pass for an image of another format."""
+    from ptmtools.texture.images import SUFFIXES, WRITTEN
+    from ptmtools.texture.images.writing import LOSSY
+
+    suffix = Path(output).suffix.lower()
+    if suffix in (*SUFFIXES, *WRITTEN, *LOSSY):
+        raise OutputError(
+            "PTM-O101",
+            f"the suffix {suffix!r} is that of an image; a .ptm is written",
+            file=output,
+            remedy="name the output .ptm",
+        )

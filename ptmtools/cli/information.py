@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from ptmtools.cli.batch import STANDARD, standard_input
+from ptmtools.cli.batch import STANDARD, no_name, standard_input
 from ptmtools.cli.common import as_json, voiced
 from ptmtools.cli.output import Voice, count, size
 from ptmtools.errors import InputError, naming
@@ -28,6 +28,8 @@ def info(voice: Voice, target: str, as_json: bool) -> None:
 
     Of a .ptm no more than its head is read.
     """
+    if not target:
+        raise no_name()
     if target != STANDARD and Path(target).is_dir():
         _info_database(voice, target, as_json)
     else:

@@ -32,6 +32,10 @@ class Voice:
         if not self.quiet:
             click.echo(text, err=self.aside)
 
+    def warn(self, text: str) -> None:
+        """A line on stderr, of what is wrong and does not stop the command."""
+        click.echo(f"ptm: {text}", err=True)
+
     def emit_json(self, document: Any) -> None:
         """The result as JSON on stdout; ``--quiet`` does not silence what was asked for."""
         import json

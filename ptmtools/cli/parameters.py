@@ -25,12 +25,13 @@ SINGULAR = {"viewpoints": "viewpoint", "image_folders": "image_folder"}
 
 
 class Numbers(click.ParamType):  # type: ignore[type-arg]  # generic only in newer Clicks
-    """``X,Y,Z``: so many numbers, separated by commas."""
+    """``X,Y,Z``: so many numbers, separated by commas; ``kind`` is float or int."""
 
     name = "numbers"
 
-    def __init__(self, counts: Sequence[int]) -> None:
+    def __init__(self, counts: Sequence[int], kind: type[float] = float) -> None:
         self.counts = tuple(counts)
+        self.kind = kind
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
         return "X,Y,Z" if self.counts == (3,) else ",".join("N" * self.counts[0])
@@ -41,12 +42,13 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # generic only in new
         if isinstance(value, tuple):
             return value
         try:
-            numbers = tuple(float(part) for part in str(value).split(","))
+            numbers = tuple(self.kind(part) for part in str(value).split(","))
         except ValueError:
             numbers = ()
         if len(numbers) not in self.counts:
             wanted = " or ".join(str(count) for count in self.counts)
-            self.fail(f"{value!r} is not {wanted} numbers separated by commas", param, ctx)
+            whole = "whole " if self.kind is int else ""
+            self.fail(f"{value!r} is not {wanted} {whole}numbers separated by commas", param, ctx)
         return numbers
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from ptmtools.cli.batch import no_name
 from ptmtools.cli.common import as_json, database, forced, voiced
 from ptmtools.cli.output import Voice, count, size
 from ptmtools.cli.parameters import options_of, take
@@ -39,6 +40,8 @@ def validate(voice: Voice, target: str, segments: int, strict: bool, as_json: bo
 
     Exits with 8 if it finds an error.
     """
+    if not target:
+        raise no_name()
     with voice.progress() as progress:
         report = check(target, progress)
         shot = shoot_segments(target, segments, progress) if segments else None

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import io
 import json
+import os
+import subprocess
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -96,6 +99,67 @@ def test_good_images_are_encoded_in_spite_of_bad_ones(
     assert sorted(path.name for path in folder.iterdir() if path.name.startswith(".")) == []
 
 
+def test_each_file_once_and_none_over_another(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("a.tga").write_bytes(Path("a.png").read_bytes())
+    assert main(["encode", ".", "sub/c.png", "./sub/../sub/c.png", "--profile", "raw"]) == 4
+    out, err = capsys.readouterr()
+    assert [line.partition(":")[0] for line in out.splitlines()] == ["b.ptm", "sub/c.ptm"]
+    (line,) = err.splitlines()
+    assert line.startswith("ptm: a.ptm: ./a.png and ./a.tga would both")
+    assert line.endswith("[PTM-O103]")
+    assert not Path("a.ptm").exists()
+    assert main(["-q", "encode", "a.png", "./a.png", "-o", "x.ptm", "--profile", "raw"]) == 0
+    Path("linked").symlink_to("sub")
+    Path("d.png").symlink_to("a.png")
+    named = ["sub/c.png", "linked/c.png", "d.png"]
+    assert main(["encode", *named, "--profile", "raw", "--force"]) == 0
+    out = capsys.readouterr().out
+    assert [line.partition(":")[0] for line in out.splitlines()] == ["sub/c.ptm", "d.ptm"]
+
+
+def test_a_name_that_is_empty_does_not_stop_the_others(folder: Path) -> None:
+    assert main(["-q", "encode", "", "a.png", "--profile", "raw"]) == 3
+    np.testing.assert_array_equal(decode("a.ptm"), RGB)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs pipes that have a name")
+def test_pipes_are_as_standard_input(folder: Path, through: Callable[..., Any]) -> None:
+    os.mkfifo("pipe")
+
+    def piped(data: bytes, *arguments: str) -> tuple[int, bytes, str]:
+        writer = threading.Thread(target=Path("pipe").write_bytes, args=[data], daemon=True)
+        writer.start()
+        found = through(b"", *arguments)
+        writer.join()
+        return found
+
+    status, data, err = piped(png_bytes(RGB), "encode", "pipe", "--profile", "raw")
+    assert (status, data) == (0, encode(RGB, RAW))
+    assert err.startswith("-: 5 levels")
+    assert piped(data, "decode", "pipe", "-q") == (0, png_bytes(RGB), "")
+    assert piped(data, "decode", "pipe", "-q", "-o", "x.png") == (0, b"", "")
+    np.testing.assert_array_equal(load_image("x.png").array(), RGB)
+    status, told, _ = piped(data, "info", "pipe", "--json")
+    assert (status, json.loads(told)["whole_levels"]) == (0, 5)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is full")
+@pytest.mark.parametrize("arguments", [["encode", "a.png"], ["decode", "a.ptm"]])
+def test_standard_output_is_full(arguments: list[str], folder: Path) -> None:
+    (folder / "a.ptm").write_bytes(encode(RGB, RAW))
+    script = Path(sys.executable).with_name("ptm")
+    with open("/dev/full", "wb") as full:
+        run = subprocess.run(
+            [script, *arguments, "-o", "-"], stdout=full, stderr=subprocess.PIPE, text=True
+        )
+    (line,) = run.stderr.splitlines()
+    assert line.startswith("ptm: standard output: ")
+    assert line.endswith("[PTM-O003]")
+    assert run.returncode == 4
+
+
 def test_stdin_and_stdout(folder: Path, through: Callable[..., Any]) -> None:
     status, data, err = through(png_bytes(RGB), "encode", "-", "--profile", "raw")
     assert (status, data) == (0, encode(RGB, RAW))
@@ -160,6 +224,44 @@ def test_colour_and_orientation_come_back(folder: Path) -> None:
         assert ptm.description().orientation == 1
         assert ptm.description().icc == b"a profile"
         np.testing.assert_array_equal(ptm.level(), np.rot90(RGB, -1))
+
+
+def test_a_damaged_description_is_told_and_left_out(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = bytearray(encode(RGB, RAW, description=Description(b"a profile", orientation=6)))
+    data[data.index(b"a profile")] ^= 1
+    (folder / "x.ptm").write_bytes(data)
+    assert main(["-q", "decode", "x.ptm"]) == 0
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("ptm: x.ptm: written without colour and orientation")
+    assert line.endswith("[PTM-I108]")
+    picture = load_image("x.png")
+    assert picture.description == Description()
+    np.testing.assert_array_equal(picture.array(), RGB)
+    assert main(["-q", "validate", "x.ptm"]) == 8
+
+
+def test_decode_reports_as_json(folder: Path, through: Callable[..., Any]) -> None:
+    (folder / "x.ptm").write_bytes(encode(RGB.astype(np.float32), RAW))
+    status, out, err = through(b"", "decode", "x.ptm", "no.ptm", "--json", "--level", "3")
+    assert (status, err.strip()[-10:]) == (3, "[PTM-I120]")
+    assert json.loads(out) == [
+        {
+            "file": "x.ptm",
+            "image": "x.npy",
+            "level": 3,
+            "width": 17,
+            "height": 10,
+            "components": 3,
+            "kind": "float32",
+            "warning": None,
+        }
+    ]
+    data = encode(RGB, RAW)
+    status, out, err = through(data[:-1], "decode", "-", "--json")
+    np.testing.assert_array_equal(load_image(out).array(), build_pyramid(RGB)[3])
+    assert (json.loads(err)[0]["image"], json.loads(err)[0]["level"]) == ("-", 3)
 
 
 def test_info_counts(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -254,7 +254,20 @@ CASES: dict[str, tuple[Prepare, str, int, str]] = {
     "output where nobody may write": (nothing, "encode model/floor.png -o /proc/a.ptm", 4, "O002"),
     "output is a device": (nothing, "encode model/floor.png --force -o /dev/full", 4, "O002"),
     "several images to one file": (nothing, TWO + " -o a.ptm", 2, "U001"),
-    "two images of one name": (grey("room_a.png"), TWO + " room_a.png -o .", 2, "U001"),
+    "two images of one name": (
+        grey("room_a.png"),
+        "encode model/room_a.png room_a.png -o .",
+        4,
+        "O103",
+    ),
+    "image without a name": (nothing, "encode ☃☃", 3, "I120"),
+    "texture without a name": (nothing, "decode ☃☃", 3, "I120"),
+    "nothing to tell of": (nothing, "info ☃☃", 3, "I120"),
+    "nothing to check": (nothing, "validate ☃☃", 3, "I120"),
+    "nothing to compare": (nothing, "compare ☃☃", 3, "I120"),
+    "output without a name": (nothing, "encode model/floor.png -o ☃☃", 2, "U001"),
+    "output named like an image": (nothing, "encode model/floor.png -o a.PNG", 4, "O101"),
+    "output named like a lossy image": (nothing, "encode model/floor.png -o a.jxl", 4, "O101"),
     "a .ptm as image": (noise, "encode a.ptm -o b.ptm", 3, "I124"),
     "Polynomial Texture Map": (file("a.ptm", HP), "decode a.ptm", 3, "I"),
     ".ptm that is text": (file("a.ptm", b"hello"), "decode a.ptm", 3, "I"),
@@ -274,6 +287,7 @@ CASES: dict[str, tuple[Prepare, str, int, str]] = {
     "window outside": (noise, "decode a.ptm --window 30,30,3,3", 3, "I106"),
     "window of no size": (noise, "decode a.ptm --window 3,3,0,3", 3, "I106"),
     "window of fractions": (noise, "decode a.ptm --window 3,3,0.5,3", 2, "U001"),
+    "window of almost whole numbers": (noise, "decode a.ptm --window 3,3,2.0,3", 2, "U001"),
     "window of three": (noise, "decode a.ptm --window 3,3,3", 2, "U001"),
 }  # fmt: skip
 
@@ -289,7 +303,8 @@ def folder(
 
 
 def split(arguments: str) -> list[str]:
-    return [part.replace("☃", " ") for part in arguments.split()]
+    """☃ stands for a space in an argument, ☃☃ for an empty argument."""
+    return ["" if part == "☃☃" else part.replace("☃", " ") for part in arguments.split()]
 
 
 @pytest.mark.parametrize("name", CASES)

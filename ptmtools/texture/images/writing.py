@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     Samples = NDArray[Any]
 
 _PLAIN = Description()
-_LOSSY = (".jpg", ".jpeg", ".jxl", ".webp", ".avif", ".heic", ".gif")
+#: Suffixes of formats that would change texels, or might.
+LOSSY = (".jpg", ".jpeg", ".jxl", ".webp", ".avif", ".heic", ".gif")
 
 
 def write_image(
@@ -73,7 +74,7 @@ def writer(suffix: str) -> Writer:
     """What writes files of that suffix. Raises OutputError PTM-O101."""
     found = WRITTEN.get(suffix.lower())
     if found is None:
-        why = "would change the texels" if suffix.lower() in _LOSSY else "is not written"
+        why = "would change the texels" if suffix.lower() in LOSSY else "is not written"
         raise OutputError(
             "PTM-O101",
             f"the suffix {suffix!r} {why}",
