@@ -23,7 +23,7 @@ import numpy as np
 from images import OUTPUT, best
 from numpy.typing import NDArray
 
-from ptmtools.texture import EncodeOptions, build_pyramid, decode_levels, encode, read_image
+from ptmtools.texture import EncodeOptions, build_pyramid, decode_levels, encode, load_image
 
 Samples = NDArray[Any]
 SIDE = 768
@@ -119,7 +119,7 @@ def main() -> None:
     given = parser.parse_args()
     images = made()
     for file in given.images or sorted((OUTPUT / "hdr").glob("*.*")):
-        images[file.name] = read_image(file)
+        images[file.name] = load_image(file).array()
     exact(next(iter(images.values()))[:64, :64], "fast")
     for name, image in images.items():
         print(f"{name}, {image.shape[1]} x {image.shape[0]} x {image.shape[2]}")
