@@ -175,9 +175,8 @@ def test_a_damaged_description_is_found() -> None:
     data[offset + length - 1] ^= 1
     with texture.open(bytes(data)) as ptm, pytest.raises(InputError, match="PTM-I108"):
         ptm.description()
-    assert texture.check(bytes(data)) == [
-        problem for problem in texture.check(bytes(data)) if "description" in problem
-    ]
+    (problem,) = texture.check(bytes(data))
+    assert problem.startswith("description: the checksum is wrong")
     with texture.open(bytes(data[: offset + 5])) as ptm, pytest.raises(InputError, match="I107"):
         ptm.description()
 
