@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
 
 import numpy as np
@@ -50,10 +51,22 @@ class Symbols:
         return next(self._escapes) if z == 255 and table < self._plain else z
 
 
+def built_in(kind: int) -> Row:
+    """Built-in table number ``kind``, from 1, of the coders of 8 bits."""
+    return _geometric(BUILT_IN_MEANS[kind - 1])
+
+
 def read_tables(
-    group: bytes, at: int, count: int, version_1: bool = False
+    group: bytes,
+    at: int,
+    count: int,
+    version_1: bool = False,
+    family: Callable[[int], Row] = built_in,
 ) -> tuple[list[Row], int]:
-    """The frequency tables at ``at`` in a group, and where they end."""
+    """The frequency tables at ``at`` in a group, and where they end.
+
+    ``family`` makes built-in tables.
+    """
     kinds: Row = []
     if version_1:
         kinds = list(group[at : at + count])
@@ -88,12 +101,12 @@ def read_tables(
             for z in range(next(sent)):
                 table[z] = next(sent)
         elif kind:
-            table = _built_in(BUILT_IN_MEANS[kind - 1])
+            table = family(kind)
         tables.append(table)
     return tables, at + size
 
 
-def _built_in(mean: int) -> Row:
+def _geometric(mean: int) -> Row:
     u = [1 << 24]
     for z in range(1, 255):
         u.append(u[-1] * (65536 * mean // (16 + mean)) >> 16 if z & 1 else u[-1])

@@ -3,7 +3,7 @@
 Least squares over a sample of block rows, one system of ten to twelve unknowns for each plane and
 each of p, q, r, s. Each sample is divided by the spread of its neighbours first, so that smooth and
 rough parts, dark and bright ones have the same say: what counts is bits, the logarithm of an error.
-The normal equations are sums of whole numbers and solved exactly (`haar.fit`).
+The normal equations are sums of whole numbers and solved exactly (`coders.equations`).
 
 Beside the fitted weights stand those that continue drawn and computed images exactly (the texel
 above, the one to the left, the plane through both): a depth map of 512² texels takes 44 kB with
@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.haar.fit import _bareiss
+from ptmtools.texture.coders.equations import bareiss
 from ptmtools.texture.coders.texel.layout import (
     NEIGHBOURS,
     WEIGHT_BITS,
@@ -134,7 +134,7 @@ def _solve(f: Array, target: Array, least: int) -> Array:
     for i in range(len(f)):
         # A ridge: a feature that never varies gets the weight 0.
         matrix[i][i] += (matrix[i][i] >> 12) + SCALE * SCALE
-    numerators, determinant = _bareiss(matrix, right)
+    numerators, determinant = bareiss(matrix, right)
     one = 2 << WEIGHT_BITS
     found = [(one * n + determinant) // (2 * determinant) for n in numerators]
     weights = np.clip(found, -WEIGHT_TOP, WEIGHT_TOP).astype(np.int64)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.rans.reference import normalised
+from ptmtools.texture.coders.rans.reference import Symbols, normalised, read_tables
 from ptmtools.texture.coders.texel import layout
 
 CLASSES, NARROW, GRID, TABLES = 18, 216, 232, 236
@@ -83,14 +83,10 @@ class _Decoder:
                     for i in range(10 + n):
                         w = read.take(2)
                         self.weights[c][k][i] = w - 65536 if w > 32767 else w
-        self.tables = _read_tables(read)
+        tables, read.at = read_tables(group, read.at, TABLES, family=built_in)
         size = read.take(4)
         self.plain = read.take(size)
-        escaped = read.take(4)
-        self.escapes = [read.take(2) for _ in range(escaped)]
-        self.words = _Bytes(group[read.at :])
-        self.states = [self.words.take(4) for _ in range(4)]
-        self.count = 0
+        self.symbols = Symbols(group[read.at :], 0, tables)
         self.means = [[[self._ordered(v) for v in texel] for texel in row] for row in below]
 
     def level(self) -> NDArray[Any]:
@@ -151,7 +147,8 @@ class _Decoder:
                         if shift:
                             lowest, highest = -(-low >> shift), high >> shift
                             before = 2 * off[plane] + (off[self.order[0]] if c > 0 else 0)
-                            off[plane] = self._symbol(GRID + before) if lowest <= highest else 1
+                            fits = lowest <= highest
+                            off[plane] = self.symbols.next(GRID + before) if fits else 1
                             if off[plane]:
                                 shift = 0
                             else:
@@ -236,63 +233,13 @@ class _Decoder:
         return ordered ^ sign if ordered & sign else ordered ^ (2 * sign - 1)
 
     def _number(self, table: int) -> int:
-        token = self._symbol(table)
+        token = self.symbols.next(table)
         if token < 16:
             return token
         bits = (token - 16 >> 2) + 2
         rest = self.plain & ((1 << bits) - 1)
         self.plain >>= bits
         return (4 + (token & 3)) << bits | rest
-
-    def _symbol(self, table: int) -> int:
-        lane = self.count & 3
-        self.count += 1
-        state = self.states[lane]
-        slot, start, symbol = state & 2047, 0, 0
-        while not start <= slot < start + self.tables[table][symbol]:
-            start += self.tables[table][symbol]
-            symbol += 1
-        state = self.tables[table][symbol] * (state >> 11) + slot - start
-        if state < 1 << 15:
-            state = state << 16 | self.words.take(2)
-        self.states[lane] = state
-        return self.escapes.pop(0) if symbol == 255 else symbol
-
-
-def _read_tables(read: _Bytes) -> list[list[int]]:
-    numbers: list[int] = []
-    n, shift = 0, 0
-    for _ in range(read.take(2)):
-        byte = read.take(1)
-        for nibble in (byte & 15, byte >> 4):
-            n |= (nibble & 7) << shift
-            shift += 3
-            if nibble < 8:
-                numbers.append(n)
-                n, shift = 0, 0
-    following = iter(numbers)
-    kinds: list[int] = []
-    last = 4
-    while len(kinds) < TABLES:
-        number = next(following)
-        if number == 0:
-            kinds += [0] * (1 + next(following))
-        elif number == 1:
-            kinds.append(255)
-        else:
-            last += -(number - 1) // 2 if number & 1 else (number - 2) // 2
-            kinds.append(last)
-    out = []
-    for kind in kinds:
-        table = [0] * 256
-        if kind == 255:
-            table[255] = next(following)
-            for z in range(next(following)):
-                table[z] = next(following)
-        elif kind:
-            table = built_in(kind)
-        out.append(table)
-    return out
 
 
 def built_in(kind: int) -> list[int]:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.texture.coders.equations import bareiss
 from ptmtools.texture.coders.haar.layout import (
     BUILT_IN_WEIGHTS,
     WEIGHT_TOP,
@@ -43,7 +44,7 @@ def fit_weights(
     bh, bw, nc = below.shape
     if bh * bw < FEWEST_BLOCKS or min(bh, bw) < 4:
         return None
-    from ptmtools.texture.coders.haar import kernels
+    from ptmtools.texture.coders.haar.fitting import kernels
 
     step = max(1, bh // SAMPLED_ROWS)
     sampled = np.arange(step // 2, bh, step)
@@ -73,31 +74,6 @@ def _solve(sums: NDArray[np.int64]) -> NDArray[np.int32]:
     for i in range(len(matrix)):
         # A ridge: a feature that never varies gets the weight 0.
         matrix[i][i] += (matrix[i][i] >> 16) + 4096
-    numerators, determinant = _bareiss(matrix, sums[:, -1].tolist())
+    numerators, determinant = bareiss(matrix, sums[:, -1].tolist())
     found = [(512 * n + determinant) // (2 * determinant) for n in numerators]
     return np.clip(found, -WEIGHT_TOP, WEIGHT_TOP).astype(np.int32)
-
-
-def _bareiss(matrix: list[list[int]], right: list[int]) -> tuple[list[int], int]:
-    """x = numerators / determinant with matrix · x = right; symmetric, positive definite, exact.
-
-    Only the upper half is eliminated: it stays symmetric, and all divisions are exact.
-    """
-    n = len(matrix)
-    rows = [[*row, b] for row, b in zip(matrix, right, strict=True)]
-    previous = 1
-    for k in range(n - 1):
-        pivot_row = rows[k]
-        pivot = pivot_row[k]
-        for i in range(k + 1, n):
-            row, factor = rows[i], pivot_row[i]
-            for j in range(i, n + 1):
-                row[j] = (row[j] * pivot - factor * pivot_row[j]) // previous
-        previous = pivot
-    determinant = rows[-1][n - 1]
-    numerators = [0] * n
-    for i in range(n - 1, -1, -1):
-        row = rows[i]
-        total = determinant * row[n] - sum(row[j] * numerators[j] for j in range(i + 1, n))
-        numerators[i] = total // row[i]
-    return numerators, determinant
