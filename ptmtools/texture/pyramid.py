@@ -15,6 +15,7 @@ NaN 0x7E00 or 0x7FC00000.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -71,11 +72,14 @@ def _means(blocks: NDArray[Any]) -> NDArray[Any]:
 
     if blocks.dtype.kind == "u":
         wide = np.uint16 if blocks.dtype.itemsize == 1 else np.uint32
-        rows: NDArray[Any] = blocks[0::2].astype(wide)
-        rows += blocks[1::2]
-        total: NDArray[Any] = rows[:, 0::2] + rows[:, 1::2]
-        total >>= 2
-        return total.astype(blocks.dtype)
+        rows: NDArray[Any] = np.add(blocks[0::2], blocks[1::2], dtype=wide)
+        rows = rows.reshape(*rows.shape[:2], math.prod(rows.shape[2:]))
+        below = np.empty((len(rows), rows.shape[1] // 2, rows.shape[2]), blocks.dtype)
+        # One component at a time: numpy's innermost loop should not be one over three of them.
+        for c in range(rows.shape[2]):
+            total = rows[:, 0::2, c] + rows[:, 1::2, c]
+            np.right_shift(total, 2, out=below[..., c], casting="unsafe")
+        return below.reshape(*below.shape[:2], *blocks.shape[2:])
     with np.errstate(all="ignore"):
         real = blocks.astype(np.float64)
         upper, lower = real[0::2], real[1::2]

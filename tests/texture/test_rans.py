@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
 from ptmtools.texture.coders.rans import kernels, tables
 from ptmtools.texture.coders.rans.reference import Symbols, normalised, read_tables
-from ptmtools.texture.coders.rans.stream import encode_symbols, read_stream
+from ptmtools.texture.coders.rans.stream import Stream, encode_symbols, read_stream
 
 TABLES = 29
 
@@ -62,37 +65,56 @@ def test_the_length_table_is_a_logarithm() -> None:
     assert np.abs(tables._log_table()[1:] - exact).max() <= 1.5
 
 
-def test_symbols_come_back_row_by_row() -> None:
+@pytest.fixture(scope="module")
+def coded() -> tuple[Stream, tables.Frequencies, NDArray[np.uint16], NDArray[np.uint8]]:
+    """A stream, its tables (of which the second is not in use), its symbols and their tables."""
     rng = np.random.default_rng(5)
     symbols = rng.geometric(0.2, 1000).astype(np.uint16) * rng.integers(0, 12, 1000, np.uint16)
-    contexts = rng.integers(0, 3, 1000, np.uint8)
+    contexts = rng.choice(np.array([0, 2, 3], np.uint8), 1000)
     symbols[7] = 40_000
-    counts = np.zeros((3, 256), np.int64)
+    counts = np.zeros((4, 256), np.int64)
     np.add.at(counts, (contexts, np.minimum(symbols, tables.ESCAPE)), 1)
-    frequency, _ = tables.choose(counts, 3)
-    data = encode_symbols(symbols, contexts, frequency, 3)
-
+    frequency, _ = tables.choose(counts, 4)
+    data = encode_symbols(symbols, contexts, frequency, 4)
     plain = Symbols(data, 0, frequency.tolist())
     assert [plain.next(int(t)) for t in contexts] == symbols.tolist()
+    return read_stream(data, 301), frequency, symbols, contexts
 
-    stream = read_stream(data, 301)
+
+def test_symbols_come_back_row_by_row(coded: Any) -> None:
+    stream, frequency, symbols, contexts = coded
     state = np.zeros(4, np.uint64)
     kernels.start_states(stream.words, state)
-    table = tables.decoding_table(frequency)
-    starts = np.arange(3, dtype=np.uint64) * tables.TABLE_SIZE
+    table, begins = tables.row_tables(frequency)
     at, escaped, found = 8, 0, []
     for row in (slice(0, 301), slice(301, 303), slice(303, 600), slice(600, 1000)):
         n = row.stop - row.start
         out = np.zeros(n, np.int32)
         at = kernels.decode_row(
-            state, stream.words, at, table, starts, contexts[row].astype(np.int32), n, out
-        )
+            state, stream.words, at, table, begins.astype(np.uint64),
+            contexts[row].astype(np.int32), n, out,
+        )  # fmt: skip
         kernels.rotate_states(state, n)
         escaped = kernels.fill_escapes(out, n, stream.escapes, escaped)
         found += out.tolist()
     assert found == symbols.tolist()
     assert at == stream.limit
     assert escaped == len(stream.escapes)
+    assert (state == kernels.STATE_LOW).all()
+
+
+def test_symbols_come_back_one_by_one(coded: Any) -> None:
+    stream, frequency, symbols, contexts = coded
+    state = np.zeros(4, np.uint64)
+    kernels.start_states(stream.words, state)
+    table = tables.single_tables(frequency)
+    at, escapes, found = 8, iter(stream.escapes.tolist()), []
+    for i, context in enumerate(contexts):
+        z, used = kernels.decode_single(table, context, state, np.uint64(i & 3), stream.words[at])
+        at += used
+        found.append(next(escapes) if z == kernels.ESCAPE else z)
+    assert found == symbols.tolist()
+    assert at == stream.limit
     assert (state == kernels.STATE_LOW).all()
 
 

@@ -6,6 +6,8 @@ frequency tables; the number of escapes and the escapes; the rANS words to the e
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,7 +27,7 @@ Bytes = NDArray[np.uint8]
 class _Ranks:
     """For each component, ranks in place of values (``ranks``) and back (``values``)."""
 
-    def __init__(self, sets: list[NDArray[np.intp] | None]) -> None:
+    def __init__(self, sets: tuple[NDArray[np.intp] | None, ...]) -> None:
         count = len(sets)
         self.ranks = np.tile(np.arange(256, dtype=np.int32), (count, 1))
         self.values = self.ranks.copy()
@@ -39,14 +41,25 @@ class _Ranks:
                 self.tops[c] = len(used) - 1
 
 
-def _sparse_values(blocks: Bytes) -> list[NDArray[np.intp] | None]:
+@cache
+def _values_themselves(components: int) -> _Ranks:
+    return _Ranks((None,) * components)
+
+
+def _ranks(sets: tuple[NDArray[np.intp] | None, ...]) -> _Ranks:
+    if all(used is None for used in sets):
+        return _values_themselves(len(sets))
+    return _Ranks(sets)
+
+
+def _sparse_values(blocks: Bytes) -> tuple[NDArray[np.intp] | None, ...]:
     """For each component its distinct values, if they are few for their range; else None."""
     from ptmtools.texture.coders.haar import kernels
 
     components = blocks.shape[2]
     used = np.zeros((components, 256), np.uint8)
     kernels.mark_values(blocks, used)
-    return [_if_sparse(np.flatnonzero(one), blocks.size // components) for one in used]
+    return tuple(_if_sparse(np.flatnonzero(one), blocks.size // components) for one in used)
 
 
 def _if_sparse(values: NDArray[np.intp], samples: int) -> NDArray[np.intp] | None:
@@ -59,7 +72,7 @@ def encode(level: Bytes, below: Bytes) -> bytes:
     """The group that refines ``below`` (h >> 1, w >> 1, c) to ``level`` (h, w, c)."""
     components = level.shape[2]
     sets = _sparse_values(level[: 2 * below.shape[0], : 2 * below.shape[1]])
-    ranks = _Ranks(sets)
+    ranks = _ranks(sets)
     sent = fit_weights(level, below, ranks.ranks)
     n = level.size - below.size
     symbols = np.zeros(n, np.uint16)
@@ -94,7 +107,7 @@ def decode(
     flags = reader.take(1)[0]
     if flags & ~(SENT_WEIGHTS | RANKED * ((1 << components) - 1)):
         raise damaged(f"flags {flags} are unknown")
-    sets = [_bits(reader.take(32)) if flags >> 4 + c & 1 else None for c in range(components)]
+    sets = tuple(_bits(reader.take(32)) if flags >> 4 + c & 1 else None for c in range(components))
     sent = None
     if flags & SENT_WEIGHTS:
         mask = _sent_mask(components)
@@ -109,8 +122,8 @@ def decode(
     edge = level.size - 4 * below.size
     stream = read_stream(reader.rest(), max(below.shape[1], edge))
     result = _pass(
-        False, level, below, sent, _Ranks(sets), words=stream.words, limit=stream.limit,
-        escapes=stream.escapes, table=tables.decoding_table(frequency), turning=not version_1,
+        False, level, below, sent, _ranks(sets), words=stream.words, limit=stream.limit,
+        escapes=stream.escapes, lookup=tables.row_tables(frequency), turning=not version_1,
     )  # fmt: skip
     if result == kernels.TRUNCATED:
         raise damaged("its stream ends early")
@@ -131,7 +144,7 @@ def _pass(
     words: NDArray[np.uint16] | None = None,
     limit: int = 0,
     escapes: NDArray[np.uint16] | None = None,
-    table: NDArray[np.uint32] | None = None,
+    lookup: tuple[NDArray[np.uint32], NDArray[np.int64]] | None = None,
     turning: bool = True,
 ) -> int:
     """`kernels.haar_pass`, with empty arrays for what a direction does not use."""
@@ -142,11 +155,13 @@ def _pass(
     edge = level.size - 4 * below.size
     references = layout.references(components)
     none = np.zeros(0, np.uint16)
+    no_bytes = np.zeros(0, np.uint8)
     return int(
         kernels.haar_pass(
             encoding,
             turning,
             level,
+            no_bytes if encoding else level.reshape(-1),
             below,
             np.array(layout.plane_order(components), np.int64),
             references,
@@ -157,17 +172,18 @@ def _pass(
             ranks.values,
             ranks.tops,
             none if symbols is None else symbols,
-            np.zeros(0, np.uint8) if contexts is None else contexts,
-            np.zeros((layout.TABLES, 256), np.int64) if counts is None else counts,
+            no_bytes if contexts is None else contexts,
+            np.zeros((layout.TABLES, 0), np.int64) if counts is None else counts,
             none if words is None else words,
             limit,
             none if escapes is None else escapes,
-            np.zeros(0, np.uint32) if table is None else table,
+            *(lookup or (np.zeros(0, np.uint32), np.zeros(layout.TABLES, np.int64))),
             kernels.workspace(below.shape[1], components, edge, len(classes)),
         )
     )
 
 
+@cache
 def _sent_mask(components: int) -> NDArray[np.bool_]:
     """Which weights (c, 3, 7) are sent, in this order."""
     mask = np.zeros((components, 3, 7), np.bool_)

@@ -20,14 +20,13 @@ from ptmtools.compiled import plain_kernel as kernel
 from ptmtools.texture.coders.rans.kernels import (
     ESCAPE,
     STATE_LOW,
-    TABLE_SIZE,
     decode_row,
     fill_escapes,
     rotate_states,
     start_states,
 )
 
-i32 = np.int32
+i32, u16 = np.int32, np.uint16
 
 #: Largest activity; larger ones count as this.
 ACTIVITY_TOP = 1023
@@ -58,6 +57,8 @@ class Workspace(NamedTuple):
     prediction: Any
     activity: Any
     decoded: Any
+    pairs: Any
+    mixed: Any
     zeros: Any
     starts: Any
     state: Any
@@ -73,7 +74,7 @@ def workspace(blocks: int, components: int, edge: int, activities: int) -> Works
         gradient=np.zeros((components, 2, blocks), i32),
         v=np.zeros((components, 2, wide), i32),
         h=np.zeros((components, 2, wide), i32),
-        g=np.zeros(wide, i32),
+        g=np.zeros((components, 2, wide), i32),
         ev=np.zeros((more, 2, wide), i32),
         eh=np.zeros((more, 2, wide), i32),
         eg=np.zeros((more, wide), i32),
@@ -83,6 +84,8 @@ def workspace(blocks: int, components: int, edge: int, activities: int) -> Works
         prediction=np.zeros(blocks, i32),
         activity=np.zeros(blocks, i32),
         decoded=np.zeros(max(blocks, edge), i32),
+        pairs=np.zeros((2, components, blocks), u16),
+        mixed=np.zeros(components * blocks, u16),
         zeros=np.zeros(edge, i32),
         starts=np.zeros((3, activities), np.uint64),
         state=np.zeros(4, np.uint64),
@@ -202,37 +205,35 @@ def _context_g(
 
 
 @kernel
-def _read_differences(level: Any, plane: int, y: int, k: int, rank: Any, out: Any) -> None:
-    """Coefficient k (V, h1, h2') of block row y, from the ranks of the texels."""
+def _read_differences(level: Any, plane: int, y: int, rank: Any, v: Any, h: Any, g: Any) -> None:
+    """V, h1 and h2' of block row y, from the ranks of the texels."""
     upper, lower = level[2 * y], level[2 * y + 1]
     c = np.uint64(plane)
-    for x in range(out.size - 2):
+    for x in range(v.size - 2):
         left, right = np.uint64(2 * x), np.uint64(2 * x + 1)
         p, q = rank[np.uint64(upper[left, c])], rank[np.uint64(upper[right, c])]
         r, s = rank[np.uint64(lower[left, c])], rank[np.uint64(lower[right, c])]
-        if k == 0:
-            out[x + 1] = i32(p + q - r - s)
-        elif k == 1:
-            out[x + 1] = i32(p - q)
-        else:
-            out[x + 1] = i32(r - s) >> 1
+        v[x + 1] = i32(p + q - r - s)
+        h[x + 1] = i32(p - q)
+        g[x + 1] = i32(r - s) >> 1
 
 
 @kernel
 def _emit(
-    values: Any, prediction: Any, activity: Any, classes: Any, first: int, residual: Any, near: Any,
-    symbols: Any, contexts: Any, counts: Any, at: int,
+    values: Any, prediction: Any, activity: Any, classes: Any, first: Any, residual: Any, near: Any,
+    symbols: Any, contexts: Any, counts: Any,
 ) -> None:  # fmt: skip
     """Encoding: residuals of a row, zigzag, with the table each is to be coded by."""
+    # Two loops: the first works on several blocks at once.
     for x in range(prediction.size):
         e = i32(values[x + 1] - prediction[x])
         residual[x + 1] = e
         near[x + 1] = abs(e)
-        z = i32(i32(e << 1) ^ i32(e >> 31))
+        symbols[x] = u16(i32(i32(e << 1) ^ i32(e >> 31)))
+    for x in range(prediction.size):
         t = first + classes[np.uint64(activity[x])]
-        symbols[at + x] = z
-        contexts[at + x] = t
-        counts[np.uint64(t), np.uint64(z if z < ESCAPE else ESCAPE)] += 1
+        contexts[x] = t
+        counts[np.uint64(t), np.uint64(min(symbols[x], u16(ESCAPE)))] += 1
 
 
 @kernel
@@ -247,14 +248,12 @@ def _absorb(decoded: Any, prediction: Any, residual: Any, near: Any, values: Any
 
 
 @kernel
-def _write_blocks(
-    row: Any, v: Any, h: Any, g: Any, texels: Any, level: Any, plane: int, y: int
-) -> int:
-    """Texels of a block row from its differences; returns bits outside a byte, if any were set."""
+def _rebuild(row: Any, v: Any, h: Any, g: Any, upper: Any, lower: Any) -> int:
+    """Two rows of texels of a plane from their differences, two texels to a number, the left one
+    in the low byte; returns bits outside a byte, if any were set.
+    """
     stray = i32(0)
-    n = row.size - 4
-    # Two loops: the first works on several blocks at once.
-    for x in range(n):
+    for x in range(row.size - 4):
         vx, hx = v[x + 1], h[x + 1]
         t = i32(i32(vx + (vx & 1)) >> 1)
         top = i32(2 * row[x + 2] + ((hx ^ t) & 1) + t)
@@ -265,29 +264,63 @@ def _write_blocks(
         r = i32(i32(bottom + d) >> 1)
         s = i32(r - d)
         stray |= p | q | r | s
-        texels[x] = i32((p & 255) | i32((q & 255) << 8) | i32((r & 255) << 16) | i32(s << 24))
-    upper, lower = level[2 * y], level[2 * y + 1]
-    c = np.uint64(plane)
-    for x in range(n):
-        four = np.uint32(texels[x])
-        left, right = np.uint64(2 * x), np.uint64(2 * x + 1)
-        upper[left, c] = four & np.uint32(255)
-        upper[right, c] = (four >> np.uint32(8)) & np.uint32(255)
-        lower[left, c] = (four >> np.uint32(16)) & np.uint32(255)
-        lower[right, c] = four >> np.uint32(24)
+        upper[x] = u16(i32((p & 255) | i32(q << 8)))
+        lower[x] = u16(i32((r & 255) | i32(s << 8)))
     return int(stray & ~255)
 
 
 @kernel
-def _write_ranked_blocks(
-    below: Any, rank: Any, value: Any, top: int, v: Any, h: Any, g: Any, level: Any, plane: int,
-    y: int,
+def _interleave(planes: Any, out: Any) -> None:
+    """Rows of (c, n) pairs of texels, from `_rebuild`, as one row of texels: n * c pairs of bytes.
+
+    Spelled out for each c: bytes moved one by one take five times as long.
+    """
+    low, high, eight = u16(255), u16(0xFF00), u16(8)
+    count = planes.shape[0]
+    a = planes[0]
+    if count == 1:
+        for x in range(a.size):
+            out[x] = a[x]
+    elif count == 2:
+        b = planes[1]
+        for x in range(a.size):
+            out[2 * x] = u16((a[x] & low) | u16(b[x] << eight))
+            out[2 * x + 1] = u16(u16(a[x] >> eight) | (b[x] & high))
+    elif count == 3:
+        b, c = planes[1], planes[2]
+        for x in range(a.size):
+            out[3 * x] = u16((a[x] & low) | u16(b[x] << eight))
+            out[3 * x + 1] = u16((c[x] & low) | (a[x] & high))
+            out[3 * x + 2] = u16(u16(b[x] >> eight) | (c[x] & high))
+    else:
+        b, c, d = planes[1], planes[2], planes[3]
+        for x in range(a.size):
+            out[4 * x] = u16((a[x] & low) | u16(b[x] << eight))
+            out[4 * x + 1] = u16((c[x] & low) | u16(d[x] << eight))
+            out[4 * x + 2] = u16(u16(a[x] >> eight) | (b[x] & high))
+            out[4 * x + 3] = u16(u16(c[x] >> eight) | (d[x] & high))
+
+
+@kernel
+def _write_row(planes: Any, pairs: Any, row: Any) -> None:
+    """A row of texels (bytes) from its planes, by way of ``pairs``."""
+    _interleave(planes, pairs)
+    for x in range(pairs.size):
+        pair = pairs[x]
+        row[2 * x] = pair & u16(255)
+        row[2 * x + 1] = pair >> u16(8)
+
+
+@kernel
+def _rebuild_ranked(
+    below: Any, rank: Any, value: Any, top: int, v: Any, h: Any, g: Any, plane: int, upper: Any,
+    lower: Any,
 ) -> int:  # fmt: skip
-    """As `_write_blocks`, for a plane whose differences are those of ranks 0 … ``top``.
+    """As `_rebuild`, for a plane whose differences are those of ranks 0 … ``top``.
 
     The differences fix the four ranks up to a common shift; each step of it raises the sum of the
-    four values by at least 4, so exactly one leaves a remainder of 0 … 3 over the texel below.
-    Returns nonzero if there is none.
+    four values by at least 4, so exactly one leaves a remainder of 0 … 3 over the texel of
+    ``below``, a row. Returns nonzero if there is none.
     """
     stray = 0
     for x in range(v.size - 2):
@@ -298,10 +331,11 @@ def _write_ranked_blocks(
         least = max(0, -min(dp, dq, dr))
         most = top - max(0, max(dp, dq, dr))
         if least > most:
+            upper[x] = lower[x] = 0
             stray = 1
             continue
-        wanted = 4 * np.int64(below[y, x, plane])
-        u = rank[below[y, x, plane]] - ((dp + dq + dr + 2) >> 2)
+        wanted = 4 * np.int64(below[x, plane])
+        u = rank[below[x, plane]] - ((dp + dq + dr + 2) >> 2)
         u = min(max(u, least), most)
         total = value[u] + value[u + dp] + value[u + dq] + value[u + dr]
         while total < wanted and u < most:
@@ -312,10 +346,8 @@ def _write_ranked_blocks(
             total = value[u] + value[u + dp] + value[u + dq] + value[u + dr]
         if total < wanted or total > wanted + 3:
             stray = 1
-        level[2 * y, 2 * x, plane] = value[u + dp]
-        level[2 * y, 2 * x + 1, plane] = value[u + dq]
-        level[2 * y + 1, 2 * x, plane] = value[u + dr]
-        level[2 * y + 1, 2 * x + 1, plane] = value[u]
+        upper[x] = value[u + dp] | value[u + dq] << 8
+        lower[x] = value[u + dr] | value[u] << 8
     return stray
 
 
@@ -360,9 +392,10 @@ def mark_values(level: Any, used: Any) -> None:
 
 @kernel
 def haar_pass(
-    encoding: bool, turning: bool, level: Any, below: Any, planes: Any, references: Any,
+    encoding: bool, turning: bool, level: Any, flat: Any, below: Any, planes: Any, references: Any,
     weights: Any, activities: Any, classes: Any, ranks: Any, values: Any, tops: Any, symbols: Any,
-    contexts: Any, counts: Any, words: Any, limit: int, escapes: Any, table: Any, work: Any,
+    contexts: Any, counts: Any, words: Any, limit: int, escapes: Any, table: Any, begins: Any,
+    work: Any,
 ) -> int:  # fmt: skip
     """One group in either direction.
 
@@ -372,16 +405,18 @@ def haar_pass(
         ``words``, ``escapes`` and ``table`` and fills ``level``.
     turning: the states take turns from row to row; False in version 1, where each row begins with
         the first.
-    level: (h, w, c) uint8. below: (h >> 1, w >> 1, c) uint8, the level below.
+    level: (h, w, c) uint8; ``flat``: decoding, all its samples in one dimension.
+    below: (h >> 1, w >> 1, c) uint8, the level below.
     planes: (c,) int64, the components in coding order.
     references: (c,) int64, how many of the planes coded first each plane's residuals refer to.
     weights: (c, 3, 7) int32 and activities: (c, 3, 7) int32, by plane in coding order.
     classes: (1024,) int64, class of an activity.
     ranks, values: (c, 256) int32, by component: value to rank, rank to value. tops: (c,) int64, the
         highest rank, or 0 where values stand for themselves (``ranks`` is the identity then).
-    symbols: (n,) uint16, contexts: (n,) uint8, counts: (2 * classes + 1, 256) int64.
+    symbols: (n,) uint16, contexts: (n,) uint8, counts: (2 * classes + 1, 256) int64; decoding,
+        (2 * classes + 1, 0).
     words: uint16, the stream, with a row's length and 8 more of padding behind ``limit``.
-    escapes: uint16. table: (2 * classes + 1) * 2048 uint32.
+    escapes: uint16. table: uint32 and begins: (2 * classes + 1,) int64 of `rans.tables.row_tables`.
     work: from `workspace`.
 
     Returns OK, TRUNCATED (the stream ended early) or IMPOSSIBLE (no encoder writes this).
@@ -393,17 +428,17 @@ def haar_pass(
     ev, eh, eg = work.ev, work.eh, work.eg
     near_v, near_h, near_g = work.near_v, work.near_h, work.near_g
     prediction, activity, decoded = work.prediction, work.activity, work.decoded
+    pairs, mixed = work.pairs, work.mixed
     height, width = level.shape[0], level.shape[1]
     tall = 2 * bh if width > 2 * bw else 0
     edge = nc * (tall + (width if height > 2 * bh else 0))
     for j in range(classes.size):
-        starts[0, j] = classes[j] * TABLE_SIZE
-        starts[1, j] = (per_kind + classes[j]) * TABLE_SIZE
-        starts[2, j] = 2 * per_kind * TABLE_SIZE
+        starts[0, j] = begins[classes[j]]
+        starts[1, j] = begins[per_kind + classes[j]]
+        starts[2, j] = begins[2 * per_kind]
 
     # Of one type, or the helpers are compiled once more for the literal 0.
     zero: Any = np.int64(0)
-    second: Any = np.int64(2)
     at, escaped, n = zero, zero, zero
     if not encoding:
         start_states(words, state)
@@ -424,6 +459,10 @@ def haar_pass(
                 _gradient(
                     rows[c, (y - 1) & 7], rows[c, y & 7], rows[c, (y + 1) & 7], gradient[c, now]
                 )
+                if encoding:
+                    _read_differences(
+                        level, plane, y, ranks[plane], v[c, now], h[c, now], g[c, now]
+                    )
                 for k in range(2):
                     if k == 0:
                         found, residual, near = v[c, now], ev[c, now], near_v[c]
@@ -439,10 +478,9 @@ def haar_pass(
                             activity,
                         )  # fmt: skip
                     if encoding:
-                        _read_differences(level, plane, y, k, ranks[plane], found)
                         _emit(
-                            found, prediction, activity, classes, zero, residual, near, symbols,
-                            contexts, counts, n,
+                            found, prediction, activity, classes, zero, residual, near,
+                            symbols[n : n + bw], contexts[n : n + bw], counts,
                         )  # fmt: skip
                         n += bw
                     else:
@@ -464,10 +502,9 @@ def haar_pass(
                     weights[c, 2], activities[c, 2], prediction, activity,
                 )  # fmt: skip
                 if encoding:
-                    _read_differences(level, plane, y - 1, second, ranks[plane], g)
                     _emit(
-                        g, prediction, activity, classes, per_kind, eg[c], near_g[c], symbols,
-                        contexts, counts, n,
+                        g[c, before], prediction, activity, classes, per_kind, eg[c], near_g[c],
+                        symbols[n : n + bw], contexts[n : n + bw], counts,
                     )  # fmt: skip
                     n += bw
                 else:
@@ -477,17 +514,26 @@ def haar_pass(
                     escaped = fill_escapes(decoded, bw, escapes, escaped)
                     if at > limit or escaped < 0:
                         return TRUNCATED
-                    _absorb(decoded, prediction, eg[c], near_g[c], g)
+                    _absorb(decoded, prediction, eg[c], near_g[c], g[c, before])
+                    upper, lower = pairs[0, plane], pairs[1, plane]
                     if tops[plane] > 0:
-                        stray |= _write_ranked_blocks(
-                            below, ranks[plane], values[plane], tops[plane], v[c, before],
-                            h[c, before], g, level, plane, y - 1,
+                        stray |= _rebuild_ranked(
+                            below[y - 1], ranks[plane], values[plane], tops[plane], v[c, before],
+                            h[c, before], g[c, before], plane, upper, lower,
                         )  # fmt: skip
                     else:
-                        stray |= _write_blocks(
-                            rows[c, (y - 1) & 7], v[c, before], h[c, before], g, activity, level,
-                            plane, y - 1,
-                        )  # fmt: skip
+                        stray |= _rebuild(
+                            rows[c, (y - 1) & 7],
+                            v[c, before],
+                            h[c, before],
+                            g[c, before],
+                            upper,
+                            lower,
+                        )
+        if y > 0 and not encoding:
+            for i in range(2):
+                begin = (2 * y - 2 + i) * width * nc
+                _write_row(pairs[i], mixed, flat[begin : begin + 2 * bw * nc])
     if edge:
         # The odd last column, then the odd last row: modulo 256, so nothing can escape.
         if not encoding:

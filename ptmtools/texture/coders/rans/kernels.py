@@ -21,6 +21,8 @@ TABLE_BITS = 11
 TABLE_SIZE = 1 << TABLE_BITS
 #: A state stays at or above this and below 2^31.
 STATE_LOW = 1 << 15
+#: Numbers of 32 bits of a table for `decode_single`: symbols by slot, intervals by symbol.
+SINGLE_SIZE = TABLE_SIZE // 4 + 256
 #: Words that must be readable behind the last one of a stream, besides the length of a row.
 PADDING = 8
 
@@ -47,7 +49,7 @@ def decode_row(
     Parameters
     ----------
     state: (4,) uint64. words: uint16, with n + `PADDING` words behind the last that may be read.
-    table: uint32 from `tables.decoding_table`: symbol << 24 | frequency << 12 | offset.
+    table: uint32 from `tables.row_tables`: symbol << 24 | frequency << 12 | offset.
     starts: uint64, where in ``table`` the table of each context begins. contexts: of each symbol.
     """
     sixteen, twelve, part = np.uint64(16), np.uint64(12), np.uint64(4095)
@@ -217,6 +219,57 @@ def choose_kinds(
 
 
 @kernel
+def _put(number: Any, packed: Any, at: Any) -> Any:
+    """``number`` as nibbles of three bits and a flag from nibble ``at`` on; returns the next."""
+    while True:
+        nibble = number & 7
+        number >>= 3
+        if number > 0:
+            nibble |= 8
+        packed[at >> 1] |= nibble << (4 * (at & 1))
+        at += 1
+        if number == 0:
+            return at
+
+
+@kernel
+def write_tables(kinds: Any, first_kind: int, sent: int, exact: Any, packed: Any) -> Any:
+    """The serialised form of tables, which `read_tables` reads, without its length.
+
+    kinds: (t,) int64. exact: (t, 256) int64, the frequencies of those that are sent.
+    packed: uint8, zeros before. Returns the number of bytes.
+    """
+    tables = kinds.size
+    at = np.int64(0)
+    t, last = 0, np.int64(first_kind)
+    while t < tables:
+        kind = kinds[t]
+        if kind == 0:
+            begin = t
+            while t + 1 < tables and kinds[t + 1] == 0:
+                t += 1
+            at = _put(np.int64(0), packed, at)
+            at = _put(np.int64(t - begin), packed, at)
+        elif kind == sent:
+            at = _put(np.int64(1), packed, at)
+        else:
+            change = kind - last
+            at = _put(2 + (2 * change if change >= 0 else -2 * change - 1), packed, at)
+            last = kind
+        t += 1
+    for t in range(tables):
+        if kinds[t] == sent:
+            used = np.int64(ESCAPE)
+            while used > 0 and exact[t, used - 1] == 0:
+                used -= 1
+            at = _put(exact[t, ESCAPE], packed, at)
+            at = _put(used, packed, at)
+            for s in range(used):
+                at = _put(exact[t, s], packed, at)
+    return (at + 1) >> 1
+
+
+@kernel
 def split_numbers(numbers: Any, symbols: Any, contexts: Any, counts: Any) -> None:
     """symbol | context << 16 taken apart, and counted; all above 254 count as 255."""
     for i in range(numbers.size):
@@ -297,10 +350,14 @@ def read_tables(
 
 
 @kernel
-def fill_decoding_table(frequency: Any, table: Any) -> None:
-    """symbol << 24 | frequency << 12 | offset for every slot of every table that is in use."""
+def fill_row_tables(frequency: Any, begins: Any, table: Any) -> None:
+    """symbol << 24 | frequency << 12 | offset for every slot of every table that is in use, from
+    ``begins`` of it on.
+    """
     for t in range(frequency.shape[0]):
-        at = t * TABLE_SIZE
+        at = np.int64(begins[t])
+        if at == 0:
+            continue
         for z in range(256):
             f = frequency[t, z]
             if f > 0:
@@ -311,10 +368,43 @@ def fill_decoding_table(frequency: Any, table: Any) -> None:
 
 
 @kernel
+def fill_single_tables(frequency: Any, slots: Any, intervals: Any) -> None:
+    """The symbol of every slot and the frequency << 12 | start of every symbol, table by table."""
+    for t in range(frequency.shape[0]):
+        at = 0
+        for z in range(256):
+            f = frequency[t, z]
+            if f > 0:
+                intervals[t, z] = f << 12 | at
+                for j in range(at, at + f):
+                    slots[t, j] = z
+                at += f
+
+
+@kernel
+def decode_single(table: Any, context: Any, state: Any, lane: Any, word: Any) -> Any:
+    """The next symbol where its table is known only once the one before is; whether ``word``, the
+    next one, was used. ``table``: from `tables.single_tables`.
+    """
+    x = state[lane]
+    slot = x & _MASK
+    own = np.uint64(context) * np.uint64(SINGLE_SIZE)
+    # Four symbols to a number.
+    four = np.uint64(table[own + (slot >> np.uint64(2))])
+    z = (four >> ((slot & np.uint64(3)) << np.uint64(3))) & np.uint64(255)
+    interval = np.uint64(table[own + np.uint64(TABLE_SIZE // 4) + z])
+    x = (interval >> np.uint64(12)) * (x >> _BITS) + slot - (interval & np.uint64(4095))
+    # Without a branch, which would be guessed wrong half of the time.
+    refill = x < _LOW
+    state[lane] = (x << np.uint64(16)) | np.uint64(word) if refill else x
+    return np.int64(z), refill
+
+
+@kernel
 def encode(
     symbols: Any, contexts: Any, plain: int, frequency: Any, work: Any, state: Any, words: Any,
     escapes: Any,
-) -> tuple[int, int]:  # fmt: skip
+) -> Any:  # fmt: skip
     """Code ``symbols`` from the last to the first, so that the decoder goes forwards.
 
     Parameters
@@ -342,27 +432,30 @@ def encode(
             work[t, s] = entry
     for last in range(4):
         state[last] = _LOW
-    at, escaped = words.size, escapes.size
-    for j in range(symbols.size):
-        i = symbols.size - 1 - j
+    at, escaped = np.uint64(words.size - 1), np.uint64(escapes.size)
+    i = np.uint64(symbols.size)
+    one, four = np.uint64(1), np.uint64(4)
+    while i > np.uint64(0):
+        i -= one
         context, z = np.uint64(contexts[i]), np.uint64(symbols[i])
         symbol = work[context, min(z, np.uint64(ESCAPE))]
         if context < np.uint64(plain) and (z >= np.uint64(ESCAPE) or symbol == 0):
-            escaped -= 1
+            escaped -= one
             escapes[escaped] = z
             symbol = work[context, np.uint64(ESCAPE)]
-        lane = np.uint64(i & 3)
+        lane = i & np.uint64(3)
         x = state[lane]
         share = (symbol >> np.uint64(15)) & np.uint64(4095)
         # Without a branch, which would be guessed wrong often: the word is written in any case.
         full = x >= share << np.uint64(20)
-        words[at - 1] = x & np.uint64(0xFFFF)
-        at -= 1 if full else 0
+        words[at] = x & np.uint64(0xFFFF)
+        at -= one if full else np.uint64(0)
         x = x >> np.uint64(16) if full else x
         q = (x * (symbol >> np.uint64(27))) >> ((symbol & np.uint64(15)) + np.uint64(31))
-        state[lane] = (q << _BITS) + (x - q * share) + ((symbol >> np.uint64(4)) & _MASK)
+        state[lane] = (q << _BITS) + (x - q * share) + ((symbol >> four) & _MASK)
+    first = np.int64(at) + 1
     for last in range(3, -1, -1):
-        at -= 2
-        words[at] = state[last] & np.uint64(0xFFFF)
-        words[at + 1] = state[last] >> np.uint64(16)
-    return at, escaped
+        first -= 2
+        words[first] = state[last] & np.uint64(0xFFFF)
+        words[first + 1] = state[last] >> np.uint64(16)
+    return first, np.int64(escaped)

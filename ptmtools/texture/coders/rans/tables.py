@@ -126,14 +126,14 @@ def choose(
     frequency = exact.copy()
     named = (kinds != UNUSED) & (kinds != SENT)
     frequency[named] = family[kinds[named]]
-    numbers = [np.array(_kind_numbers(kinds.tolist()), np.int64)]
-    rows = exact[kinds == SENT]
-    occurs = rows[:, :ESCAPE] > 0
-    most = np.where(occurs.any(axis=1), ESCAPE - occurs[:, ::-1].argmax(axis=1), 0)
-    for row, head, used in zip(rows, np.stack([rows[:, ESCAPE], most], 1), most, strict=True):
-        numbers += [head, row[:used]]
-    packed = _pack_nibbles(np.concatenate(numbers))
-    return frequency, len(packed).to_bytes(2, "little") + packed
+    packed = np.zeros(_most_bytes(len(kinds), int(np.count_nonzero(kinds == SENT))), np.uint8)
+    size = kernels.write_tables(kinds, _FIRST_KIND, SENT, exact, packed)
+    return frequency, size.to_bytes(2, "little") + packed[:size].tobytes()
+
+
+def _most_bytes(tables: int, sent: int) -> int:
+    """Of so many tables, so many of them sent: numbers take four nibbles at most."""
+    return 2 * (2 * tables + 257 * sent)
 
 
 def parse(
@@ -173,40 +173,26 @@ def _read(
     return frequency
 
 
-def _kind_numbers(kinds: list[int]) -> list[int]:
-    """0 and the number of further unused tables; 1 where sent; else 2 + change of kind, zigzag."""
-    numbers: list[int] = []
-    t, last = 0, _FIRST_KIND
-    while t < len(kinds):
-        if kinds[t] == UNUSED:
-            begin = t
-            while t + 1 < len(kinds) and kinds[t + 1] == UNUSED:
-                t += 1
-            numbers += [0, t - begin]
-        elif kinds[t] == SENT:
-            numbers.append(1)
-        else:
-            change = kinds[t] - last
-            numbers.append(2 + (2 * change if change >= 0 else -2 * change - 1))
-            last = kinds[t]
-        t += 1
-    return numbers
-
-
-def decoding_table(frequency: Frequencies) -> NDArray[np.uint32]:
-    """Flat (tables * 2048,) entries symbol << 24 | frequency << 12 | offset."""
+def row_tables(frequency: Frequencies) -> tuple[NDArray[np.uint32], NDArray[np.int64]]:
+    """For `kernels.decode_row`: entries symbol << 24 | frequency << 12 | offset of all tables in
+    use, one after the other, and where each table (t,) begins. Those not in use share one of zeros,
+    which only a damaged stream asks for.
+    """
     from ptmtools.texture.coders.rans import kernels
 
-    table = np.zeros(len(frequency) * TABLE_SIZE, np.uint32)
-    kernels.fill_decoding_table(frequency, table)
-    return table
+    used = frequency.any(axis=1)
+    begins = np.where(used, np.cumsum(used) * TABLE_SIZE, 0)
+    table = np.empty((1 + int(used.sum())) * TABLE_SIZE, np.uint32)
+    table[:TABLE_SIZE] = 0
+    kernels.fill_row_tables(frequency, begins, table)
+    return table, begins
 
 
-def _pack_nibbles(numbers: NDArray[np.int64]) -> bytes:
-    """Numbers as nibbles of 3 bits, low ones first, 8 added where more follow; low nibble first."""
-    digits = numbers[:, None] >> np.arange(0, 12, 3)
-    more = digits > 7
-    nibbles = ((digits & 7) | more << 3)[digits + (np.arange(4) == 0) > 0].astype(np.uint8)
-    pairs = np.append(nibbles, np.zeros(len(nibbles) % 2, np.uint8)).reshape(-1, 2)
-    packed: NDArray[np.uint8] = pairs[:, 0] | pairs[:, 1] << 4
-    return packed.tobytes()
+def single_tables(frequency: Frequencies) -> NDArray[np.uint32]:
+    """For `kernels.decode_single`: a third of the size; zeros where not in use."""
+    from ptmtools.texture.coders.rans import kernels
+
+    table = np.zeros((len(frequency), kernels.SINGLE_SIZE), np.uint32)
+    slots = table[:, : TABLE_SIZE // 4].view(np.uint8)
+    kernels.fill_single_tables(frequency, slots, table[:, TABLE_SIZE // 4 :])
+    return table.reshape(-1)

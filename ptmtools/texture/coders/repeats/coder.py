@@ -96,7 +96,7 @@ def decode(data: bytes, below: Bytes, shape: tuple[int, int, int]) -> Bytes:
     level = np.empty(shape[:2], np.uint32)
     result = _pass(
         False, level, _packed(below), shape[2], escaped + stream.limit,
-        tables.decoding_table(frequency), np.concatenate([stream.escapes, stream.words]), state,
+        tables.single_tables(frequency), np.concatenate([stream.escapes, stream.words]), state,
     )  # fmt: skip
     if result == kernels.TRUNCATED:
         raise damaged("its stream ends early")

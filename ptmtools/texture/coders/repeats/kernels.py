@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ptmtools.compiled import plain_kernel as kernel
-from ptmtools.texture.coders.rans.kernels import ESCAPE, STATE_LOW, TABLE_BITS
+from ptmtools.texture.coders.rans.kernels import ESCAPE, STATE_LOW, decode_single
 
 OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2
 
@@ -47,7 +47,6 @@ MOST_SYMBOLS = 24
 _MASK32 = np.uint64(0xFFFFFFFF)
 #: Stands for a texel that is none of the guesses.
 _OTHER = np.uint64(1 << 32)
-_SLOT = np.uint64((1 << TABLE_BITS) - 1)
 _HIGH = np.uint64(0x80808080)
 _LOW7 = np.uint64(0x7F7F7F7F)
 _K0, _K1, _K2 = np.uint64(0x9E3779B1), np.uint64(0x85EBCA6B), np.uint64(0xC2B2AE35)
@@ -68,18 +67,9 @@ def _symbol(encoding: bool, z: Any, context: Any, numbers: Any, words: Any, stat
     if encoding:
         numbers[np.uint64(n)] = z | context << 16
         return np.int64(z)
-    lane = np.uint64(n & 3)
-    x = np.uint64(state[lane])
-    e = np.uint64(numbers[(np.uint64(context) << np.uint64(TABLE_BITS)) + (x & _SLOT)])
-    x = ((e >> np.uint64(12)) & np.uint64(4095)) * (x >> np.uint64(TABLE_BITS)) + (
-        e & np.uint64(4095)
-    )
-    # Without a branch, which would be guessed wrong half of the time.
     at = np.uint64(state[_WORD])
-    refill = x < np.uint64(STATE_LOW)
+    z, refill = decode_single(numbers, context, state, np.uint64(n & 3), words[at])
     state[_WORD] = at + (np.uint64(1) if refill else np.uint64(0))
-    state[lane] = (x << np.uint64(16)) | np.uint64(words[at]) if refill else x
-    z = np.int64(e >> np.uint64(24))
     if z == ESCAPE:
         at = np.uint64(state[_NEXT_ESCAPE])
         if state[_NEXT_ESCAPE] < state[_ESCAPES_END]:
@@ -359,6 +349,16 @@ def _edge_samples(
 
 
 @kernel
+def _block(flat: Any, place: Any, wide: Any, mean: Any, kept: Any) -> Any:
+    """The block that begins at ``place``, if one is kept, else four times the mean."""
+    p, q, r, s = mean, mean, mean, mean
+    if kept:
+        p, q = np.uint64(flat[place]), np.uint64(flat[place + _C1])
+        r, s = np.uint64(flat[place + wide]), np.uint64(flat[place + wide + _C1])
+    return p, q, r, s
+
+
+@kernel
 def move_texels(packing: bool, level: Any, texels: Any) -> None:
     """(h, w, c) uint8 to (h, w) uint32, or back: component c in bits 8 c to 8 c + 7."""
     components = level.shape[2]
@@ -406,7 +406,7 @@ def repeats_pass(
     outcome: (w // 2 + 1,) int64, zeros. block: (4,), around: (8,) uint64 and errors: (3,)
         int64, overwritten.
     limit: index of the word behind the last.
-    numbers: uint32; decoding, the flat table of `tables.decoding_table`.
+    numbers: uint32; decoding, of `tables.single_tables`.
     words: uint16, the escapes and behind them the words, with room for `MOST_SYMBOLS` more.
     state: (9,) int64: see `_COUNT`.
 
@@ -490,12 +490,11 @@ def repeats_pass(
             a = _slot(mean * _K0 + n0 * _K2 + n1 * _K3 + w0 * _K4 + w1 * _K5, down)
             entry = np.uint64(slots[0, a])
             trust = np.int64(entry & three)
-            g0, g1, g2, g3 = mean, mean, mean, mean
-            if trust > 0:
-                g = entry >> two
-                g0, g1 = np.uint64(flat[g]), np.uint64(flat[g + one])
-                g2, g3 = np.uint64(flat[g + wide]), np.uint64(flat[g + wide + one])
-            hit = 0 if p == g0 and q == g1 and r == g2 and s == g3 else 1
+            source = entry >> two
+            hit = 0
+            if encoding:
+                g0, g1, g2, g3 = _block(flat, source, wide, mean, trust > 0)
+                hit = 0 if p == g0 and q == g1 and r == g2 and s == g3 else 1
             hit = _symbol(encoding, hit, FIRST + 3 * trust + near, numbers, words, state)
             if hit == 0:
                 if trust == 0:
@@ -505,6 +504,7 @@ def repeats_pass(
                 before = 0
                 outcome[x] = 0
                 if not encoding:
+                    g0, g1, g2, g3 = _block(flat, source, wide, mean, trust > 0)
                     level[y0, x0], level[y0, x1] = g0, g1
                     level[y1, x0], level[y1, x1] = g2, g3
                     if state[_WORD] > limit:
@@ -551,14 +551,11 @@ def repeats_pass(
                     found = TEXELS
             if encoding:
                 for k in range(2, -1, -1):
-                    g0, g1, g2, g3 = mean, mean, mean, mean
-                    if guesses[k] > 0:
-                        g = np.uint64(guesses[k]) - one
-                        g0, g1 = np.uint64(flat[g]), np.uint64(flat[g + one])
-                        g2, g3 = np.uint64(flat[g + wide]), np.uint64(flat[g + wide + one])
-                        if k == 2:
-                            g0, g1 = _plus(g0, change), _plus(g1, change)
-                            g2, g3 = _plus(g2, change), _plus(g3, change)
+                    kept = np.uint64(guesses[k])
+                    g0, g1, g2, g3 = _block(flat, kept - one, wide, mean, kept > 0)
+                    if kept > 0 and k == 2:
+                        g0, g1 = _plus(g0, change), _plus(g1, change)
+                        g2, g3 = _plus(g2, change), _plus(g3, change)
                     if p == g0 and q == g1 and r == g2 and s == g3:
                         found = k
             found = _symbol(encoding, found, context, numbers, words, state)
@@ -570,9 +567,7 @@ def repeats_pass(
                 before = 0
                 outcome[x] = 0
                 if not encoding and guesses[found] > 0:
-                    g = np.uint64(guesses[found]) - one
-                    p, q = np.uint64(flat[g]), np.uint64(flat[g + one])
-                    r, s = np.uint64(flat[g + wide]), np.uint64(flat[g + wide + one])
+                    p, q, r, s = _block(flat, np.uint64(guesses[found]) - one, wide, mean, True)
                     if found == 2:
                         p, q = _plus(p, change), _plus(q, change)
                         r, s = _plus(r, change), _plus(s, change)

@@ -214,7 +214,7 @@ def _decode(data: bytes, below: Samples, shape: Shape, max_error: int, sent: boo
     result = _pass(
         False, numbers, means, work, max_error, kind, numbering, weights, window, plain,
         np.array([read.limit, 8 * size], np.int64), words=read.words, escapes=read.escapes,
-        table=tables.decoding_table(frequency),
+        table=tables.single_tables(frequency),
     )  # fmt: skip
     if result == kernels.TRUNCATED:
         raise damaged("its stream ends early")

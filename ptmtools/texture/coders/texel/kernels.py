@@ -23,8 +23,7 @@ from ptmtools.compiled import kernel
 from ptmtools.texture.coders.rans.kernels import (
     ESCAPE,
     STATE_LOW,
-    TABLE_BITS,
-    TABLE_SIZE,
+    decode_single,
     start_states,
 )
 
@@ -201,17 +200,8 @@ def _unfold(z: Any, guess: Any, low: Any, high: Any) -> Any:
 @kernel
 def _next_symbol(state: Any, n: Any, words: Any, at: Any, table: Any, context: Any) -> Any:
     """The symbol number n of the stream, and the next word's index."""
-    lane = n & np.uint64(3)
-    x = state[lane]
-    slot = x & np.uint64(TABLE_SIZE - 1)
-    entry = np.uint64(table[np.uint64(context * TABLE_SIZE) + slot])
-    x = ((entry >> np.uint64(12)) & np.uint64(4095)) * (x >> np.uint64(TABLE_BITS))
-    x += entry & np.uint64(4095)
-    # Without a branch: which states need a word is hard to foretell.
-    refill = x < np.uint64(STATE_LOW)
-    word = np.uint64(words[at])
-    state[lane] = (x << np.uint64(16)) | word if refill else x
-    return np.int64(entry >> np.uint64(24)), at + np.uint64(1 if refill else 0)
+    z, refill = decode_single(table, context, state, n & np.uint64(3), words[at])
+    return z, at + np.uint64(1 if refill else 0)
 
 
 @kernel
@@ -242,7 +232,7 @@ def texel_pass(
     symbols: uint16, contexts: uint8, of n or with grids 2 * n, counts: (TABLES, 256) int64.
     plain: uint32 words of plain bits, with padding for a row of blocks.
     limits: (2,) int64, decoding: numbers of words and of plain bits.
-    words, escapes: as in `rans.stream.Stream`. table: of `rans.tables.decoding_table`.
+    words, escapes: as in `rans.stream.Stream`. table: of `rans.tables.single_tables`.
     space: from `workspace`.
 
     Returns OK, TRUNCATED (the stream ended early) or IMPOSSIBLE (no encoder writes this).
