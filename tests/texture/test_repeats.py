@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError
 from ptmtools.texture import build_pyramid
 from ptmtools.texture.coders.repeats import coder as repeats
-from ptmtools.texture.coders.repeats import kernels
 from ptmtools.texture.coders.repeats.reference import decode_repeats
+from ptmtools.texture.coders.repeats.symbols import kernels
 
 
 def zoo() -> dict[str, NDArray[np.uint8]]:

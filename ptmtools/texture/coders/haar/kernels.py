@@ -17,6 +17,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ptmtools.compiled import plain_kernel as kernel
+from ptmtools.texture.coders.haar.blocks.kernels import (
+    read_differences,
+    rebuild,
+    rebuild_ranked,
+    write_row,
+)
+from ptmtools.texture.coders.haar.contexts.kernels import (
+    context_g,
+    context_h,
+    context_v,
+    gradient_row,
+)
 from ptmtools.texture.coders.rans.kernels import (
     ESCAPE,
     STATE_LOW,
@@ -28,10 +40,6 @@ from ptmtools.texture.coders.rans.kernels import (
 
 i32, u16 = np.int32, np.uint16
 
-#: Largest activity; larger ones count as this.
-ACTIVITY_TOP = 1023
-#: Predictions stay within the range of V, so that every residual fits in 16 bits.
-PREDICTION_TOP = 1020
 #: A component with more distinct values than this is not coded by rank.
 MANY_VALUES = 225
 OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2
@@ -104,121 +112,6 @@ def _load_row(below: Any, plane: int, y: int, rank: Any, row: Any) -> None:
 
 
 @kernel
-def _gradient(above: Any, row: Any, under: Any, out: Any) -> None:
-    for x in range(out.size):
-        out[x] = i32(abs(i32(row[x + 3] - row[x + 1])) + abs(i32(under[x + 2] - above[x + 2])))
-
-
-@kernel
-def _finish(p: Any, a: Any, x: int, prediction: Any, activity: Any) -> None:
-    p = i32(i32(p + 128) >> 8)
-    prediction[x] = min(max(p, i32(-PREDICTION_TOP)), i32(PREDICTION_TOP))
-    activity[x] = min(i32(a >> 6), i32(ACTIVITY_TOP))
-
-
-@kernel
-def _context_v(
-    rows: Any, y: int, gradient: Any, r1: Any, r2: Any, near: Any, w: Any, a: Any,
-    prediction: Any, activity: Any,
-) -> None:  # fmt: skip
-    """Predictions and activities of a row of V, the difference between a block's two rows."""
-    nn, n, i = rows[(y - 2) & 7], rows[(y - 1) & 7], rows[y & 7]
-    s, ss = rows[(y + 1) & 7], rows[(y + 2) & 7]
-    w0, w1, w2, w3, w5, w6 = w[0], w[1], w[2], w[3], w[5], w[6]
-    a0, a1, a2, a3 = a[0], a[1], a[2], a[3]
-    for x in range(prediction.size):
-        side = i32(i32(s[x + 1] - n[x + 1]) + i32(s[x + 3] - n[x + 3]))
-        p = i32(
-            w0 * i32(s[x + 2] - n[x + 2])
-            + w1 * side
-            + w2 * i32(ss[x + 2] - i[x + 2])
-            + w3 * i32(i[x + 2] - nn[x + 2])
-            + w5 * r1[x + 1]
-            + w6 * r2[x + 1]
-        )
-        b = i32(
-            a0 * gradient[x]
-            + a1 * i32(2 * near[x + 1] + near[x] + near[x + 2])
-            + a2 * abs(r1[x + 1])
-            + a3 * abs(r2[x + 1])
-        )
-        _finish(p, b, x, prediction, activity)
-
-
-@kernel
-def _context_h(
-    rows: Any, y: int, gradient: Any, v: Any, ev: Any, r1: Any, r2: Any, near: Any, w: Any, a: Any,
-    prediction: Any, activity: Any,
-) -> None:  # fmt: skip
-    """Predictions and activities of a row of h1, the difference along a block's upper row."""
-    n, i, s = rows[(y - 1) & 7], rows[y & 7], rows[(y + 1) & 7]
-    w0, w1, w2, w3, w5, w6 = w[0], w[1], w[2], w[3], w[5], w[6]
-    a0, a1, a2, a3, a4 = a[0], a[1], a[2], a[3], a[4]
-    for x in range(prediction.size):
-        p = i32(
-            w0 * i32(i[x + 3] - i[x + 1])
-            + w1 * i32(n[x + 3] - n[x + 1])
-            + w2 * i32(s[x + 3] - s[x + 1])
-            + w3 * i32(v[x + 2] - v[x])
-            + w5 * r1[x + 1]
-            + w6 * r2[x + 1]
-        )
-        b = i32(
-            a0 * gradient[x]
-            + a1 * i32(2 * near[x + 1] + near[x] + near[x + 2])
-            + a2 * abs(r1[x + 1])
-            + a3 * abs(r2[x + 1])
-            + a4 * abs(ev[x + 1])
-        )
-        _finish(p, b, x, prediction, activity)
-
-
-@kernel
-def _context_g(
-    rows: Any, y: int, gradient: Any, v: Any, h: Any, h_under: Any, ev: Any, eh: Any, eh_under: Any,
-    r1: Any, r2: Any, near: Any, w: Any, a: Any, prediction: Any, activity: Any,
-) -> None:  # fmt: skip
-    """Predictions and activities of a row of h2', half the difference along the lower row."""
-    i, s = rows[y & 7], rows[(y + 1) & 7]
-    w0, w1, w2, w3, w4, w5, w6 = w[0], w[1], w[2], w[3], w[4], w[5], w[6]
-    a0, a1, a2, a3, a4, a5, a6 = a[0], a[1], a[2], a[3], a[4], a[5], a[6]
-    for x in range(prediction.size):
-        p = i32(
-            w0 * i32(i[x + 3] - i[x + 1])
-            + w1 * i32(s[x + 3] - s[x + 1])
-            + w2 * h[x + 1]
-            + w3 * h_under[x + 1]
-            + w4 * i32(v[x + 2] - v[x])
-            + w5 * r1[x + 1]
-            + w6 * r2[x + 1]
-        )
-        b = i32(
-            a0 * gradient[x]
-            + a1 * i32(2 * near[x + 1] + near[x] + near[x + 2])
-            + a2 * abs(r1[x + 1])
-            + a3 * abs(r2[x + 1])
-            + a4 * abs(ev[x + 1])
-            + a5 * abs(eh[x + 1])
-            + a6 * abs(eh_under[x + 1])
-        )
-        _finish(p, b, x, prediction, activity)
-
-
-@kernel
-def _read_differences(level: Any, plane: int, y: int, rank: Any, v: Any, h: Any, g: Any) -> None:
-    """V, h1 and h2' of block row y, from the ranks of the texels."""
-    upper, lower = level[2 * y], level[2 * y + 1]
-    c = np.uint64(plane)
-    for x in range(v.size - 2):
-        left, right = np.uint64(2 * x), np.uint64(2 * x + 1)
-        p, q = rank[np.uint64(upper[left, c])], rank[np.uint64(upper[right, c])]
-        r, s = rank[np.uint64(lower[left, c])], rank[np.uint64(lower[right, c])]
-        v[x + 1] = i32(p + q - r - s)
-        h[x + 1] = i32(p - q)
-        g[x + 1] = i32(r - s) >> 1
-
-
-@kernel
 def _emit(
     values: Any, prediction: Any, activity: Any, classes: Any, first: Any, residual: Any, near: Any,
     symbols: Any, contexts: Any, counts: Any,
@@ -245,110 +138,6 @@ def _absorb(decoded: Any, prediction: Any, residual: Any, near: Any, values: Any
         residual[x + 1] = e
         near[x + 1] = abs(e)
         values[x + 1] = i32(e + prediction[x])
-
-
-@kernel
-def _rebuild(row: Any, v: Any, h: Any, g: Any, upper: Any, lower: Any) -> int:
-    """Two rows of texels of a plane from their differences, two texels to a number, the left one
-    in the low byte; returns bits outside a byte, if any were set.
-    """
-    stray = i32(0)
-    for x in range(row.size - 4):
-        vx, hx = v[x + 1], h[x + 1]
-        t = i32(i32(vx + (vx & 1)) >> 1)
-        top = i32(2 * row[x + 2] + ((hx ^ t) & 1) + t)
-        bottom = i32(top - vx)
-        p = i32(i32(top + hx) >> 1)
-        q = i32(p - hx)
-        d = i32(2 * g[x + 1] + (bottom & 1))
-        r = i32(i32(bottom + d) >> 1)
-        s = i32(r - d)
-        stray |= p | q | r | s
-        upper[x] = u16(i32((p & 255) | i32(q << 8)))
-        lower[x] = u16(i32((r & 255) | i32(s << 8)))
-    return int(stray & ~255)
-
-
-@kernel
-def _interleave(planes: Any, out: Any) -> None:
-    """Rows of (c, n) pairs of texels, from `_rebuild`, as one row of texels: n * c pairs of bytes.
-
-    Spelled out for each c: bytes moved one by one take five times as long.
-    """
-    low, high, eight = u16(255), u16(0xFF00), u16(8)
-    count = planes.shape[0]
-    a = planes[0]
-    if count == 1:
-        for x in range(a.size):
-            out[x] = a[x]
-    elif count == 2:
-        b = planes[1]
-        for x in range(a.size):
-            out[2 * x] = u16((a[x] & low) | u16(b[x] << eight))
-            out[2 * x + 1] = u16(u16(a[x] >> eight) | (b[x] & high))
-    elif count == 3:
-        b, c = planes[1], planes[2]
-        for x in range(a.size):
-            out[3 * x] = u16((a[x] & low) | u16(b[x] << eight))
-            out[3 * x + 1] = u16((c[x] & low) | (a[x] & high))
-            out[3 * x + 2] = u16(u16(b[x] >> eight) | (c[x] & high))
-    else:
-        b, c, d = planes[1], planes[2], planes[3]
-        for x in range(a.size):
-            out[4 * x] = u16((a[x] & low) | u16(b[x] << eight))
-            out[4 * x + 1] = u16((c[x] & low) | u16(d[x] << eight))
-            out[4 * x + 2] = u16(u16(a[x] >> eight) | (b[x] & high))
-            out[4 * x + 3] = u16(u16(c[x] >> eight) | (d[x] & high))
-
-
-@kernel
-def _write_row(planes: Any, pairs: Any, row: Any) -> None:
-    """A row of texels (bytes) from its planes, by way of ``pairs``."""
-    _interleave(planes, pairs)
-    for x in range(pairs.size):
-        pair = pairs[x]
-        row[2 * x] = pair & u16(255)
-        row[2 * x + 1] = pair >> u16(8)
-
-
-@kernel
-def _rebuild_ranked(
-    below: Any, rank: Any, value: Any, top: int, v: Any, h: Any, g: Any, plane: int, upper: Any,
-    lower: Any,
-) -> int:  # fmt: skip
-    """As `_rebuild`, for a plane whose differences are those of ranks 0 … ``top``.
-
-    The differences fix the four ranks up to a common shift; each step of it raises the sum of the
-    four values by at least 4, so exactly one leaves a remainder of 0 … 3 over the texel of
-    ``below``, a row. Returns nonzero if there is none.
-    """
-    stray = 0
-    for x in range(v.size - 2):
-        vx, hx = v[x + 1], h[x + 1]
-        dr = 2 * g[x + 1] + ((vx ^ hx) & 1)
-        dp = (dr + vx + hx) >> 1
-        dq = dp - hx
-        least = max(0, -min(dp, dq, dr))
-        most = top - max(0, max(dp, dq, dr))
-        if least > most:
-            upper[x] = lower[x] = 0
-            stray = 1
-            continue
-        wanted = 4 * np.int64(below[x, plane])
-        u = rank[below[x, plane]] - ((dp + dq + dr + 2) >> 2)
-        u = min(max(u, least), most)
-        total = value[u] + value[u + dp] + value[u + dq] + value[u + dr]
-        while total < wanted and u < most:
-            u += 1
-            total = value[u] + value[u + dp] + value[u + dq] + value[u + dr]
-        while total > wanted + 3 and u > least:
-            u -= 1
-            total = value[u] + value[u + dp] + value[u + dq] + value[u + dr]
-        if total < wanted or total > wanted + 3:
-            stray = 1
-        upper[x] = value[u + dp] | value[u + dq] << 8
-        lower[x] = value[u + dr] | value[u] << 8
-    return stray
 
 
 @kernel
@@ -456,23 +245,21 @@ def haar_pass(
             ref2 = 1 if references[c] > 1 else nc
             if y < bh:
                 _load_row(below, plane, y + 2, ranks[plane], rows[c, (y + 2) & 7])
-                _gradient(
+                gradient_row(
                     rows[c, (y - 1) & 7], rows[c, y & 7], rows[c, (y + 1) & 7], gradient[c, now]
                 )
                 if encoding:
-                    _read_differences(
-                        level, plane, y, ranks[plane], v[c, now], h[c, now], g[c, now]
-                    )
+                    read_differences(level, plane, y, ranks[plane], v[c, now], h[c, now], g[c, now])
                 for k in range(2):
                     if k == 0:
                         found, residual, near = v[c, now], ev[c, now], near_v[c]
-                        _context_v(
+                        context_v(
                             rows[c], y, gradient[c, now], ev[ref1, now], ev[ref2, now], near,
                             weights[c, 0], activities[c, 0], prediction, activity,
                         )  # fmt: skip
                     else:
                         found, residual, near = h[c, now], eh[c, now], near_h[c]
-                        _context_h(
+                        context_h(
                             rows[c], y, gradient[c, now], v[c, now], ev[c, now], eh[ref1, now],
                             eh[ref2, now], near, weights[c, 1], activities[c, 1], prediction,
                             activity,
@@ -496,7 +283,7 @@ def haar_pass(
                     h[c, now, x] = h[c, before, x]
                     eh[c, now, x] = 0
             if y > 0:
-                _context_g(
+                context_g(
                     rows[c], y - 1, gradient[c, before], v[c, before], h[c, before], h[c, now],
                     ev[c, before], eh[c, before], eh[c, now], eg[ref1], eg[ref2], near_g[c],
                     weights[c, 2], activities[c, 2], prediction, activity,
@@ -517,12 +304,12 @@ def haar_pass(
                     _absorb(decoded, prediction, eg[c], near_g[c], g[c, before])
                     upper, lower = pairs[0, plane], pairs[1, plane]
                     if tops[plane] > 0:
-                        stray |= _rebuild_ranked(
+                        stray |= rebuild_ranked(
                             below[y - 1], ranks[plane], values[plane], tops[plane], v[c, before],
                             h[c, before], g[c, before], plane, upper, lower,
                         )  # fmt: skip
                     else:
-                        stray |= _rebuild(
+                        stray |= rebuild(
                             rows[c, (y - 1) & 7],
                             v[c, before],
                             h[c, before],
@@ -533,7 +320,7 @@ def haar_pass(
         if y > 0 and not encoding:
             for i in range(2):
                 begin = (2 * y - 2 + i) * width * nc
-                _write_row(pairs[i], mixed, flat[begin : begin + 2 * bw * nc])
+                write_row(pairs[i], mixed, flat[begin : begin + 2 * bw * nc])
     if edge:
         # The odd last column, then the odd last row: modulo 256, so nothing can escape.
         if not encoding:

@@ -43,7 +43,7 @@ Frequencies = NDArray[np.int64]
 
 def normalise(counts: NDArray[np.int64]) -> Frequencies:
     """Frequencies (t, 256) of the rows of ``counts`` (t, 256): see `kernels.normalise`."""
-    from ptmtools.texture.coders.rans import kernels
+    from ptmtools.texture.coders.rans.frequencies import kernels
 
     frequency = np.zeros_like(counts)
     kernels.normalise(counts, frequency, np.empty(256, np.int64))
@@ -114,7 +114,7 @@ def choose(
     Tables from number ``plain`` on have no escape: one that is built in is used only where it holds
     every symbol that occurs. ``family``: other tables in place of `built_in`, an empty one first.
     """
-    from ptmtools.texture.coders.rans import kernels
+    from ptmtools.texture.coders.rans.frequencies import kernels
 
     lengths = _built_in_lengths() if family is None else _lengths(family)
     family = built_in() if family is None else family
@@ -162,7 +162,7 @@ def parse_version_1(data: bytes | memoryview, tables: int) -> tuple[Frequencies,
 def _read(
     packed: bytes | memoryview, named: bool, kinds: NDArray[np.int64], family: Frequencies
 ) -> Frequencies:
-    from ptmtools.texture.coders.rans import kernels
+    from ptmtools.texture.coders.rans.frequencies import kernels
 
     frequency = np.zeros((len(kinds), 256), np.int64)
     numbers = np.frombuffer(packed, np.uint8).copy()
@@ -178,7 +178,7 @@ def row_tables(frequency: Frequencies) -> tuple[NDArray[np.uint32], NDArray[np.i
     use, one after the other, and where each table (t,) begins. Those not in use share one of zeros,
     which only a damaged stream asks for.
     """
-    from ptmtools.texture.coders.rans import kernels
+    from ptmtools.texture.coders.rans.frequencies import kernels
 
     used = frequency.any(axis=1)
     begins = np.where(used, np.cumsum(used) * TABLE_SIZE, 0)
@@ -190,9 +190,10 @@ def row_tables(frequency: Frequencies) -> tuple[NDArray[np.uint32], NDArray[np.i
 
 def single_tables(frequency: Frequencies) -> NDArray[np.uint32]:
     """For `kernels.decode_single`: a third of the size; zeros where not in use."""
-    from ptmtools.texture.coders.rans import kernels
+    from ptmtools.texture.coders.rans.frequencies import kernels
+    from ptmtools.texture.coders.rans.kernels import SINGLE_SIZE
 
-    table = np.zeros((len(frequency), kernels.SINGLE_SIZE), np.uint32)
+    table = np.zeros((len(frequency), SINGLE_SIZE), np.uint32)
     slots = table[:, : TABLE_SIZE // 4].view(np.uint8)
     kernels.fill_single_tables(frequency, slots, table[:, TABLE_SIZE // 4 :])
     return table.reshape(-1)

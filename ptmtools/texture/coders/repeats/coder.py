@@ -44,17 +44,18 @@ class Symbols:
     @property
     def hits(self) -> int:
         """Blocks that were the first guess."""
-        from ptmtools.texture.coders.repeats import kernels
+        from ptmtools.texture.coders.repeats.symbols.kernels import FIRST, GUESS
 
-        return int(self.counts[kernels.FIRST : kernels.GUESS, 0].sum())
+        return int(self.counts[FIRST:GUESS, 0].sum())
 
     @property
     def new(self) -> int:
         """Texels that were not among the guesses, of the first three of each block."""
-        from ptmtools.texture.coders.repeats import kernels
+        from ptmtools.texture.coders.repeats.kernels import DIFFERENCES
+        from ptmtools.texture.coders.repeats.symbols.kernels import GUESS, TEXEL
 
-        blocks = self.counts[kernels.GUESS : kernels.TEXEL, kernels.DIFFERENCES].sum()
-        texels = self.counts[kernels.TEXEL : kernels.TEXEL + 36, 5].sum()
+        blocks = self.counts[GUESS:TEXEL, DIFFERENCES].sum()
+        texels = self.counts[TEXEL : TEXEL + 36, 5].sum()
         return int(3 * blocks + texels)
 
 
@@ -62,6 +63,7 @@ def find(level: Bytes, below: Bytes) -> Symbols:
     """The symbols that refine ``below`` (h >> 1, w >> 1, c) to ``level`` (h, w, c)."""
     from ptmtools.texture.coders.rans.kernels import split_numbers
     from ptmtools.texture.coders.repeats import kernels
+    from ptmtools.texture.coders.repeats.symbols.kernels import TABLES
 
     blocks = below.shape[0] * below.shape[1]
     edge = level.shape[0] * level.shape[1] - 4 * blocks
@@ -72,7 +74,7 @@ def find(level: Bytes, below: Bytes) -> Symbols:
     numbers = numbers[: state[4]]
     symbols = np.empty(len(numbers), np.uint16)
     contexts = np.empty(len(numbers), np.uint8)
-    counts = np.zeros((kernels.TABLES, 256), np.int64)
+    counts = np.zeros((TABLES, 256), np.int64)
     split_numbers(numbers, symbols, contexts, counts)
     return Symbols(symbols, contexts, counts)
 
@@ -87,8 +89,9 @@ def write(found: Symbols) -> bytes:
 def decode(data: bytes, below: Bytes, shape: tuple[int, int, int]) -> Bytes:
     """The inverse of `find` and `write`. Raises InputError PTM-I112 for what no encoder writes."""
     from ptmtools.texture.coders.repeats import kernels
+    from ptmtools.texture.coders.repeats.symbols.kernels import TABLES
 
-    frequency, used = tables.parse(data, kernels.TABLES)
+    frequency, used = tables.parse(data, TABLES)
     stream = read_stream(memoryview(data)[used:], kernels.MOST_SYMBOLS)
     escaped = len(stream.escapes)
     state = np.zeros(9, np.int64)

@@ -1,0 +1,1 @@
+"""Compiled loops between texels and differences."""

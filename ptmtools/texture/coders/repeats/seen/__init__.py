@@ -1,0 +1,1 @@
+"""Compiled loops for what was seen before."""

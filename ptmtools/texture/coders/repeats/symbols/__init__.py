@@ -1,0 +1,1 @@
+"""Compiled coding of one symbol."""

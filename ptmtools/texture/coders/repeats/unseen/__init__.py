@@ -1,0 +1,1 @@
+"""Compiled loops for what was not seen before."""
