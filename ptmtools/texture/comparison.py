@@ -270,7 +270,9 @@ def _by_pillow(data: bytes, shape: tuple[int, ...]) -> Samples:
 
         return load_image(data).array()
     with Image.open(io.BytesIO(data), formats=("PNG", "WEBP", "JPEG2000")) as image:
-        texels = np.asarray(image)
+        # WebP leaves out alpha where all is opaque.
+        opaque = image.mode == "RGB" and shape[2] in (2, 4)
+        texels = np.asarray(image.convert("RGBA") if opaque else image)
     if texels.ndim == 3 and texels.shape[2] > shape[2]:
         # WebP has no grey: all three are the same.
         texels = texels[:, :, [0, -1]] if shape[2] == 2 else texels[:, :, : shape[2]]

@@ -33,6 +33,16 @@ def test_every_rival_gives_back_what_it_holds(kind: str, components: int) -> Non
         assert [one.problem for one in found.values() if "WebP" in one.codec] == [None]
 
 
+@pytest.mark.parametrize("components", [2, 4])
+def test_opaque_alpha_comes_back_from_webp(components: int) -> None:
+    texels = RNG.integers(0, 256, (19, 33, components), np.uint8)
+    if components == 2:
+        texels[:, :, 0] = 200
+    texels[:, :, -1] = 255
+    webp = [codec for codec in codecs([]) if "WebP" in codec.name]
+    assert [one.problem for one in measure(texels, webp)] == [None]
+
+
 def test_a_lossy_codec_is_found_out() -> None:
     texels = RNG.integers(0, 256, (9, 9, 3), dtype=np.uint8)
     lossy = Codec("lossy", lambda image: image.tobytes(), lambda data, shape: texels & 254)
