@@ -19,6 +19,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
+from ptmtools.progress import announce
+
 # As it loads, numba asks for SciPy's BLAS, for products of matrices, of which no kernel has any.
 # Where SciPy happens to be installed that takes longer than everything else that `ptm encode` of a
 # small image imports but numba itself (0.2 s), and where little memory is left OpenBLAS tries for
@@ -30,6 +32,7 @@ if _hidden:
 try:
     import llvmlite.ir  # type: ignore[import-untyped]
     import numba
+    import numba.core.event
     import numba.extending
     import numba.np.arraymath
 finally:
@@ -101,6 +104,23 @@ def _compiled(function: Function, **options: bool) -> Function:
     finally:
         settings.CACHE_DIR = before
     return cast("Function", compiled)
+
+
+class _FirstCompilation(numba.core.event.Listener):  # type: ignore[misc]
+    """Announces, once, that machine code is being made and not merely loaded."""
+
+    _announced = False
+
+    def on_start(self, event: Any) -> None:
+        if not self._announced:
+            self._announced = True
+            announce("compiling for this machine, as on every first run; up to a minute")
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+numba.core.event.register("numba:compile", _FirstCompilation())  # type: ignore[no-untyped-call]
 
 
 @cache

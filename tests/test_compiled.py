@@ -12,7 +12,9 @@ import ptmtools
 from ptmtools import compiled
 
 PROGRAM = """
+from ptmtools.progress import listen
 from pkg.one.kernels import outer
+listen(print)
 print(outer(1))
 """
 OUTER = """
@@ -49,13 +51,16 @@ def test_a_changed_kernel_changes_those_that_call_it(tmp_path: Path) -> None:
     )
     assert changed != source
     (tmp_path / "ptmtools" / "compiled.py").write_text(changed)
+    shutil.copy(Path(ptmtools.__file__).parent / "progress.py", tmp_path / "ptmtools")
     for factor in (10, 20):
         (package / "two" / "kernels.py").write_text(INNER.format(factor))
-        for _ in range(2):
+        for first in (True, False):
             told = subprocess.run(
                 [sys.executable, "-c", PROGRAM], cwd=tmp_path, check=True, capture_output=True
             )
-            assert int(told.stdout) == factor + 1
+            *announced, result = told.stdout.decode().splitlines()
+            assert int(result) == factor + 1
+            assert [line.startswith("compiling") for line in announced] == [True] * first
     folders = list((package / "__pycache__").glob("kernels-*"))
     assert len(folders) == 2
     shutil.rmtree(package)

@@ -16,6 +16,7 @@ import click
 
 from ptmtools.cli.failures import BROKEN_PIPE, report
 from ptmtools.cli.output import Voice
+from ptmtools.progress import listen
 from ptmtools.version import __version__
 
 #: command → (module, function, what `ptm --help` says).
@@ -79,6 +80,8 @@ def ptm(ctx: click.Context, quiet: bool, verbose: bool) -> None:
     """Turn an architectural model into a database that streams."""
     voice = ctx.ensure_object(Voice)
     voice.quiet, voice.verbose = quiet, verbose
+    if not quiet and sys.stderr.isatty():
+        listen(voice.warn)
 
 
 def main(arguments: Sequence[str]) -> int:
