@@ -106,7 +106,7 @@ def _compiled(function: Function, **options: bool) -> Function:
     return cast("Function", compiled)
 
 
-class _FirstCompilation(numba.core.event.Listener):  # type: ignore[misc]
+class _FirstCompilation(numba.core.event.Listener):
     """Announces, once, that machine code is being made and not merely loaded."""
 
     _announced = False
