@@ -1,0 +1,1 @@
+"""Compiled loops that walk straight lines through the portals."""

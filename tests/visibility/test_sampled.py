@@ -1,0 +1,84 @@
+"""Visibility by lines: never more than the flow's, and all of it where it is easy to see."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ptmtools.cells.model import Cells
+from ptmtools.visibility.flow import Portals, portal_flow
+from ptmtools.visibility.pvs import leaf_matrix
+from ptmtools.visibility.sampled import confirmed, sampled_leaves
+
+ROW = (np.arange(5) * 4.0, [0.0, 3.0], [0.0, 4.0])
+ZIGZAG = {
+    (0, 0, 0, 0): [(0.0, 2.0, 0.0, 1.0)],
+    (1, 0, 0, 0): [(0.0, 2.0, 3.0, 4.0)],
+    (2, 0, 0, 0): [(0.0, 2.0, 0.0, 1.0)],
+}
+
+
+def portals_of(cells: Cells) -> Portals:
+    return Portals(
+        cells.leaf_count,
+        cells.portal_leaf,
+        cells.portal_plane[:, :3],
+        cells.portal_point,
+        cells.portal_start,
+    )
+
+
+@pytest.fixture(scope="module")
+def maze(build_rooms) -> Portals:
+    """Five by five rooms, a door of a place and a size of its own in every wall."""
+    rng = np.random.default_rng(3)
+    cuts = np.arange(6) * 4.0
+    doors = {}
+    for i in range(5):
+        for k in range(5):
+            for axis in (0, 2):
+                low = 4.0 * (k if axis == 0 else i) + rng.uniform(0, 2.5)
+                span = (low, low + rng.uniform(0.2, 1.2))
+                # The axes that follow: y, z for doors along x; x, y for doors along z.
+                doors[i, 0, k, axis] = [(0.0, 2.0, *span) if axis == 0 else (*span, 0.0, 2.0)]
+    return portals_of(build_rooms(cuts, [0.0, 3.0], cuts, doors).cells)
+
+
+def test_lines_see_what_there_is_to_see(build_rooms):
+    hidden = portals_of(build_rooms(*ROW, ZIGZAG).cells)
+    seen = sampled_leaves(hidden, 2000)
+    assert not seen[0, 3]
+    assert not seen[3, 0]
+    assert seen.sum() == 14
+
+
+def test_lines_never_see_more_than_the_flow(maze):
+    flow = leaf_matrix(maze.leaf_count, maze.leaf, portal_flow(maze, 200_000))
+    seen = sampled_leaves(maze, 3000)
+    assert np.array_equal(seen, seen.T)
+    assert not np.any(seen & ~flow)
+    assert seen.sum() > 0.9 * flow.sum()
+    assert sampled_leaves(maze, 10).sum() < seen.sum()
+
+
+def test_aimed_lines_confirm_the_flow_and_nothing_else(maze):
+    flow = leaf_matrix(maze.leaf_count, maze.leaf, portal_flow(maze, 200_000))
+    pairs = np.argwhere(np.triu(np.ones_like(flow), 1)).astype(np.int32)
+    shown = confirmed(maze, pairs, 20_000)
+    truth = flow[pairs[:, 0], pairs[:, 1]]
+    assert not np.any(shown & ~truth)
+    assert shown.sum() > 0.95 * truth.sum()
+
+
+def test_who_shoots_changes_nothing(maze):
+    one, three = (sampled_leaves(maze, 50, workers) for workers in (1, 3))
+    assert np.array_equal(one, three)
+    assert not np.array_equal(one, sampled_leaves(maze, 50, seed=1))
+    pairs = np.argwhere(~np.eye(maze.leaf_count, dtype=bool)).astype(np.int32)
+    assert np.array_equal(confirmed(maze, pairs, 20, 1), confirmed(maze, pairs, 20, 3))
+
+
+def test_rooms_without_doors(build_rooms):
+    alone = portals_of(build_rooms(*ROW, {}).cells)
+    assert np.array_equal(sampled_leaves(alone, 10), np.eye(4, dtype=bool))
+    assert not confirmed(alone, np.array([[0, 1]], np.int32), 10).any()
