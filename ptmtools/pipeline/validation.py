@@ -5,13 +5,16 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ptmtools.cells import SubdivideOptions, structural_triangles
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells import Cells, SubdivideOptions, structural_triangles
 from ptmtools.database import ValidationReport, validate_database, validate_ptm
 from ptmtools.errors import DatabaseError
 from ptmtools.pipeline.folder import DatabaseFolder
 from ptmtools.pipeline.run import Artifacts
 from ptmtools.progress import Progress, silent
-from ptmtools.visibility import SegmentReport, check_conservative
+from ptmtools.visibility import Pvs, SegmentReport, check_conservative
 
 
 def validate(target: str | os.PathLike[str], progress: Progress = silent) -> ValidationReport:
@@ -41,10 +44,19 @@ def shoot_segments(
     ------
     DatabaseError: PTM-D001 to PTM-D006, as `DatabaseFolder` and `Artifacts`.
     """
+    structural, cells, pvs = structure_of(db)
+    return check_conservative(structural, cells, pvs, segments, progress=progress)
+
+
+def structure_of(db: str | os.PathLike[str]) -> tuple[NDArray[np.float64], Cells, Pvs]:
+    """The (T, 3, 3) triangles of a database that occlude, its cells and its PVS.
+
+    Raises as `shoot_segments`.
+    """
     held = Artifacts(DatabaseFolder.open(db))
     cut = held.db.record("cells").parameters
     options = SubdivideOptions(
         structural=tuple(cut.get("structural", ())), detail=tuple(cut.get("detail", ()))
     )
     corners = held.scene.corners[structural_triangles(held.scene, options)]
-    return check_conservative(corners, held.cells, held.pvs, segments, progress=progress)
+    return corners, held.cells, held.pvs

@@ -54,19 +54,24 @@ def compute_pvs(
 
     Raises what `portal_flow` raises.
     """
-    portals = Portals(
-        leaf_count=cells.leaf_count,
-        leaf=cells.portal_leaf.reshape(-1, 2),
-        normal=cells.portal_plane.reshape(-1, 4)[:, :3],
-        point=cells.portal_point.reshape(-1, 3),
-        start=cells.portal_start,
-    )
+    portals = portals_of(cells)
     flow = portal_flow(portals, options.budget, options.workers, progress)
     leaves = leaf_matrix(cells.leaf_count, portals.leaf, flow)
     rows, columns = np.nonzero(leaves)
     matrix = np.zeros((cells.cell_count, cells.cell_count), dtype=np.bool_)
     matrix[cells.leaf_cell[rows], cells.leaf_cell[columns]] = True
     return Pvs.from_matrix(matrix, int(flow.cut.sum()))
+
+
+def portals_of(cells: Cells) -> Portals:
+    """The portals between the leaves of a subdivision."""
+    return Portals(
+        leaf_count=cells.leaf_count,
+        leaf=cells.portal_leaf.reshape(-1, 2),
+        normal=cells.portal_plane.reshape(-1, 4)[:, :3],
+        point=cells.portal_point.reshape(-1, 3),
+        start=cells.portal_start,
+    )
 
 
 def leaf_matrix(

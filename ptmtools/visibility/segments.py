@@ -160,9 +160,8 @@ class Sampler:
     """Draws segments in and around the cells; the kinds are those of the module's head."""
 
     def __init__(self, cells: Cells) -> None:
-        tetrahedra, owner = _tetrahedra(cells)
-        edge = tetrahedra[:, 1:] - tetrahedra[:, :1]
-        self.tetrahedra = tetrahedra
+        self.tetrahedra, owner = tetrahedra(cells)
+        edge = self.tetrahedra[:, 1:] - self.tetrahedra[:, :1]
         volume = np.abs(np.linalg.det(edge))
         self.by_volume = _cumulated(volume)
         of_leaf = np.bincount(owner, weights=volume, minlength=cells.leaf_count)
@@ -248,7 +247,7 @@ class Blockers:
         return np.asarray(hit >= 0, dtype=np.bool_)
 
 
-def _tetrahedra(cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def tetrahedra(cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """(n, 4, 3) tetrahedra that fill the leaves, and the (n,) leaf of each."""
     corners, owner = [np.zeros((0, 4, 3))], [np.zeros(0, np.int64)]
     for leaf in range(cells.leaf_count):

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ptmtools.cells.model import Cells
 from ptmtools.visibility.flow import Portals, portal_flow
-from ptmtools.visibility.pvs import leaf_matrix
+from ptmtools.visibility.pvs import leaf_matrix, portals_of
 from ptmtools.visibility.sampled import confirmed, sampled_leaves
 
 ROW = (np.arange(5) * 4.0, [0.0, 3.0], [0.0, 4.0])
@@ -16,16 +15,6 @@ ZIGZAG = {
     (1, 0, 0, 0): [(0.0, 2.0, 3.0, 4.0)],
     (2, 0, 0, 0): [(0.0, 2.0, 0.0, 1.0)],
 }
-
-
-def portals_of(cells: Cells) -> Portals:
-    return Portals(
-        cells.leaf_count,
-        cells.portal_leaf,
-        cells.portal_plane[:, :3],
-        cells.portal_point,
-        cells.portal_start,
-    )
 
 
 @pytest.fixture(scope="module")
