@@ -26,6 +26,16 @@ THIN_SHARE = 1e-5
 HAIRLINE_SHARE = 8e-6
 #: Rounding of float64 arithmetic on coordinates and their intersections, with a margin.
 ROUNDING_SHARE = 1e-10
+#: Polygons of one plane are united and cut on a grid of this step (`cells.planar`): well above the
+#: rounding of float64, well below what is taken for rounding.
+GRID_SHARE = 1e-12
+
+#: Unit normals with a dot product of at least this are parallel: 1.4 mm over a metre.
+PARALLEL_COSINE = 1.0 - 1e-6
+#: Areas, volumes and scores that differ by less than this share are equal: above the rounding of
+#: float64 in any unit and at any angle, below anything that a model means. Ties go by the order of
+#: the model file, which no transformation changes.
+TIE_SHARE = 1e-9
 
 #: Of two surfaces in one pixel, depths that differ by less than this share are the same depth:
 #: 0.3 mm at 20 m, above the rounding of float32 depth and below a picture 1 mm off its wall.
@@ -44,6 +54,7 @@ class Tolerance:
     thin: the least thickness of a cell.
     hairline: an opening narrower than this is a crack.
     rounding: distances below this are rounding errors of the arithmetic itself.
+    grid: the step to which corners of polygons in a plane are snapped.
     cosine: unit normals with a dot product of at least this are parallel.
     """
 
@@ -53,6 +64,7 @@ class Tolerance:
     thin: float
     hairline: float
     rounding: float
+    grid: float
     cosine: float
 
     @staticmethod
@@ -71,5 +83,15 @@ class Tolerance:
             thin=THIN_SHARE * extent,
             hairline=HAIRLINE_SHARE * extent,
             rounding=ROUNDING_SHARE * extent,
-            cosine=1.0 - 1e-6,
+            grid=GRID_SHARE * extent,
+            cosine=PARALLEL_COSINE,
         )
+
+
+def ranked(values: NDArray[np.float64]) -> NDArray[np.int64]:
+    """(n,) indices of values >= 0 from the greatest to the least; values that differ by less than
+    `TIE_SHARE` of themselves are in the order of their indices, whatever their last digits."""
+    order = np.argsort(-values, kind="stable")
+    value = values[order]
+    run = np.concatenate([[0], np.cumsum(value[:-1] - value[1:] > TIE_SHARE * value[:-1])])
+    return order[np.lexsort((order, run[: len(order)]))]

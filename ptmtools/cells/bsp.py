@@ -22,21 +22,18 @@ from __future__ import annotations
 
 import heapq
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import OUTSIDE
 from ptmtools.cells.options import SubdivideOptions
+from ptmtools.cells.planar import Geometry, difference, intersection
 from ptmtools.cells.polyhedron import Polyhedron, clip_polygon, cut, section
 from ptmtools.cells.reveals import Reveals
 from ptmtools.cells.structure import WallPlane
 from ptmtools.progress import Progress
-from ptmtools.tolerance import Tolerance
-
-if TYPE_CHECKING:
-    Geometry = Any
+from ptmtools.tolerance import TIE_SHARE, Tolerance
 
 OCCLUSION_WEIGHT = 0.5
 BALANCE_WEIGHT = 0.3
@@ -78,7 +75,7 @@ class _Fragment:
 class _Task:
     """A node that waits for its split; `walled` until its walls are used up."""
 
-    priority: tuple[float, int, int]
+    priority: tuple[int, int, int]
     body: Polyhedron = field(compare=False)
     fragments: list[_Fragment] = field(compare=False)
     best: int = field(compare=False)
@@ -121,7 +118,8 @@ def build_tree(
         if best < 0:
             finish(body, parent)
             return
-        priority = (-fragments[best].area, len(planes), parent[1])
+        share = fragments[best].area / tolerance.extent**2
+        priority = (-round(share / TIE_SHARE), len(planes), parent[1])
         heapq.heappush(queue, _Task(priority, body, fragments, best, parent, walled))
 
     push(box, _sections(box, walls, tolerance), (-1, 0), True)
@@ -147,7 +145,7 @@ def build_tree(
                 for f in rest
                 if np.any(f.points @ facing[:3] + facing[3] > tolerance.plane)
             ]
-            push(body, _fragments(inherited), (node, side), task.walled)
+            push(body, _fragments(inherited, tolerance), (node, side), task.walled)
         progress(len(leaves), len(leaves) + len(queue), "splitting")
     return Tree(
         np.array(planes).reshape(-1, 4),
@@ -160,24 +158,26 @@ def build_tree(
 def _sections(body: Polyhedron, walls: list[WallPlane], tolerance: Tolerance) -> list[_Fragment]:
     """The fragments of walls inside a body."""
     cuts = [(w, w.walls, section(body, w.frame.plane, tolerance.rounding)) for w in walls]
-    return _fragments(cuts)
+    return _fragments(cuts, tolerance)
 
 
 def _fragments(
-    shapes: list[tuple[WallPlane, Geometry, NDArray[np.float64]]],
+    shapes: list[tuple[WallPlane, Geometry, NDArray[np.float64]]], tolerance: Tolerance
 ) -> list[_Fragment]:
-    """Wall polygons (wall, shape, outline of the node in the wall's plane) clipped to a node."""
+    """Wall polygons (wall, shape, outline of the node in the wall's plane) clipped to a node; what
+    has no more area than the rounding of its outline is none."""
     import shapely
 
+    sliver = tolerance.rounding * tolerance.extent
     kept: list[_Fragment] = []
     for wall, shape, outline in shapes:
         if len(outline) < 3:
             continue
         frame = wall.frame
         region = shapely.polygons(frame.to_plane(outline))
-        inside = shapely.intersection(shape, region)
+        inside = intersection(shape, region, tolerance.grid)
         area = float(shapely.area(inside))
-        if area > 0:
+        if area > sliver:
             points = frame.to_space(shapely.get_coordinates(inside))
             kept.append(_Fragment(wall, inside, area, points, outline, float(shapely.area(region))))
     return kept
@@ -198,7 +198,7 @@ def _best_split(
     start = np.cumsum([0] + [len(f.points) for f in fragments[:-1]])
     best, best_score = -1, -np.inf
     for i, f in enumerate(fragments):
-        if f.area < least:
+        if f.area < (1 - TIE_SHARE) * least:
             continue
         plane = f.wall.frame.plane
         reach = body.points @ plane[:3] + plane[3]
@@ -218,7 +218,7 @@ def _best_split(
         score = OCCLUSION_WEIGHT * f.area / f.section_area
         score += BALANCE_WEIGHT * (min(ahead, behind) / max(ahead, behind, 1))
         score += SPLIT_WEIGHT * (1.0 - split / max(others, 1))
-        if score > best_score:
+        if score > best_score + TIE_SHARE:
             best, best_score = i, score
     return best
 
@@ -241,5 +241,5 @@ def _closes(
                 fragment.shape,
                 lambda flat, near=near: near.to_plane(frame.to_space(flat)),
             )
-            return float(shapely.area(shapely.difference(moved, taken[tag].blocking)))
+            return float(shapely.area(difference(moved, taken[tag].blocking, tolerance.grid)))
     return fragment.area

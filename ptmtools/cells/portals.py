@@ -11,17 +11,14 @@ shrunk: what is missing from a PVS is a bug, what is too much is a cost.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.bsp import Tree
+from ptmtools.cells.planar import Geometry, difference, intersection, union
 from ptmtools.cells.structure import WallPlane
 from ptmtools.tolerance import Tolerance
-
-if TYPE_CHECKING:
-    Geometry = Any
 
 
 @dataclass(frozen=True)
@@ -103,21 +100,21 @@ def _open_pieces(
     j, i = tree.query(behind, predicate="intersects")
     order = np.lexsort((i, j))
     j, i = j[order], i[order]
-    shared = shapely.intersection(ahead[i], behind[j])
+    shared = intersection(ahead[i], behind[j], tolerance.grid)
     wide = shapely.area(shared) > 0
     i, j, shared = i[wide], j[wide], shared[wide]
     if len(shared) == 0:
         return []
     opening = _without_cracks(
-        shapely.difference(shapely.union_all(shared), wall.blocking), tolerance
+        difference(union(shared, tolerance.grid), wall.blocking, tolerance.grid), tolerance
     )
     if shapely.is_empty(opening):
         return []
-    pieces = shapely.intersection(shared, opening)
+    pieces = intersection(shared, opening, tolerance.grid)
     found = []
     for a, b, piece in zip(i.tolist(), j.tolist(), pieces, strict=True):
         for part in shapely.get_parts(piece):
-            if shapely.get_dimensions(part) < 2 or not _wider_than(part, tolerance.plane):
+            if not _wider_than(part, tolerance.plane):
                 continue
             hull = shapely.get_coordinates(_counter_clockwise(shapely.convex_hull(part)))[:-1]
             found.append((faces[1][b][0], faces[0][a][0], hull, float(shapely.area(part))))
@@ -132,8 +129,7 @@ def _without_cracks(opening: Geometry, tolerance: Tolerance) -> Geometry:
 
     core = shapely.buffer(opening, -tolerance.hairline / 2, join_style="mitre")
     grown = shapely.buffer(core, tolerance.hairline, join_style="mitre")
-    kept = shapely.get_parts(shapely.intersection(opening, grown))
-    return shapely.union_all(kept[shapely.get_dimensions(kept) == 2])
+    return intersection(opening, grown, tolerance.grid)
 
 
 def _wider_than(part: Geometry, width: float) -> bool:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.polyhedron import BOX_FACE
 from ptmtools.cells.portals import Portals
+from ptmtools.tolerance import ranked
 
 #: A surface whose normal leans less than this from the vertical can be stood on (cosine of 45°).
 FLOOR_COSINE = 0.7
@@ -53,6 +54,8 @@ def flood(
     outer = np.array([BOX_FACE in body.tags for body in tree.leaves], dtype=bool)
     if not start:
         start = largest_with_floor(tree, ~outer, corners)
+    if not start and not outer.all():
+        start = (_by_volume(tree, ~outer)[0],)
     reached = np.zeros(len(tree.leaves), dtype=bool)
     neighbours: list[list[int]] = [[] for _ in tree.leaves]
     for a, b in portals.leaves.tolist():
@@ -73,11 +76,17 @@ def largest_with_floor(
     tree: Tree, allowed: NDArray[np.bool_], corners: NDArray[np.float64]
 ) -> tuple[int, ...]:
     """The largest allowed leaf with floor below its middle, as a tuple of one, or ()."""
-    order = sorted(np.flatnonzero(allowed).tolist(), key=lambda i: (-tree.leaves[i].volume, i))
-    for leaf in order:
+    for leaf in _by_volume(tree, allowed):
         if _floor_below(tree.leaves[leaf].points.mean(axis=0), corners):
             return (leaf,)
     return ()
+
+
+def _by_volume(tree: Tree, allowed: NDArray[np.bool_]) -> list[int]:
+    """The allowed leaves, the largest first."""
+    leaves = np.flatnonzero(allowed)
+    order = ranked(np.array([tree.leaves[leaf].volume for leaf in leaves]))
+    return [int(leaf) for leaf in leaves[order]]
 
 
 def roofed_share(corners: NDArray[np.float64], floor_area: float) -> float:
@@ -90,7 +99,7 @@ def roofed_share(corners: NDArray[np.float64], floor_area: float) -> float:
     area = np.linalg.norm(normal, axis=1) / 2
     level = np.abs(normal[:, 1]) >= FLOOR_COSINE * 2 * area
     floor = np.flatnonzero(level & (area >= floor_area / 10))
-    order = floor[np.argsort(-area[floor], kind="stable")][:FLOOR_SAMPLES]
+    order = floor[ranked(area[floor])][:FLOOR_SAMPLES]
     apart = FLOOR_SHARE * float(np.ptp(corners[:, :, 1])) if len(corners) else 0.0
     covered = total = 0.0
     for triangle in order:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.cells.planar import unite
 from ptmtools.cells.polyhedron import BOX_FACE, Polyhedron
 from ptmtools.cells.structure import (
     Frame,
@@ -19,9 +20,8 @@ from ptmtools.cells.structure import (
     lying_in,
     parallel_gap,
     planes_of,
-    unite,
 )
-from ptmtools.tolerance import Tolerance
+from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
 
 
 class Reveals:
@@ -54,12 +54,12 @@ class Reveals:
         self, bounds: list[NDArray[np.float64]]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         """The nearest pair of parallel planes within the wall thickness."""
-        nearest, pair = self._limit, None
+        nearest, pair = (1 + TIE_SHARE) * self._limit, None
         for i, a in enumerate(bounds):
             for b in bounds[i + 1 :]:
                 gap = parallel_gap(a, b, self._tolerance)
                 if gap <= nearest:
-                    nearest, pair = gap, (a, b)
+                    nearest, pair = gap - self._tolerance.rounding, (a, b)
         return pair
 
     def _bridges(self, first: NDArray[np.float64], second: NDArray[np.float64]) -> list[WallPlane]:
@@ -74,7 +74,7 @@ class Reveals:
         spans = (np.abs(low) <= slack) & (np.abs(high - width) <= slack)
         bridging = inside[spans]
         found: list[WallPlane] = []
-        for seed in bridging[np.argsort(-self._areas[bridging], kind="stable")]:
+        for seed in bridging[ranked(self._areas[bridging])]:
             plane = self._planes[seed]
             apart = (parallel_gap(plane, w.frame.plane, self._tolerance) for w in found)
             if min(apart, default=self._limit) < self._tolerance.thin:
@@ -85,8 +85,8 @@ class Reveals:
             found.append(
                 WallPlane(
                     frame,
-                    unite(frame.to_plane(self._corners[walls])),
-                    unite(frame.to_plane(self._corners[flat])),
+                    unite(frame.to_plane(self._corners[walls]), self._tolerance.grid),
+                    unite(frame.to_plane(self._corners[flat]), self._tolerance.grid),
                 )
             )
         return found
@@ -99,6 +99,8 @@ def _bounds(body: Polyhedron, planes: list[NDArray[np.float64]]) -> list[NDArray
     for loop, tag in zip(body.faces, body.tags, strict=True):
         if tag == BOX_FACE:
             p = body.points[loop]
-            axis = int(np.argmin(np.ptp(p, axis=0)))
-            bounds.append(np.append(np.eye(3)[axis], -p[0, axis]))
+            arm = p - p[0]
+            normal = np.cross(arm[1:-1], arm[2:]).sum(axis=0)
+            normal /= np.linalg.norm(normal)
+            bounds.append(np.append(normal, -normal @ p[0]))
     return bounds

@@ -19,20 +19,23 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.options import SubdivideOptions
+from ptmtools.cells.planar import Geometry, union, unite
 from ptmtools.scene.model import Scene
-from ptmtools.tolerance import Tolerance
-
-if TYPE_CHECKING:
-    Geometry = Any
+from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
 
 #: Normals are binned on a grid of this step, only to find candidates quickly.
 _NORMAL_STEP = 0.02
+#: So many grids, each moved on by as large a share of the step: of two planes nearer than half that
+#: share, some grid has both in one bin (one more than the dimensions of a plane are needed).
+_GRIDS = 5
+#: Of the two normals of a plane the one that points this way is taken: no wall lies in the
+#: direction, so that rounding never decides.
+_UPWARD = np.array([0.5772156649, 0.8346268417, 0.2614972128])
 
 
 @dataclass(frozen=True)
@@ -113,32 +116,24 @@ def find_walls(scene: Scene, options: SubdivideOptions, tolerance: Tolerance) ->
     corners = scene.corners[mask]
     forced = _named(scene, options.structural)[mask]
     planes, areas = planes_of(corners)
-    layers = _layers(corners, planes, areas, forced, options.wall_area, tolerance)
+    least = (1 - TIE_SHARE) * options.wall_area
+    layers = _layers(corners, planes, areas, forced, least, tolerance)
     found: list[tuple[float, WallPlane]] = []
     for plane in layers:
         frame = Frame.of(plane)
         flat = lying_in(plane, corners, tolerance)
-        blocking = unite(frame.to_plane(corners[flat]))
+        blocking = unite(frame.to_plane(corners[flat]), tolerance.grid)
         shapely.prepare(blocking)
         parts = shapely.get_parts(blocking)
-        large = shapely.area(parts) >= options.wall_area
+        large = shapely.area(parts) >= least
         if np.any(forced[flat]):
-            named = unite(frame.to_plane(corners[flat & forced]))
+            named = unite(frame.to_plane(corners[flat & forced]), tolerance.grid)
             large |= shapely.intersects(parts, named)
         if not np.any(large):
             continue
-        walls = shapely.union_all(parts[large])
+        walls = union(parts[large], tolerance.grid)
         found.append((float(shapely.area(walls)), WallPlane(frame, walls, blocking)))
-    order = sorted(range(len(found)), key=lambda i: (-found[i][0], i))
-    return [found[i][1] for i in order]
-
-
-def unite(triangles: NDArray[np.float64]) -> Geometry:
-    """Union of (n, 3, 2) triangles of a plane: coplanar overlaps and T-junctions vanish."""
-    import shapely
-
-    polygons = shapely.polygons(np.concatenate([triangles, triangles[:, :1]], axis=1))
-    return shapely.union_all(shapely.make_valid(polygons))
+    return [found[i][1] for i in ranked(np.array([area for area, _ in found]))]
 
 
 def lying_in(
@@ -158,9 +153,7 @@ def planes_of(
     double = np.linalg.norm(normal, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         normal = np.where(double[:, None] > 0, normal / double[:, None], 0.0)
-    largest = np.argmax(np.abs(normal), axis=1)
-    sign = np.sign(normal[np.arange(len(normal)), largest])
-    normal *= np.where(sign == 0, 1.0, sign)[:, None]
+    normal *= np.where(normal @ _UPWARD < 0, -1.0, 1.0)[:, None]
     offset = -np.einsum("ij,ij->i", normal, corners.mean(axis=1))
     return np.concatenate([normal, offset[:, None]], axis=1), double / 2.0
 
@@ -179,10 +172,10 @@ def _layers(
     as what is free in it cannot reach ``wall_area``: curved detail falls away before anything
     quadratic happens.
     """
-    bins = [_bins(planes, tolerance, shift) for shift in (0.0, 0.5)]
+    bins = [_bins(planes, tolerance, shift / _GRIDS) for shift in range(_GRIDS)]
     free = areas > 0
     layers: list[tuple[float, NDArray[np.float64]]] = []
-    for seed in np.argsort(-areas, kind="stable"):
+    for seed in ranked(areas):
         if not free[seed]:
             continue
         free[seed] = False
@@ -198,8 +191,7 @@ def _layers(
         weight = float(areas[members].sum())
         if weight >= wall_area or np.any(forced[members]):
             layers.append((weight, plane))
-    layers.sort(key=lambda layer: -layer[0])
-    return [plane for _, plane in layers]
+    return [layers[i][1] for i in ranked(np.array([weight for weight, _ in layers]))]
 
 
 def _bins(

@@ -7,20 +7,22 @@
    If it does, the model is open; the root box is then clipped to the walls and the subdivision done
    again, so that the open space over low walls does not join everything to everything.
 3. The geometry is cut to the leaves, and each piece gets its owners (`ownership`).
-
-Each reachable leaf is a cell.
+4. Each reachable leaf is a cell, or the leaves of a room are (`grouping`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.bsp import Tree, build_tree
+from ptmtools.cells.grouping import grouped
 from ptmtools.cells.model import OUTSIDE, Cells
-from ptmtools.cells.options import SubdivideOptions
+from ptmtools.cells.options import CellKind, SubdivideOptions
+from ptmtools.cells.orientation import main_axes
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import Portals, find_portals
@@ -51,7 +53,7 @@ class _Space:
 def subdivide(
     scene: Scene, options: SubdivideOptions | None = None, progress: Progress = silent
 ) -> Cells:
-    """Subdivide a scene into convex cells.
+    """Subdivide a scene into convex leaves, and those into cells.
 
     Raises
     ------
@@ -60,22 +62,23 @@ def subdivide(
     """
     options = options or SubdivideOptions()
     _check(scene, options)
-    tolerance = Tolerance.for_points(scene.points)
+    axes = main_axes(scene.corners)
+    tolerance = Tolerance.for_points(scene.points @ axes.T)
     walls = find_walls(scene, options, tolerance)
     corners = scene.corners[structural_triangles(scene, options)]
     reveals = Reveals(corners, options.wall_thickness, tolerance)
-    low, high = _bounds(scene.corners)
+    low, high = _bounds(scene.corners @ axes.T)
     margin = BOX_MARGIN * tolerance.extent
     wide = np.array([low - margin, high + margin])
-    space = _divide(wide, walls, reveals, corners, options, tolerance, progress)
+    space = _divide(wide, walls, reveals, corners, options, tolerance, progress, axes)
     notes: list[str] = []
     if not space.reach.closed:
         roofed = roofed_share(corners, options.wall_area)
         tight = _thickened(*_bounds(corners if len(corners) else scene.corners), tolerance)
         notes.append(_open_note(space, roofed, tight))
-        space = _divide(tight, walls, reveals, corners, options, tolerance, progress, whole=True)
+        space = _divide(tight, walls, reveals, corners, options, tolerance, progress)
     pieces = cut_to_leaves(scene, space.tree, tolerance)
-    return _assemble(scene, space, pieces, notes)
+    return grouped(_assemble(scene, space, pieces, notes), options, tolerance)
 
 
 def _check(scene: Scene, options: SubdivideOptions) -> None:
@@ -91,6 +94,14 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
         )
     if not options.wall_thickness >= 0:
         raise InputError("PTM-I300", f"wall thickness {options.wall_thickness:g} m is negative")
+    if not 0 <= options.gain <= 1:
+        raise InputError(
+            "PTM-I300",
+            f"a gain of {options.gain:g} is no share",
+            remedy="give a number from 0 to 1, such as 0.05",
+        )
+    if options.cells not in get_args(CellKind):
+        raise InputError("PTM-I300", f"cells are no {options.cells!r}", remedy="leaf or room")
     if options.max_cells < 1:
         raise InputError("PTM-I300", f"at most {options.max_cells} cells is none", remedy="try 500")
     for pattern in (*options.structural, *options.detail):
@@ -120,10 +131,15 @@ def _divide(
     options: SubdivideOptions,
     tolerance: Tolerance,
     progress: Progress,
-    whole: bool = False,
+    axes: NDArray[np.float64] | None = None,
 ) -> _Space:
-    """Subdivide a root box and flood it; ``whole``: leaves at the box count as inside."""
+    """Subdivide a root box and flood it. Its sides run along the rows of ``axes`` (3, 3); without
+    them it is parallel to the coordinate axes, and leaves at it count as inside."""
+    whole = axes is None
     body = Polyhedron.box(box[0], box[1])
+    if axes is not None:
+        body = Polyhedron(body.points @ axes, body.faces, body.tags)
+        box = np.stack(_bounds(body.points))
     tree = build_tree(body, walls, reveals, options, tolerance, progress)
     portals = find_portals(tree, tolerance)
     start = _viewpoint_leaves(tree, box, options)
