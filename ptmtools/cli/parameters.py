@@ -20,8 +20,14 @@ import click
 T = TypeVar("T")
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
-#: Fields that are lists, whose option names one element.
-SINGULAR = {"viewpoints": "viewpoint", "image_folders": "image_folder"}
+#: Fields whose option has another name: of lists it names one element; of a stage, the stage.
+NAMES = {
+    "viewpoints": "viewpoint",
+    "image_folders": "image_folder",
+    "method": "pvs",
+    "budget": "pvs_budget",
+    "lines": "pvs_lines",
+}
 
 
 class Numbers(click.ParamType):  # type: ignore[type-arg]  # generic only in newer Clicks
@@ -103,7 +109,7 @@ def take(
 
 def _option(field: Field[Any], hint: Any, told: str | None) -> Decorator:
     default = field.default if field.default_factory is MISSING else field.default_factory()
-    flag = "--" + SINGULAR.get(field.name, field.name).replace("_", "-")
+    flag = "--" + NAMES.get(field.name, field.name).replace("_", "-")
     settings: dict[str, Any] = {"default": default, "help": told}
     if get_origin(hint) in (Union, UnionType):  # X | None
         hint = next(part for part in get_args(hint) if part is not NoneType)

@@ -109,14 +109,34 @@ def cells(
 @click.command("pvs")
 @database
 @options_of(PvsOptions, omit=["workers"])
+@click.option(
+    "--report",
+    "wanted",
+    is_flag=True,
+    help="Say what the sets look like: sizes, the "
+    "costliest portals, and openings that show suspiciously much.",
+)
 @workers
 @as_json
 @voiced
-def pvs(voice: Voice, db: str, as_json: bool, workers: int, **values: Any) -> None:
+def pvs(voice: Voice, db: str, as_json: bool, workers: int, wanted: bool, **values: Any) -> None:
     """Find which cells of DB may see each other."""
     with voice.progress() as progress:
-        report = make_pvs(db, take(PvsOptions, values), workers, progress)
-    _tell(voice, report, as_json)
+        done = make_pvs(db, take(PvsOptions, values), workers, progress)
+    if not wanted:
+        _tell(voice, done, as_json)
+        return
+    from ptmtools.cli.visibility import tell_pvs
+    from ptmtools.pipeline import Artifacts, DatabaseFolder
+    from ptmtools.visibility.report import report
+
+    artifacts = Artifacts(DatabaseFolder.open(db))
+    told = report(artifacts.cells, artifacts.pvs)
+    if as_json:
+        voice.emit_json(asdict(told))
+    else:
+        _tell(voice, done, as_json)
+        tell_pvs(voice, told)
 
 
 @click.command("ach")

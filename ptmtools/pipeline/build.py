@@ -280,12 +280,18 @@ def _look(run: Run, options: PvsOptions) -> None:
                 f"culling by visibility gains little here: on average a cell sees "
                 f"{share:.0%} of all cells, as in a single hall"
             )
+        if not pvs.conservative:
+            notes.append(
+                "the visible sets are of what random lines showed: a client that loads by them "
+                "will show holes (`--pvs full` or `fast` for use)"
+            )
         if pvs.fallbacks:
             notes.append(
                 f"the search was cut short at {pvs.fallbacks:,} portals; "
                 "their sets are larger than need be, never smaller"
             )
-        return {"average_share": share, "fallbacks": pvs.fallbacks}, tuple(notes)
+        figures = {"average_share": share, "fallbacks": pvs.fallbacks, "leaks": len(pvs.leak)}
+        return figures | {"conservative": pvs.conservative}, tuple(notes)
 
     run.stage("pvs", options, run.inputs("cells"), compute)
 

@@ -92,12 +92,17 @@ class PortalFlow:
     sees: (2K, W) uint64 rows of little-endian bits: directed portal p (2k crosses portal k along
         its normal, 2k + 1 against it) may be followed by directed portal q on one straight line.
     cut: (K,) whether the budget or the depth cut the search from a portal short.
-    operations: chain tests and clips that were done.
+    work: (K,) chain tests and clips that the search from each portal took, both ways together.
     """
 
     sees: NDArray[np.uint64]
     cut: NDArray[np.bool_]
-    operations: int
+    work: NDArray[np.int64]
+
+    @property
+    def operations(self) -> int:
+        """Chain tests and clips that were done in all."""
+        return int(self.work.sum())
 
 
 def portal_flow(
@@ -127,7 +132,7 @@ def portal_flow(
         )
     cut = np.zeros(count, dtype=np.bool_)
     if count == 0:
-        return PortalFlow(np.zeros((0, words), dtype=np.uint64), cut, 0)
+        return PortalFlow(np.zeros((0, words), dtype=np.uint64), cut, np.zeros(0, np.int64))
 
     from ptmtools.visibility import kernels
 
@@ -137,7 +142,7 @@ def portal_flow(
         known = _prepass(g, words, pool, threads)
         storage = [scratch(g, words) for _ in range(threads)]
         order = np.argsort(BITS_OF_BYTE[known.view(np.uint8)].sum(axis=1), kind="stable")
-        operations = 0
+        work = np.zeros(count, dtype=np.int64)
         for first in range(0, count, BATCH):
             batch = order[first : first + BATCH]
             seen = np.zeros((len(batch), words), dtype=np.uint64)
@@ -148,23 +153,21 @@ def portal_flow(
                 batch: NDArray[np.int64] = batch,
                 seen: NDArray[np.uint64] = seen,
                 waiting: deque[int] = waiting,
-            ) -> int:
-                done = 0
+            ) -> None:
                 while True:
                     try:
                         i = waiting.popleft()
                     except IndexError:
-                        return done
+                        return
                     p = int(batch[i])
-                    taken, cut[p] = kernels.flow(g, s, known, p, budget, seen[i])
-                    done += int(taken)
+                    work[p], cut[p] = kernels.flow(g, s, known, p, budget, seen[i])
 
-            operations += sum(pool.map(search, storage))
+            list(pool.map(search, storage))
             known[batch] = seen
             for p in batch:
                 kernels.drop_unreturned(known, p)
             progress(min(first + BATCH, count), count, "portals")
-    return PortalFlow(known, cut[0::2] | cut[1::2], operations)
+    return PortalFlow(known, cut[0::2] | cut[1::2], work[0::2] + work[1::2])
 
 
 def _prepass(g: Geometry, words: int, pool: ThreadPoolExecutor, threads: int) -> NDArray[np.uint64]:

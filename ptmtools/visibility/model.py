@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +18,24 @@ class Pvs:
     ----------
     start: (C + 1,) int64 CSR over cells.
     cell: (n,) int32 the potentially visible cells; ``cell[start[i]] == i``.
-    fallbacks: portals whose flow was given up for a looser, still conservative set.
+    work: (K,) int64 operations that the search from each portal took; empty without a search.
+    cut: (K,) bool portals whose search was given up for a looser, still conservative set.
+    leak: (n, 4) int32 cells that see suspiciously much: the cell, how many cells it sees, the
+        smallest portal that shows it half of them, and how many that one shows.
+    conservative: False if the sets are of what random lines happened to show.
     """
 
     start: NDArray[np.int64]
     cell: NDArray[np.int32]
-    fallbacks: int = 0
+    work: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    cut: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
+    leak: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), np.int32))
+    conservative: bool = True
+
+    @property
+    def fallbacks(self) -> int:
+        """Portals whose search was cut short."""
+        return int(self.cut.sum())
 
     @property
     def cell_count(self) -> int:
@@ -46,21 +59,24 @@ class Pvs:
         return matrix
 
     @staticmethod
-    def from_matrix(matrix: NDArray[np.bool_], fallbacks: int = 0) -> Pvs:
-        """From a (C, C) symmetric matrix; the diagonal is taken as set."""
+    def from_matrix(matrix: NDArray[np.bool_], **told: Any) -> Pvs:
+        """From a (C, C) symmetric matrix, the diagonal taken as set; further attributes."""
         n = len(matrix)
         rest = matrix & ~np.eye(n, dtype=np.bool_)
         rows = [np.concatenate([[i], np.flatnonzero(rest[i])]) for i in range(n)]
         start = np.concatenate([[0], np.cumsum([len(r) for r in rows])]).astype(np.int64)
         cell = np.concatenate(rows).astype(np.int32) if rows else np.zeros(0, np.int32)
-        return Pvs(start, cell, fallbacks)
+        return Pvs(start, cell, **told)
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
         """The sets as plain arrays."""
         return {
             "start": self.start,
             "cell": self.cell,
-            "fallbacks": np.array([self.fallbacks], dtype=np.int64),
+            "work": self.work,
+            "cut": self.cut,
+            "leak": self.leak,
+            "conservative": np.array([self.conservative]),
         }
 
     @staticmethod
@@ -69,5 +85,8 @@ class Pvs:
         return Pvs(
             np.asarray(arrays["start"], dtype=np.int64),
             np.asarray(arrays["cell"], dtype=np.int32),
-            int(np.asarray(arrays["fallbacks"], dtype=np.int64)[0]),
+            np.asarray(arrays["work"], dtype=np.int64),
+            np.asarray(arrays["cut"], dtype=np.bool_),
+            np.asarray(arrays["leak"], dtype=np.int32).reshape(-1, 4),
+            bool(arrays["conservative"][0]),
         )

@@ -6,7 +6,8 @@ budget are in `flow`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,9 @@ from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
 from ptmtools.visibility.flow import PortalFlow, Portals, portal_flow
+from ptmtools.visibility.leaks import find_leaks
 from ptmtools.visibility.model import Pvs
+from ptmtools.visibility.sampled import sampled_leaves
 
 
 @dataclass(frozen=True)
@@ -24,13 +27,18 @@ class PvsOptions:
 
     Attributes
     ----------
+    method: full: portal flow, exact up to the budget; fast: planes and the separators of the first
+        two portals, looser and conservative too; sampled: what random lines show, not conservative,
+        to compare with.
     budget: operations (chain tests, clips) that the search from one side of a portal may take
-        before what it has not refuted counts as visible. 0 gives the separators of the first two
-        portals only; the result is conservative at any value.
+        before what it has not refuted counts as visible; the result is conservative at any value.
+    lines: random lines through each portal, where sampled.
     workers: threads, None for one per processor; never changes the result.
     """
 
+    method: Literal["full", "fast", "sampled"] = "full"
     budget: int = 200_000
+    lines: int = 1000
     workers: int | None = None
 
     def __post_init__(self) -> None:
@@ -40,27 +48,48 @@ class PvsOptions:
                 f"budget {self.budget} or workers {self.workers} is out of range",
                 remedy="give a budget of at least 0 and at least one worker",
             )
+        if self.method not in ("full", "fast", "sampled") or self.lines < 1:
+            raise InputError(
+                "PTM-I402",
+                f"method {self.method!r} with {self.lines} lines is no way to compute visibility",
+                remedy="give full, fast or sampled, and at least one line",
+            )
 
 
 def compute_pvs(
     cells: Cells, options: PvsOptions = PvsOptions(), progress: Progress = silent
 ) -> Pvs:
-    """Cell-to-cell visibility, conservative and symmetric (paper §3; Teller & Séquin).
+    """Cell-to-cell visibility, symmetric (paper §3; Teller & Séquin).
 
-    A pair of cells is left out only if no straight line, but for hairlines thinner than the
-    rounding of the coordinates (`Tolerance.rounding`), leads from one to the other through
-    portals. Cells that share a portal always see each other. `Pvs.fallbacks` counts the portals
-    whose search was cut short by the budget.
+    Unless it is sampled, a pair of cells is left out only if no straight line, but for hairlines
+    thinner than the rounding of the coordinates (`Tolerance.rounding`), leads from one to the other
+    through portals. Cells that share a portal always see each other. `Pvs.fallbacks` counts the
+    portals whose search was cut short by the budget.
 
     Raises what `portal_flow` raises.
     """
     portals = portals_of(cells)
-    flow = portal_flow(portals, options.budget, options.workers, progress)
-    leaves = leaf_matrix(cells.leaf_count, portals.leaf, flow)
+    if options.method == "sampled":
+        leaves = sampled_leaves(portals, options.lines, options.workers)
+        return Pvs.from_matrix(_lifted(cells, leaves), conservative=False)
+    budget = options.budget if options.method == "full" else 0
+    flow = portal_flow(portals, budget, options.workers, progress)
+    matrix = _lifted(cells, leaf_matrix(cells.leaf_count, portals.leaf, flow))
+    leaks = [astuple(leak) for leak in find_leaks(cells, flow, matrix)]
+    return Pvs.from_matrix(
+        matrix,
+        work=flow.work,
+        cut=flow.cut & (options.method == "full"),
+        leak=np.array(leaks, np.int32).reshape(-1, 4),
+    )
+
+
+def _lifted(cells: Cells, leaves: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(C, C) from (L, L): a cell sees what its leaves see."""
     rows, columns = np.nonzero(leaves)
     matrix = np.zeros((cells.cell_count, cells.cell_count), dtype=np.bool_)
     matrix[cells.leaf_cell[rows], cells.leaf_cell[columns]] = True
-    return Pvs.from_matrix(matrix, int(flow.cut.sum()))
+    return matrix
 
 
 def portals_of(cells: Cells) -> Portals:

@@ -137,9 +137,9 @@ def test_the_budget_only_loosens_and_is_reported(build_rooms):
 @pytest.mark.parametrize("budget", [0, 300, 200_000])
 def test_the_number_of_workers_changes_nothing(build_rooms, budget):
     rooms = random_grid(build_rooms, np.random.default_rng(5), (5, 3, 4), 0.9)
-    one = compute_pvs(rooms.cells, PvsOptions(budget, workers=1))
+    one = compute_pvs(rooms.cells, PvsOptions(budget=budget, workers=1))
     for workers in (2, 5, None):
-        other = compute_pvs(rooms.cells, PvsOptions(budget, workers))
+        other = compute_pvs(rooms.cells, PvsOptions(budget=budget, workers=workers))
         assert np.array_equal(one.start, other.start)
         assert np.array_equal(one.cell, other.cell)
         assert one.fallbacks == other.fallbacks
@@ -172,7 +172,7 @@ def random_grid(build_rooms, rng, shape, share):
 )
 def test_what_a_ray_sees_is_in_the_pvs(build_rooms, seed, shape, share, budget):
     rooms = random_grid(build_rooms, np.random.default_rng(seed), shape, share)
-    pvs = compute_pvs(rooms.cells, PvsOptions(budget, workers=1))
+    pvs = compute_pvs(rooms.cells, PvsOptions(budget=budget, workers=1))
     report = check_conservative(rooms.triangles, rooms.cells, pvs, 20_000, seed % 1000)
     assert report.missed == ()
 

@@ -1,0 +1,124 @@
+"""What a PVS looks like: how much cells see, what was dear to find out, where it leaks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.model import Cells
+from ptmtools.visibility.model import Pvs
+
+#: Portals listed by the work that they took.
+COSTLIEST = 10
+#: Shares of the cells at which the sizes of their sets are told.
+QUANTILES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
+
+
+@dataclass(frozen=True)
+class PortalFacts:
+    """One portal.
+
+    Attributes
+    ----------
+    portal: its number. cells: the two cells that it joins. area: m² truly open.
+    centre: (x, y, z) metres, world coordinates, the mean of its vertices.
+    """
+
+    portal: int
+    cells: tuple[int, int]
+    area: float
+    centre: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class CostlyPortal(PortalFacts):
+    """A portal with the work that its search took.
+
+    Attributes
+    ----------
+    operations: chain tests and clips. cut: whether the budget ended the search.
+    """
+
+    operations: int
+    cut: bool
+
+
+@dataclass(frozen=True)
+class LeakingPortal(PortalFacts):
+    """The smallest portal through which a cell sees at least half of what it sees.
+
+    Attributes
+    ----------
+    cell: a cell that sees more than three times the median. sees: how many cells it sees.
+    through: how many of them through this portal.
+    """
+
+    cell: int
+    sees: int
+    through: int
+
+
+@dataclass(frozen=True)
+class PvsReport:
+    """What `report` tells.
+
+    Attributes
+    ----------
+    cells, portals: how many there are.
+    sizes: share of the cells → cells that this share of them sees at most, for `QUANTILES`.
+    average: cells that a cell sees, itself included.
+    operations: chain tests and clips in all. fallbacks: portals whose search was cut short.
+    costliest: the portals that took most, dearest first. leaks: those that see most first.
+    conservative: False where the sets are of what random lines showed.
+    """
+
+    cells: int
+    portals: int
+    sizes: tuple[tuple[float, int], ...]
+    average: float
+    operations: int
+    fallbacks: int
+    costliest: tuple[CostlyPortal, ...]
+    leaks: tuple[LeakingPortal, ...]
+    conservative: bool
+
+
+def report(cells: Cells, pvs: Pvs) -> PvsReport:
+    """What there is to say of the PVS of a subdivision."""
+    sees = np.sort(np.diff(pvs.start))
+    count = len(sees)
+    at = [min(count - 1, int(np.ceil(q * count)) - 1) if q else 0 for q in QUANTILES]
+    order = np.lexsort((np.arange(len(pvs.work)), -pvs.work))[:COSTLIEST]
+    return PvsReport(
+        cells=count,
+        portals=cells.portal_count,
+        sizes=tuple((q, int(sees[i])) for q, i in zip(QUANTILES, at, strict=True) if count),
+        average=float(sees.mean()) if count else 0.0,
+        operations=int(pvs.work.sum()),
+        fallbacks=pvs.fallbacks,
+        costliest=tuple(
+            CostlyPortal(**_facts(cells, int(k)), operations=int(pvs.work[k]), cut=bool(pvs.cut[k]))
+            for k in order
+        ),
+        leaks=tuple(_leaking(cells, row) for row in pvs.leak),
+        conservative=pvs.conservative,
+    )
+
+
+def _leaking(cells: Cells, row: NDArray[np.int32]) -> LeakingPortal:
+    cell, sees, portal, through = (int(n) for n in row)
+    return LeakingPortal(**_facts(cells, portal), cell=cell, sees=sees, through=through)
+
+
+def _facts(cells: Cells, k: int) -> dict[str, Any]:
+    one, other = (int(cells.leaf_cell[leaf]) for leaf in cells.portal_leaf[k])
+    x, y, z = (float(c) for c in cells.portal(k).mean(axis=0))
+    return {
+        "portal": k,
+        "cells": (one, other),
+        "area": float(cells.portal_area[k]),
+        "centre": (x, y, z),
+    }
