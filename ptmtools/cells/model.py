@@ -1,7 +1,7 @@
 """Convex cells, the BSP tree that locates them, their portals, and the geometry cut to them.
 
 A *leaf* is a convex polyhedron, a leaf of the BSP tree that somebody can reach; a *cell* is a
-union of leaves (today one leaf each, `leaf_cell` is the identity). Index -1 means "no cell":
+union of leaves, one each or as many as make up a room (`leaf_cell`). Index -1 means "no cell":
 solid matter, the outside of a closed model, or what nobody can reach.
 
 Lists of varying length are CSR: row i of ``x`` is ``x[x_start[i]:x_start[i + 1]]``.
@@ -102,6 +102,18 @@ class Cells:
     def cell_leaves(self, cell: int) -> NDArray[np.int64]:
         """The leaves of a cell."""
         return np.flatnonzero(self.leaf_cell == cell)
+
+    def leaf_volumes(self) -> NDArray[np.float64]:
+        """(L,) m³, by tetrahedra from the middle of each leaf's vertices."""
+        total = np.zeros(self.leaf_count)
+        for leaf in range(self.leaf_count):
+            loops = self.leaf_faces(leaf)
+            fan = np.concatenate(
+                [[(r[0], r[i], r[i + 1]) for i in range(1, len(r) - 1)] for r in loops]
+            )
+            a, b, c = np.moveaxis(self.leaf_point[fan] - self.leaf_points(leaf).mean(axis=0), 1, 0)
+            total[leaf] = np.einsum("ij,ij->", np.cross(a, b), c) / 6
+        return total
 
     def adjacent(self) -> list[NDArray[np.int32]]:
         """For every cell the other cells with which it shares a portal, ascending."""

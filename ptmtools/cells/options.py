@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
+
+CellKind = Literal["leaf", "room"]
 
 
 @dataclass(frozen=True)
@@ -18,6 +21,10 @@ class SubdivideOptions:
     max_cells: stop at this many leaves, best splits first.
     structural: globs over object and material names; what matches may split whatever its area.
     detail: globs; what matches never splits a cell nor blocks a portal. `structural` wins.
+    cells: every convex "leaf" of the subdivision is a cell, or the leaves of a "room", which ends
+        at its doors, are one; but see `gain`.
+    gain: leaves of one room stay cells of their own if that saves at least this share of what has
+        to be fetched in them and for them; 0 joins nothing, 1 leaves every room whole.
     viewpoints: eyes (x, y, z) in world metres from which the flood of the reachable starts.
     """
 
@@ -26,4 +33,6 @@ class SubdivideOptions:
     max_cells: int = 2000
     structural: tuple[str, ...] = ()
     detail: tuple[str, ...] = ()
+    cells: CellKind = "leaf"
+    gain: float = 0.1
     viewpoints: tuple[tuple[float, float, float], ...] = ()

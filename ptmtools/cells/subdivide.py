@@ -98,7 +98,7 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
         raise InputError(
             "PTM-I300",
             f"a gain of {options.gain:g} is no share",
-            remedy="give a number from 0 to 1, such as 0.05",
+            remedy="give a number from 0 to 1, such as 0.1",
         )
     if options.cells not in get_args(CellKind):
         raise InputError("PTM-I300", f"cells are no {options.cells!r}", remedy="leaf or room")

@@ -1,0 +1,77 @@
+"""Leaves become cells: each for itself, or grouped into rooms where parting gains too little.
+
+A room of several leaves is one cell, unless keeping some of them apart saves its viewers more than
+`SubdivideOptions.gain` of what they fetch: a corridor along many doors is worth parting, a hall is
+not. Cells never reach through a door (`rooms`), even if both sides see the same: what is behind a
+door covers little of the view, and the coverage hints can say so only of another cell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.gain import join_by_gain
+from ptmtools.cells.model import Cells
+from ptmtools.cells.options import SubdivideOptions
+from ptmtools.cells.rooms import room_of_leaf
+from ptmtools.cells.sight import sampled_sight
+from ptmtools.tolerance import Tolerance
+
+#: What is said of a model of one cell.
+ONE_HALL = "visibility culling gains nothing here: 1 hall"
+
+
+def grouped(cells: Cells, options: SubdivideOptions, tolerance: Tolerance) -> Cells:
+    """The cells that the options ask for, of cells that are single leaves.
+
+    Cells are numbered in the order of their first leaves; geometry in a boundary between two
+    leaves of one cell lies inside that cell.
+    """
+    if options.cells == "room":
+        cells = _joined(cells, numbered(_groups(cells, options.gain, tolerance)))
+    if cells.cell_count == 1:
+        cells = replace(
+            cells, notes=(*cells.notes, "visibility culling gains nothing here: 1 hall")
+        )
+    return cells
+
+
+def numbered(group: NDArray[np.integer]) -> NDArray[np.int32]:
+    """(L,) groups renamed to 0, 1, … in the order in which they first occur."""
+    _, first, row = np.unique(group, return_index=True, return_inverse=True)
+    place = np.empty(len(first), dtype=np.int32)
+    place[np.argsort(first)] = np.arange(len(first))
+    return np.asarray(place[row.reshape(-1)])
+
+
+def _groups(cells: Cells, gain: float, tolerance: Tolerance) -> NDArray[np.integer]:
+    room = room_of_leaf(cells, tolerance)
+    if gain >= 1 or len(np.unique(room)) == len(room):
+        return room
+    inner = cells.portal_leaf[room[cells.portal_leaf[:, 0]] == room[cells.portal_leaf[:, 1]]]
+    sees = sampled_sight(cells)
+    return join_by_gain(sees, cells.leaf_volumes(), _surface(cells), inner, gain)
+
+
+def _surface(cells: Cells) -> NDArray[np.float64]:
+    """(C,) m² of the surfaces of each cell; what lies in a boundary counts on both sides."""
+    a, b, c = np.moveaxis(cells.vertex[cells.triangle], 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    front, back = cells.triangle_cell.T
+    total = np.zeros(cells.cell_count)
+    np.add.at(total, front[front >= 0], area[front >= 0])
+    behind = (back >= 0) & (back != front)
+    np.add.at(total, back[behind], area[behind])
+    return total
+
+
+def _joined(cells: Cells, group: NDArray[np.int32]) -> Cells:
+    owner = cells.triangle_cell
+    return replace(
+        cells,
+        leaf_cell=group,
+        triangle_cell=np.where(owner >= 0, group[owner], -1).astype(np.int32),
+    )

@@ -1,0 +1,204 @@
+"""Which leaves make up which room: a watershed of free space on the graph of leaves.
+
+Walls cut a building into more leaves than it has rooms: every plane goes on behind the wall that
+proposed it. Leaves grow together through the openings between them, widest first, as basins do in
+a watershed of the distance from the walls: an opening joins two *regions* if it is at least
+`OPEN` of the cross-section of the narrower one. What is left of the openings then are doors.
+
+The cross-section of a region is its volume over its length in plan, and never less than that of
+anything that has joined it; length is the area over the width (least breadth in any direction) of
+the hull of its plan. So a corridor's is its width times its height, that of a room is its narrower
+side times its height, and a doorway, a sliver or a bay is narrow and joins whatever it opens into
+most: one room, since as part of that room it is narrow no more.
+
+The opening between two regions is the largest group of touching portals, by true area: two doors
+into one corridor are two openings, a wide arch that planes have cut up is one.
+
+Tried and rejected: the share of the common boundary that is open (two rooms joined by a doorway as
+deep as its wall share nothing but the doorway); the volume of the convex hull that two regions
+fill together (splits every room with a pillar, and joins small rooms through their doors); the
+largest sphere in each leaf instead of its cross-section (under a ceiling of 2.6 m all halls have
+the same).
+"""
+
+from __future__ import annotations
+
+import heapq
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.model import Cells
+from ptmtools.tolerance import Tolerance
+
+if TYPE_CHECKING:
+    Plan = Any
+
+#: An opening joins two regions if it is at least this share of the narrower one's cross-section.
+OPEN = 0.7
+#: Shares that differ by less are equal, in digits: symmetrical buildings have many, which rounding
+#: must not put in order.
+DIGITS = 6
+#: Pairs of portals that are compared at a time.
+AT_ONCE = 2048
+
+
+def room_of_leaf(cells: Cells, tolerance: Tolerance, least: float = OPEN) -> NDArray[np.int64]:
+    """(L,) the room of each leaf, called by one of its leaves.
+
+    A function of the leaves and portals alone. Of equally open pairs the one with the lower
+    numbered leaves is joined first.
+    """
+    regions = _Regions(cells, tolerance)
+    waiting = [(-regions.openness(a, b), a, b) for a, b in regions.pairs()]
+    heapq.heapify(waiting)
+    while waiting:
+        told, a, b = heapq.heappop(waiting)
+        if not regions.are_neighbours(a, b):
+            continue
+        share = regions.openness(a, b)
+        if -told > share:  # one of them has grown meanwhile
+            heapq.heappush(waiting, (-share, a, b))
+        elif share >= least:
+            for c, d in regions.join(a, b):
+                heapq.heappush(waiting, (-regions.openness(c, d), c, d))
+    return regions.of_leaf()
+
+
+class _Regions:
+    """Connected groups of leaves, each called by one of them, and the openings between them."""
+
+    def __init__(self, cells: Cells, tolerance: Tolerance) -> None:
+        import shapely
+
+        self._volume = cells.leaf_volumes()
+        plan = cells.leaf_point[:, [0, 2]]
+        rows = np.repeat(np.arange(cells.leaf_count), np.diff(cells.leaf_point_start))
+        self._plan: list[Plan] = list(
+            shapely.convex_hull(shapely.multipoints(plan, indices=rows)).tolist()
+        )
+        self._section = [_section(v, p) for v, p in zip(self._volume, self._plan, strict=True)]
+        self._parent = list(range(cells.leaf_count))
+        self._area = cells.portal_area.tolist()
+        self._touching = _touching(cells, tolerance.plane)
+        self._between: list[dict[int, list[int]]] = [{} for _ in range(cells.leaf_count)]
+        for k, (a, b) in enumerate(cells.portal_leaf.tolist()):
+            doors = self._between[a].setdefault(b, [])
+            self._between[b][a] = doors
+            doors.append(k)
+        self._opening: dict[tuple[int, int], float] = {}
+
+    def pairs(self) -> list[tuple[int, int]]:
+        """Regions with a portal between them, the lower first."""
+        return [(a, b) for a, near in enumerate(self._between) for b in sorted(near) if a < b]
+
+    def are_neighbours(self, a: int, b: int) -> bool:
+        return b in self._between[a]
+
+    def openness(self, a: int, b: int) -> float:
+        """The opening between two neighbours as a share of the narrower one's cross-section."""
+        pair = (min(a, b), max(a, b))
+        if pair not in self._opening:
+            self._opening[pair] = self._largest_opening(self._between[a][b])
+        return round(self._opening[pair] / min(self._section[a], self._section[b]), DIGITS)
+
+    def join(self, a: int, b: int) -> list[tuple[int, int]]:
+        """Makes two neighbours one region, called by the one with more neighbours; returns the
+        pairs that are new or have a larger opening."""
+        if len(self._between[a]) < len(self._between[b]):
+            a, b = b, a
+        self._parent[b] = a
+        self._volume[a] += self._volume[b]
+        self._plan[a] = self._plan[a].union(self._plan[b]).convex_hull
+        self._section[a] = max(
+            self._section[a], self._section[b], _section(self._volume[a], self._plan[a])
+        )
+        del self._between[a][b]
+        found = []
+        for c, doors in sorted(self._between[b].items()):
+            if c == a:
+                continue
+            del self._between[c][b]
+            both = [*self._between[a].get(c, ()), *doors]
+            self._between[a][c] = self._between[c][a] = both
+            pair = (min(a, c), max(a, c))
+            self._opening.pop(pair, None)
+            found.append(pair)
+        self._between[b] = {}
+        return found
+
+    def of_leaf(self) -> NDArray[np.int64]:
+        """(L,) by which leaf the region of each leaf is called."""
+        found = np.array(self._parent, dtype=np.int64)
+        while len(found) and not np.array_equal(found, found[found]):
+            found = found[found]
+        return found
+
+    def _largest_opening(self, doors: list[int]) -> float:
+        left, largest = set(doors), 0.0
+        for door in sorted(doors):
+            if door not in left:
+                continue
+            left.discard(door)
+            group, area = [door], 0.0
+            while group:
+                k = group.pop()
+                area += self._area[k]
+                reached = [j for j in self._touching[k] if j in left]
+                left.difference_update(reached)
+                group += reached
+            largest = max(largest, area)
+        return largest
+
+
+def _section(volume: float, plan: Plan) -> float:
+    """m²: the mean cross-section along a region, volume over length."""
+    import shapely
+
+    corners = shapely.get_coordinates(plan)
+    edge = np.diff(corners, axis=0)
+    length = np.linalg.norm(edge, axis=1)
+    edge = edge[length > 0] / length[length > 0, None]
+    across = np.outer(edge[:, 0], corners[:, 1]) - np.outer(edge[:, 1], corners[:, 0])
+    width = float(np.ptp(across, axis=1).min())
+    return volume * width / float(plan.area)
+
+
+def _touching(cells: Cells, near: float) -> list[list[int]]:
+    """For every portal those that it meets, within ``near`` metres, ascending."""
+    import shapely
+
+    found: list[list[int]] = [[] for _ in range(cells.portal_count)]
+    if not found:
+        return found
+    start = cells.portal_start[:-1]
+    last = np.diff(cells.portal_start) - 1
+    low = np.minimum.reduceat(cells.portal_point, start) - near / 2
+    high = np.maximum.reduceat(cells.portal_point, start) + near / 2
+    boxes = shapely.box(low[:, 0], low[:, 2], high[:, 0], high[:, 2])
+    i, j = shapely.STRtree(boxes).query(boxes, predicate="intersects")
+    close = (i < j) & (low[i, 1] <= high[j, 1]) & (low[j, 1] <= high[i, 1])
+    i, j = i[close], j[close]
+    order = np.lexsort((j, i))
+    i, j = i[order], j[order]
+    corner = np.minimum(np.arange(int(last.max()) + 1), last[:, None])
+    polygon = cells.portal_point[start[:, None] + corner]  # shorter ones repeat their last point
+    for part in range(0, len(i), AT_ONCE):
+        rows = slice(part, part + AT_ONCE)
+        p, q = polygon[i[rows]], polygon[j[rows]]
+        meet = np.minimum(_distance(p, q), _distance(q, p)) <= near
+        for a, b in zip(i[rows][meet].tolist(), j[rows][meet].tolist(), strict=True):
+            found[a].append(b)
+            found[b].append(a)
+    return found
+
+
+def _distance(points: NDArray[np.float64], polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) metres between the nearest of (n, m, 3) points and the outline of (n, m, 3) polygons."""
+    along = np.roll(polygon, -1, axis=1) - polygon
+    square = np.maximum(np.einsum("nek,nek->ne", along, along), np.finfo(np.float64).tiny)
+    to = points[:, :, None] - polygon[:, None]
+    share = np.clip(np.einsum("npek,nek->npe", to, along) / square[:, None], 0.0, 1.0)
+    nearest = np.linalg.norm(to - share[..., None] * along[:, None], axis=3)
+    return np.asarray(nearest.min(axis=(1, 2)))
