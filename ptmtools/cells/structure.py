@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.options import SubdivideOptions
-from ptmtools.cells.planar import Geometry, union, unite
+from ptmtools.cells.planar import Geometry, neighbours, union, unite
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
 
@@ -125,7 +125,8 @@ def find_walls(scene: Scene, options: SubdivideOptions, tolerance: Tolerance) ->
         blocking = unite(frame.to_plane(corners[flat]), tolerance.grid)
         shapely.prepare(blocking)
         parts = shapely.get_parts(blocking)
-        large = shapely.area(parts) >= least
+        group = neighbours(parts, tolerance.hairline)
+        large = np.bincount(group, weights=shapely.area(parts))[group] >= least
         if np.any(forced[flat]):
             named = unite(frame.to_plane(corners[flat & forced]), tolerance.grid)
             large |= shapely.intersects(parts, named)
