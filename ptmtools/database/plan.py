@@ -171,17 +171,23 @@ class _Plan:
         sections = list(self._sections(height))
         polygons = [self._shown(polygon) for _, polygon in sections]
         fills = [self._fill(cell, shades) for cell, _ in sections]
+        # Edges in their own fill close the seams between the leaves of a cell.
         axis.add_collection(
-            PolyCollection(polygons, facecolors=fills, edgecolors=_CELL_EDGE, linewidths=0.5)
+            PolyCollection(polygons, facecolors=fills, edgecolors=fills, linewidths=0.5)
         )
+        edges = _outlines(sections)
         panes = triangle_section(self._corners[~self._opaque], height)
         walls = triangle_section(self._corners[self._opaque], height)
-        chosen = [
-            p for p, (cell, _) in zip(polygons, sections, strict=True) if cell == self._options.cell
-        ]
+        chosen = [self._shown(e) for e in edges.get(self._options.cell, ())]
         axis.add_collection(
-            PolyCollection(chosen, facecolors="none", edgecolors=_CHOSEN, linewidths=5, zorder=2)
+            LineCollection(
+                [self._shown(e) for outline in edges.values() for e in outline],
+                colors=_CELL_EDGE,
+                linewidths=0.5,
+                zorder=2,
+            )
         )
+        axis.add_collection(LineCollection(chosen, colors=_CHOSEN, linewidths=5, zorder=2))
         for layer, (segments, colour, width) in enumerate(
             (
                 (np.array(self._portals(height)), _PORTAL, 2.2),
@@ -320,6 +326,20 @@ class _Plan:
             borderpad=0,
             borderaxespad=0,
         )
+
+
+def _outlines(
+    sections: Sequence[tuple[int, NDArray[np.float64]]],
+) -> dict[int | None, list[NDArray[np.float64]]]:
+    """Cell → closed lines around the union of the sections of its leaves."""
+    import shapely
+
+    found: dict[int | None, list[NDArray[np.float64]]] = {}
+    for cell in sorted({cell for cell, _ in sections}):
+        leaves = [shapely.Polygon(polygon) for number, polygon in sections if number == cell]
+        rim = shapely.boundary(shapely.union_all(leaves) if len(leaves) > 1 else leaves[0])
+        found[cell] = [shapely.get_coordinates(line) for line in shapely.get_parts(rim)]
+    return found
 
 
 def _middle(polygon: NDArray[np.float64]) -> NDArray[np.float64]:

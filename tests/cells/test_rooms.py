@@ -1,0 +1,180 @@
+"""Leaves grow into rooms, and rooms are parted again where it pays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ptmtools.cells import Cells, SubdivideOptions, subdivide
+from ptmtools.cells.gain import join_by_gain
+from ptmtools.cells.sight import sampled_sight
+from ptmtools.errors import InputError
+from ptmtools.scene import ingest
+from ptmtools.scene.model import Scene
+from ptmtools.visibility import compute_pvs
+
+BuildScene = Callable[..., Scene]
+Faces = Callable[..., list[list[list[float]]]]
+
+SAMPLES = Path(__file__).resolve().parents[2] / "sample_data"
+WHOLE = SubdivideOptions(cells="room", gain=1.0)
+
+
+@pytest.fixture
+def halved(quads: BuildScene, room_faces: Faces, partition: Faces) -> Callable[[float], Scene]:
+    """``halved(width)``: a hall of 8 × 4 × 4 m, a wall across it with an opening of full height
+    and so many metres of width."""
+
+    def build(width: float) -> Scene:
+        hole = (0.0, 4.0, -width / 2, width / 2)
+        return quads([*room_faces([-4, 0, -2], [4, 4, 2]), *partition(0.0, hole)])
+
+    return build
+
+
+def locate(cells: Cells, *points: tuple[float, float, float]) -> list[int]:
+    return cells.locate(np.array(points, dtype=np.float64)).tolist()
+
+
+def test_a_room_ends_at_its_door_and_holds_the_doorway() -> None:
+    scene = ingest(SAMPLES / "two_rooms/two_rooms.obj")
+    leaves = subdivide(scene, SubdivideOptions(cells="leaf"))
+    rooms = subdivide(scene, WHOLE)
+    assert leaves.cell_count == 3
+    assert rooms.cell_count == 2
+    volume = np.bincount(rooms.leaf_cell, rooms.leaf_volumes())
+    assert sorted(volume) == pytest.approx([48.0, 48.4])
+    assert not any("1 hall" in note for note in rooms.notes)
+
+
+def test_a_wide_opening_joins_and_a_narrow_one_parts(halved: Callable[[float], Scene]) -> None:
+    assert subdivide(halved(3.0), WHOLE).cell_count == 1
+    assert subdivide(halved(2.5), WHOLE).cell_count == 2
+    assert subdivide(halved(3.0), replace(WHOLE, cells="leaf")).cell_count > 1
+
+
+def test_two_doors_are_not_one_opening(
+    quads: BuildScene, room_faces: Faces, partition: Faces
+) -> None:
+    """A corridor 2 m wide beside a hall: each of the doors is 1.6 of the corridor's 4 m²."""
+    doors = [
+        [[0, y0, z0], [0, y1, z0], [0, y1, z1], [0, y0, z1]]
+        for y0, y1, z0, z1 in (
+            (0, 2, -10, -5),
+            (0, 1.6, -4, 4),
+            (0, 2, 5, 10),
+            (1.6, 2, -5, -4),
+            (1.6, 2, -4, 4),
+            (1.6, 2, 4, 5),
+        )
+    ]
+    cells = subdivide(quads([*room_faces([-6, 0, -10], [2, 2, 10]), *doors]), WHOLE)
+    corridor, hall = locate(cells, (1, 1, 0), (-3, 1, 0))
+    assert corridor != hall
+
+
+def test_cells_are_numbered_by_their_first_leaves_and_own_their_geometry(
+    halved: Callable[[float], Scene],
+) -> None:
+    scene = halved(2.0)
+    leaves = subdivide(scene, replace(WHOLE, cells="leaf"))
+    rooms = subdivide(scene, WHOLE)
+    _, first = np.unique(rooms.leaf_cell, return_index=True)
+    assert np.all(np.diff(first) > 0)
+    owner = leaves.triangle_cell
+    assert np.array_equal(rooms.triangle_cell, np.where(owner >= 0, rooms.leaf_cell[owner], -1))
+    for name in ("leaf_point", "portal_point", "node_child", "vertex"):
+        assert np.array_equal(getattr(rooms, name), getattr(leaves, name))
+
+
+def test_the_sets_of_a_room_are_the_union_of_its_leaves(corridor: Scene) -> None:
+    leaves = subdivide(corridor, replace(WHOLE, cells="leaf"))
+    rooms = subdivide(corridor, replace(WHOLE, gain=0.05))
+    room = rooms.leaf_cell
+    expected = np.zeros((rooms.cell_count, rooms.cell_count), dtype=bool)
+    a, b = np.nonzero(compute_pvs(leaves).to_matrix())
+    expected[room[a], room[b]] = True
+    assert not expected.all()
+    assert np.array_equal(compute_pvs(rooms).to_matrix(), expected)
+
+
+def test_a_hall_is_one_cell_and_says_so(quads: BuildScene, room_faces: Faces) -> None:
+    """Screens that part nothing: leaves, but no gain."""
+    screens = [[[x, 0, -1], [x, 1, -1], [x, 1, 1], [x, 0, 1]] for x in (-6, -2, 2, 6)]
+    scene = quads([*room_faces([-10, 0, -5], [10, 6, 5]), *screens])
+    assert subdivide(scene, SubdivideOptions(cells="leaf", wall_area=1)).cell_count > 4
+    hall = subdivide(scene, SubdivideOptions(cells="room", wall_area=1))
+    assert hall.cell_count == 1
+    assert hall.notes[-1] == "visibility culling gains nothing here: 1 hall"
+
+
+@pytest.fixture
+def corridor(quads: BuildScene) -> Scene:
+    """A stair in plan: 2 × 2 m in section, five straight stretches of 20 m."""
+    plan = [(0, 0), (20, 0), (20, 18), (38, 18), (38, 36), (58, 36)]
+    plan += [(58, 38), (36, 38), (36, 20), (18, 20), (18, 2), (0, 2)]
+    sides = [
+        [[a, 0, b], [c, 0, d], [c, 2, d], [a, 2, b]]
+        for (a, b), (c, d) in zip(plan, plan[1:] + plan[:1], strict=True)
+    ]
+    flats = [
+        [[a, y, b], [c, y, b], [c, y, d], [a, y, d]]
+        for y in (0, 2)
+        for a, b, c, d in (
+            (0, 0, 20, 2),
+            (18, 2, 20, 18),
+            (18, 18, 38, 20),
+            (36, 20, 38, 36),
+            (36, 36, 58, 38),
+        )
+    ]
+    return quads([*sides, *flats])
+
+
+def test_gain_parts_a_room_where_that_pays(corridor: Scene) -> None:
+    def cells(gain: float) -> int:
+        return subdivide(corridor, replace(WHOLE, gain=gain)).cell_count
+
+    leaves = subdivide(corridor, replace(WHOLE, cells="leaf")).cell_count
+    assert cells(1.0) == 1
+    assert 1 < cells(0.05) < leaves
+    assert cells(0.0) == leaves
+    parted = subdivide(corridor, replace(WHOLE, gain=0.05))
+    here, there = locate(parted, (5, 1, 1), (55, 1, 37))
+    assert here != there
+
+
+def test_gain_by_hand() -> None:
+    """Four leaves in a row that see 3, 3, 4 and 2 leaves; all of one volume and one area."""
+    sees = np.array([[1, 1, 1, 0], [1, 1, 1, 0], [1, 1, 1, 1], [0, 0, 1, 1]], dtype=bool)
+    pairs = np.array([[0, 1], [1, 2], [2, 3]], dtype=np.int32)
+    one = np.ones(4)
+    assert join_by_gain(sees, one, one, pairs, 0.0).tolist() == [0, 1, 2, 3]
+    assert join_by_gain(sees, one, one, pairs, 1e-5).tolist() == [0, 0, 2, 3]
+    # Three leaves that fetch four each: 12; apart 3 + 3 + 4. All four: 16 against 12.
+    assert join_by_gain(sees, one, one, pairs, 0.166).tolist() == [0, 0, 2, 3]
+    assert join_by_gain(sees, one, one, pairs, 0.167).tolist() == [0, 0, 0, 3]
+    assert join_by_gain(sees, one, one, pairs, 0.25).tolist() == [0, 0, 0, 3]
+    assert join_by_gain(sees, one, one, pairs, 0.251).tolist() == [0, 0, 0, 0]
+    # What holds nothing costs nothing, but only pairs are joined.
+    assert join_by_gain(sees, one, np.zeros(4), pairs[2:], 0.1).tolist() == [0, 1, 2, 2]
+
+
+def test_sampled_sight_is_within_the_flow_and_finds_most_of_it(corridor: Scene) -> None:
+    cells = subdivide(corridor, SubdivideOptions(cells="leaf"))
+    sees = sampled_sight(cells)
+    flow = compute_pvs(cells).to_matrix()
+    assert np.array_equal(sees, sees.T)
+    assert not np.any(sees & ~flow)
+    assert sees.sum() > 0.8 * flow.sum()
+    assert not flow.all()
+
+
+@pytest.mark.parametrize("gain", [-0.1, 1.1, float("nan")])
+def test_a_gain_that_is_no_share_is_refused(halved: Callable[[float], Scene], gain: float) -> None:
+    with pytest.raises(InputError, match="PTM-I300"):
+        subdivide(halved(1.0), SubdivideOptions(gain=gain))
