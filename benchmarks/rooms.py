@@ -83,7 +83,7 @@ def standard_walk(cells: Cells) -> Walk:
         doors[b].append((a, metres))
     here = int(max(stops, key=lambda leaf: volume[leaf]))
     stops.discard(here)
-    way, metres = [here], [0.0]
+    way, share = [here], [0.0]
     while stops:
         before, far = _distances(doors, here)
         following = min(stops, key=lambda leaf: (far[leaf], leaf))
@@ -95,11 +95,11 @@ def standard_walk(cells: Cells) -> Walk:
             leg.append(before[leg[-1]])
         for a, b in zip(leg[::-1], leg[-2::-1], strict=False):
             step = far[b] - far[a]
-            metres[-1] += step / 2
+            share[-1] += step / 2
             way.append(b)
-            metres.append(step / 2)
+            share.append(step / 2)
         here = following
-    return Walk(np.array(way), np.array(metres))
+    return Walk(np.array(way), np.array(share) if len(way) > 1 else np.ones(1))
 
 
 def _distances(
@@ -146,7 +146,7 @@ def fetched(
         met.update(row.tolist())
         at_hand += metres * size[row].sum()
         share += metres * (texels[used[row].any(axis=0)].sum() / whole if whole else 0.0)
-    length = max(float(walk.metres.sum()), 1e-9)
+    length = float(walk.metres.sum())
     return len(met), size[sorted(met)].sum() / 1e6, at_hand / length / 1e6, share / length
 
 
@@ -170,7 +170,7 @@ def views(scene: Scene, leaves: Cells, seed: int) -> list[tuple[int, NDArray[np.
     renderer = EmbreeRenderer(surfaces, FACE)
     random = np.random.default_rng(seed)
     low, high = leaves.root_box
-    found = []
+    found: list[tuple[int, NDArray[np.int64]]] = []
     while len(found) < PLACES:
         place = random.uniform(low, high)
         leaf = int(leaves.locate_leaf(place[None])[0])

@@ -237,7 +237,10 @@ def figures(stage: str, counts: Mapping[str, Any]) -> str:
             )
         case "cells":
             state = "closed" if n["closed"] else "open"
-            return f"{count(n['cells'], 'cell')}, {count(n['portals'], 'portal')}; {state}"
+            made = (
+                f" of {count(n['leaves'], 'leaf', 'leaves')}" if n["leaves"] != n["cells"] else ""
+            )
+            return f"{count(n['cells'], 'cell')}{made}, {count(n['portals'], 'portal')}; {state}"
         case "pvs":
             return f"a cell sees {n['average_share']:.1%} of all cells on average"
         case "ach":

@@ -221,11 +221,13 @@ class _Plan:
             if len(polygon) >= 3:
                 yield int(self._cells.leaf_cell[leaf]), polygon
 
+    def _doors(self) -> list[int]:
+        """Portals between cells; those between the leaves of one cell are not drawn."""
+        ends = self._cells.leaf_cell[self._cells.portal_leaf].reshape(-1, 2)
+        return np.flatnonzero(ends[:, 0] != ends[:, 1]).tolist()
+
     def _portals(self, height: float) -> list[NDArray[np.float64]]:
-        cells = self._cells
-        ends = cells.leaf_cell[cells.portal_leaf].reshape(-1, 2)
-        doors = np.flatnonzero(ends[:, 0] != ends[:, 1]).tolist()
-        cuts = (polygon_section(cells.portal(k), height) for k in doors)
+        cuts = (polygon_section(self._cells.portal(k), height) for k in self._doors())
         return [cut for cut in cuts if cut is not None]
 
     def _fill(self, cell: int, shades: Any) -> Any:
@@ -293,7 +295,7 @@ class _Plan:
         from matplotlib.lines import Line2D
 
         cells, chosen = self._cells, self._options.cell
-        parts = [f"{cells.cell_count} cells", f"{cells.portal_count} portals"]
+        parts = [f"{cells.cell_count} cells", f"{len(self._doors())} portals"]
         if self._pvs is not None:
             parts.append(f"average PVS {100 * self._pvs.average_share:.1f} %")
         if len(self._floors) > 1:

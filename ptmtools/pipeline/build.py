@@ -275,7 +275,9 @@ def _look(run: Run, options: PvsOptions) -> None:
         run.writer.put_arrays("pvs", pvs.to_arrays())
         share = pvs.average_share
         notes = []
-        if share > CULLING_GAINS_LITTLE:
+        if (
+            share > CULLING_GAINS_LITTLE and pvs.cell_count > 1
+        ):  # of one, the cells stage has said it
             notes.append(
                 f"culling by visibility gains little here: on average a cell sees "
                 f"{share:.0%} of all cells, as in a single hall"

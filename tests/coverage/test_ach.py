@@ -280,3 +280,29 @@ def test_auto_goes_by_the_size_of_the_task(room_row, has_gl, require):
     renderer = open_renderer(surfaces, AchOptions())
     assert renderer.backend == "gl"
     renderer.close()
+
+
+def test_hints_of_a_room_are_the_mean_of_its_leaves_by_volume(room_row):
+    """Three rooms in a row, of which the first two become one cell of unequal leaves."""
+    scene, cells = room_row(3)
+    point = cells.leaf_point.copy()
+    plane = cells.node_plane.copy()
+    point[np.isclose(point[:, 0], 4.0), 0] = 1.0  # 1 m and 7 m long instead of 4 m and 4 m
+    plane[np.isclose(plane[:, 3], -4.0), 3] = -1.0
+    cells = replace(cells, leaf_point=point, node_plane=plane)
+    options = AchOptions(backend="embree", face=32, samples=256)
+    alone = compute_ach(scene, cells, all_visible(3), options)
+    owner = np.array([0, 0, 1], dtype=np.int32)
+    joined = replace(
+        cells,
+        leaf_cell=owner,
+        triangle_cell=np.where(cells.triangle_cell >= 0, owner[cells.triangle_cell], -1).astype(
+            np.int32
+        ),
+    )
+    room = compute_ach(scene, joined, all_visible(2), options)
+    of_third = [alone.row(leaf)[all_visible(3).row(leaf).tolist().index(2)] for leaf in (0, 1)]
+    assert of_third[1] > 1.5 * of_third[0]
+    by_volume = (1 * of_third[0] + 7 * of_third[1]) / 8
+    assert room.row(0)[1] == pytest.approx(by_volume, rel=0.03)
+    assert abs(by_volume - np.mean(of_third)) > 0.1 * by_volume, "a plain mean is something else"
