@@ -28,7 +28,7 @@ HAIRLINE_SHARE = 8e-6
 ROUNDING_SHARE = 1e-10
 #: Polygons of one plane are united and cut on a grid of this step (`cells.planar`): well above the
 #: rounding of float64, well below what is taken for rounding.
-GRID_SHARE = 1e-12
+GRID_SHARE = 1e-13
 
 #: Unit normals with a dot product of at least this are parallel: 1.4 mm over a metre.
 PARALLEL_COSINE = 1.0 - 1e-6

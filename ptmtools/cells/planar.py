@@ -3,7 +3,7 @@
 GEOS overlays in floating point find their own way out of rounding, and now and then the wrong one:
 of two rectangles 1.3 × 2.6 and 1.3 × 2.4 that share three sides, one of them but for 4e-16, GEOS
 3.14 gives a point as the intersection. A wall lost so opens a room, an opening lost so hides one.
-On a grid (snap rounding, exact) this cannot happen; ours is `Tolerance.grid`, a hundredth of what
+On a grid (snap rounding, exact) this cannot happen; ours is `Tolerance.grid`, a thousandth of what
 counts as rounding. Results hold polygons only: lines and points in which operands touch are
 dropped.
 """

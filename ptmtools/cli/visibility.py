@@ -24,8 +24,9 @@ def tell_pvs(voice: Voice, told: PvsReport) -> None:
     if told.costliest:
         voice.say(
             f"{told.operations:,} operations; {count(told.fallbacks, 'portal')} cut short by the "
-            "budget. The costliest:"
+            f"budget; {count(told.ties, 'near-tie')} decided by less than 16 roundings"
         )
+        voice.say("the costliest portals:")
         for dear in told.costliest:
             cut = ", cut short" if dear.cut else ""
             voice.say(f"  {dear.operations:10,}  {_place(dear)}{cut}")

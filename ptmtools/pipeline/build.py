@@ -292,7 +292,12 @@ def _look(run: Run, options: PvsOptions) -> None:
                 f"the search was cut short at {pvs.fallbacks:,} portals; "
                 "their sets are larger than need be, never smaller"
             )
-        figures = {"average_share": share, "fallbacks": pvs.fallbacks, "leaks": len(pvs.leak)}
+        figures = {
+            "average_share": share,
+            "fallbacks": pvs.fallbacks,
+            "ties": int(pvs.ties.sum()),
+            "leaks": len(pvs.leak),
+        }
         return figures | {"conservative": pvs.conservative}, tuple(notes)
 
     run.stage("pvs", options, run.inputs("cells"), compute)

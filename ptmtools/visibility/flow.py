@@ -93,11 +93,14 @@ class PortalFlow:
         its normal, 2k + 1 against it) may be followed by directed portal q on one straight line.
     cut: (K,) whether the budget or the depth cut the search from a portal short.
     work: (K,) chain tests and clips that the search from each portal took, both ways together.
+    ties: (K,) how many sequences of portals the search from each portal rejected by a hair, less
+        than 16 roundings, both ways together: mostly portals that touch a plane and no more.
     """
 
     sees: NDArray[np.uint64]
     cut: NDArray[np.bool_]
     work: NDArray[np.int64]
+    ties: NDArray[np.int64]
 
     @property
     def operations(self) -> int:
@@ -132,7 +135,8 @@ def portal_flow(
         )
     cut = np.zeros(count, dtype=np.bool_)
     if count == 0:
-        return PortalFlow(np.zeros((0, words), dtype=np.uint64), cut, np.zeros(0, np.int64))
+        none = np.zeros(0, np.int64)
+        return PortalFlow(np.zeros((0, words), dtype=np.uint64), cut, none, none)
 
     from ptmtools.visibility import kernels
 
@@ -142,7 +146,7 @@ def portal_flow(
         known = _prepass(g, words, pool, threads)
         storage = [scratch(g, words) for _ in range(threads)]
         order = np.argsort(BITS_OF_BYTE[known.view(np.uint8)].sum(axis=1), kind="stable")
-        work = np.zeros(count, dtype=np.int64)
+        work, ties = np.zeros((2, count), dtype=np.int64)
         for first in range(0, count, BATCH):
             batch = order[first : first + BATCH]
             seen = np.zeros((len(batch), words), dtype=np.uint64)
@@ -160,14 +164,15 @@ def portal_flow(
                     except IndexError:
                         return
                     p = int(batch[i])
-                    work[p], cut[p] = kernels.flow(g, s, known, p, budget, seen[i])
+                    work[p], cut[p], ties[p] = kernels.flow(g, s, known, p, budget, seen[i])
 
             list(pool.map(search, storage))
             known[batch] = seen
             for p in batch:
                 kernels.drop_unreturned(known, p)
             progress(min(first + BATCH, count), count, "portals")
-    return PortalFlow(known, cut[0::2] | cut[1::2], work[0::2] + work[1::2])
+    both = (work[0::2] + work[1::2], ties[0::2] + ties[1::2])
+    return PortalFlow(known, cut[0::2] | cut[1::2], *both)
 
 
 def _prepass(g: Geometry, words: int, pool: ThreadPoolExecutor, threads: int) -> NDArray[np.uint64]:

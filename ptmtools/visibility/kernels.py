@@ -18,6 +18,8 @@ from ptmtools.compiled import kernel
 from ptmtools.visibility.winding.kernels import (
     CUT,
     EMPTY,
+    GRAZED,
+    WHOLE,
     beyond,
     clip,
     clip_all,
@@ -168,25 +170,27 @@ def drop_unreturned(known: Bits, p: int) -> None:
 @kernel
 def thin_out(
     g: Geometry, might: Bits, frame: int, seen: Bits, plane: Floats, count: int
-) -> tuple[bool, int]:
+) -> tuple[bool, int, int]:
     """Drops from a frame's possible portals the unseen ones that its separators hide.
 
-    Returns (whether an unseen one is left, portals tested).
+    Returns (whether an unseen one is left, portals tested, how many were dropped by a hair).
     """
     left = False
-    tested = 0
+    tested = ties = 0
     for w in range(might.shape[1]):
         rest = might[frame, w] & ~seen[w]
         while rest != ZERO:
             low = rest & (~rest + ONE)
             q = (w << 6) + LOW_BIT[(low * DE_BRUIJN) >> np.uint64(58)]
             tested += 1
-            if beyond(g.point, g.start, g.ball, q >> 1, plane, frame, count, g.slack):
+            now = beyond(g.point, g.start, g.ball, q >> 1, plane, frame, count, g.slack)
+            if now == WHOLE:
                 left = True
             else:
                 might[frame, w] &= ~low
+                ties += now == GRAZED
             rest &= ~low
-    return left, tested
+    return left, tested, ties
 
 
 @kernel
@@ -278,14 +282,15 @@ def glance(g: Geometry, known: Bits, source: int, seen: Bits) -> int:
 @kernel
 def flow(
     g: Geometry, s: Scratch, known: Bits, source: int, budget: int, seen: Bits
-) -> tuple[int, bool]:
+) -> tuple[int, bool, int]:
     """All directed portals that a line through ``source`` may cross after it.
 
     ``known`` (2K, W) is what each portal may see at most; ``seen`` (W,) the zeroed result row. A
     search that grows long `glance`s, once: in an open hall nearly all is seen at once, and what is
     left to look out for is little. (Glancing first costs more than it saves where walls are many:
     e1m1 +30 %. Without it, a hall of 1,344 open portals spends its whole budget.)
-    Returns (operations, whether the budget or the depth cut the search short).
+    Returns (operations, whether the budget or the depth cut the search short, ties: how many
+    rejections were by a hair, see `winding`).
     """
     words = known.shape[1]
     depth = len(s.might)
@@ -302,7 +307,7 @@ def flow(
     at[0] = g.out_start[g.leaf[source]]
     planes[0] = 0
     f = 0
-    ops = 0
+    ops = ties = 0
     cut = False
     looked = False
     while f >= 0:
@@ -335,7 +340,9 @@ def flow(
         a, b = 2 * child, 2 * child + 1
         load(g.point, g.start, k, polygon, size, b)
         n0, n1, n2 = s0 * normal[k0, 0], s0 * normal[k0, 1], s0 * normal[k0, 2]
-        if clip(polygon, size, b, distance, n0, n1, n2, floor, slack) == EMPTY:
+        now = clip(polygon, size, b, distance, n0, n1, n2, floor, slack)
+        if now <= EMPTY:
+            ties += now == GRAZED
             continue
         hidden = False
         for i in range(planes[f]):
@@ -343,7 +350,9 @@ def flow(
             if n0 * ball[k, 0] + n1 * ball[k, 1] + n2 * ball[k, 2] - c >= ball[k, 3]:
                 continue
             ops += 1
-            if clip(polygon, size, b, distance, n0, n1, n2, c, slack) == EMPTY:
+            now = clip(polygon, size, b, distance, n0, n1, n2, c, slack)
+            if now <= EMPTY:
+                ties += now == GRAZED
                 hidden = True
                 break
         if hidden:
@@ -353,7 +362,8 @@ def flow(
         n0, n1, n2 = -sq * normal[k, 0], -sq * normal[k, 1], -sq * normal[k, 2]
         ceiling = g.high[k] if q & 1 == 0 else -g.low[k]
         status = clip(polygon, size, a, distance, n0, n1, n2, -ceiling, slack)
-        if status == EMPTY:
+        if status <= EMPTY:
+            ties += status == GRAZED
             continue
         if f > 0:
             passed, last = 2 * f + 1, via[f]
@@ -364,11 +374,15 @@ def flow(
                     polygon, size, a, k0, s0, passed, last, -sp, normal, plane, depth, slack
                 )
                 ops += n + 1
-                if clip_all(polygon, size, b, distance, plane, depth, n, slack) == EMPTY:
+                now = clip_all(polygon, size, b, distance, plane, depth, n, slack)
+                if now <= EMPTY:
+                    ties += now == GRAZED
                     continue
             n = separate(polygon, size, b, k, -sq, passed, last, sp, normal, plane, depth, slack)
             ops += n + 1
-            if clip_all(polygon, size, a, distance, plane, depth, n, slack) == EMPTY:
+            now = clip_all(polygon, size, a, distance, plane, depth, n, slack)
+            if now <= EMPTY:
+                ties += now == GRAZED
                 continue
         seen[word] |= bit
         if not fresh:
@@ -380,8 +394,9 @@ def flow(
             planes[child] = separate(
                 polygon, size, a, k0, s0, b, k, -sq, normal, plane, child, slack
             )
-            left, tested = thin_out(g, might, child, seen, plane, planes[child])
+            left, tested, grazed = thin_out(g, might, child, seen, plane, planes[child])
             ops += 1 + (tested >> 3)
+            ties += grazed
             if not left:
                 continue
         if not room or ops >= budget:
@@ -393,4 +408,4 @@ def flow(
         via[child] = q
         at[child] = g.out_start[g.leaf[q]]
         f = child
-    return ops, cut
+    return ops, cut, ties

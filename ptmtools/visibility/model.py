@@ -20,6 +20,8 @@ class Pvs:
     cell: (n,) int32 the potentially visible cells; ``cell[start[i]] == i``.
     work: (K,) int64 operations that the search from each portal took; empty without a search.
     cut: (K,) bool portals whose search was given up for a looser, still conservative set.
+    ties: (K,) int64 sequences of portals that the search from each portal rejected by a hair, less
+        than 16 roundings of the arithmetic; see `PortalFlow.ties`.
     leak: (n, 4) int32 cells that see suspiciously much: the cell, how many cells it sees, the
         smallest portal that shows it half of them, and how many that one shows.
     conservative: False if the sets are of what random lines happened to show.
@@ -29,6 +31,7 @@ class Pvs:
     cell: NDArray[np.int32]
     work: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     cut: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
+    ties: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     leak: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), np.int32))
     conservative: bool = True
 
@@ -75,6 +78,7 @@ class Pvs:
             "cell": self.cell,
             "work": self.work,
             "cut": self.cut,
+            "ties": self.ties,
             "leak": self.leak,
             "conservative": np.array([self.conservative]),
         }
@@ -87,6 +91,7 @@ class Pvs:
             np.asarray(arrays["cell"], dtype=np.int32),
             np.asarray(arrays["work"], dtype=np.int64),
             np.asarray(arrays["cut"], dtype=np.bool_),
+            np.asarray(arrays["ties"], dtype=np.int64),
             np.asarray(arrays["leak"], dtype=np.int32).reshape(-1, 4),
             bool(arrays["conservative"][0]),
         )

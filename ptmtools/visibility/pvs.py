@@ -80,6 +80,7 @@ def compute_pvs(
         matrix,
         work=flow.work,
         cut=flow.cut & (options.method == "full"),
+        ties=flow.ties,
         leak=np.array(leaks, np.int32).reshape(-1, 4),
     )
 

@@ -71,6 +71,7 @@ class PvsReport:
     sizes: share of the cells → cells that this share of them sees at most, for `QUANTILES`.
     average: cells that a cell sees, itself included.
     operations: chain tests and clips in all. fallbacks: portals whose search was cut short.
+    ties: sequences of portals rejected by a hair, less than 16 roundings.
     costliest: the portals that took most, dearest first. leaks: those that see most first.
     conservative: False where the sets are of what random lines showed.
     """
@@ -81,6 +82,7 @@ class PvsReport:
     average: float
     operations: int
     fallbacks: int
+    ties: int
     costliest: tuple[CostlyPortal, ...]
     leaks: tuple[LeakingPortal, ...]
     conservative: bool
@@ -99,6 +101,7 @@ def report(cells: Cells, pvs: Pvs) -> PvsReport:
         average=float(sees.mean()) if count else 0.0,
         operations=int(pvs.work.sum()),
         fallbacks=pvs.fallbacks,
+        ties=int(pvs.ties.sum()),
         costliest=tuple(
             CostlyPortal(**_facts(cells, int(k)), operations=int(pvs.work[k]), cut=bool(pvs.cut[k]))
             for k in order

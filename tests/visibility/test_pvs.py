@@ -80,6 +80,22 @@ def test_scale_place_and_turn_change_nothing(build_rooms, scale, turned):
         assert np.array_equal(seen(rooms.cells), ZIGZAG_SEEN)
 
 
+def test_near_ties_are_counted(build_rooms):
+    # The second door begins where all lines through the first two end: at z = 2 of the far wall.
+    doors = {**ZIGZAG, (1, 0, 0, 0): [(0.0, 2.0, 1.5, 4.0)]}
+
+    def pvs(top):
+        rooms = build_rooms(*ROW, {**doors, (2, 0, 0, 0): [(0.0, 2.0, 0.0, top)]})
+        return compute_pvs(rooms.cells)
+
+    beside, touching, overlapping = pvs(1.9), pvs(2.0), pvs(2.1)
+    assert [int(p.ties.sum()) for p in (beside, overlapping)] == [0, 0]
+    assert touching.ties.sum() > 0
+    assert np.array_equal(touching.cell, beside.cell)
+    assert len(overlapping.cell) > len(touching.cell)
+    assert np.array_equal(Pvs.from_arrays(touching.to_arrays()).ties, touching.ties)
+
+
 def test_the_result_is_symmetric_and_begins_with_the_cell(build_rooms):
     pvs = compute_pvs(build_rooms(*ROW, ZIGZAG).cells)
     assert np.array_equal(pvs.to_matrix(), pvs.to_matrix().T)

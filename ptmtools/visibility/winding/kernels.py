@@ -15,7 +15,13 @@ from ptmtools.compiled import kernel
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-EMPTY, WHOLE, CUT = 0, 1, 2
+#: What clipping left. GRAZED is EMPTY by a hair: the polygon ends within `NEAR` slacks of where it
+#: would have been kept.
+GRAZED, EMPTY, WHOLE, CUT = -1, 0, 1, 2
+#: How many slacks are a hair.
+NEAR = 16.0
+#: Edges shorter than this many slacks are left over from clipping; their direction is noise.
+SHORTEST_EDGE = 16.0
 
 
 @kernel
@@ -32,7 +38,8 @@ def clip(
 ) -> int:
     """Keeps what of a polygon lies at n·x >= c, and ``slack`` more; in place.
 
-    EMPTY if nothing reaches beyond c + slack. A polygon that would outgrow its slot stays WHOLE.
+    EMPTY or GRAZED if nothing reaches beyond c + slack. A polygon that would outgrow its slot
+    stays WHOLE.
     """
     count = size[slot]
     low, high = np.inf, -np.inf
@@ -42,7 +49,7 @@ def clip(
         low = min(low, d)
         high = max(high, d)
     if high <= slack:
-        return EMPTY
+        return EMPTY if high <= slack - NEAR * slack else GRAZED
     if low >= -slack:
         return WHOLE
     spare = len(polygon) - 1
@@ -122,7 +129,7 @@ def separators_through(
         w1 = e2 * n0 - e0 * n2
         w2 = e0 * n1 - e1 * n0
         length = np.sqrt(w0 * w0 + w1 * w1 + w2 * w2)
-        if length <= 0.0:
+        if length <= SHORTEST_EDGE * slack:
             continue
         length = 1.0 / length
         w0, w1, w2 = w0 * length, w1 * length, w2 * length
@@ -202,8 +209,8 @@ def clip_all(
     for i in range(count):
         n0, n1, n2 = plane[row, i, 0], plane[row, i, 1], plane[row, i, 2]
         now = clip(polygon, size, slot, distance, n0, n1, n2, plane[row, i, 3], slack)
-        if now == EMPTY:
-            return EMPTY
+        if now <= EMPTY:
+            return now
         if now == CUT:
             status = CUT
     return status
@@ -219,22 +226,22 @@ def beyond(
     row: int,
     count: int,
     slack: float,
-) -> bool:
-    """Whether portal k reaches beyond every plane of a row."""
+) -> int:
+    """WHOLE if portal k reaches beyond every plane of a row, else EMPTY or GRAZED."""
     c0, c1, c2, radius = ball[k, 0], ball[k, 1], ball[k, 2], ball[k, 3]
     for i in range(count):
         n0, n1, n2 = plane[row, i, 0], plane[row, i, 1], plane[row, i, 2]
         d = n0 * c0 + n1 * c1 + n2 * c2 - plane[row, i, 3]
         if d > slack:
             continue
-        if d + radius <= slack:
-            return False
-        floor = plane[row, i, 3] + slack
-        found = False
+        if d + radius <= slack - NEAR * slack:
+            return EMPTY
+        high = -np.inf
         for j in range(start[k], start[k + 1]):
-            if n0 * point[j, 0] + n1 * point[j, 1] + n2 * point[j, 2] > floor:
-                found = True
+            d = n0 * point[j, 0] + n1 * point[j, 1] + n2 * point[j, 2] - plane[row, i, 3]
+            high = max(high, d)
+            if high > slack:
                 break
-        if not found:
-            return False
-    return True
+        if high <= slack:
+            return EMPTY if high <= slack - NEAR * slack else GRAZED
+    return WHOLE
