@@ -36,7 +36,7 @@ LIMIT = Limits(decoded_bytes=1 << 24)
 #: What a decoder may take besides the levels themselves: tables and scratch rows, bytes.
 ALLOWANCE = 1 << 28
 SLOW = 2.0
-EXTREMES = (0, 1, 0x7F, 0x80, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 1 << 40, 1 << 63)
+EXTREMES = (0, 1, 16, 0x7F, 0x80, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 1 << 40, 1 << 63)
 #: Fields of the head: offset and bytes, as in docs/format-ptm.md.
 FIELDS = ((8, 2), (10, 1), (11, 1), (12, 4), (16, 4), (20, 1), (21, 1), (22, 1), (23, 1), (24, 4),
           (28, 4), (32, 4), (36, 4), (44, 8), (52, 8), (64, 8), (72, 8))  # fmt: skip

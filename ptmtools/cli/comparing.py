@@ -46,7 +46,7 @@ class _Profiles(click.ParamType):  # type: ignore[type-arg]  # generic only in n
 @click.option(
     "--repeat",
     type=click.IntRange(1, 100),
-    default=1,
+    default=2,
     show_default=True,
     metavar="N",
     help="Code each image so many times; the shortest time counts.",

@@ -52,7 +52,8 @@ class Limits:
 
     Attributes
     ----------
-    decoded_bytes: size of the finest level asked for, bytes.
+    decoded_bytes: bytes of the finest level asked for, and of what decoding its largest tile takes
+        besides (levels that are not cut are one tile).
     """
 
     decoded_bytes: int = 1 << 30

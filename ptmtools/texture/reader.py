@@ -27,7 +27,7 @@ from ptmtools.texture.model import Description, Level, Limits, PtmHeader
 from ptmtools.texture.parallel import ordered
 from ptmtools.texture.profiles import Profile, Tile, profile_named
 from ptmtools.texture.sources import Ranges, Source, ranges_of
-from ptmtools.texture.tiling import Box, tiles_under
+from ptmtools.texture.tiling import Box, covering, tiles_under
 
 if TYPE_CHECKING:
     import numpy as np
@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     Samples = NDArray[Any]
 
 _LIMITS = Limits()
+#: Bytes that decoding a tile takes for each of its samples, besides the level: at most, where
+#: samples are of 8 bits without an error, and otherwise (numbers of 32 and 64 bits).
+PLAIN_WORK, WORK = 10, 33
 
 
 def open(source: Source, *, limits: Limits = _LIMITS, threads: int = 1) -> PtmReader:
@@ -176,7 +179,9 @@ class PtmReader:
                 except InputError as error:
                     wrong.append(str(error))
                     continue
-                pieces = [(*entry, f"level {number}, tile {i}") for i, entry in enumerate(index)]
+                pieces = [
+                    (*index.piece(i), f"level {number}, tile {i}") for i in range(len(index.ends))
+                ]
             for offset, length, crc32, place in pieces:
                 try:
                     self._checked(offset, length, crc32, place)
@@ -230,16 +235,21 @@ class PtmReader:
         level = self.header.levels[number]
         if not level.tiled:
             return Box(0, 0, level.width, level.height)
-        boxes = [area for _, area in tiles_under(level.width, level.height, self.header.tile, box)]
-        return Box(boxes[0].x0, boxes[0].y0, boxes[-1].x1, boxes[-1].y1)
+        return covering(level.width, level.height, self.header.tile, box)
 
     def _check_limit(self, number: int, box: Box) -> None:
+        """Texels, and what decoding them a tile at a time takes besides."""
+        header, level = self.header, self.header.levels[number]
         width, height, limit = box.x1 - box.x0, box.y1 - box.y0, self._limits.decoded_bytes
-        if width * height * self.header.texel_bytes > limit:
+        tile = 4 * header.tile**2 if level.tiled else level.width * level.height
+        plain = self.dtype.itemsize == 1 and not header.max_error
+        working = (PLAIN_WORK if plain else WORK) * header.components * min(tile, width * height)
+        needed = width * height * header.texel_bytes + working
+        if needed > limit:
             raise LimitError(
                 "PTM-L103",
-                f"{width} x {height} texels of {self.header.texel_bytes} bytes are more than the "
-                f"limit of {limit} bytes",
+                f"{width} x {height} texels of {header.texel_bytes} bytes take "
+                f"up to {needed} bytes to decode, more than the limit of {limit}",
                 place=f"level {number}",
                 remedy="ask for a coarser level or raise the limit",
             )
@@ -268,7 +278,7 @@ class PtmReader:
             tile_number, area = job
             where = f"{place}, tile {tile_number}"
             under = np.ascontiguousarray(below.texels[area.below.within(below.box).slices])
-            data = self._checked(*index[tile_number], where)
+            data = self._checked(*index.piece(tile_number), where)
             size = (area.y1 - area.y0, area.x1 - area.x0, header.components)
             with naming(place=where):
                 tile = self._decode(data, under, size, below.memory)
@@ -302,21 +312,20 @@ class PtmReader:
             data = data[1:]
         return self._profile.decode_tile(data, below, shape, max_error, memory, threads)
 
-    def _index(self, level: Level, place: str) -> list[tuple[int, int, int]]:
+    def _index(self, level: Level, place: str) -> _Index:
         """Offset, length and CRC-32 of every tile of a level."""
+        import numpy as np
+
         count = level.tiles[0] * level.tiles[1]
         size = count * TILE_ENTRY.size
         if size > level.length:
             raise _contradiction(place)
         data = self._checked(level.offset, size, level.crc32, place)
-        index = []
-        offset = level.offset + size
-        for length, crc32 in TILE_ENTRY.iter_unpack(data):
-            index.append((offset, length, crc32))
-            offset += length
-        if offset != level.end:
+        entries = np.frombuffer(data, "<u4").reshape(-1, 2)
+        ends = level.offset + size + np.cumsum(entries[:, 0], dtype=np.int64)
+        if ends[-1] != level.end:
             raise _contradiction(place)
-        return index
+        return _Index(entries, ends)
 
     def _checked(self, offset: int, length: int, crc32: int, place: str) -> bytes:
         data = self._ranges.read(offset, length)
@@ -336,6 +345,19 @@ class PtmReader:
         return InputError(
             "PTM-I107", f"is cut{of}, inside or before this", place=place, remedy=remedy
         )
+
+
+@dataclass(frozen=True)
+class _Index:
+    """The tiles of a level in the file: (n, 2) length and CRC-32, and where each ends."""
+
+    entries: NDArray[np.uint32]
+    ends: NDArray[np.int64]
+
+    def piece(self, tile: int) -> tuple[int, int, int]:
+        """Offset, length, CRC-32."""
+        length, crc32 = (int(n) for n in self.entries[tile])
+        return int(self.ends[tile]) - length, length, crc32
 
 
 @dataclass(frozen=True)

@@ -53,6 +53,18 @@ def tile_box(width: int, height: int, side: int, column: int, row: int) -> Box:
     )
 
 
+def covering(width: int, height: int, side: int, box: Box) -> Box:
+    """The rectangle of all tiles that share a texel with ``box``."""
+    across, down = tile_counts(width, height, side)
+    if (across, down) == (1, 1):
+        return Box(0, 0, width, height)
+    corners = [
+        tile_box(width, height, side, min(x // side, across - 1), min(y // side, down - 1))
+        for x, y in ((box.x0, box.y0), (box.x1 - 1, box.y1 - 1))
+    ]
+    return Box(corners[0].x0, corners[0].y0, corners[1].x1, corners[1].y1)
+
+
 def tiles_under(width: int, height: int, side: int, box: Box) -> Iterator[tuple[int, Box]]:
     """Number (row by row) and rectangle of every tile that shares a texel with ``box``."""
     across, down = tile_counts(width, height, side)

@@ -214,10 +214,11 @@ def test_a_small_file_of_a_huge_image_is_refused_without_taking_memory() -> None
 def test_a_level_beyond_the_limit_is_refused_before_memory_is_taken() -> None:
     data = encode(np.zeros((300, 200, 3), np.uint8))
     with pytest.raises(LimitError, match="PTM-L103"):
-        decode(data, limits=Limits(decoded_bytes=300 * 200 * 3 - 1))
+        decode(data, limits=Limits(decoded_bytes=300 * 200 * 3 * 11 - 1))
     with pytest.raises(LimitError, match="PTM-L103"):
         next(decode_levels(data, limits=Limits(decoded_bytes=10)))
-    assert decode(data, 3, Limits(decoded_bytes=1000)).shape == (18, 12, 3)
+    assert decode(data, limits=Limits(decoded_bytes=300 * 200 * 3 * 11)).shape == (300, 200, 3)
+    assert decode(data, 3, Limits(decoded_bytes=18 * 12 * 3 * 11)).shape == (18, 12, 3)
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import tracemalloc
 import zlib
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,8 @@ from numpy.typing import NDArray
 import ptmtools.texture as texture
 from ptmtools.errors import InputError, LimitError
 from ptmtools.texture import Description, EncodeOptions, Limits, build_pyramid, encode
+from ptmtools.texture.container import Head, pack_head
+from ptmtools.texture.tiling import Box, covering, tiles_under
 
 TILED = EncodeOptions("raw", tile=16)
 
@@ -139,17 +142,44 @@ def test_a_damaged_tile_spares_the_others() -> None:
 def test_the_limit_is_that_of_what_is_decoded() -> None:
     image = np.tile(picture(64, 64), (8, 8, 1))
     data = encode(image, EncodeOptions("raw", tile=32))
-    with texture.open(data, limits=Limits(64 * 64 * 3)) as ptm:
+    # 64 x 64 texels under the window, and ten times as much to decode a tile of up to 63 x 63.
+    with texture.open(data, limits=Limits(64 * 64 * 3 * 11)) as ptm:
         finest = len(ptm.header.levels) - 1
         assert ptm.window(finest, 40, 40, 20, 20).shape == (20, 20, 3)
         with pytest.raises(LimitError, match="PTM-L103"):
             ptm.level()
     whole = encode(image, EncodeOptions("raw", tile=0))
     with (
-        texture.open(whole, limits=Limits(64 * 64 * 3)) as ptm,
+        texture.open(whole, limits=Limits(64 * 64 * 3 * 11)) as ptm,
         pytest.raises(LimitError, match="PTM-L103"),
     ):
         ptm.window(finest, 40, 40, 20, 20)
+
+
+@settings(deadline=None)
+@given(st.integers(1, 90), st.integers(1, 90), st.sampled_from([0, 16, 18]), st.data())
+def test_what_the_tiles_under_a_window_cover(width: int, height: int, side: int, data: Any) -> None:
+    x0, y0 = data.draw(st.integers(0, width - 1)), data.draw(st.integers(0, height - 1))
+    x1, y1 = data.draw(st.integers(x0 + 1, width)), data.draw(st.integers(y0 + 1, height))
+    box = Box(x0, y0, x1, y1)
+    tiles = [tile for _, tile in tiles_under(width, height, side, box)]
+    assert covering(width, height, side, box) == (
+        min(t.x0 for t in tiles), min(t.y0 for t in tiles),
+        max(t.x1 for t in tiles), max(t.y1 for t in tiles),
+    )  # fmt: skip
+
+
+def test_a_million_tiles_are_not_listed_to_be_refused() -> None:
+    head = Head(65536, 65536, 4, "float32", "fast", 0, 16, 0)
+    data = pack_head(head, b"", [(1, zlib.crc32(b"\0"))] * 17) + bytes(17)
+    tracemalloc.start()
+    try:
+        with texture.open(data) as ptm, pytest.raises(LimitError, match="PTM-L103"):
+            ptm.level()
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 1 << 22
 
 
 DESCRIBED = Description(

@@ -3,7 +3,9 @@
 The planes are coded in the order green, red, blue, alpha; other kinds in their own order. Each may
 look at the two before it. A plane is cut into vertical strips 32 blocks wide: strip i of a plane
 needs strip i - 1 of the same and strip i + 1 of the plane before it, and nothing else, so the
-planes run after each other in a pipeline, on as many threads as there are planes.
+planes run after each other in a pipeline, on as many threads as there are planes. Where the height
+is odd, the last row of blocks also looks at the odd row of the plane before it, which comes after
+the last strip: then one plane runs after the other.
 """
 
 from __future__ import annotations
@@ -142,12 +144,13 @@ class _Pass:
                     self._task(c, strip)
             return
         done = [0] * planes
+        ahead = self.strips if self.shape[0] % 2 else 2
         running: dict[Future[None], int] = {}
         with ThreadPoolExecutor(min(threads, planes)) as pool:
             while done[-1] < self.strips:
                 # The plane furthest behind first: others wait for none but those before them.
                 for c in range(planes - 1, -1, -1):
-                    needed = min(done[c] + 2, self.strips)
+                    needed = min(done[c] + ahead, self.strips)
                     ready = c == 0 or done[c - 1] >= needed
                     if done[c] < self.strips and ready and c not in running.values():
                         running[pool.submit(self._task, c, done[c])] = c
