@@ -268,4 +268,5 @@ def scratch(g: Geometry, words: int) -> Scratch:
         via=np.zeros(depth, np.int64),
         at=np.zeros(depth, np.int64),
         distance=np.zeros(vertices),
+        line=np.zeros((2, 3)),
     )

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.compiled import kernel
+from ptmtools.compiled import kernel, plain_kernel
 from ptmtools.visibility.winding.kernels import (
     CUT,
     EMPTY,
@@ -69,15 +69,16 @@ class Scratch(NamedTuple):
     via: Ints  # (D,) the directed portal that led into the frame
     at: Ints  # (D,) next candidate, index into out
     distance: Floats  # (V,)
+    line: Floats  # (2, 3) a point and a direction
 
 
-@kernel
+@plain_kernel
 def has(rows: Bits, p: int, q: int) -> bool:
     """Whether bit q of row p is set."""
     return bool((rows[p, q >> 6] >> np.uint64(q & 63)) & ONE)
 
 
-@kernel
+@plain_kernel
 def ahead(g: Geometry, p: int, q: int) -> bool:
     """Whether a straight line may cross directed portal p and then q, by their planes alone."""
     k, j = p >> 1, q >> 1
@@ -106,7 +107,7 @@ def ahead(g: Geometry, p: int, q: int) -> bool:
     return False
 
 
-@kernel
+@plain_kernel
 def fill_ahead(g: Geometry, first: int, last: int, rows: Bits) -> None:
     """Sets the bits of `ahead` in rows first … last - 1 of ``rows`` (2K, W)."""
     for p in range(first, last):
@@ -157,7 +158,7 @@ def tighten(g: Geometry, known: Bits) -> None:
         drop_unreturned(known, p)
 
 
-@kernel
+@plain_kernel
 def drop_unreturned(known: Bits, p: int) -> None:
     """Where p does not see q, the way back from q does not see the way back from p."""
     back = p ^ 1
@@ -167,7 +168,7 @@ def drop_unreturned(known: Bits, p: int) -> None:
             known[q ^ 1, w] &= keep
 
 
-@kernel
+@plain_kernel
 def thin_out(
     g: Geometry, might: Bits, frame: int, seen: Bits, plane: Floats, count: int
 ) -> tuple[bool, int, int]:
@@ -193,7 +194,7 @@ def thin_out(
     return left, tested, ties
 
 
-@kernel
+@plain_kernel
 def draw(state: np.uint64) -> tuple[np.uint64, float]:
     """The next state of a 64-bit xorshift generator (not 0), and a number in [0, 1) from it."""
     x = np.uint64(state)
@@ -203,7 +204,7 @@ def draw(state: np.uint64) -> tuple[np.uint64, float]:
     return x, np.float64(x >> np.uint64(11)) * 2.0**-53
 
 
-@kernel
+@plain_kernel
 def place_in(g: Geometry, k: int, state: np.uint64, at: Floats) -> np.uint64:
     """Puts a random point of portal k into ``at`` (3,); returns the generator's next state."""
     first, count = g.start[k], g.start[k + 1] - g.start[k]
@@ -220,7 +221,7 @@ def place_in(g: Geometry, k: int, state: np.uint64, at: Floats) -> np.uint64:
     return state
 
 
-@kernel
+@plain_kernel
 def crosses(g: Geometry, q: int, origin: Floats, along: Floats) -> bool:
     """Whether a line crosses directed portal q in its direction."""
     k = q >> 1
@@ -242,14 +243,15 @@ def crosses(g: Geometry, q: int, origin: Floats, along: Floats) -> bool:
     return True
 
 
-@kernel
-def glance(g: Geometry, known: Bits, source: int, seen: Bits) -> int:
+@plain_kernel
+def glance(g: Geometry, known: Bits, source: int, seen: Bits, line: Floats) -> int:
     """Marks in ``seen`` (W,) what one random line to each possible portal crosses on its way.
 
     A portal so marked is seen beyond doubt, so the search need not look out for it; a line that
-    goes astray by rounding only marks what is possible anyway. Returns the leaves walked.
+    goes astray by rounding only marks what is possible anyway. ``line`` (2, 3) is overwritten.
+    Returns the leaves walked.
     """
-    origin, along = np.empty(3), np.empty(3)
+    origin, along = line[0], line[1]
     state = np.uint64(source + 1) * np.uint64(0x9E3779B97F4A7C15)
     walked = 0
     for w in range(known.shape[1]):
@@ -279,7 +281,7 @@ def glance(g: Geometry, known: Bits, source: int, seen: Bits) -> int:
     return walked
 
 
-@kernel
+@plain_kernel
 def flow(
     g: Geometry, s: Scratch, known: Bits, source: int, budget: int, seen: Bits
 ) -> tuple[int, bool, int]:
@@ -312,7 +314,7 @@ def flow(
     looked = False
     while f >= 0:
         if not looked and GLANCE_AFTER <= ops < budget:
-            ops += glance(g, known, source, seen)
+            ops += glance(g, known, source, seen, s.line)
             looked = True
         if at[f] == g.out_start[g.leaf[via[f]] + 1]:
             f -= 1

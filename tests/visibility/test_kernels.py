@@ -215,5 +215,5 @@ def test_a_glance_sees_a_straight_corridor_and_nothing_behind_a_corner(room_row,
         known = np.full((n, 1), (1 << n) - 1, np.uint64)
         known[0, 0] ^= np.uint64(1)
         seen = np.zeros(1, np.uint64)
-        assert kernels.glance(g, known, 0, seen) > 0
+        assert kernels.glance(g, known, 0, seen, np.zeros((2, 3))) > 0
         assert seen[0] == sum(1 << q for q in range(2, last + 1, 2))

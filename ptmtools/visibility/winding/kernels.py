@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.compiled import kernel
+from ptmtools.compiled import plain_kernel as kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
