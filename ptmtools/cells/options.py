@@ -33,6 +33,6 @@ class SubdivideOptions:
     max_cells: int = 2000
     structural: tuple[str, ...] = ()
     detail: tuple[str, ...] = ()
-    cells: CellKind = "leaf"
+    cells: CellKind = "room"
     gain: float = 0.1
     viewpoints: tuple[tuple[float, float, float], ...] = ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.database.findings import Findings
+from ptmtools.database.hull import convex_hull
 from ptmtools.database.wrl import Document, Node
+from ptmtools.errors import DatabaseError
 from ptmtools.tolerance import Tolerance
 
 #: How far the ach values as written, single precision, may sum up beside 1.
@@ -35,6 +38,7 @@ class ReadCell:
     adjacent, visible: URLs as written, relative to the cell's file.
     ach: (n,) float64.
     hull: (h, 3) the hull's points.
+    leaves: the (n, 3) points of each leaf; empty if the cell is a single one.
     textures: the URL lists of its image textures, each once, in the order of the file.
     """
 
@@ -43,6 +47,7 @@ class ReadCell:
     visible: tuple[str, ...]
     ach: NDArray[np.float64]
     hull: NDArray[np.float64]
+    leaves: tuple[NDArray[np.float64], ...]
     textures: tuple[tuple[str, ...], ...]
 
 
@@ -70,6 +75,9 @@ def read_cell(document: Document, file: str, found: Findings) -> ReadCell | None
         visible=fields["visibleUrl"],
         ach=fields["ach"],
         hull=fields["hullPoint"],
+        leaves=tuple(np.split(fields["leafPoint"], fields["leafStart"][1:]))
+        if "leafPoint" in fields
+        else (),
         textures=tuple(textures),
     )
 
@@ -86,24 +94,28 @@ def check_cell(
 
     ``file`` is relative to the database; ``box`` (2, 3) holds the hulls of all cells. Geometry
     beyond a face of that box is in order: a model that is open is subdivided within its walls,
-    and what lies farther out belongs to the cells at the rim.
+    and what lies farther out belongs to the cells at the rim. There the hull of several leaves may
+    lean inwards, and what lies before one of the leaves is in order too.
     """
     node = document.of_type("PTMCell")[0]
     place = f"line {node.line}"
     planes = _check_hull(cell.hull, node.fields["hullIndex"], tolerance, file, place, found)
+    bodies = [planes[~_in_box_face(planes, box, tolerance)]]
     if "leafPoint" in node.fields and "leafStart" in node.fields:
         points, start = node.fields["leafPoint"], node.fields["leafStart"]
         if len(start) < 2 or start[0] != 0 or (np.diff([*start, len(points)]) < 4).any():
             found.add("PTM-D685", file, place, "leafStart does not cut leafPoint into leaves")
-        _check_inside(planes, points, tolerance, file, place, "a leaf", found)
-    rim = _in_box_face(planes, box, tolerance)
+        else:
+            leaves = np.split(points, start[1:])
+            bodies += [p[~_in_box_face(p, box, tolerance)] for p in _leaf_planes(leaves, tolerance)]
+        _check_inside([planes], points, tolerance, file, place, "a leaf", found)
     for shape in document.of_type("Shape"):
         where = f"line {shape.line}" + (f", {shape.name}" if shape.name else "")
         _check_shape(shape, file, where, found)
         coord = _child(shape, "geometry", "coord")
         if coord is not None:
             points = coord.fields.get("point", np.zeros((0, 3)))
-            _check_inside(planes[~rim], points, tolerance, file, where, "geometry", found)
+            _check_inside(bodies, points, tolerance, file, where, "geometry", found)
     own = file.rpartition("/")[2]
     if f"{cell.name}.wrl" != own:
         found.add("PTM-D698", file, place, f"cellName is {cell.name!r}")
@@ -241,21 +253,40 @@ def _check_hull(
     if len(directed) < len(edges) or any((b, a) not in directed for a, b in directed):
         found.add("PTM-D683", file, place, "the hull is not closed")
         return none
-    a, b, c = np.moveaxis(points[triangles], 1, 0)
-    normal = np.cross(b - a, c - a)
-    length = np.linalg.norm(normal, axis=1)
-    # A sliver's normal says nothing; its neighbours bound the hull.
-    longest = np.max(np.linalg.norm([b - a, c - b, a - c], axis=2), axis=0)
-    sound = length > 2 * tolerance.plane * longest
-    if not sound.any():
+    planes = _unit_planes(points, triangles, tolerance)
+    if len(planes) == 0:
         found.add("PTM-D683", file, place, "the hull is flat")
         return none
-    normal = normal[sound] / length[sound, None]
-    planes = np.column_stack([normal, -np.einsum("ij,ij->i", normal, a[sound])])
-    if _outside(planes, points) > tolerance.plane:
+    if _outside(planes, points).max(initial=0.0) > tolerance.plane:
         found.add("PTM-D683", file, place, "the hull is not convex")
         return none
     return planes
+
+
+def _unit_planes(
+    points: NDArray[np.float64], triangles: NDArray[np.integer], tolerance: Tolerance
+) -> NDArray[np.float64]:
+    """(f, 4) planes of the triangles, outwards. A sliver's normal says nothing and is left out; its
+    neighbours bound the hull."""
+    a, b, c = np.moveaxis(points[triangles], 1, 0)
+    normal = np.cross(b - a, c - a)
+    length = np.linalg.norm(normal, axis=1)
+    longest = np.max(np.linalg.norm([b - a, c - b, a - c], axis=2), axis=0)
+    sound = length > 2 * tolerance.plane * longest
+    normal = normal[sound] / length[sound, None]
+    return np.column_stack([normal, -np.einsum("ij,ij->i", normal, a[sound])])
+
+
+def _leaf_planes(
+    leaves: Sequence[NDArray[np.float64]], tolerance: Tolerance
+) -> Iterator[NDArray[np.float64]]:
+    """The planes of each leaf that is not flat."""
+    for leaf in leaves:
+        try:
+            points, triangles = convex_hull(leaf.astype(np.float32))
+        except DatabaseError:
+            continue
+        yield _unit_planes(points.astype(np.float64), triangles, tolerance)
 
 
 def _in_box_face(
@@ -267,14 +298,16 @@ def _in_box_face(
     return np.asarray((outwards & (abs(faces) <= tolerance.plane)).any(axis=1))
 
 
-def _outside(planes: NDArray[np.float64], points: NDArray[np.float64]) -> float:
-    """How far the farthest point lies in front of a plane."""
-    far = [float((points @ plane[:3]).max() + plane[3]) for plane in planes] if len(points) else []
-    return max(far, default=0.0)
+def _outside(planes: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) how far each point lies in front of the plane that it is farthest in front of."""
+    far = np.full(len(points), -np.inf)
+    for plane in planes:
+        far = np.maximum(far, points @ plane[:3] + plane[3])
+    return far
 
 
 def _check_inside(
-    planes: NDArray[np.float64],
+    bodies: Sequence[NDArray[np.float64]],
     points: NDArray[np.float64],
     tolerance: Tolerance,
     file: str,
@@ -282,6 +315,7 @@ def _check_inside(
     what: str,
     found: Findings,
 ) -> None:
-    far = _outside(planes, points)
+    """Every point lies in one of the bodies, given by their planes; the first is the hull."""
+    far = np.min([_outside(planes, points) for planes in bodies], axis=0).max(initial=0.0)
     if far > tolerance.cluster:
         found.add("PTM-D684", file, place, f"{what} lies {far:.3g} m outside of the hull")

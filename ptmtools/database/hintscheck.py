@@ -133,7 +133,7 @@ def check_against_cells(
             "adjacent": tuple(known[c] for c in row["adjacent"]) == cell.adjacent,
             "visible": tuple(known[c] for c in row["visible"]) == cell.visible,
             "ach": _equal_single(row["ach"], cell.ach),
-            "leaves": _same_box(row["leaves"], cell.hull),
+            "leaves": _same_box(row["leaves"], cell.hull) and _same_leaves(row["leaves"], cell),
             "textures": sorted(hints.textures[t]["file"] for t in row["textures"])
             == sorted(textures[name]),
         }
@@ -202,7 +202,7 @@ def _numbers(rows: Any, width: int | None, place: str) -> None:
             raise _DamageError(f"{place}: not numbers")
 
 
-def _equal_single(full: Sequence[float], written: Any) -> bool:
+def _equal_single(full: Sequence[Any], written: Any) -> bool:
     return np.array_equal(np.array(full, np.float32), np.asarray(written).astype(np.float32))
 
 
@@ -215,3 +215,10 @@ def _same_box(leaves: Sequence[Mapping[str, Any]], hull: Any) -> bool:
         (single.min(axis=0) == other.min(axis=0)).all()
         and (single.max(axis=0) == other.max(axis=0)).all()
     )
+
+
+def _same_leaves(leaves: Sequence[Mapping[str, Any]], cell: ReadCell) -> bool:
+    if len(leaves) != max(len(cell.leaves), 1):
+        return False
+    pairs = zip(leaves, cell.leaves, strict=False)
+    return all(_equal_single(leaf["points"], points) for leaf, points in pairs)

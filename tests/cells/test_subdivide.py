@@ -11,6 +11,8 @@ from ptmtools.cells import Cells, SubdivideOptions, structural_triangles, subdiv
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Material, Scene
 
+LEAF = SubdivideOptions(cells="leaf")
+
 
 def volume(cells: Cells, leaf: int) -> float:
     centre = cells.leaf_points(leaf).mean(axis=0)
@@ -70,7 +72,7 @@ def test_walls_with_thickness_leave_solid_matter_out(quads, room_faces) -> None:
         for y0, y1, z0, z1 in ((0, 4, -2, -1), (0, 4, 1, 2), (3, 4, -1, 1)):
             walls.append([[x, y0, z0], [x, y1, z0], [x, y1, z1], [x, y0, z1]])
     tunnel = room_faces((4, 0, -1), (4.3, 3, 1), "-x +x")
-    cells = subdivide(quads(left + right + walls + tunnel))
+    cells = subdivide(quads(left + right + walls + tunnel), LEAF)
     assert cells.closed
     inside = cells.locate(np.array([[2.0, 1, 0], [4.15, 1, 0], [6, 1, 0]]))
     assert len(set(inside)) == 3
@@ -160,11 +162,11 @@ def furniture(scene_faces: list, quads) -> Scene:
 
 def test_detail_and_structural_by_name(quads, room_faces) -> None:
     scene = furniture(room_faces((0, 0, -2), (4, 4, 2)), quads)
-    assert subdivide(scene).cell_count == 2
-    assert subdivide(scene, SubdivideOptions(detail=("screen*",))).cell_count == 1
-    assert subdivide(scene, SubdivideOptions(wall_area=10)).cell_count == 1
+    assert subdivide(scene).leaf_count == 2
+    assert subdivide(scene, SubdivideOptions(detail=("screen*",))).leaf_count == 1
+    assert subdivide(scene, SubdivideOptions(wall_area=10)).leaf_count == 1
     forced = SubdivideOptions(wall_area=10, structural=("screen*",))
-    assert subdivide(scene, forced).cell_count == 2
+    assert subdivide(scene, forced).leaf_count == 2
     both = SubdivideOptions(detail=("*",), structural=("shell", "screen_1"))
     assert np.all(structural_triangles(scene, both))
 

@@ -14,11 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ptmtools.coverage.model import Ach
 from ptmtools.database import EmitOptions, GivenViewpoint, TextureRecord, emit, validate_database
 from ptmtools.database.names import DefNames
 from ptmtools.database.wrl import Node, parse
 from ptmtools.errors import DatabaseError, InputError, OutputError
 from ptmtools.scene.model import Material
+from ptmtools.visibility.model import Pvs
 
 
 def records() -> tuple[TextureRecord, ...]:
@@ -162,6 +164,39 @@ def test_a_cell_of_two_leaves(artifacts, tmp_path: Path) -> None:
     assert len(node.fields["hullPoint"]) == 8
     issues = {i.code for i in validate_database(tmp_path / "db").issues}
     assert issues == {"PTM-D650", "PTM-D671"}, "no manifest and no textures here, nothing else"
+    hints = tmp_path / "db/www/hints.json"
+    document = json.loads(hints.read_text())
+    assert [len(cell["leaves"]) for cell in document["cells"]] == [2, 1]
+    document["cells"][0]["leaves"].reverse()
+    hints.write_text(json.dumps(document))
+    assert "PTM-D701" in {i.code for i in validate_database(tmp_path / "db").issues}
+
+
+def test_geometry_beyond_the_root_box_of_a_cell_of_two_leaves(tmp_path: Path, room_row) -> None:
+    """An open model: what lies beyond the box is in order before a leaf, though the hull of a cell
+    whose leaves differ in height leans; what lies elsewhere beyond the hull is not."""
+    scene, cells = room_row(2)
+    point = cells.leaf_point.copy()
+    point[(point[:, 0] > 4) & (point[:, 1] > 2), 1] = 2.0  # the second is 2 m high, not 4
+    loose = cells.vertex.copy()
+    whole = replace(cells, leaf_cell=np.zeros(2, np.int32), leaf_point=point, closed=False)
+    whole = replace(whole, triangle_cell=np.minimum(whole.triangle_cell, 0))
+    pvs = Pvs.from_matrix(np.ones((1, 1), np.bool_))
+    ach = Ach(
+        pvs.start, *(np.ones(1) for _ in range(3)), np.full(1, 8), np.zeros(1), "embree", "by hand"
+    )
+
+    def issues(moved: tuple[float, float, float], name: str) -> set[str]:
+        vertex = loose.copy()
+        vertex[np.isclose(vertex, [0, 0, -2]).all(axis=1)] = moved
+        vertex[(vertex[:, 0] > 4.5) & (vertex[:, 1] > 2), 1] = 2.0
+        out = tmp_path / name / "www"
+        emit(scene, replace(whole, vertex=vertex), pvs, ach, (), out, EmitOptions())
+        return {i.code for i in validate_database(tmp_path / name).issues}
+
+    assert "PTM-D684" not in issues((0, 0, -2), "as it was")
+    assert "PTM-D684" not in issues((2, 6, -2), "above the higher leaf")
+    assert "PTM-D684" in issues((10, 3, -2), "above and beyond the lower leaf")
 
 
 def test_viewpoints_stand_on_the_floor(artifacts, finished: Path) -> None:
