@@ -37,7 +37,7 @@ def main() -> None:
         scene = ingest(model)
         for area in given.wall_area:
             begin = time.process_time()
-            cells = subdivide(scene, SubdivideOptions(wall_area=area))
+            cells = subdivide(scene, SubdivideOptions(cells="leaf", wall_area=area))
             middle = time.process_time()
             pvs = compute_pvs(cells)
             end = time.process_time()
