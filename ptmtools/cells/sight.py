@@ -5,8 +5,8 @@ followed to both sides through all portals that they meet. Leaves on one line se
 a potentially visible set this leaves out what no line happened to find; it serves to weigh, never
 to cull. Two thirds to nine tenths of what the portal flow finds are found in a second or two.
 
-The lines are the same for every portal, in its own plane and from its own first edge, so they
-depend neither on the order of the portals nor on where the building stands.
+The lines are the same for every portal in its own frame, so they depend neither on the order of the
+portals and of their corners nor on where the building stands and how it is turned.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ from ptmtools.cells.model import Cells
 #: Lines over all portals, and the least and the most through one of them.
 LINES = 2**19
 LEAST_LINES, MOST_LINES = 64, 512
+#: A portal whose normal has a level part smaller than this is a hatch.
+LEVEL = 1e-3
 #: Fractional parts of 1/g, 1/g², 1/g³, 1/g⁴ in units of 2⁻⁶⁴, where g⁵ = g + 1 (Roberts'
 #: sequence): the place in the portal, and the direction.
 STEPS = np.array(
@@ -58,26 +60,63 @@ def sampled_sight(cells: Cells) -> NDArray[np.bool_]:
 
 
 def _even(count: int) -> NDArray[np.float64]:
-    """(count, 4) points of the unit cube, evenly spread; integer arithmetic, the same anywhere."""
-    fixed = np.arange(1, count + 1, dtype=np.uint64)[:, None] * STEPS
-    return np.asarray((fixed >> np.uint64(11)).astype(np.float64) * 2.0**-53)
+    """(count, 4) points of the unit cube, evenly spread; integer arithmetic, the same anywhere. The
+    second half mirrors the first (`_lines`)."""
+    fixed = np.arange(1, count // 2 + 1, dtype=np.uint64)[:, None] * STEPS
+    half = (fixed >> np.uint64(11)).astype(np.float64) * 2.0**-53
+    return np.concatenate([half, [0, 1, 0, 1] + half * [1, -1, 1, -1]])
 
 
 def _lines(
     polygon: NDArray[np.float64], normal: NDArray[np.float64], share: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(n, 3) points uniform in a convex polygon, and (n, 3) unit directions ahead of it with a
-    density by the cosine, as light would pass."""
-    u, v = polygon[1:-1] - polygon[0], polygon[2:] - polygon[0]
-    area = np.linalg.norm(np.cross(u, v), axis=1)
-    until = np.cumsum(area)
-    left = share[:, 0] * until[-1]
-    which = np.minimum(np.searchsorted(until, left, "right"), len(area) - 1)
-    within = np.sqrt(np.clip((left - (until - area)[which]) / area[which], 0.0, 1.0))
-    across = (within * share[:, 1])[:, None]
-    origin = polygon[0] + (within[:, None] - across) * u[which] + across * v[which]
-    right = u[0] / np.linalg.norm(u[0])
+    density by the cosine, as light would pass.
+
+    ``share`` (n, 4) chooses the height in the polygon, the place at that height, and the direction
+    by its angle from the normal and around it. The frame has the polygon's level direction to the
+    right; turning the normal round mirrors it, so of mirrored pairs of lines both are there.
+    """
+    right = np.array([normal[2], 0.0, -normal[0]])
+    if np.linalg.norm(right) < LEVEL:  # a hatch: no direction is level more than others
+        edge = np.roll(polygon, -1, axis=0) - polygon
+        right = edge[np.argmax(np.linalg.norm(edge, axis=1))]
+    right = right / np.linalg.norm(right)
+    upward = np.cross(normal, right)
+    frame = np.stack([right, upward, normal])
+    flat = (polygon - polygon[0]) @ frame[:2].T
+    height = np.unique(flat[:, 1])
+    left, end = _chords(flat, height)
+    width, rise = end - left, np.diff(height)
+    until = np.cumsum((width[:-1] + width[1:]) * rise / 2)
+    at = share[:, 0] * until[-1]
+    k = np.minimum(np.searchsorted(until, at, "right"), len(rise) - 1)
+    # How far up slice k: the root of a quadratic, in the form that cancels nothing.
+    part = (at - np.append(0, until)[k]) / rise[k]
+    slope = width[k + 1] - width[k]
+    root = np.sqrt(np.maximum(width[k] ** 2 + 2 * slope * part, 0.0))
+    up = np.clip(2 * part / np.maximum(width[k] + root, np.finfo(np.float64).tiny), 0.0, 1.0)
+    begin = left[k] + up * (left[k + 1] - left[k])
+    x = begin + share[:, 1] * (width[k] + up * slope)
+    origin = polygon[0] + np.stack([x, height[k] + up * rise[k]], axis=1) @ frame[:2]
     radius, turn = np.sqrt(share[:, 2]), 2 * np.pi * share[:, 3]
-    frame = np.stack([right, np.cross(normal, right), normal])
     aside = np.stack([radius * np.cos(turn), radius * np.sin(turn), np.sqrt(1 - share[:, 2])])
     return origin, aside.T @ frame
+
+
+def _chords(
+    flat: NDArray[np.float64], height: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(n,) least and greatest x of a convex (m, 2) polygon at each height y."""
+    a, b = flat, np.roll(flat, -1, axis=0)
+    low, high = np.minimum(a[:, 1], b[:, 1]), np.maximum(a[:, 1], b[:, 1])
+    meets = (low <= height[:, None]) & (height[:, None] <= high)
+    rise = b[:, 1] - a[:, 1]
+    share = np.divide(
+        height[:, None] - a[:, 1], rise, out=np.zeros(meets.shape), where=rise[None] != 0
+    )
+    x = a[:, 0] + np.clip(share, 0.0, 1.0) * (b[:, 0] - a[:, 0])
+    return (
+        np.where(meets, x, np.inf).min(axis=1),
+        np.where(meets, x, -np.inf).max(axis=1),
+    )

@@ -11,7 +11,7 @@ import pytest
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.cells.gain import join_by_gain
-from ptmtools.cells.sight import sampled_sight
+from ptmtools.cells.sight import _even, _lines, sampled_sight
 from ptmtools.errors import InputError
 from ptmtools.scene import ingest
 from ptmtools.scene.model import Scene
@@ -146,6 +146,37 @@ def test_gain_parts_a_room_where_that_pays(corridor: Scene) -> None:
     parted = subdivide(corridor, replace(WHOLE, gain=0.05))
     here, there = locate(parted, (5, 1, 1), (55, 1, 37))
     assert here != there
+
+
+@pytest.mark.parametrize(("quarters", "scale"), [(1, 1.0), (2, 1.0), (3, 1.0), (0, 1 / 1024)])
+def test_the_same_cells_turned_and_in_other_units(
+    corridor: Scene, quarters: int, scale: float
+) -> None:
+    turn = np.linalg.matrix_power(np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0.0]]), quarters) * scale
+    options = replace(WHOLE, gain=0.05)
+    here = subdivide(corridor, options)
+    there = subdivide(
+        replace(corridor, points=corridor.points @ turn.T),
+        replace(options, wall_area=2 * scale**2, wall_thickness=0.5 * scale),
+    )
+    middle = np.array([here.leaf_points(i).mean(axis=0) for i in range(here.leaf_count)])
+    cell = there.locate(middle @ turn.T)
+    assert there.cell_count == here.cell_count > 1
+    same_here = here.leaf_cell[:, None] == here.leaf_cell
+    assert np.array_equal(same_here, cell[:, None] == cell)
+
+
+def test_lines_are_even_in_a_portal_and_do_not_know_its_first_corner_or_side() -> None:
+    polygon = np.array([[0, 0, 0], [4, 0, 0], [4, 2, 0], [0, 1, 0]], dtype=np.float64)
+    share = _even(512)
+    origin, along = _lines(polygon, np.array([0.0, 0, 1]), share)
+    assert origin.mean(axis=0) == pytest.approx([20 / 9, 7 / 9, 0], abs=0.03)
+    assert np.all(origin[:, 1] <= 1 + origin[:, 0] / 4 + 1e-12)
+    assert along[:, 2].mean() == pytest.approx(2 / 3, abs=0.01)  # of a density by the cosine
+    turned, back = _lines(np.roll(polygon, 1, axis=0)[::-1], np.array([0.0, 0, -1]), share)
+    lines, others = np.hstack([origin, along]), np.hstack([turned, -back])
+    apart = np.abs(lines[:, None] - others).max(axis=2)
+    assert apart.min(axis=1).max() < 1e-12
 
 
 def test_gain_by_hand() -> None:
