@@ -18,7 +18,7 @@ from ptmtools.cells.model import Cells
 
 #: Lines over all portals, and the least and the most through one of them.
 LINES = 2**19
-LEAST_LINES, MOST_LINES = 64, 512
+LEAST_LINES, MOST_LINES = 64, 2048
 #: A portal whose normal has a level part smaller than this is a hatch.
 LEVEL = 1e-3
 #: Fractional parts of 1/g, 1/g², 1/g³, 1/g⁴ in units of 2⁻⁶⁴, where g⁵ = g + 1 (Roberts'
