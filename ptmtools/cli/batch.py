@@ -15,7 +15,7 @@ from typing import IO, TypeVar
 import click
 
 from ptmtools.cli.failures import report
-from ptmtools.cli.output import Voice
+from ptmtools.cli.output import Voice, abandon_stdout
 from ptmtools.errors import InputError, OutputError, PtmError
 from ptmtools.files import writing
 
@@ -221,6 +221,7 @@ def to_standard_output(write: Callable[[IO[bytes]], object]) -> None:
         except BrokenPipeError:
             raise
         except OSError as error:
+            abandon_stdout()
             full = error.errno in (errno.ENOSPC, errno.EDQUOT)
             raise OutputError(
                 "PTM-O003" if full else "PTM-O002",

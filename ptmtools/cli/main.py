@@ -8,14 +8,13 @@ Each command lives in a module that is imported when it is called, so that ``ptm
 from __future__ import annotations
 
 import importlib
-import os
 import sys
 from collections.abc import Sequence
 
 import click
 
 from ptmtools.cli.failures import BROKEN_PIPE, report
-from ptmtools.cli.output import Voice
+from ptmtools.cli.output import Voice, abandon_stdout
 from ptmtools.progress import listen
 from ptmtools.version import __version__
 
@@ -93,9 +92,10 @@ def main(arguments: Sequence[str]) -> int:
         return status if isinstance(status, int) else 0
     except BaseException as fault:
         status = report(fault, voice.verbose)
-        if status == BROKEN_PIPE:
-            # Python flushes stdout once more as it ends; there is nobody left to read it.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        try:
+            sys.stdout.flush()
+        except OSError:
+            abandon_stdout()
         return status
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -64,6 +65,15 @@ class Voice:
                 bars.update(task[what], completed=done, total=total)
 
             yield tell
+
+
+def abandon_stdout() -> None:
+    """Nothing more goes to stdout: what its buffer holds, which Python would try to write once more
+    as it ends, is lost."""
+    with suppress(OSError, ValueError):  # of a stream that is no file
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)
 
 
 def size(count: int) -> str:
