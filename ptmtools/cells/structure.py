@@ -30,8 +30,8 @@ from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
 
 #: Normals are binned on a grid of this step, only to find candidates quickly.
 _NORMAL_STEP = 0.02
-#: So many grids, each moved on by as large a share of the step: of two planes nearer than half that
-#: share, some grid has both in one bin (one more than the dimensions of a plane are needed).
+#: So many grids, each moved on by as large a share of the step: one more than a plane has numbers,
+#: so that in one of them none of its numbers is nearer to an edge than half that share.
 _GRIDS = 5
 #: Of the two normals of a plane the one that points this way is taken: no wall lies in the
 #: direction, so that rounding never decides.
@@ -170,41 +170,78 @@ def _layers(
     """Planes that hold enough coplanar area to carry a wall, heaviest first.
 
     Triangles are compared only within bins of similar normal and offset, and a bin is left as soon
-    as what is free in it cannot reach ``wall_area``: curved detail falls away before anything
-    quadratic happens.
+    as what is free in it cannot reach ``wall_area``: curved detail and slivers fall away before
+    anything quadratic happens.
     """
-    bins = [_bins(planes, tolerance, shift / _GRIDS) for shift in range(_GRIDS)]
+    bins = _Bins(planes, np.where(forced, np.inf, areas), tolerance)
     free = areas > 0
     layers: list[tuple[float, NDArray[np.float64]]] = []
     for seed in ranked(areas):
         if not free[seed]:
             continue
         free[seed] = False
-        near = np.unique(np.concatenate([rows[label[seed]] for label, rows in bins]))
-        near = near[free[near]]
-        if areas[near].sum() + areas[seed] < wall_area and not np.any(forced[near]):
-            if forced[seed]:
-                layers.append((float(areas[seed]), planes[seed]))
-            continue
         plane = planes[seed]
+        if bins.weight(seed) < wall_area:
+            bins.drop(np.array([seed]))
+            continue
+        near = bins.near(seed)
+        near = near[free[near]]
         members = np.append(near[lying_in(plane, corners[near], tolerance)], seed)
         free[members] = False
+        bins.drop(members)
         weight = float(areas[members].sum())
         if weight >= wall_area or np.any(forced[members]):
             layers.append((weight, plane))
     return [layers[i][1] for i in ranked(np.array([weight for weight, _ in layers]))]
 
 
-def _bins(
-    planes: NDArray[np.float64], tolerance: Tolerance, shift: float
-) -> tuple[NDArray[np.int64], list[NDArray[np.int64]]]:
-    """The bin of each plane, and the planes of each bin."""
-    step = np.array([_NORMAL_STEP] * 3 + [_NORMAL_STEP * tolerance.extent])
-    key = np.floor(planes / step + shift).astype(np.int64)
-    _, label, count = np.unique(key, axis=0, return_inverse=True, return_counts=True)
-    label = label.ravel()
-    rows = np.split(np.argsort(label, kind="stable"), np.cumsum(count)[:-1])
-    return label, rows
+class _Bins:
+    """Planes in bins of similar normal and offset, so that each finds all that are near it.
+
+    There are `_GRIDS` grids of bins, and a plane is looked up in the one in which it lies furthest
+    from the edges of its bin: its neighbours to a tenth of the step are there, wherever it lies.
+    """
+
+    def __init__(
+        self, planes: NDArray[np.float64], weights: NDArray[np.float64], tolerance: Tolerance
+    ) -> None:
+        """``weights`` of the (n, 4) planes: areas, infinite for planes that a bin is kept for."""
+        step = np.array([_NORMAL_STEP] * 3 + [_NORMAL_STEP * tolerance.extent])
+        self._kept = np.isinf(weights).astype(np.int64)
+        self._area = np.where(self._kept, 0.0, weights)
+        labels, inner = [], []
+        for grid in range(_GRIDS):
+            at = planes / step + grid / _GRIDS
+            key = np.floor(at)
+            _, label = np.unique(key.astype(np.int64), axis=0, return_inverse=True)
+            labels.append(label.ravel())
+            inner.append(np.minimum(at - key, 1 - (at - key)).min(axis=1))
+        self._label = np.stack(labels)
+        self._grid = np.argmax(np.stack(inner), axis=0)
+        self._rows = [
+            np.split(np.argsort(label, kind="stable"), np.cumsum(np.bincount(label))[:-1])
+            for label in labels
+        ]
+        self._free = [np.bincount(label, self._area) for label in labels]
+        self._keep = [np.bincount(label, self._kept) for label in labels]
+
+    def near(self, plane: int) -> NDArray[np.int64]:
+        """The planes in the bin of one of them, dropped or not."""
+        grid = self._grid[plane]
+        rows: NDArray[np.int64] = self._rows[grid][self._label[grid, plane]]
+        return rows
+
+    def weight(self, plane: int) -> float:
+        """What is not dropped in that bin weighs so much."""
+        grid = self._grid[plane]
+        label = self._label[grid, plane]
+        return float("inf") if self._keep[grid][label] > 0 else float(self._free[grid][label])
+
+    def drop(self, planes: NDArray[np.int64]) -> None:
+        """Planes weigh no more."""
+        for grid, label in enumerate(self._label[:, planes]):
+            np.subtract.at(self._free[grid], label, self._area[planes])
+            np.subtract.at(self._keep[grid], label, self._kept[planes])
 
 
 def parallel_gap(
