@@ -34,20 +34,22 @@ def unite(triangles: NDArray[np.float64], grid: float) -> Geometry:
 def union(shapes: Geometry, grid: float) -> Geometry:
     """Union of an array of polygons, less corners on straight edges.
 
-    Snap rounding takes the square of the corners on one line; a wall of 100,000 strips is united
-    by neighbourhoods, each rid of such corners, and these in turn.
+    Here only the operands are brought to the grid: what would be lost is a wall, which shows too
+    much, never too little, and snap rounding takes the square of the corners on one line (10,000
+    slivers across a wall: 34 s instead of 6 s). For the same reason many polygons are united by
+    neighbourhoods, each rid of corners on straight edges, and these in turn.
     """
     import shapely
 
-    polygons = _polygons_in(shapes)
-    before = len(polygons) + 1
-    while _CHUNK < len(polygons) < before:
+    polygons = _polygons_in(shapely.set_precision(shapes, grid))
+    before = 2 * len(polygons) + 1
+    while _CHUNK < len(polygons) < before / 2:
         before = len(polygons)
         polygons = polygons[_along_a_curve(shapely.get_coordinates(shapely.centroid(polygons)))]
         chunks = np.array_split(polygons, -(-before // _CHUNK))
-        united = [shapely.union_all(chunk, grid_size=grid) for chunk in chunks]
+        united = [shapely.union_all(chunk) for chunk in chunks]
         polygons = _polygons_in(shapely.simplify(united, grid))
-    return shapely.simplify(shapely.union_all(polygons, grid_size=grid), grid)
+    return shapely.simplify(shapely.union_all(polygons), grid)
 
 
 def _along_a_curve(points: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -79,13 +81,13 @@ def neighbours(polygons: Geometry, gap: float) -> NDArray[np.int64]:
     T-junction whose edge misses the corner by a rounding joins what it was meant to join."""
     import shapely
 
-    if len(polygons) < 2:
-        return np.zeros(len(polygons), dtype=np.int64)
-    grown = shapely.buffer(polygons, gap / 2, join_style="mitre")
-    groups = shapely.get_parts(shapely.union_all(grown))
-    inside, group = shapely.STRtree(groups).query(shapely.point_on_surface(polygons), "intersects")
-    label = np.zeros(len(polygons), dtype=np.int64)
-    label[inside] = group
+    tree = shapely.STRtree(polygons)
+    one, other = tree.query(polygons, predicate="dwithin", distance=gap)
+    label = np.arange(len(polygons))
+    while np.any(label[one] != label[other]):
+        least = label.copy()
+        np.minimum.at(least, label[one], label[other])
+        label = least[least[label]]
     return label
 
 

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.options import SubdivideOptions
-from ptmtools.cells.planar import Geometry, neighbours, union, unite
+from ptmtools.cells.planar import Geometry, neighbours, unite
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
 
@@ -132,7 +132,7 @@ def find_walls(scene: Scene, options: SubdivideOptions, tolerance: Tolerance) ->
             large |= shapely.intersects(parts, named)
         if not np.any(large):
             continue
-        walls = union(parts[large], tolerance.grid)
+        walls = shapely.multipolygons(parts[large])
         found.append((float(shapely.area(walls)), WallPlane(frame, walls, blocking)))
     return [found[i][1] for i in ranked(np.array([area for area, _ in found]))]
 
