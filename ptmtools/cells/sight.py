@@ -39,7 +39,7 @@ def sampled_sight(cells: Cells) -> NDArray[np.bool_]:
         return seen
     from ptmtools.cells.kernels import sight_lines
 
-    count = min(max(LINES // len(ends), LEAST_LINES), MOST_LINES)
+    count = min(max(LINES // len(ends), LEAST_LINES), MOST_LINES) // 2 * 2  # mirrored pairs
     share = _even(count)
     origin, along = np.empty((2, len(ends), count, 3))
     for k in range(len(ends)):

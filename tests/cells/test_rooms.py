@@ -205,6 +205,16 @@ def test_sampled_sight_is_within_the_flow_and_finds_most_of_it(corridor: Scene) 
     assert not flow.all()
 
 
+def test_any_number_of_lines_comes_in_mirrored_pairs(
+    corridor: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cells = subdivide(corridor, SubdivideOptions(cells="leaf"))
+    monkeypatch.setattr("ptmtools.cells.sight.LINES", 128 * cells.portal_count)
+    even = sampled_sight(cells)
+    monkeypatch.setattr("ptmtools.cells.sight.LINES", 129 * cells.portal_count)
+    assert np.array_equal(sampled_sight(cells), even)
+
+
 @pytest.mark.parametrize("gain", [-0.1, 1.1, float("nan")])
 def test_a_gain_that_is_no_share_is_refused(halved: Callable[[float], Scene], gain: float) -> None:
     with pytest.raises(InputError, match="PTM-I300"):
