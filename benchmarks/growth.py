@@ -1,0 +1,227 @@
+"""How time and memory grow with the building: ``python benchmarks/growth.py [--rooms 12,50,200]``
+
+Sample museums of 12, 50, 200 and 800 rooms (`sample_data/make_museum.py`, the least textures) are
+made in a temporary folder, or in ``--folder``, and go through the stages with default options:
+
+scene         reading the model
+leaves        the subdivision into convex leaves with their portals
+rooms         grouping the leaves into cells
+pvs           the portal flow
+ach           coverage hints, Embree, ``--face`` pixels a side
+emit          the served files but for textures, which know nothing of cells
+
+Every stage of every museum runs in a process of its own, after the two rooms of the sample data,
+which compile the kernels and load the libraries. *CPU* and *wall* are seconds of the stage alone;
+what it reads and writes between stages does not count. *Peak* is the most memory that was resident
+during the stage over what was resident before it, inputs read; where the system does not tell, it
+is that of the process.
+
+The last rows are the exponents b of seconds or megabytes = a · leavesᵇ, by least squares in the
+logarithms, with the standard error of b. A museum that hit `--max-cells` is marked.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import gc
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ptmtools.cells import Cells, SubdivideOptions, subdivide
+from ptmtools.cells.grouping import grouped
+from ptmtools.coverage.ach import compute_ach
+from ptmtools.coverage.model import Ach
+from ptmtools.coverage.options import AchOptions
+from ptmtools.database import TextureRecord, emit
+from ptmtools.pipeline.archive import pack_arrays, unpack_arrays
+from ptmtools.pipeline.run import peak_memory
+from ptmtools.scene import Scene, ingest
+from ptmtools.tolerance import Tolerance
+from ptmtools.visibility import Pvs, compute_pvs
+
+ROOT = Path(__file__).resolve().parent.parent
+SMALL = ROOT / "sample_data/two_rooms/two_rooms.obj"
+ROOMS = (12, 50, 200, 800)
+STAGES = ("scene", "leaves", "rooms", "pvs", "ach", "emit")
+FIGURES = ("cpu", "wall", "peak")
+
+
+@dataclass(frozen=True)
+class Work:
+    """A museum's folder, in which a stage leaves its result for the next, and the options."""
+
+    folder: Path
+    model: Path
+    max_cells: int
+    face: int
+
+    def run(self, stage: str) -> dict[str, float]:
+        """Runs a stage, leaves its result and returns its figures."""
+        work = self._prepared(stage)
+        gc.collect()
+        before = _resident(since_now=True)
+        cpu, wall = time.process_time(), time.perf_counter()
+        result = work()
+        cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
+        peak = max(peak_memory() if before is None else _most_resident() - before, 0)
+        figures = {"cpu": cpu, "wall": wall, "peak": peak / 1e6}
+        if isinstance(result, Scene | Cells | Pvs | Ach):
+            (self.folder / f"{stage}.npz").write_bytes(pack_arrays(result.to_arrays()))
+        if isinstance(result, Scene):
+            figures["triangles"] = len(result.triangles)
+        if isinstance(result, Cells):
+            figures |= {
+                "leaves": result.leaf_count,
+                "cells": result.cell_count,
+                "portals": result.portal_count,
+                "limited": any("max-cells" in note for note in result.notes),
+            }
+        return figures
+
+    def _prepared(self, stage: str) -> Callable[[], Any]:
+        """The stage as a function, its inputs read."""
+        if stage == "scene":
+            return lambda: ingest(self.model)
+        scene = Scene.from_arrays(self._arrays("scene"), lambda digest: b"")
+        options = replace(SubdivideOptions(), max_cells=self.max_cells)
+        if stage == "leaves":
+            return lambda: subdivide(scene, replace(options, cells="leaf"))
+        if stage == "rooms":
+            leaves = Cells.from_arrays(self._arrays("leaves"))
+            return lambda: grouped(leaves, options, Tolerance.for_points(scene.points))
+        cells = Cells.from_arrays(self._arrays("rooms"))
+        if stage == "pvs":
+            return lambda: compute_pvs(cells)
+        pvs = Pvs.from_arrays(self._arrays("pvs"))
+        if stage == "ach":
+            asked = AchOptions(face=self.face, backend="embree")
+            return lambda: compute_ach(scene, cells, pvs, asked)
+        ach = Ach.from_arrays(self._arrays("ach"))
+        textures = tuple(
+            TextureRecord(i, f"textures/{image.name}.ptm", f"{image.name}.png", 1, 1, 3, (), "")
+            for i, image in enumerate(scene.images)
+        )
+        out = self.folder / "www"
+        return lambda: emit(scene, cells, pvs, ach, textures, out, force=True)
+
+    def _arrays(self, stage: str) -> dict[str, Any]:
+        file = self.folder / f"{stage}.npz"
+        return unpack_arrays(file.read_bytes(), file=file)
+
+
+def _resident(*, since_now: bool) -> int | None:
+    """Bytes resident; ``since_now`` forgets the peak so far. None where the system cannot."""
+    try:
+        if since_now:
+            Path("/proc/self/clear_refs").write_text("5")
+        return _status("VmRSS")
+    except OSError:
+        return None
+
+
+def _most_resident() -> int:
+    return _status("VmHWM")
+
+
+def _status(name: str) -> int:
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith(f"{name}:"))
+
+
+def one_stage(stage: str, work: Work) -> None:
+    """What a process of its own does: the small model as far as the stage, then the stage."""
+    with tempfile.TemporaryDirectory(dir=work.folder) as small:
+        warm = replace(work, folder=Path(small), model=SMALL)
+        for name in STAGES[: STAGES.index(stage) + 1]:
+            warm.run(name)
+    print(json.dumps(work.run(stage)))
+
+
+def measured(rooms: int, folder: Path, max_cells: int, face: int) -> dict[str, Any]:
+    """Makes a museum and runs all of its stages, each in a process of its own."""
+    folder = folder / f"museum{rooms}"
+    maker = [sys.executable, str(ROOT / "sample_data/make_museum.py"), "-o", str(folder / "model")]
+    maker += ["--rooms", str(rooms), "--size", "16", "--force"]
+    subprocess.run(maker, check=True, stdout=subprocess.DEVNULL)
+    row: dict[str, Any] = {"rooms": rooms}
+    for stage in STAGES:
+        call = [sys.executable, __file__, "--stage", stage, "--folder", str(folder)]
+        call += ["--max-cells", str(max_cells), "--face", str(face)]
+        done = subprocess.run(call, check=True, stdout=subprocess.PIPE, text=True)
+        for name, value in json.loads(done.stdout.splitlines()[-1]).items():
+            row[f"{stage} {name}" if name in FIGURES else name] = value
+    return row
+
+
+def exponent(leaves: list[float], figures: list[float]) -> tuple[float, float]:
+    """The slope of log figures over log leaves, and its standard error (nan below 3 points)."""
+    x, y = np.log(leaves), np.log(np.maximum(figures, 1e-9))
+    spread = float(((x - x.mean()) ** 2).sum())
+    if len(x) < 2 or spread == 0:
+        return float("nan"), float("nan")
+    slope = float(((x - x.mean()) * (y - y.mean())).sum()) / spread
+    rest = y - y.mean() - slope * (x - x.mean())
+    error = (rest @ rest / (len(x) - 2) / spread) ** 0.5 if len(x) > 2 else float("nan")
+    return slope, float(error)
+
+
+def print_row(row: dict[str, Any]) -> None:
+    mark = "*" if row["limited"] else ""
+    sizes = " | ".join(f"{row[k]:,}" for k in ("triangles", "leaves", "cells", "portals"))
+    for figure, digits in (("cpu", 1), ("wall", 1), ("peak", 0)):
+        head = f"{row['rooms']} | {sizes}{mark}" if figure == "cpu" else " | | | | "
+        stages = " | ".join(f"{row[f'{stage} {figure}']:,.{digits}f}" for stage in STAGES)
+        print(f"| {head} | {_UNITS[figure]} | {stages} |", flush=True)
+
+
+_UNITS = {"cpu": "CPU s", "wall": "wall s", "peak": "peak MB"}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--rooms", default=",".join(map(str, ROOMS)), metavar="N,N,…")
+    parser.add_argument("--max-cells", type=int, default=SubdivideOptions().max_cells)
+    parser.add_argument("--face", type=int, default=32, help="pixels a side of a view")
+    parser.add_argument("--csv", type=Path, metavar="FILE", help="the figures as a table")
+    parser.add_argument("--folder", type=Path, help="where museums are made and left")
+    parser.add_argument("--stage", choices=STAGES, help=argparse.SUPPRESS)
+    given = parser.parse_args(arguments)
+    if given.stage:
+        model = given.folder / "model/museum.obj"
+        one_stage(given.stage, Work(given.folder, model, given.max_cells, given.face))
+        return 0
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = given.folder or Path(scratch)
+        print(f"| rooms | triangles | leaves | cells | portals | | {' | '.join(STAGES)} |")
+        print("|---" * (6 + len(STAGES)) + "|")
+        rows = []
+        for rooms in map(int, given.rooms.split(",")):
+            rows.append(measured(rooms, folder, given.max_cells, given.face))
+            print_row(rows[-1])
+    leaves = [row["leaves"] for row in rows]
+    for figure in FIGURES:
+        fits = [exponent(leaves, [row[f"{stage} {figure}"] for row in rows]) for stage in STAGES]
+        cells = " | ".join(f"{slope:.2f} ± {error:.2f}" for slope, error in fits)
+        print(f"| exponent | | | | | {_UNITS[figure]} | {cells} |")
+    if given.csv:
+        with given.csv.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(rows)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
