@@ -1,0 +1,209 @@
+"""A standard walk through a model, and what it makes a client fetch.
+
+The walk goes through the middle of the twelve largest rooms, always on to the nearest one left,
+through portals of at least 1 m². It is a line in space, so that subdivisions of other cell sizes
+are held against the same one; the rooms are those of the subdivision it is made from.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells import Cells
+from ptmtools.database import TextureRecord
+from ptmtools.database.cellfile import CellText, CellWriter
+from ptmtools.scene import Scene
+from ptmtools.tolerance import Tolerance
+from ptmtools.visibility import Pvs
+
+#: Rooms that the walk leads through, and the least portal that it passes (m²).
+STOPS, DOOR = 12, 1.0
+
+
+@dataclass(frozen=True)
+class Way:
+    """The leaves that a walk passes, in its order, and how many metres of it lie in each."""
+
+    leaf: NDArray[np.int64]
+    metres: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Load:
+    """What a walker fetches and holds.
+
+    Attributes
+    ----------
+    files: cell files fetched, each once. megabytes: their size.
+    at_hand: megabytes of cell files in the walker's visible set, on average over the way.
+    """
+
+    files: int
+    megabytes: float
+    at_hand: float
+
+
+def standard_walk(cells: Cells) -> NDArray[np.float64]:
+    """(n, 3) the corners of the walk that the module describes; ``cells`` are whole rooms."""
+    middle = np.array([cells.leaf_points(i).mean(axis=0) for i in range(cells.leaf_count)])
+    volume = cells.leaf_volumes()
+    rooms = np.argsort(-np.bincount(cells.leaf_cell, volume), kind="stable")[:STOPS]
+    stops = {int(max(cells.cell_leaves(r), key=lambda leaf: (volume[leaf], -leaf))) for r in rooms}
+    doors: list[list[tuple[int, float]]] = [[] for _ in range(cells.leaf_count)]
+    portal: dict[tuple[int, int], tuple[float, int]] = {}
+    for k in np.flatnonzero(cells.portal_area >= DOOR).tolist():
+        a, b = cells.portal_leaf[k].tolist()
+        at = cells.portal(k).mean(axis=0)
+        metres = float(np.linalg.norm(middle[a] - at) + np.linalg.norm(middle[b] - at))
+        doors[a].append((b, metres))
+        doors[b].append((a, metres))
+        for pair in ((a, b), (b, a)):
+            portal[pair] = min(portal.get(pair, (np.inf, 0)), (metres, k))
+    here = int(max(stops, key=lambda leaf: volume[leaf]))
+    stops.discard(here)
+    corners = [middle[here]]
+    while stops:
+        before, far = _distances(doors, here)
+        following = min(stops, key=lambda leaf: (far[leaf], leaf))
+        if not np.isfinite(far[following]):
+            break
+        stops.discard(following)
+        leg = [following]
+        while leg[-1] != here:
+            leg.append(before[leg[-1]])
+        for a, b in pairwise(reversed(leg)):
+            corners += [cells.portal(portal[a, b][1]).mean(axis=0), middle[b]]
+        here = following
+    return np.array(corners)
+
+
+def _distances(
+    doors: list[list[tuple[int, float]]], start: int
+) -> tuple[list[int], NDArray[np.float64]]:
+    """For every leaf the one before it on the shortest way from ``start``, and the metres."""
+    far = np.full(len(doors), np.inf)
+    before = [-1] * len(doors)
+    far[start] = 0.0
+    waiting = [(0.0, start)]
+    while waiting:
+        metres, leaf = heapq.heappop(waiting)
+        for other, step in doors[leaf] if metres == far[leaf] else ():
+            if metres + step < far[other]:
+                far[other], before[other] = metres + step, leaf
+                heapq.heappush(waiting, (metres + step, other))
+    return before, far
+
+
+def passed(cells: Cells, walk: NDArray[np.float64]) -> Way:
+    """Where a walk (n, 3) leads in a subdivision, which need not be the one it was made from.
+
+    What lies in no leaf, or for less than a hairline in one, is left out. A walk of one point is
+    one metre where it stands.
+    """
+    if len(walk) == 1:
+        leaf = cells.locate_leaf(walk)
+        return Way(leaf[leaf >= 0].astype(np.int64), np.ones(int((leaf >= 0).sum())))
+    least = Tolerance.for_points(cells.root_box).hairline
+    found = [
+        (leaf, metres)
+        for a, b in pairwise(walk)
+        for leaf, metres in _stretches(cells, a, b)
+        if metres >= least
+    ]
+    return Way(
+        np.array([leaf for leaf, _ in found], dtype=np.int64),
+        np.array([metres for _, metres in found], dtype=np.float64),
+    )
+
+
+def _stretches(
+    cells: Cells, a: NDArray[np.float64], b: NDArray[np.float64]
+) -> list[tuple[int, float]]:
+    """The leaves along a segment inside the root box, and the metres in each: down the tree, the
+    nearer child first."""
+    length = float(np.linalg.norm(b - a))
+    root = 0 if len(cells.node_plane) else -2
+    waiting, found = [(root, 0.0, 1.0)], []
+    while waiting:
+        node, begin, end = waiting.pop()
+        if node < 0:
+            if node <= -2:
+                found.append((-2 - node, (end - begin) * length))
+            continue
+        plane = cells.node_plane[node]
+        first, last = (plane[:3] @ (a + t * (b - a)) + plane[3] for t in (begin, end))
+        near, far = cells.node_child[node].tolist()
+        if first <= 0:
+            near, far = far, near
+        if (first > 0) == (last > 0):
+            waiting.append((near, begin, end))
+        else:
+            cut = begin + (end - begin) * float(first / (first - last))
+            waiting += [(far, cut, end), (near, begin, cut)]
+    return found
+
+
+def cell_texts(
+    scene: Scene, cells: Cells, pvs: Pvs, hints: Sequence[NDArray[np.float64]]
+) -> list[CellText]:
+    """The files of all cells; ``hints`` are aligned with the rows of ``pvs``."""
+    records = {
+        i: TextureRecord(i, f"textures/{image.name}.ptm", f"{image.name}.png", 1, 1, 3, (), "")
+        for i, image in enumerate(scene.images)
+    }
+    writer = CellWriter(scene, cells, records, True)
+    adjacent = cells.adjacent()
+    return [
+        writer.cell(c, adjacent[c].tolist(), pvs.row(c).tolist(), hints[c])
+        for c in range(cells.cell_count)
+    ]
+
+
+def load(cells: Cells, pvs: Pvs, way: Way, size: NDArray[np.int64]) -> Load:
+    """What a walker fetches, who on the way holds what the cell he is in may see; ``size`` is
+    (C,) bytes of each cell's file."""
+    passes = np.unique(cells.leaf_cell[way.leaf]).tolist()
+    met = sorted({int(seen) for cell in passes for seen in pvs.row(cell)})
+    return Load(len(met), float(size[met].sum()) / 1e6, at_hand(cells, pvs, way, size) / 1e6)
+
+
+def at_hand(cells: Cells, pvs: Pvs, way: Way, size: NDArray[np.number]) -> float:
+    """The sum of ``size`` (C,) over the walker's visible set, on average over the way."""
+    metres = np.bincount(cells.leaf_cell[way.leaf], way.metres, cells.cell_count)
+    held = sum(metres[c] * float(size[pvs.row(c)].sum()) for c in np.flatnonzero(metres).tolist())
+    return float(held / max(metres.sum(), np.finfo(np.float64).tiny))
+
+
+def texels_at_hand(scene: Scene, cells: Cells, pvs: Pvs, way: Way, texts: list[CellText]) -> float:
+    """Share of the texels in use that the walker's visible set holds, on average over the way."""
+    texels = _texels(scene)
+    used = np.zeros((len(texts), len(texels)), dtype=bool)
+    for c, text in enumerate(texts):
+        used[c, list(text.images)] = True
+    whole = float(texels[used.any(axis=0)].sum())
+    if not whole:
+        return 0.0
+    metres = np.bincount(cells.leaf_cell[way.leaf], way.metres, cells.cell_count)
+    held = sum(
+        metres[c] * float(texels[used[pvs.row(c)].any(axis=0)].sum())
+        for c in np.flatnonzero(metres).tolist()
+    )
+    return float(held / max(metres.sum(), np.finfo(np.float64).tiny) / whole)
+
+
+def _texels(scene: Scene) -> NDArray[np.float64]:
+    import io
+
+    from PIL import Image
+
+    found = []
+    for image in scene.images:
+        with Image.open(io.BytesIO(image.load())) as opened:
+            found.append(float(opened.width * opened.height))
+    return np.array(found)
