@@ -125,11 +125,15 @@ def passed(cells: Cells, walk: NDArray[np.float64]) -> Way:
 def _stretches(
     cells: Cells, a: NDArray[np.float64], b: NDArray[np.float64]
 ) -> list[tuple[int, float]]:
-    """The leaves along a segment inside the root box, and the metres in each: down the tree, the
-    nearer child first."""
+    """The leaves along a segment, and the metres in each: down the tree, the nearer child first."""
     length = float(np.linalg.norm(b - a))
-    root = 0 if len(cells.node_plane) else -2
-    waiting, found = [(root, 0.0, 1.0)], []
+    waiting: list[tuple[int, float, float]] = []
+    found: list[tuple[int, float]] = []
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sides = np.sort((cells.root_box - a) / (b - a), axis=0)
+    begin, end = max(0.0, float(np.nanmax(sides[0]))), min(1.0, float(np.nanmin(sides[1])))
+    if begin < end and cells.leaf_count:
+        waiting.append((0 if len(cells.node_plane) else -2, begin, end))
     while waiting:
         node, begin, end = waiting.pop()
         if node < 0:
