@@ -3,6 +3,7 @@
 # make lint    ruff and mypy
 # make bench   the benchmarks, on the data at hand
 # make bench-codec   only those of the texture codec, beside other formats (about an hour)
+# make bench-pvs     cells and visibility, what is traded for what (a quarter of an hour)
 # make sample  only the sample museum
 # make setup   only the virtual environment
 # make clean   remove what was built, except the virtual environment
@@ -21,7 +22,7 @@ JOBS ?= 2
 PYTEST_ARGS ?=
 export PTM_SHARED ?= $(abspath ../shared)
 
-.PHONY: help setup demo test lint bench bench-codec sample clean
+.PHONY: help setup demo test lint bench bench-codec bench-pvs sample clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -82,6 +83,9 @@ bench-codec: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/codec/huge.py
 	$(BIN)/python benchmarks/codec/startup.py
 	$(BIN)/python benchmarks/codec/fuzz.py
+
+bench-pvs: build/museum/.made $(VENV)/.installed-dev
+	$(BIN)/python benchmarks/pvs_trade.py
 
 bench: $(VENV)/.installed-dev
 	@mkdir -p build/bench
