@@ -40,6 +40,8 @@ BALANCE_WEIGHT = 0.3
 SPLIT_WEIGHT = 0.2
 #: A fragment smaller than this share of `SubdivideOptions.wall_area` no longer splits.
 FRAGMENT_SHARE = 0.01
+#: Up to so many fragments of a node are asked by their corners, more by their boxes first.
+_FEW = 64
 
 
 @dataclass(frozen=True)
@@ -51,12 +53,14 @@ class Tree:
     planes: (N, 4) the nodes' planes; walls: what lies in them.
     children: (N, 2) int32 as in `Cells.node_child`.
     leaves: the convex polyhedra, face tags are node indices.
+    unsplit: how many of them hold walls that the limit left in one piece.
     """
 
     planes: NDArray[np.float64]
     walls: tuple[WallPlane, ...]
     children: NDArray[np.int32]
     leaves: tuple[Polyhedron, ...]
+    unsplit: int = 0
 
 
 @dataclass(frozen=True)
@@ -98,6 +102,7 @@ def build_tree(
     children: list[list[int]] = []
     leaves: list[Polyhedron] = []
     queue: list[_Task] = []
+    unsplit = 0
 
     def place(parent: tuple[int, int], child: int) -> None:
         if parent[0] >= 0:
@@ -127,6 +132,7 @@ def build_tree(
         task = heapq.heappop(queue)
         if len(leaves) + len(queue) + 2 > options.max_cells:
             finish(task.body, task.parent)
+            unsplit += 1
             continue
         wall = task.fragments[task.best].wall
         plane = wall.frame.plane
@@ -136,14 +142,15 @@ def build_tree(
         children.append([OUTSIDE, OUTSIDE])
         place(task.parent, node)
         rest = [f for i, f in enumerate(task.fragments) if i != task.best]
+        extents = _Extents(rest)
         for side, body in enumerate(cut(task.body, plane, node, tolerance.rounding)):
             if body is None:
                 raise AssertionError("a split that was accepted has two sides")
             facing = plane if side == 0 else -plane
             inherited = [
                 (f.wall, f.shape, clip_polygon(f.outline, facing, tolerance.rounding))
-                for f in rest
-                if np.any(f.points @ facing[:3] + facing[3] > tolerance.plane)
+                for f, ahead in zip(rest, extents.ahead(facing, tolerance), strict=True)
+                if ahead
             ]
             push(body, _fragments(inherited, tolerance), (node, side), task.walled)
         progress(len(leaves), len(leaves) + len(queue), "splitting")
@@ -152,6 +159,7 @@ def build_tree(
         tuple(taken),
         np.array(children, dtype=np.int32).reshape(-1, 2),
         tuple(leaves),
+        unsplit,
     )
 
 
@@ -168,19 +176,57 @@ def _fragments(
     has no more area than the rounding of its outline is none."""
     import shapely
 
-    sliver = tolerance.rounding * tolerance.extent
+    shapes = [(wall, shape, outline) for wall, shape, outline in shapes if len(outline) >= 3]
+    if not shapes:
+        return []
+    flat = [wall.frame.to_plane(outline) for wall, _, outline in shapes]
+    of = np.repeat(np.arange(len(flat)), [len(outline) for outline in flat])
+    regions = shapely.polygons(shapely.linearrings(np.concatenate(flat), indices=of))
+    inside = intersection(np.array([shape for _, shape, _ in shapes]), regions, tolerance.grid)
+    areas = shapely.area(inside)
+    corners, of = shapely.get_coordinates(inside, return_index=True)
+    start = np.searchsorted(of, np.arange(len(shapes) + 1))
+    sections = shapely.area(regions)
     kept: list[_Fragment] = []
-    for wall, shape, outline in shapes:
-        if len(outline) < 3:
-            continue
-        frame = wall.frame
-        region = shapely.polygons(frame.to_plane(outline))
-        inside = intersection(shape, region, tolerance.grid)
-        area = float(shapely.area(inside))
-        if area > sliver:
-            points = frame.to_space(shapely.get_coordinates(inside))
-            kept.append(_Fragment(wall, inside, area, points, outline, float(shapely.area(region))))
+    for i in np.flatnonzero(areas > tolerance.rounding * tolerance.extent).tolist():
+        wall, _, outline = shapes[i]
+        points = wall.frame.to_space(corners[start[i] : start[i + 1]])
+        kept.append(
+            _Fragment(wall, inside[i], float(areas[i]), points, outline, float(sections[i]))
+        )
     return kept
+
+
+class _Extents:
+    """Which fragments reach in front of planes: boxes decide, corners where boxes do not."""
+
+    def __init__(self, fragments: list[_Fragment]) -> None:
+        self._count = len(fragments)
+        if not fragments:
+            return
+        self._points = np.concatenate([f.points for f in fragments])
+        self._start = np.cumsum([0] + [len(f.points) for f in fragments])
+        low = np.minimum.reduceat(self._points, self._start[:-1])
+        high = np.maximum.reduceat(self._points, self._start[:-1])
+        self._middle, self._half = (low + high) / 2, (high - low) / 2
+
+    def ahead(self, plane: NDArray[np.float64], tolerance: Tolerance) -> NDArray[np.bool_]:
+        """(n,) which fragments have a point farther in front than lies in the (4,) plane."""
+        if not self._count:
+            return np.zeros(0, dtype=bool)
+        if self._count <= _FEW:
+            distance = self._points @ plane[:3] + plane[3]
+            few: NDArray[np.bool_] = (
+                np.maximum.reduceat(distance, self._start[:-1]) > tolerance.plane
+            )
+            return few
+        middle = self._middle @ plane[:3] + (plane[3] - tolerance.plane)
+        half = self._half @ np.abs(plane[:3]) + tolerance.rounding
+        found: NDArray[np.bool_] = middle > half
+        for i in np.flatnonzero(~found & (middle > -half)).tolist():
+            points = self._points[self._start[i] : self._start[i + 1]]
+            found[i] = np.any(points @ plane[:3] + plane[3] > tolerance.plane)
+        return found
 
 
 def _best_split(
@@ -194,8 +240,7 @@ def _best_split(
     """Index of the fragment whose plane splits best, or -1."""
     if not fragments:
         return -1
-    points = np.concatenate([f.points for f in fragments])
-    start = np.cumsum([0] + [len(f.points) for f in fragments[:-1]])
+    extents = _Extents(fragments)
     best, best_score = -1, -np.inf
     for i, f in enumerate(fragments):
         if f.area < (1 - TIE_SHARE) * least:
@@ -209,9 +254,7 @@ def _best_split(
             least, tolerance.hairline**2
         ):
             continue
-        distance = points @ plane[:3] + plane[3]
-        front = np.maximum.reduceat(distance, start) > tolerance.plane
-        back = np.minimum.reduceat(distance, start) < -tolerance.plane
+        front, back = extents.ahead(plane, tolerance), extents.ahead(-plane, tolerance)
         others = len(fragments) - 1
         split = int(np.count_nonzero(front & back))
         ahead, behind = int(np.count_nonzero(front)), int(np.count_nonzero(back))

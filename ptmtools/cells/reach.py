@@ -101,9 +101,13 @@ def roofed_share(corners: NDArray[np.float64], floor_area: float) -> float:
     floor = np.flatnonzero(level & (area >= floor_area / 10))
     order = floor[ranked(area[floor])][:FLOOR_SAMPLES]
     apart = FLOOR_SHARE * float(np.ptp(corners[:, :, 1])) if len(corners) else 0.0
+    stood_on = corners[level]
+    low, high = stood_on.min(axis=1), stood_on.max(axis=1)
     covered = total = 0.0
     for triangle in order:
-        heights = _plumb(corners[triangle].mean(axis=0), corners)
+        eye = corners[triangle].mean(axis=0)
+        around = (low <= eye) & (eye <= high)
+        heights = _plumb(eye, stood_on[around[:, 0] & around[:, 2]])
         if not np.any(heights < -apart):
             total += area[triangle]
             covered += area[triangle] * bool(np.any(heights > apart))

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.cells.nearby import Nearby
 from ptmtools.cells.planar import unite
 from ptmtools.cells.polyhedron import BOX_FACE, Polyhedron
 from ptmtools.cells.structure import (
@@ -33,6 +34,7 @@ class Reveals:
         """``corners``: (T, 3, 3) structural triangles."""
         self._corners = corners
         self._planes, self._areas = planes_of(corners)
+        self._nearby = Nearby(corners, tolerance.rounding)
         self._limit = wall_thickness
         self._tolerance = tolerance
         self._known: dict[bytes, list[WallPlane]] = {}
@@ -67,10 +69,11 @@ class Reveals:
         turn = float(np.sign(first[:3] @ second[:3]))
         width = abs(float(first[3]) - turn * float(second[3]))
         inward = float(np.sign(float(first[3]) - turn * float(second[3]))) or 1.0
-        depth = inward * (self._corners @ first[:3] + first[3])
+        near = self._nearby.between(first, *sorted((inward * slack, inward * (width - slack))))
+        depth = inward * (self._corners[near] @ first[:3] + first[3])
         low, high = depth.min(axis=1), depth.max(axis=1)
-        inside = np.flatnonzero((high > slack) & (low < width - slack) & (self._areas > 0))
-        low, high = low[inside], high[inside]
+        within = (high > slack) & (low < width - slack) & (self._areas[near] > 0)
+        inside, low, high = near[within], low[within], high[within]
         spans = (np.abs(low) <= slack) & (np.abs(high - width) <= slack)
         bridging = inside[spans]
         found: list[WallPlane] = []

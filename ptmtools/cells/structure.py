@@ -23,6 +23,7 @@ from fnmatch import fnmatchcase
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.cells.nearby import Nearby
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
 from ptmtools.scene.model import Scene
@@ -118,17 +119,19 @@ def find_walls(scene: Scene, options: SubdivideOptions, tolerance: Tolerance) ->
     planes, areas = planes_of(corners)
     least = (1 - TIE_SHARE) * options.wall_area
     layers = _layers(corners, planes, areas, forced, least, tolerance)
+    nearby = Nearby(corners, tolerance.rounding)
     found: list[tuple[float, WallPlane]] = []
     for plane in layers:
         frame = Frame.of(plane)
-        flat = lying_in(plane, corners, tolerance)
+        near = nearby.between(plane, -tolerance.plane, tolerance.plane)
+        flat = near[lying_in(plane, corners[near], tolerance)]
         blocking = unite(frame.to_plane(corners[flat]), tolerance.grid)
         shapely.prepare(blocking)
         parts = shapely.get_parts(blocking)
         group = neighbours(parts, tolerance.hairline)
         large = np.bincount(group, weights=shapely.area(parts))[group] >= least
         if np.any(forced[flat]):
-            named = unite(frame.to_plane(corners[flat & forced]), tolerance.grid)
+            named = unite(frame.to_plane(corners[flat[forced[flat]]]), tolerance.grid)
             large |= shapely.intersects(parts, named)
         if not np.any(large):
             continue
@@ -182,7 +185,7 @@ def _layers(
         free[seed] = False
         plane = planes[seed]
         if bins.weight(seed) < wall_area:
-            bins.drop(np.array([seed]))
+            bins.drop_one(seed)
             continue
         near = bins.near(seed)
         near = near[free[near]]
@@ -209,39 +212,43 @@ class _Bins:
         step = np.array([_NORMAL_STEP] * 3 + [_NORMAL_STEP * tolerance.extent])
         self._kept = np.isinf(weights).astype(np.int64)
         self._area = np.where(self._kept, 0.0, weights)
-        labels, inner = [], []
+        labels, inner, bins = [], [], 0
         for grid in range(_GRIDS):
             at = planes / step + grid / _GRIDS
             key = np.floor(at)
             _, label = np.unique(key.astype(np.int64), axis=0, return_inverse=True)
-            labels.append(label.ravel())
+            labels.append(label.ravel() + bins)
+            bins += int(label.max(initial=-1)) + 1
             inner.append(np.minimum(at - key, 1 - (at - key)).min(axis=1))
         self._label = np.stack(labels)
         self._grid = np.argmax(np.stack(inner), axis=0)
-        self._rows = [
-            np.split(np.argsort(label, kind="stable"), np.cumsum(np.bincount(label))[:-1])
-            for label in labels
-        ]
-        self._free = [np.bincount(label, self._area) for label in labels]
-        self._keep = [np.bincount(label, self._kept) for label in labels]
+        every = self._label.ravel()
+        order = np.argsort(every, kind="stable") % max(len(planes), 1)
+        self._rows = np.split(order, np.cumsum(np.bincount(every, minlength=1))[:-1])
+        self._free = np.bincount(every, np.tile(self._area, _GRIDS), bins)
+        self._keep = np.bincount(every, np.tile(self._kept, _GRIDS), bins)
 
     def near(self, plane: int) -> NDArray[np.int64]:
         """The planes in the bin of one of them, dropped or not."""
-        grid = self._grid[plane]
-        rows: NDArray[np.int64] = self._rows[grid][self._label[grid, plane]]
+        rows: NDArray[np.int64] = self._rows[self._label[self._grid[plane], plane]]
         return rows
 
     def weight(self, plane: int) -> float:
         """What is not dropped in that bin weighs so much."""
-        grid = self._grid[plane]
-        label = self._label[grid, plane]
-        return float("inf") if self._keep[grid][label] > 0 else float(self._free[grid][label])
+        label = self._label[self._grid[plane], plane]
+        return float("inf") if self._keep[label] > 0 else float(self._free[label])
 
     def drop(self, planes: NDArray[np.int64]) -> None:
         """Planes weigh no more."""
-        for grid, label in enumerate(self._label[:, planes]):
-            np.subtract.at(self._free[grid], label, self._area[planes])
-            np.subtract.at(self._keep[grid], label, self._kept[planes])
+        for label in self._label[:, planes]:
+            np.subtract.at(self._free, label, self._area[planes])
+            np.subtract.at(self._keep, label, self._kept[planes])
+
+    def drop_one(self, plane: int) -> None:
+        """The same for one plane, which is in each bin but once."""
+        label = self._label[:, plane]
+        self._free[label] -= self._area[plane]
+        self._keep[label] -= self._kept[plane]
 
 
 def parallel_gap(

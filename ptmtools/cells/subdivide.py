@@ -77,6 +77,11 @@ def subdivide(
         tight = _thickened(*_bounds(corners if len(corners) else scene.corners), tolerance)
         notes.append(_open_note(space, roofed, tight))
         space = _divide(tight, walls, reveals, corners, options, tolerance, progress)
+    if space.tree.unsplit:
+        notes.append(
+            f"the limit of {options.max_cells:,} leaves was reached: {space.tree.unsplit:,} leaves "
+            "hold walls that do not part them and so hide nothing; raise --max-cells"
+        )
     pieces = cut_to_leaves(scene, space.tree, tolerance)
     return grouped(_assemble(scene, space, pieces, notes), options, tolerance)
 

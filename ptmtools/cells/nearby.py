@@ -1,0 +1,53 @@
+"""The triangles near a plane, found without looking at all of them.
+
+A building has as many wall planes as rooms and each holds a few of its triangles: asking every
+triangle of every plane is quadratic (800 rooms: 24,000 planes and a million triangles). Triangles
+are therefore put into blocks of neighbours with bounding boxes, and only blocks that come near the
+plane are looked into.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Triangles in a block.
+_BLOCK = 64
+#: Bits of each coordinate by which triangles are ordered.
+_BITS = 16
+
+
+class Nearby:
+    """Blocks of the (n, 3, 3) triangles ``corners``; ``margin`` metres cover their rounding."""
+
+    def __init__(self, corners: NDArray[np.float64], margin: float) -> None:
+        self._margin = margin
+        self._order = _along_a_curve(corners.mean(axis=1)) if len(corners) else np.zeros(0, int)
+        first = np.arange(0, len(corners), _BLOCK)
+        points = corners[self._order]
+        if len(first):
+            low = np.minimum.reduceat(points.min(axis=1), first)
+            high = np.maximum.reduceat(points.max(axis=1), first)
+        else:
+            low = high = np.zeros((0, 3))
+        self._middle, self._half = (low + high) / 2, (high - low) / 2
+
+    def between(self, plane: NDArray[np.float64], low: float, high: float) -> NDArray[np.int64]:
+        """Triangles, ascending, among which are all with a point whose distance from the (4,)
+        plane, along its normal, is in [low, high]."""
+        distance = self._middle @ plane[:3] + plane[3]
+        reach = self._half @ np.abs(plane[:3]) + self._margin
+        block = np.flatnonzero((distance + reach >= low) & (distance - reach <= high))
+        row = (block[:, None] * _BLOCK + np.arange(_BLOCK)).ravel()
+        return np.sort(self._order[row[row < len(self._order)]])
+
+
+def _along_a_curve(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """An order of (n, 3) points in which neighbours mostly follow one another (Morton's)."""
+    low, size = points.min(axis=0), max(float(np.ptp(points, axis=0).max()), np.finfo(float).tiny)
+    at = ((points - low) / size * (2**_BITS - 1)).astype(np.int64)
+    code = np.zeros(len(points), dtype=np.int64)
+    for bit in range(_BITS):
+        for axis in range(3):
+            code |= (at[:, axis] >> bit & 1) << (3 * bit + axis)
+    return np.argsort(code, kind="stable")
