@@ -293,7 +293,7 @@ def tables(rows: Sequence[Row]) -> str:
     by = {(r.model, r.wall_area, r.kind, r.method): r for r in rows}
     cells = [
         ["model", "wall m²", "cells are", "cells", "portals", "PVS", "walk: files", "MB"]
-        + ["at hand: MB", "volume", "texels", "CPU s: cells", "flow", "flow s", "MB"]
+        + ["at hand: MB", "volume", "texels", "CPU s: cells", "flow", "flow s", "flow MB"]
     ]
     for r in rows:
         if r.method == "full":
@@ -367,24 +367,24 @@ def plot(rows: Sequence[Row], path: Path) -> None:
                         markersize=5,
                         linewidth=1.3,
                     )
-                    if method == "full":
+                    if (kind, method) == ("room", "full"):
                         for r, at, up in zip(mine, x, y, strict=True):
                             ax.annotate(
                                 f"{r.wall_area:g}",
                                 (at, up),
-                                xytext=(0, 6 if kind == "leaf" else -6),
+                                xytext=(0, -6 if line else 6),
                                 textcoords="offset points",
                                 ha="center",
-                                va="bottom" if kind == "leaf" else "top",
+                                va="top" if line else "bottom",
                                 fontsize=8,
                                 color="#222222",
                                 path_effects=[withStroke(linewidth=2.5, foreground="white")],
                             )
-            if name == "at_hand_volume":
+            if line == 0:
                 ax.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
             ax.set_xscale("log")
             ax.margins(x=0.12, y=0.15)
-            ax.set_ylim(bottom=0)
+            ax.set_ylim(0, None if line else 1.08)
             ax.grid(True, which="major", color="#e4e4e4", linewidth=0.7)
             ax.set_axisbelow(True)
             for side in ("top", "right"):
@@ -415,7 +415,7 @@ def plot(rows: Sequence[Row], path: Path) -> None:
         loc="lower center",
         frameon=False,
         fontsize=9,
-        title="numbers: least wall area, m²",
+        title="numbers: least wall area, m²; for all methods and leaves in the same order",
         title_fontsize=9,
     )
     figure.tight_layout(rect=(0, 0.09, 1, 1))
