@@ -27,6 +27,7 @@ NAMES = {
     "method": "pvs",
     "budget": "pvs_budget",
     "lines": "pvs_lines",
+    "exact": "pvs_exact",
 }
 
 

@@ -24,7 +24,11 @@ def tell_pvs(voice: Voice, told: PvsReport) -> None:
     if told.costliest:
         voice.say(
             f"{told.operations:,} operations; {count(told.fallbacks, 'portal')} cut short by the "
-            f"budget; {count(told.ties, 'near-tie')} decided by less than 16 roundings"
+            "budget"
+        )
+        voice.say(
+            f"{count(told.ties, 'sequence')} of portals rejected by a hair (16 roundings); "
+            f"{told.decided:,} mattered and were decided in exact arithmetic: {told.opened:,} open"
         )
         voice.say("the costliest portals:")
         for dear in told.costliest:

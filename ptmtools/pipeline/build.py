@@ -296,6 +296,8 @@ def _look(run: Run, options: PvsOptions) -> None:
             "average_share": share,
             "fallbacks": pvs.fallbacks,
             "ties": int(pvs.ties.sum()),
+            "decided_exactly": int(pvs.decided.sum()),
+            "opened": int(pvs.opened.sum()),
             "leaks": len(pvs.leak),
         }
         return figures | {"conservative": pvs.conservative}, tuple(notes)

@@ -46,6 +46,7 @@ from ptmtools.progress import Progress, silent
 from ptmtools.tolerance import Tolerance
 
 if TYPE_CHECKING:
+    from ptmtools.visibility.exact import ExactPortals
     from ptmtools.visibility.kernels import Geometry, Scratch
 
 #: Portals whose results appear to the others at once.
@@ -56,6 +57,8 @@ ROUNDS = 3
 DEPTH = 1024
 #: Vertices that clipping may add to a portal before it is left unclipped.
 GROWTH = 24
+#: Words that remember which sequences a search rejected by a hair.
+HAIR = 1 << 16
 #: Bytes that the two bit matrices may take: 60,000 portals.
 MATRIX_BYTES = 1 << 32
 BITS_OF_BYTE = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1).sum(
@@ -95,12 +98,16 @@ class PortalFlow:
     work: (K,) chain tests and clips that the search from each portal took, both ways together.
     ties: (K,) how many sequences of portals the search from each portal rejected by a hair, less
         than 16 roundings, both ways together: mostly portals that touch a plane and no more.
+    decided: (K,) how many of them mattered and were decided in exact arithmetic.
+    opened: (K,) how many of those let a line pass.
     """
 
     sees: NDArray[np.uint64]
     cut: NDArray[np.bool_]
     work: NDArray[np.int64]
     ties: NDArray[np.int64]
+    decided: NDArray[np.int64]
+    opened: NDArray[np.int64]
 
     @property
     def operations(self) -> int:
@@ -113,6 +120,7 @@ def portal_flow(
     budget: int,
     workers: int | None = None,
     progress: Progress = silent,
+    exact: bool = True,
 ) -> PortalFlow:
     """Conservative visibility from portal to portal (Teller & Séquin; paper §3).
 
@@ -120,6 +128,8 @@ def portal_flow(
     ----------
     budget: operations for each directed portal; see the module's head.
     workers: threads; None takes one for each processor. The result is the same for any number.
+    exact: whether sequences rejected by a hair are decided again in exact arithmetic (`hairs`);
+        otherwise lines of sight thinner than a few roundings are not seen.
 
     Raises InputError PTM-I400 (arrays that do not fit together), PTM-I401 (a coordinate
     that is not finite); LimitError PTM-L400 (more portals than fit into memory).
@@ -134,26 +144,27 @@ def portal_flow(
             remedy="subdivide less finely (a greater wall area, fewer cells)",
         )
     cut = np.zeros(count, dtype=np.bool_)
+    counts = np.zeros((4, count), dtype=np.int64)
     if count == 0:
-        none = np.zeros(0, np.int64)
-        return PortalFlow(np.zeros((0, words), dtype=np.uint64), cut, none, none)
+        return PortalFlow(np.zeros((0, words), dtype=np.uint64), cut, *counts)
 
     from ptmtools.visibility import kernels
+    from ptmtools.visibility.exact import ExactPortals
+    from ptmtools.visibility.hairs import searched
 
     g = geometry(portals)
     threads = min(workers or os.cpu_count() or 1, BATCH)
     with ThreadPoolExecutor(threads) as pool:
         known = _prepass(g, words, pool, threads)
-        storage = [scratch(g, words) for _ in range(threads)]
+        storage = [(scratch(g, words), ExactPortals(g) if exact else None) for _ in range(threads)]
         order = np.argsort(BITS_OF_BYTE[known.view(np.uint8)].sum(axis=1), kind="stable")
-        work, ties = np.zeros((2, count), dtype=np.int64)
         for first in range(0, count, BATCH):
             batch = order[first : first + BATCH]
             seen = np.zeros((len(batch), words), dtype=np.uint64)
             waiting = deque(range(len(batch)))
 
             def search(
-                s: Scratch,
+                tools: tuple[Scratch, ExactPortals | None],
                 batch: NDArray[np.int64] = batch,
                 seen: NDArray[np.uint64] = seen,
                 waiting: deque[int] = waiting,
@@ -164,15 +175,14 @@ def portal_flow(
                     except IndexError:
                         return
                     p = int(batch[i])
-                    work[p], cut[p], ties[p] = kernels.flow(g, s, known, p, budget, seen[i])
+                    cut[p], *counts[:, p] = searched(g, *tools, known, p, budget, seen[i])
 
             list(pool.map(search, storage))
             known[batch] = seen
             for p in batch:
                 kernels.drop_unreturned(known, p)
             progress(min(first + BATCH, count), count, "portals")
-    both = (work[0::2] + work[1::2], ties[0::2] + ties[1::2])
-    return PortalFlow(known, cut[0::2] | cut[1::2], *both)
+    return PortalFlow(known, cut[0::2] | cut[1::2], *(counts[:, 0::2] + counts[:, 1::2]))
 
 
 def _prepass(g: Geometry, words: int, pool: ThreadPoolExecutor, threads: int) -> NDArray[np.uint64]:
@@ -265,8 +275,9 @@ def scratch(g: Geometry, words: int) -> Scratch:
         plane=np.zeros((depth + 1, 2 * vertices, 4)),
         planes=np.zeros(depth + 1, np.int64),
         might=np.zeros((depth, words), np.uint64),
-        via=np.zeros(depth, np.int64),
+        via=np.zeros(depth + 1, np.int64),
         at=np.zeros(depth, np.int64),
         distance=np.zeros(vertices),
         line=np.zeros((2, 3)),
+        hair=np.zeros(HAIR, np.int64),
     )

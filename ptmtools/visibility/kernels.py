@@ -66,10 +66,11 @@ class Scratch(NamedTuple):
     plane: Floats  # (D + 1, 2V, 4) normal and offset: kept is where n·x >= offset
     planes: Ints  # (D + 1,) how many
     might: Bits  # (D, W) bits
-    via: Ints  # (D,) the directed portal that led into the frame
+    via: Ints  # (D + 1,) the directed portal that led into the frame
     at: Ints  # (D,) next candidate, index into out
     distance: Floats  # (V,)
     line: Floats  # (2, 3) a point and a direction
+    hair: Ints  # (H,) sequences rejected by a hair, each after its length
 
 
 @plain_kernel
@@ -169,13 +170,59 @@ def drop_unreturned(known: Bits, p: int) -> None:
 
 
 @plain_kernel
+def record(s: Scratch, used: int, frame: int, q: int) -> int:
+    """Appends the sequence of portals that led into a frame, and q, to the ``used`` words of
+    `Scratch.hair`, if there is room; returns the words now used."""
+    if used + frame + 2 > len(s.hair):
+        return used
+    s.hair[used] = frame + 1
+    for f in range(1, frame + 1):
+        s.hair[used + f] = s.via[f]
+    s.hair[used + frame + 1] = q
+    return used + frame + 2
+
+
+@plain_kernel
+def mark(sequence: Ints, first: int, count: int) -> np.uint64:
+    """A hash (FNV-1a over words) of ``count`` portals of a sequence."""
+    value = np.uint64(0xCBF29CE484222325)
+    for i in range(first, first + count):
+        value = (value ^ np.uint64(sequence[i])) * np.uint64(0x00000100000001B3)
+    return value
+
+
+@plain_kernel
+def settled(s: Scratch, opened: Bits, lenient: bool, frame: int, q: int, status: int) -> int:
+    """The status of a clip; GRAZED becomes WHOLE if ``lenient``, or if the sequence of portals that
+    led into the frame, and q, is among the ``opened`` ones, ascending `mark`s."""
+    if status != GRAZED or lenient:
+        return WHOLE if status == GRAZED else status
+    if len(opened) == 0:
+        return status
+    before = s.via[frame + 1]
+    s.via[frame + 1] = q
+    value = mark(s.via, 1, frame + 1)
+    s.via[frame + 1] = before
+    low, high = 0, len(opened)
+    while low < high:
+        middle = (low + high) >> 1
+        if opened[middle] < value:
+            low = middle + 1
+        else:
+            high = middle
+    return WHOLE if low < len(opened) and opened[low] == value else status
+
+
+@plain_kernel
 def thin_out(
-    g: Geometry, might: Bits, frame: int, seen: Bits, plane: Floats, count: int
-) -> tuple[bool, int, int]:
+    g: Geometry, s: Scratch, opened: Bits, lenient: bool, frame: int, seen: Bits, used: int
+) -> tuple[bool, int, int, int]:
     """Drops from a frame's possible portals the unseen ones that its separators hide.
 
-    Returns (whether an unseen one is left, portals tested, how many were dropped by a hair).
+    Returns (whether an unseen one is left, portals tested, how many were dropped by a hair, words
+    of `Scratch.hair` used).
     """
+    might, plane, count = s.might, s.plane, s.planes[frame]
     left = False
     tested = ties = 0
     for w in range(might.shape[1]):
@@ -185,13 +232,16 @@ def thin_out(
             q = (w << 6) + LOW_BIT[(low * DE_BRUIJN) >> np.uint64(58)]
             tested += 1
             now = beyond(g.point, g.start, g.ball, q >> 1, plane, frame, count, g.slack)
+            now = settled(s, opened, lenient, frame, q, now)
             if now == WHOLE:
                 left = True
             else:
                 might[frame, w] &= ~low
-                ties += now == GRAZED
+                if now == GRAZED:
+                    ties += 1
+                    used = record(s, used, frame, q)
             rest &= ~low
-    return left, tested, ties
+    return left, tested, ties, used
 
 
 @plain_kernel
@@ -283,16 +333,26 @@ def glance(g: Geometry, known: Bits, source: int, seen: Bits, line: Floats) -> i
 
 @plain_kernel
 def flow(
-    g: Geometry, s: Scratch, known: Bits, source: int, budget: int, seen: Bits
-) -> tuple[int, bool, int]:
+    g: Geometry,
+    s: Scratch,
+    known: Bits,
+    source: int,
+    budget: int,
+    opened: Bits,
+    lenient: bool,
+    seen: Bits,
+) -> tuple[int, bool, int, int]:
     """All directed portals that a line through ``source`` may cross after it.
+
+    Rejections by a hair stand, except of the sequences with `mark`s in ``opened``, ascending, or
+    of all if ``lenient``.
 
     ``known`` (2K, W) is what each portal may see at most; ``seen`` (W,) the zeroed result row. A
     search that grows long `glance`s, once: in an open hall nearly all is seen at once, and what is
     left to look out for is little. (Glancing first costs more than it saves where walls are many:
     e1m1 +30 %. Without it, a hall of 1,344 open portals spends its whole budget.)
     Returns (operations, whether the budget or the depth cut the search short, ties: how many
-    rejections were by a hair, see `winding`).
+    rejections were by a hair, see `winding`, words of `Scratch.hair` that tell which).
     """
     words = known.shape[1]
     depth = len(s.might)
@@ -309,7 +369,7 @@ def flow(
     at[0] = g.out_start[g.leaf[source]]
     planes[0] = 0
     f = 0
-    ops = ties = 0
+    ops = ties = used = 0
     cut = False
     looked = False
     while f >= 0:
@@ -343,31 +403,25 @@ def flow(
         load(g.point, g.start, k, polygon, size, b)
         n0, n1, n2 = s0 * normal[k0, 0], s0 * normal[k0, 1], s0 * normal[k0, 2]
         now = clip(polygon, size, b, distance, n0, n1, n2, floor, slack)
-        if now <= EMPTY:
-            ties += now == GRAZED
-            continue
-        hidden = False
+        now = settled(s, opened, lenient, f, q, now)
         for i in range(planes[f]):
+            if now <= EMPTY:
+                break
             n0, n1, n2, c = plane[f, i, 0], plane[f, i, 1], plane[f, i, 2], plane[f, i, 3]
             if n0 * ball[k, 0] + n1 * ball[k, 1] + n2 * ball[k, 2] - c >= ball[k, 3]:
                 continue
             ops += 1
             now = clip(polygon, size, b, distance, n0, n1, n2, c, slack)
-            if now <= EMPTY:
-                ties += now == GRAZED
-                hidden = True
-                break
-        if hidden:
-            continue
-        copy(polygon, size, 2 * f, a, size[2 * f])
-        ops += 1
-        n0, n1, n2 = -sq * normal[k, 0], -sq * normal[k, 1], -sq * normal[k, 2]
-        ceiling = g.high[k] if q & 1 == 0 else -g.low[k]
-        status = clip(polygon, size, a, distance, n0, n1, n2, -ceiling, slack)
-        if status <= EMPTY:
-            ties += status == GRAZED
-            continue
-        if f > 0:
+            now = settled(s, opened, lenient, f, q, now)
+        status = now
+        if now > EMPTY:
+            copy(polygon, size, 2 * f, a, size[2 * f])
+            ops += 1
+            n0, n1, n2 = -sq * normal[k, 0], -sq * normal[k, 1], -sq * normal[k, 2]
+            ceiling = g.high[k] if q & 1 == 0 else -g.low[k]
+            now = clip(polygon, size, a, distance, n0, n1, n2, -ceiling, slack)
+            now = status = settled(s, opened, lenient, f, q, now)
+        if now > EMPTY and f > 0:
             passed, last = 2 * f + 1, via[f]
             sp = 1.0 if last & 1 == 0 else -1.0
             last >>= 1
@@ -377,15 +431,19 @@ def flow(
                 )
                 ops += n + 1
                 now = clip_all(polygon, size, b, distance, plane, depth, n, slack)
-                if now <= EMPTY:
-                    ties += now == GRAZED
-                    continue
-            n = separate(polygon, size, b, k, -sq, passed, last, sp, normal, plane, depth, slack)
-            ops += n + 1
-            now = clip_all(polygon, size, a, distance, plane, depth, n, slack)
-            if now <= EMPTY:
-                ties += now == GRAZED
-                continue
+                now = settled(s, opened, lenient, f, q, now)
+            if now > EMPTY:
+                n = separate(
+                    polygon, size, b, k, -sq, passed, last, sp, normal, plane, depth, slack
+                )
+                ops += n + 1
+                now = clip_all(polygon, size, a, distance, plane, depth, n, slack)
+                now = settled(s, opened, lenient, f, q, now)
+        if now <= EMPTY:
+            if now == GRAZED:
+                ties += 1
+                used = record(s, used, f, q)
+            continue
         seen[word] |= bit
         if not fresh:
             continue
@@ -396,7 +454,8 @@ def flow(
             planes[child] = separate(
                 polygon, size, a, k0, s0, b, k, -sq, normal, plane, child, slack
             )
-            left, tested, grazed = thin_out(g, might, child, seen, plane, planes[child])
+            via[child] = q
+            left, tested, grazed, used = thin_out(g, s, opened, lenient, child, seen, used)
             ops += 1 + (tested >> 3)
             ties += grazed
             if not left:
@@ -407,7 +466,6 @@ def flow(
                 seen[w] |= might[row, w]
             cut = True
             continue
-        via[child] = q
         at[child] = g.out_start[g.leaf[q]]
         f = child
-    return ops, cut, ties
+    return ops, cut, ties, used

@@ -21,7 +21,9 @@ class Pvs:
     work: (K,) int64 operations that the search from each portal took; empty without a search.
     cut: (K,) bool portals whose search was given up for a looser, still conservative set.
     ties: (K,) int64 sequences of portals that the search from each portal rejected by a hair, less
-        than 16 roundings of the arithmetic; see `PortalFlow.ties`.
+        than 16 roundings of the arithmetic.
+    decided: (K,) int64 those of them that mattered and were decided in exact arithmetic.
+    opened: (K,) int64 those that let a line pass; see `PortalFlow`.
     leak: (n, 4) int32 cells that see suspiciously much: the cell, how many cells it sees, the
         smallest portal that shows it half of them, and how many that one shows.
     conservative: False if the sets are of what random lines happened to show.
@@ -32,6 +34,8 @@ class Pvs:
     work: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     cut: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, np.bool_))
     ties: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    decided: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    opened: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     leak: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), np.int32))
     conservative: bool = True
 
@@ -79,6 +83,8 @@ class Pvs:
             "work": self.work,
             "cut": self.cut,
             "ties": self.ties,
+            "decided": self.decided,
+            "opened": self.opened,
             "leak": self.leak,
             "conservative": np.array([self.conservative]),
         }
@@ -92,6 +98,8 @@ class Pvs:
             np.asarray(arrays["work"], dtype=np.int64),
             np.asarray(arrays["cut"], dtype=np.bool_),
             np.asarray(arrays["ties"], dtype=np.int64),
+            np.asarray(arrays["decided"], dtype=np.int64),
+            np.asarray(arrays["opened"], dtype=np.int64),
             np.asarray(arrays["leak"], dtype=np.int32).reshape(-1, 4),
             bool(arrays["conservative"][0]),
         )

@@ -33,12 +33,15 @@ class PvsOptions:
     budget: operations (chain tests, clips) that the search from one side of a portal may take
         before what it has not refuted counts as visible; the result is conservative at any value.
     lines: random lines through each portal, where sampled.
+    exact: whether what floating point rejects by a hair is decided again in exact arithmetic;
+        otherwise lines of sight thinner than a few roundings are not seen.
     workers: threads, None for one per processor; never changes the result.
     """
 
     method: Literal["full", "fast", "sampled"] = "full"
     budget: int = 200_000
     lines: int = 1000
+    exact: bool = True
     workers: int | None = None
 
     def __post_init__(self) -> None:
@@ -73,7 +76,7 @@ def compute_pvs(
         leaves = sampled_leaves(portals, options.lines, options.workers)
         return Pvs.from_matrix(_lifted(cells, leaves), conservative=False)
     budget = options.budget if options.method == "full" else 0
-    flow = portal_flow(portals, budget, options.workers, progress)
+    flow = portal_flow(portals, budget, options.workers, progress, options.exact)
     matrix = _lifted(cells, leaf_matrix(cells.leaf_count, portals.leaf, flow))
     leaks = [astuple(leak) for leak in find_leaks(cells, flow, matrix)]
     return Pvs.from_matrix(
@@ -81,6 +84,8 @@ def compute_pvs(
         work=flow.work,
         cut=flow.cut & (options.method == "full"),
         ties=flow.ties,
+        decided=flow.decided,
+        opened=flow.opened,
         leak=np.array(leaks, np.int32).reshape(-1, 4),
     )
 

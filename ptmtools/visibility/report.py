@@ -71,7 +71,8 @@ class PvsReport:
     sizes: share of the cells → cells that this share of them sees at most, for `QUANTILES`.
     average: cells that a cell sees, itself included.
     operations: chain tests and clips in all. fallbacks: portals whose search was cut short.
-    ties: sequences of portals rejected by a hair, less than 16 roundings.
+    ties: sequences of portals rejected by a hair, less than 16 roundings. decided: those of them
+        that mattered and were decided in exact arithmetic. opened: those that let a line pass.
     costliest: the portals that took most, dearest first. leaks: those that see most first.
     conservative: False where the sets are of what random lines showed.
     """
@@ -83,6 +84,8 @@ class PvsReport:
     operations: int
     fallbacks: int
     ties: int
+    decided: int
+    opened: int
     costliest: tuple[CostlyPortal, ...]
     leaks: tuple[LeakingPortal, ...]
     conservative: bool
@@ -102,6 +105,8 @@ def report(cells: Cells, pvs: Pvs) -> PvsReport:
         operations=int(pvs.work.sum()),
         fallbacks=pvs.fallbacks,
         ties=int(pvs.ties.sum()),
+        decided=int(pvs.decided.sum()),
+        opened=int(pvs.opened.sum()),
         costliest=tuple(
             CostlyPortal(**_facts(cells, int(k)), operations=int(pvs.work[k]), cut=bool(pvs.cut[k]))
             for k in order

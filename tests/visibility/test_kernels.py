@@ -138,6 +138,7 @@ def two_portals(first, second, leaves, normals):
 
 
 SQUARE = np.array([[0, 0, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1]])
+NONE = np.zeros(0, np.uint64)
 
 
 @pytest.mark.parametrize("reverse", [False, True])
@@ -188,7 +189,7 @@ def test_a_chain_longer_than_the_scratch_is_accepted_whole(room_row):
     short = whole._replace(might=whole.might[:3], polygon=whole.polygon[-9:], plane=whole.plane[:4])
     for storage, expected_cut in ((whole, False), (short, True)):
         seen = np.zeros(1, np.uint64)
-        _, cut, _ = kernels.flow(g, storage, known, 0, 10**6, seen)
+        _, cut, *_ = kernels.flow(g, storage, known, 0, 10**6, NONE, False, seen)
         assert cut == expected_cut
         assert seen[0] == known[0, 0]
 

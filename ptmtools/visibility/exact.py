@@ -1,0 +1,198 @@
+"""Whether a line can pass a sequence of portals, in exact arithmetic.
+
+The flow rejects a sequence when a polygon ends within a few roundings of a plane. Whether it ends
+before or behind it is then beyond floating point, and is decided here: the same clipping (see
+`flow`), in integers. A point is (X, Y, Z, W) with W > 0, a plane (A, B, C, D), the side of a point
+the sign of their product. Coordinates are those stored, which as binary fractions are integers over
+a power of two; portals are made truly plane by moving their vertices along one axis.
+
+Numbers grow with every cut. A new vertex with more than `BITS` is rounded *along its edge* to the
+outer side, so that polygons only ever grow: what is found empty is so for certain, what is found
+open may be open by 2⁻¹⁹² of an edge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from math import gcd
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from ptmtools.visibility.kernels import Geometry
+
+Point = tuple[int, int, int, int]
+Plane = tuple[int, int, int, int]
+Polygon = list[Point]
+
+#: Vertices with longer numbers are rounded outwards, to shares of an edge of `SHARE` bits.
+BITS, SHARE = 2048, 192
+
+
+class _Left(NamedTuple):
+    """What a sequence leaves of its first portal and, from the second on, of its last, and the
+    planes that bound all lines through both, the first one's own plane at the head."""
+
+    source: Polygon
+    passed: Polygon
+    bounds: list[Plane]
+
+
+class ExactPortals:
+    """Portals with integer coordinates. Not to be shared between threads."""
+
+    def __init__(self, geometry: Geometry) -> None:
+        self._geometry = geometry
+        self._portal: dict[int, tuple[Polygon, Plane]] = {}
+        #: By sequence, all from one source: those of one search begin alike.
+        self._left: dict[tuple[int, ...], _Left | None] = {}
+
+    def passes(self, sequence: tuple[int, ...]) -> bool:
+        """Whether something is left when a sequence of directed portals is clipped as the flow does
+        it; False proves that no line passes the interiors of all of them in turn."""
+        if sequence[:1] not in self._left:
+            portal, plane = self._directed(sequence[0])
+            self._left.clear()
+            self._left[sequence[:1]] = _Left(portal, [], [plane])
+        left = self._left[sequence[:1]]
+        for length in range(2, len(sequence) + 1):
+            if left is None:
+                break
+            part = sequence[:length]
+            if part not in self._left:
+                self._left[part] = _beyond(left, *self._directed(part[-1]))
+            left = self._left[part]
+        return left is not None
+
+    def _directed(self, q: int) -> tuple[Polygon, Plane]:
+        """The polygon of a directed portal and its plane, positive beyond it."""
+        if q >> 1 not in self._portal:
+            self._portal[q >> 1] = self._exactly(q >> 1)
+        polygon, plane = self._portal[q >> 1]
+        return polygon, plane if q & 1 == 0 else _turned(plane)
+
+    def _exactly(self, k: int) -> tuple[Polygon, Plane]:
+        g = self._geometry
+        points = [_binary(row) for row in g.point[g.start[k] : g.start[k + 1]].tolist()]
+        a, b, c, _ = _binary(g.normal[k].tolist())
+        x, y, z, w = points[0]
+        plane = (a * w, b * w, c * w, -(a * x + b * y + c * z))
+        axis = max(range(3), key=lambda i: abs(plane[i]))
+        moved = []
+        for point in points:
+            side = _side(plane, point)
+            # point - side / plane[axis] along the axis lies in the plane.
+            scale = abs(plane[axis])
+            shift = side if plane[axis] > 0 else -side
+            new = [n * scale for n in point]
+            new[axis] -= shift
+            moved.append(_reduced((new[0], new[1], new[2], new[3])))
+        return moved, plane
+
+
+def _beyond(left: _Left, portal: Polygon, plane: Plane) -> _Left | None:
+    """The same with one more portal, nothing if no line passes that too."""
+    portal = _clipped(portal, left.bounds)
+    source = _clipped(left.source, [_turned(plane)])
+    if portal and source and left.passed:
+        portal = _clipped(portal, _separators(source, left.passed))
+        source = _clipped(source, _separators(portal, left.passed)) if portal else []
+    if not portal or not source:
+        return None
+    return _Left(source, portal, [left.bounds[0], *_separators(source, portal)])
+
+
+def _binary(row: Sequence[float]) -> Point:
+    """(X, Y, Z, W) of three floats, exactly; W is a power of two."""
+    ratios = [value.as_integer_ratio() for value in row]
+    w = max(d for _, d in ratios)
+    x, y, z = (n * (w // d) for n, d in ratios)
+    return x, y, z, w
+
+
+def _side(plane: Plane, point: Point) -> int:
+    return plane[0] * point[0] + plane[1] * point[1] + plane[2] * point[2] + plane[3] * point[3]
+
+
+def _turned(plane: Plane) -> Plane:
+    return -plane[0], -plane[1], -plane[2], -plane[3]
+
+
+def _reduced(n: tuple[int, int, int, int]) -> tuple[int, int, int, int]:
+    common = gcd(*n)
+    return n if common <= 1 else (n[0] // common, n[1] // common, n[2] // common, n[3] // common)
+
+
+def _clipped(polygon: Polygon, planes: Sequence[Plane]) -> Polygon:
+    """What of a polygon lies on the positive sides; nothing if that has no area."""
+    for plane in planes:
+        sides = [_side(plane, point) for point in polygon]
+        if max(sides) <= 0:
+            return []
+        if min(sides) >= 0:
+            continue
+        kept = []
+        following = [*range(1, len(polygon)), 0]
+        for i, j in enumerate(following):
+            if sides[i] >= 0:
+                kept.append(polygon[i])
+            if sides[i] > 0 > sides[j]:
+                kept.append(_between(polygon[i], polygon[j], sides[i], -sides[j]))
+            elif sides[i] < 0 < sides[j]:
+                kept.append(_between(polygon[j], polygon[i], sides[j], -sides[i]))
+        polygon = kept
+    return polygon
+
+
+def _between(inner: Point, outer: Point, inward: int, outward: int) -> Point:
+    """The point of an edge that lies in a plane, ``inward`` and ``outward`` from its ends."""
+    if inward.bit_length() + max(map(int.bit_length, outer)) > BITS:
+        shift = max(inward.bit_length(), outward.bit_length()) - SHARE
+        if shift > 0:
+            inward, outward = (inward >> shift) + 1, outward >> shift
+    x, y, z, w = (inward * o + outward * i for i, o in zip(inner, outer, strict=True))
+    return _reduced((x, y, z, w))
+
+
+def _separators(near: Polygon, far: Polygon) -> list[Plane]:
+    """All planes through an edge of the one and a vertex of the other polygon that have ``near``
+    on their negative and ``far`` on their positive side, neither wholly in them."""
+    return [
+        *_through_edges(near, far, lambda one, other: max(one) <= 0 <= min(other)),
+        *_through_edges(far, near, lambda one, other: max(other) <= 0 <= min(one)),
+    ]
+
+
+def _through_edges(
+    edged: Polygon, other: Polygon, separates: Callable[[list[int], list[int]], bool]
+) -> Iterator[Plane]:
+    for i, start in enumerate(edged):
+        end = edged[i - 1]
+        found = set()
+        for corner in other:
+            plane = _reduced(_plane(start, end, corner))
+            if plane in found or not any(plane[:3]):
+                continue
+            found.add(plane)
+            one = [_side(plane, point) for point in edged]
+            rest = [_side(plane, point) for point in other]
+            if not (any(one) and any(rest)):
+                continue
+            if separates(one, rest):
+                yield plane
+            elif separates([-s for s in one], [-s for s in rest]):
+                yield _turned(plane)
+
+
+def _plane(p: Point, q: Point, r: Point) -> Plane:
+    """The plane through three points: the minors of their coordinates."""
+    px, py, pz, pw = p
+    qx, qy, qz, qw = q
+    rx, ry, rz, rw = r
+    xy, xz, xw = qx * ry - qy * rx, qx * rz - qz * rx, qx * rw - qw * rx
+    yz, yw, zw = qy * rz - qz * ry, qy * rw - qw * ry, qz * rw - qw * rz
+    return (
+        py * zw - pz * yw + pw * yz,
+        -(px * zw - pz * xw + pw * xz),
+        px * yw - py * xw + pw * xy,
+        -(px * yz - py * xz + pz * xy),
+    )

@@ -1,0 +1,138 @@
+"""Sequences of portals in exact arithmetic, and what the flow makes of the answers."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ptmtools.visibility import PvsOptions, compute_pvs, exact, hairs
+from ptmtools.visibility.exact import ExactPortals
+from ptmtools.visibility.flow import Portals, geometry, portal_flow
+from ptmtools.visibility.pvs import portals_of
+
+ROW = (np.arange(5) * 4.0, [0.0, 3.0], [0.0, 4.0])
+# All lines through the first two doors pass the third wall at z >= 2; the third ends at `top`.
+FIRST_TWO = {(0, 0, 0, 0): [(0.0, 2.0, 0.0, 1.0)], (1, 0, 0, 0): [(0.0, 2.0, 1.5, 4.0)]}
+
+
+def three_doors(build_rooms, top):
+    return build_rooms(*ROW, {**FIRST_TWO, (2, 0, 0, 0): [(0.0, 2.0, 0.0, top)]}).cells
+
+
+def along_a_line(seed: int, count: int, miss: float | None = None) -> ExactPortals:
+    """Random convex portals around a random line, crossed in turn; the last one so many times its
+    radius beside it."""
+    rng = np.random.default_rng(seed)
+    axes, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    points, normals = [], []
+    for at in range(count):
+        normal = axes[0] + 0.3 * rng.normal(size=3)
+        normal /= np.linalg.norm(normal)
+        u = np.cross(normal, axes[1])
+        u /= np.linalg.norm(u)
+        angle = np.sort(rng.uniform(0, 2 * np.pi / 5, 5) + 2 * np.pi / 5 * np.arange(5))
+        radius = rng.uniform(0.05, 1)
+        ring = radius * (np.outer(np.cos(angle), u) + np.outer(np.sin(angle), np.cross(normal, u)))
+        shift = 0 if miss is None or at + 1 < count else miss * radius * np.cross(normal, u)
+        points.append(4 * at * axes[0] + ring + shift)
+        normals.append(normal)
+    leaf = np.column_stack([np.arange(count), np.arange(1, count + 1)]).astype(np.int32)
+    start = 5 * np.arange(count + 1)
+    portals = Portals(count + 1, leaf, np.array(normals), np.concatenate(points), start)
+    return ExactPortals(geometry(portals))
+
+
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(2, 9))
+@settings(max_examples=40, deadline=None)
+def test_a_line_passes_what_it_passes(seed, count):
+    portals = along_a_line(seed, count)
+    there = tuple(2 * k for k in range(count))
+    assert portals.passes(there)
+    assert portals.passes(tuple(q ^ 1 for q in reversed(there)))
+    assert portals.passes((*there[:1], *there[1::2]))  # with portals between left out
+
+
+def test_rounded_vertices_lose_no_line(monkeypatch):
+    """With few bits every cut is rounded, and still nothing that passes is lost."""
+    monkeypatch.setattr(exact, "BITS", 64)
+    monkeypatch.setattr(exact, "SHARE", 8)
+    for seed in range(20):
+        assert along_a_line(seed, 9).passes(tuple(range(0, 18, 2)))
+
+
+def test_numbers_do_not_grow_without_bound():
+    portals = along_a_line(3, 30)
+    assert portals.passes(tuple(range(0, 60, 2)))
+    left = portals._left[tuple(range(0, 60, 2))]
+    assert max(n.bit_length() for point in left.source for n in point) < 30 * exact.BITS
+
+
+def test_portals_in_the_wrong_order_or_far_aside_are_refuted():
+    portals = along_a_line(1, 5)
+    assert not portals.passes((4, 2))
+    assert not portals.passes((0, 2, 1))
+    small = along_a_line(1, 3, miss=1e6)
+    assert not small.passes((0, 2, 4))
+
+
+@pytest.mark.parametrize("beyond", [-1e-15, 0.0, 1e-15, 1e-12])
+def test_the_last_place_decides(beyond):
+    """Below z = 0 at x = 0 and above 1/2 at 4, a line passes x = 8 above 1: there the third ends."""
+    doors = [(0.0, -1.0, 0.0), (4.0, 0.5, 1.5), (8.0, 0.0, 1.0 + beyond)]
+    points = [
+        [(x, 0.0, low), (x, 1.0, low), (x, 1.0, high), (x, 0.0, high)] for x, low, high in doors
+    ]
+    leaf = np.array([[0, 1], [1, 2], [2, 3]], np.int32)
+    portals = Portals(4, leaf, np.eye(3)[[0, 0, 0]], np.concatenate(points), np.arange(4) * 4)
+    g = geometry(portals)
+    reach = [Fraction(float(z)) for z in g.point[:, 2]]
+    open_ = max(reach[8:]) > 2 * min(reach[4:8]) - max(reach[:4])
+    assert open_ == (beyond > 0)
+    assert ExactPortals(g).passes((0, 2, 4)) == open_
+    assert ExactPortals(g).passes((5, 3, 1)) == open_
+
+
+def test_a_hairline_is_seen_in_exact_arithmetic(build_rooms):
+    touching = compute_pvs(three_doors(build_rooms, 2.0))
+    assert touching.decided.sum() > 0
+    assert touching.opened.sum() == 0
+    assert not touching.to_matrix()[0, 3]
+    cells = three_doors(build_rooms, 2.0 + 1e-11)
+    hairline, rounded = (compute_pvs(cells, PvsOptions(exact=e)) for e in (True, False))
+    assert rounded.ties.sum() > 0
+    assert rounded.decided.sum() == 0
+    assert not rounded.to_matrix()[0, 3]
+    assert hairline.opened.sum() > 0
+    assert hairline.to_matrix()[0, 3]
+    assert np.array_equal(hairline.to_matrix(), hairline.to_matrix().T)
+
+
+def test_too_many_to_decide_count_as_seen(build_rooms, monkeypatch):
+    monkeypatch.setattr(hairs, "DECIDED", 0)
+    pvs = compute_pvs(three_doors(build_rooms, 2.0))
+    assert pvs.to_matrix()[0, 3]
+    assert pvs.fallbacks > 0
+    assert pvs.decided.sum() == 0
+
+
+def test_exact_answers_do_not_depend_on_the_number_of_workers(build_rooms):
+    rng = np.random.default_rng(4)
+    doors = {}
+    for i, j in np.ndindex(5, 5):
+        for axis, far in ((0, i), (2, j)):
+            if far < 4:
+                # Edges on a coarse raster line up, or nearly.
+                u, v = rng.integers(0, 3, 2) + rng.choice([0, 1e-12, -1e-12], 2)
+                door = (v, v + 1, 0.0, 2.0) if axis == 2 else (0.0, 2.0, u, u + 1)
+                doors[i, 0, j, axis] = [door]
+    grid = np.arange(6) * 4.0
+    portals = portals_of(build_rooms(grid, [0.0, 3.0], grid, doors).cells)
+    one, three = (portal_flow(portals, 200_000, workers) for workers in (1, 3))
+    assert one.decided.sum() > 10
+    assert one.opened.sum() > 0
+    for name in ("sees", "cut", "work", "ties", "decided", "opened"):
+        assert np.array_equal(getattr(one, name), getattr(three, name))
