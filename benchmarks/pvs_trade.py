@@ -351,7 +351,7 @@ def plot(rows: Sequence[Row], path: Path) -> None:
     from matplotlib import pyplot as plt
     from matplotlib.lines import Line2D
     from matplotlib.patheffects import withStroke
-    from matplotlib.ticker import PercentFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, PercentFormatter
 
     models = list(dict.fromkeys(r.model for r in rows))
     what = (("at_hand_volume", "share of the building at hand"), ("walk_mb", "MB fetched"))
@@ -391,10 +391,16 @@ def plot(rows: Sequence[Row], path: Path) -> None:
                                 path_effects=[withStroke(linewidth=2.5, foreground="white")],
                             )
             if line == 0:
+                ax.set_yticks([0, 0.25, 0.5, 0.75, 1])
                 ax.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0))
             ax.set_xscale("log")
-            ax.margins(x=0.12, y=0.15)
-            ax.set_ylim(0, None if line else 1.08)
+            ax.margins(x=0.12)
+            low, high = ax.get_xlim()
+            ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 30 * low else (1,)))
+            ax.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+            ax.xaxis.set_minor_formatter(NullFormatter())
+            top = max(getattr(r, name) for r in rows if r.model == model) if line else 1.0
+            ax.set_ylim(-0.08 * top if line else 0, 1.12 * top)
             ax.grid(True, which="major", color="#e4e4e4", linewidth=0.7)
             ax.set_axisbelow(True)
             for side in ("top", "right"):
@@ -429,7 +435,7 @@ def plot(rows: Sequence[Row], path: Path) -> None:
         title_fontsize=9,
     )
     figure.tight_layout(rect=(0, 0.09, 1, 1))
-    figure.savefig(path, dpi=110)
+    figure.savefig(path, dpi=100)
 
 
 def main(arguments: list[str] | None = None) -> int:
