@@ -30,7 +30,7 @@ class SubdivideOptions:
 
     wall_area: float = 2.0
     wall_thickness: float = 0.5
-    max_cells: int = 2000
+    max_cells: int = 10_000
     structural: tuple[str, ...] = ()
     detail: tuple[str, ...] = ()
     cells: CellKind = "room"
