@@ -152,7 +152,8 @@ def measured(rooms: int, folder: Path, max_cells: int, face: int) -> dict[str, A
     folder = folder / f"museum{rooms}"
     maker = [sys.executable, str(ROOT / "sample_data/make_museum.py"), "-o", str(folder / "model")]
     maker += ["--rooms", str(rooms), "--size", "16", "--force"]
-    subprocess.run(maker, check=True, stdout=subprocess.DEVNULL)
+    if not (folder / "model/museum.obj").is_file():
+        subprocess.run(maker, check=True, stdout=subprocess.DEVNULL)
     row: dict[str, Any] = {"rooms": rooms}
     for stage in STAGES:
         call = [sys.executable, __file__, "--stage", stage, "--folder", str(folder)]
@@ -195,7 +196,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--max-cells", type=int, default=SubdivideOptions().max_cells)
     parser.add_argument("--face", type=int, default=32, help="pixels a side of a view")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="the figures as a table")
-    parser.add_argument("--folder", type=Path, help="where museums are made and left")
+    parser.add_argument("--folder", type=Path, help="where museums are made, left and found again")
     parser.add_argument("--stage", choices=STAGES, help=argparse.SUPPRESS)
     given = parser.parse_args(arguments)
     if given.stage:
