@@ -1,4 +1,4 @@
-"""A floor plan per storey: cells, walls, portals, and one cell's visible set shaded by ACH.
+"""A floor plan per storey: cells, walls, portals, leaks, one cell's visible set shaded by ACH.
 
 Everything drawn is a true section at one height, so a plan shows what the stages computed and
 nothing that an artist would add. Without matplotlib the plan cannot be drawn (extra `plot`).
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
+from ptmtools.database.leakmarks import LEAK, draw_leaks, leaks_by_portal
 from ptmtools.database.model import PlotOptions, PlotReport
 from ptmtools.database.section import area, leaf_section, polygon_section, triangle_section
 from ptmtools.database.storeys import cut_height, storeys
@@ -114,6 +115,7 @@ class _Plan:
         self._floors = floors
         self._corners = cells.vertex[cells.triangle]
         self._opaque = scene.opaque[cells.triangle_source]
+        self._leaks = leaks_by_portal(pvs)
         self._shade: dict[int, float] | None = None
         if options.cell is not None and pvs is not None:
             row = pvs.row(options.cell)
@@ -152,6 +154,7 @@ class _Plan:
             axis.set_axis_off()
             axis.set(xlim=(self._low[0], self._high[0]), ylim=(self._high[1], self._low[1]))
             self._storey(axis, floor, shades, panel)
+            draw_leaks(axis, self._cells, self._leaks, self._floors, i, self._shown)
         if self._shade is not None:
             long = min(0.8 * (height - _HEAD), 4.0)
             low = height - _HEAD - _CAPTION - long
@@ -313,6 +316,8 @@ class _Plan:
         lines = [(_WALL, "opaque"), (_PORTAL, "portal")]
         if not self._opaque.all():
             lines.insert(1, (_SEE_THROUGH, "transparent"))
+        if self._leaks:
+            lines.append((LEAK, "leak, and cells that see too much by it"))
         if chosen is not None and self._shade is not None:
             lines.append((_CHOSEN, f"cell {chosen}, sees {len(self._shade)} cells"))
         figure.legend(

@@ -2,7 +2,8 @@
 
 A cell that sees several times as many cells as most do sees them through something: a window onto
 a courtyard, which is as it should be, or a gap under a wall that somebody forgot to close. Among
-the openings through which it sees at least half of what it sees, the smallest is named.
+the openings between cells through which it sees at least half of what it sees, the smallest is
+named.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ def _leak(cells: Cells, flow: PortalFlow, cell: int, sees: int) -> Leak | None:
     reached = np.unpackbits(seen.view(np.uint8), count=len(enters), bitorder="little")
     reached[out] = 1
     best: tuple[float, int, int] | None = None
-    for q in np.flatnonzero(reached):
+    for q in np.flatnonzero(reached & (enters != leaves)):
         onward = (flow.sees[q] & seen).view(np.uint8)
         behind = enters[np.unpackbits(onward, count=len(enters), bitorder="little").astype(bool)]
         through = len(np.unique(np.append(behind, enters[q])))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from PIL import Image
 
 from ptmtools.database import PlotOptions, plot_plan
+from ptmtools.database.leakmarks import LEAK
 from ptmtools.errors import InputError, MissingComponentError, OutputError
 
 SMALL = PlotOptions(width=6, dpi=60)
@@ -75,3 +77,17 @@ def test_faults(artifacts, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setitem(sys.modules, "matplotlib.backends.backend_agg", None)
     with pytest.raises(MissingComponentError, match=r"pip install 'ptmtools\[plot\]'.*PTM-M600"):
         draw(a, tmp_path / "b.png")
+
+
+def test_leaks_are_ringed(artifacts, tmp_path: Path) -> None:
+    leaking = replace(artifacts.pvs, leak=np.array([[0, 3, 0, 2]], np.int32))
+    plain, ringed = (
+        draw(artifacts, tmp_path / f"{i}.png", pvs=pvs)
+        for i, pvs in enumerate((artifacts.pvs, leaking))
+    )
+    assert pixels(plain, LEAK) == 0
+    assert pixels(ringed, LEAK) > 60
+    # The ring is around the first door: that end of the row, not the other.
+    at = np.argwhere(abs(ringed - [0xE0, 0x94, 0x00]).sum(axis=2) < 12)
+    in_plan = at[at[:, 0] > 40]  # below the legend
+    assert in_plan[:, 1].max() < 0.6 * ringed.shape[1]

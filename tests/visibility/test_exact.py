@@ -81,7 +81,7 @@ def test_portals_in_the_wrong_order_or_far_aside_are_refuted():
 
 @pytest.mark.parametrize("beyond", [-1e-15, 0.0, 1e-15, 1e-12])
 def test_the_last_place_decides(beyond):
-    """Below z = 0 at x = 0 and above 1/2 at 4, a line passes x = 8 above 1: there the third ends."""
+    """Below z = 0 at x = 0 and above 1/2 at 4, lines pass x = 8 above 1, where the third ends."""
     doors = [(0.0, -1.0, 0.0), (4.0, 0.5, 1.5), (8.0, 0.0, 1.0 + beyond)]
     points = [
         [(x, 0.0, low), (x, 1.0, low), (x, 1.0, high), (x, 0.0, high)] for x, low, high in doors
