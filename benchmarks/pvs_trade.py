@@ -334,12 +334,13 @@ def tables(rows: Sequence[Row]) -> str:
 
 def _markdown(table: list[list[str]]) -> str:
     """Rows of a table, the first its head; what the first columns repeat is left out."""
-    lines = [table[0], ["---"] * len(table[0])]
+    lines = [table[0]]
     for above, row in pairwise(table):
         same = [a == b for a, b in zip(above[:2], row[:2], strict=True)]
         model = "" if same[0] else row[0]
         lines.append([model, "" if all(same) else row[1], *row[2:]])
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+    text = [f"| {' | '.join(line)} |\n" for line in lines]
+    return "".join([text[0], "|" + "---|" * len(table[0]) + "\n", *text[1:]])
 
 
 def plot(rows: Sequence[Row], path: Path) -> None:
