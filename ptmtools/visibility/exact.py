@@ -13,7 +13,7 @@ open may be open by 2⁻¹⁹² of an edge.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from math import gcd
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 Point = tuple[int, int, int, int]
 Plane = tuple[int, int, int, int]
+Line = tuple[int, int, int, int, int, int]
 Polygon = list[Point]
 
 #: Vertices with longer numbers are rounded outwards, to shares of an edge of `SHARE` bits.
@@ -154,45 +155,55 @@ def _between(inner: Point, outer: Point, inward: int, outward: int) -> Point:
 
 
 def _separators(near: Polygon, far: Polygon) -> list[Plane]:
-    """All planes through an edge of the one and a vertex of the other polygon that have ``near``
-    on their negative and ``far`` on their positive side, neither wholly in them."""
-    return [
-        *_through_edges(near, far, lambda one, other: max(one) <= 0 <= min(other)),
-        *_through_edges(far, near, lambda one, other: max(other) <= 0 <= min(one)),
-    ]
+    """All planes through an edge of the one and a vertex of the other polygon that have ``near`` on
+    their negative and ``far`` on their positive side, neither wholly in them."""
+    return [*_beside(near, far), *(_turned(plane) for plane in _beside(far, near))]
 
 
-def _through_edges(
-    edged: Polygon, other: Polygon, separates: Callable[[list[int], list[int]], bool]
-) -> Iterator[Plane]:
-    for i, start in enumerate(edged):
-        end = edged[i - 1]
-        found = set()
+def _beside(edged: Polygon, other: Polygon) -> Iterator[Plane]:
+    """The planes through an edge of ``edged``, on their negative side, that touch ``other``, on
+    their positive side: each turns about its edge until nothing of ``other`` is behind it."""
+    for i, end in enumerate(edged):
+        line = _line(edged[i - 1], end)
+        found: Plane | None = None
         for corner in other:
-            plane = _reduced(_plane(start, end, corner))
-            if plane in found or not any(plane[:3]):
+            if found is not None and _side(found, corner) >= 0:
                 continue
-            found.add(plane)
-            one = [_side(plane, point) for point in edged]
-            rest = [_side(plane, point) for point in other]
-            if not (any(one) and any(rest)):
-                continue
-            if separates(one, rest):
+            plane = _through(line, corner)
+            sides = [_side(plane, point) for point in edged]
+            if max(sides) > 0:
+                found = _turned(plane)
+            elif min(sides) < 0:
+                found = plane
+        if found is not None:
+            plane = _reduced(found)
+            behind = [_side(plane, point) for point in edged]
+            beyond = [_side(plane, point) for point in other]
+            if min(behind) < 0 >= max(behind) and max(beyond) > 0 <= min(beyond):
                 yield plane
-            elif separates([-s for s in one], [-s for s in rest]):
-                yield _turned(plane)
 
 
-def _plane(p: Point, q: Point, r: Point) -> Plane:
-    """The plane through three points: the minors of their coordinates."""
+def _line(p: Point, q: Point) -> Line:
+    """The line through two points: the 2 × 2 minors xy, xz, xw, yz, yw, zw of their coordinates."""
     px, py, pz, pw = p
     qx, qy, qz, qw = q
-    rx, ry, rz, rw = r
-    xy, xz, xw = qx * ry - qy * rx, qx * rz - qz * rx, qx * rw - qw * rx
-    yz, yw, zw = qy * rz - qz * ry, qy * rw - qw * ry, qz * rw - qw * rz
     return (
-        py * zw - pz * yw + pw * yz,
-        -(px * zw - pz * xw + pw * xz),
-        px * yw - py * xw + pw * xy,
-        -(px * yz - py * xz + pz * xy),
+        px * qy - py * qx,
+        px * qz - pz * qx,
+        px * qw - pw * qx,
+        py * qz - pz * qy,
+        py * qw - pw * qy,
+        pz * qw - pw * qz,
+    )
+
+
+def _through(line: Line, point: Point) -> Plane:
+    """The plane through a line and a point: the 3 × 3 minors."""
+    xy, xz, xw, yz, yw, zw = line
+    x, y, z, w = point
+    return (
+        y * zw - z * yw + w * yz,
+        z * xw - x * zw - w * xz,
+        x * yw - y * xw + w * xy,
+        y * xz - x * yz - z * xy,
     )
