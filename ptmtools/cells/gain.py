@@ -9,8 +9,8 @@ surfaces in it (what it takes to fetch it) and S the leaves that it sees, a grou
 
 and the **gain** of parting it is 1 - apart / together, the share of the fetching that this saves.
 It is 0 in a hall, whatever the size of the rest of the building, and says the same in any unit.
-Groups are joined in the order of what parting the two together would gain, as long as that is less
-than the threshold.
+Groups are joined in the order of what parting the two together would gain, the lower numbered
+leaves first where it is the same, as long as that is less than the threshold.
 
 Who sees whom is estimated (`sight`), not computed: the subdivision comes before visibility, and
 the estimate decides only where cells end, never what they see.
@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 #: Gains that differ by less are equal, in digits: symmetrical buildings have many, which rounding
 #: must not put in order.
-DIGITS = 6
+DIGITS = 4
 
 
 def join_by_gain(

@@ -20,6 +20,8 @@ from ptmtools.cells.rooms import room_of_leaf
 from ptmtools.cells.sight import sampled_sight
 from ptmtools.tolerance import Tolerance
 
+#: Shares of a triangle that differ by less are equal, in digits.
+DIGITS = 6
 #: What is said of a model of one cell.
 ONE_HALL = "visibility culling gains nothing here: 1 hall"
 
@@ -47,13 +49,47 @@ def numbered(group: NDArray[np.integer]) -> NDArray[np.int32]:
     return np.asarray(place[row.reshape(-1)])
 
 
+def rank_in_file(cells: Cells) -> NDArray[np.int64]:
+    """(L,) the place of each leaf in an order that no transformation of the model changes: leaves
+    are compared by the share that they hold of the model's first triangle of which one of them
+    holds more, and go by number where they hold the same of all.
+
+    Leaves themselves are numbered as planes split them, and which side of a plane is its front
+    depends on how the model is turned.
+    """
+    a, b, c = np.moveaxis(cells.vertex[cells.triangle], 1, 0)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    source = cells.triangle_source
+    front, back = cells.triangle_cell.T
+    behind = (back >= 0) & (back != front)
+    leaf = np.concatenate([front[front >= 0], back[behind]]).astype(np.int64)
+    piece = np.concatenate([np.flatnonzero(front >= 0), np.flatnonzero(behind)])
+    count = int(source.max(initial=-1)) + 1
+    pair, row = np.unique(leaf * count + source[piece], return_inverse=True)
+    held = np.bincount(row, area[piece])
+    whole = np.bincount(source, area)[pair % max(count, 1)]
+    share = np.round(np.divide(held, whole, out=np.zeros(len(held)), where=whole > 0), DIGITS)
+    held_by: list[list[tuple[int, float]]] = [[] for _ in range(cells.leaf_count)]
+    for at, part in zip(pair.tolist(), share.tolist(), strict=True):
+        if part > 0:
+            held_by[at // count].append((at % count, -part))
+    rank = np.empty(cells.leaf_count, dtype=np.int64)
+    # A leaf that holds nothing more comes last, not first.
+    key = [[*held, (count, 0.0)] for held in held_by]
+    rank[sorted(range(cells.leaf_count), key=key.__getitem__)] = np.arange(cells.leaf_count)
+    return rank
+
+
 def _groups(cells: Cells, gain: float, tolerance: Tolerance) -> NDArray[np.integer]:
-    room = room_of_leaf(cells, tolerance)
+    rank = rank_in_file(cells)
+    room = room_of_leaf(cells, tolerance, rank)
     if gain >= 1 or len(np.unique(room)) == len(room):
         return room
     inner = cells.portal_leaf[room[cells.portal_leaf[:, 0]] == room[cells.portal_leaf[:, 1]]]
-    sees = sampled_sight(cells)
-    return join_by_gain(sees, cells.leaf_volumes(), _surface(cells), inner, gain)
+    order = np.argsort(rank)
+    sees = sampled_sight(cells)[np.ix_(order, order)]
+    weights = cells.leaf_volumes()[order], _surface(cells)[order]
+    return join_by_gain(sees, *weights, rank[inner], gain)[rank]
 
 
 def _surface(cells: Cells) -> NDArray[np.float64]:

@@ -37,20 +37,26 @@ if TYPE_CHECKING:
 
 #: An opening joins two regions if it is at least this share of the narrower one's cross-section.
 OPEN = 0.7
-#: Shares that differ by less are equal, in digits: symmetrical buildings have many, which rounding
-#: must not put in order.
-DIGITS = 6
+#: Shares that agree in so many significant digits are equal: symmetrical buildings have many, which
+#: rounding must not put in order, not even that of a file far from its origin on a sliver.
+DIGITS = 4
 #: Pairs of portals that are compared at a time.
 AT_ONCE = 2048
 
 
-def room_of_leaf(cells: Cells, tolerance: Tolerance, least: float = OPEN) -> NDArray[np.int64]:
+def room_of_leaf(
+    cells: Cells,
+    tolerance: Tolerance,
+    rank: NDArray[np.int64] | None = None,
+    least: float = OPEN,
+) -> NDArray[np.int64]:
     """(L,) the room of each leaf, called by one of its leaves.
 
-    A function of the leaves and portals alone. Of equally open pairs the one with the lower
-    numbered leaves is joined first.
+    Of equally open pairs the one whose leaves come first is joined first, by (L,) ``rank`` or else
+    by number: a doorway between two equal rooms.
     """
-    regions = _Regions(cells, tolerance)
+    rank = np.arange(cells.leaf_count) if rank is None else rank
+    regions = _Regions(cells, rank, tolerance)
     waiting = [(-regions.openness(a, b), a, b) for a, b in regions.pairs()]
     heapq.heapify(waiting)
     while waiting:
@@ -63,27 +69,28 @@ def room_of_leaf(cells: Cells, tolerance: Tolerance, least: float = OPEN) -> NDA
         elif share >= least:
             for c, d in regions.join(a, b):
                 heapq.heappush(waiting, (-regions.openness(c, d), c, d))
-    return regions.of_leaf()
+    return np.argsort(rank)[regions.of_leaf()[rank]]
 
 
 class _Regions:
-    """Connected groups of leaves, each called by one of them, and the openings between them."""
+    """Connected groups of leaves, each called by the rank of one of them, and the openings between
+    them."""
 
-    def __init__(self, cells: Cells, tolerance: Tolerance) -> None:
+    def __init__(self, cells: Cells, rank: NDArray[np.int64], tolerance: Tolerance) -> None:
         import shapely
 
-        self._volume = cells.leaf_volumes()
+        order = np.argsort(rank)
+        self._volume = cells.leaf_volumes()[order]
         plan = cells.leaf_point[:, [0, 2]]
         rows = np.repeat(np.arange(cells.leaf_count), np.diff(cells.leaf_point_start))
-        self._plan: list[Plan] = list(
-            shapely.convex_hull(shapely.multipoints(plan, indices=rows)).tolist()
-        )
+        hulls = shapely.convex_hull(shapely.multipoints(plan, indices=rows))
+        self._plan: list[Plan] = list(hulls[order].tolist())
         self._section = [_section(v, p) for v, p in zip(self._volume, self._plan, strict=True)]
         self._parent = list(range(cells.leaf_count))
         self._area = cells.portal_area.tolist()
         self._touching = _touching(cells, tolerance.plane)
         self._between: list[dict[int, list[int]]] = [{} for _ in range(cells.leaf_count)]
-        for k, (a, b) in enumerate(cells.portal_leaf.tolist()):
+        for k, (a, b) in enumerate(rank[cells.portal_leaf].tolist()):
             doors = self._between[a].setdefault(b, [])
             self._between[b][a] = doors
             doors.append(k)
@@ -101,7 +108,8 @@ class _Regions:
         pair = (min(a, b), max(a, b))
         if pair not in self._opening:
             self._opening[pair] = self._largest_opening(self._between[a][b])
-        return round(self._opening[pair] / min(self._section[a], self._section[b]), DIGITS)
+        share = self._opening[pair] / min(self._section[a], self._section[b])
+        return float(f"{share:.{DIGITS}g}")
 
     def join(self, a: int, b: int) -> list[tuple[int, int]]:
         """Makes two neighbours one region, called by the one with more neighbours; returns the
@@ -129,7 +137,7 @@ class _Regions:
         return found
 
     def of_leaf(self) -> NDArray[np.int64]:
-        """(L,) by which leaf the region of each leaf is called."""
+        """(L,) by which leaf the region of each leaf is called, both by rank."""
         found = np.array(self._parent, dtype=np.int64)
         while len(found) and not np.array_equal(found, found[found]):
             found = found[found]

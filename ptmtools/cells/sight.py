@@ -5,8 +5,9 @@ followed to both sides through all portals that they meet. Leaves on one line se
 a potentially visible set this leaves out what no line happened to find; it serves to weigh, never
 to cull. Two thirds to nine tenths of what the portal flow finds are found in a second or two.
 
-The lines are the same for every portal in its own frame, so they depend neither on the order of the
-portals and of their corners nor on where the building stands and how it is turned.
+The lines are the same for every portal in its own frame, and the same seen from either side and
+after quarter turns of that frame. So they depend neither on the order of the portals and of their
+corners nor on where the building stands and how it is turned, be it on its head.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from numpy.typing import NDArray
 from ptmtools.cells.model import Cells
 
 #: Lines over all portals, and the least and the most through one of them.
-LINES = 2**19
-LEAST_LINES, MOST_LINES = 64, 2048
+LINES = 2**20
+LEAST_LINES, MOST_LINES = 64, 8192
 #: A portal whose normal has a level part smaller than this is a hatch.
 LEVEL = 1e-3
 #: Fractional parts of 1/g, 1/g², 1/g³, 1/g⁴ in units of 2⁻⁶⁴, where g⁵ = g + 1 (Roberts'
@@ -39,7 +40,7 @@ def sampled_sight(cells: Cells) -> NDArray[np.bool_]:
         return seen
     from ptmtools.cells.kernels import sight_lines
 
-    count = min(max(LINES // len(ends), LEAST_LINES), MOST_LINES) // 2 * 2  # mirrored pairs
+    count = min(max(LINES // len(ends), LEAST_LINES), MOST_LINES) // 8 * 8
     share = _even(count)
     origin, along = np.empty((2, len(ends), count, 3))
     for k in range(len(ends)):
@@ -60,11 +61,15 @@ def sampled_sight(cells: Cells) -> NDArray[np.bool_]:
 
 
 def _even(count: int) -> NDArray[np.float64]:
-    """(count, 4) points of the unit cube, evenly spread; integer arithmetic, the same anywhere. The
-    second half mirrors the first (`_lines`)."""
-    fixed = np.arange(1, count // 2 + 1, dtype=np.uint64)[:, None] * STEPS
-    half = (fixed >> np.uint64(11)).astype(np.float64) * 2.0**-53
-    return np.concatenate([half, [0, 1, 0, 1] + half * [1, -1, 1, -1]])
+    """(count, 4) points of the unit cube, evenly spread; integer arithmetic, the same anywhere.
+    They come in eights: the quarter turns of the frame, and those seen from behind (`_lines`)."""
+    fixed = np.arange(1, count // 8 + 1, dtype=np.uint64)[:, None] * STEPS
+    turned = [(fixed >> np.uint64(11)).astype(np.float64) * 2.0**-53]
+    for _ in range(3):
+        up, along, radius, turn = turned[-1].T
+        turned.append(np.stack([along, 1 - up, radius, (turn + 0.25) % 1], axis=1))
+    front = np.concatenate(turned)
+    return np.concatenate([front, [0, 1, 0, 1] + front * [1, -1, 1, -1]])
 
 
 def _lines(
@@ -75,7 +80,8 @@ def _lines(
 
     ``share`` (n, 4) chooses the height in the polygon, the place at that height, and the direction
     by its angle from the normal and around it. The frame has the polygon's level direction to the
-    right; turning the normal round mirrors it, so of mirrored pairs of lines both are there.
+    right, that of a hatch its longest edge; turning the normal round mirrors it, and what is level
+    changes when a building is laid on its side, so `_even` holds what becomes of each line.
     """
     right = np.array([normal[2], 0.0, -normal[0]])
     if np.linalg.norm(right) < LEVEL:  # a hatch: no direction is level more than others

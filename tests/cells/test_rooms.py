@@ -179,6 +179,17 @@ def test_lines_are_even_in_a_portal_and_do_not_know_its_first_corner_or_side() -
     assert apart.min(axis=1).max() < 1e-12
 
 
+def test_lines_do_not_know_what_is_level() -> None:
+    """A doorway laid on its side has the same lines."""
+    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    polygon = np.array([[0, 0, 0], [1, 0, 0], [1, 2, 0], [0, 2, 0]], dtype=np.float64)
+    share = _even(64)
+    upright = np.hstack(_lines(polygon, np.array([0.0, 0, 1]), share))
+    origin, along = _lines(polygon @ turn.T, np.array([0.0, 0, 1]), share)
+    laid = np.hstack([origin @ turn, along @ turn])
+    assert np.abs(upright[:, None] - laid).max(axis=2).min(axis=1).max() < 1e-12
+
+
 def test_gain_by_hand() -> None:
     """Four leaves in a row that see 3, 3, 4 and 2 leaves; all of one volume and one area."""
     sees = np.array([[1, 1, 1, 0], [1, 1, 1, 0], [1, 1, 1, 1], [0, 0, 1, 1]], dtype=bool)
@@ -205,13 +216,13 @@ def test_sampled_sight_is_within_the_flow_and_finds_most_of_it(corridor: Scene) 
     assert not flow.all()
 
 
-def test_any_number_of_lines_comes_in_mirrored_pairs(
+def test_any_number_of_lines_comes_in_eights(
     corridor: Scene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cells = subdivide(corridor, SubdivideOptions(cells="leaf"))
     monkeypatch.setattr("ptmtools.cells.sight.LINES", 128 * cells.portal_count)
     even = sampled_sight(cells)
-    monkeypatch.setattr("ptmtools.cells.sight.LINES", 129 * cells.portal_count)
+    monkeypatch.setattr("ptmtools.cells.sight.LINES", 135 * cells.portal_count)
     assert np.array_equal(sampled_sight(cells), even)
 
 
