@@ -221,25 +221,6 @@ def test_closed_models_by_any_angle(models: dict[str, Model], name: str, seed: i
     turned(models[name], axes * np.linalg.det(axes), upright=False)
 
 
-@pytest.mark.parametrize("turns", [1, 2, 3])
-def test_a_doorway_between_two_equal_rooms(quads, room_faces, partition, turns: int) -> None:
-    """It joins the same one, whichever side of the walls is their front."""
-    jambs = [[[-0.1, y, z], [0.1, y, z], [0.1, w, x], [-0.1, w, x]] for y, z, w, x in _JAMBS]
-    hole = (0.0, 2.0, -0.5, 0.5)
-    walls = [*partition(-0.1, hole), *partition(0.1, hole)]
-    scene = quads([*room_faces([-4, 0, -2], [4, 4, 2]), *walls, *jambs])
-    turn = quarter_turns(1, turns)
-    cells = [subdivide(replace(scene, points=scene.points @ t.T), ROOMS) for t in (np.eye(3), turn)]
-    eyes = np.array([[-2.0, 1, 0], [0, 1, 0], [2, 1, 0]])
-    here, there = cells[0].locate(eyes), cells[1].locate(eyes @ turn.T)
-    assert here[0] != here[2]
-    assert here[1] in here[[0, 2]]
-    assert np.array_equal(here[1] == here, there[1] == there)
-
-
-_JAMBS = [(0, -0.5, 2, -0.5), (0, 0.5, 2, 0.5)]
-
-
 def turned(model: Model, turn: np.ndarray, upright: bool = True) -> None:
     def there(points: np.ndarray) -> np.ndarray:
         return points @ turn.T
