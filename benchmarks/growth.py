@@ -62,6 +62,7 @@ class Work:
 
     folder: Path
     model: Path
+    wall_area: float
     max_cells: int
     face: int
 
@@ -93,7 +94,7 @@ class Work:
         if stage == "scene":
             return lambda: ingest(self.model)
         scene = Scene.from_arrays(self._arrays("scene"), lambda digest: b"")
-        options = replace(SubdivideOptions(), max_cells=self.max_cells)
+        options = SubdivideOptions(wall_area=self.wall_area, max_cells=self.max_cells)
         if stage == "leaves":
             return lambda: subdivide(scene, replace(options, cells="leaf"))
         if stage == "rooms":
@@ -147,7 +148,7 @@ def one_stage(stage: str, work: Work) -> None:
     print(json.dumps(work.run(stage)))
 
 
-def measured(rooms: int, folder: Path, max_cells: int, face: int) -> dict[str, Any]:
+def measured(rooms: int, folder: Path, options: list[str]) -> dict[str, Any]:
     """Makes a museum and runs all of its stages, each in a process of its own."""
     folder = folder / f"museum{rooms}"
     maker = [sys.executable, str(ROOT / "sample_data/make_museum.py"), "-o", str(folder / "model")]
@@ -156,8 +157,7 @@ def measured(rooms: int, folder: Path, max_cells: int, face: int) -> dict[str, A
         subprocess.run(maker, check=True, stdout=subprocess.DEVNULL)
     row: dict[str, Any] = {"rooms": rooms}
     for stage in STAGES:
-        call = [sys.executable, __file__, "--stage", stage, "--folder", str(folder)]
-        call += ["--max-cells", str(max_cells), "--face", str(face)]
+        call = [sys.executable, __file__, "--stage", stage, "--folder", str(folder), *options]
         done = subprocess.run(call, check=True, stdout=subprocess.PIPE, text=True)
         for name, value in json.loads(done.stdout.splitlines()[-1]).items():
             row[f"{stage} {name}" if name in FIGURES else name] = value
@@ -193,6 +193,7 @@ def main(arguments: list[str] | None = None) -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--rooms", default=",".join(map(str, ROOMS)), metavar="N,N,…")
+    parser.add_argument("--wall-area", type=float, default=SubdivideOptions().wall_area)
     parser.add_argument("--max-cells", type=int, default=SubdivideOptions().max_cells)
     parser.add_argument("--face", type=int, default=32, help="pixels a side of a view")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="the figures as a table")
@@ -201,15 +202,18 @@ def main(arguments: list[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     if given.stage:
         model = given.folder / "model/museum.obj"
-        one_stage(given.stage, Work(given.folder, model, given.max_cells, given.face))
+        work = Work(given.folder, model, given.wall_area, given.max_cells, given.face)
+        one_stage(given.stage, work)
         return 0
+    options = [f"--wall-area={given.wall_area}", f"--max-cells={given.max_cells}"]
+    options.append(f"--face={given.face}")
     with tempfile.TemporaryDirectory() as scratch:
         folder = given.folder or Path(scratch)
         print(f"| rooms | triangles | leaves | cells | portals | | {' | '.join(STAGES)} |")
         print("|---" * (6 + len(STAGES)) + "|")
         rows = []
         for rooms in map(int, given.rooms.split(",")):
-            rows.append(measured(rooms, folder, given.max_cells, given.face))
+            rows.append(measured(rooms, folder, options))
             print_row(rows[-1])
     leaves = [row["leaves"] for row in rows]
     for figure in FIGURES:
