@@ -26,7 +26,7 @@ Line = tuple[int, int, int, int, int, int]
 Polygon = list[Point]
 
 #: Vertices with longer numbers are rounded outwards, to shares of an edge of `SHARE` bits.
-BITS, SHARE = 2048, 192
+BITS, SHARE = 1024, 192
 
 
 class _Left(NamedTuple):

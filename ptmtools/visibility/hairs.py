@@ -1,10 +1,10 @@
 """Searches whose rejections by a hair are decided again in exact arithmetic.
 
 A search tells which sequences of portals it rejected by less than the rounding of its arithmetic
-allows to be sure of (`winding`). Those that matter, because something behind them was not seen
-otherwise, are put to `ExactPortals`. Where one lets a line pass, the search is done again with it
-let through, as often as that brings up new ones. Where there are too many, all are let through: the
-result is looser, and conservative as ever.
+allows to be sure of (`winding`). Another one that lets them all through tells what depends on
+them, mostly nothing. Those on which something depends are put to `ExactPortals`. Where a line can
+pass one, the search is done again with that let through, as often as this brings up new ones. Where
+there are too many, all are let through: the result is looser, and conservative as ever.
 """
 
 from __future__ import annotations
@@ -54,32 +54,39 @@ def searched(
     of `kernels.flow`. Without ``arithmetic`` rejections by a hair stand."""
     from ptmtools.visibility import kernels
 
+    none = np.zeros(0, np.uint64)
+    work, cut, ties, used = kernels.flow(g, s, known, source, budget, none, False, seen)
+    if ties == 0 or arithmetic is None:
+        return Searched(cut, work, ties, 0, 0)
+    rejected = set(_sequences(s.hair[:used]))
+    hidden = known[source] & ~seen
+    if not any(_matters(known, hidden, sequence[-1]) for sequence in rejected):
+        return Searched(cut, work, ties, 0, 0)
+    # With all of them let through, what more is seen? What is seen already need not be found again.
+    most = seen.copy()
+    work += kernels.flow(g, s, known, source, budget, none, True, most)[0]
     passes: dict[tuple[int, ...], bool] = {}
-    opened = np.zeros(0, np.uint64)
-    work, ties, lenient = 0, 0, False
-    for again in range(AGAIN + 1):
-        seen[:] = 0
-        ops, cut, found, used = kernels.flow(g, s, known, source, budget, opened, lenient, seen)
-        work += ops
-        ties = max(ties, found)
-        if found == 0 or arithmetic is None or lenient:
-            break
-        new = [
+    for _ in range(AGAIN):
+        doubtful = most & ~seen
+        new = sorted(
             sequence
-            for sequence in _sequences(s.hair[:used])
-            if sequence not in passes and _matters(known, source, seen, sequence[-1])
-        ]
-        lenient = used > len(s.hair) // 2 or len(passes) + len(new) > DECIDED or again == AGAIN - 1
-        if lenient:
-            continue
+            for sequence in rejected - passes.keys()
+            if _matters(known, doubtful, sequence[-1])
+        )
+        if used > len(s.hair) // 2 or len(passes) + len(new) > DECIDED:
+            break
         for sequence in new:
             passes[sequence] = arithmetic.passes((source, *sequence))
         if not any(passes[sequence] for sequence in new):
-            break
+            return Searched(cut, work, ties, len(passes), sum(passes.values()))
         through = [sequence for sequence, open_ in passes.items() if open_]
         marks = [kernels.mark(np.array(way, np.int64), 0, len(way)) for way in through]
         opened = np.sort(np.array(marks, np.uint64))
-    return Searched(cut or lenient, work, ties, len(passes), sum(passes.values()))
+        more, cut, found, used = kernels.flow(g, s, known, source, budget, opened, False, seen)
+        work, ties = work + more, max(ties, found)
+        rejected = set(_sequences(s.hair[:used]))
+    seen[:] = most
+    return Searched(True, work, ties, len(passes), sum(passes.values()))
 
 
 def _sequences(words: NDArray[np.int64]) -> Iterator[tuple[int, ...]]:
@@ -92,8 +99,7 @@ def _sequences(words: NDArray[np.int64]) -> Iterator[tuple[int, ...]]:
         at = following
 
 
-def _matters(known: NDArray[np.uint64], source: int, seen: NDArray[np.uint64], last: int) -> bool:
-    """Whether the last portal of a rejected sequence, or anything behind it, is still hidden."""
-    hidden = known[source] & ~seen
-    itself = int(hidden[last >> 6]) >> (last & 63) & 1
-    return bool(itself or np.any(known[last] & hidden))
+def _matters(known: NDArray[np.uint64], doubtful: NDArray[np.uint64], last: int) -> bool:
+    """Whether the last portal of a rejected sequence, or what may lie behind it, is doubtful."""
+    itself = int(doubtful[last >> 6]) >> (last & 63) & 1
+    return bool(itself or np.any(known[last] & doubtful))

@@ -347,7 +347,8 @@ def flow(
     Rejections by a hair stand, except of the sequences with `mark`s in ``opened``, ascending, or
     of all if ``lenient``.
 
-    ``known`` (2K, W) is what each portal may see at most; ``seen`` (W,) the zeroed result row. A
+    ``known`` (2K, W) is what each portal may see at most; ``seen`` (W,) the result row,
+    zeroed or with what is seen already. A
     search that grows long `glance`s, once: in an open hall nearly all is seen at once, and what is
     left to look out for is little. (Glancing first costs more than it saves where walls are many:
     e1m1 +30 %. Without it, a hall of 1,344 open portals spends its whole budget.)
