@@ -33,6 +33,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
@@ -155,8 +156,8 @@ def portal_flow(
     g = geometry(portals)
     threads = min(workers or os.cpu_count() or 1, BATCH)
     with ThreadPoolExecutor(threads) as pool:
-        known = _prepass(g, words, pool, threads)
         storage = [(scratch(g, words), ExactPortals(g) if exact else None) for _ in range(threads)]
+        known = _prepass(g, [s for s, _ in storage], pool)
         order = np.argsort(BITS_OF_BYTE[known.view(np.uint8)].sum(axis=1), kind="stable")
         for first in range(0, count, BATCH):
             batch = order[first : first + BATCH]
@@ -178,26 +179,41 @@ def portal_flow(
                     cut[p], *counts[:, p] = searched(g, *tools, known, p, budget, seen[i])
 
             list(pool.map(search, storage))
+            dropped = known[batch] & ~seen
             known[batch] = seen
-            for p in batch:
-                kernels.drop_unreturned(known, p)
+            for p, row in zip(batch, dropped, strict=True):
+                kernels.drop_unreturned(known, p, row)
             progress(min(first + BATCH, count), count, "portals")
     return PortalFlow(known, cut[0::2] | cut[1::2], *(counts[:, 0::2] + counts[:, 1::2]))
 
 
-def _prepass(g: Geometry, words: int, pool: ThreadPoolExecutor, threads: int) -> NDArray[np.uint64]:
+def _prepass(g: Geometry, storage: list[Scratch], pool: ThreadPoolExecutor) -> NDArray[np.uint64]:
     """(2K, W) a first upper bound of what each directed portal sees, from planes and floods."""
     from ptmtools.visibility import kernels
 
-    count = len(g.leaf)
-    front = np.zeros((count, words), dtype=np.uint64)
-    known = np.zeros((count, words), dtype=np.uint64)
-    ends = np.linspace(0, count, 4 * threads + 1).astype(np.int64)
-    spans = list(pairwise(ends.tolist()))
-    list(pool.map(lambda span: kernels.fill_ahead(g, span[0], span[1], front), spans))
-    list(pool.map(lambda span: kernels.flood(g, front, span[0], span[1], known), spans))
+    count, words = len(g.leaf), storage[0].might.shape[1]
+    known, tighter = np.zeros((2, count, words), dtype=np.uint64)
+    parts = 8 * len(storage)
+
+    def share(what: Callable[..., None], length: int, *matrices: NDArray[np.uint64]) -> None:
+        spans = deque(pairwise(np.linspace(0, length, parts + 1).astype(np.int64).tolist()))
+
+        def work(s: Scratch) -> None:
+            while True:
+                try:
+                    span = spans.popleft()
+                except IndexError:
+                    return
+                what(g, s, *span, *matrices)
+
+        list(pool.map(work, storage))
+
+    share(kernels.flood, count, known)
+    share(kernels.return_sight, words, known)
     for _ in range(ROUNDS):
-        kernels.tighten(g, known)
+        share(kernels.tighten, count, known, tighter)
+        known, tighter = tighter, known
+        share(kernels.return_sight, words, known)
     return known
 
 

@@ -80,71 +80,90 @@ def has(rows: Bits, p: int, q: int) -> bool:
 
 
 @plain_kernel
-def ahead(g: Geometry, p: int, q: int) -> bool:
-    """Whether a straight line may cross directed portal p and then q, by their planes alone."""
-    k, j = p >> 1, q >> 1
-    if k == j:
+def reaches(g: Geometry, k: int, n: Floats, s: float, floor: float) -> bool:
+    """Whether portal k has a point with s · n·x > floor."""
+    ball = g.ball
+    middle = s * (n[0] * ball[k, 0] + n[1] * ball[k, 1] + n[2] * ball[k, 2])
+    if middle > floor:
+        return True
+    if middle + ball[k, 3] <= floor:
         return False
-    # Something of q must lie beyond p's plane: max over q of ±n·x > min over p of ±n·x.
-    n = g.normal[k]
-    s = 1.0 if p & 1 == 0 else -1.0
-    floor = (g.low[k] if p & 1 == 0 else -g.high[k]) + g.slack
-    found = False
-    for i in range(g.start[j], g.start[j + 1]):
-        x = g.point[i]
-        if s * (n[0] * x[0] + n[1] * x[1] + n[2] * x[2]) > floor:
-            found = True
-            break
-    if not found:
-        return False
-    # And something of p before q's plane.
-    n = g.normal[j]
-    s = 1.0 if q & 1 == 0 else -1.0
-    ceiling = (g.high[j] if q & 1 == 0 else -g.low[j]) - g.slack
     for i in range(g.start[k], g.start[k + 1]):
-        x = g.point[i]
-        if s * (n[0] * x[0] + n[1] * x[1] + n[2] * x[2]) < ceiling:
+        if s * (n[0] * g.point[i, 0] + n[1] * g.point[i, 1] + n[2] * g.point[i, 2]) > floor:
             return True
     return False
 
 
 @plain_kernel
-def fill_ahead(g: Geometry, first: int, last: int, rows: Bits) -> None:
-    """Sets the bits of `ahead` in rows first … last - 1 of ``rows`` (2K, W)."""
-    for p in range(first, last):
-        for q in range(len(g.leaf)):
-            if ahead(g, p, q):
-                rows[p, q >> 6] |= ONE << np.uint64(q & 63)
+def ahead(g: Geometry, p: int, q: int) -> bool:
+    """Whether a straight line may cross directed portal p and then q, by their planes alone:
+    something of q lies beyond p's plane, and something of p before q's."""
+    k, j = p >> 1, q >> 1
+    if k == j:
+        return False
+    s = 1.0 if p & 1 == 0 else -1.0
+    floor = (g.low[k] if p & 1 == 0 else -g.high[k]) + g.slack
+    if not reaches(g, j, g.normal[k], s, floor):
+        return False
+    s = -1.0 if q & 1 == 0 else 1.0
+    floor = (-g.high[j] if q & 1 == 0 else g.low[j]) + g.slack
+    return reaches(g, k, g.normal[j], s, floor)
 
 
 @kernel
-def flood(g: Geometry, front: Bits, first: int, last: int, rows: Bits) -> None:
-    """Rows first … last - 1 of ``rows`` become what a flood reaches through ``front``.
+def flood(g: Geometry, s: Scratch, first: int, last: int, rows: Bits) -> None:
+    """Rows first … last - 1 of ``rows`` (2K, W) become what floods from them reach.
 
-    A portal is reached when it lies ahead of the source and of the portal before it.
+    From p and each next portal r a flood goes on through what lies ahead of p and of the portal
+    before it, and beyond the planes that separate p from r.
     """
     stack = np.empty(len(g.leaf) + 1, np.int64)
+    visited = np.zeros(len(g.leaf), np.int64)
+    facing = np.zeros(len(g.leaf), np.int64)  # ± (p + 1): whether a portal is ahead of p, if known
+    wave = 0
     for p in range(first, last):
-        stack[0] = p
-        top = 1
-        while top > 0:
-            top -= 1
-            r = stack[top]
-            leaf = g.leaf[r]
-            for i in range(g.out_start[leaf], g.out_start[leaf + 1]):
-                q = g.out[i]
-                if has(front, p, q) and (r == p or has(front, r, q)) and not has(rows, p, q):
-                    rows[p, q >> 6] |= ONE << np.uint64(q & 63)
-                    stack[top] = q
-                    top += 1
+        leaf = g.leaf[p]
+        for i in range(g.out_start[leaf], g.out_start[leaf + 1]):
+            r = g.out[i]
+            if not ahead(g, p, r):
+                continue
+            rows[p, r >> 6] |= ONE << np.uint64(r & 63)
+            load(g.point, g.start, p >> 1, s.polygon, s.size, 0)
+            load(g.point, g.start, r >> 1, s.polygon, s.size, 1)
+            a, b = (1.0 if p & 1 == 0 else -1.0), (-1.0 if r & 1 == 0 else 1.0)
+            count = separate(
+                s.polygon, s.size, 0, p >> 1, a, 1, r >> 1, b, g.normal, s.plane, 0, g.slack
+            )
+            wave += 1
+            stack[0] = r
+            top = 1
+            while top > 0:
+                top -= 1
+                before = stack[top]
+                inside = g.leaf[before]
+                for j in range(g.out_start[inside], g.out_start[inside + 1]):
+                    q = g.out[j]
+                    if visited[q] == wave:
+                        continue
+                    if abs(facing[q]) != p + 1:
+                        facing[q] = p + 1 if ahead(g, p, q) else -p - 1
+                    if facing[q] < 0 or not ahead(g, before, q):
+                        continue
+                    visited[q] = wave  # what the planes hide, they hide from wherever it is reached
+                    now = beyond(g.point, g.start, g.ball, q >> 1, s.plane, 0, count, g.slack)
+                    if now != EMPTY:
+                        rows[p, q >> 6] |= ONE << np.uint64(q & 63)
+                        stack[top] = q
+                        top += 1
 
 
 @kernel
-def tighten(g: Geometry, known: Bits) -> None:
-    """One round of: what p may see, some q behind p's next leaf is or may see; then symmetry."""
-    n, words = known.shape
+def tighten(g: Geometry, _: Scratch, first: int, last: int, known: Bits, tighter: Bits) -> None:
+    """Rows first … last - 1 of ``tighter``: what p may see by ``known``, if some q behind p's next
+    leaf is it or may see it."""
+    words = known.shape[1]
     some = np.empty(words, np.uint64)
-    for p in range(n):
+    for p in range(first, last):
         some[:] = ZERO
         leaf = g.leaf[p]
         for i in range(g.out_start[leaf], g.out_start[leaf + 1]):
@@ -154,18 +173,56 @@ def tighten(g: Geometry, known: Bits) -> None:
                     some[w] |= known[q, w]
                 some[q >> 6] |= ONE << np.uint64(q & 63)
         for w in range(words):
-            known[p, w] &= some[w]
-    for p in range(n):
-        drop_unreturned(known, p)
+            tighter[p, w] = known[p, w] & some[w]
 
 
 @plain_kernel
-def drop_unreturned(known: Bits, p: int) -> None:
-    """Where p does not see q, the way back from q does not see the way back from p."""
+def transpose(square: Bits) -> None:
+    """A square of 64 × 64 bits (64,), turned about its diagonal in place: halves change places,
+    then the halves of halves (Warren, Hacker's Delight, 7-3)."""
+    step, mask = 32, np.uint64(0x00000000FFFFFFFF)
+    while step > 0:
+        shift = np.uint64(step)
+        i = 0
+        while i < 64:
+            moved = ((square[i] >> shift) ^ square[i | step]) & mask
+            square[i] ^= moved << shift
+            square[i | step] ^= moved
+            i = ((i | step) + 1) & ~step
+        step >>= 1
+        mask ^= mask << np.uint64(step)
+
+
+@kernel
+def return_sight(g: Geometry, _: Scratch, first: int, last: int, known: Bits) -> None:
+    """Rows of the blocks first … last - 1 of 64: p sees q only if the way back from q sees that
+    from p. Rows may change meanwhile: what they lose so, p loses here anyway.
+    """
+    count, words = len(g.leaf), known.shape[1]
+    square = np.empty(64, np.uint64)
+    odd = np.uint64(0xAAAAAAAAAAAAAAAA)
+    for block in range(first, last):
+        for w in range(words):
+            for i in range(64):
+                back = (w << 6) + i ^ 1
+                row = known[back, block] if back < count else ZERO
+                square[i] = (row & odd) >> ONE | (row & ~odd) << ONE
+            transpose(square)
+            for i in range(min(64, count - (block << 6))):
+                known[(block << 6) + i, w] &= square[i]
+
+
+@plain_kernel
+def drop_unreturned(known: Bits, p: int, dropped: Bits) -> None:
+    """Where p sees q no longer, ``dropped`` (W,), the way back from q does not see that from p."""
     back = p ^ 1
     w, keep = back >> 6, ~(ONE << np.uint64(back & 63))
-    for q in range(len(known)):
-        if not has(known, p, q):
+    for v in range(len(dropped)):
+        rest = dropped[v]
+        while rest != ZERO:
+            low = rest & (~rest + ONE)
+            rest &= ~low
+            q = (v << 6) + LOW_BIT[(low * DE_BRUIJN) >> np.uint64(58)]
             known[q ^ 1, w] &= keep
 
 

@@ -218,3 +218,40 @@ def test_a_glance_sees_a_straight_corridor_and_nothing_behind_a_corner(room_row,
         seen = np.zeros(1, np.uint64)
         assert kernels.glance(g, known, 0, seen, np.zeros((2, 3))) > 0
         assert seen[0] == sum(1 << q for q in range(2, last + 1, 2))
+
+
+@given(RANDOM)
+def test_transposing_bits(rng):
+    rows = rng.integers(0, 2**64, 64, dtype=np.uint64)
+    bits = np.unpackbits(rows.view(np.uint8).reshape(64, 8), axis=1, bitorder="little")
+    kernels.transpose(rows)
+    turned = np.unpackbits(rows.view(np.uint8).reshape(64, 8), axis=1, bitorder="little")
+    assert np.array_equal(turned, bits.T)
+
+
+@pytest.mark.parametrize("count", [2, 64, 70, 200])
+def test_sight_is_returned(room_row, count):
+    rng = np.random.default_rng(count)
+    cells = room_row(count // 2 + 1)[1]
+    normals = cells.portal_plane[:, :3]
+    g = geometry(
+        Portals(count // 2 + 1, cells.portal_leaf, normals, cells.portal_point, cells.portal_start)
+    )
+    sees = rng.random((count, count)) < 0.7
+    words = (count + 63) // 64
+    rows = np.zeros((count, words * 64), bool)
+    rows[:, :count] = sees
+    known = np.packbits(rows, axis=1, bitorder="little").view(np.uint64).reshape(count, words)
+    kernels.return_sight(g, scratch(g, words), 0, words, known)
+    back = np.arange(count) ^ 1
+    expected = sees & sees[back][:, back].T
+    found = np.unpackbits(known.view(np.uint8), axis=1, count=count, bitorder="little")
+    assert np.array_equal(found.astype(bool), expected)
+    # A bit that goes later takes its way back with it.
+    p, q = np.argwhere(expected)[0]
+    dropped = np.zeros(words, np.uint64)
+    dropped[q >> 6] = np.uint64(1) << np.uint64(q & 63)
+    kernels.drop_unreturned(known, p, dropped)
+    expected[q ^ 1, p ^ 1] = False
+    found = np.unpackbits(known.view(np.uint8), axis=1, count=count, bitorder="little")
+    assert np.array_equal(found.astype(bool), expected)
