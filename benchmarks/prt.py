@@ -163,7 +163,7 @@ class Sequences:
         return True
 
     def _passes_in_parts(self, sequence: tuple[int, ...]) -> bool:
-        """Whether each part passes, both ways: only its first and last portal are narrowed in one."""
+        """Whether each part passes, both ways: only the first and last portal of one narrow."""
         back = tuple(q ^ 1 for q in reversed(sequence))
         return all(
             self._parts.passes(way[first:])
