@@ -28,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
+from ptmtools.cells.nearby import Nearby
 from ptmtools.scene.model import Scene
 
 #: Directions of the parity rays. Fixed, in no simple relation to each other or to the axes, so
@@ -143,14 +144,13 @@ class Surroundings:
     Attributes
     ----------
     corners: (T, 3, 3) all surfaces, metres.
-    low, high: (T, 3) their bounding boxes.
+    nearby: finds those near a point.
     bodies: the closed ones with an inside.
     boxes: (B, 2, 3) the bounding boxes of the bodies.
     """
 
     corners: NDArray[np.float64]
-    low: NDArray[np.float64]
-    high: NDArray[np.float64]
+    nearby: Nearby
     bodies: tuple[Body, ...]
     boxes: NDArray[np.float64]
 
@@ -160,7 +160,7 @@ class Surroundings:
         corners = scene.corners
         found = tuple(bodies(scene, cells))
         boxes = np.array([body.box for body in found]).reshape(-1, 2, 3)
-        return Surroundings(corners, corners.min(axis=1), corners.max(axis=1), found, boxes)
+        return Surroundings(corners, Nearby(corners, 0.0), found, boxes)
 
     def in_matter(self, point: NDArray[np.float64]) -> bool:
         """Whether a (3,) point is inside a body."""
@@ -169,10 +169,9 @@ class Surroundings:
 
     def clearance(self, point: NDArray[np.float64], enough: float) -> float:
         """Distance in metres from a (3,) point to the nearest surface, at most ``enough``."""
-        near = np.all((self.low <= point + enough) & (self.high >= point - enough), axis=1)
-        if not near.any():
-            return enough
-        return min(enough, float(distances(self.corners[near] - point).min()))
+        near = self.corners[self.nearby.meeting(point - enough, point + enough)] - point
+        near = near[np.all((near.min(axis=1) <= enough) & (near.max(axis=1) >= -enough), axis=1)]
+        return min(enough, float(distances(near).min(initial=enough)))
 
 
 def distances(corners: NDArray[np.float64]) -> NDArray[np.float64]:
