@@ -10,7 +10,7 @@ node's cross-section that the wall covers, *balance* the smaller over the larger
 fragments on the two sides, *splits* the share of the other fragments that the plane cuts. Nodes
 are split in the order of the wall area that their best plane brings, so that a limit on the number
 of leaves keeps the best splits. Where no wall is left, the reveals of a thick wall may still split
-(`reveals`).
+(`reveals`), and last of all what closes the node's whole cross-section (`caps`).
 
 A split that would leave a side thinner than a leaf may be is refused: no leaf is flat after
 rounding to float32. Where it would leave a side thinner than the cluster distance (a picture on a
@@ -21,11 +21,13 @@ the near boundary that is open without it.
 from __future__ import annotations
 
 import heapq
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.cells.caps import Caps
 from ptmtools.cells.model import OUTSIDE
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, difference, intersection
@@ -42,6 +44,8 @@ SPLIT_WEIGHT = 0.2
 FRAGMENT_SHARE = 0.01
 #: Up to so many fragments of a node are asked by their corners, more by their boxes first.
 _FEW = 64
+#: What may split a node, in this order.
+_WALLS, _REVEALS, _CAPS = range(3)
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,7 @@ class Tree:
     children: (N, 2) int32 as in `Cells.node_child`.
     leaves: the convex polyhedra, face tags are node indices.
     unsplit: how many of them hold walls that the limit left in one piece.
+    capped: for each node that a cap splits, its polyhedron.
     """
 
     planes: NDArray[np.float64]
@@ -61,6 +66,7 @@ class Tree:
     children: NDArray[np.int32]
     leaves: tuple[Polyhedron, ...]
     unsplit: int = 0
+    capped: Mapping[int, Polyhedron] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -77,32 +83,35 @@ class _Fragment:
 
 @dataclass(order=True)
 class _Task:
-    """A node that waits for its split; `walled` until its walls are used up."""
+    """A node that waits for its split, and what its fragments are of: walls, reveals or caps."""
 
-    priority: tuple[int, int, int]
+    priority: tuple[bool, int, int, int]
     body: Polyhedron = field(compare=False)
     fragments: list[_Fragment] = field(compare=False)
     best: int = field(compare=False)
     parent: tuple[int, int] = field(compare=False)
-    walled: bool = field(compare=False)
+    source: int = field(compare=False)
 
 
 def build_tree(
     box: Polyhedron,
     walls: list[WallPlane],
     reveals: Reveals,
+    caps: Caps,
     options: SubdivideOptions,
     tolerance: Tolerance,
     progress: Progress,
 ) -> Tree:
-    """Split ``box`` by the planes of ``walls``, then of ``reveals``; the module tells the order."""
-    least = FRAGMENT_SHARE * options.wall_area
+    """Split ``box`` by the planes of ``walls``, then of ``reveals``, then of ``caps``; the
+    module tells the order."""
+    least = (FRAGMENT_SHARE * options.wall_area, 0.0, 0.0)
     planes: list[NDArray[np.float64]] = []
     taken: list[WallPlane] = []
     children: list[list[int]] = []
     leaves: list[Polyhedron] = []
     queue: list[_Task] = []
     unsplit = 0
+    capped: dict[int, Polyhedron] = {}
 
     def place(parent: tuple[int, int], child: int) -> None:
         if parent[0] >= 0:
@@ -113,26 +122,27 @@ def build_tree(
         leaves.append(body)
 
     def push(
-        body: Polyhedron, fragments: list[_Fragment], parent: tuple[int, int], walled: bool
+        body: Polyhedron, fragments: list[_Fragment], parent: tuple[int, int], source: int
     ) -> None:
-        best = _best_split(body, fragments, least if walled else 0.0, planes, taken, tolerance)
-        if best < 0 and walled:
-            walled = False
-            fragments = _sections(body, reveals.within(body, planes), tolerance)
-            best = _best_split(body, fragments, 0.0, planes, taken, tolerance)
+        best = _best_split(body, fragments, least[source], planes, taken, tolerance)
+        while best < 0 and source < _CAPS:
+            source += 1
+            more = reveals.within(body, planes) if source == _REVEALS else caps.within(body)
+            fragments = _sections(body, more, tolerance)
+            best = _best_split(body, fragments, least[source], planes, taken, tolerance)
         if best < 0:
             finish(body, parent)
             return
         share = fragments[best].area / tolerance.extent**2
-        priority = (-round(share / TIE_SHARE), len(planes), parent[1])
-        heapq.heappush(queue, _Task(priority, body, fragments, best, parent, walled))
+        priority = (source == _CAPS, -round(share / TIE_SHARE), len(planes), parent[1])
+        heapq.heappush(queue, _Task(priority, body, fragments, best, parent, source))
 
-    push(box, _sections(box, walls, tolerance), (-1, 0), True)
+    push(box, _sections(box, walls, tolerance), (-1, 0), _WALLS)
     while queue:
         task = heapq.heappop(queue)
         if len(leaves) + len(queue) + 2 > options.max_cells:
             finish(task.body, task.parent)
-            unsplit += 1
+            unsplit += task.source != _CAPS
             continue
         wall = task.fragments[task.best].wall
         plane = wall.frame.plane
@@ -140,6 +150,8 @@ def build_tree(
         planes.append(plane)
         taken.append(wall)
         children.append([OUTSIDE, OUTSIDE])
+        if task.source == _CAPS:
+            capped[node] = task.body
         place(task.parent, node)
         rest = [f for i, f in enumerate(task.fragments) if i != task.best]
         extents = _Extents(rest)
@@ -152,7 +164,11 @@ def build_tree(
                 for f, ahead in zip(rest, extents.ahead(facing, tolerance), strict=True)
                 if ahead
             ]
-            push(body, _fragments(inherited, tolerance), (node, side), task.walled)
+            # A part of what a cap closed may have other caps, so it is asked again.
+            if task.source == _CAPS:
+                push(body, [], (node, side), _REVEALS)
+            else:
+                push(body, _fragments(inherited, tolerance), (node, side), task.source)
         progress(len(leaves), len(leaves) + len(queue), "splitting")
     return Tree(
         np.array(planes).reshape(-1, 4),
@@ -160,6 +176,7 @@ def build_tree(
         np.array(children, dtype=np.int32).reshape(-1, 2),
         tuple(leaves),
         unsplit,
+        capped,
     )
 
 

@@ -1,4 +1,4 @@
-"""The triangles near a plane, found without looking at all of them.
+"""The triangles near a plane or in a box, found without looking at all of them.
 
 A building has as many wall planes as rooms and each holds a few of its triangles: asking every
 triangle of every plane is quadratic (800 rooms: 24,000 planes and a million triangles). Triangles
@@ -37,7 +37,14 @@ class Nearby:
         plane, along its normal, is in [low, high]."""
         distance = self._middle @ plane[:3] + plane[3]
         reach = self._half @ np.abs(plane[:3]) + self._margin
-        block = np.flatnonzero((distance + reach >= low) & (distance - reach <= high))
+        return self._members(np.flatnonzero((distance + reach >= low) & (distance - reach <= high)))
+
+    def meeting(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Triangles, ascending, among which are all that meet the box between two corners."""
+        apart = np.maximum(low - self._middle, self._middle - high) - self._half
+        return self._members(np.flatnonzero(np.all(apart <= self._margin, axis=1)))
+
+    def _members(self, block: NDArray[np.int64]) -> NDArray[np.int64]:
         row = (block[:, None] * _BLOCK + np.arange(_BLOCK)).ravel()
         return np.sort(self._order[row[row < len(self._order)]])
 

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.bsp import Tree
-from ptmtools.cells.planar import Geometry, difference, intersection, union
+from ptmtools.cells.planar import Geometry, difference, intersection, union, without_cracks
+from ptmtools.cells.rejoin import Rejoined
 from ptmtools.cells.structure import WallPlane
 from ptmtools.tolerance import Tolerance
 
@@ -27,12 +28,14 @@ class Portals:
 
     Attributes
     ----------
+    nodes: (K,) the node whose plane it lies in, ascending.
     leaves: (K, 2) the leaf behind and the leaf in front of the plane.
     planes: (K, 4), normals pointing into ``leaves[:, 1]``.
     polygons: (n, 3) each, convex, counter-clockwise seen against the normal.
     areas: (K,) m² open, before hulls.
     """
 
+    nodes: NDArray[np.int64]
     leaves: NDArray[np.int32]
     planes: NDArray[np.float64]
     polygons: tuple[NDArray[np.float64], ...]
@@ -42,6 +45,7 @@ class Portals:
         """Only the portals between kept leaves, with leaves renamed."""
         kept = np.flatnonzero(keep[self.leaves[:, 0]] & keep[self.leaves[:, 1]])
         return Portals(
+            self.nodes[kept],
             rename[self.leaves[kept]].astype(np.int32).reshape(-1, 2),
             self.planes[kept].reshape(-1, 4),
             tuple(self.polygons[k] for k in kept),
@@ -49,24 +53,57 @@ class Portals:
         )
 
 
-def find_portals(tree: Tree, tolerance: Tolerance) -> Portals:
-    """All openings between the leaves of a tree, in the order of its nodes."""
+def find_portals(
+    tree: Tree, tolerance: Tolerance, within: NDArray[np.bool_] | None = None
+) -> Portals:
+    """All openings between the leaves of a tree, in the order of its nodes; only those in nodes of
+    which ``within``, (N,), is true if it is given."""
     faces = _faces_by_node(tree)
+    nodes: list[int] = []
     leaves: list[tuple[int, int]] = []
     planes: list[NDArray[np.float64]] = []
     polygons: list[NDArray[np.float64]] = []
     areas: list[float] = []
     for node, wall in enumerate(tree.walls):
+        if within is not None and not within[node]:
+            continue
         for back, front, flat, area in _open_pieces(faces[node], wall, tolerance):
+            nodes.append(node)
             leaves.append((back, front))
             planes.append(tree.planes[node])
             polygons.append(wall.frame.to_space(flat))
             areas.append(area)
     return Portals(
+        np.array(nodes, dtype=np.int64),
         np.array(leaves, dtype=np.int32).reshape(-1, 2),
         np.array(planes).reshape(-1, 4),
         tuple(polygons),
         np.array(areas),
+    )
+
+
+def portals_rejoined(
+    portals: Portals, before: Tree, joint: Rejoined, tolerance: Tolerance
+) -> Portals:
+    """`find_portals` of a rejoined tree, with the ``portals`` of the tree ``before`` in every plane
+    in which no leaf has changed."""
+    changed = np.bincount(joint.leaf)[joint.leaf] > 1
+    stale = joint.node < 0
+    for leaf in np.flatnonzero(changed).tolist():
+        stale[[tag for tag in before.leaves[leaf].tags if tag >= 0]] = True
+    again = np.zeros(len(joint.tree.planes), dtype=bool)
+    again[joint.node[stale & (joint.node >= 0)]] = True
+    fresh = find_portals(joint.tree, tolerance, again)
+    kept = np.flatnonzero(~stale[portals.nodes])
+    nodes = np.concatenate([joint.node[portals.nodes[kept]], fresh.nodes])
+    order = np.argsort(nodes, kind="stable")
+    polygons = [portals.polygons[k] for k in kept] + list(fresh.polygons)
+    return Portals(
+        nodes[order],
+        np.concatenate([joint.leaf[portals.leaves[kept]], fresh.leaves])[order].astype(np.int32),
+        np.concatenate([portals.planes[kept], fresh.planes])[order],
+        tuple(polygons[k] for k in order),
+        np.concatenate([portals.areas[kept], fresh.areas])[order],
     )
 
 
@@ -105,8 +142,10 @@ def _open_pieces(
     i, j, shared = i[wide], j[wide], shared[wide]
     if len(shared) == 0:
         return []
-    opening = _without_cracks(
-        difference(union(shared, tolerance.grid), wall.blocking, tolerance.grid), tolerance
+    opening = without_cracks(
+        difference(union(shared, tolerance.grid), wall.blocking, tolerance.grid),
+        tolerance.hairline,
+        tolerance.grid,
     )
     if shapely.is_empty(opening):
         return []
@@ -119,17 +158,6 @@ def _open_pieces(
             hull = shapely.get_coordinates(_counter_clockwise(shapely.convex_hull(part)))[:-1]
             found.append((faces[1][b][0], faces[0][a][0], hull, float(shapely.area(part))))
     return found
-
-
-def _without_cracks(opening: Geometry, tolerance: Tolerance) -> Geometry:
-    """The opening less what is narrower than a hairline: a morphological opening, grown by twice
-    what was eroded and clipped, so that what stays is not shrunk. A crack under a wall would
-    otherwise stretch the hull of a door along all of it."""
-    import shapely
-
-    core = shapely.buffer(opening, -tolerance.hairline / 2, join_style="mitre")
-    grown = shapely.buffer(core, tolerance.hairline, join_style="mitre")
-    return intersection(opening, grown, tolerance.grid)
 
 
 def _wider_than(part: Geometry, width: float) -> bool:

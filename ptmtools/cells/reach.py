@@ -41,6 +41,14 @@ class Reach:
     closed: bool
     start: tuple[int, ...]
 
+    def renamed(self, leaf: NDArray[np.int64]) -> Reach:
+        """The same over leaves of which each of these, (L,), is or is part of ``leaf[i]``; parts
+        of one leaf must be reached alike."""
+        reached = np.zeros(int(leaf.max(initial=-1)) + 1, dtype=bool)
+        reached[leaf] = self.reached
+        start = tuple(dict.fromkeys(leaf[list(self.start)].tolist()))
+        return Reach(reached, self.closed, start)
+
 
 def flood(
     tree: Tree, portals: Portals, corners: NDArray[np.float64], start: tuple[int, ...]

@@ -18,15 +18,17 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.cells.bsp import Tree, build_tree
+from ptmtools.cells.bsp import FRAGMENT_SHARE, Tree, build_tree
+from ptmtools.cells.caps import Caps
 from ptmtools.cells.grouping import grouped
 from ptmtools.cells.model import OUTSIDE, Cells
 from ptmtools.cells.options import CellKind, SubdivideOptions
 from ptmtools.cells.orientation import main_axes
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.polyhedron import Polyhedron
-from ptmtools.cells.portals import Portals, find_portals
+from ptmtools.cells.portals import Portals, find_portals, portals_rejoined
 from ptmtools.cells.reach import Reach, flood, largest_with_floor, roofed_share
+from ptmtools.cells.rejoin import rejoined
 from ptmtools.cells.reveals import Reveals
 from ptmtools.cells.structure import WallPlane, find_walls, structural_triangles
 from ptmtools.errors import InputError
@@ -67,16 +69,17 @@ def subdivide(
     walls = find_walls(scene, options, tolerance)
     corners = scene.corners[structural_triangles(scene, options)]
     reveals = Reveals(corners, options.wall_thickness, tolerance)
+    caps = Caps(corners, FRAGMENT_SHARE * options.wall_area, tolerance)
     low, high = _bounds(scene.corners @ axes.T)
     margin = BOX_MARGIN * tolerance.extent
     wide = np.array([low - margin, high + margin])
-    space = _divide(wide, walls, reveals, corners, options, tolerance, progress, axes)
+    space = _divide(wide, walls, reveals, caps, corners, options, tolerance, progress, axes)
     notes: list[str] = []
     if not space.reach.closed:
         roofed = roofed_share(corners, options.wall_area)
         tight = _thickened(*_bounds(corners if len(corners) else scene.corners), tolerance)
         notes.append(_open_note(space, roofed, tight))
-        space = _divide(tight, walls, reveals, corners, options, tolerance, progress)
+        space = _divide(tight, walls, reveals, caps, corners, options, tolerance, progress)
     if space.tree.unsplit:
         notes.append(
             f"the limit of {options.max_cells:,} leaves was reached: {space.tree.unsplit:,} leaves "
@@ -132,6 +135,7 @@ def _divide(
     box: NDArray[np.float64],
     walls: list[WallPlane],
     reveals: Reveals,
+    caps: Caps,
     corners: NDArray[np.float64],
     options: SubdivideOptions,
     tolerance: Tolerance,
@@ -145,13 +149,18 @@ def _divide(
     if axes is not None:
         body = Polyhedron(body.points @ axes, body.faces, body.tags)
         box = np.stack(_bounds(body.points))
-    tree = build_tree(body, walls, reveals, options, tolerance, progress)
+    tree = build_tree(body, walls, reveals, caps, options, tolerance, progress)
     portals = find_portals(tree, tolerance)
     start = _viewpoint_leaves(tree, box, options)
     if not start and whole:
         every = np.ones(len(tree.leaves), dtype=bool)
         start = largest_with_floor(tree, every, corners) or _largest(tree)
-    return _Space(box, tree, portals, flood(tree, portals, corners, start))
+    reach = flood(tree, portals, corners, start)
+    if tree.capped:
+        joint = rejoined(tree, reach.reached)
+        portals = portals_rejoined(portals, tree, joint, tolerance)
+        tree, reach = joint.tree, reach.renamed(joint.leaf)
+    return _Space(box, tree, portals, reach)
 
 
 def _largest(tree: Tree) -> tuple[int, ...]:

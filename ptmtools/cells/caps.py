@@ -1,0 +1,143 @@
+"""Caps: small polygons that close the whole cross-section of a leaf.
+
+The planes of walls go on behind them and cut the solid matter of floors and walls into wedges. A
+flight of stairs does so to the floor slab beside it: between the slope and the top of the slab
+lie matter and a piece of the stairwell, and what parts the two is the edge of the slab, smaller
+than a wall; nor is it a reveal, for the wedge lies between no two parallel faces. It is
+recognised by what it does: no opening is left beside it. Such a split costs one leaf and never a
+portal. A polygon that leaves an opening, however small, is none.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.nearby import Nearby
+from ptmtools.cells.planar import difference, unite, without_cracks
+from ptmtools.cells.polyhedron import Polyhedron, section
+from ptmtools.cells.structure import Frame, WallPlane, lying_in, planes_of
+from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
+
+#: Areas are compared with this share to spare before polygons are.
+_SPARE = 1e-3
+#: So many planes are cut with a leaf at a time, and so many are held against all triangles.
+_CHUNK, _ROWS = 4096, 256
+
+
+class Caps:
+    """The structural triangles of a scene, to ask which of them close a leaf."""
+
+    def __init__(self, corners: NDArray[np.float64], least: float, tolerance: Tolerance) -> None:
+        """``corners``: (T, 3, 3) structural triangles; ``least``: m², smaller caps are none."""
+        self._least = least
+        self._corners = corners
+        self._planes, self._areas = planes_of(corners)
+        self._nearby = Nearby(corners, tolerance.rounding)
+        self._low, self._high = corners.min(axis=1), corners.max(axis=1)
+        self._tolerance = tolerance
+
+    def within(self, body: Polyhedron) -> list[WallPlane]:
+        """The planes in which what lies there leaves no opening between two parts of a body."""
+        low, high = body.points.min(axis=0), body.points.max(axis=0)
+        near = self._nearby.meeting(low, high)
+        slack = self._tolerance.plane
+        apart = (self._low[near] > high + slack) | (self._high[near] < low - slack)
+        near = near[~apart.any(axis=1)]
+        inside = near[self._reaching_into(body, near)]
+        areas = self._areas[inside]
+        needed = _section_areas(body, self._planes[inside]) * (1 - _SPARE)
+        least = (1 - _SPARE) * (1 - TIE_SHARE) * self._least
+        free = (needed >= least) & (needed <= areas.sum())
+        free[free] = needed[free] <= self._in_plane(inside[free], inside)
+        found: list[WallPlane] = []
+        for seed in ranked(areas):
+            if not free[seed]:
+                continue
+            plane = self._planes[inside[seed]]
+            members = np.flatnonzero(lying_in(plane, self._corners[inside], self._tolerance))
+            free[members] = False
+            free[seed] = False
+            if areas[members].sum() >= needed[seed]:
+                cap = self._closing(body, plane, near)
+                found += [cap] if cap else []
+        return found
+
+    def _reaching_into(self, body: Polyhedron, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Rows of those triangles that have a point farther inside each face than lies in its
+        plane: all that have a part inside, and few others."""
+        found = np.flatnonzero(self._areas[triangles] > 0)
+        for loop in body.faces:
+            p = body.points[loop]
+            normal = np.cross(p[1:-1] - p[0], p[2:] - p[0]).sum(axis=0)
+            normal /= np.linalg.norm(normal)
+            height = self._corners[triangles[found]] @ normal
+            found = found[height.min(axis=1) < p[0] @ normal - self._tolerance.plane]
+        return found
+
+    def _in_plane(
+        self, seeds: NDArray[np.int64], triangles: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """For each seed at least the area of those triangles that lie in its plane."""
+        middle, areas = self._corners[triangles].mean(axis=1), self._areas[triangles]
+        planes = self._planes[seeds]
+        found = [np.zeros(0)]
+        for first in range(0, len(planes), _ROWS):
+            plane = planes[first : first + _ROWS]
+            height = plane[:, :3] @ middle.T + plane[:, 3:]
+            found.append((np.abs(height) <= self._tolerance.plane) @ areas)
+        return np.concatenate(found)
+
+    def _closing(
+        self, body: Polyhedron, plane: NDArray[np.float64], near: NDArray[np.int64]
+    ) -> WallPlane | None:
+        """What lies in a plane, if it leaves no opening in a body's section with it."""
+        import shapely
+
+        tolerance = self._tolerance
+        outline = section(body, plane, tolerance.rounding)
+        if len(outline) < 3:
+            return None
+        frame = Frame.of(plane)
+        flat = near[lying_in(plane, self._corners[near], tolerance)]
+        blocking = unite(frame.to_plane(self._corners[flat]), tolerance.grid)
+        region = shapely.polygons(frame.to_plane(outline))
+        opening = without_cracks(
+            difference(region, blocking, tolerance.grid), tolerance.hairline, tolerance.grid
+        )
+        return WallPlane(frame, blocking, blocking) if shapely.is_empty(opening) else None
+
+
+def _section_areas(body: Polyhedron, planes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) areas (m²) of a body's sections with (n, 4) planes, but for rounding; infinite where a
+    plane does not cut it."""
+    edge = np.concatenate([np.stack([loop, np.roll(loop, -1)], axis=1) for loop in body.faces])
+    one, other = edge[edge[:, 0] < edge[:, 1]].T
+    areas = np.full(len(planes), np.inf)
+    for first in range(0, len(planes), _CHUNK):
+        plane = planes[first : first + _CHUNK]
+        height = plane[:, :3] @ body.points.T + plane[:, 3:]
+        crosses = (height[:, one] > 0) != (height[:, other] > 0)
+        cut = np.flatnonzero(crosses.any(axis=1))
+        a, b, crosses = height[cut][:, one], height[cut][:, other], crosses[cut]
+        t = np.divide(a, a - b, out=np.zeros(a.shape), where=crosses)[..., None]
+        points = body.points[one] * (1 - t) + body.points[other] * t
+        # An edge that is not cut repeats a corner, and adds nothing.
+        corner = points[np.arange(len(cut)), crosses.argmax(axis=1)][:, None]
+        points = np.where(crosses[..., None], points, corner) - corner
+        centre = points.mean(axis=1, keepdims=True)
+        areas[first + cut] = _around(points - centre, plane[cut, :3])
+    return areas
+
+
+def _around(points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) areas of the convex polygons with corners (n, k, 3), in any order, about 0."""
+    axis = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
+    u = np.cross(axis, normals)
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    v = np.cross(normals, u)
+    x, y = np.einsum("nki,ni->nk", points, u), np.einsum("nki,ni->nk", points, v)
+    order = np.argsort(np.arctan2(y, x), axis=1)
+    x, y = np.take_along_axis(x, order, 1), np.take_along_axis(y, order, 1)
+    doubled: NDArray[np.float64] = (x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1)).sum(axis=1)
+    return doubled / 2
