@@ -6,6 +6,9 @@ lie matter and a piece of the stairwell, and what parts the two is the edge of t
 than a wall; nor is it a reveal, for the wedge lies between no two parallel faces. It is
 recognised by what it does: no opening is left beside it. Such a split costs one leaf and never a
 portal. A polygon that leaves an opening, however small, is none.
+
+No area is too small: a chain of matter is as open as its narrowest end, and in the museum of 50
+rooms, with caps of 0.02 m² and more only, all of the 992 leaves stay that 365 are with all caps.
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ from ptmtools.cells.nearby import Nearby
 from ptmtools.cells.planar import difference, unite, without_cracks
 from ptmtools.cells.polyhedron import Polyhedron, section
 from ptmtools.cells.structure import Frame, WallPlane, lying_in, planes_of
-from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
+from ptmtools.tolerance import Tolerance, ranked
 
 #: Areas are compared with this share to spare before polygons are.
 _SPARE = 1e-3
@@ -28,9 +31,8 @@ _CHUNK, _ROWS = 4096, 256
 class Caps:
     """The structural triangles of a scene, to ask which of them close a leaf."""
 
-    def __init__(self, corners: NDArray[np.float64], least: float, tolerance: Tolerance) -> None:
-        """``corners``: (T, 3, 3) structural triangles; ``least``: m², smaller caps are none."""
-        self._least = least
+    def __init__(self, corners: NDArray[np.float64], tolerance: Tolerance) -> None:
+        """``corners``: (T, 3, 3) structural triangles."""
         self._corners = corners
         self._planes, self._areas = planes_of(corners)
         self._nearby = Nearby(corners, tolerance.rounding)
@@ -47,8 +49,7 @@ class Caps:
         inside = near[self._reaching_into(body, near)]
         areas = self._areas[inside]
         needed = _section_areas(body, self._planes[inside]) * (1 - _SPARE)
-        least = (1 - _SPARE) * (1 - TIE_SHARE) * self._least
-        free = (needed >= least) & (needed <= areas.sum())
+        free = needed <= areas.sum()
         free[free] = needed[free] <= self._in_plane(inside[free], inside)
         found: list[WallPlane] = []
         for seed in ranked(areas):

@@ -18,7 +18,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.cells.bsp import FRAGMENT_SHARE, Tree, build_tree
+from ptmtools.cells.bsp import Tree, build_tree
 from ptmtools.cells.caps import Caps
 from ptmtools.cells.grouping import grouped
 from ptmtools.cells.model import OUTSIDE, Cells
@@ -69,7 +69,7 @@ def subdivide(
     walls = find_walls(scene, options, tolerance)
     corners = scene.corners[structural_triangles(scene, options)]
     reveals = Reveals(corners, options.wall_thickness, tolerance)
-    caps = Caps(corners, FRAGMENT_SHARE * options.wall_area, tolerance)
+    caps = Caps(corners, tolerance)
     low, high = _bounds(scene.corners @ axes.T)
     margin = BOX_MARGIN * tolerance.extent
     wide = np.array([low - margin, high + margin])
