@@ -12,30 +12,31 @@ SHOWN_LEAKS = 5
 def tell_pvs(voice: Voice, told: PvsReport) -> None:
     """The report as lines on stdout."""
     voice.say(
-        f"{count(told.cells, 'cell')}, {count(told.portals, 'portal')}; a cell sees "
-        f"{told.average:.1f} cells on average, itself included"
+        f"{count(told.cells, 'cell')}; {count(told.portals, 'portal')}, {told.doors:,} of them "
+        f"between cells; a cell sees {told.average:.1f} cells on average, itself included"
     )
     if not told.conservative:
         voice.say("sampled: what no random line showed is missing")
-    voice.say(
-        "cells seen, by share of the cells that see no more: "
-        + ", ".join(f"{share:.0%} {sees:,}" for share, sees in told.sizes)
-    )
+    if told.cells > 1:
+        voice.say("cells seen: " + ", ".join(_share(*size) for size in told.sizes))
     if told.costliest:
-        voice.say(
-            f"{told.operations:,} operations; {count(told.fallbacks, 'portal')} cut short by the "
-            "budget"
-        )
-        voice.say(
-            f"{count(told.ties, 'sequence')} of portals rejected by a hair (16 roundings); "
-            f"{told.decided:,} mattered and were decided in exact arithmetic: {told.opened:,} open"
-        )
+        cut = f"; {count(told.fallbacks, 'portal')} cut short" if told.fallbacks else ""
+        voice.say(f"{told.operations:,} operations{cut}")
+        if told.ties:
+            exactly = (
+                f"{told.decided:,} that may matter decided in exact arithmetic: "
+                f"{told.decided - told.opened:,} closed, {told.opened:,} open"
+            )
+            voice.say(
+                f"{count(told.ties, 'near-tie')}, " + (exactly if told.decided else "none matters")
+            )
         voice.say("the costliest portals:")
         for dear in told.costliest:
             cut = ", cut short" if dear.cut else ""
             voice.say(f"  {dear.operations:10,}  {_place(dear)}{cut}")
     if not told.leaks:
-        voice.say("no leaks: no cell sees more than three times what most do")
+        if told.cells > 1:
+            voice.say("no leaks: no one opening shows a cell suspiciously much")
         return
     voice.say("cells that see more than three times the median, and the smallest opening that")
     voice.say("shows them half of it (a gap that nobody meant?):")
@@ -48,7 +49,20 @@ def tell_pvs(voice: Voice, told: PvsReport) -> None:
         voice.say(f"  … and {len(told.leaks) - shown} more; -v shows them")
 
 
+def _share(share: float, sees: int) -> str:
+    """How many cells this share of the cells see at most."""
+    match share:
+        case 0.0:
+            return f"least {sees:,}"
+        case 0.5:
+            return f"median {sees:,}"
+        case 1.0:
+            return f"most {sees:,}"
+    return f"{share:.0%} ≤ {sees:,}"
+
+
 def _place(one: PortalFacts) -> str:
-    between = " and ".join(str(cell) for cell in one.cells)
+    a, b = one.cells
+    where = f"between cells {a} and {b}" if a != b else f"inside cell {a}"
     at = ",".join(f"{c:.2f}" for c in one.centre)
-    return f"portal {one.portal} between cells {between}, {one.area:.3g} m² at {at}"
+    return f"portal {one.portal} {where}, {one.area:.3g} m² at {at}"

@@ -32,6 +32,8 @@ _WALL, _SEE_THROUGH, _PORTAL, _CHOSEN = "#1c2733", "#7d8fd8", "#f0562d", "#b0125
 _SHADES = "YlGnBu"
 #: The least share that has a shade of its own; smaller ones look like it.
 _FAINTEST = 1e-4
+#: The shade of all visible cells while no shares are known.
+_EVEN = 0.005
 #: Cells with a larger share have so dark a shade that their number is white.
 _DARK = 0.02
 #: Numbers are left out of cells narrower than this many points on paper.
@@ -117,9 +119,10 @@ class _Plan:
         self._opaque = scene.opaque[cells.triangle_source]
         self._leaks = leaks_by_portal(pvs)
         self._shade: dict[int, float] | None = None
+        self._shares_known = ach is not None
         if options.cell is not None and pvs is not None:
             row = pvs.row(options.cell)
-            share = np.full(len(row), 1 / len(row)) if ach is None else ach.row(options.cell)
+            share = np.full(len(row), _EVEN) if ach is None else ach.row(options.cell)
             self._shade = dict(zip(row.tolist(), share.tolist(), strict=True))
         # Seen from above with X to the right and Z down, or Z to the right and X up.
         plan = cells.leaf_point[:, [0, 2]]
@@ -138,7 +141,8 @@ class _Plan:
 
         span = self._high - self._low
         width = self._options.width
-        bar = _BAR if self._shade is not None else 0.0
+        barred = self._shade is not None and self._shares_known
+        bar = _BAR if barred else 0.0
         columns = 2 if len(self._floors) > 1 and span[0] < 1.6 * span[1] else 1
         rows = -(-len(self._floors) // columns)
         panel = (width - 2 * _MARGIN - bar - (columns - 1) * _GAP) / columns
@@ -155,7 +159,7 @@ class _Plan:
             axis.set(xlim=(self._low[0], self._high[0]), ylim=(self._high[1], self._low[1]))
             self._storey(axis, floor, shades, panel)
             draw_leaks(axis, self._cells, self._leaks, self._floors, i, self._shown)
-        if self._shade is not None:
+        if barred:
             long = min(0.8 * (height - _HEAD), 4.0)
             low = height - _HEAD - _CAPTION - long
             place = (1 - (_MARGIN + 0.58) / width, low / height, 0.14 / width, long / height)
@@ -211,7 +215,7 @@ class _Plan:
         self._scale_bar(axis)
         numbers = len({cell for cell, _ in sections})
         axis.set_title(
-            f"floor {floor:+.2f} m, cut at {height:+.2f} m: {numbers} cells",
+            f"floor {floor:+.2f} m, cut at {height:+.2f} m: {_count(numbers, 'cell')}",
             fontsize=9,
             color=_INK,
             loc="left",
@@ -298,7 +302,8 @@ class _Plan:
         from matplotlib.lines import Line2D
 
         cells, chosen = self._cells, self._options.cell
-        parts = [f"{cells.cell_count} cells", f"{len(self._doors())} portals"]
+        doors = _count(len(self._doors()), "portal")
+        parts = [_count(cells.cell_count, "cell"), f"{doors} between them"]
         if self._pvs is not None:
             parts.append(f"average PVS {100 * self._pvs.average_share:.1f} %")
         if len(self._floors) > 1:
@@ -357,6 +362,10 @@ def _middle(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
     if total <= 0:
         return np.asarray(polygon.mean(axis=0))
     return np.asarray(polygon[0] + ((a + b) * cross[:, None]).sum(axis=0) / (3 * total))
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number:,} {what}" + "s" * (number != 1)
 
 
 def _round_length(length: float) -> float:

@@ -3,8 +3,12 @@
 The flow rejects a sequence when a polygon ends within a few roundings of a plane. Whether it ends
 before or behind it is then beyond floating point, and is decided here: the same clipping (see
 `flow`), in integers. A point is (X, Y, Z, W) with W > 0, a plane (A, B, C, D), the side of a point
-the sign of their product. Coordinates are those stored, which as binary fractions are integers over
-a power of two; portals are made truly plane by moving their vertices along one axis.
+the sign of their product. Coordinates are those of the kernels, which as binary fractions are
+integers over a power of two; portals are made truly plane by moving their vertices along one axis.
+
+What is decided so is decided of these coordinates, and their last digits are noise: in a building
+that is turned, the edges of doors that meet in a line no longer do, by 1e-16 of its extent. Portals
+are therefore drawn in by `NOISE` first. A line that passes has that much room on all sides.
 
 Numbers grow with every cut. A new vertex with more than `BITS` is rounded *along its edge* to the
 outer side, so that polygons only ever grow: what is found empty is so for certain, what is found
@@ -15,16 +19,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from math import gcd
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-if TYPE_CHECKING:
-    from ptmtools.visibility.kernels import Geometry
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.visibility.storage import Geometry
 
 Point = tuple[int, int, int, int]
 Plane = tuple[int, int, int, int]
 Line = tuple[int, int, int, int, int, int]
 Polygon = list[Point]
 
+#: Of the rounding by which the search itself errs, the share that coordinates may have lost.
+NOISE = 1e-4
 #: Vertices with longer numbers are rounded outwards, to shares of an edge of `SHARE` bits.
 BITS, SHARE = 1024, 192
 
@@ -73,7 +81,7 @@ class ExactPortals:
 
     def _exactly(self, k: int) -> tuple[Polygon, Plane]:
         g = self._geometry
-        points = [_binary(row) for row in g.point[g.start[k] : g.start[k + 1]].tolist()]
+        points = [_binary(row) for row in self._drawn_in(k).tolist()]
         a, b, c, _ = _binary(g.normal[k].tolist())
         x, y, z, w = points[0]
         plane = (a * w, b * w, c * w, -(a * x + b * y + c * z))
@@ -88,6 +96,16 @@ class ExactPortals:
             new[axis] -= shift
             moved.append(_reduced((new[0], new[1], new[2], new[3])))
         return moved, plane
+
+    def _drawn_in(self, k: int) -> NDArray[np.float64]:
+        """(n, 3) the vertices of a portal, moved towards its middle, and no further."""
+        g = self._geometry
+        points = g.point[g.start[k] : g.start[k + 1]]
+        inward = g.ball[k, :3] - points
+        way = np.linalg.norm(inward, axis=1, keepdims=True)
+        share = np.divide(NOISE * g.slack, way, out=np.ones_like(way), where=way > 0)
+        moved: NDArray[np.float64] = points + np.minimum(share, 1.0) * inward
+        return moved
 
 
 def _beyond(left: _Left, portal: Polygon, plane: Plane) -> _Left | None:

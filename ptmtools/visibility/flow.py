@@ -17,6 +17,7 @@ Over the textbook:
   seen; if none is left, the whole subtree is.
 * A search that grows long shoots one line at each portal that is still possible. What a line
   crosses is seen without a search; what is left to refute is little, even in an open hall.
+* What is rejected by less than the rounding of the arithmetic is decided exactly (`hairs`).
 * Each source portal has a budget of operations, not of seconds. When it is spent, open branches
   are not followed; what their separators leave of the possible set counts as seen.
 
@@ -33,11 +34,11 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,10 +46,15 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError, LimitError
 from ptmtools.progress import Progress, silent
 from ptmtools.tolerance import Tolerance
+from ptmtools.visibility.storage import Geometry, Scratch
 
 if TYPE_CHECKING:
     from ptmtools.visibility.exact import ExactPortals
-    from ptmtools.visibility.kernels import Geometry, Scratch
+
+Tool = TypeVar("Tool")
+Task = TypeVar("Task")
+Span = tuple[int, int]
+Rows = NDArray[np.uint64]
 
 #: Portals whose results appear to the others at once.
 BATCH = 64
@@ -127,10 +133,11 @@ def portal_flow(
 
     Parameters
     ----------
-    budget: operations for each directed portal; see the module's head.
+    budget: operations for each search from a directed portal; see the module's head. With ``exact``
+        a search may be repeated until three budgets are spent.
     workers: threads; None takes one for each processor. The result is the same for any number.
     exact: whether sequences rejected by a hair are decided again in exact arithmetic (`hairs`);
-        otherwise lines of sight thinner than a few roundings are not seen.
+        otherwise lines of sight thinner than a rounding are not seen.
 
     Raises InputError PTM-I400 (arrays that do not fit together), PTM-I401 (a coordinate
     that is not finite); LimitError PTM-L400 (more portals than fit into memory).
@@ -149,7 +156,7 @@ def portal_flow(
     if count == 0:
         return PortalFlow(np.zeros((0, words), dtype=np.uint64), cut, *counts)
 
-    from ptmtools.visibility import kernels
+    from ptmtools.visibility.bits.kernels import drop_unreturned
     from ptmtools.visibility.exact import ExactPortals
     from ptmtools.visibility.hairs import searched
 
@@ -162,58 +169,72 @@ def portal_flow(
         for first in range(0, count, BATCH):
             batch = order[first : first + BATCH]
             seen = np.zeros((len(batch), words), dtype=np.uint64)
-            waiting = deque(range(len(batch)))
 
             def search(
                 tools: tuple[Scratch, ExactPortals | None],
+                i: int,
                 batch: NDArray[np.int64] = batch,
                 seen: NDArray[np.uint64] = seen,
-                waiting: deque[int] = waiting,
             ) -> None:
-                while True:
-                    try:
-                        i = waiting.popleft()
-                    except IndexError:
-                        return
-                    p = int(batch[i])
-                    cut[p], *counts[:, p] = searched(g, *tools, known, p, budget, seen[i])
+                p = int(batch[i])
+                cut[p], *counts[:, p] = searched(g, *tools, known, p, budget, seen[i])
 
-            list(pool.map(search, storage))
+            _each(pool, storage, range(len(batch)), search)
             dropped = known[batch] & ~seen
             known[batch] = seen
             for p, row in zip(batch, dropped, strict=True):
-                kernels.drop_unreturned(known, p, row)
+                drop_unreturned(known, p, row)
             progress(min(first + BATCH, count), count, "portals")
     return PortalFlow(known, cut[0::2] | cut[1::2], *(counts[:, 0::2] + counts[:, 1::2]))
 
 
-def _prepass(g: Geometry, storage: list[Scratch], pool: ThreadPoolExecutor) -> NDArray[np.uint64]:
+def _each(
+    pool: ThreadPoolExecutor,
+    tools: Sequence[Tool],
+    tasks: Iterable[Task],
+    work: Callable[[Tool, Task], None],
+) -> None:
+    """Does all tasks, each worker with a tool of its own."""
+    waiting = deque(tasks)
+
+    def serve(tool: Tool) -> None:
+        while True:
+            try:
+                task = waiting.popleft()
+            except IndexError:
+                return
+            work(tool, task)
+
+    list(pool.map(serve, tools))
+
+
+def _prepass(g: Geometry, storage: Sequence[Scratch], pool: ThreadPoolExecutor) -> Rows:
     """(2K, W) a first upper bound of what each directed portal sees, from planes and floods."""
-    from ptmtools.visibility import kernels
+    from ptmtools.visibility.bits.kernels import return_sight
+    from ptmtools.visibility.prepass.kernels import flood, tighten
 
     count, words = len(g.leaf), storage[0].might.shape[1]
     known, tighter = np.zeros((2, count, words), dtype=np.uint64)
-    parts = 8 * len(storage)
 
-    def share(what: Callable[..., None], length: int, *matrices: NDArray[np.uint64]) -> None:
-        spans = deque(pairwise(np.linspace(0, length, parts + 1).astype(np.int64).tolist()))
+    def spans(length: int) -> Iterable[Span]:
+        return pairwise(np.linspace(0, length, 8 * len(storage) + 1).astype(np.int64).tolist())
 
-        def work(s: Scratch) -> None:
-            while True:
-                try:
-                    span = spans.popleft()
-                except IndexError:
-                    return
-                what(g, s, *span, *matrices)
+    def by_floods(s: Scratch, span: Span, rows: Rows = known) -> None:
+        flood(g, s, span[0], span[1], rows)
 
-        list(pool.map(work, storage))
+    _each(pool, storage, spans(count), by_floods)
+    for left in range(ROUNDS, -1, -1):
 
-    share(kernels.flood, count, known)
-    share(kernels.return_sight, words, known)
-    for _ in range(ROUNDS):
-        share(kernels.tighten, count, known, tighter)
-        known, tighter = tighter, known
-        share(kernels.return_sight, words, known)
+        def returned(_: Scratch, span: Span, rows: Rows = known) -> None:
+            return_sight(rows, span[0], span[1])
+
+        def by_neighbours(_: Scratch, span: Span, rows: Rows = known, to: Rows = tighter) -> None:
+            tighten(g, span[0], span[1], rows, to)
+
+        _each(pool, storage, spans(words), returned)
+        if left:
+            _each(pool, storage, spans(count), by_neighbours)
+            known, tighter = tighter, known
     return known
 
 
@@ -239,7 +260,6 @@ def check(portals: Portals) -> None:
 
 def geometry(portals: Portals) -> Geometry:
     """The portals as the kernels want them: centred, wound about their normals, with bounds."""
-    from ptmtools.visibility.kernels import Geometry
 
     start = portals.start.astype(np.int64)
     sizes = np.diff(start)
@@ -281,7 +301,6 @@ def geometry(portals: Portals) -> Geometry:
 
 def scratch(g: Geometry, words: int) -> Scratch:
     """Working storage for one worker."""
-    from ptmtools.visibility.kernels import Scratch
 
     depth = min(DEPTH, len(g.leaf) + 1)
     vertices = int(np.diff(g.start).max()) + GROWTH

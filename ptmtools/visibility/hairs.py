@@ -4,24 +4,23 @@ A search tells which sequences of portals it rejected by less than the rounding 
 allows to be sure of (`winding`). Another one that lets them all through tells what depends on
 them, mostly nothing. Those on which something depends are put to `ExactPortals`. Where a line can
 pass one, the search is done again with that let through, as often as this brings up new ones. Where
-there are too many, all are let through: the result is looser, and conservative as ever.
+there are too many, or a budget ends, all are let through: looser, and conservative as ever.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.visibility.exact import ExactPortals
+from ptmtools.visibility.storage import Geometry, Scratch
 
-if TYPE_CHECKING:
-    from ptmtools.visibility.kernels import Geometry, Scratch
-
-#: Sequences decided exactly for one directed portal, and searches done again, at most.
-DECIDED, AGAIN = 64, 8
+#: Sequences decided exactly for one directed portal, at most.
+DECIDED = 64
+#: No search is done again when this many budgets are spent.
+COSTLIEST = 3
 
 
 class Searched(NamedTuple):
@@ -56,50 +55,59 @@ def searched(
 
     none = np.zeros(0, np.uint64)
     work, cut, ties, used = kernels.flow(g, s, known, source, budget, none, False, seen)
-    if ties == 0 or arithmetic is None:
-        return Searched(cut, work, ties, 0, 0)
-    rejected = set(_sequences(s.hair[:used]))
-    hidden = known[source] & ~seen
-    if not any(_matters(known, hidden, sequence[-1]) for sequence in rejected):
+    rejected = set(noted := _sequences(s.hair[:used]))
+    overflown = len(noted) < ties
+    if arithmetic is None or not (
+        overflown or _that_matter(known, known[source] & ~seen, rejected)
+    ):
         return Searched(cut, work, ties, 0, 0)
     # With all of them let through, what more is seen? What is seen already need not be found again.
     most = seen.copy()
-    work += kernels.flow(g, s, known, source, budget, none, True, most)[0]
+    more, loosely, _, _ = kernels.flow(g, s, known, source, budget, none, True, most)
+    work += more
     passes: dict[tuple[int, ...], bool] = {}
-    for _ in range(AGAIN):
-        doubtful = most & ~seen
-        new = sorted(
-            sequence
-            for sequence in rejected - passes.keys()
-            if _matters(known, doubtful, sequence[-1])
-        )
-        if used > len(s.hair) // 2 or len(passes) + len(new) > DECIDED:
+    while not (cut or loosely or overflown) and work < COSTLIEST * budget:
+        new = _that_matter(known, most & ~seen, rejected - passes.keys())
+        if len(passes) + len(new) > DECIDED:
             break
         for sequence in new:
             passes[sequence] = arithmetic.passes((source, *sequence))
         if not any(passes[sequence] for sequence in new):
-            return Searched(cut, work, ties, len(passes), sum(passes.values()))
-        through = [sequence for sequence, open_ in passes.items() if open_]
-        marks = [kernels.mark(np.array(way, np.int64), 0, len(way)) for way in through]
-        opened = np.sort(np.array(marks, np.uint64))
+            return Searched(False, work, ties, len(passes), sum(passes.values()))
+        opened = np.sort(np.array([_mark(way) for way, open_ in passes.items() if open_]))
         more, cut, found, used = kernels.flow(g, s, known, source, budget, opened, False, seen)
         work, ties = work + more, max(ties, found)
-        rejected = set(_sequences(s.hair[:used]))
-    seen[:] = most
+        rejected = set(noted := _sequences(s.hair[:used]))
+        overflown = len(noted) < found
+    seen |= most
     return Searched(True, work, ties, len(passes), sum(passes.values()))
 
 
-def _sequences(words: NDArray[np.int64]) -> Iterator[tuple[int, ...]]:
+def _mark(sequence: tuple[int, ...]) -> np.uint64:
+    from ptmtools.visibility import kernels
+
+    return np.uint64(kernels.mark(np.array(sequence, np.int64), 0, len(sequence)))
+
+
+def _sequences(words: NDArray[np.int64]) -> list[tuple[int, ...]]:
     """The sequences in `Scratch.hair`, each after its length."""
     row = words.tolist()
+    found = []
     at = 0
     while at < len(row):
         following = at + 1 + row[at]
-        yield tuple(row[at + 1 : following])
+        found.append(tuple(row[at + 1 : following]))
         at = following
+    return found
 
 
-def _matters(known: NDArray[np.uint64], doubtful: NDArray[np.uint64], last: int) -> bool:
-    """Whether the last portal of a rejected sequence, or what may lie behind it, is doubtful."""
-    itself = int(doubtful[last >> 6]) >> (last & 63) & 1
-    return bool(itself or np.any(known[last] & doubtful))
+def _that_matter(
+    known: NDArray[np.uint64], doubtful: NDArray[np.uint64], rejected: set[tuple[int, ...]]
+) -> list[tuple[int, ...]]:
+    """The rejected sequences, in order, whose last portal, or what may lie behind it, is among the
+    ``doubtful`` (W,)."""
+    lasts = np.array(sorted({sequence[-1] for sequence in rejected}), np.int64)
+    itself = doubtful[lasts >> 6] >> (lasts & 63).astype(np.uint64) & np.uint64(1)
+    matter = itself.astype(bool) | np.any(known[lasts] & doubtful, axis=1)
+    kept = set(lasts[matter].tolist())
+    return sorted(sequence for sequence in rejected if sequence[-1] in kept)

@@ -34,7 +34,7 @@ class PvsOptions:
         before what it has not refuted counts as visible; the result is conservative at any value.
     lines: random lines through each portal, where sampled.
     exact: whether what floating point rejects by a hair is decided again in exact arithmetic;
-        otherwise lines of sight thinner than a few roundings are not seen.
+        otherwise lines of sight thinner than a rounding are not seen.
     workers: threads, None for one per processor; never changes the result.
     """
 
@@ -45,10 +45,11 @@ class PvsOptions:
     workers: int | None = None
 
     def __post_init__(self) -> None:
+        wrong = f"budget {self.budget}" if self.budget < 0 else f"workers {self.workers}"
         if self.budget < 0 or (self.workers is not None and self.workers < 1):
             raise InputError(
                 "PTM-I402",
-                f"budget {self.budget} or workers {self.workers} is out of range",
+                f"{wrong} is out of range",
                 remedy="give a budget of at least 0 and at least one worker",
             )
         if self.method not in ("full", "fast", "sampled") or self.lines < 1:
@@ -67,7 +68,7 @@ def compute_pvs(
     Unless it is sampled, a pair of cells is left out only if no straight line, but for hairlines
     thinner than the rounding of the coordinates (`Tolerance.rounding`), leads from one to the other
     through portals. Cells that share a portal always see each other. `Pvs.fallbacks` counts the
-    portals whose search was cut short by the budget.
+    portals whose search was cut short.
 
     Raises what `portal_flow` raises.
     """

@@ -67,7 +67,7 @@ class PvsReport:
 
     Attributes
     ----------
-    cells, portals: how many there are.
+    cells, portals: how many there are. doors: portals between two cells.
     sizes: share of the cells → cells that this share of them sees at most, for `QUANTILES`.
     average: cells that a cell sees, itself included.
     operations: chain tests and clips in all. fallbacks: portals whose search was cut short.
@@ -79,6 +79,7 @@ class PvsReport:
 
     cells: int
     portals: int
+    doors: int
     sizes: tuple[tuple[float, int], ...]
     average: float
     operations: int
@@ -97,9 +98,11 @@ def report(cells: Cells, pvs: Pvs) -> PvsReport:
     count = len(sees)
     at = [min(count - 1, int(np.ceil(q * count)) - 1) if q else 0 for q in QUANTILES]
     order = np.lexsort((np.arange(len(pvs.work)), -pvs.work))[:COSTLIEST]
+    ends = cells.portal_leaf.reshape(-1, 2)
     return PvsReport(
         cells=count,
         portals=cells.portal_count,
+        doors=int(np.count_nonzero(np.ptp(cells.leaf_cell[ends], axis=1))),
         sizes=tuple((q, int(sees[i])) for q, i in zip(QUANTILES, at, strict=True) if count),
         average=float(sees.mean()) if count else 0.0,
         operations=int(pvs.work.sum()),

@@ -1,0 +1,1 @@
+"""Square matrices of bits: who sees whom, over directed portals."""

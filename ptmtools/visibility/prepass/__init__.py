@@ -1,0 +1,1 @@
+"""A first, quick bound of what each portal sees."""

@@ -1,0 +1,42 @@
+"""What the kernels work on: portals, and working storage."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bits = NDArray[np.uint64]
+
+
+class Geometry(NamedTuple):
+    """Portals ready for the kernels; `flow.geometry` fills it."""
+
+    point: Floats  # (Q, 3) centred on the scene
+    start: Ints  # (K + 1,)
+    normal: Floats  # (K, 3)
+    low: Floats  # (K,) least and
+    high: Floats  # (K,) greatest normal·x over the portal's own points
+    ball: Floats  # (K, 4) centre and radius of a ball around it
+    leaf: Ints  # (2K,) the leaf that a directed portal leads into
+    out_start: Ints  # (L + 1,) CSR over leaves:
+    out: Ints  # (2K,) the directed portals that lead out of a leaf
+    slack: float  # distances below this are rounding
+
+
+class Scratch(NamedTuple):
+    """Working storage of one worker; `flow.scratch` sizes it."""
+
+    polygon: Floats  # (2D + 3, V, 3)
+    size: Ints  # (2D + 3,)
+    plane: Floats  # (D + 1, 2V, 4) normal and offset: kept is where n·x >= offset
+    planes: Ints  # (D + 1,) how many
+    might: Bits  # (D, W) bits
+    via: Ints  # (D + 1,) the directed portal that led into the frame
+    at: Ints  # (D,) next candidate, index into out
+    distance: Floats  # (V,)
+    line: Floats  # (2, 3) a point and a direction
+    hair: Ints  # (H,) sequences rejected by a hair, each after its length

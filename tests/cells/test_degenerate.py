@@ -1,0 +1,111 @@
+"""Models that no architect would draw and every exporter writes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ptmtools.cells import Cells, SubdivideOptions, subdivide
+from ptmtools.scene.model import Material, Scene
+from ptmtools.visibility import check_conservative, compute_pvs
+
+LEAF = SubdivideOptions(cells="leaf")
+LOW, HIGH = (0, 0, -2), (8, 4, 2)
+
+
+def triangles(corners: np.ndarray) -> Scene:
+    """A scene of (n, 3, 3) corners, one object and one material."""
+    count = len(corners)
+    return Scene(
+        points=corners.reshape(-1, 3).astype(np.float64),
+        triangles=np.arange(3 * count, dtype=np.int32).reshape(-1, 3),
+        uv=np.zeros((count, 3, 2)),
+        triangle_object=np.zeros(count, dtype=np.int32),
+        triangle_material=np.zeros(count, dtype=np.int32),
+        two_sided=np.ones(count, dtype=bool),
+        objects=("all",),
+        materials=(Material("plain"),),
+    )
+
+
+def assert_sound(scene: Scene, cells: Cells, segments: int = 20_000) -> None:
+    """Cells see themselves and their neighbours, and no segment finds more."""
+    pvs = compute_pvs(cells)
+    seen = pvs.to_matrix()
+    assert np.array_equal(seen, seen.T)
+    assert seen.diagonal().all()
+    for cell, neighbours in enumerate(cells.adjacent()):
+        assert seen[cell, neighbours].all()
+    report = check_conservative(scene.corners, cells, pvs, segments)
+    assert report.tried > segments / 2
+    assert report.missed == ()
+
+
+def test_an_empty_room_is_one_cell(quads, room_faces) -> None:
+    scene = quads(room_faces(LOW, HIGH))
+    cells = subdivide(scene)
+    assert (cells.closed, cells.leaf_count, cells.cell_count, cells.portal_count) == (True, 1, 1, 0)
+    assert cells.leaf_volumes() == pytest.approx([128])
+    assert compute_pvs(cells).cell.tolist() == [0]
+    assert_sound(scene, cells)
+
+
+@pytest.mark.parametrize("thick", [0.0, 1e-12, 1e-7, 1e-5])
+def test_walls_with_hardly_any_thickness(quads, room_faces, partition, thick: float) -> None:
+    """Two sheets, or one twice, around nothing: two rooms and the door, no cell between."""
+    sheets = [face for x in (4, 4 + thick) for face in partition(x, (0, 3, -1, 1))]
+    scene = quads(room_faces(LOW, HIGH) + sheets)
+    cells = subdivide(scene, LEAF)
+    assert cells.closed
+    assert cells.leaf_count == 2
+    assert cells.portal_area == pytest.approx([6.0], rel=1e-4)
+    assert_sound(scene, cells)
+
+
+def test_a_wall_of_a_hundred_thousand_slivers(quads, room_faces, partition) -> None:
+    """Fans and strips as a triangulator may leave them, all in one plane, beside a door."""
+    count = 25_000
+    y = np.linspace(0, 4, count + 1)
+    corners = []
+    for z0, z1 in ((-2.0, -1.0), (1.0, 2.0)):
+        low, high = y[:-1], y[1:]
+        four, near, far = (np.full(count, value) for value in (4.0, z0, z1))
+        a, b = (np.stack([four, low, side], axis=1) for side in (near, far))
+        c, d = (np.stack([four, high, side], axis=1) for side in (near, far))
+        corners += [np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)]
+    shell = quads(room_faces(LOW, HIGH) + partition(4, (0, 4, -1, 1))[:0])
+    lintel = np.array([[[4, 3, -1], [4, 4, -1], [4, 4, 1]], [[4, 3, -1], [4, 4, 1], [4, 3, 1]]])
+    scene = triangles(np.concatenate([shell.corners, *corners, lintel]))
+    assert len(scene.triangles) > 100_000
+    cells = subdivide(scene, LEAF)
+    assert cells.leaf_count == 2
+    assert cells.portal_area == pytest.approx([6.0])
+    assert_sound(scene, cells)
+
+
+def test_a_room_shaped_like_a_ball(quads) -> None:
+    """20,000 triangles, none of them a wall: what has no flat wall is not cut."""
+    rings, around = 100, 101
+    polar = np.linspace(0, np.pi, rings + 1)
+    turn = np.linspace(0, 2 * np.pi, around + 1)
+    ring, step = np.meshgrid(polar, turn, indexing="ij")
+    ball = 6 * np.stack([np.sin(ring) * np.cos(step), np.cos(ring), np.sin(ring) * np.sin(step)], 2)
+    a, b, c, d = ball[:-1, :-1], ball[1:, :-1], ball[1:, 1:], ball[:-1, 1:]
+    corners = np.concatenate([np.stack([a, b, c], 2), np.stack([a, c, d], 2)]).reshape(-1, 3, 3)
+    scene = triangles(corners)
+    assert len(scene.triangles) > 20_000
+    cells = subdivide(scene)
+    assert cells.cell_count == 1
+    assert np.all(cells.locate(np.array([[0.0, 0, 0], [5, 0, 0]])) == 0)
+    assert_sound(scene, cells)
+
+
+def test_triangles_without_area_change_nothing(quads, room_faces, partition) -> None:
+    scene = quads(room_faces(LOW, HIGH) + partition(4, (0, 3, -1, 1)))
+    needles = np.array([[[1, 1, 0], [1, 1, 0], [2, 1, 0]], [[1, 2, 1], [2, 2, 1], [3, 2, 1]]])
+    one, other = (
+        subdivide(triangles(np.concatenate([scene.corners, more])), LEAF)
+        for more in (needles[:0], needles)
+    )
+    assert np.array_equal(one.portal_point, other.portal_point)
+    assert one.leaf_count == other.leaf_count == 2
