@@ -28,7 +28,7 @@ def along_a_line(seed: int, count: int, miss: float | None = None) -> ExactPorta
     axes, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     points, normals = [], []
     for at in range(count):
-        normal = axes[0] + 0.3 * rng.normal(size=3)
+        normal = axes[0] + 0.3 * rng.uniform(-1, 1, 3)  # within a right angle of the line
         normal /= np.linalg.norm(normal)
         u = np.cross(normal, axes[1])
         u /= np.linalg.norm(u)

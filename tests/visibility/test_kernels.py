@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from ptmtools.visibility import kernels
 from ptmtools.visibility.bits import kernels as bits
 from ptmtools.visibility.flow import GROWTH, Portals, geometry, scratch
+from ptmtools.visibility.prepass import kernels as prepass
 from ptmtools.visibility.winding import kernels as winding
 
 SLACK = 1e-12
@@ -129,7 +130,7 @@ def test_no_line_through_both_polygons_leaves_the_separators(rng):
 def test_lowest_set_bit_of_every_word():
     for i in range(64):
         low = (1 << i) * 0x03F79D71B4CB0A89 % 2**64 >> 58
-        assert kernels.LOW_BIT[low] == i
+        assert bits.LOW_BIT[low] == i
 
 
 def two_portals(first, second, leaves, normals):
@@ -150,16 +151,16 @@ def test_ahead(reverse):
     # Along +x: first, then second; back: second, then first. Never otherwise, never itself.
     expected = np.zeros((4, 4), bool)
     expected[0, 2] = expected[3, 1] = True
-    assert np.array_equal([[kernels.ahead(g, p, q) for q in range(4)] for p in range(4)], expected)
+    assert np.array_equal([[prepass.ahead(g, p, q) for q in range(4)] for p in range(4)], expected)
 
 
 def test_ahead_in_one_plane_and_touching():
     side = two_portals(SQUARE, SQUARE + [0, 1, 0], [[0, 1], [2, 3]], [[1, 0, 0], [1, 0, 0]])
-    assert not any(kernels.ahead(side, p, q) for p in range(4) for q in range(4))
+    assert not any(prepass.ahead(side, p, q) for p in range(4) for q in range(4))
     wall = SQUARE[:, [1, 0, 2]] + [0, 1, 0]  # in y = 1, x 0 … 1: shares an edge with the first
     g = two_portals(SQUARE, wall, [[0, 1], [1, 2]], [[1, 0, 0], [0, 1, 0]])
-    assert kernels.ahead(g, 0, 2)
-    assert not kernels.ahead(g, 1, 2)
+    assert prepass.ahead(g, 0, 2)
+    assert not prepass.ahead(g, 1, 2)
 
 
 def test_geometry_winds_polygons_about_their_normals():
@@ -224,10 +225,17 @@ def test_a_glance_sees_a_straight_corridor_and_nothing_behind_a_corner(room_row,
 @given(RANDOM)
 def test_transposing_bits(rng):
     rows = rng.integers(0, 2**64, 64, dtype=np.uint64)
-    bits = np.unpackbits(rows.view(np.uint8).reshape(64, 8), axis=1, bitorder="little")
-    bits.transpose(rows)
-    turned = np.unpackbits(rows.view(np.uint8).reshape(64, 8), axis=1, bitorder="little")
-    assert np.array_equal(turned, bits.T)
+    before, after = (
+        np.unpackbits(square.view(np.uint8).reshape(64, 8), axis=1, bitorder="little")
+        for square in (rows, turned(rows))
+    )
+    assert np.array_equal(after, before.T)
+
+
+def turned(rows):
+    square = rows.copy()
+    bits.transpose(square)
+    return square
 
 
 @pytest.mark.parametrize("count", [2, 64, 70, 200])
