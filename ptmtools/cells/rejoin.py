@@ -3,7 +3,7 @@
 A cap (`caps`) is worth a leaf where something behind it cannot be reached. Elsewhere, where both
 its sides are reached some other way or neither is, it would only add leaves, mostly slivers of
 some centimetres: the gallery would have half as many again (43 instead of 29), willowgarage an
-eighth (852 instead of 753), and nobody would load less. So all caps are tried, and after the flood
+eighth (852 instead of 753). So all caps are tried, and after the flood
 those that cut nothing off are taken back. What is rejoined is reached as a whole or not at all,
 and the flood need not be run again.
 """
