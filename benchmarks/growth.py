@@ -36,6 +36,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from memory import with_peak
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.cells.grouping import grouped
@@ -44,7 +45,6 @@ from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.database import TextureRecord, emit
 from ptmtools.pipeline.archive import pack_arrays, unpack_arrays
-from ptmtools.pipeline.run import peak_memory
 from ptmtools.scene import Scene, ingest
 from ptmtools.tolerance import Tolerance
 from ptmtools.visibility import Pvs, compute_pvs
@@ -70,11 +70,9 @@ class Work:
         """Runs a stage, leaves its result and returns its figures."""
         work = self._prepared(stage)
         gc.collect()
-        before = _resident(since_now=True)
         cpu, wall = time.process_time(), time.perf_counter()
-        result = work()
+        result, peak = with_peak(work)
         cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
-        peak = max(peak_memory() if before is None else _most_resident() - before, 0)
         figures = {"cpu": cpu, "wall": wall, "peak": peak / 1e6}
         if isinstance(result, Scene | Cells | Pvs | Ach):
             (self.folder / f"{stage}.npz").write_bytes(pack_arrays(result.to_arrays()))
@@ -118,25 +116,6 @@ class Work:
     def _arrays(self, stage: str) -> dict[str, Any]:
         file = self.folder / f"{stage}.npz"
         return unpack_arrays(file.read_bytes(), file=file)
-
-
-def _resident(*, since_now: bool) -> int | None:
-    """Bytes resident; ``since_now`` forgets the peak so far. None where the system cannot."""
-    try:
-        if since_now:
-            Path("/proc/self/clear_refs").write_text("5")
-        return _status("VmRSS")
-    except OSError:
-        return None
-
-
-def _most_resident() -> int:
-    return _status("VmHWM")
-
-
-def _status(name: str) -> int:
-    lines = Path("/proc/self/status").read_text().splitlines()
-    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith(f"{name}:"))
 
 
 def one_stage(stage: str, work: Work) -> None:

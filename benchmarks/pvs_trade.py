@@ -16,7 +16,7 @@ at_hand_volume, at_hand_texels
 cells_cpu_s, cells_s       processor and wall seconds of the subdivision, grouping included
 flow_cpu_s, flow_s         the same of the visibility, compilation excluded; it is that of leaves,
                            whatever the cells are
-flow_mb, before_mb         most memory of the process that computed it, and of it before it began
+flow_mb                    most memory that it took, beyond what its process held before
 missed_pairs, missed_segments, cracks
                            what `check_conservative` shows to be missing (``--segments`` tried)
 lacks                      pairs of cells of the full set that are not in this one
@@ -36,7 +36,6 @@ import argparse
 import csv
 import os
 import pickle
-import resource
 import sys
 import tempfile
 import time
@@ -92,7 +91,6 @@ class Row:
     flow_cpu_s: float
     flow_s: float
     flow_mb: float
-    before_mb: float
     segments: int
     missed_pairs: int
     missed_segments: int
@@ -104,12 +102,6 @@ def in_child(work: Callable[..., Any], *given: Any) -> Any:
     """What ``work`` returns, done by a fresh process."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         return pool.submit(work, *given).result()
-
-
-def peak() -> float:
-    """Most megabytes that this process has held."""
-    unit = 1 if sys.platform == "darwin" else 1024
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
 
 
 def timed(work: Callable[..., Any], *given: Any) -> tuple[Any, float, float]:
@@ -174,14 +166,15 @@ def flow(folder: Path, method: Any) -> dict[str, float]:
     """Keeps the visible sets of leaves, and those of rooms, which see what their leaves see; what
     the former took."""
     import numpy as np
+    from memory import with_peak
 
     from ptmtools.visibility import Pvs, PvsOptions, compute_pvs
 
     compute_pvs(stored(folder, "small"), PvsOptions(method=method))
     leaves = stored(folder, "leaf")
-    before = peak()
-    pvs, cpu, wall = timed(compute_pvs, leaves, PvsOptions(method=method))
-    most = peak()
+    (pvs, cpu, wall), most = with_peak(
+        lambda: timed(compute_pvs, leaves, PvsOptions(method=method))
+    )
     stored(folder, f"leaf-{method}", pvs)
     rooms = stored(folder, "room")
     matrix = np.zeros((rooms.cell_count, rooms.cell_count), dtype=np.bool_)
@@ -189,7 +182,7 @@ def flow(folder: Path, method: Any) -> dict[str, float]:
     matrix[one, other] = True
     lifted = Pvs.from_matrix(matrix, cut=pvs.cut, conservative=pvs.conservative)
     stored(folder, f"room-{method}", lifted)
-    return {"flow_cpu_s": cpu, "flow_s": wall, "flow_mb": most, "before_mb": before}
+    return {"flow_cpu_s": cpu, "flow_s": wall, "flow_mb": most / 1e6}
 
 
 def weigh(folder: Path, model: Path, kind: str) -> dict[str, dict[str, Any]]:
@@ -315,7 +308,7 @@ def tables(rows: Sequence[Row]) -> str:
                 [r.model, f"{r.wall_area:g}", r.kind, f"{r.cells:,}", f"{r.portals:,}"]
                 + [f"{r.pvs:.1%}", f"{r.walk_files:,}", f"{r.walk_mb:.2f}", f"{r.at_hand_mb:.2f}"]
                 + [f"{r.at_hand_volume:.0%}", f"{r.at_hand_texels:.0%}", f"{r.cells_cpu_s:.1f}"]
-                + [f"{r.flow_cpu_s:.2f}", f"{r.flow_s:.2f}", f"{r.flow_mb - r.before_mb:.0f}"]
+                + [f"{r.flow_cpu_s:.2f}", f"{r.flow_s:.2f}", f"{r.flow_mb:.0f}"]
             )
     methods = [
         ["model", "wall m²", "PVS: sampled", "full", "fast", "at hand MB: sampled", "full", "fast"]
