@@ -8,8 +8,9 @@ Reads PRT2 (N A B then N points in brackets per portal, then one line of leafs p
 transpose, which is still conservative. Leafs that only the reference joins are put to the test
 twice: ``--lines`` random lines from a portal of one to a portal of the other are walked through the
 portals; and every sequence of portals from the one to the other is clipped in exact arithmetic. A
-line that arrives would prove that our flow misses a pair (exit status 1); a sequence of which nothing
-is left proves that there is none. CPU time is that of the process, after one warm-up that loads or compiles the kernels.
+line that arrives would prove that our flow misses a pair (exit status 1); if nothing is left of any
+sequence, there is none. CPU time is that of the process, after one warm-up that loads or compiles
+the kernels.
 
 Lines thinner than the rounding are not seen, as in the reference; with ``--exact`` the sequences
 that were rejected by a hair are decided exactly, which takes two to three times as long.
