@@ -236,6 +236,13 @@ def turned(model: Model, turn: np.ndarray, upright: bool = True) -> None:
     [
         ("hospital", "unit"),
         ("hospital", "far"),
+        pytest.param(
+            "hospital",
+            "farther",
+            marks=pytest.mark.xfail(
+                reason="parallel caps of equal size are told apart by lost digits", strict=True
+            ),
+        ),
         ("hospital", "y 2"),
         ("gallery", "unit"),
         ("gallery", "far"),
@@ -254,9 +261,8 @@ def test_a_real_model_that_is_open(shared: Path, name: str, change: str) -> None
         options = replace(ROOMS, wall_area=2 * scale**2, wall_thickness=0.5 * scale)
         scene = replace(model.scene, points=points * scale)
         assert_same(model, subdivide(scene, options), lambda p: p * scale, scale)
-    elif change == "far":
-        # Farther out a cap of the hospital comes and goes with the digits that are lost.
-        extents = 1e3 if name == "hospital" else 1e6
+    elif change.startswith("far"):
+        extents = 1e3 if (name, change) == ("hospital", "far") else 1e6
         shift = extents * model.extent * np.array([1.0, 0.9, -1.1])
         scene = replace(model.scene, points=(points + shift) - shift)
         assert_same(model, subdivide(scene, ROOMS), lambda p: p, place=FAR_PLACE)
