@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,7 +128,7 @@ def build_tree(
         while best < 0 and source < _CAPS:
             source += 1
             more = reveals.within(body, planes) if source == _REVEALS else caps.within(body)
-            fragments = _sections(body, more, tolerance)
+            fragments = _sections(body, more, tolerance, whole=source == _CAPS)
             best = _best_split(body, fragments, least[source], planes, taken, tolerance)
         if best < 0:
             finish(body, parent)
@@ -180,10 +180,14 @@ def build_tree(
     )
 
 
-def _sections(body: Polyhedron, walls: list[WallPlane], tolerance: Tolerance) -> list[_Fragment]:
-    """The fragments of walls inside a body."""
+def _sections(
+    body: Polyhedron, walls: list[WallPlane], tolerance: Tolerance, whole: bool = False
+) -> list[_Fragment]:
+    """The fragments of walls inside a body; those that close its ``whole`` section count as all of
+    it, whatever its last digits."""
     cuts = [(w, w.walls, section(body, w.frame.plane, tolerance.rounding)) for w in walls]
-    return _fragments(cuts, tolerance)
+    found = _fragments(cuts, tolerance)
+    return [replace(f, area=f.section_area) for f in found] if whole else found
 
 
 def _fragments(

@@ -40,7 +40,9 @@ class Caps:
         self._tolerance = tolerance
 
     def within(self, body: Polyhedron) -> list[WallPlane]:
-        """The planes in which what lies there leaves no opening between two parts of a body."""
+        """The planes in which what lies there leaves no opening between two parts of a body, in the
+        order of the model's triangles: many are equally good, and areas of strips some centimetres
+        wide keep few digits far from the origin."""
         low, high = body.points.min(axis=0), body.points.max(axis=0)
         near = self._nearby.meeting(low, high)
         slack = self._tolerance.plane
@@ -51,7 +53,7 @@ class Caps:
         needed = _section_areas(body, self._planes[inside]) * (1 - _SPARE)
         free = needed <= areas.sum()
         free[free] = needed[free] <= self._in_plane(inside[free], inside)
-        found: list[WallPlane] = []
+        found: list[tuple[int, WallPlane]] = []
         for seed in ranked(areas):
             if not free[seed]:
                 continue
@@ -61,8 +63,8 @@ class Caps:
             free[seed] = False
             if areas[members].sum() >= needed[seed]:
                 cap = self._closing(body, plane, near)
-                found += [cap] if cap else []
-        return found
+                found += [(int(inside[members[0]]), cap)] if cap else []
+        return [cap for _, cap in sorted(found, key=lambda one: one[0])]
 
     def _reaching_into(self, body: Polyhedron, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
         """Rows of those triangles that have a point farther inside each face than lies in its
