@@ -65,7 +65,7 @@ def subdivide(
     options = options or SubdivideOptions()
     _check(scene, options)
     axes = main_axes(scene.corners)
-    tolerance = Tolerance.for_points(scene.points @ axes.T)
+    tolerance = Tolerance.for_points(scene.points @ axes.T).for_walls(options.wall_thickness)
     walls = find_walls(scene, options, tolerance)
     corners = scene.corners[structural_triangles(scene, options)]
     reveals = Reveals(corners, options.wall_thickness, tolerance)

@@ -63,10 +63,12 @@ def test_portals_lie_in_both_leaves_and_point_forward(room_row) -> None:
         assert cells.locate_leaf(middle - 0.1 * plane[:3]) == behind
 
 
-def test_walls_with_thickness_leave_solid_matter_out(quads, room_faces) -> None:
-    # Two rooms 0.3 m apart, a door tunnel between them with jambs, floor and lintel.
+@pytest.mark.parametrize("length", [4, 500])
+def test_walls_with_thickness_leave_solid_matter_out(quads, room_faces, length: float) -> None:
+    # Two rooms 0.3 m apart, a door tunnel between them with jambs, floor and lintel. In a building
+    # of 500 m 0.3 m is less than the cluster distance would be without a bound.
     left = room_faces((0, 0, -2), (4, 4, 2), "+x")
-    right = room_faces((4.3, 0, -2), (8.3, 4, 2), "-x")
+    right = room_faces((4.3, 0, -2), (4.3 + length, 4, 2), "-x")
     walls = []
     for x in (4.0, 4.3):
         for y0, y1, z0, z1 in ((0, 4, -2, -1), (0, 4, 1, 2), (3, 4, -1, 1)):
@@ -80,7 +82,7 @@ def test_walls_with_thickness_leave_solid_matter_out(quads, room_faces) -> None:
     # The doorway is a cell of its own; the matter around it and the outside are nobody's.
     assert cells.cell_count == 3
     matter = [[4.15, 3.5, 0], [4.15, 1, 1.5], [4.15, 1, -1.5]]
-    outside = [[-0.5, 1, 0], [2, 4.5, 0], [9, 1, 0]]
+    outside = [[-0.5, 1, 0], [2, 4.5, 0], [5 + length, 1, 0]]
     assert np.all(cells.locate(np.array(matter + outside)) == -1)
 
 
