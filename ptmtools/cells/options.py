@@ -17,7 +17,8 @@ class SubdivideOptions:
     wall_area: the least area in m² of a polygon that may split a cell. Smaller: more and tighter
         cells, and a slower portal flow.
     wall_thickness: parallel walls nearer than this (metres) are the two faces of one wall; there,
-        polygons that bridge its thickness (jambs, lintels, sills) split whatever their area.
+        polygons that bridge its thickness (jambs, lintels, sills) split whatever their area. What
+        stands off a wall by less than 0.12 of it, or 1/1000 of the extent, hangs on it.
     max_cells: stop at this many leaves, best splits first.
     structural: globs over object and material names; what matches may split whatever its area.
     detail: globs; what matches never splits a cell nor blocks a portal. `structural` wins.
