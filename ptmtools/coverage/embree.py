@@ -1,7 +1,8 @@
 """The item buffer by ray casting: one ray through every pixel centre, with Embree.
 
 Needs no graphics system and costs the same whatever the number of triangles, so it serves where
-there is no OpenGL, and is the oracle of the OpenGL backend's tests.
+there is no OpenGL, and is the oracle of the OpenGL backend's tests. The rays of many sample points
+are cast together, since a single point has as few as a hundred.
 
 Embree computes in float32. Its tree is built once, around the middle of the geometry: a vertex is
 off by at most 6e-8 of the extent, 3 µm in a building of 50 m. Rebuilding it around every sample
@@ -16,25 +17,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.coverage.item_buffer import BEFORE, VIEWS, Surfaces, pixel_centres
+from ptmtools.coverage.eyes import Eyes
+from ptmtools.coverage.item_buffer import BEFORE, VIEWS, Surfaces
+
+#: Rays that are cast together: their arrays stay within the processor's cache.
+RAYS = 2**16
 
 
 class EmbreeRenderer:
-    """Draws with Embree; may be used by several threads at once."""
+    """Draws with Embree, which keeps the interpreter's lock: processes, not threads, add speed."""
 
     backend = "embree"
 
     def __init__(self, surfaces: Surfaces, face: int) -> None:
         """Builds the trees over ``surfaces``, for views of ``face`` pixels a side."""
         self._surfaces = surfaces
-        self._opaque = np.flatnonzero(surfaces.opaque)
-        self._transparent = np.flatnonzero(~surfaces.opaque)
-        self._opaque_tree = _tree(surfaces, self._opaque)
-        self._transparent_tree = _tree(surfaces, self._transparent)
-        at = pixel_centres(face)
-        x, y = (grid[None, ..., None] for grid in np.meshgrid(at, at))
-        right, up, forward = (VIEWS[:, i][:, None, None] for i in range(3))
-        self._directions = (forward + x * right + y * up).astype(np.float32).reshape(-1, 3)
+        self._face = face
+        self.most = max(1, RAYS // (len(VIEWS) * face * face))
+        opaque, transparent = np.flatnonzero(surfaces.opaque), np.flatnonzero(~surfaces.opaque)
+        self._opaque, self._transparent = _Tree(surfaces, opaque), _Tree(surfaces, transparent)
 
     @property
     def name(self) -> str:
@@ -43,53 +44,88 @@ class EmbreeRenderer:
 
         return f"Embree (embreex {version('embreex')})"
 
-    def layers(self, point: NDArray[np.float64], near: float) -> NDArray[np.int64]:
-        """See `Renderer.layers`."""
-        return self._cast(point, self._directions)
+    def show(self, eyes: Eyes, needed: NDArray[np.bool_] | None = None) -> NDArray[np.int32]:
+        """See `Renderer.show`."""
+        origin, along = self._rays(eyes)
+        if self._transparent.empty:
+            layers = self._opaque.nearest(origin, along)[None]
+        else:
+            layers = self._two_layers(origin, along)[0]
+        return layers.reshape(-1, len(eyes), len(VIEWS), self._face**2)
 
-    def traced(self, point: NDArray[np.float64], pixels: NDArray[np.int64]) -> NDArray[np.int64]:
-        """See `Renderer.traced`."""
-        return self._cast(point, self._directions[pixels])
+    def trace(
+        self, eyes: Eyes, pixels: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """See `Renderer.trace`."""
+        each = len(VIEWS) * self._face**2
+        origin, along = (rays[pixels] for rays in self._rays(eyes))
+        found, depth = self._two_layers(origin, along)
+        if self._transparent.empty:
+            found, depth = found[:1], depth[:1]
+        exact = self._surfaces.normalised(eyes.point)[pixels // each]
+        return found, self._surfaces.world(exact + depth[..., None] * along)
 
-    def _cast(
-        self, point: NDArray[np.float64], directions: NDArray[np.float32]
-    ) -> NDArray[np.int64]:
-        """(L, n) the triangle of each layer that each of the (n, 3) rays hits, or -1."""
-        eye = self._surfaces.normalised(point).astype(np.float32)
-        origins = np.tile(eye, (len(directions), 1))
-        if self._transparent_tree is None:
-            if self._opaque_tree is None:
-                return np.full((1, len(origins)), -1, dtype=np.int64)
-            found = self._opaque_tree.run(origins, directions)
-            return _named(found, self._opaque)[None]
-        limit = np.full(len(origins), np.inf, dtype=np.float32)
-        opaque = np.full(len(origins), -1, dtype=np.int64)
-        if self._opaque_tree is not None:
-            hit = self._opaque_tree.run(origins, directions, output=True)
-            opaque = _named(hit["primID"], self._opaque)
-            limit[opaque >= 0] = hit["tfar"][opaque >= 0] / np.float32(BEFORE)
-        panes = self._transparent_tree.run(origins, directions, dists=limit)
-        return np.stack([opaque, _named(panes, self._transparent)])
+    def _rays(self, eyes: Eyes) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        from ptmtools.coverage.tally.kernels import cast_rays
+
+        count = len(eyes) * len(VIEWS) * self._face**2
+        origin, along = (np.empty((count, 3), dtype=np.float32) for _ in range(2))
+        place = self._surfaces.normalised(eyes.point)
+        cast_rays(place, eyes.shift / self._face, self._face, VIEWS, origin, along)
+        return origin, along
+
+    def _two_layers(
+        self, origin: NDArray[np.float32], along: NDArray[np.float32]
+    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """(2, n) opaque and transparent triangles that the (n, 3) rays hit, or -1; (2, n) depths,
+        0 where there is none."""
+        opaque, depth = self._opaque.hits(origin, along)
+        limit = np.where(opaque >= 0, depth / np.float32(BEFORE), np.float32(np.inf))
+        pane, pane_depth = self._transparent.hits(origin, along, limit.astype(np.float32))
+        found, depths = np.stack([opaque, pane]), np.stack([depth, pane_depth]).astype(np.float64)
+        return found, np.where(found >= 0, depths, 0.0)
 
     def close(self) -> None:
         """Drops the trees."""
-        self._opaque_tree = self._transparent_tree = None
+        del self._opaque, self._transparent
 
 
-def _tree(surfaces: Surfaces, which: NDArray[np.int64]) -> Any:
-    """A committed Embree scene over the (n,) triangles ``which``; None without any."""
-    from embreex.mesh_construction import TriangleMesh
-    from embreex.rtcore_scene import EmbreeScene
+class _Tree:
+    """A committed Embree scene over some of the surfaces."""
 
-    if len(which) == 0:
-        return None
-    tree = EmbreeScene(robust=True)
-    TriangleMesh(tree, surfaces.place.astype(np.float32), surfaces.triangle[which])
-    ray = np.ones((1, 3), dtype=np.float32)
-    tree.run(ray, ray)  # builds the tree now, on this thread
-    return tree
+    def __init__(self, surfaces: Surfaces, which: NDArray[np.int64]) -> None:
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
 
+        self.empty = len(which) == 0
+        self._all = len(which) == len(surfaces.triangle)
+        self._which = np.append(which, -1).astype(np.int32)
+        self._tree: Any = None
+        if not self.empty:
+            self._tree = EmbreeScene(robust=True)
+            mesh = surfaces.place.astype(np.float32), surfaces.triangle[which]
+            TriangleMesh(self._tree, *mesh)
+            ray = np.ones((1, 3), dtype=np.float32)
+            self._tree.run(ray, ray)  # builds the tree now
 
-def _named(found: NDArray[np.int32], which: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Numbers within a tree, -1 for a miss, as numbers of the surfaces in it."""
-    return np.append(which, -1)[found]
+    def nearest(self, origin: NDArray[np.float32], along: NDArray[np.float32]) -> NDArray[np.int32]:
+        """(n,) the triangle that each of the (n, 3) rays hits first, or -1."""
+        if self.empty:
+            return np.full(len(origin), -1, dtype=np.int32)
+        return self._named(self._tree.run(origin, along))
+
+    def hits(
+        self,
+        origin: NDArray[np.float32],
+        along: NDArray[np.float32],
+        limit: NDArray[np.float32] | None = None,
+    ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """`nearest` within (n,) ``limit`` depths, and their (n,) depths."""
+        if self.empty:
+            return self.nearest(origin, along), np.zeros(len(origin), dtype=np.float32)
+        found = self._tree.run(origin, along, dists=limit, output=True)
+        return self._named(found["primID"]), found["tfar"]
+
+    def _named(self, found: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Numbers within the tree, -1 for a miss, as numbers of the surfaces in it."""
+        return found if self._all else self._which[found]

@@ -1,8 +1,8 @@
 """The item buffer: which surface shows in each pixel of six square views around a point (§5).
 
 Both backends answer the same question, *which triangle does pixel (view, row, column) show*, for
-the same pixel centres; whose triangle that is is decided here, once, in float64. A triangle in a
-boundary belongs to a cell on either side, and the pixel counts for the viewer's side (design,
+the same directions; whose triangle that is is decided elsewhere (`looking`), in float64. A triangle
+in a boundary belongs to a cell on either side, and the pixel counts for the viewer's side (design,
 "Ownership"), so of coincident faces it does not matter which one wins.
 
 The paper draws each object in its cell's colour. The triangle's own number was preferred: with
@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
+from ptmtools.coverage.eyes import Eyes
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import DEPTH_SHARE
 
@@ -63,9 +64,10 @@ class Surfaces:
         power of two.
     place: (W, 3) float64 normalised vertices.
     triangle: (M, 3) int32 into `place`.
-    normal: (M, 3) float64 unit normal of the scene's triangle that each is a piece of, which is
-        better known than that of a sliver.
+    plane: (M, 4) float64 of the scene's triangle that each is a piece of, which is better known
+        than that of a sliver: unit normal and offset in normalised coordinates.
     cell: (M, 2) int32 the cell on the front and on the back, -1 for none.
+    image: (M,) int32 the image that each shows, -1 for none.
     opaque: (M,) bool.
     cell_count: cells in all.
     """
@@ -74,8 +76,9 @@ class Surfaces:
     scale: float
     place: NDArray[np.float64]
     triangle: NDArray[np.int32]
-    normal: NDArray[np.float64]
+    plane: NDArray[np.float64]
     cell: NDArray[np.int32]
+    image: NDArray[np.int32]
     opaque: NDArray[np.bool_]
     cell_count: int
 
@@ -89,33 +92,32 @@ class Surfaces:
         centre = low + (high - low) / 2
         extent = float((high - low).max())
         scale = 2.0 ** -np.frexp(extent)[1] if extent > 0 else 1.0
+        place = (cells.vertex - centre) * scale
         source = scene.corners[cells.triangle_source]
         normal = np.cross(source[:, 1] - source[:, 0], source[:, 2] - source[:, 0])
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+        offset = -np.einsum("ij,ij->i", normal, place[cells.triangle[:, 0]])
+        image = np.array([m.image for m in scene.materials], dtype=np.int32)
         return Surfaces(
             centre=centre,
             scale=float(scale),
-            place=(cells.vertex - centre) * scale,
+            place=place,
             triangle=cells.triangle,
-            normal=normal,
+            plane=np.column_stack([normal, offset]),
             cell=cells.triangle_cell,
+            image=image[scene.triangle_material[cells.triangle_source]],
             opaque=scene.opaque[cells.triangle_source],
             cell_count=cells.cell_count,
         )
 
-    def normalised(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
-        """A (3,) point in world metres, in the coordinates of `place`."""
-        return np.asarray((point - self.centre) * self.scale)
+    def normalised(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(…, 3) points in world metres, in the coordinates of `place`."""
+        return np.asarray((points - self.centre) * self.scale)
 
-    def viewer_cell(
-        self, triangle: NDArray[np.int64], point: NDArray[np.float64]
-    ) -> NDArray[np.int32]:
-        """(n,) the cell for which each of the (n,) triangles counts, seen from a (3,) point in
-        world metres; -1 for none."""
-        towards = self.normalised(point) - self.place[self.triangle[triangle, 0]]
-        in_front = np.einsum("ij,ij->i", towards, self.normal[triangle]) > 0
-        return np.asarray(self.cell[triangle, np.where(in_front, 0, 1)], dtype=np.int32)
+    def world(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The inverse of `normalised`."""
+        return np.asarray(points / self.scale + self.centre)
 
 
 class Renderer(Protocol):
@@ -125,6 +127,7 @@ class Renderer(Protocol):
     ----------
     backend: "gl" or "embree".
     name: the renderer's own name.
+    most: how many sample points it takes at a time.
     """
 
     @property
@@ -133,52 +136,20 @@ class Renderer(Protocol):
     @property
     def name(self) -> str: ...
 
-    def layers(self, point: NDArray[np.float64], near: float) -> NDArray[np.int64]:
-        """(L, 6 face²) the triangle that each pixel of the six views from a (3,) point (world
-        metres) shows, -1 for none, in the order (view, row, column); opaque surfaces first, then
-        the transparent ones before them, if the scene has any. No surface is nearer to the point
-        than ``near`` metres."""
+    @property
+    def most(self) -> int: ...
 
-    def traced(self, point: NDArray[np.float64], pixels: NDArray[np.int64]) -> NDArray[np.int64]:
-        """(L, n) what a ray through the centre of each of the (n,) pixels says of its layers."""
+    def show(self, eyes: Eyes, needed: NDArray[np.bool_] | None = None) -> NDArray[np.int32]:
+        """(L, K, 6, face²) the triangle that each pixel shows, -1 for none, in the order (point,
+        view, row, column); opaque surfaces first, then the transparent ones before them, if the
+        scene has any. ``needed`` (C,) are the cells whose surfaces may show, if that is known:
+        others need not be drawn."""
+
+    def trace(
+        self, eyes: Eyes, pixels: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """(L, n) what a ray through each of the (n,) pixels, numbered from 0 in the order of
+        `show`, says of its layers, and (L, n, 3) where it hits, in world metres."""
 
     def close(self) -> None:
         """Gives back what the backend holds."""
-
-
-def sample_coverage(
-    renderer: Renderer,
-    surfaces: Surfaces,
-    point: NDArray[np.float64],
-    near: float,
-    expected: NDArray[np.bool_] | None = None,
-) -> NDArray[np.int64]:
-    """(C + 1,) pixels covered, seen from a (3,) point in world metres, by each of the C cells,
-    and last by what belongs to no cell. ``near``: see `Renderer.layers`.
-
-    ``expected`` (C,) are the cells that may be seen, if that is known. A pixel that shows another
-    one is not believed before a ray has confirmed it: a rasteriser rounds corners to 1/256 pixel,
-    and past a rounded edge it sees what no straight line reaches.
-    """
-    layers = renderer.layers(point, near)
-    seen, owner = _owners(surfaces, layers, point)
-    if expected is not None:
-        doubted = seen[~np.append(expected, False)[owner]]
-        if len(doubted):
-            pixels = np.flatnonzero(np.isin(layers, doubted).any(axis=0))
-            layers[:, pixels] = renderer.traced(point, pixels)
-            seen, owner = _owners(surfaces, layers, point)
-    pixels_of = np.bincount(layers[layers >= 0], minlength=len(surfaces.cell))
-    covered = np.zeros(surfaces.cell_count + 1, dtype=np.int64)
-    np.add.at(covered, owner, pixels_of[seen])  # -1 is the last
-    return covered
-
-
-def _owners(
-    surfaces: Surfaces, layers: NDArray[np.int64], point: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """The triangles that show anywhere, ascending, and the cell for which each of them counts."""
-    shows = np.zeros(len(surfaces.cell), dtype=np.bool_)
-    shows[layers[layers >= 0]] = True
-    seen = np.flatnonzero(shows)
-    return seen, surfaces.viewer_cell(seen, point)

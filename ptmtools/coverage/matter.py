@@ -45,21 +45,10 @@ class Body:
 
     def contains(self, point: NDArray[np.float64]) -> bool:
         """Whether a (3,) point in the box is inside: odd crossings along most of the rays."""
-        odd = sum(crossings(self.corners - point, d) % 2 for d in DIRECTIONS)
+        from ptmtools.coverage.clearance.kernels import crossings
+
+        odd = sum(crossings(point, self.corners, d) % 2 for d in DIRECTIONS)
         return 2 * odd > len(DIRECTIONS)
-
-
-def crossings(corners: NDArray[np.float64], direction: NDArray[np.float64]) -> int:
-    """How many of the (n, 3, 3) triangles the ray from the origin along ``direction`` crosses."""
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    # Signed volumes with the ray's line: all of one sign where the line passes through.
-    u = np.cross(a, b) @ direction
-    v = np.cross(b, c) @ direction
-    w = np.cross(c, a) @ direction
-    through = ((u >= 0) & (v >= 0) & (w >= 0)) | ((u <= 0) & (v <= 0) & (w <= 0))
-    normal = np.cross(b - a, c - a)
-    ahead = np.einsum("ij,ij->i", normal, a) * (normal @ direction) > 0
-    return int(np.count_nonzero(through & ahead))
 
 
 def bodies(scene: Scene, cells: Cells) -> list[Body]:
@@ -144,7 +133,7 @@ class Surroundings:
     Attributes
     ----------
     corners: (T, 3, 3) all surfaces, metres.
-    nearby: finds those near a point.
+    nearby: finds those near a box.
     bodies: the closed ones with an inside.
     boxes: (B, 2, 3) the bounding boxes of the bodies.
     """
@@ -162,33 +151,31 @@ class Surroundings:
         boxes = np.array([body.box for body in found]).reshape(-1, 2, 3)
         return Surroundings(corners, Nearby(corners, 0.0), found, boxes)
 
-    def in_matter(self, point: NDArray[np.float64]) -> bool:
-        """Whether a (3,) point is inside a body."""
-        boxed = np.all((self.boxes[:, 0] <= point) & (point <= self.boxes[:, 1]), axis=1)
-        return any(self.bodies[i].contains(point) for i in np.flatnonzero(boxed))
+    def in_matter(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(n,) whether each of the (n, 3) points is inside a body."""
+        inside = np.zeros(len(points), dtype=np.bool_)
+        if len(points) == 0:
+            return inside
+        low, high = points.min(axis=0), points.max(axis=0)
+        near = np.all((self.boxes[:, 0] <= high) & (low <= self.boxes[:, 1]), axis=1)
+        for body in np.flatnonzero(near):
+            lower, upper = self.boxes[body]
+            boxed = ~inside & np.all((lower <= points) & (points <= upper), axis=1)
+            for i in np.flatnonzero(boxed):
+                inside[i] = self.bodies[body].contains(points[i])
+        return inside
 
-    def clearance(self, point: NDArray[np.float64], enough: float) -> float:
-        """Distance in metres from a (3,) point to the nearest surface, at most ``enough``."""
-        near = self.corners[self.nearby.meeting(point - enough, point + enough)] - point
-        near = near[np.all((near.min(axis=1) <= enough) & (near.max(axis=1) >= -enough), axis=1)]
-        return min(enough, float(distances(near).min(initial=enough)))
+    def clearance(self, points: NDArray[np.float64], enough: float) -> NDArray[np.float64]:
+        """(n,) distance in metres from each of the (n, 3) points to the nearest surface, at most
+        ``enough``."""
+        from ptmtools.coverage.clearance.kernels import clearances
 
-
-def distances(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) distances of the origin from (n, 3, 3) triangles."""
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normal, axis=1)
-    nearest = np.full(len(corners), np.inf)
-    over = length > 0
-    for i in range(3):
-        a, b = corners[:, i], corners[:, (i + 1) % 3]
-        edge = b - a
-        along = -np.einsum("ij,ij->i", a, edge)
-        square = np.einsum("ij,ij->i", edge, edge)
-        t = np.divide(along, square, out=np.zeros_like(along), where=square > 0)
-        foot = a + np.clip(t, 0.0, 1.0)[:, None] * edge
-        nearest = np.minimum(nearest, np.linalg.norm(foot, axis=1))
-        over &= np.einsum("ij,ij->i", np.cross(edge, -a), normal) >= 0
-    height = np.abs(np.einsum("ij,ij->i", corners[:, 0], normal))
-    face = np.divide(height, length, out=np.full_like(height, np.inf), where=over)
-    return np.asarray(np.minimum(nearest, face))
+        found = np.full(len(points), enough)
+        if len(points):
+            low, high = points.min(axis=0) - enough, points.max(axis=0) + enough
+            near = self.corners[self.nearby.meeting(low, high)]
+            order = np.argsort(points[:, 0], kind="stable")
+            ascending = np.full(len(points), enough)
+            clearances(np.ascontiguousarray(points[order]), near, enough, ascending)
+            found[order] = ascending
+        return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,57 +14,80 @@ from numpy.typing import NDArray
 class Ach:
     """Coverage hints of every cell (paper §5).
 
+    An entry is a cell and one of its PVS; entries are aligned with `Pvs.cell`.
+
     Attributes
     ----------
     start: (C + 1,) int64 CSR over cells, equal to the PVS's.
-    value: (n,) float64 share of the covered pixels, aligned with `Pvs.cell`; a row sums to 1. A
-        cell none of whose pixels was covered has 1 for itself.
-    pixels: (n,) int64 the pixels counted, N_j of the paper.
+    value: (n,) float64 share of the covered pixels; a row sums to 1. A cell none of whose pixels
+        was covered has 1 for itself.
+    pixels: (n,) float64 the pixels counted, N_j of the paper; weighted by their solid angle over
+        that of a pixel in the middle of a view, if that was asked for.
+    error: (n,) float64 standard error of `value`; NaN for an entry that was never met (see
+        `unseen_below`) and where there was one sample point only.
+    p95: (n,) float64 the share that is exceeded from at most 5 % of the sample points.
+    seen: (n,) float64 share of the sample points from which the entry was seen.
+    views: (n, 6) float64 the same as `value` for each of the six views alone: +x, -x, +y, -y, +z,
+        -z.
     missed: (C,) float64 share of the covered pixels that fell on cells outside the PVS, or on
         what belongs to no cell.
     samples: (C,) int32 sample points used.
     rejected: (C,) int32 sample points rejected: inside matter, or too near to a surface.
+    uncertain: (C,) float64 bound of the total variation between the row and the truth, at about
+        95 %; NaN with one sample point.
+    unseen_below: (C,) float64 an entry never met is seen from less than this share of the cell, at
+        95 % (rule of three).
+    floor: (C,) float64 what a client may take for an entry never met: half a pixel's share.
+    texture_start, texture, texture_value: (n + 1,) int64 CSR over entries, (m,) int32 images of the
+        scene, -1 for what has none, ascending within an entry, and (m,) float64 their shares, which
+        sum to the entry's `value`. Empty unless asked for.
     backend: "gl" or "embree".
     renderer: the renderer's own name, for the record.
     """
 
     start: NDArray[np.int64]
     value: NDArray[np.float64]
-    pixels: NDArray[np.int64]
+    pixels: NDArray[np.float64]
+    error: NDArray[np.float64]
+    p95: NDArray[np.float64]
+    seen: NDArray[np.float64]
+    views: NDArray[np.float64]
     missed: NDArray[np.float64]
     samples: NDArray[np.int32]
     rejected: NDArray[np.int32]
+    uncertain: NDArray[np.float64]
+    unseen_below: NDArray[np.float64]
+    floor: NDArray[np.float64]
+    texture_start: NDArray[np.int64]
+    texture: NDArray[np.int32]
+    texture_value: NDArray[np.float64]
     backend: str
     renderer: str
 
     def row(self, i: int) -> NDArray[np.float64]:
         """The hints of cell ``i``, aligned with row ``i`` of the PVS."""
-        return self.value[self.start[i] : self.start[i + 1]]
+        return self.value[self.entries(i)]
+
+    def entries(self, i: int) -> slice:
+        """Where the entries of cell ``i`` are."""
+        return slice(int(self.start[i]), int(self.start[i + 1]))
+
+    @property
+    def by_texture(self) -> bool:
+        """Whether shares of textures were measured."""
+        return len(self.texture_start) > 0
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
         """The hints as plain arrays."""
-        about = json.dumps({"backend": self.backend, "renderer": self.renderer}, sort_keys=True)
-        return {
-            "start": self.start,
-            "value": self.value,
-            "pixels": self.pixels,
-            "missed": self.missed,
-            "samples": self.samples,
-            "rejected": self.rejected,
-            "about": np.frombuffer(about.encode(), dtype=np.uint8),
-        }
+        arrays = {f.name: getattr(self, f.name) for f in fields(self)}
+        about = {"backend": arrays.pop("backend"), "renderer": arrays.pop("renderer")}
+        text = json.dumps(about, sort_keys=True)
+        return {**arrays, "about": np.frombuffer(text.encode(), dtype=np.uint8)}
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> Ach:
         """Inverse of `to_arrays`."""
         about = json.loads(bytes(np.asarray(arrays["about"], dtype=np.uint8)).decode())
-        return Ach(
-            start=np.asarray(arrays["start"], dtype=np.int64),
-            value=np.asarray(arrays["value"], dtype=np.float64),
-            pixels=np.asarray(arrays["pixels"], dtype=np.int64),
-            missed=np.asarray(arrays["missed"], dtype=np.float64),
-            samples=np.asarray(arrays["samples"], dtype=np.int32),
-            rejected=np.asarray(arrays["rejected"], dtype=np.int32),
-            backend=about["backend"],
-            renderer=about["renderer"],
-        )
+        names = [f.name for f in fields(Ach) if f.name not in ("backend", "renderer")]
+        plain = {name: np.asarray(arrays[name]) for name in names}
+        return Ach(**plain, backend=about["backend"], renderer=about["renderer"])

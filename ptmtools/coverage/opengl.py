@@ -1,13 +1,17 @@
 """The item buffer by rasterisation: OpenGL through EGL, no window, hardware or Mesa.
 
-Six plain draws into one strip of R32UI pixels, each fragment writing its triangle's number, and
-one read. Measured and rejected: occlusion queries (slower), layered cube rendering (slower, or
-wrong in moderngl), a histogram in a compute shader (bit for bit the same, and needs OpenGL 4.3).
+Every fragment writes its triangle's number into R32UI pixels. The views of many sample points lie
+side by side in one large target, so that small views, which are all vertices and no pixels, still
+fill a graphics processor: for each of the six directions one instanced draw, an instance for every
+point, kept within its own tile by clip distances. Measured and rejected: occlusion queries
+(slower), layered cube rendering (slower, or wrong in moderngl), a histogram in a compute shader
+(bit for bit the same, and needs OpenGL 4.3).
 
-- The eye is subtracted in float64's precision: a position travels as two floats, high and low.
+- The eye is subtracted in float64's precision: positions and eyes travel as two floats each.
 - Depth is linear, w / far. A perspective depth of 24 bits with a small near plane loses pictures
   that hang 1 mm off a wall at 5 to 20 m; linear ones resolve 6e-8 of the farthest depth.
 - The projection has no far plane, and its near plane only clips.
+- Only what can show is drawn (`_Culling`).
 """
 
 from __future__ import annotations
@@ -19,37 +23,59 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.coverage.embree import EmbreeRenderer
+from ptmtools.coverage.eyes import Eyes
 from ptmtools.coverage.item_buffer import BEFORE, VIEWS, Surfaces
 from ptmtools.errors import MissingComponentError
 
 APT = "apt install libegl1 libgl1 libgl1-mesa-dri"
 #: Renderers that run on the processor.
 SOFTWARE = re.compile(r"llvmpipe|softpipe|swrast|swiftshader|software", re.IGNORECASE)
+#: The widest target, pixels a side; every OpenGL 3.3 has it. Software needs no large one.
+WIDEST = {True: 2048, False: 4096}
+#: GL_CLIP_DISTANCE0, for which moderngl has no name.
+CLIP_DISTANCE = 0x3000
+#: Rays that look for cells outside the PVS, whose surfaces then have to be drawn too: a side of
+#: a view, and points.
+PROBE_FACE, PROBE_POINTS = 8, 16
 
 VERTEX = """
 #version 330
 in vec3 high;
 in vec3 low;
-uniform vec3 eye_high;
-uniform vec3 eye_low;
+in vec3 eye_high;
+in vec3 eye_low;
+in vec2 shift;
+in vec2 depths;  // near, 1 / far
 uniform mat3 view;  // rows right, up, forward
-uniform float near;
+uniform int direction;  // its number
+uniform int tiles;  // along a side of the target
 out float w;
+flat out float depth_scale;
+out float gl_ClipDistance[4];
 void main() {
     vec3 p = view * ((high - eye_high) + (low - eye_low));
     w = p.z;
-    gl_Position = vec4(p.x, p.y, p.z - 2.0 * near, p.z);
+    depth_scale = depths.y;
+    vec2 at = p.xy - shift * p.z;
+    gl_ClipDistance[0] = p.z + at.x;
+    gl_ClipDistance[1] = p.z - at.x;
+    gl_ClipDistance[2] = p.z + at.y;
+    gl_ClipDistance[3] = p.z - at.y;
+    int number = 6 * gl_InstanceID + direction;
+    vec2 middle = vec2(2 * ivec2(number % tiles, number / tiles) + 1 - tiles) / tiles;
+    gl_Position = vec4(at / tiles + middle * p.z, p.z - 2.0 * depths.x, p.z);
 }
 """
 
 FRAGMENT = """
 #version 330
 in float w;
-uniform float depth_scale;
+flat in float depth_scale;
+uniform float before;
 uniform int base;
 out uint triangle;
 void main() {
-    gl_FragDepth = w * depth_scale;
+    gl_FragDepth = w * depth_scale * before;
     triangle = uint(gl_PrimitiveID + base);
 }
 """
@@ -70,93 +96,182 @@ class OpenGLRenderer:
         self._surfaces = surfaces
         self._face = face
         self._rays: EmbreeRenderer | None = None
-        opaque = np.flatnonzero(surfaces.opaque)
-        transparent = np.flatnonzero(~surfaces.opaque)
-        self._order = np.concatenate([opaque, transparent])
-        self._split = len(opaque)
+        self._probe: EmbreeRenderer | None = None
+        self._culling = _Culling(surfaces)
+        widest = max(WIDEST[is_software(self.name)], 3 * face)
+        self._tiles = widest // face  # along a side of the target
+        self._side = self._tiles * face
+        self.most = self._tiles**2 // len(VIEWS)
         place = surfaces.place
         self._box = np.stack([place.min(axis=0), place.max(axis=0)]) if len(place) else VIEWS[0, :2]
         self._program = context.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
-        self._vertices: Any = None
-        if len(self._order):
-            high = place.astype(np.float32)
-            low = (place - high).astype(np.float32)
-            self._vertices = context.vertex_array(
-                self._program,
-                [(context.buffer(np.hstack([high, low]).tobytes()), "3f 3f", "high", "low")],
-                index_buffer=context.buffer(surfaces.triangle[self._order].tobytes()),
-            )
-        size = (len(VIEWS) * face, face)
+        high = place.astype(np.float32)
+        low = (place - high).astype(np.float32)
+        self._vertices = context.buffer(np.hstack([high, low]).tobytes()) if len(place) else None
+        size = (self._side, self._side)
         depth = context.depth_renderbuffer(size)  # 24 bits
-        self._background = bytes(4 * size[0] * size[1])
-        self._items = [
-            context.texture(size, 1, dtype="u4") for _ in range(2 if len(transparent) else 1)
-        ]
+        self._layers = 1 if surfaces.opaque.all() else 2
+        self._items = [context.texture(size, 1, dtype="u4") for _ in range(self._layers)]
         self._targets = [context.framebuffer([items], depth) for items in self._items]
         context.enable_only(moderngl.DEPTH_TEST)
+        for plane in range(4):
+            context.enable_direct(CLIP_DISTANCE + plane)
         context.depth_func = "<"
 
-    def layers(self, point: NDArray[np.float64], near: float) -> NDArray[np.int64]:
-        """See `Renderer.layers`."""
-        if self._vertices is None:
-            return np.full((1, len(VIEWS) * self._face**2), -1, dtype=np.int64)
-        eye = self._surfaces.normalised(point)
-        high = eye.astype(np.float32)
-        self._program["eye_high"].value = tuple(high.tolist())
-        self._program["eye_low"].value = tuple((eye - high).astype(np.float32).tolist())
-        # A surface at distance r from the eye has a depth of at least r / √3 wherever it is seen.
-        self._program["near"].value = near * self._surfaces.scale / 2
-        # Twice the farthest depth: what is farthest still passes the test against 1.
-        far = 2 * float(np.abs(self._box - eye).max())
-        self._targets[0].clear(depth=1.0)
-        found = [self._draw(0, 0, self._split, 1 / far)]
-        if len(self._targets) > 1:
-            count = len(self._order) - self._split
-            found.append(self._draw(1, self._split, count, BEFORE / far))
-        return np.append(-1, self._order)[np.stack(found)]
+    def show(self, eyes: Eyes, needed: NDArray[np.bool_] | None = None) -> NDArray[np.int32]:
+        """See `Renderer.show`."""
+        shape = (self._layers, len(eyes), len(VIEWS), self._face**2)
+        if self._vertices is None or not len(eyes):
+            return np.full(shape, -1, dtype=np.int32)
+        place = self._surfaces.normalised(eyes.point)
+        lists = self._culling.lists(place, self._face, self._drawn(eyes, needed))
+        order = np.concatenate([part for view in lists for part in view])
+        index = self._context.buffer(self._surfaces.triangle[order].tobytes() or bytes(12))
+        points = self._context.buffer(self._instances(eyes, place).tobytes())
+        drawing = self._context.vertex_array(
+            self._program,
+            [
+                (self._vertices, "3f 3f", "high", "low"),
+                (points, "3f 3f 2f 2f /i", "eye_high", "eye_low", "shift", "depths"),
+            ],
+            index_buffer=index,
+        )
+        try:
+            self._program["tiles"].value = self._tiles
+            drawn = [self._draw(drawing, lists, layer, len(eyes)) for layer in range(self._layers)]
+        finally:
+            for thing in (drawing, index, points):
+                thing.release()
+        return np.append(-1, order).astype(np.int32)[np.stack(drawn)].reshape(shape)
 
-    def traced(self, point: NDArray[np.float64], pixels: NDArray[np.int64]) -> NDArray[np.int64]:
-        """See `Renderer.traced`; by Embree, whose trees are built at the first call."""
+    def trace(
+        self, eyes: Eyes, pixels: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """See `Renderer.trace`; by Embree, whose trees are built at the first call."""
         if self._rays is None:
             self._rays = EmbreeRenderer(self._surfaces, self._face)
-        return self._rays.traced(point, pixels)
+        return self._rays.trace(eyes, pixels)
 
-    def _draw(self, layer: int, first: int, count: int, depth_scale: float) -> NDArray[np.int64]:
-        """One layer of the six views, before the depth that is there: (6 face²,) triangles in the
-        order of the upload, from 1; 0 for none."""
-        face, target = self._face, self._targets[layer]
+    def _instances(self, eyes: Eyes, place: NDArray[np.float64]) -> NDArray[np.float32]:
+        """(K, 10) what the shader is told of each sample point."""
+        rows = np.empty((len(eyes), 10), dtype=np.float32)
+        rows[:, 0:3] = high = place.astype(np.float32)
+        rows[:, 3:6] = place - high
+        rows[:, 6:8] = eyes.shift / self._face
+        # A surface at distance r from the eye has a depth of at least r / √3 wherever it is seen.
+        rows[:, 8] = eyes.near * self._surfaces.scale / 2
+        # Twice the farthest depth: what is farthest still passes the test against 1.
+        rows[:, 9] = 0.5 / np.abs(self._box[:, None] - place).max(axis=(0, 2))
+        return rows
+
+    def _drawn(self, eyes: Eyes, needed: NDArray[np.bool_] | None) -> NDArray[np.bool_] | None:
+        """The cells whose surfaces are to be drawn: those ``needed``, and those outside that a few
+        rays meet, so that nothing shows through where they stand. None for all."""
+        if needed is None or needed.all():
+            return None
+        if self._probe is None:
+            self._probe = EmbreeRenderer(self._surfaces, PROBE_FACE)
+        met = self._probe.show(eyes.part(slice(PROBE_POINTS)))
+        cells = self._surfaces.cell[np.unique(met[met >= 0])]
+        drawn = needed.copy()
+        drawn[cells[cells >= 0]] = True
+        return drawn
+
+    def _draw(
+        self, drawing: Any, lists: list[list[NDArray[np.int64]]], layer: int, count: int
+    ) -> NDArray[np.int64]:
+        """One layer of all views, before the depth that is there: (count, 6, face²) triangles in
+        the order of the upload, from 1; 0 for none."""
+        target = self._targets[layer]
+        rows = -(-len(VIEWS) * count // self._tiles)
+        size = (self._side, rows * self._face)
+        target.viewport = target.scissor = (0, 0, self._side, self._side)
+        if layer == 0:
+            target.clear(depth=1.0, viewport=size)
         # OpenGL leaves undefined what clearing does to a target of integers.
-        self._items[layer].write(self._background)
-        self._program["depth_scale"].value = depth_scale
-        self._program["base"].value = first + 1
+        self._items[layer].write(bytes(4 * size[0] * size[1]), viewport=(0, 0, *size))
         target.use()
-        for i, view in enumerate(VIEWS if count else ()):
-            target.viewport = (i * face, 0, face, face)
-            self._program["view"].value = tuple(view.T.reshape(-1))
-            self._vertices.render(vertices=3 * count, first=3 * first)
-        target.viewport = (0, 0, len(VIEWS) * face, face)
-        strip = np.frombuffer(target.read(components=1, dtype="u4"), dtype=np.uint32)
-        views = strip.reshape(face, len(VIEWS), face).transpose(1, 0, 2)
-        return np.asarray(views.reshape(-1), dtype=np.int64)
+        self._program["before"].value = 1.0 if layer == 0 else BEFORE
+        first = 0
+        for direction, (view, parts) in enumerate(zip(VIEWS, lists, strict=True)):
+            before, drawn = first + sum(map(len, parts[:layer])), len(parts[layer])
+            if drawn:
+                self._program["direction"].value = direction
+                self._program["view"].value = tuple(view.T.reshape(-1))
+                self._program["base"].value = before + 1
+                drawing.render(vertices=3 * drawn, first=3 * before, instances=count)
+            first += sum(map(len, parts))
+        found = np.frombuffer(target.read(size, components=1, dtype="u4"), dtype=np.uint32)
+        tiles = found.reshape(rows, self._face, self._tiles, self._face).transpose(0, 2, 1, 3)
+        each = tiles.reshape(rows * self._tiles, self._face**2)[: len(VIEWS) * count]
+        return np.asarray(each.reshape(count, len(VIEWS), -1), dtype=np.int64)
 
     def close(self) -> None:
         """Gives the context back."""
         self._context.release()
-        self._rays = None
+        self._rays = self._probe = None
 
 
-def create_context() -> Any:
-    """A moderngl context without a window; raises `MissingComponentError` PTM-M500 where there is
-    no OpenGL 3.3."""
+class _Culling:
+    """Which surfaces can show in a view from somewhere in a box: those of the cells that are to be
+    drawn, or of none, that reach into the view's pyramid."""
+
+    def __init__(self, surfaces: Surfaces) -> None:
+        self._surfaces = surfaces
+        corners = surfaces.place[surfaces.triangle]
+        self._low, self._high = corners.min(axis=1), corners.max(axis=1)
+
+    def lists(
+        self, place: NDArray[np.float64], face: int, drawn: NDArray[np.bool_] | None
+    ) -> list[list[NDArray[np.int64]]]:
+        """For each of the six views the opaque and the transparent triangles to be drawn, seen from
+        the (K, 3) points; ``drawn`` (C,) are the cells, None for all."""
+        cell = self._surfaces.cell
+        if drawn is None:
+            kept = np.arange(len(cell))
+        else:
+            wanted = np.append(drawn, False)[cell].any(axis=1) | (cell < 0).all(axis=1)
+            kept = np.flatnonzero(wanted)
+        # Where the surface is, seen from the points.
+        low = self._low[kept] - place.max(axis=0)
+        high = self._high[kept] - place.min(axis=0)
+        lists = []
+        for right, up, forward in VIEWS:
+            _, deepest = _along(forward, low, high)
+            ahead = deepest > 0
+            for axis in (right, up):
+                least, most = _along(axis, low, high)
+                aside = np.maximum(np.maximum(least, -most), 0.0)
+                ahead &= aside <= (1 + 1 / face) * deepest
+            shown = kept[ahead]
+            opaque = self._surfaces.opaque[shown]
+            lists.append([shown[opaque], shown[~opaque]])
+        return lists
+
+
+def _along(
+    axis: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Least and greatest coordinates of (n, 3) boxes along an axis of the coordinates."""
+    i = int(np.argmax(np.abs(axis)))
+    return (low[:, i], high[:, i]) if axis[i] > 0 else (-high[:, i], -low[:, i])
+
+
+def create_context(gpu: int | None = None) -> Any:
+    """A moderngl context without a window, on the EGL device with number ``gpu``, or the first;
+    raises `MissingComponentError` PTM-M500 where there is no OpenGL 3.3."""
     try:
         import moderngl
 
         settings: dict[str, Any] = {"backend": "egl"}
+        if gpu is not None:
+            settings["device_index"] = gpu
         return moderngl.create_context(require=330, standalone=True, **settings)
     except Exception as error:  # moderngl raises bare Exception, ctypes OSError
+        device = "" if gpu is None else f" on device {gpu}"
         raise MissingComponentError(
             "PTM-M500",
-            f"no OpenGL to draw with ({error})",
+            f"no OpenGL to draw with{device} ({error})",
             remedy=f"{APT}, or choose the embree backend",
         ) from error
 

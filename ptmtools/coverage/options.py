@@ -7,13 +7,23 @@ from typing import Literal, get_args
 
 from ptmtools.errors import InputError
 
+Preset = Literal["paper", "fast", "default", "high"]
+Placement = Literal["sobol", "kd", "uniform"]
+Weighting = Literal["pixel", "solid-angle"]
 Backend = Literal["auto", "gl", "embree"]
 
 #: The widest view in pixels a side: six of them side by side are within what OpenGL 4 guarantees
 #: for a render target (16384).
 MAX_FACE = 2048
-#: Sample points a cell: their cloud stays within a few hundred megabytes.
+#: Sample points a cell: the counts of all of them are held at once.
 MAX_SAMPLES = 2**14
+#: Of each preset: sample points a cell, pixels a side of a view, and how the points are placed.
+PRESETS: dict[Preset, tuple[int, int, Placement]] = {
+    "paper": (8, 256, "uniform"),
+    "fast": (32, 4, "sobol"),
+    "default": (256, 8, "sobol"),
+    "high": (2048, 8, "sobol"),
+}
 
 
 @dataclass(frozen=True)
@@ -22,38 +32,96 @@ class AchOptions:
 
     Attributes
     ----------
-    samples: sample points a cell; the paper uses 8.
+    preset: "paper" (8 points, 256 pixels a side), "fast", "default" or "high": how many sample
+        points, how large the views and how the points are placed, where that is not given.
+    samples: sample points a cell; with tolerance, the most.
     face: pixels a side of each of the six views. Positions matter far more: ask for more samples
         before a larger face.
+    placement: of sample points: "sobol" (a scrambled sequence), "kd" (the middles of equal parts,
+        best for fewer than 30) or "uniform" (at random, as in the paper).
+    tolerance: in each cell, points are added until the hints are this near to the truth (total
+        variation, at about 95 %), or there are as many as samples allows.
+    weighting: "pixel" counts every pixel of a view alike, as the paper; "solid-angle" counts less
+        towards the edges and corners of a view, by how much of the sphere a pixel covers.
     backend: "gl" (OpenGL), "embree" (rays on the processor), or "auto": whichever is there and
         expected to be faster.
+    gpu: which of the machine's graphics devices "gl" draws with; if not given, the first.
     clearance: metres that a sample point keeps from every surface; if not given, a quarter of
         the least thickness that a cell may have.
-    seed: which stretch of the sequence of sample points is taken.
-    workers: threads of the embree backend, None for one per processor; never changes the result.
+    seed: which sequence of sample points is taken.
+    per_texture: also measures how much of the view each texture of each visible cell covers.
+    workers: processes of the embree backend; never changes the result.
     """
 
-    samples: int = 8
-    face: int = 64
+    preset: Preset = "default"
+    samples: int | None = None
+    face: int | None = None
+    placement: Placement | None = None
+    tolerance: float | None = None
+    weighting: Weighting = "pixel"
     backend: Backend = "auto"
+    gpu: int | None = None
     clearance: float | None = None
     seed: int = 0
-    workers: int | None = field(default=None, compare=False)
+    per_texture: bool = False
+    workers: int = field(default=1, compare=False)
 
     def __post_init__(self) -> None:
         """Raises `InputError` PTM-I500 for a value that makes no sense."""
-        self._within("samples", self.samples, 1, MAX_SAMPLES)
-        self._within("face", self.face, 1, MAX_FACE)
+        self._among("preset", self.preset, get_args(Preset))
+        self._among("backend", self.backend, get_args(Backend))
+        self._among("weighting", self.weighting, get_args(Weighting))
+        self._among("placement", self.placed, get_args(Placement))
+        self._within("samples", self.points, 1, MAX_SAMPLES)
+        self._within("face", self.side, 1, MAX_FACE)
         self._within("seed", self.seed, 0, 2**32 - 1)
-        self._within("workers", 1 if self.workers is None else self.workers, 1, 1024)
-        if self.backend not in get_args(Backend):
-            known = ", ".join(get_args(Backend))
-            raise InputError("PTM-I500", f"no backend '{self.backend}'", remedy=f"one of {known}")
+        self._within("gpu", self.gpu or 0, 0, 255)
+        self._within("workers", self.workers, 1, 1024)
         if self.clearance is not None and not 0 < self.clearance < float("inf"):
             raise InputError(
                 "PTM-I500",
                 f"a clearance of {self.clearance} m makes no sense",
                 remedy="give a distance above 0",
+            )
+        if self.tolerance is not None:
+            self._for_tolerance(self.tolerance)
+
+    @property
+    def points(self) -> int:
+        """Sample points a cell, or the most of them."""
+        if self.samples is not None:
+            return self.samples
+        return PRESETS[self.preset][0] if self.tolerance is None else MAX_SAMPLES
+
+    @property
+    def side(self) -> int:
+        """Pixels a side of a view."""
+        return PRESETS[self.preset][1] if self.face is None else self.face
+
+    @property
+    def placed(self) -> Placement:
+        """How sample points are placed."""
+        return PRESETS[self.preset][2] if self.placement is None else self.placement
+
+    def _for_tolerance(self, tolerance: float) -> None:
+        if not 0 < tolerance < 1:
+            raise InputError(
+                "PTM-I500",
+                f"a tolerance of {tolerance} makes no sense",
+                remedy="give a total variation above 0 and below 1, such as 0.01",
+            )
+        if self.placed == "kd":
+            raise InputError(
+                "PTM-I500",
+                "with a tolerance points are added one by one, which parts of a cell do not allow",
+                remedy="take --placement sobol",
+            )
+
+    @staticmethod
+    def _among(name: str, value: str, known: tuple[str, ...]) -> None:
+        if value not in known:
+            raise InputError(
+                "PTM-I500", f"no {name} '{value}'", remedy=f"one of {', '.join(known)}"
             )
 
     @staticmethod

@@ -1,113 +1,136 @@
-"""Where a cell is looked from: points spread uniformly over its volume, best first.
-
-The paper takes "samples per cell whose COPs are uniformly distributed inside the cell" (§5).
-Position matters far more than resolution, so the points are stratified: the volume is filled with
-a low-discrepancy cloud, the cloud is halved again and again along its longest axis into as many
-parts of equal volume as there are samples, and each part is looked at from the point nearest to
-its centroid. Where that turns out to be unusable, another point of the same part takes its place,
-and the rest of the cell keeps its share of the samples. Rejected: independent random points, and
-a random point of each part; both are noisier (docs/coverage.md).
-
-A cell is a union of disjoint convex leaves; a leaf is cut into tetrahedra around its centroid.
-The cloud is a Kronecker sequence in integer arithmetic (Roberts' generalised golden ratio in
-four dimensions: one picks the tetrahedron, three the point in it), so it is the same on every
-machine and for every version of every library, and depends on nothing but the leaves and the seed.
-"""
+"""The hints of one cell: where to look from, how often, and what comes of it."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
+from ptmtools.coverage.estimate import GROUPS, Row, estimate, grouped, shares, spread
+from ptmtools.coverage.eyes import Eyes, Places, Sequence
+from ptmtools.coverage.item_buffer import Renderer, Surfaces
+from ptmtools.coverage.looking import Looker, Owners, Seen
+from ptmtools.coverage.matter import Surroundings
+from ptmtools.coverage.options import AchOptions
+from ptmtools.coverage.placement import Volume
+from ptmtools.scene.model import Scene
+from ptmtools.tolerance import Tolerance
+from ptmtools.visibility.model import Pvs
 
-#: Points of the cloud for each sample asked for: enough that parts of equal count are parts of
-#: equal volume within a few percent.
-CLOUD = 256
-#: Points that a part of the cell offers, evenly picked from its share of the cloud.
-TRIES = 32
-#: Fractional parts of 1/g, 1/g², 1/g³, 1/g⁴ in units of 2⁻⁶⁴, where g⁵ = g + 1.
-STEPS = np.array(
-    [15802862336838869349, 13537915256980136287, 11597591980405560693, 9935365762805847689],
-    dtype=np.uint64,
-)
-
-
-def tetrahedra(cells: Cells, cell: int) -> NDArray[np.float64]:
-    """(n, 4, 3) disjoint tetrahedra that fill a cell, metres; flat ones are left out."""
-    found: list[NDArray[np.float64]] = []
-    for leaf in cells.cell_leaves(cell):
-        centroid = cells.leaf_points(int(leaf)).mean(axis=0)
-        for loop in cells.leaf_faces(int(leaf)):
-            face = cells.leaf_point[loop]
-            fan = np.empty((max(len(face) - 2, 0), 4, 3))
-            fan[:, 0] = centroid
-            fan[:, 1] = face[0]
-            fan[:, 2] = face[1:-1]
-            fan[:, 3] = face[2:]
-            found.append(fan)
-    every = np.concatenate(found) if found else np.zeros((0, 4, 3))
-    return every[volumes(every) > 0]
+#: The default clearance as a share of the thinnest that a cell may be, so that even such a cell
+#: has usable points.
+CLEARANCE = 0.25
+#: Sees from sample points what a row of the PVS asks for.
+Look = Callable[[Eyes], Seen]
+#: Points of each of the groups that a tolerance is first tried with.
+FIRST = 8
 
 
-def volumes(tetra: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) volumes of (n, 4, 3) tetrahedra, m³."""
-    a, b, c = (tetra[:, 1:] - tetra[:, :1]).transpose(1, 0, 2)
-    return np.asarray(np.abs(np.einsum("ij,ij->i", a, np.cross(b, c))) / 6, dtype=np.float64)
+@dataclass(frozen=True)
+class TextureShares:
+    """Shares of the owners within the entries of a row: (n,) int64 how many each entry has, and
+    for all of them (m,) int64 `owner` and (m,) float64 `share` of the row."""
+
+    count: NDArray[np.int64]
+    owner: NDArray[np.int64]
+    share: NDArray[np.float64]
 
 
-def kronecker(count: int, seed: int) -> NDArray[np.float64]:
-    """(count, 4) points of the unit cube, evenly spread; ``seed`` picks the stretch of the
-    sequence."""
-    first = (1 + seed * count) % 2**64
-    index = np.arange(count, dtype=np.uint64) + np.uint64(first)
-    fixed = index[:, None] * STEPS  # whole turns drop out: wraps modulo 2⁶⁴ on purpose
-    return np.asarray((fixed >> np.uint64(11)).astype(np.float64) * 2.0**-53)
+@dataclass(frozen=True)
+class CellHints:
+    """What was found out about one cell; see `Ach`."""
+
+    row: Row
+    missed: float
+    samples: int
+    rejected: int
+    textures: TextureShares
 
 
-def cloud(tetra: NDArray[np.float64], count: int, seed: int) -> NDArray[np.float64]:
-    """(count, 3) points uniform in the union of (n, 4, 3) tetrahedra, metres."""
-    share = np.cumsum(volumes(tetra))
-    at = kronecker(count, seed)
-    which = np.minimum(np.searchsorted(share / share[-1], at[:, 0], "right"), len(tetra) - 1)
-    # The gaps between three sorted numbers and the ends of [0, 1] are uniform barycentric
-    # coordinates.
-    cut = np.sort(at[:, 1:], axis=1)
-    weight = np.diff(cut, axis=1, prepend=0.0, append=1.0)
-    base = tetra[which, 0]
-    offset = np.einsum("ij,ijk->ik", weight[:, 1:], tetra[which, 1:] - base[:, None])
-    return np.asarray(base + offset, dtype=np.float64)
+class Sampler:
+    """Ready to sample any cell of a scene."""
 
+    def __init__(
+        self,
+        scene: Scene,
+        cells: Cells,
+        pvs: Pvs,
+        options: AchOptions,
+        surfaces: Surfaces,
+        renderer: Renderer,
+    ) -> None:
+        self._cells, self._pvs, self._options = cells, pvs, options
+        self._around = Surroundings.of(scene, cells)
+        thin = Tolerance.for_points(scene.points).thin
+        self._clearance = options.clearance or CLEARANCE * thin
+        self._owners = Owners.of(surfaces, options.per_texture)
+        by_angle = options.weighting == "solid-angle"
+        self._looker = Looker(renderer, surfaces, cells, options.side, by_angle=by_angle)
 
-def strata(points: NDArray[np.float64], parts: int) -> list[NDArray[np.int64]]:
-    """Indices of the (n, 3) points in ``parts`` groups of equal size, compact in space.
+    def of_cell(self, cell: int) -> CellHints:
+        """The hints of one cell."""
+        places = Places(Volume(self._cells, cell), self._around, self._clearance)
+        wanted, begin = self._owners.in_cells(self._pvs.row(cell))
 
-    Each group is halved across its longest axis; an odd number of parts is divided as evenly as
-    it goes. Within a group the points are in order of their distance from its centroid.
-    """
-    pending = [(np.arange(len(points), dtype=np.int64), parts)]
-    done: list[NDArray[np.int64]] = []
-    while pending:
-        group, share = pending.pop()
-        here = points[group]
-        if share == 1:
-            away = np.sum((here - here.mean(axis=0)) ** 2, axis=1)
-            done.append(group[np.argsort(away, kind="stable")])
-            continue
-        axis = int(np.argmax(np.ptp(here, axis=0)))
-        order = group[np.argsort(here[:, axis], kind="stable")]
-        low = share // 2
-        middle = len(order) * low // share
-        pending.append((order[middle:], share - low))
-        pending.append((order[:middle], low))
-    return done
+        def look(eyes: Eyes) -> Seen:
+            return self._looker.look(eyes, self._owners, wanted)
 
+        if self._options.tolerance is None:
+            eyes = self._eyes(places)
+            eyes = eyes if len(eyes) else places.least_bad()
+            seen, group = look(eyes), grouped(len(eyes))
+        else:
+            seen, group = self._until_certain(places, look, begin, self._options.tolerance)
+        by_cell = np.add.reduceat(seen.counts, begin, axis=2)
+        owned = shares(seen.counts.sum(axis=(0, 1)))
+        met = np.flatnonzero(owned)
+        entry = np.searchsorted(begin, met, "right") - 1
+        total = int(seen.counts.sum()) + int(seen.missed.sum())
+        return CellHints(
+            row=estimate(by_cell, group, self._looker.unit),
+            missed=int(seen.missed.sum()) / max(total, 1),
+            samples=len(group),
+            rejected=places.rejected,
+            textures=TextureShares(
+                np.bincount(entry, minlength=len(begin)), wanted[met], owned[met]
+            ),
+        )
 
-def candidates(cells: Cells, cell: int, samples: int, seed: int) -> list[NDArray[np.float64]]:
-    """For each of ``samples`` equal parts of a cell (TRIES, 3) points, from its centroid outwards;
-    empty if the cell has no volume."""
-    tetra = tetrahedra(cells, cell)
-    if len(tetra) == 0:
-        return []
-    points = cloud(tetra, CLOUD * samples, seed)
-    return [points[group[:: CLOUD // TRIES]] for group in strata(points, samples)]
+    def _eyes(self, places: Places) -> Eyes:
+        options = self._options
+        if options.placed == "kd":
+            return places.of_parts(options.points, options.seed)
+        return Sequence(places, options.placed, options.seed).take(options.points)
+
+    def _until_certain(
+        self, places: Places, look: Look, begin: NDArray[np.int64], tolerance: float
+    ) -> tuple[Seen, NDArray[np.int64]]:
+        """What is seen, and the (K,) group of each point: of eight independent sequences as many
+        points as make the hints certain, doubled until they are."""
+        options = self._options
+        seeds = ((options.seed + 1 << 32) + g for g in range(GROUPS))
+        sequences = [Sequence(places, options.placed, seed) for seed in seeds]
+        found: list[Seen] = []
+        group = np.zeros(0, dtype=np.int64)
+        more = max(1, min(FIRST, options.points // GROUPS))
+        while True:
+            eyes = [sequence.take(more) for sequence in sequences]
+            added = np.repeat(np.arange(GROUPS), [len(e) for e in eyes])
+            every = Eyes.join(eyes)
+            if not len(added) and not found:
+                every, added = places.least_bad(), np.zeros(1, dtype=np.int64)
+                return look(every), added[: len(every)]
+            found.append(look(every))
+            group = np.concatenate([group, added])
+            seen = Seen(
+                np.concatenate([f.counts for f in found]),
+                np.concatenate([f.missed for f in found]),
+            )
+            by_cell = np.add.reduceat(seen.counts.sum(axis=1), begin, axis=1)
+            bound = spread(by_cell, group)[1]
+            more = min(len(group) // GROUPS, (options.points - len(group)) // GROUPS)
+            if bound <= tolerance or more < 1 or not len(added):
+                return seen, group

@@ -43,6 +43,7 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D704": ("error", "hints.json and a texture file disagree"),
     "PTM-D705": ("error", "portals in hints.json are wrong, or not those of the adjacent cells"),
     "PTM-D706": ("error", "hints.json and the viewpoints of the root file disagree"),
+    "PTM-D707": ("error", "the statistics of the coverage in hints.json do not fit it"),
     "PTM-D710": ("error", "a .ptm file is damaged"),
     "PTM-D711": ("error", "a .ptm file and its PNG twin show different images"),
     "PTM-D712": ("error", "a PNG twin cannot be read"),

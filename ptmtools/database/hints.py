@@ -24,6 +24,8 @@ from ptmtools.visibility.model import Pvs
 
 FORMAT = "ptmtools hints"
 SCHEMA = 1
+#: Significant digits of statistics.
+DIGITS = 5
 
 
 def hints_text(
@@ -67,6 +69,7 @@ def hints_text(
             "samples": int(ach.samples[c]),
             "rejected": int(ach.rejected[c]),
             "missed": float(ach.missed[c]),
+            "coverage": _coverage(ach, c, place),
             "portals": portals[c],
         }
         for c in range(cells.cell_count)
@@ -102,6 +105,34 @@ def _leaf(cells: Cells, leaf: int) -> dict[str, Any]:
         "points": cells.leaf_points(leaf).tolist(),
         "faces": [(loop - first).tolist() for loop in cells.leaf_faces(leaf)],
     }
+
+
+def _coverage(ach: Ach, c: int, place: Mapping[int, int]) -> dict[str, Any]:
+    """How far the hints of a cell can be trusted, and how they differ by point, view and texture;
+    aligned with its visible cells, with `DIGITS` digits."""
+    rows = ach.entries(c)
+    told: dict[str, Any] = {
+        "error": _short(ach.error[rows]),
+        "p95": _short(ach.p95[rows]),
+        "seen": _short(ach.seen[rows]),
+        "views": [_short(view) for view in ach.views[rows].T],
+        "uncertain": _short(ach.uncertain[c : c + 1])[0],
+        "unseenBelow": _short(ach.unseen_below[c : c + 1])[0],
+        "floor": _short(ach.floor[c : c + 1])[0],
+    }
+    if ach.by_texture:
+        told["textures"] = []
+        for entry in range(rows.start, rows.stop):
+            of_entry = slice(int(ach.texture_start[entry]), int(ach.texture_start[entry + 1]))
+            images, value = ach.texture[of_entry].tolist(), _short(ach.texture_value[of_entry])
+            shares = [[place.get(i), share] for i, share in zip(images, value, strict=True)]
+            told["textures"].append(shares)
+    return told
+
+
+def _short(values: NDArray[np.float64]) -> list[float | None]:
+    """Rounded to `DIGITS` significant digits; None for NaN."""
+    return [None if v != v else float(f"{v:.{DIGITS}g}") for v in values.tolist()]
 
 
 def _portals(cells: Cells) -> list[list[dict[str, Any]]]:

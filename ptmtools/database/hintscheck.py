@@ -8,11 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.database.cellcheck import ReadCell, check_shares
 from ptmtools.database.findings import Findings
 from ptmtools.database.hints import FORMAT, SCHEMA
 
+#: How far sums of statistics, which are rounded, may be off.
+ROUNDED = 1e-3
 #: How far the ach values in full precision may sum up beside 1.
 ACH_SLACK = 1e-9
 #: Missed mass above this is worth a warning.
@@ -62,7 +65,18 @@ _CELL: dict[str, Any] = {
     "samples": int,
     "rejected": int,
     "missed": _NUMBER,
+    "coverage": dict,
     "portals": list,
+}
+_MAYBE = (*_NUMBER, type(None))
+_COVERAGE: dict[str, Any] = {
+    "error": list,
+    "p95": list,
+    "seen": list,
+    "views": list,
+    "uncertain": _MAYBE,
+    "unseenBelow": _NUMBER,
+    "floor": _NUMBER,
 }
 _LEAF: dict[str, Any] = {"points": list, "faces": list}
 _PORTAL: dict[str, Any] = {"neighbour": int, "polygon": list, "area": _NUMBER}
@@ -104,6 +118,8 @@ def check_hints(hints: ReadHints, file: str, found: Findings) -> None:
         if cell["missed"] > MISSED:
             share = f"{cell['missed']:.3g} of the pixels"
             found.add("PTM-D703", file, place, f"{share} fell on cells outside the PVS")
+        if wrong := _misfit(cell["coverage"], ach):
+            found.add("PTM-D707", file, place, wrong)
         to = [portal["neighbour"] for portal in cell["portals"]]
         if sorted(set(to)) != sorted(cell["adjacent"]):
             found.add("PTM-D705", file, place, "the portals lead to other cells than the adjacent")
@@ -141,6 +157,31 @@ def check_against_cells(
             found.add("PTM-D701", file, f"cell {i}", f"{field} differs from {name}")
 
 
+def _misfit(coverage: Mapping[str, Any], ach: NDArray[np.float64]) -> str:
+    """What is wrong with the statistics of a row of (n,) shares; empty if nothing is."""
+    views = coverage["views"]
+    columns = {name: coverage[name] for name in ("error", "p95", "seen")}
+    if len(views) != 6:
+        return "views are not six"
+    columns |= {f"views[{i}]": view for i, view in enumerate(views)}
+    for name, values in columns.items():
+        if not isinstance(values, list) or len(values) != len(ach):
+            return f"{name} is not aligned with ach"
+        missing = name != "error" and None in values
+        if missing or not all(v is None or (type(v) in _NUMBER and 0 <= v <= 1) for v in values):
+            return f"{name} is outside 0 to 1"
+    if any(abs(sum(view) - 1) > ROUNDED for view in views):
+        return "the shares of a view do not sum to 1"
+    # But for a cell that sees nothing, which has 1 for itself.
+    if any(seen == 0 < share < 1 for seen, share in zip(coverage["seen"], ach, strict=True)):
+        return "what is seen from nowhere has a share"
+    if "textures" in coverage:
+        sums = [sum(share for _, share in entry) for entry in coverage["textures"]]
+        if len(sums) != len(ach) or np.abs(np.array(sums) - ach).max(initial=0) > ROUNDED:
+            return "the shares of textures do not sum to those of their cells"
+    return ""
+
+
 def _no_constant(name: str) -> float:
     raise _DamageError(f"the number {name} is not finite")
 
@@ -166,6 +207,7 @@ def _read(document: Any) -> ReadHints:
         _indices(cell["visible"], len(cells), f"cells[{i}].visible")
         _indices(cell["textures"], len(textures), f"cells[{i}].textures")
         _numbers([cell["ach"]], None, f"cells[{i}].ach")
+        _typed(cell["coverage"], _COVERAGE, f"cells[{i}].coverage")
         for leaf in cell["leaves"]:
             _typed(leaf, _LEAF, f"cells[{i}].leaves")
             _numbers(leaf["points"], 3, f"cells[{i}].leaves.points")

@@ -13,8 +13,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ptmtools.cells import SubdivideOptions, subdivide
 from ptmtools.coverage.ach import compute_ach
+from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.database import EmitOptions
 from ptmtools.pipeline.emission import put_files
@@ -310,14 +313,30 @@ def _sample(run: Run, options: AchOptions) -> None:
         ach = compute_ach(run.scene, run.cells, run.pvs, options, run.progress)
         run.hold("ach", ach)
         run.writer.put_arrays("ach", ach.to_arrays())
-        blind = int((ach.samples == 0).sum())
-        notes = (f"no sample point was found in {blind:,} cells",) if blind else ()
+        notes = _coverage_notes(ach, options)
+        known = bool(np.isfinite(ach.uncertain).any())
         return {
             "backend": ach.backend,
             "renderer": ach.renderer,
             "samples": int(ach.samples.sum()),
             "rejected": int(ach.rejected.sum()),
             "most_missed": float(ach.missed.max(initial=0.0)),
+            "mean_uncertain": float(np.nanmean(ach.uncertain)) if known else None,
         }, notes
 
     run.stage("ach", options, run.inputs("scene", "cells", "pvs"), compute)
+
+
+def _coverage_notes(ach: Ach, options: AchOptions) -> tuple[str, ...]:
+    notes = []
+    if blind := int((ach.samples == 0).sum()):
+        notes.append(f"no sample point was found in {blind:,} cells")
+    if options.tolerance is not None:
+        short = int((~(ach.uncertain <= options.tolerance)).sum())
+        if short:
+            notes.append(
+                f"{short:,} cells did not reach the tolerance of {options.tolerance:g} "
+                f"with {options.points:,} sample points (`--samples`); their `uncertain` says how "
+                "near they came"
+            )
+    return tuple(notes)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,9 @@ import pytest
 
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.embree import EmbreeRenderer
-from ptmtools.coverage.item_buffer import Renderer, Surfaces, sample_coverage
+from ptmtools.coverage.eyes import Eyes
+from ptmtools.coverage.item_buffer import Renderer, Surfaces
+from ptmtools.coverage.looking import Looker, Owners
 from ptmtools.coverage.opengl import APT, OpenGLRenderer, create_context
 from ptmtools.errors import MissingComponentError
 from ptmtools.scene.model import Material, Scene
@@ -48,13 +50,43 @@ def renderer_of(backend: str, surfaces: Surfaces, face: int) -> Iterator[Rendere
 
 
 @pytest.fixture(scope="session")
+def drawing() -> Callable[..., AbstractContextManager[Renderer]]:
+    """``with drawing(backend, surfaces, face) as renderer``."""
+    return renderer_of
+
+
+def eyes_at(points, near: float = 1e-3, shift=(0.0, 0.0)) -> Eyes:
+    place = np.array(points, dtype=np.float64).reshape(-1, 3)
+    return Eyes(place, np.full(len(place), near), np.tile(np.array(shift, float), (len(place), 1)))
+
+
+@pytest.fixture(scope="session")
+def eyes() -> Callable[..., Eyes]:
+    """``eyes(points, near, shift)``."""
+    return eyes_at
+
+
+def counted(renderer: Renderer, surfaces: Surfaces, cells: Cells, at: Eyes, face: int) -> list[int]:
+    owners = Owners.of(surfaces, by_image=False)
+    looker = Looker(renderer, surfaces, cells, face, by_angle=False)
+    seen = looker.look(at, owners, np.arange(surfaces.cell_count))
+    return np.append(seen.counts.sum(axis=(0, 1)), seen.missed.sum())
+
+
+@pytest.fixture(scope="session")
+def count() -> Callable[..., np.ndarray]:
+    """``count(renderer, surfaces, cells, eyes, face)``: pixels of each cell, then of none."""
+    return counted
+
+
+@pytest.fixture(scope="session")
 def coverage_at() -> Callable[..., np.ndarray]:
     """``coverage_at(backend, scene, cells, point, face)``: pixels of each cell, then of none."""
 
     def at(backend, scene, cells, point, face=64, near=1e-3):
         surfaces = Surfaces.of(scene, cells)
         with renderer_of(backend, surfaces, face) as renderer:
-            return sample_coverage(renderer, surfaces, np.array(point, dtype=float), near)
+            return counted(renderer, surfaces, cells, eyes_at(point, near), face)
 
     return at
 

@@ -11,8 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ptmtools.coverage.embree import EmbreeRenderer
-from ptmtools.coverage.item_buffer import VIEWS, Surfaces, pixel_centres, sample_coverage
-from ptmtools.coverage.opengl import OpenGLRenderer, create_context
+from ptmtools.coverage.item_buffer import VIEWS, Surfaces, pixel_centres
+from ptmtools.coverage.looking import Looker, Owners
 
 FACE = 64
 
@@ -232,54 +232,108 @@ def test_backends_agree_anywhere(room_row, coverage_at, has_gl, require, eye, fa
 class Doubtful:
     """Rays, but with some pixels shown wrongly, as past a rounded edge."""
 
-    backend, name = "embree", "doubtful"
+    backend, name, most = "embree", "doubtful", 10
 
     def __init__(self, rays, wrong, triangle):
         self.rays, self.wrong, self.triangle = rays, wrong, triangle
 
-    def layers(self, point, near):
-        found = self.rays.layers(point, near)
-        found[0, self.wrong] = self.triangle
+    def show(self, eyes, needed=None):
+        found = self.rays.show(eyes, needed)
+        found.reshape(1, -1)[0, self.wrong] = self.triangle
         return found
 
-    def traced(self, point, pixels):
+    def trace(self, eyes, pixels):
         assert set(self.wrong) <= set(pixels)
-        return self.rays.traced(point, pixels)
+        return self.rays.trace(eyes, pixels)
 
     def close(self):
         self.rays.close()
 
 
-def test_an_unexpected_cell_is_believed_only_if_a_ray_confirms_it(room_row):
+def test_an_unexpected_cell_is_believed_only_if_a_ray_confirms_it(room_row, eyes):
     scene, cells = room_row(3)
     surfaces = Surfaces.of(scene, cells)
+    owners = Owners.of(surfaces, by_image=False)
     rays = EmbreeRenderer(surfaces, FACE)
-    eye = np.array([2.0, 1.7, 0.3])
-    truth = sample_coverage(rays, surfaces, eye, 1e-3)
+    eye = eyes([2.0, 1.7, 0.3])
+
+    def look(renderer, wanted):
+        looker = Looker(renderer, surfaces, cells, FACE, by_angle=False)
+        seen = looker.look(eye, owners, np.array(wanted))
+        return [*seen.counts.sum(axis=(0, 1)).tolist(), int(seen.missed[0])]
+
+    truth = look(rays, [0, 1, 2])
     assert truth[2] > 0
     in_room_2 = int(np.flatnonzero((cells.triangle_cell == [2, -1]).all(axis=1))[0])
     wrong = Doubtful(rays, [5, 77, 1000], in_room_2)
-    fooled = sample_coverage(wrong, surfaces, eye, 1e-3)
+    fooled = look(wrong, [0, 1, 2])
     assert fooled[2] == truth[2] + 3
-    adjacent_only = np.array([True, True, False])
-    assert sample_coverage(wrong, surfaces, eye, 1e-3, adjacent_only).tolist() == truth.tolist()
-    everything = np.ones(3, dtype=bool)
-    assert sample_coverage(wrong, surfaces, eye, 1e-3, everything).tolist() == fooled.tolist()
+    assert look(wrong, [0, 1]) == [*truth[:2], truth[2]], "what room 2 really covers is missed"
 
 
-def test_rays_through_some_pixels_are_the_rays_through_all(room_row, furnish, backend):
+def test_what_reaches_in_a_hair_is_seen_where_it_is(room_row, furnish, eyes):
+    """The end of a wall that belongs to room 2, a tenth of a millimetre deep in room 1: from room
+    1, which cannot see room 2, it is part of room 1."""
+    scene, cells = room_row(3)
+    reach = rectangle_across(8.0 - 1e-5, (0, 3), (1.2, 1.8))
+    scene, cells = furnish(scene, cells, [reach], [(2, 2)])
+    surfaces = Surfaces.of(scene, cells)
+    rays = EmbreeRenderer(surfaces, FACE)
+    looker = Looker(rays, surfaces, cells, FACE, by_angle=False)
+    seen = looker.look(eyes([6, 1.7, 0.3]), Owners.of(surfaces, by_image=False), np.array([0, 1]))
+    every = looker.look(eyes([6, 1.7, 0.3]), Owners.of(surfaces, by_image=False), np.arange(3))
+    in_room_2 = int(every.counts[..., 2].sum())
+    recovered = int(seen.counts[..., 1].sum()) - int(every.counts[..., 1].sum())
+    assert recovered > 20
+    assert recovered + int(seen.missed[0]) == in_room_2
+
+
+def test_rays_through_some_pixels_are_the_rays_through_all(
+    room_row, furnish, backend, eyes, drawing
+):
     scene, cells = room_row(2)
     pane = rectangle_across(4.0, (0, 3), (-1, 1))
     surfaces = Surfaces.of(*furnish(scene, cells, [pane], [(0, 1)], transparent=True))
-    eye = np.array([1.0, 1.7, 0.3])
-    whole = EmbreeRenderer(surfaces, FACE).layers(eye, 1e-3)
-    assert whole.shape == (2, 6 * FACE**2)
-    pixels = np.arange(0, 6 * FACE**2, 7)
-    if backend == "gl":
-        renderer = OpenGLRenderer(create_context(), surfaces, FACE)
-    else:
-        renderer = EmbreeRenderer(surfaces, FACE)
-    assert np.array_equal(renderer.traced(eye, pixels), whole[:, pixels])
-    drawn = renderer.layers(eye, 1e-3)
-    renderer.close()
+    at = eyes([[1.0, 1.7, 0.3], [2.5, 1.1, -0.3]], shift=(0.3, -0.6))
+    whole = EmbreeRenderer(surfaces, FACE).show(at)
+    assert whole.shape == (2, 2, 6, FACE**2)
+    pixels = np.arange(0, 2 * 6 * FACE**2, 7)
+    with drawing(backend, surfaces, FACE) as renderer:
+        found, place = renderer.trace(at, pixels)
+        drawn = renderer.show(at)
+    assert np.array_equal(found, whole.reshape(2, -1)[:, pixels])
+    hit = found[0] >= 0
+    plane = surfaces.plane[found[0][hit]]
+    off = np.einsum("ij,ij->i", plane[:, :3], surfaces.normalised(place[0][hit])) + plane[:, 3]
+    assert np.abs(off).max() < 1e-6
     assert np.mean(drawn != whole) < 1e-3  # triangles that share an edge may share its pixels
+
+
+def test_many_points_at_once_are_each_alone(room_row, furnish, backend, eyes, drawing):
+    """More than fit into one target or one batch of rays, some in other rooms."""
+    scene, cells = room_row(3)
+    pane = rectangle_across(4.0, (0, 3), (-1, 1))
+    surfaces = Surfaces.of(*furnish(scene, cells, [pane], [(0, 1)], transparent=True))
+    points = np.random.default_rng(1).uniform([0.2, 0.2, -1.8], [11.8, 3.8, 1.8], (50, 3))
+    face = 16
+    with drawing(backend, surfaces, face) as renderer:
+        together = renderer.show(eyes(points, shift=(0.5, 0.25)))
+        for k in (0, 17, 49):
+            alone = renderer.show(eyes(points[k], shift=(0.5, 0.25)))
+            assert np.array_equal(together[:, k], alone[:, 0])
+    assert (together >= 0).any(axis=(1, 2, 3)).all()
+
+
+def test_culled_surfaces_would_not_show(room_row, eyes, drawing, has_gl, require):
+    """Only what the PVS needs is drawn; what stands outside it and shows is drawn nevertheless."""
+    if not has_gl:
+        require("OpenGL", "apt install libegl1 libgl1 libgl1-mesa-dri")
+    scene, cells = room_row(3)
+    surfaces = Surfaces.of(scene, cells)
+    at = eyes([[2.0, 1.7, 0.3], [1.0, 1.0, 1.0]])
+    with drawing("gl", surfaces, FACE) as renderer:
+        every = renderer.show(at)
+        assert np.array_equal(renderer.show(at, np.array([True, True, True])), every)
+        assert np.array_equal(renderer.show(at, np.array([True, False, False])), every)
+        hidden = renderer._culling.lists(surfaces.normalised(at.point), FACE, None)
+    assert sum(len(o) for o, _ in hidden) < 6 * len(surfaces.triangle)

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ptmtools.coverage.matter import Surroundings, bodies, distances, edge_groups
+from ptmtools.coverage.clearance.kernels import distance
+from ptmtools.coverage.matter import Surroundings, bodies, edge_groups
 
 SPAN = st.floats(-4, 4).map(lambda x: round(x, 3))
 POINT = st.tuples(SPAN, SPAN, SPAN)
@@ -40,17 +41,17 @@ def around(room_row, furnish, quads, sides=(0, 0)):
 def test_inside_a_statue(room_row, furnish):
     found = around(room_row, furnish, STATUE)
     assert len(found.bodies) == 1
-    assert found.in_matter(INSIDE)
-    assert not found.in_matter(OUTSIDE)
-    assert not found.in_matter(np.array([1.5, 2.6, -0.5]))
+    assert found.in_matter(np.atleast_2d(INSIDE))[0]
+    assert not found.in_matter(np.atleast_2d(OUTSIDE))[0]
+    assert not found.in_matter(np.atleast_2d(np.array([1.5, 2.6, -0.5])))[0]
 
 
 @pytest.mark.parametrize("flip", [[0], [1, 4], [0, 1, 2]])
 def test_winding_need_not_be_right(room_row, furnish, flip):
     quads = [q[::-1] if i in flip else q for i, q in enumerate(STATUE)]
     found = around(room_row, furnish, quads)
-    assert found.in_matter(INSIDE)
-    assert not found.in_matter(OUTSIDE)
+    assert found.in_matter(np.atleast_2d(INSIDE))[0]
+    assert not found.in_matter(np.atleast_2d(OUTSIDE))[0]
 
 
 def test_a_shell_that_faces_inwards_is_a_room(room_row, furnish):
@@ -62,7 +63,7 @@ def test_a_statue_may_stand_on_the_floor(room_row, furnish):
     scene, cells = room_row(1)
     quads = box([1, 0, -1], [2, 2.5, 0])
     sides = [(0, -1) if i == 2 else (0, 0) for i in range(6)]
-    assert Surroundings.of(*furnish(scene, cells, quads, sides)).in_matter(INSIDE)
+    assert Surroundings.of(*furnish(scene, cells, quads, sides)).in_matter(INSIDE[None])[0]
 
 
 def test_structure_is_the_subdivisions_business(room_row, furnish):
@@ -82,13 +83,13 @@ def test_open_and_thin_things_have_no_inside(room_row, furnish):
     for quads in (sheet, no_lid, twice):
         found = around(room_row, furnish, quads)
         for point in (INSIDE, OUTSIDE, np.array([1.001, 1.3, -0.45])):
-            assert not found.in_matter(point)
+            assert not found.in_matter(np.atleast_2d(point))[0]
 
 
 def test_a_body_within_a_body(room_row, furnish):
     found = around(room_row, furnish, STATUE + box([1.2, 1, -0.8], [1.6, 1.5, -0.2]))
     assert len(found.bodies) == 2
-    assert found.in_matter(INSIDE)
+    assert found.in_matter(np.atleast_2d(INSIDE))[0]
 
 
 def test_groups_hang_together_by_edges_not_by_corners():
@@ -104,7 +105,7 @@ def test_groups_hang_together_by_edges_not_by_corners():
 def test_distance_to_a_triangle(a, b, c):
     """Against the least distance to a dense set of points of it, slivers and points included."""
     corners = np.array([a, b, c])
-    found = float(distances(corners[None])[0])
+    found = distance(np.zeros(3), corners)
     n = 60
     i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1))
     u, v = (g[i + j <= n] / n for g in (i, j))
@@ -118,6 +119,14 @@ def test_distance_to_a_triangle(a, b, c):
 
 def test_clearance_stops_looking_when_it_is_enough(room_row, furnish):
     found = around(room_row, furnish, STATUE)
-    assert found.clearance(np.array([2.25, 1.3, -0.5]), 1.0) == pytest.approx(0.25)
-    assert found.clearance(np.array([2.25, 1.3, -0.5]), 0.1) == 0.1
-    assert found.clearance(np.array([2.0, 1.3, -0.5]), 0.1) == 0
+    points = np.array([[2.25, 1.3, -0.5], [2.0, 1.3, -0.5], [0.5, 2.0, 0.25]])
+    assert found.clearance(points, 1.0) == pytest.approx([0.25, 0, 0.5])
+    assert found.clearance(points, 0.1).tolist() == [0.1, 0, 0.1]
+
+
+def test_clearance_is_that_of_all_triangles(room_row, furnish):
+    """Points in any order, against every triangle."""
+    found = around(room_row, furnish, STATUE)
+    points = np.random.default_rng(0).uniform([-0.2, -0.2, -2.2], [4.2, 4.2, 2.2], (300, 3))
+    nearest = [min(distance(p, corners) for corners in found.corners) for p in points]
+    assert found.clearance(points, 0.3) == pytest.approx(np.minimum(nearest, 0.3))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +12,11 @@ import pytest
 
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.subdivide import subdivide
-from ptmtools.coverage.ach import choose_eyes
-from ptmtools.coverage.embree import EmbreeRenderer
-from ptmtools.coverage.item_buffer import Surfaces, sample_coverage
-from ptmtools.coverage.matter import Surroundings
-from ptmtools.coverage.opengl import APT, OpenGLRenderer, create_context
+from ptmtools.coverage.ach import compute_ach
+from ptmtools.coverage.opengl import APT
 from ptmtools.coverage.options import AchOptions
 from ptmtools.scene.ingestion import ingest
+from ptmtools.visibility.pvs import compute_pvs
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -35,20 +34,16 @@ def assert_backends_agree(model: Path, transparent: bool) -> None:
     scene = ingest(model)
     assert scene.opaque.all() != transparent
     cells = subdivide(scene, SubdivideOptions(max_cells=30))
-    surfaces, around = Surfaces.of(scene, cells), Surroundings.of(scene, cells)
-    options = AchOptions(samples=2)
-    gl = OpenGLRenderer(create_context(), surfaces, 64)
-    rays = EmbreeRenderer(surfaces, 64)
-    covered, differ = 0, 0.0
-    for cell in range(cells.cell_count):
-        for eye in choose_eyes(cells, around, cell, options, 1e-3)[0]:
-            one = sample_coverage(gl, surfaces, eye.point, eye.near)
-            other = sample_coverage(rays, surfaces, eye.point, eye.near)
-            covered += int(other.sum())
-            differ += float(np.abs(one - other).sum()) / 2
-    gl.close()
-    assert covered > 20 * 64**2 * cells.cell_count / 4
-    assert differ / covered <= 1e-4
+    pvs = compute_pvs(cells)
+    options = AchOptions(samples=4, face=64)
+    one, other = (
+        compute_ach(scene, cells, pvs, replace(options, backend=backend))
+        for backend in ("gl", "embree")
+    )
+    assert np.array_equal(one.samples, other.samples)
+    covered = other.pixels.sum()
+    assert covered > 20 * 64**2 * cells.cell_count / 2
+    assert np.abs(one.pixels - other.pixels).sum() / 2 / covered <= 1e-4
 
 
 def test_the_hospital(shared, has_gl, require):

@@ -37,6 +37,37 @@ class Artifacts:
     ach: Ach
 
 
+def hints_by_hand(pvs: Pvs, value: np.ndarray) -> Ach:
+    """Made-up hints of a thousand pixels for each cell."""
+    cells = pvs.cell_count
+    return Ach(
+        start=pvs.start,
+        value=value,
+        pixels=value * 1000,
+        error=value / 10,
+        p95=np.minimum(2 * value, 1),
+        seen=np.where(value > 0, 0.5, 0.0),
+        views=np.tile(value[:, None], 6),
+        missed=np.zeros(cells),
+        samples=np.full(cells, 8, np.int32),
+        rejected=np.zeros(cells, np.int32),
+        uncertain=np.full(cells, 0.05),
+        unseen_below=np.full(cells, 3 / 8),
+        floor=np.full(cells, 0.5 / 1000),
+        texture_start=np.zeros(0, np.int64),
+        texture=np.zeros(0, np.int32),
+        texture_value=np.zeros(0),
+        backend="embree",
+        renderer="by hand",
+    )
+
+
+@pytest.fixture(scope="session")
+def made_up_hints() -> Callable[[Pvs, np.ndarray], Ach]:
+    """``made_up_hints(pvs, value)``."""
+    return hints_by_hand
+
+
 @pytest.fixture(scope="session")
 def artifacts(room_row: Callable[[int], tuple[Scene, Cells]]) -> Artifacts:
     """Three rooms with every kind of material; coverage values are made up."""
@@ -52,16 +83,7 @@ def artifacts(room_row: Callable[[int], tuple[Scene, Cells]]) -> Artifacts:
     )
     pvs = Pvs.from_matrix(np.ones((3, 3), np.bool_))
     pixels = np.array([700, 200, 100, 600, 250, 150, 800, 100, 100], np.int64)
-    ach = Ach(
-        start=pvs.start,
-        value=pixels / 1000,
-        pixels=pixels,
-        missed=np.zeros(3),
-        samples=np.full(3, 8, np.int32),
-        rejected=np.zeros(3, np.int32),
-        backend="embree",
-        renderer="by hand",
-    )
+    ach = hints_by_hand(pvs, pixels / 1000)
     return Artifacts(scene, cells, pvs, ach)
 
 

@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ptmtools.coverage.model import Ach
 from ptmtools.database import EmitOptions, GivenViewpoint, TextureRecord, emit, validate_database
 from ptmtools.database.names import DefNames
 from ptmtools.database.wrl import Node, parse
@@ -141,7 +140,7 @@ def test_an_empty_cell_has_a_file(artifacts, tmp_path: Path) -> None:
     assert document.of_type("Shape") == []
 
 
-def test_a_cell_of_two_leaves(artifacts, tmp_path: Path) -> None:
+def test_a_cell_of_two_leaves(artifacts, tmp_path: Path, made_up_hints) -> None:
     cells = replace(
         artifacts.cells,
         leaf_cell=np.array([0, 0, 1], np.int32),
@@ -150,12 +149,7 @@ def test_a_cell_of_two_leaves(artifacts, tmp_path: Path) -> None:
         + np.minimum(artifacts.cells.triangle_cell, 0),
     )
     pvs = replace(artifacts.pvs, start=np.array([0, 2, 4]), cell=np.array([0, 1, 1, 0], np.int32))
-    ach = replace(
-        artifacts.ach,
-        start=pvs.start,
-        value=np.array([0.75, 0.25, 0.5, 0.5]),
-        missed=np.zeros(2),
-    )
+    ach = made_up_hints(pvs, np.array([0.75, 0.25, 0.5, 0.5]))
     write(artifacts, tmp_path / "db/www", cells=cells, pvs=pvs, ach=ach)
     node = parse((tmp_path / "db/www/cells/c0000.wrl").read_bytes()).of_type("PTMCell")[0]
     assert node.fields["leafStart"].tolist() == [0, 8]
@@ -172,7 +166,9 @@ def test_a_cell_of_two_leaves(artifacts, tmp_path: Path) -> None:
     assert "PTM-D701" in {i.code for i in validate_database(tmp_path / "db").issues}
 
 
-def test_geometry_beyond_the_root_box_of_a_cell_of_two_leaves(tmp_path: Path, room_row) -> None:
+def test_geometry_beyond_the_root_box_of_a_cell_of_two_leaves(
+    tmp_path: Path, room_row, made_up_hints
+) -> None:
     """An open model: what lies beyond the box is in order before a leaf, though the hull of a cell
     whose leaves differ in height leans; what lies elsewhere beyond the hull is not."""
     scene, cells = room_row(2)
@@ -182,9 +178,7 @@ def test_geometry_beyond_the_root_box_of_a_cell_of_two_leaves(tmp_path: Path, ro
     whole = replace(cells, leaf_cell=np.zeros(2, np.int32), leaf_point=point, closed=False)
     whole = replace(whole, triangle_cell=np.minimum(whole.triangle_cell, 0))
     pvs = Pvs.from_matrix(np.ones((1, 1), np.bool_))
-    ach = Ach(
-        pvs.start, *(np.ones(1) for _ in range(3)), np.full(1, 8), np.zeros(1), "embree", "by hand"
-    )
+    ach = made_up_hints(pvs, np.ones(1))
 
     def issues(moved: tuple[float, float, float], name: str) -> set[str]:
         vertex = loose.copy()

@@ -1,0 +1,1 @@
+"""How far points are from surfaces, and what they are inside of (`matter`)."""

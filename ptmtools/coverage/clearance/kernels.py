@@ -1,0 +1,110 @@
+"""Compiled distances of points from triangles, crossings of rays, and descent through the BSP."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.compiled import kernel
+
+Floats = NDArray[np.float64]
+
+
+@kernel
+def locate_leaves(
+    points: Floats, plane: Floats, child: NDArray[np.int32], leaf: NDArray[np.int32]
+) -> None:
+    """Writes into ``leaf`` (n,) the leaf that contains each of the (n, 3) points, or -1, for a tree
+    of (N, 4) planes and (N, 2) children with N > 0; as `Cells.locate_leaf`, box aside."""
+    for i in range(len(points)):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        node = 0
+        while node >= 0:
+            side = plane[node, 0] * x + plane[node, 1] * y + plane[node, 2] * z + plane[node, 3]
+            node = child[node, 0] if side > 0 else child[node, 1]
+        leaf[i] = -2 - node if node <= -2 else -1
+
+
+@kernel
+def clearances(points: Floats, corners: Floats, enough: float, found: Floats) -> None:
+    """Writes into ``found`` (n,) the distance of each of the (n, 3) points, ascending in x, from
+    the nearest of the (m, 3, 3) triangles, at most ``enough``."""
+    found[:] = enough
+    x = points[:, 0]
+    for t in range(len(corners)):
+        a, b, c = corners[t, 0], corners[t, 1], corners[t, 2]
+        first = np.searchsorted(x, min(a[0], b[0], c[0]) - enough)
+        end = np.searchsorted(x, max(a[0], b[0], c[0]) + enough, side="right")
+        if first == end:
+            continue
+        low_y, high_y = min(a[1], b[1], c[1]) - enough, max(a[1], b[1], c[1]) + enough
+        low_z, high_z = min(a[2], b[2], c[2]) - enough, max(a[2], b[2], c[2]) + enough
+        for i in range(first, end):
+            if low_y <= points[i, 1] <= high_y and low_z <= points[i, 2] <= high_z:
+                found[i] = min(found[i], distance(points[i], corners[t]))
+
+
+@kernel
+def distance(p: Floats, corner: Floats) -> float:
+    """Distance of a (3,) point from a (3, 3) triangle, a sliver or a point included."""
+    o = corner[0]
+    ux, uy, uz = corner[1, 0] - o[0], corner[1, 1] - o[1], corner[1, 2] - o[2]
+    vx, vy, vz = corner[2, 0] - o[0], corner[2, 1] - o[1], corner[2, 2] - o[2]
+    nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    length = np.sqrt(nx * nx + ny * ny + nz * nz)
+    nearest = np.inf
+    over = length > 0
+    for i in range(3):
+        a, b = corner[i], corner[(i + 1) % 3]
+        ex, ey, ez = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        wx, wy, wz = p[0] - a[0], p[1] - a[1], p[2] - a[2]
+        square = ex * ex + ey * ey + ez * ez
+        t = (wx * ex + wy * ey + wz * ez) / square if square > 0 else 0.0
+        t = min(max(t, 0.0), 1.0)
+        fx, fy, fz = wx - t * ex, wy - t * ey, wz - t * ez
+        nearest = min(nearest, np.sqrt(fx * fx + fy * fy + fz * fz))
+        cx, cy, cz = ey * wz - ez * wy, ez * wx - ex * wz, ex * wy - ey * wx
+        over = over and cx * nx + cy * ny + cz * nz >= 0
+    if over:
+        height = abs((p[0] - o[0]) * nx + (p[1] - o[1]) * ny + (p[2] - o[2]) * nz)
+        nearest = min(nearest, height / length)
+    return nearest
+
+
+@kernel
+def crossings(point: Floats, corners: Floats, along: Floats) -> int:
+    """How many of the (m, 3, 3) triangles the ray from a (3,) point along a (3,) direction
+    crosses: those past whose three edges its line runs on the same side, ahead of the point."""
+    crossed = 0
+    dx, dy, dz = along[0], along[1], along[2]
+    for t in range(len(corners)):
+        ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
+        bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
+        cx, cy, cz = corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]
+        ax, ay, az = ax - point[0], ay - point[1], az - point[2]
+        bx, by, bz = bx - point[0], by - point[1], bz - point[2]
+        cx, cy, cz = cx - point[0], cy - point[1], cz - point[2]
+        u = _volume(ax, ay, az, bx, by, bz, dx, dy, dz)
+        v = _volume(bx, by, bz, cx, cy, cz, dx, dy, dz)
+        w = _volume(cx, cy, cz, ax, ay, az, dx, dy, dz)
+        if (u >= 0 and v >= 0 and w >= 0) or (u <= 0 and v <= 0 and w <= 0):
+            bx, by, bz, cx, cy, cz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
+            height = _volume(bx, by, bz, cx, cy, cz, ax, ay, az)
+            crossed += height * _volume(bx, by, bz, cx, cy, cz, dx, dy, dz) > 0
+    return crossed
+
+
+@kernel
+def _volume(
+    ax: float,
+    ay: float,
+    az: float,
+    bx: float,
+    by: float,
+    bz: float,
+    cx: float,
+    cy: float,
+    cz: float,
+) -> float:
+    """a × b · c."""
+    return (ay * bz - az * by) * cx + (az * bx - ax * bz) * cy + (ax * by - ay * bx) * cz

@@ -1,0 +1,116 @@
+"""From counts at sample points to hints, and how far they can be trusted.
+
+A hint is a ratio, the pixels of one cell over all pixels, both summed over the sample points. Its
+standard error comes from eight groups of points, by the linearised ratio (Cochran, *Sampling
+Techniques*, 1977, §6.4). Where the groups are independently scrambled (``--tolerance``) it is
+honest; where they are stretches of one sequence, which complement one another, it is too large,
+by a factor of about two; of eight single points it is too small at times.
+
+The error of a whole row is its total variation, half the sum of absolute differences. The distance
+of each group's own hints from the mean says how that is distributed: a mean of R groups is closer
+to the truth than a group to the mean by the square root of R - 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Groups of sample points that the standard error is taken from.
+GROUPS = 8
+#: Student's t for GROUPS - 1 degrees of freedom: two-sided 95 % and one-sided 95 %.
+T_TWO_SIDED = 2.365
+T_ONE_SIDED = 1.895
+#: Rule of three: what was not met in K trials happens in less than 3/K of all, at 95 %.
+RULE_OF_THREE = 3.0
+
+
+@dataclass(frozen=True)
+class Row:
+    """The hints of one cell, for each of the n cells of its PVS.
+
+    Attributes
+    ----------
+    value: (n,) float64 share of what is seen; sums to 1.
+    pixels: (n,) float64 pixels, weighted.
+    error: (n,) float64 standard error of `value`; NaN where no pixel was met, or with one point.
+    p95: (n,) float64 the share that is exceeded from 5 % of the points.
+    seen: (n,) float64 share of the points from which it is seen.
+    views: (n, 6) float64 the same share for each of the six views alone; each column sums to 1.
+    uncertain: float64 a bound of the total variation between `value` and the truth, at about 95 %;
+        NaN with one point.
+    """
+
+    value: NDArray[np.float64]
+    pixels: NDArray[np.float64]
+    error: NDArray[np.float64]
+    p95: NDArray[np.float64]
+    seen: NDArray[np.float64]
+    views: NDArray[np.float64]
+    uncertain: float
+
+
+def shares(counts: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(…, n) counts over their sums; where that is 0, 1 for the first of the n.
+
+    Each quotient is off by half a unit in its last place at most, so the exact sum of a row is
+    within 1.2e-16 of 1.
+    """
+    total = counts.sum(axis=-1, keepdims=True)
+    found = counts / np.maximum(total, 1)
+    if found.shape[-1]:
+        found[..., 0] += total[..., 0] == 0
+    return np.asarray(found)
+
+
+def estimate(counts: NDArray[np.int64], group: NDArray[np.int64], unit: int) -> Row:
+    """The hints from (K, 6, n) weighted pixels at K points, each of the (K,) ``group``; a pixel in
+    the middle of a view weighs ``unit``."""
+    total = counts.sum(axis=(0, 1))
+    at_points = counts.sum(axis=1)
+    value = shares(total)
+    error, uncertain = spread(at_points, group)
+    return Row(
+        value=value,
+        pixels=total / unit,
+        error=np.where(total > 0, error, np.nan),
+        p95=ninety_fifth(at_points),
+        seen=np.count_nonzero(at_points, axis=0) / max(len(counts), 1),
+        views=shares(counts.sum(axis=0)).T,
+        uncertain=uncertain,
+    )
+
+
+def spread(
+    counts: NDArray[np.int64], group: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], float]:
+    """(n,) standard errors of the shares of (K, n) counts, and a bound, at about 95 %, of the total
+    variation between them and the truth; NaN where there is one group only."""
+    groups = int(group.max()) + 1 if len(group) else 0
+    if groups < 2:
+        return np.full(counts.shape[1], np.nan), float("nan")
+    summed = np.zeros((groups, counts.shape[1]), dtype=np.int64)
+    np.add.at(summed, group, counts)
+    value, size = shares(summed.sum(axis=0)), summed.sum(axis=1)
+    away = summed - value * size[:, None]
+    mean = max(size.mean(), 1.0)
+    error = np.sqrt((away**2).sum(axis=0) / (groups * (groups - 1))) / mean
+    distance = np.abs(away).sum(axis=1) / (2 * mean)
+    likely = distance.mean() + T_ONE_SIDED * distance.std(ddof=1) * np.sqrt(1 + 1 / groups)
+    return error, float(likely / np.sqrt(groups - 1))
+
+
+def ninety_fifth(counts: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(n,) the least share that at least 95 % of the (K, n) points do not exceed."""
+    if len(counts) == 0:
+        return np.zeros(counts.shape[1])
+    at_points = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    rank = -(-19 * len(counts) // 20) - 1
+    return np.asarray(np.partition(at_points, rank, axis=0)[rank])
+
+
+def grouped(count: int) -> NDArray[np.int64]:
+    """(count,) the group of each of a sequence of points: eight stretches of equal length."""
+    return np.arange(count) * min(GROUPS, count) // max(count, 1)

@@ -1,0 +1,141 @@
+"""The sample points of a cell: usable places from which its six views are drawn.
+
+Points inside matter or too near to a surface are passed over and counted (`matter`); the next of
+the sequence, or of the same part of the cell, takes their place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.coverage.matter import Surroundings
+from ptmtools.coverage.placement import TRIES, Volume
+
+#: Points of a sequence that are looked at together, at least.
+BATCH = 64
+
+
+@dataclass(frozen=True)
+class Eyes:
+    """K sample points.
+
+    Attributes
+    ----------
+    point: (K, 3) float64, metres, world coordinates.
+    near: (K,) float64 metres within which each has no surface.
+    shift: (K, 2) float64 in (-1, 1): how far right and up of the pixel centres its views are
+        drawn, in halves of a pixel.
+    """
+
+    point: NDArray[np.float64]
+    near: NDArray[np.float64]
+    shift: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.point)
+
+    def part(self, rows: slice) -> Eyes:
+        """Some of them."""
+        return Eyes(self.point[rows], self.near[rows], self.shift[rows])
+
+    @staticmethod
+    def none() -> Eyes:
+        """No points."""
+        return Eyes(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 2)))
+
+    @staticmethod
+    def join(parts: list[Eyes]) -> Eyes:
+        """Several, one after the other."""
+        columns = zip(*(vars(part).values() for part in parts), strict=True)
+        return Eyes(*(np.concatenate(column) for column in columns))
+
+
+@dataclass
+class Places:
+    """Finds usable points in one cell, ``clearance`` metres from all surfaces.
+
+    ``rejected`` counts the points that were passed over so far; the best of them is kept for the
+    case that there is no better one.
+    """
+
+    volume: Volume
+    around: Surroundings
+    clearance: float
+    rejected: int = 0
+    _best: tuple[bool, float, NDArray[np.float64]] | None = field(default=None, init=False)
+
+    def usable(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(n,) which of the (n, 3) points can be looked from; counts none of them."""
+        free = self.around.clearance(points, self.clearance)
+        outside = ~self.around.in_matter(points)
+        good = (free >= self.clearance) & outside
+        if not good.any():
+            for i in np.lexsort((free, outside))[-1:]:
+                found = (bool(outside[i]), float(free[i]), points[i])
+                if self._best is None or found[:2] > self._best[:2]:
+                    self._best = found
+        return np.asarray(good)
+
+    def of_parts(self, count: int, seed: int) -> Eyes:
+        """One point of each of ``count`` equal parts of the cell; a part without a usable one,
+        such as one filled by a statue, gives none."""
+        chosen = []
+        parts = [] if self.volume.empty else self.volume.parts(count, seed)
+        for part in parts:
+            first = self.usable(part[:1])
+            good = np.flatnonzero(first if first[0] else self.usable(part))
+            self.rejected += int(good[0]) if len(good) else len(part)
+            chosen += [part[i] for i in good[:1]]
+        return self.at(np.array(chosen).reshape(-1, 3), np.full((len(chosen), 2), 0.5))
+
+    def at(self, points: NDArray[np.float64], unit: NDArray[np.float64]) -> Eyes:
+        """Eyes at usable points, shifted by two coordinates in (0, 1) each."""
+        return Eyes(points, np.full(len(points), self.clearance), 2 * unit - 1)
+
+    def least_bad(self) -> Eyes:
+        """Where nothing is usable: the one point that is outside matter, if possible, and farthest
+        from all surfaces. None in a cell without volume."""
+        if self._best is None:
+            return Eyes.none()
+        _, free, point = self._best
+        # On the surface itself, where nothing can be right, the near plane still has to be.
+        near = max(free, self.clearance / 1024)
+        return Eyes(point[None], np.array([near]), np.zeros((1, 2)))
+
+
+class Sequence:
+    """The usable points of one random or scrambled sequence in a cell, in their order."""
+
+    def __init__(self, places: Places, kind: str, seed: int) -> None:
+        """``kind`` is "sobol" or "uniform"."""
+        self._places = places
+        self._draw = places.volume.sobol if kind == "sobol" else places.volume.random
+        self._seed = seed
+        self._next = 0
+        self._waiting = np.zeros((0, 5))
+        self._good = np.zeros(0, dtype=np.bool_)
+        self._refused = 0
+
+    def take(self, count: int) -> Eyes:
+        """The next ``count`` usable points; fewer if more than `TRIES` in the cell are refused
+        for each."""
+        places = self._places
+        while not places.volume.empty and int(self._good.sum()) < count:
+            if self._refused > TRIES * count:
+                break
+            size = max(BATCH, self._next)
+            drawn = self._draw(self._next, size, self._seed)
+            good = places.usable(drawn[:, :3]) if len(drawn) else np.zeros(0, np.bool_)
+            self._next += size
+            self._refused += int((~good).sum())
+            self._waiting = np.concatenate([self._waiting, drawn])
+            self._good = np.concatenate([self._good, good])
+        last = np.flatnonzero(self._good)[:count]
+        end = int(last[-1]) + 1 if len(last) == count and count else len(self._good)
+        taken = self._waiting[last]
+        places.rejected += end - len(last)
+        self._waiting, self._good = self._waiting[end:], self._good[end:]
+        return places.at(taken[:, :3], taken[:, 3:])

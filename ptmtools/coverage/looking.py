@@ -1,0 +1,195 @@
+"""From sample points to counts: whose surfaces show, point by point and view by view.
+
+A pixel counts for the owner, on the viewer's side, of the triangle that it shows. Where that is a
+cell outside the PVS, or none, the pixel is doubted, and asked again in two steps:
+
+1. a ray through it is cast. A rasteriser rounds corners to 1/256 pixel, and past a rounded edge it
+   sees what no straight line reaches;
+2. the point that the ray hits, drawn a little towards the viewer, is located in the BSP tree.
+   Geometry that reaches into a cell by less than a plane's tolerance is not cut off there, and
+   belongs to the cell that it mostly lies in, but what is seen of it is seen in this one.
+
+What is then still outside the PVS is missed mass: left out of the hints and reported.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.model import Cells
+from ptmtools.coverage.eyes import Eyes
+from ptmtools.coverage.item_buffer import VIEWS, Renderer, Surfaces
+from ptmtools.tolerance import Tolerance
+
+#: Weight of a pixel in the middle of a view where pixels are weighted by solid angle.
+SOLID_ANGLE_UNIT = 2**16
+#: How far towards the viewer a hit is moved before it is located, in tolerances of a plane.
+TOWARDS = 4.0
+
+
+@dataclass(frozen=True)
+class Owners:
+    """For whom a pixel can count: each cell, or each image within each cell.
+
+    Attributes
+    ----------
+    cell, image: (S,) int32 of each owner, in order of cell, then image; image -1 is what has none,
+        and every cell has that owner.
+    first: (C + 1,) where the owners of each cell begin.
+    of_side: (M, 2) int32 the owner of each triangle's front and back, -1 for none.
+    """
+
+    cell: NDArray[np.int32]
+    image: NDArray[np.int32]
+    first: NDArray[np.int64]
+    of_side: NDArray[np.int32]
+
+    @staticmethod
+    def of(surfaces: Surfaces, by_image: bool) -> Owners:
+        """Cells, or images within cells."""
+        image = surfaces.image if by_image else np.full(len(surfaces.image), -1, np.int32)
+        images = int(image.max(initial=-1)) + 2
+        key = surfaces.cell.astype(np.int64) * images + (image[:, None] + 1)
+        bare = np.arange(surfaces.cell_count) * images
+        every = np.unique(np.concatenate([key[surfaces.cell >= 0], bare]))
+        cell = every // images
+        return Owners(
+            cell=cell.astype(np.int32),
+            image=(every % images - 1).astype(np.int32),
+            first=np.searchsorted(cell, np.arange(surfaces.cell_count + 1)),
+            of_side=np.where(surfaces.cell < 0, -1, np.searchsorted(every, key)).astype(np.int32),
+        )
+
+    def in_cells(self, cells: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """The owners in each of the (n,) cells, cell after cell, and where each cell's begin."""
+        size = self.first[cells + 1] - self.first[cells]
+        begin = np.concatenate([[0], np.cumsum(size)[:-1]]).astype(np.int64)
+        within = np.arange(int(size.sum())) - np.repeat(begin, size)
+        return np.repeat(self.first[cells], size) + within, begin
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What is seen from K points: (K, 6, m) int64 ``counts`` of weighted pixels of the owners asked
+    for, and (K,) int64 of those that belong to none of them."""
+
+    counts: NDArray[np.int64]
+    missed: NDArray[np.int64]
+
+
+class Looker:
+    """Looks around from sample points with one renderer."""
+
+    def __init__(
+        self, renderer: Renderer, surfaces: Surfaces, cells: Cells, face: int, *, by_angle: bool
+    ) -> None:
+        """``by_angle``: pixels are weighted by solid angle."""
+        self.unit = SOLID_ANGLE_UNIT if by_angle else 1
+        self._renderer = renderer
+        self._surfaces = surfaces
+        self._cells = cells
+        self._face = face
+        self._towards = TOWARDS * Tolerance.for_points(cells.vertex).plane
+
+    def look(self, eyes: Eyes, owners: Owners, wanted: NDArray[np.int64]) -> Seen:
+        """What is seen of the (m,) ``wanted`` owners."""
+        column = np.full(len(owners.cell) + 1, -1, dtype=np.int32)
+        column[wanted] = np.arange(len(wanted))
+        needed = np.zeros(self._surfaces.cell_count, dtype=np.bool_)
+        needed[owners.cell[wanted]] = True
+        counts = np.zeros((len(eyes), len(VIEWS), len(wanted)), dtype=np.int64)
+        missed = np.zeros(len(eyes), dtype=np.int64)
+        most = self._renderer.most
+        for first in range(0, len(eyes), most):
+            rows = slice(first, first + most)
+            self._add(eyes.part(rows), owners, column, needed, counts[rows], missed[rows])
+        return Seen(counts, missed)
+
+    def _add(
+        self,
+        eyes: Eyes,
+        owners: Owners,
+        column: NDArray[np.int32],
+        needed: NDArray[np.bool_],
+        counts: NDArray[np.int64],
+        missed: NDArray[np.int64],
+    ) -> None:
+        from ptmtools.coverage.tally.kernels import tally
+
+        layers = self._renderer.show(eyes, needed)
+        place = self._surfaces.normalised(eyes.point)
+        weight = self._weight(eyes)
+        size = self._face**2
+        doubt = np.empty(layers[0].size, dtype=np.int64)
+        for layer, shows in enumerate(layers):
+            found = tally(
+                shows, place, self._surfaces.plane, owners.of_side, column, weight, counts, doubt
+            )
+            if not found:
+                continue
+            pixel = doubt[:found].copy()
+            at, view = pixel // (len(VIEWS) * size), pixel // size % len(VIEWS)
+            owner, hit = self._again(eyes, pixel, layer, owners, column)
+            weighs = weight[np.minimum(at, len(weight) - 1), pixel % size]
+            expected = owner >= 0
+            np.add.at(
+                counts, (at[expected], view[expected], column[owner[expected]]), weighs[expected]
+            )
+            lost = hit & ~expected
+            np.add.at(missed, at[lost], weighs[lost])
+
+    def _again(
+        self,
+        eyes: Eyes,
+        pixel: NDArray[np.int64],
+        layer: int,
+        owners: Owners,
+        column: NDArray[np.int32],
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """(n,) the expected owner that each of the (n,) doubted pixels counts for, or -1; (n,)
+        whether it shows anything."""
+        found, place = self._renderer.trace(eyes, pixel)
+        shows, place = found[layer], place[layer]
+        eye = eyes.point[pixel // (len(VIEWS) * self._face**2)]
+        hit = shows >= 0
+        plane = self._surfaces.plane[shows]
+        side = np.einsum("ij,ij->i", plane[:, :3], self._surfaces.normalised(eye)) + plane[:, 3]
+        owner = np.where(hit, owners.of_side[shows, np.where(side > 0, 0, 1)], -1).astype(np.int64)
+        lost = np.flatnonzero(hit & (column[owner] < 0))
+        owner[~hit | (column[owner] < 0)] = -1
+        if len(lost):
+            back = eye[lost] - place[lost]
+            length = np.linalg.norm(back, axis=1, keepdims=True)
+            step = np.minimum(self._towards / np.maximum(length, self._towards), 0.5)
+            cell = self._cells.locate(place[lost] + step * back)
+            image = np.where(
+                owners.image.max(initial=-1) < 0, -1, self._surfaces.image[shows[lost]]
+            )
+            nearer = owners_at(owners, cell, image)
+            owner[lost] = np.where(column[nearer] >= 0, nearer, -1)
+        return owner, hit
+
+    def _weight(self, eyes: Eyes) -> NDArray[np.int64]:
+        from ptmtools.coverage.tally.kernels import weigh
+
+        if self.unit == 1:
+            return np.ones((1, self._face**2), dtype=np.int64)
+        weight = np.empty((len(eyes), self._face**2), dtype=np.int64)
+        weigh(self._face, eyes.shift / self._face, self.unit, weight)
+        return weight
+
+
+def owners_at(
+    owners: Owners, cell: NDArray[np.int32], image: NDArray[np.int32]
+) -> NDArray[np.int64]:
+    """(n,) the owner of each of the (n,) images in each of the (n,) cells; what has no image where
+    the cell has nothing with that one; -1 where the cell is -1."""
+    images = int(owners.image.max(initial=-1)) + 2
+    every = owners.cell.astype(np.int64) * images + owners.image + 1
+    key = cell.astype(np.int64) * images + image + 1
+    found = np.minimum(np.searchsorted(every, key), len(every) - 1)
+    bare = owners.first[cell]
+    return np.where(cell < 0, -1, np.where(every[found] == key, found, bare)).astype(np.int64)

@@ -1,0 +1,142 @@
+"""Where a cell is looked from: points spread over its volume.
+
+The paper takes "samples per cell whose COPs are uniformly distributed inside the cell" (§5).
+Position matters far more than resolution (docs/coverage.md), so there is a choice of how:
+
+``sobol``
+    A scrambled Sobol' sequence in the cell's bounding box, of which the points in the cell are
+    kept. Any number of points is evenly spread, and more can be added: the error falls as K^-0.8.
+    Where hardly any of the box is cell, as with a thin slanting one, the sequence fills the
+    tetrahedra of its leaves instead, with a fourth dimension for the choice among them.
+``kd``
+    The volume is halved again and again along its longest axis into as many parts of equal volume
+    as there are points, and each part is looked at from the point nearest to its centroid: best
+    below some thirty points.
+``uniform``
+    Independent random points, as in the paper: K^-0.5.
+
+A cell is a union of disjoint convex leaves. Points depend on nothing but its shape and the seed:
+not on other cells, the unit, the number of workers or the version of a library.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.model import Cells
+from ptmtools.coverage.sobol import sobol, uniform
+
+#: Points of the cloud that is divided into parts, for each part: enough that parts of equal count
+#: are parts of equal volume within a few percent.
+CLOUD = 256
+#: Points that a part of the cell offers, evenly picked from its share of the cloud.
+TRIES = 32
+#: A cell that fills less than this share of its bounding box is filled by tetrahedra.
+FILLED = 1 / 32
+
+
+def tetrahedra(cells: Cells, cell: int) -> NDArray[np.float64]:
+    """(n, 4, 3) disjoint tetrahedra that fill a cell, metres; flat ones are left out."""
+    found: list[NDArray[np.float64]] = []
+    for leaf in cells.cell_leaves(cell):
+        centroid = cells.leaf_points(int(leaf)).mean(axis=0)
+        for loop in cells.leaf_faces(int(leaf)):
+            face = cells.leaf_point[loop]
+            fan = np.empty((max(len(face) - 2, 0), 4, 3))
+            fan[:, 0] = centroid
+            fan[:, 1] = face[0]
+            fan[:, 2] = face[1:-1]
+            fan[:, 3] = face[2:]
+            found.append(fan)
+    every = np.concatenate(found) if found else np.zeros((0, 4, 3))
+    return every[volumes(every) > 0]
+
+
+def volumes(tetra: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) volumes of (n, 4, 3) tetrahedra, m³."""
+    a, b, c = (tetra[:, 1:] - tetra[:, :1]).transpose(1, 0, 2)
+    return np.asarray(np.abs(np.einsum("ij,ij->i", a, np.cross(b, c))) / 6, dtype=np.float64)
+
+
+def filling(tetra: NDArray[np.float64], unit: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, 3) points, uniform in the union of (n, 4, 3) tetrahedra if the (m, 4 or more)
+    coordinates in (0, 1) are: the first three tell where in a tetrahedron, the fourth in which."""
+    share = np.cumsum(volumes(tetra))
+    which = np.minimum(np.searchsorted(share / share[-1], unit[:, 3], "right"), len(tetra) - 1)
+    # The gaps between three sorted numbers and the ends of [0, 1] are uniform barycentric
+    # coordinates.
+    cut = np.sort(unit[:, :3], axis=1)
+    weight = np.diff(cut, axis=1, prepend=0.0, append=1.0)
+    base = tetra[which, 0]
+    offset = np.einsum("ij,ijk->ik", weight[:, 1:], tetra[which, 1:] - base[:, None])
+    return np.asarray(base + offset, dtype=np.float64)
+
+
+class Volume:
+    """A cell as something to put points into."""
+
+    def __init__(self, cells: Cells, cell: int) -> None:
+        self._cells, self._cell = cells, cell
+        self._tetra = tetrahedra(cells, cell)
+        self.empty = len(self._tetra) == 0
+        if not self.empty:
+            points = self._tetra.reshape(-1, 3)
+            self._low, self._size = points.min(axis=0), np.ptp(points, axis=0)
+            share = float(volumes(self._tetra).sum()) / float(np.prod(self._size))
+            self.boxed = share >= FILLED
+
+    def random(self, first: int, count: int, seed: int) -> NDArray[np.float64]:
+        """(count, 5) independent points ``first`` …: positions, and ½ ½."""
+        unit = uniform(first, count, seed)
+        return np.hstack([filling(self._tetra, unit), np.full((count, 2), 0.5)])
+
+    def sobol(self, first: int, count: int, seed: int) -> NDArray[np.float64]:
+        """(at most count, 5) points ``first`` … of a scrambled sequence, those in the cell: their
+        positions in metres, and two more coordinates in (0, 1)."""
+        unit = sobol(first, count, seed)
+        if not self.boxed:
+            return np.hstack([filling(self._tetra, unit), unit[:, 4:]])
+        points = self._low + unit[:, :3] * self._size
+        return np.hstack([points, unit[:, 4:]])[self._holds(points)]
+
+    def parts(self, count: int, seed: int) -> list[NDArray[np.float64]]:
+        """For each of ``count`` equal parts of the cell (TRIES, 3) points, from its centroid
+        outwards."""
+        points = filling(self._tetra, sobol(0, CLOUD * count, seed))
+        return [points[group[:: CLOUD // TRIES]] for group in strata(points, count)]
+
+    def _holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        from ptmtools.coverage.clearance.kernels import locate_leaves
+
+        cells = self._cells
+        leaf = np.zeros(len(points), dtype=np.int32)
+        if len(cells.node_plane):
+            locate_leaves(points, cells.node_plane, cells.node_child, leaf)
+        low, high = cells.root_box
+        boxed = np.all((points >= low) & (points <= high), axis=1)
+        return np.asarray(boxed & (leaf >= 0) & (cells.leaf_cell[leaf] == self._cell))
+
+
+def strata(points: NDArray[np.float64], parts: int) -> list[NDArray[np.int64]]:
+    """Indices of the (n, 3) points in ``parts`` groups of equal size, compact in space.
+
+    Each group is halved across its longest axis; an odd number of parts is divided as evenly as
+    it goes. Within a group the points are in order of their distance from its centroid.
+    """
+    pending = [(np.arange(len(points), dtype=np.int64), parts)]
+    done: list[NDArray[np.int64]] = []
+    while pending:
+        group, share = pending.pop()
+        here = points[group]
+        if share == 1:
+            away = np.sum((here - here.mean(axis=0)) ** 2, axis=1)
+            done.append(group[np.argsort(away, kind="stable")])
+            continue
+        axis = int(np.argmax(np.ptp(here, axis=0)))
+        order = group[np.argsort(here[:, axis], kind="stable")]
+        low = share // 2
+        middle = len(order) * low // share
+        pending.append((order[middle:], share - low))
+        pending.append((order[:middle], low))
+    return done

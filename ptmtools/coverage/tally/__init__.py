@@ -1,0 +1,1 @@
+"""Counting what the pixels of item buffers show (`item_buffer`)."""
