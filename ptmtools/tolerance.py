@@ -27,6 +27,9 @@ THIN_SHARE = 1e-5
 #: A gap between walls narrower than this is a crack of the modelling, not an opening: 0.4 mm in a
 #: building of 50 m.
 HAIRLINE_SHARE = 8e-6
+#: What the last digits of coordinates may have lost, in any unit and at any angle: half a picometre
+#: in a building of 50 m.
+NOISE_SHARE = 1e-14
 #: Rounding of float64 arithmetic on coordinates and their intersections, with a margin.
 ROUNDING_SHARE = 1e-10
 #: Polygons of one plane are united and cut on a grid of this step (`cells.planar`): well above the
@@ -57,6 +60,7 @@ class Tolerance:
     thin: the least thickness of a cell.
     hairline: an opening narrower than this is a crack.
     rounding: distances below this are rounding errors of the arithmetic itself.
+    noise: coordinates are not known better than this, whatever arithmetic is done on them.
     grid: the step to which corners of polygons in a plane are snapped.
     cosine: unit normals with a dot product of at least this are parallel.
     """
@@ -67,6 +71,7 @@ class Tolerance:
     thin: float
     hairline: float
     rounding: float
+    noise: float
     grid: float
     cosine: float
 
@@ -92,6 +97,7 @@ class Tolerance:
             thin=THIN_SHARE * extent,
             hairline=HAIRLINE_SHARE * extent,
             rounding=ROUNDING_SHARE * extent,
+            noise=NOISE_SHARE * extent,
             grid=GRID_SHARE * extent,
             cosine=PARALLEL_COSINE,
         )

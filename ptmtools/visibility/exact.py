@@ -8,11 +8,13 @@ integers over a power of two; portals are made truly plane by moving their verti
 
 What is decided so is decided of these coordinates, and their last digits are noise: in a building
 that is turned, the edges of doors that meet in a line no longer do, by 1e-16 of its extent. Portals
-are therefore drawn in by `NOISE` first. A line that passes has that much room on all sides.
+are therefore drawn in by `Tolerance.noise` first. A line that passes has so much room on all sides.
 
 Numbers grow with every cut. A new vertex with more than `BITS` is rounded *along its edge* to the
 outer side, so that polygons only ever grow: what is found empty is so for certain, what is found
-open may be open by 2⁻¹⁹² of an edge.
+open may be open by 2⁻⁹⁶ of the distance from a vertex to a plane.
+
+This is slow; `decide` asks it what nothing else can tell.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.tolerance import Tolerance
 from ptmtools.visibility.storage import Geometry
 
 Point = tuple[int, int, int, int]
@@ -31,10 +34,8 @@ Plane = tuple[int, int, int, int]
 Line = tuple[int, int, int, int, int, int]
 Polygon = list[Point]
 
-#: Of the rounding by which the search itself errs, the share that coordinates may have lost.
-NOISE = 1e-4
-#: Vertices with longer numbers are rounded outwards, to shares of an edge of `SHARE` bits.
-BITS, SHARE = 1024, 192
+#: Vertices with longer numbers are rounded outwards, their distances to `SHARE` bits.
+BITS, SHARE = 512, 96
 
 
 class _Left(NamedTuple):
@@ -72,6 +73,10 @@ class ExactPortals:
             left = self._left[part]
         return left is not None
 
+    def vertices(self, k: int) -> Polygon:
+        """The vertices of a portal, drawn in by `Tolerance.noise`, exactly in its plane."""
+        return self._directed(2 * k)[0]
+
     def _directed(self, q: int) -> tuple[Polygon, Plane]:
         """The polygon of a directed portal and its plane, positive beyond it."""
         if q >> 1 not in self._portal:
@@ -103,7 +108,9 @@ class ExactPortals:
         points = g.point[g.start[k] : g.start[k + 1]]
         inward = g.ball[k, :3] - points
         way = np.linalg.norm(inward, axis=1, keepdims=True)
-        share = np.divide(NOISE * g.slack, way, out=np.ones_like(way), where=way > 0)
+        share = np.divide(
+            Tolerance.for_points(g.point).noise, way, out=np.ones_like(way), where=way > 0
+        )
         moved: NDArray[np.float64] = points + np.minimum(share, 1.0) * inward
         return moved
 
@@ -165,9 +172,12 @@ def _clipped(polygon: Polygon, planes: Sequence[Plane]) -> Polygon:
 def _between(inner: Point, outer: Point, inward: int, outward: int) -> Point:
     """The point of an edge that lies in a plane, ``inward`` and ``outward`` from its ends."""
     if inward.bit_length() + max(map(int.bit_length, outer)) > BITS:
-        shift = max(inward.bit_length(), outward.bit_length()) - SHARE
-        if shift > 0:
-            inward, outward = (inward >> shift) + 1, outward >> shift
+        # Each of them by itself: they are as long as the numbers of the ends that they belong to.
+        up = max(inward.bit_length() - SHARE, 0)
+        down = max(outward.bit_length() - SHARE, 0)
+        least = min(up, down)
+        inward = (inward >> up) + (up > 0) << up - least
+        outward = outward >> down << down - least
     x, y, z, w = (inward * o + outward * i for i, o in zip(inner, outer, strict=True))
     return _reduced((x, y, z, w))
 

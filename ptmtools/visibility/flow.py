@@ -49,7 +49,7 @@ from ptmtools.tolerance import Tolerance
 from ptmtools.visibility.storage import Geometry, Scratch
 
 if TYPE_CHECKING:
-    from ptmtools.visibility.exact import ExactPortals
+    from ptmtools.visibility.decide import Decisions
 
 Tool = TypeVar("Tool")
 Task = TypeVar("Task")
@@ -157,13 +157,13 @@ def portal_flow(
         return PortalFlow(np.zeros((0, words), dtype=np.uint64), cut, *counts)
 
     from ptmtools.visibility.bits.kernels import drop_unreturned
-    from ptmtools.visibility.exact import ExactPortals
+    from ptmtools.visibility.decide import Decisions
     from ptmtools.visibility.hairs import searched
 
     g = geometry(portals)
     threads = min(workers or os.cpu_count() or 1, BATCH)
     with ThreadPoolExecutor(threads) as pool:
-        storage = [(scratch(g, words), ExactPortals(g) if exact else None) for _ in range(threads)]
+        storage = [(scratch(g, words), Decisions(g) if exact else None) for _ in range(threads)]
         known = _prepass(g, [s for s, _ in storage], pool)
         order = np.argsort(BITS_OF_BYTE[known.view(np.uint8)].sum(axis=1), kind="stable")
         for first in range(0, count, BATCH):
@@ -171,7 +171,7 @@ def portal_flow(
             seen = np.zeros((len(batch), words), dtype=np.uint64)
 
             def search(
-                tools: tuple[Scratch, ExactPortals | None],
+                tools: tuple[Scratch, Decisions | None],
                 i: int,
                 batch: NDArray[np.int64] = batch,
                 seen: NDArray[np.uint64] = seen,

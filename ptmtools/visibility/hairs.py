@@ -2,7 +2,7 @@
 
 A search tells which sequences of portals it rejected by less than the rounding of its arithmetic
 allows to be sure of (`winding`). Another one that lets them all through tells what depends on
-them, mostly nothing. Those on which something depends are put to `ExactPortals`. Where a line can
+them, mostly nothing. Those on which something depends are put to `Decisions`. Where a line can
 pass one, the search is done again with that let through, as often as this brings up new ones. Where
 there are too many, or a budget ends, all are let through: looser, and conservative as ever.
 """
@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.visibility.exact import ExactPortals
+from ptmtools.visibility.decide import Decisions
 from ptmtools.visibility.storage import Geometry, Scratch
 
 #: Sequences decided exactly for one directed portal, at most.
@@ -43,7 +43,7 @@ class Searched(NamedTuple):
 def searched(
     g: Geometry,
     s: Scratch,
-    arithmetic: ExactPortals | None,
+    arithmetic: Decisions | None,
     known: NDArray[np.uint64],
     source: int,
     budget: int,

@@ -40,3 +40,23 @@ class Scratch(NamedTuple):
     distance: Floats  # (V,)
     line: Floats  # (2, 3) a point and a direction
     hair: Ints  # (H,) sequences rejected by a hair, each after its length
+
+
+class DoubledPortals(NamedTuple):
+    """Portals in numbers of twice the length of a double, (high, low) along the last axis;
+    `decide` fills it."""
+
+    point: Floats  # (Q, 3, 2) at most 1
+    start: Ints  # (K + 1,)
+    normal: Floats  # (K, 3)
+
+
+class DoubledScratch(NamedTuple):
+    """Working storage of one worker for these."""
+
+    polygon: Floats  # (4, V, 3, 2)
+    size: Ints  # (4,)
+    cuts: Ints  # (4,) how often each polygon was cut
+    plane: Floats  # (2, 2V + 1, 4, 2) normal and offset: kept is where n·x >= offset
+    side: Floats  # (V, 2)
+    vector: Floats  # (2, 3, 2)

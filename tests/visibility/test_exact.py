@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ptmtools.tolerance import Tolerance
 from ptmtools.visibility import PvsOptions, compute_pvs, exact, flow, hairs
 from ptmtools.visibility.exact import ExactPortals
 from ptmtools.visibility.flow import Portals, geometry, portal_flow
@@ -62,6 +65,18 @@ def test_rounded_vertices_lose_no_line(monkeypatch):
         assert along_a_line(seed, 9).passes(tuple(range(0, 18, 2)))
 
 
+def test_a_rounded_vertex_is_where_it_was_however_long_the_numbers_of_the_ends():
+    """From (1, 2, 3) with short numbers to (5, 2, 3) with long ones, a third of the way."""
+    long = 3**500
+    inner, outer = (1, 2, 3, 1), (5 * long, 2 * long, 3 * long, long)
+    for one, other, at in ((inner, outer, 1 + 4 / 3), (outer, inner, 5 - 4 / 3)):
+        inward, outward = (one[3] << 2000, other[3] << 2001)  # distances times the numbers' length
+        x, y, z, w = exact._between(one, other, inward, outward)
+        assert max(x, y, z, w).bit_length() < 2 * exact.BITS
+        assert abs(Fraction(x, w) - Fraction(at)) < Fraction(1, 2**50)
+        assert (y, z) == (2 * w, 3 * w)
+
+
 def test_numbers_do_not_grow_without_bound():
     portals = along_a_line(3, 30)
     assert portals.passes(tuple(range(0, 60, 2)))
@@ -88,7 +103,7 @@ def test_what_is_more_than_noise_decides(beyond):
     leaf = np.array([[0, 1], [1, 2], [2, 3]], np.int32)
     portals = Portals(4, leaf, np.eye(3)[[0, 0, 0]], np.concatenate(points), np.arange(4) * 4)
     g = geometry(portals)
-    open_ = beyond > 2 * exact.NOISE * g.slack
+    open_ = beyond > 2 * Tolerance.for_points(g.point).noise
     assert open_ == (beyond == 1e-12)
     assert ExactPortals(g).passes((0, 2, 4)) == open_
     assert ExactPortals(g).passes((5, 3, 1)) == open_
