@@ -40,7 +40,7 @@ class Row:
     seen: (n,) float64 share of the points from which it is seen.
     views: (n, 6) float64 the same share for each of the six views alone; each column sums to 1.
     uncertain: float64 a bound of the total variation between `value` and the truth, at about 95 %;
-        NaN with one point.
+        NaN with fewer than eight points, which would not tell: of two it held in half of the cases.
     """
 
     value: NDArray[np.float64]
@@ -87,7 +87,8 @@ def spread(
     counts: NDArray[np.int64], group: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], float]:
     """(n,) standard errors of the shares of (K, n) counts, and a bound, at about 95 %, of the total
-    variation between them and the truth; NaN where there is one group only."""
+    variation between them and the truth; NaN where there is one group only, or for the bound fewer
+    than `GROUPS`."""
     groups = int(group.max()) + 1 if len(group) else 0
     if groups < 2:
         return np.full(counts.shape[1], np.nan), float("nan")
@@ -97,6 +98,8 @@ def spread(
     away = summed - value * size[:, None]
     mean = max(size.mean(), 1.0)
     error = np.sqrt((away**2).sum(axis=0) / (groups * (groups - 1))) / mean
+    if groups < GROUPS:
+        return error, float("nan")
     distance = np.abs(away).sum(axis=1) / (2 * mean)
     likely = distance.mean() + T_ONE_SIDED * distance.std(ddof=1) * np.sqrt(1 + 1 / groups)
     return error, float(likely / np.sqrt(groups - 1))

@@ -34,7 +34,7 @@ class Ach:
     samples: (C,) int32 sample points used.
     rejected: (C,) int32 sample points rejected: inside matter, or too near to a surface.
     uncertain: (C,) float64 bound of the total variation between the row and the truth, at about
-        95 %; NaN with one sample point.
+        95 %; NaN with fewer than eight sample points.
     unseen_below: (C,) float64 an entry never met is seen from less than this share of the cell, at
         95 % (rule of three).
     floor: (C,) float64 what a client may take for an entry never met: half a pixel's share.

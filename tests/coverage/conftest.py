@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -156,3 +157,77 @@ def moved_and_scaled(
 def elsewhere() -> Callable[..., tuple[Scene, Cells]]:
     """``elsewhere(scene, cells, offset, factor)``."""
     return moved_and_scaled
+
+
+def pixel_corner(d, y, z):
+    """Area on the faces of the cube [-1, 1]³, of 24 in all, of the rectangle between (d, 0, 0) and
+    (d, y, z) seen from the origin, d > 0; odd in y and z. The integral of d / max(d, |y|, |z|)³.
+    """
+    less, more = (f(np.abs(y), np.abs(z)) for f in (np.minimum, np.maximum))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ahead = less * more / d**2
+        on_one_side = less / d + less * d / 2 * (1 / d**2 - 1 / more**2)
+        round_the_corner = 3 - 2 * d / less + d / 2 * (1 / less - less / more**2)
+    area = np.where(more <= d, ahead, np.where(less <= d, on_one_side, round_the_corner))
+    return np.sign(y) * np.sign(z) * area / 24
+
+
+def angle_corner(d, y, z):
+    """The same as a solid angle, over 4π."""
+    return np.arctan(y * z / (d * np.sqrt(d * d + y * y + z * z))) / (4 * np.pi)
+
+
+def of_a_window(weighting, d, y, z):
+    """Share of all that is seen from the origin that a rectangle across the x axis at distance d
+    takes up; y and z are its ends."""
+    corner = pixel_corner if weighting == "pixel" else angle_corner
+    return sum((-1) ** (i + j) * corner(d, y[i], z[j]) for i in range(2) for j in range(2))
+
+
+def panels(*ends: float, nodes: int = 24):
+    """Nodes and weights of Gauss-Legendre quadrature between each two of the ends; their mean."""
+    x, w = np.polynomial.legendre.leggauss(nodes)
+    low, size = np.array(ends[:-1])[:, None], np.diff(ends)[:, None]
+    return (low + size * (x + 1) / 2).ravel(), (size * w / 2).ravel() / (ends[-1] - ends[0])
+
+
+@cache
+def beyond(doors: int, weighting: str, y_ends=(0.0, 3.0), z_ends=(-1.0, 1.0), length=4.0) -> float:
+    """What lies beyond so many doors of `room_row` in a row, all of the given ends, as a share of
+    all that is seen, on average over a room of the given length; by dense quadrature."""
+    u, wd = panels(0, 1, nodes=40)
+    wd, d = 3 * u**2 * wd, length * u**3  # dense where the eye comes close to the door
+    y, wy = panels(0, *(e for e in y_ends if 0 < e < 4), 4)
+    z, wz = panels(-2, *(e for e in z_ends if -2 < e < 2), 2)
+    d, y, z = np.meshgrid(d, y, z, indexing="ij", sparse=True)
+    # The last door as it appears in the plane of the first.
+    s = d / (d + 4 * (doors - 1))
+    open_y = [f(e - y, (e - y) * s) for f, e in zip((np.maximum, np.minimum), y_ends, strict=True)]
+    open_z = [f(e - z, (e - z) * s) for f, e in zip((np.maximum, np.minimum), z_ends, strict=True)]
+    open_y[1], open_z[1] = np.maximum(*open_y), np.maximum(*open_z)
+    seen = of_a_window(weighting, d, open_y, open_z)
+    return float(np.einsum("i,j,k,ijk->", wd, wy, wz, seen))
+
+
+@pytest.fixture(scope="session")
+def through_doors() -> Callable[..., float]:
+    """``through_doors(doors, weighting, y_ends, z_ends, length)``: the share of what is seen from a
+    room that lies beyond so many doors, by quadrature."""
+    return beyond
+
+
+@pytest.fixture(scope="session")
+def exact_row() -> Callable[[int, str], np.ndarray]:
+    """``exact_row(n, weighting)``: the (n, n) hints of `room_row`, by quadrature."""
+
+    def exact(n: int, weighting: str = "pixel") -> np.ndarray:
+        share = [1.0, *(beyond(k, weighting) for k in range(1, n))]
+        found = np.zeros((n, n))
+        for i in range(n):
+            for far, step in ((n - 1 - i, 1), (i, -1)):
+                for k in range(1, far + 1):
+                    found[i, i + step * k] = share[k] - (share[k + 1] if k < far else 0.0)
+            found[i, i] = 1 - found[i].sum()
+        return found
+
+    return exact
