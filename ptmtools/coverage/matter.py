@@ -57,52 +57,63 @@ def bodies(scene: Scene, cells: Cells) -> list[Body]:
         return []
     _, weld = np.unique(scene.points + 0.0, axis=0, return_inverse=True)  # -0 is 0
     corner = weld.reshape(-1)[scene.triangles]
-    group = edge_groups(corner)
+    edge, forward = edges(corner)
+    group = edge_groups(edge)
+    closed, balanced = winding(edge, forward, group)
     all_corners = scene.corners
-    area = areas(all_corners)
-    in_boundary = boundary_area(scene, cells)
+    count = len(corner)
+    area = np.bincount(group, areas(all_corners), count)
+    in_boundary = np.bincount(group, boundary_area(scene, cells), count)
+    solid = closed & (2 * in_boundary <= area)
     order = np.argsort(group, kind="stable")
+    order = order[solid[group[order]]]
     found = []
     for members in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
-        balance = winding_balance(corner[members])
-        if balance is None or 2 * in_boundary[members].sum() > area[members].sum():
+        if not len(members):
             continue
         corners = all_corners[members]
         box = np.array([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
-        inwards = balance and signed_volume(corners - box.mean(axis=0)) < 0
+        inwards = balanced[group[members[0]]] and signed_volume(corners - box.mean(axis=0)) < 0
         if not inwards:
             found.append(Body(corners, box))
     return found
 
 
-def edge_groups(corner: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(T,) for each (T, 3) triangle the least index of the triangles that it hangs together with
-    through shared edges."""
-    count = len(corner)
-    edges = np.sort(corner[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    _, edge = np.unique(edges, axis=0, return_inverse=True)
-    edge = edge.reshape(-1)
-    owner = np.repeat(np.arange(count), 3)
+def edges(corner: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """For each of the (T, 3) triangles (T, 3) the numbers of its edges, equal for those that share
+    both ends, and whether it runs along them towards the corner with the higher number."""
+    ends = np.stack([corner, np.roll(corner, -1, axis=1)], axis=2)
+    low, high = ends.min(axis=2), ends.max(axis=2)
+    _, edge = np.unique(low * (int(corner.max()) + 1) + high, return_inverse=True)
+    return edge.reshape(-1, 3), ends[..., 0] < ends[..., 1]
+
+
+def edge_groups(edge: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(T,) for each triangle, of the (T, 3) ``edges``, the least index of the triangles that it
+    hangs together with through shared edges."""
+    count = len(edge)
     group = np.arange(count)
     while True:
         least = np.full(int(edge.max()) + 1, count)
-        np.minimum.at(least, edge, group[owner])
-        better = np.minimum(group, least[edge].reshape(-1, 3).min(axis=1))
+        np.minimum.at(least, edge, group[:, None])
+        better = np.minimum(group, least[edge].min(axis=1))
         better = better[better]  # pointer jumping: long strips need few rounds
         if np.array_equal(better, group):
             return group
         group = better
 
 
-def winding_balance(corner: NDArray[np.int64]) -> bool | None:
-    """Whether a group of (n, 3) triangles is consistently wound; None if it is not closed."""
-    directed = corner[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    forward = directed[:, 0] < directed[:, 1]
-    _, edge = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True)
-    edge = edge.reshape(-1)
-    if np.any(np.bincount(edge) % 2):
-        return None
-    return bool(np.all(np.bincount(edge, weights=np.where(forward, 1.0, -1.0)) == 0))
+def winding(
+    edge: NDArray[np.int64], forward: NDArray[np.bool_], group: NDArray[np.int64]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """(T,) whether the group with each number is closed, and whether it is wound consistently, from
+    the (T, 3) ``edges`` and their directions; of numbers that no group has, anything."""
+    used = np.bincount(edge.ravel())
+    turned = np.bincount(edge.ravel(), np.where(forward, 1.0, -1.0).ravel())
+    closed, balanced = (np.ones(len(edge), dtype=np.bool_) for _ in range(2))
+    closed[group[(used[edge] % 2 > 0).any(axis=1)]] = False
+    balanced[group[(turned[edge] != 0).any(axis=1)]] = False
+    return closed, balanced
 
 
 def signed_volume(corners: NDArray[np.float64]) -> float:

@@ -21,8 +21,8 @@ MAX_SAMPLES = 2**14
 PRESETS: dict[Preset, tuple[int, int, Placement]] = {
     "paper": (8, 256, "uniform"),
     "fast": (32, 4, "sobol"),
-    "default": (256, 8, "sobol"),
-    "high": (2048, 8, "sobol"),
+    "default": (512, 4, "sobol"),
+    "high": (4096, 4, "sobol"),
 }
 
 

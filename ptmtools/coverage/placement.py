@@ -21,6 +21,8 @@ not on other cells, the unit, the number of workers or the version of a library.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,21 +38,56 @@ TRIES = 32
 FILLED = 1 / 32
 
 
-def tetrahedra(cells: Cells, cell: int) -> NDArray[np.float64]:
-    """(n, 4, 3) disjoint tetrahedra that fill a cell, metres; flat ones are left out."""
-    found: list[NDArray[np.float64]] = []
-    for leaf in cells.cell_leaves(cell):
-        centroid = cells.leaf_points(int(leaf)).mean(axis=0)
-        for loop in cells.leaf_faces(int(leaf)):
-            face = cells.leaf_point[loop]
-            fan = np.empty((max(len(face) - 2, 0), 4, 3))
-            fan[:, 0] = centroid
-            fan[:, 1] = face[0]
-            fan[:, 2] = face[1:-1]
-            fan[:, 3] = face[2:]
-            found.append(fan)
-    every = np.concatenate(found) if found else np.zeros((0, 4, 3))
-    return every[volumes(every) > 0]
+@dataclass(frozen=True)
+class Tetrahedra:
+    """Disjoint tetrahedra that fill the leaves.
+
+    Attributes
+    ----------
+    corners, volume: (n, 4, 3) metres and (n,) m³; flat ones are left out.
+    leaf_start: (L + 1,) CSR over leaves.
+    leaves, cell_start: (L,) the leaves in the order of their cells, (C + 1,) CSR over cells.
+    """
+
+    corners: NDArray[np.float64]
+    volume: NDArray[np.float64]
+    leaf_start: NDArray[np.int64]
+    leaves: NDArray[np.int64]
+    cell_start: NDArray[np.int64]
+
+    @staticmethod
+    def of(cells: Cells) -> Tetrahedra:
+        """Fans over the faces of every leaf, from the middle of its vertices."""
+        points = np.diff(cells.leaf_point_start)
+        if not len(points):
+            nothing = np.zeros(0, np.int64)
+            start = np.zeros(1, np.int64)
+            return Tetrahedra(np.zeros((0, 4, 3)), np.zeros(0), start, nothing, start)
+        middle = np.add.reduceat(cells.leaf_point, cells.leaf_point_start[:-1]) / points[:, None]
+        size = np.maximum(np.diff(cells.face_start) - 2, 0)
+        face = np.repeat(np.arange(len(size)), size)
+        first = cells.face_start[:-1][face]
+        second = first + 1 + np.arange(len(face)) - np.repeat(np.cumsum(size) - size, size)
+        leaf = np.searchsorted(cells.leaf_face_start, face, "right") - 1
+        loop = cells.leaf_point[cells.face_index]
+        corners = np.stack([middle[leaf], loop[first], loop[second], loop[second + 1]], axis=1)
+        volume = volumes(corners)
+        solid = volume > 0
+        return Tetrahedra(
+            corners[solid],
+            volume[solid],
+            np.searchsorted(leaf[solid], np.arange(len(points) + 1)),
+            np.argsort(cells.leaf_cell, kind="stable"),
+            np.concatenate([[0], np.cumsum(np.bincount(cells.leaf_cell))]),
+        )
+
+    def of_cell(self, cell: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Those of a cell, and their volumes."""
+        leaves = self.leaves[self.cell_start[cell] : self.cell_start[cell + 1]]
+        rows = np.concatenate(
+            [np.arange(self.leaf_start[leaf], self.leaf_start[leaf + 1]) for leaf in leaves]
+        )
+        return self.corners[rows], self.volume[rows]
 
 
 def volumes(tetra: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -59,10 +96,13 @@ def volumes(tetra: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.abs(np.einsum("ij,ij->i", a, np.cross(b, c))) / 6, dtype=np.float64)
 
 
-def filling(tetra: NDArray[np.float64], unit: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(m, 3) points, uniform in the union of (n, 4, 3) tetrahedra if the (m, 4 or more)
-    coordinates in (0, 1) are: the first three tell where in a tetrahedron, the fourth in which."""
-    share = np.cumsum(volumes(tetra))
+def filling(
+    tetra: NDArray[np.float64], volume: NDArray[np.float64], unit: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(m, 3) points, uniform in the union of (n, 4, 3) tetrahedra with (n,) volumes if the (m, 4 or
+    more) coordinates in (0, 1) are: the first three tell where in a tetrahedron, the fourth in
+    which."""
+    share = np.cumsum(volume)
     which = np.minimum(np.searchsorted(share / share[-1], unit[:, 3], "right"), len(tetra) - 1)
     # The gaps between three sorted numbers and the ends of [0, 1] are uniform barycentric
     # coordinates.
@@ -76,34 +116,34 @@ def filling(tetra: NDArray[np.float64], unit: NDArray[np.float64]) -> NDArray[np
 class Volume:
     """A cell as something to put points into."""
 
-    def __init__(self, cells: Cells, cell: int) -> None:
+    def __init__(self, cells: Cells, tetrahedra: Tetrahedra, cell: int) -> None:
         self._cells, self._cell = cells, cell
-        self._tetra = tetrahedra(cells, cell)
+        self._tetra, self._volume = tetrahedra.of_cell(cell)
         self.empty = len(self._tetra) == 0
         if not self.empty:
             points = self._tetra.reshape(-1, 3)
             self._low, self._size = points.min(axis=0), np.ptp(points, axis=0)
-            share = float(volumes(self._tetra).sum()) / float(np.prod(self._size))
+            share = float(self._volume.sum()) / float(np.prod(self._size))
             self.boxed = share >= FILLED
 
     def random(self, first: int, count: int, seed: int) -> NDArray[np.float64]:
         """(count, 5) independent points ``first`` …: positions, and ½ ½."""
         unit = uniform(first, count, seed)
-        return np.hstack([filling(self._tetra, unit), np.full((count, 2), 0.5)])
+        return np.hstack([filling(self._tetra, self._volume, unit), np.full((count, 2), 0.5)])
 
     def sobol(self, first: int, count: int, seed: int) -> NDArray[np.float64]:
         """(at most count, 5) points ``first`` … of a scrambled sequence, those in the cell: their
         positions in metres, and two more coordinates in (0, 1)."""
         unit = sobol(first, count, seed)
         if not self.boxed:
-            return np.hstack([filling(self._tetra, unit), unit[:, 4:]])
+            return np.hstack([filling(self._tetra, self._volume, unit), unit[:, 4:]])
         points = self._low + unit[:, :3] * self._size
         return np.hstack([points, unit[:, 4:]])[self._holds(points)]
 
     def parts(self, count: int, seed: int) -> list[NDArray[np.float64]]:
         """For each of ``count`` equal parts of the cell (TRIES, 3) points, from its centroid
         outwards."""
-        points = filling(self._tetra, sobol(0, CLOUD * count, seed))
+        points = filling(self._tetra, self._volume, sobol(0, CLOUD * count, seed))
         return [points[group[:: CLOUD // TRIES]] for group in strata(points, count)]
 
     def _holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:

@@ -15,7 +15,7 @@ from ptmtools.coverage.item_buffer import Renderer, Surfaces
 from ptmtools.coverage.looking import Looker, Owners, Seen
 from ptmtools.coverage.matter import Surroundings
 from ptmtools.coverage.options import AchOptions
-from ptmtools.coverage.placement import Volume
+from ptmtools.coverage.placement import Tetrahedra, Volume
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance
 from ptmtools.visibility.model import Pvs
@@ -64,6 +64,7 @@ class Sampler:
     ) -> None:
         self._cells, self._pvs, self._options = cells, pvs, options
         self._around = Surroundings.of(scene, cells)
+        self._tetrahedra = Tetrahedra.of(cells)
         thin = Tolerance.for_points(scene.points).thin
         self._clearance = options.clearance or CLEARANCE * thin
         self._owners = Owners.of(surfaces, options.per_texture)
@@ -72,7 +73,7 @@ class Sampler:
 
     def of_cell(self, cell: int) -> CellHints:
         """The hints of one cell."""
-        places = Places(Volume(self._cells, cell), self._around, self._clearance)
+        places = Places(Volume(self._cells, self._tetrahedra, cell), self._around, self._clearance)
         wanted, begin = self._owners.in_cells(self._pvs.row(cell))
 
         def look(eyes: Eyes) -> Seen:

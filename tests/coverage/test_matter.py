@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ptmtools.coverage.clearance.kernels import distance
-from ptmtools.coverage.matter import Surroundings, bodies, edge_groups
+from ptmtools.coverage.matter import Surroundings, bodies, edge_groups, edges
 
 SPAN = st.floats(-4, 4).map(lambda x: round(x, 3))
 POINT = st.tuples(SPAN, SPAN, SPAN)
@@ -95,7 +95,8 @@ def test_a_body_within_a_body(room_row, furnish):
 def test_groups_hang_together_by_edges_not_by_corners():
     strip = np.array([[i, i + 1, i + 2] for i in range(200)])
     touching = np.array([[300, 301, 302], [302, 303, 304]])
-    group = edge_groups(np.concatenate([strip, touching]))
+    edge, _ = edges(np.concatenate([strip, touching]))
+    group = edge_groups(edge)
     assert set(group[:200]) == {0}
     assert group[200:].tolist() == [200, 201]
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ptmtools.coverage.placement import TRIES, Volume, filling, strata, tetrahedra, volumes
+from ptmtools.coverage.placement import TRIES, Tetrahedra, Volume, filling, strata, volumes
 from ptmtools.coverage.sobol import sobol, uniform
 
 FROZEN_SOBOL = [
@@ -52,16 +52,24 @@ FROZEN_UNIFORM = [
 CORNER = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]], dtype=np.float64)
 
 
+def volume(cells, cell):
+    return Volume(cells, Tetrahedra.of(cells), cell)
+
+
+def filled(tetra, unit):
+    return filling(tetra, volumes(tetra), unit)
+
+
 def test_tetrahedra_fill_the_cell(room_row):
     _, cells = room_row(2)
-    assert volumes(tetrahedra(cells, 1)).sum() == pytest.approx(64)
-    assert tetrahedra(cells, 1)[..., 0].min() == 4
+    assert Tetrahedra.of(cells).of_cell(1)[1].sum() == pytest.approx(64)
+    assert Tetrahedra.of(cells).of_cell(1)[0][..., 0].min() == 4
 
 
 def test_a_cell_of_several_leaves_is_filled_whole(room_row):
     _, cells = room_row(3)
     joined = replace(cells, leaf_cell=np.array([0, 1, 0], dtype=np.int32))
-    points = np.concatenate(Volume(joined, 0).parts(8, 0))
+    points = np.concatenate(volume(joined, 0).parts(8, 0))
     in_first = np.mean(points[:, 0] < 4)
     assert in_first == pytest.approx(0.5, abs=0.05)
     assert not np.any((points[:, 0] > 4) & (points[:, 0] < 8))
@@ -96,7 +104,7 @@ def test_scrambles_are_uniform_and_independent():
 
 
 def test_a_filling_is_uniform_in_a_tetrahedron():
-    points = filling(CORNER, sobol(0, 4096, 0))
+    points = filled(CORNER, sobol(0, 4096, 0))
     assert (points >= 0).all()
     assert (points.sum(axis=1) <= 1).all()
     assert points.mean(axis=0) == pytest.approx([0.25, 0.25, 0.25], abs=2e-3)
@@ -105,7 +113,7 @@ def test_a_filling_is_uniform_in_a_tetrahedron():
 
 
 def test_a_filling_goes_by_volume():
-    points = filling(np.concatenate([CORNER, CORNER * 2 + 10]), sobol(0, 8192, 0))
+    points = filled(np.concatenate([CORNER, CORNER * 2 + 10]), sobol(0, 8192, 0))
     assert np.mean(points[:, 0] < 5) == pytest.approx(1 / 9, abs=2e-3)
 
 
@@ -114,7 +122,7 @@ def test_points_fill_a_cell_of_two_leaves_evenly(room_row, draw):
     """Its bounding box holds another cell, where no point falls."""
     _, cells = room_row(3)
     joined = replace(cells, leaf_cell=np.array([0, 1, 0], dtype=np.int32))
-    points = getattr(Volume(joined, 0), draw)(0, 3000, 0)[:, :3]
+    points = getattr(volume(joined, 0), draw)(0, 3000, 0)[:, :3]
     if draw == "sobol":
         assert len(points) == pytest.approx(2000, rel=0.01)
     assert not np.any((points[:, 0] > 4) & (points[:, 0] < 8))
@@ -127,10 +135,10 @@ def test_points_fill_a_cell_of_two_leaves_evenly(room_row, draw):
 def test_a_slanting_sliver_is_filled_by_tetrahedra(room_row):
     """It fills so little of its box that few points of the box would meet it."""
     _, cells = room_row(1)
-    wide = Volume(cells, 0)
+    wide = volume(cells, 0)
     slope = cells.leaf_point.copy()
     slope[:, 1] = slope[:, 1] / 100 + slope[:, 0]
-    thin = Volume(replace(cells, leaf_point=slope), 0)
+    thin = volume(replace(cells, leaf_point=slope), 0)
     assert wide.boxed
     assert not thin.boxed
     points = thin.sobol(0, 512, 0)
@@ -151,7 +159,7 @@ def test_strata_are_a_partition_into_equal_parts(count, parts, seed):
 
 def test_eight_samples_of_a_cube_are_the_middles_of_its_octants(room_row):
     _, cells = room_row(1)
-    first = np.array([part[0] for part in Volume(cells, 0).parts(8, 0)])
+    first = np.array([part[0] for part in volume(cells, 0).parts(8, 0)])
     octants = (first > [2, 2, 0]).astype(int) @ [1, 2, 4]
     assert sorted(octants) == list(range(8))
     middle = np.where(first > [2, 2, 0], [3, 3, 1], [1, 1, -1])
@@ -160,7 +168,7 @@ def test_eight_samples_of_a_cube_are_the_middles_of_its_octants(room_row):
 
 def test_seeds_give_other_points(room_row):
     _, cells = room_row(1)
-    one, other = (Volume(cells, 0).parts(8, seed)[0] for seed in (0, 1))
+    one, other = (volume(cells, 0).parts(8, seed)[0] for seed in (0, 1))
     assert one.shape == other.shape == (TRIES, 3)
     assert not np.any(np.all(one[:, None] == other[None], axis=2))
 
@@ -169,7 +177,7 @@ def test_seeds_give_other_points(room_row):
 def test_the_unit_does_not_matter(room_row, elsewhere, power):
     scene, cells = room_row(2)
     _, scaled = elsewhere(scene, cells, np.zeros(3), 2.0**power)
-    here, there = Volume(cells, 1), Volume(scaled, 1)
+    here, there = volume(cells, 1), volume(scaled, 1)
     for part, scaled_part in zip(here.parts(5, 0), there.parts(5, 0), strict=True):
         assert np.array_equal(part * 2.0**power, scaled_part)
     assert np.array_equal(here.sobol(0, 64, 0)[:, :3] * 2.0**power, there.sobol(0, 64, 0)[:, :3])
@@ -177,5 +185,5 @@ def test_the_unit_does_not_matter(room_row, elsewhere, power):
 
 def test_a_flat_cell_is_empty(room_row):
     _, cells = room_row(1)
-    assert Volume(replace(cells, leaf_point=cells.leaf_point * [1, 0, 1]), 0).empty
-    assert not Volume(cells, 0).empty
+    assert volume(replace(cells, leaf_point=cells.leaf_point * [1, 0, 1]), 0).empty
+    assert not volume(cells, 0).empty
