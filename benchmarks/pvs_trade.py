@@ -9,7 +9,8 @@ visibility, a row of the CSV:
 leaves, cells, portals     of the subdivision
 pvs                        mean share of all cells that a cell may see
 cut                        portals whose search the budget ended
-walk_files, walk_mb        cell files fetched along the standard walk (`walk.py`), and megabytes
+walk_reached, walk_stops   rooms that the standard walk (`walk.py`) leads through, and was to
+walk_files, walk_mb        cell files fetched along the walk, each once, and their megabytes
 at_hand_mb                 megabytes that the walker's visible set holds, on average over the way
 at_hand_volume, at_hand_texels
                            the same as a share of the building's volume, and of all texels in use
@@ -81,6 +82,8 @@ class Row:
     portals: int
     pvs: float
     cut: int
+    walk_reached: int
+    walk_stops: int
     walk_files: int
     walk_mb: float
     at_hand_mb: float
@@ -193,7 +196,8 @@ def weigh(folder: Path, model: Path, kind: str) -> dict[str, dict[str, Any]]:
     from ptmtools.scene import ingest
 
     scene, cells = ingest(model), stored(folder, kind)
-    way = passed(cells, stored(folder, "walk"))
+    walk = stored(folder, "walk")
+    way = passed(cells, walk.corner)
     volume = np.bincount(cells.leaf_cell, cells.leaf_volumes())
     full = stored(folder, f"{kind}-full").to_matrix()
     found = {}
@@ -208,6 +212,8 @@ def weigh(folder: Path, model: Path, kind: str) -> dict[str, dict[str, Any]]:
             "portals": cells.portal_count,
             "pvs": pvs.average_share,
             "cut": pvs.fallbacks,
+            "walk_reached": walk.reached,
+            "walk_stops": walk.stops,
             "walk_files": walked.files,
             "walk_mb": walked.megabytes,
             "at_hand_mb": walked.at_hand,
@@ -296,7 +302,8 @@ def read_csv(path: Path) -> list[Row]:
 
 
 def tables(rows: Sequence[Row]) -> str:
-    """Two Markdown tables: cells by full visibility, and rooms by all methods."""
+    """Two Markdown tables: cells by full visibility, and rooms by all methods; and which walks
+    leave rooms out."""
     by = {(r.model, r.wall_area, r.kind, r.method): r for r in rows}
     cells = [
         ["model", "wall m²", "cells are", "cells", "portals", "PVS", "walk: files", "MB"]
@@ -326,7 +333,12 @@ def tables(rows: Sequence[Row]) -> str:
                 + [f"{r.cut:,}", f"{s.lacks:,}", f"{s.missed_pairs:,}"]
                 + [f"{r.missed_pairs:,} / {f.missed_pairs:,}"]
             )
-    return f"{_markdown(cells)}\n{_markdown(methods)}"
+    short = {r.model: r for r in rows if r.walk_reached < r.walk_stops}
+    left_out = "".join(
+        f"\nThe walk through {model} reaches {r.walk_reached} of {r.walk_stops} rooms.\n"
+        for model, r in short.items()
+    )
+    return f"{_markdown(cells)}\n{_markdown(methods)}{left_out}"
 
 
 def _markdown(table: list[list[str]]) -> str:

@@ -111,7 +111,7 @@ def main() -> None:
         tolerance = Tolerance.for_points(scene.points)
         leaves = subdivide(scene, LEAF)
         rooms = grouped(leaves, WHOLE, tolerance)
-        way = passed(leaves, standard_walk(rooms))
+        way = passed(leaves, standard_walk(rooms).corner)
         seen = views(scene, leaves, seed=1)
         for name, options in kinds.items():
             start = time.process_time()

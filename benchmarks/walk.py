@@ -27,6 +27,21 @@ STOPS, DOOR = 12, 1.0
 
 
 @dataclass(frozen=True)
+class Walk:
+    """A walk in space.
+
+    Attributes
+    ----------
+    corner: (n, 3) its corners, metres. stops: the rooms that it was to lead through, the first
+        among them. reached: how many of them it leads through; doors wide enough lead to no others.
+    """
+
+    corner: NDArray[np.float64]
+    stops: int
+    reached: int
+
+
+@dataclass(frozen=True)
 class Way:
     """The leaves that a walk passes, in its order, and how many metres of it lie in each."""
 
@@ -49,8 +64,8 @@ class Load:
     at_hand: float
 
 
-def standard_walk(cells: Cells) -> NDArray[np.float64]:
-    """(n, 3) the corners of the walk that the module describes; ``cells`` are whole rooms."""
+def standard_walk(cells: Cells) -> Walk:
+    """The walk that the module describes; ``cells`` are whole rooms."""
     middle = np.array([cells.leaf_points(i).mean(axis=0) for i in range(cells.leaf_count)])
     volume = cells.leaf_volumes()
     rooms = np.argsort(-np.bincount(cells.leaf_cell, volume), kind="stable")[:STOPS]
@@ -65,6 +80,7 @@ def standard_walk(cells: Cells) -> NDArray[np.float64]:
         doors[b].append((a, metres))
         for pair in ((a, b), (b, a)):
             portal[pair] = min(portal.get(pair, (np.inf, 0)), (metres, k))
+    asked = len(stops)
     here = int(max(stops, key=lambda leaf: volume[leaf]))
     stops.discard(here)
     corners = [middle[here]]
@@ -80,7 +96,7 @@ def standard_walk(cells: Cells) -> NDArray[np.float64]:
         for a, b in pairwise(reversed(leg)):
             corners += [cells.portal(portal[a, b][1]).mean(axis=0), middle[b]]
         here = following
-    return np.array(corners)
+    return Walk(np.array(corners), asked, asked - len(stops))
 
 
 def _distances(
@@ -101,7 +117,7 @@ def _distances(
 
 
 def passed(cells: Cells, walk: NDArray[np.float64]) -> Way:
-    """Where a walk (n, 3) leads in a subdivision, which need not be the one it was made from.
+    """Where a walk with these (n, 3) corners leads in a subdivision, which need not be its own.
 
     What lies in no leaf, or for less than a hairline in one, is left out. A walk of one point is
     one metre where it stands.

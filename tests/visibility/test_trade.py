@@ -29,20 +29,22 @@ def row(build_rooms: Callable[..., Any]) -> Any:
 
 def test_the_walk_leads_from_the_largest_room_to_the_nearest_ones(row: Any) -> None:
     walk = standard_walk(row)
-    assert walk[:, 0].tolist() == [9, 6, 5, 4, 2]
-    way = passed(row, walk)
+    assert walk.corner[:, 0].tolist() == [9, 6, 5, 4, 2]
+    assert (walk.reached, walk.stops) == (3, 3)
+    way = passed(row, walk.corner)
     assert way.leaf.tolist() == [2, 1, 1, 0]
     assert way.metres.tolist() == pytest.approx([3, 1, 1, 2])
 
 
 def test_the_walk_passes_no_door_of_less_than_a_square_metre(row: Any) -> None:
     walk = standard_walk(replace(row, portal_area=np.array([0.9, 1.0])))
-    assert walk[:, 0].tolist() == [9, 6, 5]
+    assert walk.corner[:, 0].tolist() == [9, 6, 5]
+    assert (walk.reached, walk.stops) == (2, 3)
 
 
 def test_a_walk_is_the_same_line_in_other_cells(build_rooms: Callable[..., Any], row: Any) -> None:
     finer = build_rooms((0, 1, 3, 7, 12), (0, 2, 3), (0, 3), {}).cells
-    way = passed(finer, standard_walk(row))
+    way = passed(finer, standard_walk(row).corner)
     assert [finer.leaf_points(i)[:, 0].min() for i in way.leaf] == [7, 3, 3, 3, 3, 1]
     assert way.metres.tolist() == pytest.approx([2, 1, 1, 1, 1, 1])
 
@@ -57,7 +59,7 @@ def test_what_lies_outside_is_left_out_of_a_walk(row: Any) -> None:
 def test_bytes_of_a_walk_by_hand(row: Any) -> None:
     sees = np.array([[1, 1, 0], [1, 1, 1], [0, 1, 1]], dtype=bool)
     pvs, size = Pvs.from_matrix(sees), np.array([1_000_000, 2_000_000, 4_000_000])
-    way = passed(row, standard_walk(row))
+    way = passed(row, standard_walk(row).corner)
     walked = load(row, pvs, way, size)
     assert (walked.files, walked.megabytes) == (3, 7.0)
     assert walked.at_hand == pytest.approx((3 * 6 + 2 * 7 + 2 * 3) / 7)
@@ -93,6 +95,12 @@ def test_the_table_is_written_read_and_drawn(
     assert methods.strip().split("\n")[2].startswith("| one | 2 | 25.0% | 50.0% | 75.0% |")
     assert methods.strip().split("\n")[3].startswith("|  | 0.5 |")
     assert (tmp_path / "pvs.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_walk_that_leaves_rooms_out_says_so() -> None:
+    assert "walk through" not in pvs_trade.tables(rows())
+    short = [replace(r, walk_stops=12, walk_reached=9 + 3 * (r.model == "one")) for r in rows()]
+    assert pvs_trade.tables(short).endswith("\n\nThe walk through two reaches 9 of 12 rooms.\n")
 
 
 def test_a_conservative_set_that_misses_a_pair_is_a_failure(tmp_path: Path) -> None:
