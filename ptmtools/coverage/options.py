@@ -17,6 +17,8 @@ Backend = Literal["auto", "gl", "embree"]
 MAX_FACE = 2048
 #: Sample points a cell: the counts of all of them are held at once.
 MAX_SAMPLES = 2**14
+#: The least that samples may be with a tolerance: one for each of the sequences that are compared.
+LEAST_FOR_TOLERANCE = 8
 #: Of each preset: sample points a cell, pixels a side of a view, and how the points are placed.
 PRESETS: dict[Preset, tuple[int, int, Placement]] = {
     "paper": (8, 256, "uniform"),
@@ -109,6 +111,12 @@ class AchOptions:
                 "PTM-I500",
                 f"a tolerance of {tolerance} makes no sense",
                 remedy="give a total variation above 0 and below 1, such as 0.01",
+            )
+        if self.points < LEAST_FOR_TOLERANCE:
+            raise InputError(
+                "PTM-I500",
+                f"{self.points} sample points do not tell how far they are from a tolerance",
+                remedy=f"allow {LEAST_FOR_TOLERANCE} or more, or leave --samples out",
             )
         if self.placed == "kd":
             raise InputError(

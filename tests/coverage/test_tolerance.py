@@ -1,0 +1,197 @@
+"""How the error falls with the number of sample points, and points added until it is small
+enough: against hints known by quadrature."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ptmtools.coverage.ach import compute_ach
+from ptmtools.coverage.estimate import GROUPS
+from ptmtools.coverage.options import LEAST_FOR_TOLERANCE, AchOptions
+from ptmtools.errors import InputError
+from ptmtools.pipeline.build import _coverage_notes
+from ptmtools.visibility.model import Pvs
+
+RAYS = AchOptions(face=4, backend="embree")
+ROOMS = 3
+
+
+def matrix(ach, pvs):
+    """(C, C) hints, 0 outside the PVS."""
+    found = np.zeros((pvs.cell_count, pvs.cell_count))
+    for i in range(pvs.cell_count):
+        found[i, pvs.row(i)] = ach.row(i)
+    return found
+
+
+def all_visible(n):
+    return Pvs.from_matrix(np.ones((n, n), dtype=bool))
+
+
+def variation(found, truth):
+    return np.abs(found - truth).sum(axis=1) / 2
+
+
+@pytest.fixture(scope="module")
+def runs(room_row):
+    """``runs(tolerance)``: hints of a row of rooms from several seeds, made once."""
+    made = {}
+
+    def at(tolerance):
+        if tolerance not in made:
+            made[tolerance] = [
+                compute_ach(
+                    *room_row(ROOMS),
+                    all_visible(ROOMS),
+                    replace(RAYS, tolerance=tolerance, seed=seed),
+                )
+                for seed in range(30)
+            ]
+        return made[tolerance]
+
+    return at
+
+
+@pytest.mark.parametrize("tolerance", [0.02, 0.01])
+def test_the_truth_is_within_the_tolerance(runs, exact_row, tolerance):
+    truth = exact_row(ROOMS)
+    away = np.array([variation(matrix(a, all_visible(ROOMS)), truth) for a in runs(tolerance)])
+    uncertain = np.array([a.uncertain for a in runs(tolerance)])
+    assert (uncertain <= tolerance).all()
+    assert np.mean(away <= tolerance) >= 0.95
+    assert away.max() <= 2.6 * tolerance
+    assert np.mean(away <= uncertain) >= 0.87, "the bound itself, where sampling stopped"
+
+
+def test_error_bars_of_independent_sequences_are_honest(runs, exact_row):
+    """Neither too small nor, as with stretches of one sequence, twice too large."""
+    truth = exact_row(ROOMS)
+    worst = []
+    for ach in runs(0.01):
+        error = np.array([ach.error[ach.entries(i)] for i in range(ROOMS)])
+        rows = [all_visible(ROOMS).row(i) for i in range(ROOMS)]
+        expected = np.array([truth[i, row] for i, row in enumerate(rows)])
+        found = np.array([ach.row(i) for i in range(ROOMS)])
+        worst.append(((found - expected) / error)[expected > 0.02])
+    score = np.concatenate(worst)
+    assert 0.6 < np.sqrt(np.mean(score**2)) < 1.6
+    assert np.mean(np.abs(score) <= 2.365) >= 0.88
+
+
+def test_a_smaller_tolerance_takes_more_points(runs):
+    coarse, fine = (np.mean([a.samples.sum() for a in runs(t)]) for t in (0.02, 0.01))
+    assert 1.5 * coarse < fine
+
+
+def test_cells_take_as_many_points_as_they_need(room_row, furnish):
+    """A closed room is certain at once; the one with a view is not."""
+    scene, cells = room_row(3)
+    bricks = [[4, 0, -1], [4, 3, -1], [4, 3, 1], [4, 0, 1]]
+    scene, cells = furnish(scene, cells, [bricks], [(1, 0)])
+    ach = compute_ach(scene, cells, all_visible(3), replace(RAYS, tolerance=0.004))
+    assert ach.samples[0] == 64
+    assert (ach.samples[1:] >= 256).all()
+    assert ach.uncertain[0] == 0
+    assert (ach.unseen_below == 3 / ach.samples).all()
+
+
+@pytest.mark.parametrize("most", [8, 100, 128])
+def test_samples_caps_the_points(room_row, most):
+    scene, cells = room_row(3)
+    options = replace(RAYS, tolerance=0.001, samples=most)
+    ach = compute_ach(scene, cells, all_visible(3), options)
+    assert (ach.samples <= most).all()
+    assert (ach.samples > most - 8).all()
+    assert (ach.uncertain > 0.001).all()
+    notes = _coverage_notes(ach, options)
+    assert len(notes) == 1
+    assert notes[0].startswith("3 cells did not reach the tolerance of 0.001 with")
+
+
+def test_the_note_counts_the_cells_that_fell_short(room_row):
+    scene, cells = room_row(3)
+    options = replace(RAYS, tolerance=0.01)
+    ach = compute_ach(scene, cells, all_visible(3), options)
+    assert _coverage_notes(ach, options) == ()
+    short = replace(ach, uncertain=np.array([0.5, 0.009, np.nan]))
+    assert _coverage_notes(short, options)[0].startswith("2 cells did not reach")
+    assert _coverage_notes(short, replace(options, tolerance=None)) == ()
+
+
+def test_a_tolerance_needs_eight_points():
+    """One for each of the independent sequences."""
+    assert LEAST_FOR_TOLERANCE == GROUPS
+    with pytest.raises(InputError, match="PTM-I500"):
+        AchOptions(tolerance=0.1, samples=7)
+    AchOptions(tolerance=0.1, samples=8)
+
+
+def test_uniform_points_reach_a_tolerance_too(room_row, exact_row):
+    options = replace(RAYS, placement="uniform", tolerance=0.02)
+    ach = compute_ach(*room_row(2), all_visible(2), options)
+    sobol = compute_ach(*room_row(2), all_visible(2), replace(options, placement="sobol"))
+    assert (variation(matrix(ach, all_visible(2)), exact_row(2)) <= 0.02).all()
+    assert ach.samples.sum() > sobol.samples.sum()
+
+
+def test_a_tolerance_is_the_same_from_one_process_or_two(room_row, monkeypatch):
+    monkeypatch.setattr("ptmtools.coverage.ach.WORTH_A_PROCESS", 1.0)
+    options = replace(RAYS, tolerance=0.02, per_texture=True)
+    one, two = (
+        compute_ach(*room_row(ROOMS), all_visible(ROOMS), replace(options, workers=n)).to_arrays()
+        for n in (1, 2)
+    )
+    for name, array in one.items():
+        assert np.array_equal(array, two[name], equal_nan=array.dtype.kind == "f"), name
+
+
+def rate(placement, room_row, truth, seeds):
+    """The exponent with which the error falls from 32 to 2048 points, and the errors."""
+    points = np.array([32, 128, 512, 2048])
+    error = []
+    for count in points:
+        options = replace(RAYS, placement=placement, samples=int(count))
+        away = [
+            variation(
+                matrix(
+                    compute_ach(*room_row(2), all_visible(2), replace(options, seed=seed)),
+                    all_visible(2),
+                ),
+                truth,
+            )
+            for seed in range(seeds)
+        ]
+        error.append(np.mean(away))
+    return float(np.polyfit(np.log(points), np.log(error), 1)[0]), error
+
+
+def test_the_error_falls_faster_with_sobol_points(room_row, exact_row):
+    truth = exact_row(2)
+    slow, of_uniform = rate("uniform", room_row, truth, 6)
+    fast, of_sobol = rate("sobol", room_row, truth, 6)
+    assert -0.65 < slow < -0.35
+    assert fast < -0.6
+    assert of_sobol[-1] < of_uniform[-1] / 3
+
+
+def test_few_points_are_best_at_the_middles_of_equal_parts(room_row, exact_row):
+    truth = exact_row(2)
+    mean = {}
+    for placement in ("kd", "uniform"):
+        options = replace(RAYS, placement=placement, samples=8, face=16)
+        mean[placement] = np.mean(
+            [
+                variation(
+                    matrix(
+                        compute_ach(*room_row(2), all_visible(2), replace(options, seed=seed)),
+                        all_visible(2),
+                    ),
+                    truth,
+                )
+                for seed in range(8)
+            ]
+        )
+    assert mean["kd"] < mean["uniform"] / 2
