@@ -36,6 +36,12 @@ Polygon = list[Point]
 
 #: Vertices with longer numbers are rounded outwards, their distances to `SHARE` bits.
 BITS, SHARE = 512, 96
+#: A sequence that takes longer numbers than this counts as open: one of e1m1 took a minute.
+LONGEST = 8192
+
+
+class _LengthError(Exception):
+    """Numbers of more than `LONGEST` bits."""
 
 
 class _Left(NamedTuple):
@@ -69,7 +75,10 @@ class ExactPortals:
                 break
             part = sequence[:length]
             if part not in self._left:
-                self._left[part] = _beyond(left, *self._directed(part[-1]))
+                try:
+                    self._left[part] = _beyond(left, *self._directed(part[-1]))
+                except _LengthError:
+                    return True
             left = self._left[part]
         return left is not None
 
@@ -179,7 +188,10 @@ def _between(inner: Point, outer: Point, inward: int, outward: int) -> Point:
         inward = (inward >> up) + (up > 0) << up - least
         outward = outward >> down << down - least
     x, y, z, w = (inward * o + outward * i for i, o in zip(inner, outer, strict=True))
-    return _reduced((x, y, z, w))
+    found = _reduced((x, y, z, w))
+    if found[3].bit_length() > LONGEST:
+        raise _LengthError
+    return found
 
 
 def _separators(near: Polygon, far: Polygon) -> list[Plane]:

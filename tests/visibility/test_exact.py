@@ -77,6 +77,13 @@ def test_a_rounded_vertex_is_where_it_was_however_long_the_numbers_of_the_ends()
         assert (y, z) == (2 * w, 3 * w)
 
 
+def test_what_takes_too_long_numbers_counts_as_open(monkeypatch):
+    portals = along_a_line(1, 5, miss=3.0)
+    assert not portals.passes((0, 2, 4, 6, 8))
+    monkeypatch.setattr(exact, "LONGEST", 100)
+    assert along_a_line(1, 5, miss=3.0).passes((0, 2, 4, 6, 8))
+
+
 def test_numbers_do_not_grow_without_bound():
     portals = along_a_line(3, 30)
     assert portals.passes(tuple(range(0, 60, 2)))
