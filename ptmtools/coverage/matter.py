@@ -23,6 +23,7 @@ at random, as in most OBJ files).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,17 @@ from ptmtools.scene.model import Scene
 DIRECTIONS = np.array([[0.683, 0.577, 0.448], [-0.371, 0.819, -0.437], [0.291, -0.463, -0.837]])
 
 
+def _frames() -> NDArray[np.float64]:
+    forward = DIRECTIONS / np.sqrt((DIRECTIONS**2).sum(axis=1, keepdims=True))
+    right = np.cross(forward, [1.0, 0.0, 0.0])
+    right /= np.sqrt((right**2).sum(axis=1, keepdims=True))
+    return np.stack([right, np.cross(forward, right), forward], axis=1)
+
+
+#: (3, 3, 3) for each a rotation, whose rows are the new axes, in which it runs along +z.
+FRAMES = _frames()
+
+
 @dataclass(frozen=True)
 class Body:
     """A closed surface with an inside: its (n, 3, 3) corners and (2, 3) bounding box, metres."""
@@ -43,12 +55,23 @@ class Body:
     corners: NDArray[np.float64]
     box: NDArray[np.float64]
 
-    def contains(self, point: NDArray[np.float64]) -> bool:
-        """Whether a (3,) point in the box is inside: odd crossings along most of the rays."""
+    def contains(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(n,) whether each of the (n, 3) points is inside: odd crossings along most rays."""
         from ptmtools.coverage.clearance.kernels import crossings
 
-        odd = sum(crossings(point, self.corners, d) % 2 for d in DIRECTIONS)
-        return 2 * odd > len(DIRECTIONS)
+        odd = np.zeros(len(points), dtype=np.int64)
+        for frame, corners in zip(FRAMES, self._turned, strict=True):
+            turned = np.einsum("ij,kj->ik", points, frame)
+            order = np.argsort(turned[:, 0], kind="stable")
+            crossed = np.zeros(len(points), dtype=np.int64)
+            crossings(turned[order], corners, crossed)
+            odd[order] += crossed % 2
+        return np.asarray(2 * odd > len(FRAMES))
+
+    @cached_property
+    def _turned(self) -> list[NDArray[np.float64]]:
+        """The corners in each of the frames."""
+        return [np.einsum("tij,kj->tik", self.corners, frame) for frame in FRAMES]
 
 
 def bodies(scene: Scene, cells: Cells) -> list[Body]:
@@ -172,8 +195,7 @@ class Surroundings:
         for body in np.flatnonzero(near):
             lower, upper = self.boxes[body]
             boxed = ~inside & np.all((lower <= points) & (points <= upper), axis=1)
-            for i in np.flatnonzero(boxed):
-                inside[i] = self.bodies[body].contains(points[i])
+            inside[boxed] = self.bodies[body].contains(points[boxed])
         return inside
 
     def clearance(self, points: NDArray[np.float64], enough: float) -> NDArray[np.float64]:

@@ -72,39 +72,26 @@ def distance(p: Floats, corner: Floats) -> float:
 
 
 @kernel
-def crossings(point: Floats, corners: Floats, along: Floats) -> int:
-    """How many of the (m, 3, 3) triangles the ray from a (3,) point along a (3,) direction
-    crosses: those past whose three edges its line runs on the same side, ahead of the point."""
-    crossed = 0
-    dx, dy, dz = along[0], along[1], along[2]
+def crossings(points: Floats, corners: Floats, crossed: NDArray[np.int64]) -> None:
+    """Adds to ``crossed`` (n,) how many of the (m, 3, 3) triangles the ray along +z from each of
+    the (n, 3) points, ascending in x, crosses: those that its line passes through ahead of it."""
+    x = points[:, 0]
     for t in range(len(corners)):
-        ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
-        bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
-        cx, cy, cz = corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]
-        ax, ay, az = ax - point[0], ay - point[1], az - point[2]
-        bx, by, bz = bx - point[0], by - point[1], bz - point[2]
-        cx, cy, cz = cx - point[0], cy - point[1], cz - point[2]
-        u = _volume(ax, ay, az, bx, by, bz, dx, dy, dz)
-        v = _volume(bx, by, bz, cx, cy, cz, dx, dy, dz)
-        w = _volume(cx, cy, cz, ax, ay, az, dx, dy, dz)
-        if (u >= 0 and v >= 0 and w >= 0) or (u <= 0 and v <= 0 and w <= 0):
-            bx, by, bz, cx, cy, cz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
-            height = _volume(bx, by, bz, cx, cy, cz, ax, ay, az)
-            crossed += height * _volume(bx, by, bz, cx, cy, cz, dx, dy, dz) > 0
-    return crossed
-
-
-@kernel
-def _volume(
-    ax: float,
-    ay: float,
-    az: float,
-    bx: float,
-    by: float,
-    bz: float,
-    cx: float,
-    cy: float,
-    cz: float,
-) -> float:
-    """a × b · c."""
-    return (ay * bz - az * by) * cx + (az * bx - ax * bz) * cy + (ax * by - ay * bx) * cz
+        a, b, c = corners[t, 0], corners[t, 1], corners[t, 2]
+        first = np.searchsorted(x, min(a[0], b[0], c[0]))
+        end = np.searchsorted(x, max(a[0], b[0], c[0]), side="right")
+        if first == end:
+            continue
+        low, high = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
+        top = max(a[2], b[2], c[2])
+        for i in range(first, end):
+            p = points[i]
+            if not (low <= p[1] <= high) or p[2] > top:
+                continue
+            # Of an edge and the edge the other way round exactly opposite.
+            u = (b[0] - p[0]) * (c[1] - p[1]) - (b[1] - p[1]) * (c[0] - p[0])
+            v = (c[0] - p[0]) * (a[1] - p[1]) - (c[1] - p[1]) * (a[0] - p[0])
+            w = (a[0] - p[0]) * (b[1] - p[1]) - (a[1] - p[1]) * (b[0] - p[0])
+            if (u >= 0 and v >= 0 and w >= 0) or (u <= 0 and v <= 0 and w <= 0):
+                above = u * (a[2] - p[2]) + v * (b[2] - p[2]) + w * (c[2] - p[2])
+                crossed[i] += above * (u + v + w) > 0
