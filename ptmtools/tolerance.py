@@ -38,10 +38,11 @@ GRID_SHARE = 1e-13
 
 #: Unit normals with a dot product of at least this are parallel: 1.4 mm over a metre.
 PARALLEL_COSINE = 1.0 - 1e-6
-#: Areas, volumes and scores that differ by less than this share are equal: above the rounding of
-#: float64 in any unit and at any angle, below anything that a model means. Ties go by the order of
-#: the model file, which no transformation changes.
-TIE_SHARE = 1e-9
+#: Areas, volumes and scores that differ by less than this share are equal: above what reveals some
+#: centimetres wide lose in a file 1e6 extents from its origin (with 1e-9 the office gets other
+#: portals there), below anything that a model means. Ties go by the order of the model file, which
+#: no transformation changes.
+TIE_SHARE = 3e-7
 
 #: Of two surfaces in one pixel, depths that differ by less than this share are the same depth:
 #: 0.3 mm at 20 m, above the rounding of float32 depth and below a picture 1 mm off its wall.
