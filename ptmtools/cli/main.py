@@ -33,6 +33,7 @@ COMMANDS = {
     "validate": ("reports", "validate", "Check a database or a .ptm file."),
     "info": ("information", "info", "Say what is in a database or a .ptm file."),
     "plot": ("reports", "plot", "Draw the floor plan of a database."),
+    "tradeoff": ("tradeoff", "tradeoff", "Measure what the knobs of the stages cost and bring."),
     "encode": ("images", "encode", "Encode images as .ptm files."),
     "decode": ("images", "decode", "Decode .ptm files to images."),
     "compare": ("comparing", "compare", "Compare .ptm with other image formats: size and speed."),

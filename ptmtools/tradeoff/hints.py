@@ -1,4 +1,4 @@
-"""What the knobs of the coverage hints buy (see `ptmtools.tradeoff`).
+"""What the knobs of the coverage hints buy (see `experiment`).
 
 The error of a setting is the total variation between its hints of a cell and those of a reference:
 many more points, of an independent scramble, with rays. Some cells stand for all.
@@ -18,7 +18,7 @@ from ptmtools.coverage.item_buffer import Surfaces
 from ptmtools.coverage.options import PRESETS, AchOptions
 from ptmtools.coverage.sampling import CellHints, Sampler
 from ptmtools.scene.model import Scene
-from ptmtools.tradeoff import Measured, Setting, timed
+from ptmtools.tradeoff.experiment import Measured, Setting, timed
 from ptmtools.visibility.model import Pvs
 
 #: The seed of the reference, which no user is likely to choose.

@@ -1,0 +1,65 @@
+"""The outcome of experiments as a table of text, as CSV, and as pictures."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+
+from ptmtools.tradeoff.experiment import Trade
+
+
+def table(trade: Trade, wanted: float | None = None) -> list[str]:
+    """Lines of text: every trial by cost, a star where no other is as good for less; the rates; and
+    the cheapest setting for the wanted error."""
+    names = [t.setting.name for t in trade.trials]
+    wide = max(map(len, [*names, "setting"]))
+    lines = [
+        f"{trade.stage}: {trade.error}, against CPU seconds of one core and {trade.work}",
+        f"  {'setting':<{wide}}  {'seconds':>9} {'work':>11} {'error':>8} {'worst':>8}",
+    ]
+    for trial in trade.trials:
+        m = trial.measured
+        star = "*" if trial.best else " "
+        more = "".join(f"  {k} {v:.3g}" for k, v in m.more.items() if v)
+        lines.append(
+            f"{star} {trial.setting.name:<{wide}}  {m.seconds:9.2f} {m.work:11,.0f} "
+            f"{m.error:8.4f} {m.worst:8.4f}{more}"
+        )
+    if trade.reference_error:
+        lines.append(f"  the reference's own standard error: {trade.reference_error:.4f}")
+    for family, rate in trade.rates.items():
+        lines.append(f"  {family}: error ∝ work^{rate:.2f}")
+    if wanted is not None:
+        found = trade.cheapest(wanted)
+        told = found.setting.name if found else "none of these; the least error is the last star's"
+        lines.append(f"  cheapest for an error of at most {wanted:g}: {told}")
+    return lines
+
+
+def as_csv(trades: Sequence[Trade]) -> str:
+    """All trials of all stages: what is in `Measured`, other figures as ``name=value``."""
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(
+        [
+            "stage",
+            "setting",
+            "cpu_s",
+            "work",
+            "work_unit",
+            "error",
+            "worst",
+            "error_of",
+            "best",
+            "more",
+        ]
+    )
+    for trade in trades:
+        for trial in trade.trials:
+            m = trial.measured
+            more = " ".join(f"{k}={v:.6g}" for k, v in m.more.items())
+            figures = [f"{m.seconds:.4f}", f"{m.work:.6g}", trade.work, f"{m.error:.6g}"]
+            told = [f"{m.worst:.6g}", trade.error, int(trial.best), more]
+            rows.writerow([trade.stage, trial.setting.name, *figures, *told])
+    return text.getvalue()

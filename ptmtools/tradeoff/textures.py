@@ -1,0 +1,60 @@
+"""What the profiles of the textures buy.
+
+All of them give the pixels back exactly, so what is to be wished is few bytes. The error of a
+setting is the bytes of all levels over those of the finest level as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ptmtools.scene.model import SourceImage
+from ptmtools.texture import EncodeOptions, encode, read_image
+from ptmtools.tradeoff.experiment import Measured, Setting, timed
+
+#: Texels a side that are encoded of an image.
+CORNER = 512
+
+
+class TexturesTrade:
+    """The experiment of the stage ``textures``."""
+
+    stage = "textures"
+    work = "texels"
+    error = "bytes stored, of those of the finest level"
+    reference_error = 0.0
+
+    def __init__(
+        self, images: Sequence[SourceImage], options: EncodeOptions, images_tried: int = 4
+    ) -> None:
+        """The corner of ``images_tried`` images stands for all of them."""
+        chosen = np.linspace(0, len(images) - 1, min(images_tried, len(images))).astype(int)
+        whole = [read_image(images[i].load()) for i in np.unique(chosen)]
+        self._pixels = [pixels[:CORNER, :CORNER] for pixels in whole]
+        tried = sum(pixels.size for pixels in self._pixels)
+        part = tried / max(sum(pixels.size for pixels in whole), 1)
+        self._times = len(images) / max(len(whole), 1) / (part or 1)
+        self._options = options
+        if self._pixels:
+            for setting in self.settings():  # compiles what is compiled
+                encode(self._pixels[0][:8, :8], replace(options, **setting.knobs))
+
+    def settings(self) -> Sequence[Setting]:
+        """See `Experiment.settings`."""
+        return [Setting(f"--profile {p}", {"profile": p}) for p in ("raw", "fast", "small")]
+
+    def measure(self, setting: Setting) -> Measured:
+        """See `Experiment.measure`."""
+        options = replace(self._options, **setting.knobs)
+        files, seconds = timed(lambda: [encode(pixels, options) for pixels in self._pixels])
+        raw = np.array([pixels.nbytes for pixels in self._pixels])
+        stored = np.array([len(data) for data in files])
+        return Measured(
+            seconds=seconds * self._times,
+            work=float(sum(pixels.shape[0] * pixels.shape[1] for pixels in self._pixels)),
+            error=float(stored.sum() / max(raw.sum(), 1)),
+            worst=float((stored / raw).max(initial=0.0)),
+        )
