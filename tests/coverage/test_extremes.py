@@ -418,7 +418,7 @@ def places(room_row, points, clearance):
     """Where points are taken in turn from those given, in a room."""
     scene, cells = room_row(1)
     at = Places(Volume(cells, Tetrahedra.of(cells), 0), Surroundings.of(scene, cells), clearance)
-    return at, at.usable(np.array(points, dtype=np.float64))
+    return at, at.usable(np.array(points, dtype=np.float64).reshape(-1, 3))
 
 
 def test_a_point_on_a_face_an_edge_or_a_corner_is_rejected(room_row):
@@ -435,6 +435,14 @@ def test_the_least_bad_point_is_the_one_farthest_from_all_faces(room_row):
     assert eyes.point.tolist() == [[2, 0.3, 0]]
     assert eyes.near.tolist() == [0.3]
     assert eyes.shift.tolist() == [[0, 0]]
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_the_best_of_all_batches_is_kept(room_row, order):
+    at, _ = places(room_row, [], 1.0)
+    for points in ([[2, 0.1, 0], [2, 0.2, 0]], [[2, 0.4, 0], [2, 0.3, 0]])[::order]:
+        assert not at.usable(np.array(points)).any()
+    assert at.least_bad().near.tolist() == [0.4]
 
 
 def test_from_on_a_face_itself_the_near_plane_still_has_a_place(room_row):
