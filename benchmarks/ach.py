@@ -1,176 +1,332 @@
-"""Coverage hints: what a sample point costs, how far the backends agree, what 8 points are worth.
+"""Coverage hints: what accuracy costs. ``make bench-ach``, or
 
-    python benchmarks/ach.py [MODEL | DATABASE ...] [--points N] [--cells N] [--reference N]
+    python benchmarks/ach.py [MODEL…] [--cells N] [--only accuracy grid tolerance agreement speed]
 
-Models are read and cut with the default options; of a database the stages are used as they are.
-Without arguments: the two rooms of the sample data. Two tables for each:
+For every model, cut with the default options, up to ``--cells`` cells stand for all. CPU seconds
+are those of all threads of this process, for the whole model; errors are total variations (half
+the sum of absolute differences) between a cell's hints and those of 8,192 other points.
 
-1. Milliseconds for a sample point (six views; best of three, median over points) by each backend
-   at three sizes of the views, both in this run, one thread of Embree against what Mesa takes; and
-   the share of all pixels that count for different cells.
-2. The error of the hints by number and choice of sample points: total variation (half the L1
-   distance) of a cell's hints against ``--reference`` other points, mean and 95th percentile over
-   cells. Views of 32 pixels a side, Embree. The reference has an error of its own, about that of
-   as many random points.
+accuracy    the presets with both backends and with ``auto``: error, missed mass, rays, CPU seconds,
+            and both as a share of the paper's preset with ``auto``. Is ``auto`` the faster one?
+grid        `CoverageTrade`'s grid of settings, into `ach.csv` and `ach.png`
+tolerance   achieved errors under ``--tolerance``, and how often the truth lies within
+            the error bars
+agreement   pixels that differ between the backends
+speed       rays and sample points a second of each backend, and what the whole takes over what
+            Embree or the draws take in it, which is a bare loop; two processes against one
+
+Tables go to the standard output and into `build/bench/ach.md`, in Markdown.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.cells import subdivide
 from ptmtools.cells.model import Cells
-from ptmtools.coverage.ach import choose_eyes
-from ptmtools.coverage.embree import EmbreeRenderer
-from ptmtools.coverage.item_buffer import Renderer, Surfaces, sample_coverage
-from ptmtools.coverage.matter import Surroundings
+from ptmtools.coverage import ach as stage
+from ptmtools.coverage.ach import compute_ach
+from ptmtools.coverage.backend import open_renderer, triangles_of_a_pvs
+from ptmtools.coverage.item_buffer import VIEWS, Surfaces
 from ptmtools.coverage.opengl import OpenGLRenderer, create_context
-from ptmtools.coverage.options import AchOptions
-from ptmtools.coverage.sampling import candidates, cloud, tetrahedra
+from ptmtools.coverage.options import PRESETS, AchOptions
 from ptmtools.errors import MissingComponentError
+from ptmtools.scene import ingest
 from ptmtools.scene.model import Scene
-from ptmtools.tolerance import Tolerance
+from ptmtools.tradeoff.experiment import Trade, run
+from ptmtools.tradeoff.figure import picture
+from ptmtools.tradeoff.hints import CoverageTrade
+from ptmtools.tradeoff.report import as_csv
+from ptmtools.visibility.model import Pvs
+from ptmtools.visibility.pvs import compute_pvs
 
-SAMPLE = Path(__file__).resolve().parent.parent / "sample_data/two_rooms/two_rooms.obj"
-FACES = (64, 128, 256)
-
-
-def load(path: Path) -> tuple[Scene, Cells]:
-    """A subdivided scene from a database, or from a model."""
-    if path.is_dir():
-        from ptmtools.pipeline import Artifacts, DatabaseFolder
-
-        stages = Artifacts(DatabaseFolder.open(path))
-        return stages.scene, stages.cells
-    from ptmtools.cells.subdivide import subdivide
-    from ptmtools.scene.ingestion import ingest
-
-    scene = ingest(path)
-    return scene, subdivide(scene)
-
-
-def spread(count: int, most: int) -> list[int]:
-    """At most ``most`` of ``count`` numbers, evenly spread."""
-    return sorted({int(i) for i in np.linspace(0, count - 1, min(most, count))})
-
-
-def timed(work: Callable[[], Any]) -> tuple[Any, float]:
-    """What ``work`` returns, and the milliseconds of the best of three runs."""
-    took = []
-    for _ in range(3):
-        start = time.perf_counter()
-        result = work()
-        took.append(1e3 * (time.perf_counter() - start))
-    return result, min(took)
+ROOT = Path(__file__).resolve().parent.parent
+SHARED = Path(os.environ.get("PTM_SHARED", ROOT.parent / "shared"))
+OUTPUT = ROOT / "build/bench"
+MODELS = (
+    ROOT / "build/museum/museum.obj",
+    *(SHARED / f"scenes/{n}/{n}.obj" for n in ("hospital", "willowgarage", "gallery", "office")),
+)
+PARTS = ("accuracy", "grid", "tolerance", "agreement", "speed")
+REFERENCE = 8192
+#: Student's t for seven degrees of freedom, two-sided 95 %.
+T = 2.365
+#: Cells whose speed is measured.
+LARGEST = 6
+#: Cells that a software OpenGL is tried on, for settings of many sample points.
+FEW = 3
+Subject = tuple[Scene, Cells, Pvs]
 
 
-def cost(surfaces: Surfaces, around: Surroundings, cells: Cells, clearance: float, n: int) -> None:
-    """Prints the first table."""
-    eyes = []
-    for cell in spread(cells.cell_count, n):
-        eyes += choose_eyes(cells, around, cell, AchOptions(samples=1), clearance)[0]
-    print(f"{'face':>6} {'gl ms':>8} {'embree ms':>10} {'differ':>9}   renderer")
-    for face in FACES:
-        rays = EmbreeRenderer(surfaces, face)
-        gl: Renderer | None = None
-        try:
-            gl = OpenGLRenderer(create_context(), surfaces, face)
-        except MissingComponentError as missing:
-            print(missing)
-        covered, differ = 0, 0.0
-        took: dict[str, list[float]] = {"gl": [], "embree": []}
-        for eye in eyes:
-            found = {}
-            for renderer in filter(None, (gl, rays)):
+class Report:
+    """Markdown, printed as it comes."""
 
-                def look(renderer: Renderer = renderer, eye: Any = eye) -> NDArray[np.int64]:
-                    return sample_coverage(renderer, surfaces, eye.point, eye.near)
+    def __init__(self) -> None:
+        self.lines: list[str] = []
 
-                found[renderer.backend], ms = timed(look)
-                took[renderer.backend].append(ms)
-            covered += int(found["embree"].sum())
-            differ += float(np.abs(found.get("gl", found["embree"]) - found["embree"]).sum()) / 2
-        fast = f"{np.median(took['gl']):8.1f}" if gl else f"{'-':>8}"
-        share = f"{differ / max(covered, 1):9.1e}" if gl else f"{'-':>9}"
-        name = gl.name if gl else "-"
-        print(f"{face:6d} {fast} {np.median(took['embree']):10.1f} {share}   {name}")
-        if gl:
-            gl.close()
+    def say(self, line: str) -> None:
+        print(line, flush=True)
+        self.lines.append(line)
+
+    def head(self, title: str, columns: Sequence[str]) -> None:
+        self.say(f"\n### {title}\n")
+        self.say("| " + " | ".join(columns) + " |")
+        self.say("|---" * len(columns) + "|")
+
+    def row(self, values: Iterable[Any]) -> None:
+        self.say("| " + " | ".join(map(str, values)) + " |")
+
+
+def cpu(work: Callable[[], Any]) -> tuple[Any, float]:
+    """What ``work`` returns, and processor seconds."""
+    start = time.process_time()
+    found = work()
+    return found, time.process_time() - start
+
+
+def has_gl() -> str:
+    """The name of the OpenGL renderer; empty without one."""
+    try:
+        context = create_context()
+    except MissingComponentError as missing:
+        print(missing)
+        return ""
+    name = str(context.info["GL_RENDERER"])
+    context.release()
+    return name
 
 
 def accuracy(
-    surfaces: Surfaces,
-    around: Surroundings,
-    cells: Cells,
-    clearance: float,
-    most: int,
-    reference: int,
+    report: Report, trials: dict[str, CoverageTrade], subjects: dict[str, Subject]
 ) -> None:
-    """Prints the second table."""
-    rays = EmbreeRenderer(surfaces, 32)
-    random = np.random.default_rng(0)
+    columns = ("model", "preset", "backend", "mean", "p95", "max", "missed", "rays a cell", "CPU s",
+               "error / paper", "time / paper")  # fmt: skip
+    report.head("Presets", columns)
+    right = []
+    for name, trade in trials.items():
+        base: tuple[float, float] | None = None
+        for preset in PRESETS:
+            seconds = {}
+            options = AchOptions(preset=preset)
+            backends = ("embree", "gl") if has_gl() else ("embree",)
+            for backend in backends:
+                few = backend == "gl" and options.points > PRESETS["paper"][0]
+                every = trade.tried
+                trade.tried = every[:FEW] if few else every
+                found, seconds[backend], _ = trade.hints(replace(options, backend=backend))
+                errors = trade.errors(found)
+                trade.tried = every
+                surfaces = Surfaces.of(subjects[name][0], subjects[name][1])
+                chosen = open_renderer(surfaces, *subjects[name][1:], options)
+                auto = chosen.backend
+                chosen.close()
+                mean = float(errors.mean())
+                if preset == "paper" and backend == auto:
+                    base = mean, seconds[backend]
+                ratios = ("–", "–")
+                if base and backend == auto:
+                    ratios = (f"{mean / max(base[0], 1e-12):.3f}" if base[0] else "0 / 0",
+                              f"{seconds[backend] / base[1]:.4f}")  # fmt: skip
+                missed = np.mean([hints.missed for hints in found])
+                rays = np.mean([hints.row.pixels.sum() for hints in found])
+                report.row((
+                    name, preset, backend + (" (auto)" if backend == auto else ""), f"{mean:.4f}",
+                    f"{np.percentile(errors, 95):.4f}", f"{errors.max():.4f}", f"{missed:.1e}",
+                    f"{rays:,.0f}", f"{seconds[backend]:.2f}", *ratios,
+                ))  # fmt: skip
+            if len(seconds) == 2:
+                right.append(seconds[auto] <= 1.1 * min(seconds.values()))
+    if right:
+        report.say(f"\n`auto` took the faster backend, or one at most a tenth slower, in "
+                   f"{sum(right)} of {len(right)} cases.")  # fmt: skip
+    for name, trade in trials.items():
+        report.say(f"The reference of {name} has a standard error of {trade.reference_error:.5f}.")
 
-    def usable(point: NDArray[np.float64]) -> bool:
-        return around.clearance(point, clearance) >= clearance and not around.in_matter(point)
 
-    def hints(points: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-        covered = sum(
-            (sample_coverage(rays, surfaces, p, clearance) for p in points),
-            np.zeros(surfaces.cell_count + 1, dtype=np.int64),
-        )
-        return np.asarray(covered / max(covered.sum(), 1))
+def grid(report: Report, trials: dict[str, CoverageTrade]) -> list[Trade]:
+    report.head("Rates: error ∝ rays^b", ("model", "family", "b"))
+    found = []
+    for name, trade in trials.items():
+        done = run(trade)
+        found.append(replace(done, stage=name))
+        for family, rate in done.rates.items():
+            report.row((name, family, f"{rate:.2f}"))
+    OUTPUT.mkdir(parents=True, exist_ok=True)
+    (OUTPUT / "ach.csv").write_text(as_csv(found))
+    (OUTPUT / "ach.png").write_bytes(picture(found))
+    return found
 
-    def independent(cell: int, count: int) -> list[NDArray[np.float64]]:
-        points = cloud(tetrahedra(cells, cell), 64 * count, int(random.integers(2**16)))
-        picked = (points[i] for i in random.permutation(len(points)))
-        return [p for p, _ in zip(filter(usable, picked), range(count), strict=False)]
 
-    def of_each_part(cell: int, count: int, first: bool) -> list[NDArray[np.float64]]:
-        chosen = []
-        for part in candidates(cells, cell, count, 0):
-            order = range(len(part)) if first else random.permutation(len(part))
-            chosen += [part[i] for i in order if usable(part[i])][:1]
-        return chosen
+def tolerance(report: Report, trials: dict[str, CoverageTrade]) -> None:
+    columns = ("model", "tolerance", "cells", "within", "mean error", "max", "points: median",
+               "most", "not reached", "bars hold", "CPU s")  # fmt: skip
+    report.head("Tolerance", columns)
+    for name, trade in trials.items():
+        for wanted in (0.02, 0.01):
+            found, seconds, _ = trade.hints(AchOptions(backend="embree", tolerance=wanted, face=4))
+            errors = trade.errors(found)
+            points = [hints.samples for hints in found]
+            short = sum(not hints.row.uncertain <= wanted for hints in found)
+            bars = bar_coverage(trade, found)
+            report.row((
+                name, wanted, len(found), f"{np.mean(errors <= wanted):.1%}",
+                f"{errors.mean():.4f}", f"{errors.max():.4f}", int(np.median(points)), max(points),
+                short,
+                "–" if bars is None else f"{bars[0]:.1%} of {bars[1]}", f"{seconds:.2f}",
+            ))  # fmt: skip
 
-    choices: dict[str, Callable[[int, int], list[NDArray[np.float64]]]] = {
-        "random points": independent,
-        "a random point of each part": lambda c, k: of_each_part(c, k, False),
-        "the middle of each part": lambda c, k: of_each_part(c, k, True),
-    }
-    errors: dict[tuple[str, int], list[float]] = {}
-    for cell in spread(cells.cell_count, most):
-        truth = hints(independent(cell, reference))
-        for name, choose in choices.items():
-            for count in (8, 64):
-                away = np.abs(hints(choose(cell, count)) - truth).sum() / 2
-                errors.setdefault((name, count), []).append(float(away))
-    print(f"{'sample points':>32} {'mean error':>11} {'95 %':>7}")
-    for (name, count), found in errors.items():
-        print(f"{count:4d} {name:>27} {np.mean(found):11.4f} {np.percentile(found, 95):7.4f}")
+
+def bar_coverage(trade: CoverageTrade, found: Sequence[Any]) -> tuple[float, int] | None:
+    """How often the reference is within t · error of entries above 0.05, and of how many."""
+    held: list[NDArray[np.bool_]] = []
+    for hints, truth in zip(found, trade.truth, strict=True):
+        row = hints.row
+        large = (truth > 0.05) & (truth < 1) & np.isfinite(row.error)
+        held.append(np.abs(row.value - truth)[large] <= T * row.error[large] + 1e-12)
+    every = np.concatenate(held)
+    return (float(every.mean()), len(every)) if len(every) else None
+
+
+def agreement(report: Report, subjects: dict[str, Subject], cells_tried: int) -> None:
+    if not has_gl():
+        return
+    report.head("GL against Embree", ("model", "face", "points", "pixels", "differ"))
+    for name, (scene, cells, pvs) in subjects.items():
+        for face, points in ((8, 16), (64, 4)):
+            trade = CoverageTrade(scene, cells, pvs, AchOptions(), cells_tried, 8)
+            options = AchOptions(samples=points, face=face)
+            one, other = (trade.hints(replace(options, backend=b))[0] for b in ("gl", "embree"))
+            pairs = list(zip(one, other, strict=True))
+            differ = sum(float(np.abs(a.row.pixels - b.row.pixels).sum()) / 2 for a, b in pairs)
+            size = sum(float(b.row.pixels.sum()) for _, b in pairs)
+            report.row((name, face, points, f"{size:,.0f}", f"{differ / max(size, 1):.1e}"))
+
+
+class Stopwatch:
+    """Counts the wall seconds within calls of functions."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+
+    def timed(self, work: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*given: Any, **named: Any) -> Any:
+            start = time.perf_counter()
+            try:
+                return work(*given, **named)
+            finally:
+                self.seconds += time.perf_counter() - start
+
+        return call
+
+
+class TimedTree:
+    """An Embree scene whose rays are timed."""
+
+    def __init__(self, tree: Any, watch: Stopwatch) -> None:
+        self.run = watch.timed(tree.run)
+
+
+def watched(renderer: Any) -> Stopwatch:
+    """What a renderer spends in Embree, or in draws and reading their pixels."""
+    watch = Stopwatch()
+    if isinstance(renderer, OpenGLRenderer):
+        renderer._draw = watch.timed(renderer._draw)  # type: ignore[method-assign]
+    else:
+        for tree in (renderer._opaque, renderer._transparent):
+            if not tree.empty:
+                tree._tree = TimedTree(tree._tree, watch)
+    return watch
+
+
+def speed(report: Report, subjects: dict[str, Subject]) -> None:
+    columns = ("model", "backend", "face", "points", "points / s", "Mrays / s", "whole / bare")
+    report.head(
+        "Speed, one process: wall seconds of the whole over those of the bare loop", columns
+    )
+    for name, (scene, cells, pvs) in subjects.items():
+        surfaces = Surfaces.of(scene, cells)
+        volumes = np.bincount(cells.leaf_cell, cells.leaf_volumes())
+        largest = np.argsort(-volumes, kind="stable")[:LARGEST].tolist()
+        for face, count in ((4, 512), (8, 256), (64, 8), (256, 2)):
+            for backend in ("embree", "gl") if has_gl() else ("embree",):
+                points = min(count, 32) if backend == "gl" else count
+                options = AchOptions(backend=backend, samples=points, face=face)
+                renderer = open_renderer(surfaces, cells, pvs, options)
+                sampler = stage.Sampler(scene, cells, pvs, options, surfaces, renderer)
+                sampler.of_cell(largest[0])
+                watch = watched(renderer)
+                start = time.perf_counter()
+                used = sum(sampler.of_cell(cell).samples for cell in largest)
+                whole = time.perf_counter() - start
+                renderer.close()
+                rays = used * len(VIEWS) * face**2
+                report.row((
+                    name, backend, face, points, f"{used / whole:,.0f}",
+                    f"{rays / whole / 1e6:.2f}", f"{whole / watch.seconds:.2f}",
+                ))  # fmt: skip
+    two_processes(report, {n: s for n, s in subjects.items() if n in ("museum", "hospital")})
+
+
+def two_processes(report: Report, subjects: dict[str, Subject]) -> None:
+    title = "Two processes against one (--preset high --backend embree, wall seconds)"
+    report.head(title, ("model", "one", "two", "times"))
+    for name, subject in subjects.items():
+        took = []
+        for workers in (1, 2):
+            options = AchOptions(preset="high", backend="embree", workers=workers)
+            start = time.perf_counter()
+            compute_ach(*subject, options)
+            took.append(time.perf_counter() - start)
+        report.row((name, *(f"{t:.1f}" for t in took), f"{took[0] / took[1]:.2f}"))
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("source", nargs="*", type=Path, default=[SAMPLE])
-    parser.add_argument("--points", type=int, default=24, help="sample points that are timed")
-    parser.add_argument("--cells", type=int, default=12, help="cells of the second table")
-    parser.add_argument("--reference", type=int, default=512, help="points of the reference")
-    options = parser.parse_args()
-    for path in options.source:
-        scene, cells = load(path)
-        surfaces, around = Surfaces.of(scene, cells), Surroundings.of(scene, cells)
-        clearance = Tolerance.for_points(scene.points).thin
-        pieces = len(cells.triangle)
-        print(f"{path.name}: {cells.cell_count} cells, {pieces} triangles after the cut")
-        cost(surfaces, around, cells, clearance, options.points)
-        accuracy(surfaces, around, cells, clearance, options.cells, options.reference)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("models", nargs="*", type=Path, default=[m for m in MODELS if m.exists()])
+    parser.add_argument("--cells", type=int, default=16, help="cells that stand for all")
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS)
+    given = parser.parse_args()
+    report = Report()
+    report.say(f"OpenGL: {has_gl() or 'none'}")
+    subjects: dict[str, Subject] = {}
+    trials: dict[str, CoverageTrade] = {}
+    report.head("Models", ("model", "cells", "tried", "triangles", "of a PVS"))
+    for model in given.models:
+        scene = ingest(model)
+        cells = subdivide(scene)
+        pvs = compute_pvs(cells)
+        subjects[model.stem] = scene, cells, pvs
+        few = set(given.only) <= {"agreement", "speed"}
+        trade = CoverageTrade(scene, cells, pvs, AchOptions(), given.cells, 8 if few else REFERENCE)
+        trials[model.stem] = trade
+        mean = triangles_of_a_pvs(cells, pvs)
+        sizes = cells.cell_count, len(trade.tried), f"{len(cells.triangle):,}", f"{mean:,.0f}"
+        report.row((model.stem, *sizes))
+    parts: dict[str, Callable[[], Any]] = {
+        "accuracy": lambda: accuracy(report, trials, subjects),
+        "grid": lambda: grid(report, trials),
+        "tolerance": lambda: tolerance(report, trials),
+        "agreement": lambda: agreement(report, subjects, given.cells),
+        "speed": lambda: speed(report, subjects),
+    }
+    for part in PARTS:
+        if part in given.only:
+            parts[part]()
+    OUTPUT.mkdir(parents=True, exist_ok=True)
+    (OUTPUT / "ach.md").write_text("\n".join(report.lines) + "\n")
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

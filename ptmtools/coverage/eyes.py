@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.coverage.matter import Surroundings
-from ptmtools.coverage.placement import TRIES, Volume
+from ptmtools.coverage.placement import FILLED, TRIES, Volume
 
 #: Points of a sequence that are looked at together, at least.
 BATCH = 64
@@ -121,12 +121,13 @@ class Sequence:
 
     def take(self, count: int) -> Eyes:
         """The next ``count`` usable points; fewer if more than `TRIES` in the cell are refused
-        for each."""
+        for each, or its box holds hardly any of the cell, against what its volume says."""
         places = self._places
         while not places.volume.empty and int(self._good.sum()) < count:
-            if self._refused > TRIES * count:
+            if self._refused > TRIES * count or self._next > TRIES * count / FILLED:
                 break
-            size = max(BATCH, self._next)
+            # Every cell asks for the same stretches, which are computed once.
+            size = max(BATCH, self._next // 8) if self._next else _power_of_two(max(count, BATCH))
             drawn = self._draw(self._next, size, self._seed)
             good = places.usable(drawn[:, :3]) if len(drawn) else np.zeros(0, np.bool_)
             self._next += size
@@ -139,3 +140,7 @@ class Sequence:
         places.rejected += end - len(last)
         self._waiting, self._good = self._waiting[end:], self._good[end:]
         return places.at(taken[:, :3], taken[:, 3:])
+
+
+def _power_of_two(least: int) -> int:
+    return 1 << (least - 1).bit_length()

@@ -57,16 +57,23 @@ class Body:
 
     def contains(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """(n,) whether each of the (n, 3) points is inside: odd crossings along most rays."""
+        first, second = self._odd(0, points), self._odd(1, points)
+        unsure = np.flatnonzero(first != second)
+        if len(unsure):
+            first[unsure] = self._odd(2, points[unsure])
+        return first
+
+    def _odd(self, ray: int, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(n,) whether one of the rays from each of the (n, 3) points crosses an odd number."""
         from ptmtools.coverage.clearance.kernels import crossings
 
-        odd = np.zeros(len(points), dtype=np.int64)
-        for frame, corners in zip(FRAMES, self._turned, strict=True):
-            turned = np.einsum("ij,kj->ik", points, frame)
-            order = np.argsort(turned[:, 0], kind="stable")
-            crossed = np.zeros(len(points), dtype=np.int64)
-            crossings(turned[order], corners, crossed)
-            odd[order] += crossed % 2
-        return np.asarray(2 * odd > len(FRAMES))
+        turned = np.einsum("ij,kj->ik", points, FRAMES[ray])
+        order = np.argsort(turned[:, 0], kind="stable")
+        crossed = np.zeros(len(points), dtype=np.int64)
+        crossings(turned[order], self._turned[ray], crossed)
+        odd = np.empty(len(points), dtype=np.bool_)
+        odd[order] = crossed % 2 > 0
+        return odd
 
     @cached_property
     def _turned(self) -> list[NDArray[np.float64]]:

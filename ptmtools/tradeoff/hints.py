@@ -51,7 +51,8 @@ class CoverageTrade:
         cells_tried: int = 24,
         reference_points: int = 4096,
     ) -> None:
-        """``options``: what settings leave open, such as the backend and the weighting."""
+        """``options``: what settings leave open, such as the backend and the weighting. `tried` are
+        the cells that stand for all, evenly spread; `truth` their hints by the reference."""
         self._scene, self._cells, self._pvs, self._options = scene, cells, pvs, options
         self._surfaces = Surfaces.of(scene, cells)
         every = cells.cell_count
@@ -66,7 +67,7 @@ class CoverageTrade:
             tolerance=None,
         )
         found, _, _ = self.hints(reference)
-        self._truth = [hints.row.value for hints in found]
+        self.truth = [hints.row.value for hints in found]
         # A bound of its error; its standard error is about half of that.
         self.reference_error = float(np.mean([hints.row.uncertain for hints in found])) / 2
 
@@ -102,7 +103,7 @@ class CoverageTrade:
 
     def errors(self, found: Sequence[CellHints]) -> NDArray[np.float64]:
         """(n,) total variation between hints of the cells tried and the reference."""
-        pairs = zip(found, self._truth, strict=True)
+        pairs = zip(found, self.truth, strict=False)
         return np.array([np.abs(hints.row.value - truth).sum() / 2 for hints, truth in pairs])
 
     def hints(self, options: AchOptions) -> tuple[list[CellHints], float, str]:
