@@ -4,6 +4,7 @@
 # make bench   the benchmarks, on the data at hand
 # make bench-codec   only those of the texture codec, beside other formats (about an hour)
 # make bench-pvs     cells and visibility, what is traded for what (a quarter of an hour)
+# make bench-ach     coverage hints: what accuracy costs (half an hour)
 # make sample  only the sample museum
 # make setup   only the virtual environment
 # make clean   remove what was built, except the virtual environment
@@ -22,7 +23,7 @@ JOBS ?= 2
 PYTEST_ARGS ?=
 export PTM_SHARED ?= $(abspath ../shared)
 
-.PHONY: help setup demo test lint bench bench-codec bench-pvs sample clean
+.PHONY: help setup demo test lint bench bench-codec bench-pvs bench-ach sample clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -87,6 +88,9 @@ bench-codec: $(VENV)/.installed-dev
 bench-pvs: build/museum/.made $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/pvs_trade.py
 
+bench-ach: build/museum/.made $(VENV)/.installed-dev
+	$(BIN)/python benchmarks/ach.py
+
 bench: $(VENV)/.installed-dev
 	@mkdir -p build/bench
 	$(BIN)/python benchmarks/codec/sizes.py --only-png --profiles raw,fast
@@ -95,7 +99,7 @@ bench: $(VENV)/.installed-dev
 	  $(BIN)/python benchmarks/prt.py "$$map" -o "build/bench/$$(basename "$$map" .prt).npz" \
 	    --reference "$${map%.prt}.visible.npz"; { set +x; } 2>/dev/null; done
 	@[ ! -d build/museum.db ] || { set -x; $(BIN)/python benchmarks/false_negatives.py build/museum.db; }
-	$(BIN)/python benchmarks/ach.py
+	$(BIN)/python benchmarks/ach.py sample_data/two_rooms/two_rooms.obj --only accuracy speed
 
 clean:
 	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -8,7 +8,7 @@ import click
 
 from ptmtools.cli.common import as_json, database, forced, voiced
 from ptmtools.cli.output import Voice
-from ptmtools.files import write_bytes
+from ptmtools.files import refuse_existing, write_bytes
 from ptmtools.pipeline import Artifacts, DatabaseFolder
 from ptmtools.tradeoff.experiment import run
 from ptmtools.tradeoff.report import as_csv, table
@@ -66,6 +66,9 @@ def tradeoff(
 
     A star marks the settings that no cheaper one beats. Nothing in DB is changed.
     """
+    for file in (csv_file, plot_file):
+        if file and not force:
+            refuse_existing(file)
     ready = experiments(Artifacts(DatabaseFolder.open(db)), cells_tried, reference)
     trades = []
     with voice.progress() as progress:
