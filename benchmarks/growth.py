@@ -7,7 +7,7 @@ scene         reading the model
 leaves        the subdivision into convex leaves with their portals
 rooms         grouping the leaves into cells
 pvs           the portal flow
-ach           coverage hints, Embree, ``--face`` pixels a side
+ach           coverage hints, Embree, the default preset
 emit          the served files but for textures, which know nothing of cells
 
 Every stage of every museum runs in a process of its own, after the two rooms of the sample data,
@@ -64,7 +64,6 @@ class Work:
     model: Path
     wall_area: float
     max_cells: int
-    face: int
 
     def run(self, stage: str) -> dict[str, float]:
         """Runs a stage, leaves its result and returns its figures."""
@@ -103,7 +102,7 @@ class Work:
             return lambda: compute_pvs(cells)
         pvs = Pvs.from_arrays(self._arrays("pvs"))
         if stage == "ach":
-            asked = AchOptions(face=self.face, backend="embree")
+            asked = AchOptions(backend="embree")
             return lambda: compute_ach(scene, cells, pvs, asked)
         ach = Ach.from_arrays(self._arrays("ach"))
         textures = tuple(
@@ -174,18 +173,16 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--rooms", default=",".join(map(str, ROOMS)), metavar="N,N,…")
     parser.add_argument("--wall-area", type=float, default=SubdivideOptions().wall_area)
     parser.add_argument("--max-cells", type=int, default=SubdivideOptions().max_cells)
-    parser.add_argument("--face", type=int, default=32, help="pixels a side of a view")
     parser.add_argument("--csv", type=Path, metavar="FILE", help="the figures as a table")
     parser.add_argument("--folder", type=Path, help="where museums are made, left and found again")
     parser.add_argument("--stage", choices=STAGES, help=argparse.SUPPRESS)
     given = parser.parse_args(arguments)
     if given.stage:
         model = given.folder / "model/museum.obj"
-        work = Work(given.folder, model, given.wall_area, given.max_cells, given.face)
+        work = Work(given.folder, model, given.wall_area, given.max_cells)
         one_stage(given.stage, work)
         return 0
     options = [f"--wall-area={given.wall_area}", f"--max-cells={given.max_cells}"]
-    options.append(f"--face={given.face}")
     with tempfile.TemporaryDirectory() as scratch:
         folder = given.folder or Path(scratch)
         print(f"| rooms | triangles | leaves | cells | portals | | {' | '.join(STAGES)} |")

@@ -32,12 +32,15 @@ from walk import cell_texts, load, passed, standard_walk, texels_at_hand
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.cells.grouping import grouped
-from ptmtools.coverage.ach import CLEARANCE, compute_ach
+from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.embree import EmbreeRenderer
-from ptmtools.coverage.item_buffer import Surfaces, sample_coverage
+from ptmtools.coverage.eyes import Eyes
+from ptmtools.coverage.item_buffer import Surfaces
+from ptmtools.coverage.looking import Looker, Owners
 from ptmtools.coverage.matter import Surroundings
 from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
+from ptmtools.coverage.sampling import CLEARANCE
 from ptmtools.scene import Scene, ingest
 from ptmtools.tolerance import Tolerance
 from ptmtools.visibility import Pvs, compute_pvs
@@ -56,21 +59,28 @@ PLACES, FACE = 300, 64
 
 
 def views(scene: Scene, leaves: Cells, seed: int) -> list[tuple[int, NDArray[np.int64]]]:
-    """For random places, uniform over the volume and clear of matter, the leaf and (L + 1,) the
-    pixels that each leaf covers, seen from there."""
+    """For random places, uniform over the volume and clear of matter, the leaf and (L,) the pixels
+    that each leaf covers, seen from there."""
     around, surfaces = Surroundings.of(scene, leaves), Surfaces.of(scene, leaves)
     clearance = CLEARANCE * Tolerance.for_points(scene.points).thin
-    renderer = EmbreeRenderer(surfaces, FACE)
     random = np.random.default_rng(seed)
     low, high = leaves.root_box
-    found: list[tuple[int, NDArray[np.int64]]] = []
-    while len(found) < PLACES:
-        place = random.uniform(low, high)
-        leaf = int(leaves.locate_leaf(place[None])[0])
-        if leaf < 0 or around.clearance(place, clearance) < clearance or around.in_matter(place):
-            continue
-        found.append((leaf, sample_coverage(renderer, surfaces, place, clearance)))
-    return found
+    points = np.zeros((0, 3))
+    while len(points) < PLACES:
+        tried = random.uniform(low, high, (PLACES, 3))
+        tried = tried[leaves.locate_leaf(tried) >= 0]
+        clear = around.clearance(tried, clearance) >= clearance
+        points = np.concatenate([points, tried[clear & ~around.in_matter(tried)]])
+    points = points[:PLACES]
+    eyes = Eyes(points, np.full(PLACES, clearance), np.zeros((PLACES, 2)))
+    looker = Looker(EmbreeRenderer(surfaces, FACE), surfaces, leaves, FACE, by_angle=False)
+    owners = Owners.of(surfaces, by_image=False)
+    every = np.arange(leaves.cell_count)
+    of_leaf = leaves.locate_leaf(points).tolist()
+    return [
+        (leaf, looker.look(eyes.part(slice(i, i + 1)), owners, every).counts.sum(axis=(0, 1)))
+        for i, leaf in enumerate(of_leaf)
+    ]
 
 
 def hint_error(
@@ -82,7 +92,7 @@ def hint_error(
     room_of_cell[cells.leaf_cell] = rooms.leaf_cell
     errors = []
     for leaf, pixels in seen:
-        view = np.bincount(rooms.leaf_cell, pixels[:-1], count)
+        view = np.bincount(rooms.leaf_cell, pixels, count)
         if view.sum() == 0:
             continue
         cell = int(cells.leaf_cell[leaf])
@@ -117,7 +127,7 @@ def main() -> None:
             start = time.process_time()
             cells = grouped(leaves, options, tolerance)
             pvs = compute_pvs(cells)
-            ach = compute_ach(scene, cells, pvs, AchOptions(face=32, backend="embree"))
+            ach = compute_ach(scene, cells, pvs, AchOptions(backend="embree"))
             seconds = time.process_time() - start
             hints = [ach.row(c) for c in range(cells.cell_count)]
             texts = cell_texts(scene, cells, pvs, hints)
