@@ -49,11 +49,6 @@ VIEWS = np.array(
 BEFORE = 1.0 - DEPTH_SHARE
 
 
-def pixel_centres(face: int) -> NDArray[np.float64]:
-    """(face,) where the centres of a row of pixels lie in (-1, 1); exact for powers of two."""
-    return (2.0 * np.arange(face) + 1.0) / face - 1.0
-
-
 @dataclass(frozen=True)
 class Surfaces:
     """The geometry cut to the cells, as the backends take it.

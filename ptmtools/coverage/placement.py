@@ -84,9 +84,9 @@ class Tetrahedra:
     def of_cell(self, cell: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Those of a cell, and their volumes."""
         leaves = self.leaves[self.cell_start[cell] : self.cell_start[cell + 1]]
-        rows = np.concatenate(
-            [np.arange(self.leaf_start[leaf], self.leaf_start[leaf + 1]) for leaf in leaves]
-        )
+        first, size = self.leaf_start[leaves], np.diff(self.leaf_start)[leaves]
+        before = np.cumsum(size) - size
+        rows = np.repeat(first - before, size) + np.arange(int(size.sum()))
         return self.corners[rows], self.volume[rows]
 
 

@@ -11,10 +11,15 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ptmtools.coverage.embree import EmbreeRenderer
-from ptmtools.coverage.item_buffer import VIEWS, Surfaces, pixel_centres
+from ptmtools.coverage.item_buffer import VIEWS, Surfaces
 from ptmtools.coverage.looking import Looker, Owners
 
 FACE = 64
+
+
+def pixel_centres(face):
+    """Where the centres of a row of pixels lie in (-1, 1)."""
+    return (2.0 * np.arange(face) + 1.0) / face - 1.0
 
 
 def centres_within(low: Fraction, high: Fraction, face: int) -> int:
