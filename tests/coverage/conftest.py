@@ -37,6 +37,12 @@ def backend(request, has_gl, require) -> str:
     return request.param
 
 
+@pytest.fixture(scope="session")
+def pixel_centres() -> Callable[[int], np.ndarray]:
+    """``pixel_centres(face)``: where the centres of a row of pixels lie in (-1, 1)."""
+    return lambda face: (2.0 * np.arange(face) + 1.0) / face - 1.0
+
+
 @contextmanager
 def renderer_of(backend: str, surfaces: Surfaces, face: int) -> Iterator[Renderer]:
     renderer: Renderer

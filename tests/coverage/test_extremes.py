@@ -12,7 +12,7 @@ from ptmtools.cells.model import Cells
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.embree import EmbreeRenderer
 from ptmtools.coverage.eyes import Places
-from ptmtools.coverage.item_buffer import VIEWS, Surfaces, pixel_centres
+from ptmtools.coverage.item_buffer import VIEWS, Surfaces
 from ptmtools.coverage.looking import Looker, Owners
 from ptmtools.coverage.matter import Surroundings
 from ptmtools.coverage.options import AchOptions
@@ -158,7 +158,7 @@ def test_mirrored_views_are_mirrored(room_row):
 
 @pytest.mark.parametrize(("half", "sideways"), [(30, 40.0), (250, 0.0)])
 def test_a_picture_a_tenth_of_a_millimetre_off_a_wall_is_seen_from_50_m(
-    room_row, furnish, coverage_at, backend, half, sideways
+    room_row, furnish, coverage_at, backend, half, sideways, pixel_centres
 ):
     """In a building 60 or 500 m wide. Counted against the same rays in float64."""
     scene, cells = room_row(2)
@@ -361,7 +361,7 @@ def test_five_thousand_cells(room_row, furnish, drawing, backend):
 
 
 @pytest.mark.parametrize("by_image", [False, True])
-def test_seventy_thousand_cells(room_row, furnish, eyes, backend, drawing, by_image):
+def test_seventy_thousand_cells(room_row, furnish, eyes, backend, drawing, by_image, pixel_centres):
     """A floor of as many tiles, each a cell of its own: more than 16 bits can tell. What each
     pixel shows is worked out in float64."""
     side = 265

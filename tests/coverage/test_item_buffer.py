@@ -17,11 +17,6 @@ from ptmtools.coverage.looking import Looker, Owners
 FACE = 64
 
 
-def pixel_centres(face):
-    """Where the centres of a row of pixels lie in (-1, 1)."""
-    return (2.0 * np.arange(face) + 1.0) / face - 1.0
-
-
 def centres_within(low: Fraction, high: Fraction, face: int) -> int:
     """How many of a row of pixel centres lie strictly between two points of [-1, 1]."""
     at = [Fraction(2 * i + 1, face) - 1 for i in range(face)]
@@ -81,7 +76,7 @@ def test_the_partition_counts_for_the_viewers_side(room_row, coverage_at, backen
 @pytest.mark.parametrize("distance", [5.0, 20.0])
 @pytest.mark.parametrize("sideways", [0.0, 17.0])
 def test_a_picture_1_mm_off_the_wall_wins(
-    room_row, furnish, coverage_at, backend, distance, sideways
+    room_row, furnish, coverage_at, backend, distance, sideways, pixel_centres
 ):
     """The wall is 60 m long; the picture stands for cell 1. Counted against the same rays in
     float64; seen sideways from 5 m the wall runs past the eye at a grazing angle."""
@@ -135,7 +130,7 @@ def test_of_panes_the_nearest_counts_once_and_never_behind_a_wall(
     assert coverage_at(backend, *more, eye).tolist() == one.tolist()
 
 
-def test_a_pane_lying_in_the_wall_counts(room_row, furnish, coverage_at, backend):
+def test_a_pane_lying_in_the_wall_counts(room_row, furnish, coverage_at, backend, pixel_centres):
     """Rounding must not decide whether it is before or behind."""
     scene, cells = room_row(1)
     eye = [1.1, 1.7, 0.3]
