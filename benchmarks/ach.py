@@ -8,7 +8,7 @@ the sum of absolute differences) between a cell's hints and those of 8,192 other
 
 accuracy    the presets with both backends and with ``auto``: error, missed mass, rays, CPU seconds,
             and both as a share of the paper's preset with ``auto``. Is ``auto`` the faster one?
-            OpenGL in software is tried on three cells beyond the paper's preset, on none with `high`
+            OpenGL in software is tried on three cells beyond the paper's preset, and not on `high`
 grid        `CoverageTrade`'s grid of settings, into `ach.csv` and `ach.png`
 tolerance   achieved errors under ``--tolerance``, and how often the truth lies within
             the error bars
