@@ -281,12 +281,12 @@ def speed(report: Report, subjects: dict[str, Subject]) -> None:
 
 
 def two_processes(report: Report, subjects: dict[str, Subject]) -> None:
-    title = "Two processes against one (--preset high --backend embree, wall seconds)"
+    title = "Two processes against one (--samples 16384 --backend embree, wall seconds)"
     report.head(title, ("model", "one", "two", "times"))
     for name, subject in subjects.items():
         took = []
         for workers in (1, 2):
-            options = AchOptions(preset="high", backend="embree", workers=workers)
+            options = AchOptions(samples=16384, backend="embree", workers=workers)
             start = time.perf_counter()
             compute_ach(*subject, options)
             took.append(time.perf_counter() - start)

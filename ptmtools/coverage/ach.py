@@ -33,8 +33,8 @@ from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
 
-#: Rays that a process of its own is worth: it takes a second or two to start.
-WORTH_A_PROCESS = 2e7
+#: Rays that a process of its own is worth: it takes a second or two to start, as 5 million rays do.
+WORTH_A_PROCESS = 1e7
 
 
 def compute_ach(
