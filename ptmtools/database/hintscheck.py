@@ -118,7 +118,7 @@ def check_hints(hints: ReadHints, file: str, found: Findings) -> None:
         if cell["missed"] > MISSED:
             share = f"{cell['missed']:.3g} of the pixels"
             found.add("PTM-D703", file, place, f"{share} fell on cells outside the PVS")
-        if wrong := _misfit(cell["coverage"], ach):
+        if wrong := _misfit(cell["coverage"], ach, len(hints.textures)):
             found.add("PTM-D707", file, place, wrong)
         to = [portal["neighbour"] for portal in cell["portals"]]
         if sorted(set(to)) != sorted(cell["adjacent"]):
@@ -157,8 +157,9 @@ def check_against_cells(
             found.add("PTM-D701", file, f"cell {i}", f"{field} differs from {name}")
 
 
-def _misfit(coverage: Mapping[str, Any], ach: NDArray[np.float64]) -> str:
-    """What is wrong with the statistics of a row of (n,) shares; empty if nothing is."""
+def _misfit(coverage: Mapping[str, Any], ach: NDArray[np.float64], known: int) -> str:
+    """What is wrong with the statistics of a row of (n,) shares, in a document of ``known``
+    textures; empty if nothing is."""
     views = coverage["views"]
     columns = {name: coverage[name] for name in ("error", "p95", "seen")}
     if len(views) != 6:
@@ -175,11 +176,28 @@ def _misfit(coverage: Mapping[str, Any], ach: NDArray[np.float64]) -> str:
     # But for a cell that sees nothing, which has 1 for itself.
     if any(seen == 0 < share < 1 for seen, share in zip(coverage["seen"], ach, strict=True)):
         return "what is seen from nowhere has a share"
-    if "textures" in coverage:
-        sums = [sum(share for _, share in entry) for entry in coverage["textures"]]
-        if len(sums) != len(ach) or np.abs(np.array(sums) - ach).max(initial=0) > ROUNDED:
+    return _misfit_textures(coverage["textures"], ach, known) if "textures" in coverage else ""
+
+
+def _misfit_textures(rows: Any, ach: NDArray[np.float64], known: int) -> str:
+    """What is wrong with the shares of textures, of which the document has ``known``."""
+    if not isinstance(rows, list) or len(rows) != len(ach):
+        return "textures is not aligned with ach"
+    for row, share in zip(rows, ach, strict=True):
+        if not isinstance(row, list) or not all(_is_share(entry, known) for entry in row):
+            return "textures has other entries than pairs of a texture and a share from 0 to 1"
+        if abs(sum(part for _, part in row) - share) > ROUNDED:
             return "the shares of textures do not sum to those of their cells"
     return ""
+
+
+def _is_share(entry: Any, known: int) -> bool:
+    """Whether it is ``[texture, share]``, the texture null or one of ``known``."""
+    if not isinstance(entry, list) or len(entry) != 2:
+        return False
+    texture, share = entry
+    listed = texture is None or (type(texture) is int and 0 <= texture < known)
+    return listed and type(share) in _NUMBER and 0 <= share <= 1
 
 
 def _no_constant(name: str) -> float:

@@ -68,6 +68,21 @@ def hinted(change: Callable[[dict], object]) -> Damage:
     return damage
 
 
+def textured(shares: object) -> Damage:
+    """Puts something in the place of the shares of textures of a cell that sees three."""
+    return hinted(lambda d: d["cells"][2]["coverage"].update(textures=shares))
+
+
+def painted(texture: object) -> Damage:
+    """Says that this texture alone is what a cell sees."""
+
+    def change(document: dict) -> None:
+        cell = document["cells"][2]
+        cell["coverage"]["textures"] = [[[texture, share]] for share in cell["ach"]]
+
+    return hinted(change)
+
+
 def repainted(db: Path) -> None:
     Image.fromarray(np.zeros((16, 24, 3), np.uint8)).save(db / "www/textures/a.png")
 
@@ -143,7 +158,25 @@ FAULTS: list[tuple[str, Damage]] = [
     ("PTM-D707", hinted(lambda d: d["cells"][1]["coverage"]["p95"].__setitem__(0, None))),
     ("PTM-D707", hinted(lambda d: d["cells"][2]["coverage"]["views"].pop())),
     ("PTM-D707", hinted(lambda d: d["cells"][2]["coverage"]["views"][3].__setitem__(0, 0.5))),
-    ("PTM-D707", hinted(lambda d: d["cells"][2]["coverage"].update(textures=[[[0, 0.5]]] * 3))),
+    *(
+        ("PTM-D707", textured(shares))
+        for shares in (
+            [[[0, 0.5]]] * 3,
+            5,
+            None,
+            {},
+            [[1], [2], [3]],
+            [5, 6, 7],
+            [[["a", "b"]], [], []],
+            [[["0", 1]], [], []],
+            [[[0, None]], [], []],
+            [[[0, 1.5], [1, -0.5]], [], []],
+            [[[True, 0.5]], [], []],
+            [[[0, 0.5, 0.5]], [], []],
+            [[[0, 0.5]], []],
+        )
+    ),
+    *(("PTM-D707", painted(texture)) for texture in (2, -1, 0.0, True, "0", [])),
     ("PTM-D700", hinted(lambda d: d["cells"][2]["coverage"].pop("floor"))),
     ("PTM-D706", hinted(lambda d: d["viewpoints"][0].__setitem__("cell", 2))),
     ("PTM-D710", flipped),
@@ -164,6 +197,15 @@ def test_each_planted_fault_is_found(
     assert code in found, [str(i) for i in report.issues]
     assert found[code].severity == CODES[code][0]
     assert report.ok == (code == "PTM-D703")
+
+
+@pytest.mark.parametrize("texture", [None, 0, 1])
+def test_shares_of_known_textures_are_no_fault(
+    database: Path, seal: Damage, texture: int | None
+) -> None:
+    painted(texture)(database)
+    seal(database)
+    assert codes(database) == set()
 
 
 def test_what_the_manifest_says(database: Path) -> None:
