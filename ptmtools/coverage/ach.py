@@ -110,7 +110,7 @@ def _gathered(
         rejected=np.array([hints.rejected for hints in found], dtype=np.int32),
         uncertain=np.array([row.uncertain for row in rows], dtype=np.float64),
         unseen_below=np.minimum(1.0, RULE_OF_THREE / np.maximum(samples, 1)),
-        floor=0.5 / np.maximum(total, 1.0),
+        floor=np.divide(0.5, total, out=np.zeros_like(total), where=total > 0),
         texture_start=np.cumsum(np.append(0, size)) if textures else np.zeros(0, np.int64),
         texture=owners.image[owner],
         texture_value=every,

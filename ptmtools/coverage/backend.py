@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-
 import numpy as np
 
 from ptmtools.cells.model import Cells
@@ -46,14 +44,17 @@ def open_renderer(surfaces: Surfaces, cells: Cells, pvs: Pvs, options: AchOption
     "auto" is OpenGL wherever there is hardware for it; on a software OpenGL whichever of the two
     `rasterising_pays` expects to be faster; Embree where there is no OpenGL.
 
-    Raises `MissingComponentError` PTM-M500 if "gl" is asked for and there is no OpenGL.
+    Raises `MissingComponentError` PTM-M500 if "gl" or a device is asked for and there is no OpenGL.
     """
     context = None
     if options.backend == "gl":
         context = create_context(options.gpu)
     elif options.backend == "auto":
-        with contextlib.suppress(MissingComponentError):
+        try:
             context = create_context(options.gpu)
+        except MissingComponentError:
+            if options.gpu is not None:  # who names a device wants that one
+                raise
     if context is None:
         return EmbreeRenderer(surfaces, options.side)
     software = is_software(context.info["GL_RENDERER"])

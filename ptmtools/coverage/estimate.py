@@ -65,11 +65,15 @@ def shares(counts: NDArray[np.int64]) -> NDArray[np.float64]:
     return np.asarray(found)
 
 
-def estimate(counts: NDArray[np.int64], group: NDArray[np.int64], unit: int) -> Row:
-    """The hints from (K, 6, n) weighted pixels at K points, each of the (K,) ``group``; a pixel in
-    the middle of a view weighs ``unit``."""
-    total = counts.sum(axis=(0, 1))
-    at_points = counts.sum(axis=1)
+def estimate(
+    at_points: NDArray[np.int64],
+    in_views: NDArray[np.int64],
+    group: NDArray[np.int64],
+    unit: int,
+) -> Row:
+    """The hints from (K, n) weighted pixels at K points, each of the (K,) ``group``, and (6, n) of
+    the same in each view; a pixel in the middle of a view weighs ``unit``."""
+    total = in_views.sum(axis=0)
     value = shares(total)
     error, uncertain = spread(at_points, group)
     return Row(
@@ -77,8 +81,8 @@ def estimate(counts: NDArray[np.int64], group: NDArray[np.int64], unit: int) -> 
         pixels=total / unit,
         error=np.where(total > 0, error, np.nan),
         p95=ninety_fifth(at_points),
-        seen=np.count_nonzero(at_points, axis=0) / max(len(counts), 1),
-        views=shares(counts.sum(axis=0)).T,
+        seen=np.count_nonzero(at_points, axis=0) / max(len(at_points), 1),
+        views=shares(in_views).T,
         uncertain=uncertain,
     )
 
@@ -114,6 +118,10 @@ def ninety_fifth(counts: NDArray[np.int64]) -> NDArray[np.float64]:
     return np.asarray(np.partition(at_points, rank, axis=0)[rank])
 
 
-def grouped(count: int) -> NDArray[np.int64]:
-    """(count,) the group of each of a sequence of points: eight stretches of equal length."""
-    return np.arange(count) * min(GROUPS, count) // max(count, 1)
+def grouped(count: int, in_stretches: bool = True) -> NDArray[np.int64]:
+    """(count,) the group of each of a sequence of points: eight stretches of equal length; or,
+    where neighbours follow one another, every eighth point."""
+    groups = min(GROUPS, count)
+    if in_stretches:
+        return np.arange(count) * groups // max(count, 1)
+    return np.arange(count) % max(groups, 1)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ptmtools.coverage.matter import Surroundings
 from ptmtools.coverage.placement import FILLED, TRIES, Volume
+from ptmtools.coverage.sobol import sobol
 
 #: Points of a sequence that are looked at together, at least.
 BATCH = 64
@@ -83,13 +84,15 @@ class Places:
         """One point of each of ``count`` equal parts of the cell; a part without a usable one,
         such as one filled by a statue, gives none."""
         chosen = []
+        shift = sobol(0, count, seed)[:, 4:]
         parts = [] if self.volume.empty else self.volume.parts(count, seed)
-        for part in parts:
+        for number, part in enumerate(parts):
             first = self.usable(part[:1])
             good = np.flatnonzero(first if first[0] else self.usable(part))
             self.rejected += int(good[0]) if len(good) else len(part)
-            chosen += [part[i] for i in good[:1]]
-        return self.at(np.array(chosen).reshape(-1, 3), np.full((len(chosen), 2), 0.5))
+            chosen += [np.append(part[i], shift[number]) for i in good[:1]]
+        found = np.array(chosen).reshape(-1, 5)
+        return self.at(found[:, :3], found[:, 3:])
 
     def at(self, points: NDArray[np.float64], unit: NDArray[np.float64]) -> Eyes:
         """Eyes at usable points, shifted by two coordinates in (0, 1) each."""
@@ -102,7 +105,7 @@ class Places:
             return Eyes.none()
         _, free, point = self._best
         # On the surface itself, where nothing can be right, the near plane still has to be.
-        near = max(free, self.clearance / 1024)
+        near = free or self.clearance * np.finfo(np.float32).eps
         return Eyes(point[None], np.array([near]), np.zeros((1, 2)))
 
 
@@ -117,17 +120,19 @@ class Sequence:
         self._next = 0
         self._waiting = np.zeros((0, 5))
         self._good = np.zeros(0, dtype=np.bool_)
-        self._refused = 0
+        self._refused = self._asked = 0
 
     def take(self, count: int) -> Eyes:
         """The next ``count`` usable points; fewer if more than `TRIES` in the cell are refused
         for each, or its box holds hardly any of the cell, against what its volume says."""
         places = self._places
+        self._asked += count
         while not places.volume.empty and int(self._good.sum()) < count:
-            if self._refused > TRIES * count or self._next > TRIES * count / FILLED:
+            most = TRIES * self._asked
+            if self._refused > most or self._next > most / FILLED:
                 break
             # Every cell asks for the same stretches, which are computed once.
-            size = max(BATCH, self._next // 8) if self._next else _power_of_two(max(count, BATCH))
+            size = max(BATCH, self._next // 4) if self._next else _power_of_two(max(count, BATCH))
             drawn = self._draw(self._next, size, self._seed)
             good = places.usable(drawn[:, :3]) if len(drawn) else np.zeros(0, np.bool_)
             self._next += size

@@ -40,12 +40,14 @@ class Owners:
         and every cell has that owner.
     first: (C + 1,) where the owners of each cell begin.
     of_side: (M, 2) int32 the owner of each triangle's front and back, -1 for none.
+    images: more than any image of the scene, plus 1.
     """
 
     cell: NDArray[np.int32]
     image: NDArray[np.int32]
     first: NDArray[np.int64]
     of_side: NDArray[np.int32]
+    images: int
 
     @staticmethod
     def of(surfaces: Surfaces, by_image: bool) -> Owners:
@@ -61,6 +63,7 @@ class Owners:
             image=(every % images - 1).astype(np.int32),
             first=np.searchsorted(cell, np.arange(surfaces.cell_count + 1)),
             of_side=np.where(surfaces.cell < 0, -1, np.searchsorted(every, key)).astype(np.int32),
+            images=images,
         )
 
     def in_cells(self, cells: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -73,11 +76,36 @@ class Owners:
 
 @dataclass(frozen=True)
 class Seen:
-    """What is seen from K points: (K, 6, m) int64 ``counts`` of weighted pixels of the owners asked
-    for, and (K,) int64 of those that belong to none of them."""
+    """Weighted pixels seen from K points.
 
-    counts: NDArray[np.int64]
+    Attributes
+    ----------
+    at_points: (K, m) int64 of each of the owners asked for, at each point.
+    in_views: (6, m) int64 of the same in each view, over all points.
+    missed: (K,) int64 of what belongs to none of them.
+    """
+
+    at_points: NDArray[np.int64]
+    in_views: NDArray[np.int64]
     missed: NDArray[np.int64]
+
+    @staticmethod
+    def join(parts: list[Seen]) -> Seen:
+        """From the points of several, one after the other."""
+        return Seen(
+            np.concatenate([part.at_points for part in parts]),
+            np.sum([part.in_views for part in parts], axis=0),
+            np.concatenate([part.missed for part in parts]),
+        )
+
+    def grouped(self, begin: NDArray[np.int64]) -> Seen:
+        """The owners from each of the (n,) ``begin`` to the next as one."""
+        if len(begin) == self.at_points.shape[1]:
+            return self
+        at_points, in_views = (
+            np.add.reduceat(counts, begin, axis=1) for counts in (self.at_points, self.in_views)
+        )
+        return Seen(at_points, in_views, self.missed)
 
 
 class Looker:
@@ -100,13 +128,17 @@ class Looker:
         column[wanted] = np.arange(len(wanted))
         needed = np.zeros(self._surfaces.cell_count, dtype=np.bool_)
         needed[owners.cell[wanted]] = True
-        counts = np.zeros((len(eyes), len(VIEWS), len(wanted)), dtype=np.int64)
-        missed = np.zeros(len(eyes), dtype=np.int64)
+        seen = Seen(
+            np.zeros((len(eyes), len(wanted)), dtype=np.int64),
+            np.zeros((len(VIEWS), len(wanted)), dtype=np.int64),
+            np.zeros(len(eyes), dtype=np.int64),
+        )
         most = self._renderer.most
         for first in range(0, len(eyes), most):
             rows = slice(first, first + most)
-            self._add(eyes.part(rows), owners, column, needed, counts[rows], missed[rows])
-        return Seen(counts, missed)
+            part = Seen(seen.at_points[rows], seen.in_views, seen.missed[rows])
+            self._add(eyes.part(rows), owners, column, needed, part)
+        return seen
 
     def _add(
         self,
@@ -114,8 +146,7 @@ class Looker:
         owners: Owners,
         column: NDArray[np.int32],
         needed: NDArray[np.bool_],
-        counts: NDArray[np.int64],
-        missed: NDArray[np.int64],
+        seen: Seen,
     ) -> None:
         from ptmtools.coverage.tally.kernels import tally
 
@@ -125,21 +156,19 @@ class Looker:
         size = self._face**2
         doubt = np.empty(layers[0].size, dtype=np.int64)
         for layer, shows in enumerate(layers):
-            found = tally(
-                shows, place, self._surfaces.plane, owners.of_side, column, weight, counts, doubt
-            )
+            given = self._surfaces.plane, owners.of_side, column, weight
+            found = tally(shows, place, *given, seen.at_points, seen.in_views, doubt)
             if not found:
                 continue
             pixel = doubt[:found].copy()
             at, view = pixel // (len(VIEWS) * size), pixel // size % len(VIEWS)
             owner, hit = self._again(eyes, pixel, layer, owners, column)
             weighs = weight[np.minimum(at, len(weight) - 1), pixel % size]
-            expected = owner >= 0
-            np.add.at(
-                counts, (at[expected], view[expected], column[owner[expected]]), weighs[expected]
-            )
-            lost = hit & ~expected
-            np.add.at(missed, at[lost], weighs[lost])
+            expected, lost = owner >= 0, hit & (owner < 0)
+            entry = column[owner[expected]]
+            np.add.at(seen.at_points, (at[expected], entry), weighs[expected])
+            np.add.at(seen.in_views, (view[expected], entry), weighs[expected])
+            np.add.at(seen.missed, at[lost], weighs[lost])
 
     def _again(
         self,
@@ -165,9 +194,7 @@ class Looker:
             length = np.linalg.norm(back, axis=1, keepdims=True)
             step = np.minimum(self._towards / np.maximum(length, self._towards), 0.5)
             cell = self._cells.locate(place[lost] + step * back)
-            image = np.where(
-                owners.image.max(initial=-1) < 0, -1, self._surfaces.image[shows[lost]]
-            )
+            image = np.where(owners.images > 1, self._surfaces.image[shows[lost]], -1)
             nearer = owners_at(owners, cell, image)
             owner[lost] = np.where(column[nearer] >= 0, nearer, -1)
         return owner, hit
@@ -187,9 +214,8 @@ def owners_at(
 ) -> NDArray[np.int64]:
     """(n,) the owner of each of the (n,) images in each of the (n,) cells; what has no image where
     the cell has nothing with that one; -1 where the cell is -1."""
-    images = int(owners.image.max(initial=-1)) + 2
-    every = owners.cell.astype(np.int64) * images + owners.image + 1
-    key = cell.astype(np.int64) * images + image + 1
+    every = owners.cell.astype(np.int64) * owners.images + owners.image + 1
+    key = cell.astype(np.int64) * owners.images + image + 1
     found = np.minimum(np.searchsorted(every, key), len(every) - 1)
     bare = owners.first[cell]
     return np.where(cell < 0, -1, np.where(every[found] == key, found, bare)).astype(np.int64)

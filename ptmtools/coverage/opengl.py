@@ -1,11 +1,11 @@
 """The item buffer by rasterisation: OpenGL through EGL, no window, hardware or Mesa.
 
 Every fragment writes its triangle's number into R32UI pixels. The views of many sample points lie
-side by side in one large target, so that small views, which are all vertices and no pixels, still
-fill a graphics processor: for each of the six directions one instanced draw, an instance for every
-point, kept within its own tile by clip distances. Measured and rejected: occlusion queries
-(slower), layered cube rendering (slower, or wrong in moderngl), a histogram in a compute shader
-(bit for bit the same, and needs OpenGL 4.3).
+side by side in one large target, which is cleared and read once; each is a draw with a viewport of
+its own. Measured and rejected: one instanced draw for all points, tiles told apart in the shader
+(in a 2 mm cell beside walls of 10 m adding a tile's place to a position costs whole pixels);
+occlusion queries (slower), layered cube rendering (slower, or wrong in moderngl), a histogram in a
+compute shader (bit for bit the same, and needs OpenGL 4.3).
 
 - The eye is subtracted in float64's precision: positions and eyes travel as two floats each.
 - Depth is linear, w / far. A perspective depth of 24 bits with a small near plane loses pictures
@@ -17,6 +17,7 @@ point, kept within its own tile by clip distances. Measured and rejected: occlus
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -30,10 +31,8 @@ from ptmtools.errors import MissingComponentError
 APT = "apt install libegl1 libgl1 libgl1-mesa-dri"
 #: Renderers that run on the processor.
 SOFTWARE = re.compile(r"llvmpipe|softpipe|swrast|swiftshader|software", re.IGNORECASE)
-#: The widest target, pixels a side; every OpenGL 3.3 has it. Software needs no large one.
+#: The widest target, pixels a side, but for larger views. Software needs no large one.
 WIDEST = {True: 2048, False: 4096}
-#: GL_CLIP_DISTANCE0, for which moderngl has no name.
-CLIP_DISTANCE = 0x3000
 #: Rays that look for cells outside the PVS, whose surfaces then have to be drawn too: a side of
 #: a view, and points.
 PROBE_FACE, PROBE_POINTS = 8, 16
@@ -42,40 +41,27 @@ VERTEX = """
 #version 330
 in vec3 high;
 in vec3 low;
-in vec3 eye_high;
-in vec3 eye_low;
-in vec2 shift;
-in vec2 depths;  // near, 1 / far
+uniform vec3 eye_high;
+uniform vec3 eye_low;
+uniform vec2 shift;
 uniform mat3 view;  // rows right, up, forward
-uniform int direction;  // its number
-uniform int tiles;  // along a side of the target
+uniform float near;
 out float w;
-flat out float depth_scale;
-out float gl_ClipDistance[4];
 void main() {
     vec3 p = view * ((high - eye_high) + (low - eye_low));
     w = p.z;
-    depth_scale = depths.y;
-    vec2 at = p.xy - shift * p.z;
-    gl_ClipDistance[0] = p.z + at.x;
-    gl_ClipDistance[1] = p.z - at.x;
-    gl_ClipDistance[2] = p.z + at.y;
-    gl_ClipDistance[3] = p.z - at.y;
-    int number = 6 * gl_InstanceID + direction;
-    vec2 middle = vec2(2 * ivec2(number % tiles, number / tiles) + 1 - tiles) / tiles;
-    gl_Position = vec4(at / tiles + middle * p.z, p.z - 2.0 * depths.x, p.z);
+    gl_Position = vec4(p.xy - shift * p.z, p.z - 2.0 * near, p.z);
 }
 """
 
 FRAGMENT = """
 #version 330
 in float w;
-flat in float depth_scale;
-uniform float before;
+uniform float depth_scale;
 uniform int base;
 out uint triangle;
 void main() {
-    gl_FragDepth = w * depth_scale * before;
+    gl_FragDepth = w * depth_scale;
     triangle = uint(gl_PrimitiveID + base);
 }
 """
@@ -98,7 +84,8 @@ class OpenGLRenderer:
         self._rays: EmbreeRenderer | None = None
         self._probe: EmbreeRenderer | None = None
         self._culling = _Culling(surfaces)
-        widest = max(WIDEST[is_software(self.name)], 3 * face)
+        most = int(context.info["GL_MAX_TEXTURE_SIZE"])
+        widest = max(min(WIDEST[is_software(self.name)], most), 3 * face)
         self._tiles = widest // face  # along a side of the target
         self._side = self._tiles * face
         self.most = self._tiles**2 // len(VIEWS)
@@ -114,8 +101,6 @@ class OpenGLRenderer:
         self._items = [context.texture(size, 1, dtype="u4") for _ in range(self._layers)]
         self._targets = [context.framebuffer([items], depth) for items in self._items]
         context.enable_only(moderngl.DEPTH_TEST)
-        for plane in range(4):
-            context.enable_direct(CLIP_DISTANCE + plane)
         context.depth_func = "<"
 
     def show(self, eyes: Eyes, needed: NDArray[np.bool_] | None = None) -> NDArray[np.int32]:
@@ -127,21 +112,13 @@ class OpenGLRenderer:
         lists = self._culling.lists(place, self._face, self._drawn(eyes, needed))
         order = np.concatenate([part for view in lists for part in view])
         index = self._context.buffer(self._surfaces.triangle[order].tobytes() or bytes(12))
-        points = self._context.buffer(self._instances(eyes, place).tobytes())
-        drawing = self._context.vertex_array(
-            self._program,
-            [
-                (self._vertices, "3f 3f", "high", "low"),
-                (points, "3f 3f 2f 2f /i", "eye_high", "eye_low", "shift", "depths"),
-            ],
-            index_buffer=index,
-        )
+        content = [(self._vertices, "3f 3f", "high", "low")]
+        drawing = self._context.vertex_array(self._program, content, index_buffer=index)
         try:
-            self._program["tiles"].value = self._tiles
-            drawn = [self._draw(drawing, lists, layer, len(eyes)) for layer in range(self._layers)]
+            drawn = [self._draw(drawing, lists, layer, eyes) for layer in range(self._layers)]
         finally:
-            for thing in (drawing, index, points):
-                thing.release()
+            drawing.release()
+            index.release()
         return np.append(-1, order).astype(np.int32)[np.stack(drawn)].reshape(shape)
 
     def trace(
@@ -151,18 +128,6 @@ class OpenGLRenderer:
         if self._rays is None:
             self._rays = EmbreeRenderer(self._surfaces, self._face)
         return self._rays.trace(eyes, pixels)
-
-    def _instances(self, eyes: Eyes, place: NDArray[np.float64]) -> NDArray[np.float32]:
-        """(K, 10) what the shader is told of each sample point."""
-        rows = np.empty((len(eyes), 10), dtype=np.float32)
-        rows[:, 0:3] = high = place.astype(np.float32)
-        rows[:, 3:6] = place - high
-        rows[:, 6:8] = eyes.shift / self._face
-        # A surface at distance r from the eye has a depth of at least r / √3 wherever it is seen.
-        rows[:, 8] = eyes.near * self._surfaces.scale / 2
-        # Twice the farthest depth: what is farthest still passes the test against 1.
-        rows[:, 9] = 0.5 / np.abs(self._box[:, None] - place).max(axis=(0, 2))
-        return rows
 
     def _drawn(self, eyes: Eyes, needed: NDArray[np.bool_] | None) -> NDArray[np.bool_] | None:
         """The cells whose surfaces are to be drawn: those ``needed``, and those outside that a few
@@ -178,33 +143,64 @@ class OpenGLRenderer:
         return drawn
 
     def _draw(
-        self, drawing: Any, lists: list[list[NDArray[np.int64]]], layer: int, count: int
+        self, drawing: Any, lists: list[list[NDArray[np.int64]]], layer: int, eyes: Eyes
     ) -> NDArray[np.int64]:
-        """One layer of all views, before the depth that is there: (count, 6, face²) triangles in
-        the order of the upload, from 1; 0 for none."""
-        target = self._targets[layer]
-        rows = -(-len(VIEWS) * count // self._tiles)
-        size = (self._side, rows * self._face)
-        target.viewport = target.scissor = (0, 0, self._side, self._side)
+        """One layer of all views, before the depth that is there: (K, 6, face²) triangles in the
+        order of the upload, from 1; 0 for none."""
+        target, face, tiles = self._targets[layer], self._face, self._tiles
+        rows = -(-len(VIEWS) * len(eyes) // tiles)
+        size = (self._side, rows * face)
         if layer == 0:
             target.clear(depth=1.0, viewport=size)
         # OpenGL leaves undefined what clearing does to a target of integers.
         self._items[layer].write(bytes(4 * size[0] * size[1]), viewport=(0, 0, *size))
         target.use()
-        self._program["before"].value = 1.0 if layer == 0 else BEFORE
-        first = 0
-        for direction, (view, parts) in enumerate(zip(VIEWS, lists, strict=True)):
-            before, drawn = first + sum(map(len, parts[:layer])), len(parts[layer])
-            if drawn:
-                self._program["direction"].value = direction
-                self._program["view"].value = tuple(view.T.reshape(-1))
-                self._program["base"].value = before + 1
-                drawing.render(vertices=3 * drawn, first=3 * before, instances=count)
-            first += sum(map(len, parts))
+        parts = self._parts(lists, layer)
+        for k, told in enumerate(self._told(eyes, layer)):
+            for name, value in told.items():
+                self._program[name].value = value
+            for direction, (view, first, count) in enumerate(parts):
+                if count:
+                    tile = len(VIEWS) * k + direction
+                    target.viewport = (tile % tiles * face, tile // tiles * face, face, face)
+                    self._program["view"].value = view
+                    self._program["base"].value = first + 1
+                    drawing.render(vertices=3 * count, first=3 * first)
+        target.viewport = (0, 0, *size)
         found = np.frombuffer(target.read(size, components=1, dtype="u4"), dtype=np.uint32)
-        tiles = found.reshape(rows, self._face, self._tiles, self._face).transpose(0, 2, 1, 3)
-        each = tiles.reshape(rows * self._tiles, self._face**2)[: len(VIEWS) * count]
-        return np.asarray(each.reshape(count, len(VIEWS), -1), dtype=np.int64)
+        split = found.reshape(rows, face, tiles, face)
+        each = split.transpose(0, 2, 1, 3).reshape(rows * tiles, face**2)
+        return np.asarray(each[: len(VIEWS) * len(eyes)], dtype=np.int64)
+
+    @staticmethod
+    def _parts(
+        lists: list[list[NDArray[np.int64]]], layer: int
+    ) -> list[tuple[tuple[float, ...], int, int]]:
+        """For each view its axes, and the first and the number of its triangles of a layer."""
+        found, first = [], 0
+        for view, parts in zip(VIEWS, lists, strict=True):
+            before = first + sum(map(len, parts[:layer]))
+            found.append((tuple(view.T.reshape(-1).tolist()), before, len(parts[layer])))
+            first += sum(map(len, parts))
+        return found
+
+    def _told(self, eyes: Eyes, layer: int) -> Iterator[dict[str, Any]]:
+        """What the shaders are told of each sample point."""
+        place = self._surfaces.normalised(eyes.point)
+        high = place.astype(np.float32)
+        low = (place - high).astype(np.float32)
+        # A surface at distance r from the eye has a depth of at least r / √3 wherever it is seen.
+        near = eyes.near * self._surfaces.scale / 2
+        # Twice the farthest depth: what is farthest still passes the test against 1.
+        far = 2 * np.abs(self._box[:, None] - place).max(axis=(0, 2))
+        for k in range(len(eyes)):
+            yield {
+                "eye_high": tuple(high[k].tolist()),
+                "eye_low": tuple(low[k].tolist()),
+                "shift": tuple((eyes.shift[k] / self._face).tolist()),
+                "near": float(near[k]),
+                "depth_scale": (1.0 if layer == 0 else BEFORE) / float(far[k]),
+            }
 
     def close(self) -> None:
         """Gives the context back."""

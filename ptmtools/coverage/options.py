@@ -12,8 +12,7 @@ Placement = Literal["sobol", "kd", "uniform"]
 Weighting = Literal["pixel", "solid-angle"]
 Backend = Literal["auto", "gl", "embree"]
 
-#: The widest view in pixels a side: six of them side by side are within what OpenGL 4 guarantees
-#: for a render target (16384).
+#: The widest view in pixels a side: a point's six fit into a target of 6144 by 4096.
 MAX_FACE = 2048
 #: Sample points a cell: the counts of all of them are held at once.
 MAX_SAMPLES = 2**14

@@ -15,6 +15,9 @@ Position matters far more than resolution (docs/coverage.md), so there is a choi
 ``uniform``
     Independent random points, as in the paper: K^-0.5.
 
+All come with a shift of their views' pixels by less than half a pixel, spread as evenly: with the
+same few pixel centres at every point no number of points would be enough.
+
 A cell is a union of disjoint convex leaves. Points depend on nothing but its shape and the seed:
 not on other cells, the unit, the number of workers or the version of a library.
 """
@@ -127,9 +130,10 @@ class Volume:
             self.boxed = share >= FILLED
 
     def random(self, first: int, count: int, seed: int) -> NDArray[np.float64]:
-        """(count, 5) independent points ``first`` …: positions, and ½ ½."""
+        """(count, 5) independent points ``first`` …: positions in metres, and two more coordinates
+        in (0, 1)."""
         unit = uniform(first, count, seed)
-        return np.hstack([filling(self._tetra, self._volume, unit), np.full((count, 2), 0.5)])
+        return np.hstack([filling(self._tetra, self._volume, unit), unit[:, 4:]])
 
     def sobol(self, first: int, count: int, seed: int) -> NDArray[np.float64]:
         """(at most count, 5) points ``first`` … of a scrambled sequence, those in the cell: their

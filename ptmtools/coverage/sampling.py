@@ -82,16 +82,17 @@ class Sampler:
         if self._options.tolerance is None:
             eyes = self._eyes(places)
             eyes = eyes if len(eyes) else places.least_bad()
-            seen, group = look(eyes), grouped(len(eyes))
+            spread_out = self._options.placed != "kd"
+            seen, group = look(eyes), grouped(len(eyes), spread_out)
         else:
             seen, group = self._until_certain(places, look, begin, self._options.tolerance)
-        by_cell = np.add.reduceat(seen.counts, begin, axis=2)
-        owned = shares(seen.counts.sum(axis=(0, 1)))
+        owned = shares(seen.in_views.sum(axis=0))
         met = np.flatnonzero(owned)
         entry = np.searchsorted(begin, met, "right") - 1
-        total = int(seen.counts.sum()) + int(seen.missed.sum())
+        total = int(seen.in_views.sum()) + int(seen.missed.sum())
+        by_cell = seen.grouped(begin)
         return CellHints(
-            row=estimate(by_cell, group, self._looker.unit),
+            row=estimate(by_cell.at_points, by_cell.in_views, group, self._looker.unit),
             missed=int(seen.missed.sum()) / max(total, 1),
             samples=len(group),
             rejected=places.rejected,
@@ -112,7 +113,7 @@ class Sampler:
         """What is seen, and the (K,) group of each point: of eight independent sequences as many
         points as make the hints certain, doubled until they are."""
         options = self._options
-        seeds = ((options.seed + 1 << 32) + g for g in range(GROUPS))
+        seeds = ((options.seed << 3) + g + (1 << 35) for g in range(GROUPS))
         sequences = [Sequence(places, options.placed, seed) for seed in seeds]
         found: list[Seen] = []
         group = np.zeros(0, dtype=np.int64)
@@ -124,14 +125,10 @@ class Sampler:
             if not len(added) and not found:
                 every, added = places.least_bad(), np.zeros(1, dtype=np.int64)
                 return look(every), added[: len(every)]
-            found.append(look(every))
+            found = [Seen.join([*found, look(every)])]
             group = np.concatenate([group, added])
-            seen = Seen(
-                np.concatenate([f.counts for f in found]),
-                np.concatenate([f.missed for f in found]),
-            )
-            by_cell = np.add.reduceat(seen.counts.sum(axis=1), begin, axis=1)
+            by_cell = found[0].grouped(begin).at_points
             bound = spread(by_cell, group)[1]
             more = min(len(group) // GROUPS, (options.points - len(group)) // GROUPS)
             if bound <= tolerance or more < 1 or not len(added):
-                return seen, group
+                return found[0], group

@@ -48,7 +48,7 @@ def _directions() -> NDArray[np.uint32]:
 _DIRECTIONS = _directions()
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def sobol(first: int, count: int, seed: int) -> NDArray[np.float64]:
     """(count, DIMENSIONS) points ``first`` … of the sequence scrambled by ``seed``, in (0, 1); not
     to be written to, since every cell asks for the same ones.

@@ -77,7 +77,7 @@ def counted(renderer: Renderer, surfaces: Surfaces, cells: Cells, at: Eyes, face
     owners = Owners.of(surfaces, by_image=False)
     looker = Looker(renderer, surfaces, cells, face, by_angle=False)
     seen = looker.look(at, owners, np.arange(surfaces.cell_count))
-    return np.append(seen.counts.sum(axis=(0, 1)), seen.missed.sum())
+    return np.append(seen.in_views.sum(axis=0), seen.missed.sum())
 
 
 @pytest.fixture(scope="session")

@@ -282,6 +282,21 @@ def test_auto_without_opengl_casts_rays(room_row, no_gl):
     assert_same(ach, asked)
 
 
+def test_who_names_a_device_wants_that_one(room_row, no_gl):
+    scene, cells = room_row(1)
+    with pytest.raises(MissingComponentError, match="on device 3"):
+        compute_ach(scene, cells, all_visible(1), AchOptions(gpu=3))
+
+
+def test_any_seed_will_do_with_a_tolerance(room_row):
+    scene, cells = room_row(2)
+    options = AchOptions(tolerance=0.2, backend="embree", seed=2**32 - 1, samples=64)
+    found = compute_ach(scene, cells, all_visible(2), options)
+    other = compute_ach(scene, cells, all_visible(2), replace(options, seed=2**32 - 2))
+    assert (found.samples == 64).all()
+    assert not np.array_equal(found.pixels, other.pixels)
+
+
 def test_auto_goes_by_the_size_of_the_task(room_row, has_gl, require):
     assert rasterising_pays(1000, 64)
     assert not rasterising_pays(100_000, 64)

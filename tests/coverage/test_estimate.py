@@ -54,6 +54,11 @@ def test_ninety_five_percent_of_the_points_do_not_exceed_p95(rows):
         assert share == min(enough)
 
 
+def estimated(counts, group, unit):
+    """Of (K, 6, n) pixels at each point in each view."""
+    return estimate(counts.sum(axis=1), counts.sum(axis=0), group, unit)
+
+
 def test_the_ninety_fifth_of_twenty_is_the_last_but_one():
     counts = np.column_stack([np.arange(20), 100 - np.arange(20)])
     assert ninety_fifth(counts).tolist() == [0.18, 0.99]
@@ -70,9 +75,16 @@ def test_groups_are_stretches_of_equal_length(count):
         assert size.max() - size.min() <= 1
 
 
+def test_of_parts_in_order_every_eighth_is_a_group():
+    group = grouped(20, in_stretches=False)
+    assert group.tolist() == [*range(8), *range(8), *range(4)]
+    assert grouped(3, in_stretches=False).tolist() == [0, 1, 2]
+    assert grouped(0, in_stretches=False).tolist() == []
+
+
 def test_views_weighted_by_what_they_show_are_the_whole():
     counts = np.random.default_rng(0).integers(0, 50, (40, 6, 5)) * [9, 3, 1, 1, 0]
-    row = estimate(counts, grouped(40), 1)
+    row = estimated(counts, grouped(40), 1)
     assert row.views.shape == (5, 6)
     assert row.views.sum(axis=0) == pytest.approx(np.ones(6), abs=1e-15)
     weight = counts.sum(axis=(0, 2))
@@ -81,14 +93,14 @@ def test_views_weighted_by_what_they_show_are_the_whole():
 
 
 def test_an_empty_view_has_1_for_the_cell_itself():
-    row = estimate(in_all_views(np.array([[3, 1], [5, 1]])), grouped(2), 1)
+    row = estimated(in_all_views(np.array([[3, 1], [5, 1]])), grouped(2), 1)
     assert row.views[:, 0].tolist() == [0.8, 0.2]
     assert row.views[:, 1:].tolist() == [[1.0] * 5, [0.0] * 5]
 
 
 def test_points_that_see_nothing_count_as_points():
     at_points = np.array([[4, 4], [0, 0], [0, 0], [8, 0]])
-    row = estimate(in_all_views(at_points), grouped(4), 4)
+    row = estimated(in_all_views(at_points), grouped(4), 4)
     assert row.value.tolist() == [0.75, 0.25]
     assert row.pixels.tolist() == [3, 1]
     assert row.seen.tolist() == [0.5, 0.25]
@@ -96,14 +108,14 @@ def test_points_that_see_nothing_count_as_points():
 
 
 def test_nothing_seen_at_all():
-    row = estimate(np.zeros((9, 6, 3), dtype=np.int64), grouped(9), 1)
+    row = estimated(np.zeros((9, 6, 3), dtype=np.int64), grouped(9), 1)
     assert row.value.tolist() == [1, 0, 0]
     assert row.seen.tolist() == row.p95.tolist() == row.pixels.tolist() == [0, 0, 0]
     assert np.isnan(row.error).all()
 
 
 def test_no_points_at_all():
-    row = estimate(np.zeros((0, 6, 2), dtype=np.int64), grouped(0), 1)
+    row = estimated(np.zeros((0, 6, 2), dtype=np.int64), grouped(0), 1)
     assert row.value.tolist() == [1, 0]
     assert row.p95.tolist() == row.seen.tolist() == [0, 0]
     assert np.isnan(row.error).all()
@@ -111,7 +123,7 @@ def test_no_points_at_all():
 
 
 def test_one_point_says_nothing_of_its_error():
-    row = estimate(in_all_views(np.array([[7, 1]])), grouped(1), 1)
+    row = estimated(in_all_views(np.array([[7, 1]])), grouped(1), 1)
     assert row.value.tolist() == [0.875, 0.125]
     assert np.isnan(row.error).all()
     assert math.isnan(row.uncertain)
@@ -119,7 +131,7 @@ def test_one_point_says_nothing_of_its_error():
 
 def test_what_was_never_met_has_no_error_of_0():
     at_points = np.random.default_rng(1).integers(1, 9, (16, 3)) * [1, 1, 0]
-    row = estimate(in_all_views(at_points), grouped(16), 1)
+    row = estimated(in_all_views(at_points), grouped(16), 1)
     assert np.isnan(row.error).tolist() == [False, False, True]
     assert row.error[0] > 0
     assert row.value[2] == row.seen[2] == row.p95[2] == 0

@@ -410,14 +410,14 @@ def test_seventy_thousand_cells(room_row, furnish, eyes, backend, drawing, by_im
         looker = Looker(renderer, surfaces, cells, face, by_angle=False)
         wanted, begin = owners.in_cells(np.arange(side**2, dtype=np.int32))
         seen = looker.look(eyes(eye), owners, wanted)
-    found = np.add.reduceat(seen.counts, begin, axis=2)[0, v]
+    found = np.add.reduceat(seen.in_views, begin, axis=1)[v]
     # A pixel whose centre lies on a joint may show either tile.
     assert np.abs(found - expected).sum() / 2 <= 1e-3 * face**2
     assert found.sum() == face**2
     assert seen.missed[0] == 0
     if by_image:
         painted = owners.image[wanted] == owners.cell[wanted] % 3
-        assert seen.counts[..., ~painted].sum() == 0
+        assert seen.at_points[:, ~painted].sum() == 0
 
 
 def places(room_row, points, clearance):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from ptmtools.coverage.embree import EmbreeRenderer
 from ptmtools.coverage.item_buffer import VIEWS, Surfaces
-from ptmtools.coverage.looking import Looker, Owners
+from ptmtools.coverage.looking import Looker, Owners, owners_at
 
 FACE = 64
 
@@ -260,7 +260,7 @@ def test_an_unexpected_cell_is_believed_only_if_a_ray_confirms_it(room_row, eyes
     def look(renderer, wanted):
         looker = Looker(renderer, surfaces, cells, FACE, by_angle=False)
         seen = looker.look(eye, owners, np.array(wanted))
-        return [*seen.counts.sum(axis=(0, 1)).tolist(), int(seen.missed[0])]
+        return [*seen.in_views.sum(axis=0).tolist(), int(seen.missed[0])]
 
     truth = look(rays, [0, 1, 2])
     assert truth[2] > 0
@@ -282,8 +282,8 @@ def test_what_reaches_in_a_hair_is_seen_where_it_is(room_row, furnish, eyes):
     looker = Looker(rays, surfaces, cells, FACE, by_angle=False)
     seen = looker.look(eyes([6, 1.7, 0.3]), Owners.of(surfaces, by_image=False), np.array([0, 1]))
     every = looker.look(eyes([6, 1.7, 0.3]), Owners.of(surfaces, by_image=False), np.arange(3))
-    in_room_2 = int(every.counts[..., 2].sum())
-    recovered = int(seen.counts[..., 1].sum()) - int(every.counts[..., 1].sum())
+    in_room_2 = int(every.at_points[..., 2].sum())
+    recovered = int(seen.at_points[..., 1].sum()) - int(every.at_points[..., 1].sum())
     assert recovered > 20
     assert recovered + int(seen.missed[0]) == in_room_2
 
@@ -337,3 +337,36 @@ def test_culled_surfaces_would_not_show(room_row, eyes, drawing, has_gl, require
         assert np.array_equal(renderer.show(at, np.array([True, False, False])), every)
         hidden = renderer._culling.lists(surfaces.normalised(at.point), FACE, None)
     assert sum(len(o) for o, _ in hidden) < 6 * len(surfaces.triangle)
+
+
+def test_many_small_views_between_two_near_surfaces(room_row, eyes, drawing, has_gl, require):
+    """A slab of 12 m by 4 m and 2 mm: corners are far off, what shows is a hair away. OpenGL has to
+    see what rays see though hundreds of views lie side by side."""
+    if not has_gl:
+        require("OpenGL", "apt install libegl1 libgl1 libgl1-mesa-dri")
+    scene, cells = room_row(3)
+    flat = np.array([1.0, 5e-4, 1.0])
+    slab = replace(scene, points=scene.points * flat), replace(cells, vertex=cells.vertex * flat)
+    surfaces = Surfaces.of(*slab)
+    points = np.random.default_rng(3).uniform([0.1, 0.2, -1.9], [11.9, 3.8, 1.9], (60, 3)) * flat
+    at = eyes(points, near=5e-5, shift=(0.2, 0.1))
+    face = 8
+    with drawing("embree", surfaces, face) as rays, drawing("gl", surfaces, face) as gl:
+        assert gl.most >= len(points)
+        differ = rays.show(at) != gl.show(at)
+    assert differ.mean() < 2e-3
+
+
+def test_an_unknown_image_in_a_cell_counts_as_none_of_it(room_row):
+    """Of two cells with images 0 and 1; a triangle of no cell has image 5."""
+    scene, cells = room_row(2)
+    surfaces = Surfaces.of(scene, cells)
+    image = np.arange(len(surfaces.cell), dtype=np.int32) % 2
+    owner = surfaces.cell.copy()
+    owner[0], image[0] = -1, 5
+    owners = Owners.of(replace(surfaces, cell=owner, image=image), by_image=True)
+    found = owners_at(owners, np.array([0, 1, -1, 1]), np.array([5, 5, 0, 1]))
+    assert owners.cell[found[:2]].tolist() == [0, 1]
+    assert owners.image[found[:2]].tolist() == [-1, -1]
+    assert found[2] == -1
+    assert (owners.cell[found[3]], owners.image[found[3]]) == (1, 1)

@@ -216,3 +216,13 @@ def test_few_points_are_best_at_the_middles_of_equal_parts(room_row, exact_row):
             ]
         )
     assert mean["kd"] < mean["uniform"] / 2
+
+
+@pytest.mark.parametrize("placement", ["sobol", "uniform"])
+def test_views_of_a_few_pixels_have_no_grid(room_row, exact_row, placement):
+    """With the same 16 pixel centres at every point no number of points would be enough."""
+    options = replace(RAYS, samples=4096, face=4, placement=placement)
+    found = compute_ach(*room_row(ROOMS), all_visible(ROOMS), options)
+    away = variation(matrix(found, all_visible(ROOMS)), exact_row(ROOMS))
+    assert (away <= 1.5 * found.uncertain).all()
+    assert found.uncertain.max() < 0.02

@@ -59,7 +59,8 @@ def tally(
     owner: NDArray[np.int32],
     column: NDArray[np.int32],
     weight: Ints,
-    counts: Ints,
+    at_points: Ints,
+    in_views: Ints,
     doubt: Ints,
 ) -> int:
     """Adds up whom the pixels belong to; returns how many it could not place.
@@ -73,7 +74,7 @@ def tally(
     owner: (M, 2) to whom a pixel counts that shows a triangle from its front or back, or -1.
     column: (S + 1,) the column of each owner, -1 if it is not expected; the last is -1.
     weight: (1 or K, face²) of the pixels.
-    counts: (K, 6, n) what is added to.
+    at_points, in_views: (K, n) and (6, n) what is added to.
     doubt: (m,) filled with the numbers of pixels, from 0 in the order of ``shows``, that show a
         triangle whose owner is not expected; as many as there is room for.
     """
@@ -90,7 +91,8 @@ def tally(
                 side = plane[t, 0] * x + plane[t, 1] * y + plane[t, 2] * z + plane[t, 3]
                 j = column[owner[t, 0] if side > 0 else owner[t, 1]]
                 if j >= 0:
-                    counts[k, v, j] += weight[of, i]
+                    at_points[k, j] += weight[of, i]
+                    in_views[v, j] += weight[of, i]
                 else:
                     if doubted < len(doubt):
                         doubt[doubted] = (k * views + v) * size + i
