@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from collections.abc import Iterator
@@ -38,10 +39,12 @@ class Voice:
         click.echo(f"ptm: {text}", err=True)
 
     def emit_json(self, document: Any) -> None:
-        """The result as JSON on stdout; ``--quiet`` does not silence what was asked for."""
+        """The result as JSON on stdout; ``--quiet`` does not silence what was asked for. What is
+        not a finite number, which JSON cannot say, becomes null."""
         import json
 
-        click.echo(json.dumps(document, indent=1, ensure_ascii=False), err=self.aside)
+        text = json.dumps(_finite(document), indent=1, ensure_ascii=False, allow_nan=False)
+        click.echo(text, err=self.aside)
 
     @contextmanager
     def progress(self) -> Iterator[Progress]:
@@ -65,6 +68,15 @@ class Voice:
                 bars.update(task[what], completed=done, total=total)
 
             yield tell
+
+
+def _finite(value: Any) -> Any:
+    """A JSON document with None for NaN and the infinities."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {name: _finite(inner) for name, inner in value.items()}
+    return [_finite(inner) for inner in value] if isinstance(value, (list, tuple)) else value
 
 
 def abandon_stdout() -> None:
