@@ -25,7 +25,7 @@ import argparse
 import os
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -41,6 +41,7 @@ from ptmtools.coverage.backend import open_renderer, triangles_of_a_pvs
 from ptmtools.coverage.item_buffer import VIEWS, Surfaces
 from ptmtools.coverage.opengl import OpenGLRenderer, create_context, is_software
 from ptmtools.coverage.options import PRESETS, AchOptions
+from ptmtools.coverage.sampling import CellHints
 from ptmtools.errors import MissingComponentError
 from ptmtools.scene import ingest
 from ptmtools.scene.model import Scene
@@ -124,11 +125,9 @@ def accuracy(
             backends = ("embree", "gl") if gl and (preset != "high" or not slow) else ("embree",)
             for backend in backends:
                 few = backend == "gl" and options.points > PRESETS["paper"][0]
-                every = trade.tried
-                trade.tried = every[:FEW] if few else every
-                found, seconds[backend], _ = trade.hints(replace(options, backend=backend))
+                tried = trade.tried[:FEW] if few else trade.tried
+                found, seconds[backend], _ = trade.hints(replace(options, backend=backend), tried)
                 errors = trade.errors(found)
-                trade.tried = every
                 surfaces = Surfaces.of(subjects[name][0], subjects[name][1])
                 chosen = open_renderer(surfaces, *subjects[name][1:], options)
                 auto = chosen.backend
@@ -140,8 +139,9 @@ def accuracy(
                 if base and backend == auto:
                     ratios = (f"{mean / max(base[0], 1e-12):.3f}" if base[0] else "0 / 0",
                               f"{seconds[backend] / base[1]:.4f}")  # fmt: skip
-                missed = np.mean([hints.missed for hints in found])
-                rays = np.mean([hints.row.pixels.sum() for hints in found])
+                missed = np.mean([hints.missed for hints in found.values()])
+                points = np.mean([hints.samples for hints in found.values()])
+                rays = points * len(VIEWS) * options.side**2
                 report.row((
                     name, preset, backend + (" (auto)" if backend == auto else ""), f"{mean:.4f}",
                     f"{np.percentile(errors, 95):.4f}", f"{errors.max():.4f}", f"{missed:.1e}",
@@ -178,8 +178,8 @@ def tolerance(report: Report, trials: dict[str, CoverageTrade]) -> None:
         for wanted in (0.02, 0.01):
             found, seconds, _ = trade.hints(AchOptions(backend="embree", tolerance=wanted, face=4))
             errors = trade.errors(found)
-            points = [hints.samples for hints in found]
-            short = sum(not hints.row.uncertain <= wanted for hints in found)
+            points = [hints.samples for hints in found.values()]
+            short = sum(not hints.row.uncertain <= wanted for hints in found.values())
             bars = bar_coverage(trade, found)
             report.row((
                 name, wanted, len(found), f"{np.mean(errors <= wanted):.1%}",
@@ -189,11 +189,11 @@ def tolerance(report: Report, trials: dict[str, CoverageTrade]) -> None:
             ))  # fmt: skip
 
 
-def bar_coverage(trade: CoverageTrade, found: Sequence[Any]) -> tuple[float, int] | None:
+def bar_coverage(trade: CoverageTrade, found: Mapping[int, CellHints]) -> tuple[float, int] | None:
     """How often the reference is within t · error of entries above 0.05, and of how many."""
     held: list[NDArray[np.bool_]] = []
-    for hints, truth in zip(found, trade.truth, strict=True):
-        row = hints.row
+    for cell, hints in found.items():
+        row, truth = hints.row, trade.truth[cell]
         large = (truth > 0.05) & (truth < 1) & np.isfinite(row.error)
         held.append(np.abs(row.value - truth)[large] <= T * row.error[large] + 1e-12)
     every = np.concatenate(held)
@@ -209,7 +209,7 @@ def agreement(report: Report, subjects: dict[str, Subject], cells_tried: int) ->
             trade = CoverageTrade(scene, cells, pvs, AchOptions(), cells_tried, 8)
             options = AchOptions(samples=points, face=face)
             one, other = (trade.hints(replace(options, backend=b))[0] for b in ("gl", "embree"))
-            pairs = list(zip(one, other, strict=True))
+            pairs = list(zip(one.values(), other.values(), strict=True))
             differ = sum(float(np.abs(a.row.pixels - b.row.pixels).sum()) / 2 for a, b in pairs)
             size = sum(float(b.row.pixels.sum()) for _, b in pairs)
             report.row((name, face, points, f"{size:,.0f}", f"{differ / max(size, 1):.1e}"))

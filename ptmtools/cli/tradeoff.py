@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from dataclasses import asdict
+from pathlib import Path
+from typing import Any
 
 import click
 
 from ptmtools.cli.common import as_json, database, forced, voiced
 from ptmtools.cli.output import Voice
-from ptmtools.files import refuse_existing, write_bytes
+from ptmtools.coverage.options import MAX_SAMPLES
+from ptmtools.errors import OutputError
+from ptmtools.files import refuse_existing, write_bytes, writing
 from ptmtools.pipeline import Artifacts, DatabaseFolder
-from ptmtools.tradeoff.experiment import run
+from ptmtools.tradeoff.experiment import Trade, run
+from ptmtools.tradeoff.figure import picture, require
 from ptmtools.tradeoff.report import as_csv, table
 from ptmtools.tradeoff.stages import STAGES, experiments
+
+#: Of the reference: so many that settings with fewer remain.
+LEAST_POINTS = 64
 
 
 @click.command("tradeoff")
@@ -33,17 +43,17 @@ from ptmtools.tradeoff.stages import STAGES, experiments
 @click.option(
     "--cells-tried",
     type=click.IntRange(1),
-    default=24,
+    default=16,
     show_default=True,
     help="Cells that stand for all, where hints are tried.",
 )
 @click.option(
     "--reference",
-    type=click.IntRange(8, 2**14),
-    default=4096,
+    type=click.IntRange(LEAST_POINTS, MAX_SAMPLES),
+    default=MAX_SAMPLES,
     show_default=True,
     metavar="POINTS",
-    help="Sample points a cell that hints are compared with.",
+    help="Sample points a cell that hints are compared with; settings of fewer are tried.",
 )
 @click.option("--csv", "csv_file", type=click.Path(), help="Also write every trial as CSV.")
 @click.option("--plot", "plot_file", type=click.Path(), help="Also draw error against cost, a PNG.")
@@ -67,8 +77,10 @@ def tradeoff(
     A star marks the settings that no cheaper one beats. Nothing in DB is changed.
     """
     for file in (csv_file, plot_file):
-        if file and not force:
-            refuse_existing(file)
+        if file:
+            _writable(file, force)
+    if plot_file:
+        require()
     ready = experiments(Artifacts(DatabaseFolder.open(db)), cells_tried, reference)
     trades = []
     with voice.progress() as progress:
@@ -78,13 +90,33 @@ def tradeoff(
     if csv_file:
         write_bytes(csv_file, as_csv(trades).encode(), force=force)
     if plot_file:
-        from ptmtools.tradeoff.figure import picture
-
         write_bytes(plot_file, picture(trades), force=force)
     if as_json:
-        voice.emit_json([asdict(trade) for trade in trades])
+        voice.emit_json([_document(trade, wanted) for trade in trades])
         return
     for trade in trades:
         for line in table(trade, wanted):
             voice.say(line)
         voice.say("")
+
+
+def _writable(file: str, force: bool) -> None:
+    """Raises the `OutputError` that writing the file would end in, before much is measured for it:
+    PTM-O001 it exists, PTM-O002 there is no such folder, or none that may be written to."""
+    if not force:
+        refuse_existing(file)
+    path = Path(file).absolute()
+    if path.exists() and not path.is_file():
+        raise OutputError("PTM-O002", "is not a file", file=file, remedy="name a file instead")
+    with writing(file):
+        os.stat(path.parent / ".")  # what is no folder fails too
+        if not os.access(path.parent, os.W_OK | os.X_OK):
+            raise OSError(errno.EACCES, os.strerror(errno.EACCES))
+
+
+def _document(trade: Trade, wanted: float | None) -> dict[str, Any]:
+    """As JSON has it; with a wanted error, ``cheapest`` is the setting's name, or None."""
+    if wanted is None:
+        return asdict(trade)
+    found = trade.cheapest(wanted)
+    return {**asdict(trade), "cheapest": found.setting.name if found else None}

@@ -17,6 +17,9 @@ from ptmtools.scene.model import Scene
 from ptmtools.tradeoff.experiment import Measured, Setting, timed
 from ptmtools.visibility.pvs import PvsOptions, compute_pvs
 
+#: Leaves of a subdivision that is only there to have everything compiled.
+WARM = 4
+
 
 class CellsTrade:
     """The experiment of the stage ``cells``."""
@@ -28,6 +31,8 @@ class CellsTrade:
 
     def __init__(self, scene: Scene, options: SubdivideOptions) -> None:
         self._scene, self._options = scene, options
+        few = subdivide(scene, replace(options, max_cells=WARM))
+        compute_pvs(few, PvsOptions(method="fast", workers=1))  # now both are compiled
 
     def settings(self) -> Sequence[Setting]:
         """See `Experiment.settings`."""

@@ -12,18 +12,25 @@ from ptmtools.tradeoff.experiment import Trade
 COLORS = ("#1b6ca8", "#d1603d", "#5a9367", "#8d6a9f", "#b08d2e", "#5b6770", "#c2437a", "#2f8f8b")
 
 
+def require() -> None:
+    """Raises `MissingComponentError` PTM-M600 without matplotlib."""
+    try:
+        import matplotlib.figure  # noqa: F401 - whether it is there
+    except ImportError as fault:
+        raise MissingComponentError(
+            "PTM-M600", "matplotlib is missing", remedy="pip install 'ptmtools[plot]'"
+        ) from fault
+
+
 def picture(trades: Sequence[Trade]) -> bytes:
     """A PNG: every trial, families joined, settings that no other beats named.
 
     Raises `MissingComponentError` PTM-M600 without matplotlib.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as fault:
-        raise MissingComponentError(
-            "PTM-M600", "matplotlib is missing", remedy="pip install 'ptmtools[plot]'"
-        ) from fault
+    require()
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(8, 5 * max(len(trades), 1)), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
     for i, trade in enumerate(trades):

@@ -1,12 +1,12 @@
 """What the knobs of the coverage hints buy (see `experiment`).
 
 The error of a setting is the total variation between its hints of a cell and those of a reference:
-many more points, of an independent scramble, with rays. Some cells stand for all.
+more points than any setting, of an independent scramble, with rays. Some cells stand for all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,15 +14,17 @@ from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.backend import open_renderer
-from ptmtools.coverage.item_buffer import Surfaces
-from ptmtools.coverage.options import PRESETS, AchOptions
+from ptmtools.coverage.item_buffer import VIEWS, Surfaces
+from ptmtools.coverage.options import MAX_SAMPLES, PRESETS, AchOptions
 from ptmtools.coverage.sampling import CellHints, Sampler
 from ptmtools.scene.model import Scene
 from ptmtools.tradeoff.experiment import Measured, Setting, timed
 from ptmtools.visibility.model import Pvs
 
-#: The seed of the reference, which no user is likely to choose.
+#: The seed of the reference, but for a user who takes the same.
 REFERENCE_SEED = 2**31 - 1
+#: Its pixels a side: as good as more, since every point shifts them.
+REFERENCE_FACE = 4
 #: Points and pixels a side of other settings than the presets.
 GRID = (
     ("sobol", (32, 128, 512, 2048), 2),
@@ -48,31 +50,36 @@ class CoverageTrade:
         cells: Cells,
         pvs: Pvs,
         options: AchOptions = AchOptions(),  # noqa: B008 - a frozen value
-        cells_tried: int = 24,
-        reference_points: int = 4096,
+        cells_tried: int = 16,
+        reference_points: int = MAX_SAMPLES,
     ) -> None:
         """``options``: what settings leave open, such as the backend and the weighting. `tried` are
-        the cells that stand for all, evenly spread; `truth` their hints by the reference."""
+        the cells that stand for all, evenly spread; `truth` their hints by the reference, by cell.
+        """
         self._scene, self._cells, self._pvs, self._options = scene, cells, pvs, options
         self._surfaces = Surfaces.of(scene, cells)
+        self._most = reference_points
         every = cells.cell_count
         self.tried = np.unique(np.linspace(0, every - 1, min(cells_tried, every)).astype(int))
         reference = replace(
             options,
             backend="embree",
             samples=reference_points,
-            face=8,
+            face=REFERENCE_FACE,
             placement="sobol",
-            seed=REFERENCE_SEED,
+            seed=REFERENCE_SEED - (options.seed == REFERENCE_SEED),
             tolerance=None,
         )
         found, _, _ = self.hints(reference)
-        self.truth = [hints.row.value for hints in found]
-        # A bound of its error; its standard error is about half of that.
-        self.reference_error = float(np.mean([hints.row.uncertain for hints in found])) / 2
+        self.truth = {cell: hints.row.value for cell, hints in found.items()}
+        # Bounds of its error; its standard error is about half of that. Cells with too few usable
+        # points have none.
+        bounds = np.array([hints.row.uncertain for hints in found.values()], dtype=np.float64)
+        bounds = bounds[np.isfinite(bounds)]
+        self.reference_error = float(bounds.mean()) / 2 if len(bounds) else 0.0
 
     def settings(self) -> Sequence[Setting]:
-        """See `Experiment.settings`."""
+        """See `Experiment.settings`; those of fewer points than the reference."""
         presets = [Setting(f"--preset {name}", {"preset": name}) for name in PRESETS]
         grid = [
             Setting(
@@ -83,31 +90,43 @@ class CoverageTrade:
             for placement, counts, face in GRID
             for samples in counts
         ]
-        return [*presets, *grid]
+        points = {s.name: replace(self._options, **s.knobs).points for s in (*presets, *grid)}
+        return [s for s in (*presets, *grid) if points[s.name] < self._most]
 
     def measure(self, setting: Setting) -> Measured:
         """See `Experiment.measure`."""
-        found, seconds, backend = self.hints(replace(self._options, **setting.knobs))
+        options = replace(self._options, **setting.knobs)
+        found, seconds, backend = self.hints(options)
         errors = self.errors(found)
+        points = np.array([hints.samples for hints in found.values()])
+        missed = np.array([hints.missed for hints in found.values()])
+        many = max(len(found), 1)
         return Measured(
             seconds=seconds,
-            work=float(np.mean([hints.row.pixels.sum() for hints in found])),
-            error=float(errors.mean()),
-            worst=float(errors.max()),
+            work=float(points.sum()) * len(VIEWS) * options.side**2 / many,
+            error=float(errors.sum()) / many,
+            worst=float(errors.max(initial=0.0)),
             more={
-                "p95": float(np.percentile(errors, 95)),
-                "missed": float(np.mean([hints.missed for hints in found])),
+                "p95": float(np.percentile(errors, 95)) if len(errors) else 0.0,
+                "missed": float(missed.sum()) / many,
                 "gl": float(backend == "gl"),
             },
         )
 
-    def errors(self, found: Sequence[CellHints]) -> NDArray[np.float64]:
-        """(n,) total variation between hints of the cells tried and the reference."""
-        pairs = zip(found, self.truth, strict=False)
-        return np.array([np.abs(hints.row.value - truth).sum() / 2 for hints, truth in pairs])
+    def errors(self, found: Mapping[int, CellHints]) -> NDArray[np.float64]:
+        """(n,) total variation between hints of n of the cells tried, by cell, and the reference.
 
-    def hints(self, options: AchOptions) -> tuple[list[CellHints], float, str]:
-        """The hints of the cells tried, processor seconds for all cells, and the backend."""
+        Raises KeyError for a cell that was not tried.
+        """
+        pairs = ((hints.row.value, self.truth[cell]) for cell, hints in found.items())
+        return np.array([np.abs(value - truth).sum() / 2 for value, truth in pairs])
+
+    def hints(
+        self, options: AchOptions, cells: Sequence[int] | None = None
+    ) -> tuple[dict[int, CellHints], float, str]:
+        """The hints of some of the cells tried, by cell, or of all of them; processor seconds for
+        all cells of the scene; and the backend."""
+        asked = [int(cell) for cell in (self.tried if cells is None else cells)]
         renderer = open_renderer(self._surfaces, self._cells, self._pvs, options)
         renderer.close()  # what is loaded but once is no part of the cost
 
@@ -119,10 +138,10 @@ class CoverageTrade:
 
         sampler, before = timed(ready)
         try:
-            if len(self.tried):
-                sampler.of_cell(int(self.tried[0]))
-            found, seconds = timed(lambda: [sampler.of_cell(int(cell)) for cell in self.tried])
-            seconds *= self._cells.cell_count / max(len(self.tried), 1)
+            if asked:
+                sampler.of_cell(asked[0])
+            found, seconds = timed(lambda: {cell: sampler.of_cell(cell) for cell in asked})
+            seconds *= self._cells.cell_count / max(len(asked), 1)
             return found, before + seconds, renderer.backend
         finally:
             renderer.close()

@@ -16,8 +16,12 @@ from ptmtools.cells.model import Cells
 from ptmtools.tradeoff.experiment import Measured, Setting, timed
 from ptmtools.visibility.pvs import PvsOptions, compute_pvs
 
-#: The budget of the reference, as many times that of the options.
-AMPLE = 10
+#: The budget of the reference, which hardly any portal exhausts.
+AMPLE = 2_000_000
+#: Those that are tried, beside the one that the database was built with.
+BUDGETS = (200, 2_000, 20_000, 200_000)
+#: What settings do not say: near-ties decided exactly, one thread.
+_BASE = PvsOptions(exact=True, workers=1)
 
 
 class VisibilityTrade:
@@ -29,14 +33,15 @@ class VisibilityTrade:
     reference_error = 0.0
 
     def __init__(self, cells: Cells, options: PvsOptions) -> None:
-        self._cells, self._options = cells, replace(options, workers=1)
-        ample = replace(self._options, method="full", budget=AMPLE * max(options.budget, 1))
+        """``options``: of them only the budget counts; the rest is what settings say."""
+        self._cells, self._own = cells, options.budget
+        ample = replace(_BASE, method="full", budget=max(AMPLE, options.budget))
         self._truth = compute_pvs(cells, ample).to_matrix()
-        compute_pvs(cells, replace(self._options, method="sampled", lines=1))  # now it is compiled
+        compute_pvs(cells, replace(_BASE, method="sampled", lines=1))  # now it is compiled
 
     def settings(self) -> Sequence[Setting]:
         """See `Experiment.settings`."""
-        budget = self._options.budget
+        usual = BUDGETS[-1]
         return [
             *(
                 Setting(
@@ -50,17 +55,17 @@ class VisibilityTrade:
             Setting("--pvs fast", {"method": "fast"}),
             *(
                 Setting(f"--pvs full --pvs-budget {n}", {"method": "full", "budget": n}, "budget")
-                for n in (budget // 1000, budget // 100, budget // 10, budget)
+                for n in sorted({*BUDGETS, self._own})
             ),
             Setting(
-                f"--pvs full --pvs-budget {budget} --no-pvs-exact",
-                {"method": "full", "exact": False},
+                f"--pvs full --pvs-budget {usual} --no-pvs-exact",
+                {"method": "full", "budget": usual, "exact": False},
             ),
         ]
 
     def measure(self, setting: Setting) -> Measured:
         """See `Experiment.measure`."""
-        options = replace(self._options, **setting.knobs)
+        options = replace(_BASE, **setting.knobs)
         pvs, seconds = timed(lambda: compute_pvs(self._cells, options))
         found = pvs.to_matrix()
         extra, missing = found & ~self._truth, self._truth & ~found

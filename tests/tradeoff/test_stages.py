@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import json
+import math
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +13,14 @@ import pytest
 from PIL import Image
 
 from ptmtools.cli.main import main
+from ptmtools.cli.output import Voice
 from ptmtools.coverage.options import AchOptions
 from ptmtools.pipeline import BuildOptions, build_scene
+from ptmtools.scene.model import SourceImage
+from ptmtools.texture import EncodeOptions
 from ptmtools.tradeoff.experiment import Setting
-from ptmtools.tradeoff.hints import CoverageTrade
+from ptmtools.tradeoff.hints import REFERENCE_SEED, CoverageTrade
+from ptmtools.tradeoff.textures import TexturesTrade
 from ptmtools.tradeoff.visibility import VisibilityTrade
 from ptmtools.visibility.pvs import PvsOptions, compute_pvs
 
@@ -59,6 +66,71 @@ def test_one_stage_as_json(db, capsys) -> None:
     assert full[-1]["measured"]["error"] == 0
 
 
+def test_the_cheapest_in_json(db, capsys) -> None:
+    asked = ["tradeoff", str(db), "--stage", "textures", "--stage", "cells", "--json"]
+    assert main([*asked, "--error", "1e-9"]) == 0
+    assert [t["cheapest"] for t in json.loads(capsys.readouterr().out)] == [None, None]
+    assert main([*asked, "--error", "1e9"]) == 0
+    for trade in json.loads(capsys.readouterr().out):
+        assert trade["cheapest"] == trade["trials"][0]["setting"]["name"]
+
+
+def no_constant(name: str) -> None:
+    raise ValueError(name)
+
+
+def test_cells_without_usable_points_give_json_and_rates(tmp_path, capsys) -> None:
+    """Nothing in the rooms keeps a megametre from all surfaces: one point stands for each."""
+    path = tmp_path / "tight.db"
+    build_scene(TWO_ROOMS, path, BuildOptions(ach=AchOptions(backend="embree", clearance=1e6)))
+    assert main(["tradeoff", str(path), "--stage", "ach", *LITTLE, "--json"]) == 0
+    (trade,) = json.loads(capsys.readouterr().out, parse_constant=no_constant)
+    assert trade["reference_error"] == 0
+    works = {t["setting"]["name"]: t["measured"]["work"] for t in trade["trials"]}
+    assert works["--preset fast"] == 6 * 4**2
+
+
+def test_what_is_no_number_is_null_in_json(capsys) -> None:
+    document = {"a": [math.nan, {"b": np.float64("inf")}], "c": (-math.inf, 1.5, True, None, "NaN")}
+    Voice().emit_json(document)
+    told = json.loads(capsys.readouterr().out, parse_constant=no_constant)
+    assert told == {"a": [None, {"b": None}], "c": [None, 1.5, True, None, "NaN"]}
+
+
+def test_a_database_of_lossy_textures() -> None:
+    """The profile raw, which is always exact, is tried all the same."""
+    noise = np.random.default_rng(0).integers(0, 256, (32, 32, 3), np.uint8)
+    png = io.BytesIO()
+    Image.fromarray(noise).save(png, "png")
+    image = SourceImage("noise.png", "0" * 64, png.getvalue)
+    trade = TexturesTrade([image], EncodeOptions(max_error=2))
+    sizes = {s.name: trade.measure(s).error for s in trade.settings()}
+    assert sizes["--profile small"] < 1.1
+    assert sizes["--profile raw"] > 1.3
+
+
+@pytest.mark.parametrize("option", ["--csv", "--plot"])
+@pytest.mark.parametrize("file", ["absent/x", "file/x", "folder"])
+def test_what_cannot_be_written_is_told_before_anything_runs(
+    db, tmp_path, capsys, monkeypatch, option, file
+) -> None:
+    monkeypatch.setattr("ptmtools.cli.tradeoff.run", pytest.fail)
+    (tmp_path / "file").touch()
+    (tmp_path / "folder").mkdir()
+    assert main(["tradeoff", str(db), option, str(tmp_path / file), "--force"]) == 4
+    assert "PTM-O002" in capsys.readouterr().err
+
+
+def test_a_plot_without_matplotlib_is_told_before_anything_runs(
+    db, tmp_path, capsys, monkeypatch
+) -> None:
+    monkeypatch.setattr("ptmtools.cli.tradeoff.run", pytest.fail)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    assert main(["tradeoff", str(db), "--plot", str(tmp_path / "t.png")]) == 6
+    assert "PTM-M600" in capsys.readouterr().err
+
+
 def test_a_database_without_a_stage_says_which(tmp_path, capsys) -> None:
     assert main(["cells", str(TWO_ROOMS), "-o", str(tmp_path / "a.db")]) == 0
     assert main(["tradeoff", str(tmp_path / "a.db"), "--stage", "ach"]) == 5
@@ -78,6 +150,64 @@ def test_hints_by_more_points_are_nearer_to_the_reference(room_row) -> None:
     assert many.work == 64 * few.work == 512 * 6 * 64
     assert few.error <= few.more["p95"] <= few.worst
     assert 0 < trade.reference_error < 0.01
+
+
+def test_hints_of_some_cells_are_compared_with_their_own(room_row) -> None:
+    scene, cells = room_row(4)
+    options = AchOptions(backend="embree", samples=64)
+    trade = CoverageTrade(scene, cells, compute_pvs(cells), options, 4, 64)
+    some, _, _ = trade.hints(options, [3, 1])
+    every, _, _ = trade.hints(options)
+    assert list(every) == [0, 1, 2, 3]
+    assert trade.errors(some).tolist() == trade.errors(every)[[3, 1]].tolist()
+    with pytest.raises(KeyError):
+        trade.errors({9: every[0]})
+
+
+def test_only_settings_of_fewer_points_than_the_reference(room_row) -> None:
+    scene, cells = room_row(3)
+    given = scene, cells, compute_pvs(cells), AchOptions(backend="embree"), 1
+    few = {s.name: s for s in CoverageTrade(*given, 64).settings()}
+    assert "--preset fast" in few
+    assert "--preset default" not in few
+    assert max(s.knobs.get("samples", 0) for s in few.values()) == 32
+    every = [s.name for s in CoverageTrade(*given).settings()]
+    assert "--preset high" in every
+    assert any("--samples 2048" in name for name in every)
+
+
+@pytest.mark.parametrize("seed", [0, REFERENCE_SEED])
+def test_the_reference_has_a_scramble_of_its_own(room_row, seed) -> None:
+    scene, cells = room_row(4)
+    options = AchOptions(backend="embree", seed=seed)
+    trade = CoverageTrade(scene, cells, compute_pvs(cells), options, 2, 64)
+    same = trade.measure(Setting("", {"samples": 64, "face": 4, "placement": "sobol"}))
+    assert same.error > 0
+
+
+@pytest.mark.parametrize("built", [PvsOptions(budget=7, exact=False), PvsOptions(method="fast")])
+def test_visibility_is_tried_alike_whatever_the_database_was_built_with(room_row, built) -> None:
+    _, cells = room_row(4)
+    asked: list[PvsOptions] = []
+
+    def watched(cells, options):
+        asked.append(options)
+        return compute_pvs(cells, options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("ptmtools.tradeoff.visibility.compute_pvs", watched)
+        trade = VisibilityTrade(cells, built)
+        assert (asked[0].method, asked[0].budget, asked[0].exact) == ("full", 2_000_000, True)
+        asked.clear()
+        settings = trade.settings()
+        for setting in settings:
+            trade.measure(setting)
+    assert [o.exact for o in asked] == ["--no-pvs-exact" not in s.name for s in settings]
+    budgets = [s.knobs["budget"] for s in settings if s.family == "budget"]
+    assert budgets == sorted({200, 2_000, 20_000, 200_000, built.budget})
+    for setting, options in zip(settings, asked, strict=True):
+        assert f"--pvs {options.method}" in setting.name
+        assert options.method != "full" or f"--pvs-budget {options.budget}" in setting.name
 
 
 def test_sampled_visibility_lacks_pairs_and_is_never_the_best(room_row) -> None:
