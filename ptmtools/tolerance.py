@@ -83,10 +83,11 @@ class Tolerance:
         return Tolerance.for_extent(extent if extent > 0 else 1.0)
 
     def for_walls(self, thickness: float) -> Tolerance:
-        """The same where walls are up to ``thickness`` metres thick; 0 changes nothing."""
+        """The same where walls are up to ``thickness`` metres thick; 0 changes nothing. However
+        thin they are, what lies in one plane is one wall."""
         if thickness == 0:
             return self
-        return replace(self, cluster=min(self.cluster, CLUSTER_OF_WALL * thickness))
+        return replace(self, cluster=min(self.cluster, max(CLUSTER_OF_WALL * thickness, self.plane)))
 
     @staticmethod
     def for_extent(extent: float) -> Tolerance:

@@ -7,6 +7,7 @@ import pytest
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.scene.model import Material, Scene
+from ptmtools.tolerance import Tolerance
 from ptmtools.visibility import check_conservative, compute_pvs
 
 LEAF = SubdivideOptions(cells="leaf")
@@ -81,6 +82,19 @@ def test_a_wall_of_a_hundred_thousand_slivers(quads, room_faces) -> None:
     assert cells.leaf_count == 2
     assert cells.portal_area == pytest.approx([6.0])
     assert_sound(scene, cells)
+
+
+def test_walls_in_one_plane_are_one_however_thin_walls_may_be(quads, room_faces, partition) -> None:
+    """The other half of a wall, out of line by less than an on-plane distance."""
+    usual = Tolerance.for_extent(8.0)
+    assert usual.for_walls(0) == usual
+    assert [usual.for_walls(t).cluster for t in (1e-12, 1e-9, 1e-5)] == [usual.plane] * 3
+    assert usual.plane < usual.for_walls(0.01).cluster < usual.cluster == usual.for_walls(1).cluster
+    sheets = [face for x in (4, 4 + usual.plane / 2) for face in partition(x, (0, 3, -1, 1))]
+    scene = quads(room_faces(LOW, HIGH) + sheets)
+    for thickness in (0.0, 1e-9, 0.5):
+        cells = subdivide(scene, SubdivideOptions(cells="leaf", wall_thickness=thickness))
+        assert cells.leaf_count == 2
 
 
 def test_a_room_shaped_like_a_ball() -> None:
