@@ -27,6 +27,9 @@ CLEARANCE = 0.25
 Look = Callable[[Eyes], Seen]
 #: Points of each of the groups that a tolerance is first tried with.
 FIRST = 8
+#: What a bound falls by, about, as the points are doubled (K^-0.6): one that falls faster has luck,
+#: and stopping at every piece of luck makes bounds too small.
+FALL = 2**-0.6
 
 
 @dataclass(frozen=True)
@@ -117,6 +120,7 @@ class Sampler:
         sequences = [Sequence(places, options.placed, seed) for seed in seeds]
         found: list[Seen] = []
         group = np.zeros(0, dtype=np.int64)
+        before = np.inf
         more = max(1, min(FIRST, options.points // GROUPS))
         while True:
             eyes = [sequence.take(more) for sequence in sequences]
@@ -128,7 +132,8 @@ class Sampler:
             found = [Seen.join([*found, look(every)])]
             group = np.concatenate([group, added])
             by_cell = found[0].grouped(begin).at_points
-            bound = spread(by_cell, group)[1]
+            now = spread(by_cell, group)[1]
+            bound, before = max(now, before * FALL), now
             more = min(len(group) // GROUPS, (options.points - len(group)) // GROUPS)
             if bound <= tolerance or more < 1 or not len(added):
                 return found[0], group
