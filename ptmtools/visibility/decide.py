@@ -1,8 +1,9 @@
 """Whether a line can pass a sequence of portals: quickly where that can tell, else in integers.
 
 Nearly all sequences that doubles cannot decide, numbers of twice the length can (`doubled`),
-without the interpreter's lock: of 1,818 in a hospital, walls of 0.25 m² and up, all but 7. Those go
-to `exact`, which takes a hundred times as long.
+without the interpreter's lock: in a hospital, walls of 0.25 m² and up, 99 of 100. The others go to
+`exact`, which takes a hundred times as long; among sequences of twenty portals with hardly any
+room, most of the open ones do.
 """
 
 from __future__ import annotations

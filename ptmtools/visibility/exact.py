@@ -61,6 +61,8 @@ class ExactPortals:
         self._portal: dict[int, tuple[Polygon, Plane]] = {}
         #: By sequence, all from one source: those of one search begin alike.
         self._left: dict[tuple[int, ...], _Left | None] = {}
+        #: Those of them that take too long numbers.
+        self._endless: set[tuple[int, ...]] = set()
 
     def passes(self, sequence: tuple[int, ...]) -> bool:
         """Whether something is left when a sequence of directed portals is clipped as the flow does
@@ -68,16 +70,20 @@ class ExactPortals:
         if sequence[:1] not in self._left:
             portal, plane = self._directed(sequence[0])
             self._left.clear()
+            self._endless.clear()
             self._left[sequence[:1]] = _Left(portal, [], [plane])
         left = self._left[sequence[:1]]
         for length in range(2, len(sequence) + 1):
             if left is None:
                 break
             part = sequence[:length]
+            if part in self._endless:
+                return True
             if part not in self._left:
                 try:
                     self._left[part] = _beyond(left, *self._directed(part[-1]))
                 except _LengthError:
+                    self._endless.add(part)
                     return True
             left = self._left[part]
         return left is not None

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ptmtools.tolerance import Tolerance
+from ptmtools.visibility import exact
 from ptmtools.visibility.decide import Decisions
 from ptmtools.visibility.doubled import kernels
 from ptmtools.visibility.exact import ExactPortals
@@ -20,15 +21,21 @@ SHIFTS = (0.0, 0.0, 3e-15, -3e-15, 4e-14, -4e-14, 1e-12, -1e-12, 1e-9, -1e-9)
 NUMBERS = st.floats(-4, 4, allow_subnormal=False).filter(lambda x: x == 0 or abs(x) > 1e-100)
 
 
-def lined_up(seed: int, count: int, scale: float = 1.0, turned: bool = False) -> Portals:
+def lined_up(
+    seed: int,
+    count: int,
+    scale: float = 1.0,
+    turned: bool = False,
+    shifts: tuple[float, ...] = SHIFTS,
+) -> Portals:
     """Doors, one behind the other, with edges on planes that all touch two lines or one, but for
-    some of the `SHIFTS`."""
+    some of the ``shifts``."""
     rng = np.random.default_rng(seed)
     slope, height = rng.uniform(-0.3, 0.3, 2)
     points = []
     for i in range(count):
         x = 2.0 * i + rng.choice([0.0, rng.uniform(0, 1)])
-        edge = np.array([slope * x + rng.choice(SHIFTS), height * x + rng.choice(SHIFTS)])
+        edge = np.array([slope * x + rng.choice(shifts), height * x + rng.choice(shifts)])
         # The line passes the door's corner or a side, or runs through the middle.
         low = edge - rng.choice([0.0, 0.0, 0.5, 1.0], 2)
         points.append([(x, low[0], low[1]), (x, low[0] + 1, low[1]),
@@ -59,6 +66,67 @@ def test_arithmetic_is_as_precise_as_it_says(a, b, c, d):
     if q != 0 and abs(p) < abs(q) * 2**200:
         assert abs(fraction(kernels.over(x, y)) - p / q) <= abs(p / q) / 2**100 + least
     assert kernels.greater(x, y) == (p > q)
+
+
+def test_the_bounds_of_errors_fit_each_other():
+    """What the proof in `kernels` takes for granted."""
+    k = kernels
+    most = (k.CUTS + 1) * k.ERROR  # of a vertex; 1 for its coordinates
+    assert most <= k.WRONG
+    assert k.SLACK / 2 >= 4 * k.WRONG  # two polygons, both as wrong, both measured
+    assert k.SLACK > 4 * k.WRONG
+    assert k.FLAT * k.ROUGHLY >= 64 * k.WRONG
+    assert k.ROUGHLY > 2.0**-40  # in doubles
+    assert Tolerance.for_extent(0.5).noise > 1000 * k.FLAT  # else nothing would be certain
+
+
+def without_rounding(portals: ExactPortals, way: tuple[int, ...]) -> bool | None:
+    """Whether something is left; None if that takes too long numbers."""
+    polygon, plane = portals._directed(way[0])
+    left: exact._Left | None = exact._Left(polygon, [], [plane])
+    for q in way[1:]:
+        try:
+            left = exact._beyond(left, *portals._directed(q))
+        except exact._LengthError:
+            return None
+        if left is None:
+            return False
+    return True
+
+
+def test_what_is_certain_of_long_sequences_is_true(monkeypatch):
+    """Doors that leave about as much room as they are drawn in, against integers never rounded."""
+    monkeypatch.setattr(exact, "BITS", 20_000)
+    monkeypatch.setattr(exact, "LONGEST", 20_000)
+    rng = np.random.default_rng(7)
+    tried = {True: 0, False: 0}
+    certain = 0
+    for seed in range(60):
+        count = int(rng.integers(15, 21))
+        portals = lined_up(seed, count, turned=seed % 2 == 1, shifts=SHIFTS[:6])
+        room = rng.uniform(0.55, 0.85) * Tolerance.for_points(portals.point).noise
+        for k in range(count):
+            door = portals.point[4 * k : 4 * k + 4]
+            middle = door.mean(axis=0)
+            door += (door - middle) * 2 * room
+        g = geometry(portals)
+        way = tuple(2 * k for k in range(count))
+        expected = without_rounding(ExactPortals(g), way)
+        if expected is None:
+            continue
+        decisions = Decisions(g)
+        for k in range(count):
+            decisions._load(k)
+        row = np.array(way, np.int64)
+        outside, inside = (
+            kernels.left(decisions._portals, decisions._scratch, row, o) for o in (True, False)
+        )
+        assert outside != kernels.CLOSED or not expected
+        assert inside != kernels.OPEN or expected
+        tried[expected] += 1
+        certain += outside == kernels.CLOSED or inside == kernels.OPEN
+    assert min(tried.values()) >= 10
+    assert certain >= 0.7 * sum(tried.values())
 
 
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(2, 7), turned=st.booleans())

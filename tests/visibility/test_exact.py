@@ -81,7 +81,11 @@ def test_what_takes_too_long_numbers_counts_as_open(monkeypatch):
     portals = along_a_line(1, 5, miss=3.0)
     assert not portals.passes((0, 2, 4, 6, 8))
     monkeypatch.setattr(exact, "LONGEST", 100)
-    assert along_a_line(1, 5, miss=3.0).passes((0, 2, 4, 6, 8))
+    portals = along_a_line(1, 5, miss=3.0)
+    assert portals.passes((0, 2, 4, 6, 8))
+    monkeypatch.setattr(exact, "_beyond", None)  # and is not tried again, nor what begins with it
+    assert portals.passes((0, 2, 4, 6, 8))
+    assert portals.passes((0, 2, 4, 6, 8, 8))
 
 
 def test_numbers_do_not_grow_without_bound():

@@ -8,6 +8,23 @@ of them is right to `ERROR`.
 The clipping is that of `exact`, twice: once *outside*, with polygons and half-spaces too large by
 more than all errors together, so that what it finds empty is so; once *inside*, with both too
 small. Planes are a unit normal n and an offset c; kept is n·x >= c.
+
+Why that is certain. A vertex newly cut is computed somewhere on an edge, wrong by less than
+`ERROR`; the same share of the true edge is off by what the ends are. So after k cuts a vertex is
+off by less than e = (k + 1) · `ERROR` <= `WRONG` from that of a polygon Q, convex and in the
+portal's plane. Sides are computed to far less than `WRONG`.
+
+*Outside* Q contains what is truly left. A plane accepted has a gap of at least SLACK / 2 between
+computed polygons, so of SLACK / 2 - 4 WRONG >= 0 between the true ones: it does separate them. It
+is moved by SLACK, so what is cut off of Q is off the true half-space by SLACK - 4 WRONG > 0.
+
+*Inside* Q lies in what is truly left, and smaller polygons are separated by more planes. The plane
+through an edge and a vertex, all wrong by e, is off by less than 32 e / h elsewhere, where h is
+the least height of the triangle between them: coordinates are at most 1, so a point of the plane
+is (1 + 14 / h) times as wrong as the corners, and h, of which the third side is not looked at, may
+be half of what is taken for it. Planes are moved by that and by SLACK, more than what is clipped
+is wrong by; h is the least of all vertices that the true plane might touch (`least_height`). Where
+an edge is too short or a vertex too near to a plane to be sure, it cannot be told.
 """
 
 from __future__ import annotations
@@ -15,7 +32,7 @@ from __future__ import annotations
 import numpy as np
 
 from ptmtools.compiled import plain_kernel as kernel
-from ptmtools.visibility.storage import DoubledPortals, DoubledScratch, Ints
+from ptmtools.visibility.storage import DoubledPortals, DoubledScratch, Floats, Ints
 
 Double = tuple[float, float]
 
@@ -23,14 +40,18 @@ Double = tuple[float, float]
 CLOSED, OPEN, UNSURE = 0, 1, 2
 #: More than a product of vectors and a vertex newly cut may be wrong by.
 ERROR = 2.0**-99
-#: The rounding of a number of magnitude 1.
-ROUNDING = 2.0**-104
-#: By how much polygons and half-spaces are larger outside.
-SLACK = 2.0**-92
-#: What is less than the greatest by this share in doubles is less.
-ROUGHLY = 2.0**-30
-#: How often a polygon is cut, at most: so its vertices are wrong by less than half of `SLACK`.
-CUTS = 200
+#: How often a polygon is cut, at most.
+CUTS = 255
+#: More than a vertex of a polygon is wrong by, after so many cuts of points rounded once.
+WRONG = (CUTS + 1) * ERROR
+#: By how much polygons and half-spaces are larger outside and smaller inside. A plane is accepted
+#: if it leaves half of this between two polygons, each wrong by `WRONG`, measured as well as that.
+SLACK = 8 * WRONG
+#: What is less than the greatest by this share in doubles is less, ...
+ROUGHLY = 2.0**-24
+#: Inside, edges and distances shorter than this decide nothing: wrong by `WRONG`, the angle of a
+#: plane would be off by more than a 64th of `ROUGHLY`.
+FLAT = 64 * WRONG / ROUGHLY
 #: What of the source, of the portal passed last and of the next is left; spare.
 SOURCE, PASSED, NEXT, SPARE = 0, 1, 2, 3
 #: Rows of planes: those that bound all lines so far, and others.
@@ -111,9 +132,10 @@ def side(s: DoubledScratch, row: int, i: int, slot: int, k: int) -> Double:
 
 
 @kernel
-def clip(s: DoubledScratch, row: int, count: int, slot: int) -> int:
+def clip(s: DoubledScratch, row: int, count: int, slot: int, outside: bool) -> int:
     """Keeps what of a polygon lies in all half-spaces of a row, in place. CLOSED if a plane has
-    nothing of it beyond, UNSURE if it outgrows its slot or is cut too often, else OPEN."""
+    nothing of it beyond, UNSURE if it outgrows its slot or is cut too often, else OPEN. Inside,
+    vertices nearer than `FLAT` to the one before them are left out, which only makes it smaller."""
     polygon = s.polygon
     for i in range(count):
         size = s.size[slot]
@@ -147,7 +169,36 @@ def clip(s: DoubledScratch, row: int, count: int, slot: int) -> int:
                     polygon[SPARE, m, a, 0], polygon[SPARE, m, a, 1] = x
                 m += 1
         move(s, SPARE, slot, m)
+        if not outside:
+            thin_out(s, slot)
+            if s.size[slot] < 3:
+                return UNSURE
     return OPEN
+
+
+@kernel
+def thin_out(s: DoubledScratch, slot: int) -> None:
+    """Drops vertices of a polygon nearer than 2 · `FLAT` to the one before them."""
+    x = s.polygon[slot]
+    m = 0
+    for k in range(s.size[slot]):
+        if m > 0 and close(x, k, m - 1):
+            continue
+        for a in range(3):
+            x[m, a, 0], x[m, a, 1] = x[k, a, 0], x[k, a, 1]
+        m += 1
+    while m > 1 and close(x, m - 1, 0):
+        m -= 1
+    s.size[slot] = m
+
+
+@kernel
+def close(x: Floats, i: int, j: int) -> bool:
+    """Whether two vertices (V, 3, 2) are nearer than 2 · `FLAT` along every axis."""
+    for a in range(3):
+        if abs(x[i, a, 0] - x[j, a, 0] + (x[i, a, 1] - x[j, a, 1])) > 2 * FLAT:
+            return False
+    return True
 
 
 @kernel
@@ -191,6 +242,7 @@ def beside(
     accepted by measuring both polygons; inside, the kept side is drawn in by what the plane may be
     wrong by, and where that cannot be told the answer is -1. Returns the planes in the row.
     """
+    wrong = ERROR * (1 + max(s.cuts[a], s.cuts[b]))
     polygon, plane, edge, outward = s.polygon, s.plane, s.vector[0], s.vector[1]
     k, sign = q >> 1, 1.0 if q & 1 == 0 else -1.0
     for i in range(s.size[a]):
@@ -204,9 +256,9 @@ def beside(
             edge[c, 0], edge[c, 1] = along
             length += along[0] * along[0]
         length = np.sqrt(length)
-        if length <= ERROR:
-            if outside or length == 0.0:
-                continue
+        if outside and length <= ERROR:
+            continue
+        if not outside and length < FLAT:
             return -1
         if count == plane.shape[1]:
             return -1
@@ -216,7 +268,7 @@ def beside(
             y = times((edge[c2, 0], edge[c2, 1]), (g.normal[k, c1] / length, 0.0))
             outward[c, 0], outward[c, 1] = less(x, y)
         turn: Double = (-np.inf, 0.0)
-        height = longest = 0.0
+        left_out = False
         for m in range(s.size[b]):
             u: Double = (0.0, 0.0)
             v: Double = (0.0, 0.0)
@@ -231,6 +283,10 @@ def beside(
                 far += r[0] * r[0]
             if v[0] > ERROR:
                 rough = -u[0] / v[0]
+                if not outside:
+                    high = np.sqrt(u[0] * u[0] + v[0] * v[0])
+                    high *= min(1.0, length / max(length, np.sqrt(far)))
+                    s.side[m, 0], s.side[m, 1] = rough, max(high, ERROR)
                 if rough + ROUGHLY * (1.0 + abs(rough)) < turn[0]:
                     continue
                 t = over((-u[0], -u[1]), v)
@@ -238,12 +294,14 @@ def beside(
                     t = added(t, (SLACK * np.sqrt(1.0 + t[0] * t[0]) / v[0], 0.0))
                 if greater(t, turn):
                     turn = t
-                    height, longest = np.sqrt(u[0] * u[0] + v[0] * v[0]), np.sqrt(far)
-            elif not outside and v[0] >= -ERROR and u[0] <= ERROR:
-                return -1
-        if turn[0] == -np.inf:
-            if outside:
-                continue
+            elif not outside:
+                if v[0] >= -wrong - ERROR and u[0] <= FLAT:
+                    return -1
+                s.side[m, 0], s.side[m, 1] = -np.inf, 1.0
+                left_out = True
+        if outside and turn[0] == -np.inf:
+            continue
+        if turn[0] == -np.inf or (left_out and turn[0] < -1 / ROUGHLY):
             return -1
         scale = 1.0 / np.sqrt(1.0 + turn[0] * turn[0])
         for c in range(3):
@@ -267,10 +325,8 @@ def beside(
                 continue
             shift = -SLACK
         else:
-            # The ends of the edge and the vertex are in the plane to a rounding: as much, times the
-            # inverse of the height of the triangle between them, it may be off elsewhere.
-            height *= min(1.0, length / max(longest, length))
-            shift = ROUNDING * (1.0 + 1.0 / max(height, ERROR))
+            height = least_height(s, s.size[b], turn[0], 32 * wrong)
+            shift = SLACK + 32 * wrong / height
             if between < -shift:
                 continue
         if flip:
@@ -281,6 +337,22 @@ def beside(
         plane[row, count, 3, 0], plane[row, count, 3, 1] = added(beyond, (shift, 0.0))
         count += 1
     return count
+
+
+@kernel
+def least_height(s: DoubledScratch, count: int, turn: float, wrong: float) -> float:
+    """Of the vertices, each with its t and height in ``side``, that may have the greatest t, if the
+    angle of each is wrong by ``wrong`` over its height: the least height."""
+    least = np.inf
+    for m in range(count):
+        t, height = s.side[m, 0], s.side[m, 1]
+        angle = wrong / height
+        if t == -np.inf or height >= least:
+            continue
+        more = ROUGHLY * (1.0 + abs(t)) + 2.0 * (1.0 + t * t) * angle
+        if angle * (1.0 + abs(t)) > 0.25 or t + more >= turn:
+            least = height
+    return least
 
 
 @kernel
@@ -301,7 +373,7 @@ def own(g: DoubledPortals, s: DoubledScratch, q: int, shift: float, row: int) ->
 def left(g: DoubledPortals, s: DoubledScratch, sequence: Ints, outside: bool) -> int:
     """What is left when a sequence of directed portals is clipped: CLOSED, nothing, which is
     certain if ``outside``; OPEN, something, which is certain if not; or UNSURE."""
-    shift = -SLACK if outside else 4 * ERROR
+    shift = -SLACK if outside else 2 * FLAT
     first = sequence[0]
     load(g, s, first >> 1, SOURCE)
     own(g, s, first, shift, BOUNDS)
@@ -335,8 +407,9 @@ def left(g: DoubledPortals, s: DoubledScratch, sequence: Ints, outside: bool) ->
                 if step == 4:
                     bounds = count
                     continue
-            now = clip(s, row, count, target)
+            now = clip(s, row, count, target, outside)
             if now != OPEN:
                 return now
         move(s, NEXT, PASSED, s.size[NEXT])
+        s.cuts[PASSED] = s.cuts[NEXT]
     return OPEN
