@@ -87,7 +87,9 @@ class Tolerance:
         thin they are, what lies in one plane is one wall."""
         if thickness == 0:
             return self
-        return replace(self, cluster=min(self.cluster, max(CLUSTER_OF_WALL * thickness, self.plane)))
+        return replace(
+            self, cluster=min(self.cluster, max(CLUSTER_OF_WALL * thickness, self.plane))
+        )
 
     @staticmethod
     def for_extent(extent: float) -> Tolerance:
