@@ -4,7 +4,7 @@
 # make bench   the benchmarks, on the data at hand
 # make bench-codec   only those of the texture codec, beside other formats (about an hour)
 # make bench-pvs     cells and visibility, what is traded for what (a quarter of an hour)
-# make bench-ach     coverage hints: what accuracy costs (half an hour)
+# make bench-ach     coverage hints: what accuracy costs (a quarter of an hour)
 # make sample  only the sample museum
 # make setup   only the virtual environment
 # make clean   remove what was built, except the virtual environment
