@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.backend import open_renderer
 from ptmtools.coverage.estimate import RULE_OF_THREE
-from ptmtools.coverage.item_buffer import Renderer, Surfaces
+from ptmtools.coverage.item_buffer import VIEWS, Renderer, Surfaces
 from ptmtools.coverage.looking import Owners
 from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
@@ -35,6 +35,8 @@ from ptmtools.visibility.model import Pvs
 
 #: Rays that a process of its own is worth: it takes a second or two to start, as 5 million rays do.
 WORTH_A_PROCESS = 1e7
+#: Sample points that a tolerance takes in most cells, at most.
+EXPECTED = 1024
 
 
 def compute_ach(
@@ -75,7 +77,8 @@ def _each(
     renderer: Renderer,
 ) -> Iterable[CellHints]:
     """The hints of every cell, in order."""
-    rays = cells.cell_count * options.points * 6 * options.side**2
+    points = options.points if options.tolerance is None else EXPECTED
+    rays = cells.cell_count * points * len(VIEWS) * options.side**2
     workers = min(options.workers, int(rays / WORTH_A_PROCESS))
     if renderer.backend == "embree" and workers > 1:
         return shared_out(scene, cells, pvs, options, workers)

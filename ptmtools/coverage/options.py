@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
+from ptmtools.coverage.estimate import GROUPS
 from ptmtools.errors import InputError
 
 Preset = Literal["paper", "fast", "default", "high"]
@@ -16,8 +17,6 @@ Backend = Literal["auto", "gl", "embree"]
 MAX_FACE = 2048
 #: Sample points a cell: the counts of all of them are held at once.
 MAX_SAMPLES = 2**14
-#: The least that samples may be with a tolerance: one for each of the sequences that are compared.
-LEAST_FOR_TOLERANCE = 8
 #: Of each preset: sample points a cell, pixels a side of a view, and how the points are placed.
 PRESETS: dict[Preset, tuple[int, int, Placement]] = {
     "paper": (8, 256, "uniform"),
@@ -39,7 +38,7 @@ class AchOptions:
     face: pixels a side of each of the six views. Positions matter far more: ask for more samples
         before a larger face.
     placement: of sample points: "sobol" (a scrambled sequence), "kd" (the middles of equal parts,
-        best for fewer than 30) or "uniform" (at random, as in the paper).
+        best for fewer than 16) or "uniform" (at random, as in the paper).
     tolerance: in each cell, points are added until the hints are this near to the truth (total
         variation, at about 95 %), or there are as many as samples allows.
     weighting: "pixel" counts every pixel of a view alike, as the paper; "solid-angle" counts less
@@ -111,11 +110,11 @@ class AchOptions:
                 f"a tolerance of {tolerance} makes no sense",
                 remedy="give a total variation above 0 and below 1, such as 0.01",
             )
-        if self.points < LEAST_FOR_TOLERANCE:
+        if self.points < GROUPS:  # of which each needs one
             raise InputError(
                 "PTM-I500",
                 f"{self.points} sample points do not tell how far they are from a tolerance",
-                remedy=f"allow {LEAST_FOR_TOLERANCE} or more, or leave --samples out",
+                remedy=f"allow {GROUPS} or more, or leave --samples out",
             )
         if self.placed == "kd":
             raise InputError(

@@ -11,7 +11,7 @@ Position matters far more than resolution (docs/coverage.md), so there is a choi
 ``kd``
     The volume is halved again and again along its longest axis into as many parts of equal volume
     as there are points, and each part is looked at from the point nearest to its centroid: best
-    below some thirty points.
+    below some sixteen points.
 ``uniform``
     Independent random points, as in the paper: K^-0.5.
 

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from ptmtools.coverage.embree import EmbreeRenderer
@@ -215,9 +215,11 @@ def test_neither_place_nor_unit_matters(
     eye=st.tuples(st.floats(0.2, 11.8), st.floats(0.2, 3.8), st.floats(-1.8, 1.8)),
     face=st.sampled_from([16, 33, 64]),
 )
+@example(eye=(4.0, 1.0, 0.0), face=33)
 def test_backends_agree_anywhere(room_row, coverage_at, has_gl, require, eye, face):
     """Rasterised edges are rounded to 1/256 pixel, so an edge along a row of pixel centres may
-    move by that row; no more than a few such rows at a time."""
+    move by that row; no more than a few such rows at a time. From the very plane of a partition
+    that plane is a row in each of four views, and where rooms meet in it either may win."""
     if not has_gl:
         require("OpenGL", "apt install libegl1 libgl1 libgl1-mesa-dri")
     scene, cells = room_row(3)
@@ -226,7 +228,8 @@ def test_backends_agree_anywhere(room_row, coverage_at, has_gl, require, eye, fa
     by_gl = coverage_at("gl", scene, cells, eye, face)
     by_rays = coverage_at("embree", scene, cells, eye, face)
     assert by_gl.sum() == by_rays.sum() == 6 * face**2
-    assert np.abs(by_gl - by_rays).max() <= 2 * face
+    ties = 4 * face if eye[0] in (4, 8) else 0
+    assert np.abs(by_gl - by_rays).max() <= 2 * face + ties
 
 
 class Doubtful:

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from ptmtools.coverage.ach import compute_ach
-from ptmtools.coverage.estimate import GROUPS
-from ptmtools.coverage.options import LEAST_FOR_TOLERANCE, AchOptions
+from ptmtools.coverage.options import AchOptions
 from ptmtools.errors import InputError
 from ptmtools.pipeline.build import _coverage_notes
 from ptmtools.visibility.model import Pvs
@@ -126,7 +125,6 @@ def test_the_note_counts_the_cells_that_fell_short(room_row):
 
 def test_a_tolerance_needs_eight_points():
     """One for each of the independent sequences."""
-    assert LEAST_FOR_TOLERANCE == GROUPS
     with pytest.raises(InputError, match="PTM-I500"):
         AchOptions(tolerance=0.1, samples=7)
     AchOptions(tolerance=0.1, samples=8)
@@ -220,9 +218,10 @@ def test_few_points_are_best_at_the_middles_of_equal_parts(room_row, exact_row):
 
 @pytest.mark.parametrize("placement", ["sobol", "uniform"])
 def test_views_of_a_few_pixels_have_no_grid(room_row, exact_row, placement):
-    """With the same 16 pixel centres at every point no number of points would be enough."""
-    options = replace(RAYS, samples=4096, face=4, placement=placement)
+    """With the same 4 pixel centres at every point no number of points would be enough: here they
+    are off by 0.007."""
+    options = replace(RAYS, samples=4096, face=2, placement=placement)
     found = compute_ach(*room_row(ROOMS), all_visible(ROOMS), options)
     away = variation(matrix(found, all_visible(ROOMS)), exact_row(ROOMS))
     assert (away <= 1.5 * found.uncertain).all()
-    assert found.uncertain.max() < 0.02
+    assert found.uncertain.max() < 0.004
