@@ -45,6 +45,7 @@ class TextureRecord:
     width, height, components: of the finest level stored.
     levels: coarsest first.
     sha256: hex digest of the `.ptm`'s bytes.
+    fallback_level: index into `levels` of the one that the PNG twin holds, or None.
     """
 
     image: int
@@ -55,6 +56,7 @@ class TextureRecord:
     components: int
     levels: tuple[TextureLevel, ...]
     sha256: str
+    fallback_level: int | None = None
 
 
 @dataclass(frozen=True)

@@ -122,11 +122,13 @@ def texture_records(run: Run) -> tuple[TextureRecord, ...]:
             )
             for level in header.levels
         )
+        served = f"{SERVED}/{twin}" in outputs
         records.append(
             TextureRecord(
                 image=i,
                 file=file,
-                fallback=twin if f"{SERVED}/{twin}" in outputs else None,
+                fallback=twin if served else None,
+                fallback_level=len(levels) - 1 if served else None,
                 width=levels[-1].width,
                 height=levels[-1].height,
                 components=header.components,
