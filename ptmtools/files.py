@@ -4,6 +4,11 @@ The bytes go to a temporary file in the target's folder, are flushed to the disk
 target's name in one step. Whatever goes wrong, the temporary file is removed and the target is
 untouched. Where the system can, the temporary file has no name until it is whole, so that not even
 a killed process leaves one; elsewhere a killed process leaves a hidden ``.part`` file.
+
+Links are not followed on the way: a target that is a symbolic link is replaced itself, and what it
+points to is left alone. A folder that was made to be written into is walked by `real_folder`, which
+refuses links. That guards against what lies there before, such as a database from elsewhere, not
+against somebody who may write in the folder and exchanges it at the same moment.
 """
 
 from __future__ import annotations
@@ -11,6 +16,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import stat
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO
@@ -106,6 +112,90 @@ def refuse_existing(path: str | os.PathLike[str]) -> None:
             file=path,
             remedy="use --force to replace it, or name another file",
         )
+
+
+def real_folder(
+    root: str | os.PathLike[str], relative: str | os.PathLike[str] = "", *, make: bool = True
+) -> Path:
+    """The folder ``relative`` (with slashes) below ``root``, reached through no link.
+
+    ``root`` may be a link: whoever named it chose it. What is absent is made, or with ``make``
+    False left absent, and the path is returned all the same.
+
+    Raises
+    ------
+    OutputError: PTM-O005 if a component below the root is a symbolic link; PTM-O002 if one is no
+        folder, or the name leads out of the root, or a folder cannot be made; PTM-O003.
+    """
+    here = Path(root)
+    steps = _steps(here, relative)
+    with writing(here.joinpath(*steps)):
+        if make:
+            here.mkdir(parents=True, exist_ok=True)
+        for step in steps:
+            here /= step
+            if make:
+                with contextlib.suppress(FileExistsError):
+                    here.mkdir()
+            mode = _mode(here)
+            if stat.S_ISLNK(mode):
+                raise _link(here)
+            if mode and not stat.S_ISDIR(mode):
+                raise OutputError(
+                    "PTM-O002",
+                    "is not a folder",
+                    file=here,
+                    remedy="move it away, or name another output",
+                )
+    return here
+
+
+def real_file(root: str | os.PathLike[str], relative: str | os.PathLike[str]) -> Path | None:
+    """The regular file ``relative`` (with slashes) below ``root``, or None if there is none.
+
+    For what is read to be written on, moved or removed. Raises OutputError PTM-O005 if it is a
+    symbolic link or is reached through one, and as `real_folder` does.
+    """
+    steps = _steps(Path(root), relative)
+    if not steps:
+        return None
+    file = real_folder(root, "/".join(steps[:-1]), make=False) / steps[-1]
+    with writing(file):
+        mode = _mode(file)
+    if stat.S_ISLNK(mode):
+        raise _link(file)
+    return file if stat.S_ISREG(mode) else None
+
+
+def _steps(root: Path, relative: str | os.PathLike[str]) -> list[str]:
+    """The components of a relative name, none of which leads out on any system."""
+    name = Path(relative).as_posix() if isinstance(relative, os.PathLike) else relative
+    steps = [] if name in ("", ".") else name.split("/")
+    if "\\" in name or "\0" in name or ":" in name or {"", ".", ".."} & set(steps):
+        raise OutputError(
+            "PTM-O002",
+            f"{name!r} would lead out of the folder",
+            file=root,
+            remedy="nothing was written; the name comes from a damaged file",
+        )
+    return steps
+
+
+def _mode(path: Path) -> int:
+    """The kind of what is there, a link's own; 0 if nothing is."""
+    try:
+        return os.lstat(path).st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return 0
+
+
+def _link(path: Path) -> OutputError:
+    return OutputError(
+        "PTM-O005",
+        "is a symbolic link, which is not followed when writing",
+        file=path,
+        remedy="put a real folder or file in its place, or name another output",
+    )
 
 
 def _output_error(target: Path, error: OSError) -> OutputError:

@@ -12,7 +12,7 @@ from typing import IO
 import pytest
 
 from ptmtools.errors import OutputError
-from ptmtools.files import write_bytes, write_with
+from ptmtools.files import real_file, real_folder, write_bytes, write_with
 
 KILLED = """
 import os, signal, sys
@@ -87,3 +87,89 @@ def test_a_file_that_came_to_be_meanwhile_is_not_written_over(tmp_path: Path, fo
             write_with(target, write)
         assert target.read_bytes() == b"theirs"
     assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_target_that_is_a_link_is_replaced_itself(tmp_path: Path) -> None:
+    (tmp_path / "kept").write_bytes(b"theirs")
+    (tmp_path / "link").symlink_to("kept")
+    with pytest.raises(OutputError, match="PTM-O001"):
+        write_bytes(tmp_path / "link", b"mine")
+    write_bytes(tmp_path / "link", b"mine", force=True)
+    assert not (tmp_path / "link").is_symlink()
+    assert (tmp_path / "link").read_bytes() == b"mine"
+    assert (tmp_path / "kept").read_bytes() == b"theirs"
+
+
+def test_a_dangling_link_leads_nowhere(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to("elsewhere")
+    with pytest.raises(OutputError, match="PTM-O001"):
+        write_bytes(tmp_path / "link", b"mine")
+    write_bytes(tmp_path / "link", b"mine", force=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["link"]
+
+
+def test_folders_are_made_below_a_root(tmp_path: Path) -> None:
+    made = real_folder(tmp_path / "db", "www/textures")
+    assert made == tmp_path / "db/www/textures"
+    assert made.is_dir()
+    assert real_folder(tmp_path / "db", Path("www")) == tmp_path / "db/www"
+    assert real_folder(tmp_path / "db") == tmp_path / "db"
+    assert not real_folder(tmp_path / "db", "stages/x", make=False).exists()
+    assert not (tmp_path / "db/stages").exists()
+
+
+@pytest.mark.parametrize("relative", ["www", "www/textures", "www/textures/deeper"])
+@pytest.mark.parametrize("make", [False, True])
+def test_links_below_the_root_are_refused(relative: str, make: bool, tmp_path: Path) -> None:
+    (tmp_path / "outside").mkdir()
+    (tmp_path / "db").mkdir()
+    place = tmp_path / "db" / relative
+    place.parent.mkdir(parents=True, exist_ok=True)
+    place.symlink_to(tmp_path / "outside")
+    with pytest.raises(OutputError, match="PTM-O005"):
+        real_folder(tmp_path / "db", relative, make=make)
+    with pytest.raises(OutputError, match="PTM-O005"):
+        real_folder(tmp_path / "db", f"{relative}/below", make=make)
+    assert not list((tmp_path / "outside").iterdir())
+
+
+def test_the_root_itself_may_be_a_link(tmp_path: Path) -> None:
+    (tmp_path / "big disk").mkdir()
+    (tmp_path / "db").symlink_to("big disk")
+    real_folder(tmp_path / "db", "www")
+    assert (tmp_path / "big disk/www").is_dir()
+
+
+def test_a_file_in_place_of_a_folder_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "www").write_bytes(b"")
+    for make in (False, True):
+        with pytest.raises(OutputError, match="PTM-O002"):
+            real_folder(tmp_path, "www/textures", make=make)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["..", "a/../b", "/etc", "a//b", "./a", "a/", "a\\b", "C:a", "\\\\host\\share", "a\0b"],
+)
+def test_names_that_lead_out_are_refused(name: str, tmp_path: Path) -> None:
+    for what in (real_folder, real_file):
+        with pytest.raises(OutputError, match="PTM-O002"):
+            what(tmp_path, name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_real_files(tmp_path: Path) -> None:
+    (tmp_path / "www").mkdir()
+    (tmp_path / "www/a").write_bytes(b"a")
+    assert real_file(tmp_path, "www/a") == tmp_path / "www/a"
+    assert real_file(tmp_path, "www/b") is None
+    assert real_file(tmp_path, "nowhere/b") is None
+    assert real_file(tmp_path, "www") is None
+    assert real_file(tmp_path, "") is None
+    os.mkfifo(tmp_path / "www/fifo")
+    assert real_file(tmp_path, "www/fifo") is None
+    (tmp_path / "www/link").symlink_to("a")
+    (tmp_path / "alias").symlink_to("www")
+    for name in ("www/link", "alias/a"):
+        with pytest.raises(OutputError, match="PTM-O005"):
+            real_file(tmp_path, name)
