@@ -29,7 +29,8 @@ from numpy.typing import NDArray
 from ptmtools.tolerance import Tolerance
 from ptmtools.visibility.decide import Decisions
 from ptmtools.visibility.flow import PortalFlow, Portals, geometry, portal_flow
-from ptmtools.visibility.pvs import PvsOptions, leaf_matrix
+from ptmtools.visibility.options import PvsOptions
+from ptmtools.visibility.pvs import leaf_matrix
 
 
 def read_prt(path: Path) -> tuple[Portals, NDArray[np.int64]]:

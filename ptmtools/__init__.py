@@ -12,9 +12,9 @@ All of it is loaded when first used.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from ptmtools.lazy import names
 from ptmtools.version import __version__
 
 if TYPE_CHECKING:
@@ -65,7 +65,8 @@ if TYPE_CHECKING:
     )
     from ptmtools.texture.reader import open as open
     from ptmtools.visibility.model import Pvs
-    from ptmtools.visibility.pvs import PvsOptions, compute_pvs
+    from ptmtools.visibility.options import PvsOptions
+    from ptmtools.visibility.pvs import compute_pvs
 
 _HOME = {
     "Ach": "coverage.model",
@@ -92,7 +93,7 @@ _HOME = {
     "PtmHeader": "texture",
     "PtmReader": "texture",
     "Pvs": "visibility.model",
-    "PvsOptions": "visibility.pvs",
+    "PvsOptions": "visibility.options",
     "Scene": "scene",
     "SubdivideOptions": "cells",
     "TextureOptions": "pipeline",
@@ -175,8 +176,4 @@ __all__ = [
     "write_png",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+__getattr__ = names(__name__, _HOME)

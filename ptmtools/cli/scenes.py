@@ -33,7 +33,7 @@ from ptmtools.pipeline import (
     build_scene as build,
 )
 from ptmtools.scene import IngestOptions
-from ptmtools.visibility.pvs import PvsOptions
+from ptmtools.visibility.options import PvsOptions
 
 #: Notes that are shown without ``-v``.
 SHOWN_NOTES = 12

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-from ptmtools.coverage.estimate import GROUPS
 from ptmtools.errors import InputError
 
 Preset = Literal["paper", "fast", "default", "high"]
@@ -110,6 +109,8 @@ class AchOptions:
                 f"a tolerance of {tolerance} makes no sense",
                 remedy="give a total variation above 0 and below 1, such as 0.01",
             )
+        from ptmtools.coverage.estimate import GROUPS
+
         if self.points < GROUPS:  # of which each needs one
             raise InputError(
                 "PTM-I500",

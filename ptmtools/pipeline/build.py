@@ -26,7 +26,8 @@ from ptmtools.pipeline.run import IMAGES, Run, StageReport, peak_memory, work_of
 from ptmtools.pipeline.textures import TextureOptions, check_images, check_options, put_textures
 from ptmtools.progress import Progress, silent
 from ptmtools.scene import IngestOptions, Note, Scene, ingest
-from ptmtools.visibility.pvs import PvsOptions, compute_pvs
+from ptmtools.visibility.options import PvsOptions
+from ptmtools.visibility.pvs import compute_pvs
 
 PathLike = str | os.PathLike[str]
 

@@ -6,11 +6,14 @@ are imported when they are first asked for.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from ptmtools.lazy import names
 
 if TYPE_CHECKING:
-    from ptmtools.scene.ingestion import IngestOptions, ingest
+    from ptmtools.scene.ingestion import ingest
     from ptmtools.scene.model import Camera, Material, Note, Scene, SourceImage, Space
+    from ptmtools.scene.options import IngestOptions
 
 __all__ = [
     "Camera",
@@ -23,11 +26,11 @@ __all__ = [
     "ingest",
 ]
 
-
-def __getattr__(name: str) -> Any:
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module
-
-    home = "ingestion" if name in ("IngestOptions", "ingest") else "model"
-    return getattr(import_module(f"{__name__}.{home}"), name)
+__getattr__ = names(
+    __name__,
+    {
+        **dict.fromkeys(__all__, "model"),
+        "IngestOptions": "options",
+        "ingest": "ingestion",
+    },
+)

@@ -20,7 +20,6 @@ through another library, N231 material that cannot be seen.
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -33,6 +32,7 @@ from ptmtools.scene import space as spaces
 from ptmtools.scene.faces import KeptFaces, keep_faces
 from ptmtools.scene.images import ImageStore
 from ptmtools.scene.model import Camera, Material, Scene, Space
+from ptmtools.scene.options import IngestOptions
 from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import MAX_VERTICES, Findings, Source
 from ptmtools.scene.texels import uses_holes
@@ -44,27 +44,9 @@ SMALLEST_EXTENT, LARGEST_EXTENT = 1e-6, 1e9
 PLAIN, WHITE = (0.8, 0.8, 0.8), (1.0, 1.0, 1.0)
 
 
-@dataclass(frozen=True)
-class IngestOptions:
-    """How a model is read.
-
-    Attributes
-    ----------
-    unit: m, cm, mm, in, ft or the metres in one unit; None guesses from the size.
-    up: the model's up axis, "y" or "z"; None guesses from floor area and size.
-    strict: missing files, unknown materials, unreadable images and dropped faces are errors.
-    allow_outside: the model may name files outside its own folder.
-    """
-
-    unit: str | float | None = None
-    up: Literal["y", "z"] | None = None
-    strict: bool = False
-    allow_outside: bool = False
-
-
 def ingest(
     path: str | os.PathLike[str],
-    options: IngestOptions = IngestOptions(),
+    options: IngestOptions = IngestOptions(),  # noqa: B008 - a frozen value
     progress: Progress = silent,
 ) -> Scene:
     """Read a model file.

@@ -5,8 +5,9 @@ The names below are loaded when first used, so that importing this package costs
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from ptmtools.lazy import names
 
 if TYPE_CHECKING:
     from ptmtools.texture.codec import check, decode, decode_levels
@@ -72,8 +73,4 @@ _HOME = {
     "write_png": "images",
 }
 
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+__getattr__ = names(__name__, _HOME)

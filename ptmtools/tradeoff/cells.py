@@ -15,7 +15,8 @@ import numpy as np
 from ptmtools.cells import SubdivideOptions, subdivide
 from ptmtools.scene.model import Scene
 from ptmtools.tradeoff.experiment import Measured, Setting, timed
-from ptmtools.visibility.pvs import PvsOptions, compute_pvs
+from ptmtools.visibility.options import PvsOptions
+from ptmtools.visibility.pvs import compute_pvs
 
 #: Leaves of a subdivision that is only there to have everything compiled.
 WARM = 4

@@ -15,7 +15,7 @@ from ptmtools.tradeoff.experiment import Experiment
 from ptmtools.tradeoff.hints import CoverageTrade
 from ptmtools.tradeoff.textures import TexturesTrade
 from ptmtools.tradeoff.visibility import VisibilityTrade
-from ptmtools.visibility.pvs import PvsOptions
+from ptmtools.visibility.options import PvsOptions
 
 #: Those with an experiment, in the order in which they run.
 STAGES = ("cells", "pvs", "ach", "textures")

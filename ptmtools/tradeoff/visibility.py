@@ -14,7 +14,8 @@ import numpy as np
 
 from ptmtools.cells.model import Cells
 from ptmtools.tradeoff.experiment import Measured, Setting, timed
-from ptmtools.visibility.pvs import PvsOptions, compute_pvs
+from ptmtools.visibility.options import PvsOptions
+from ptmtools.visibility.pvs import compute_pvs
 
 #: The budget of the reference, which hardly any portal exhausts.
 AMPLE = 2_000_000

@@ -3,9 +3,17 @@
 `compute_pvs` computes them, `check_conservative` tries to catch them missing something.
 """
 
-from ptmtools.visibility.model import Pvs
-from ptmtools.visibility.pvs import PvsOptions, compute_pvs
-from ptmtools.visibility.segments import MissedPair, SegmentReport, check_conservative
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ptmtools.lazy import names
+
+if TYPE_CHECKING:
+    from ptmtools.visibility.model import Pvs
+    from ptmtools.visibility.options import PvsOptions
+    from ptmtools.visibility.pvs import compute_pvs
+    from ptmtools.visibility.segments import MissedPair, SegmentReport, check_conservative
 
 __all__ = [
     "MissedPair",
@@ -15,3 +23,15 @@ __all__ = [
     "check_conservative",
     "compute_pvs",
 ]
+
+__getattr__ = names(
+    __name__,
+    {
+        "MissedPair": "segments",
+        "Pvs": "model",
+        "PvsOptions": "options",
+        "SegmentReport": "segments",
+        "check_conservative": "segments",
+        "compute_pvs": "pvs",
+    },
+)

@@ -22,7 +22,8 @@ from ptmtools.tradeoff.experiment import Setting
 from ptmtools.tradeoff.hints import REFERENCE_SEED, CoverageTrade
 from ptmtools.tradeoff.textures import TexturesTrade
 from ptmtools.tradeoff.visibility import VisibilityTrade
-from ptmtools.visibility.pvs import PvsOptions, compute_pvs
+from ptmtools.visibility.options import PvsOptions
+from ptmtools.visibility.pvs import compute_pvs
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data/two_rooms/two_rooms.obj"
 LITTLE = ("--cells-tried", "2", "--reference", "64")

@@ -1,0 +1,24 @@
+"""The knobs of ingest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class IngestOptions:
+    """How a model is read.
+
+    Attributes
+    ----------
+    unit: m, cm, mm, in, ft or the metres in one unit; None guesses from the size.
+    up: the model's up axis, "y" or "z"; None guesses from floor area and size.
+    strict: missing files, unknown materials, unreadable images and dropped faces are errors.
+    allow_outside: the model may name files outside its own folder.
+    """
+
+    unit: str | float | None = None
+    up: Literal["y", "z"] | None = None
+    strict: bool = False
+    allow_outside: bool = False

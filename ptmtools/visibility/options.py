@@ -1,0 +1,47 @@
+"""The knobs of the visibility stage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from ptmtools.errors import InputError
+
+
+@dataclass(frozen=True)
+class PvsOptions:
+    """Settings of `compute_pvs`.
+
+    Attributes
+    ----------
+    method: full: portal flow, exact up to the budget; fast: planes and the separators of the first
+        two portals, looser and conservative too; sampled: what random lines show, not conservative,
+        to compare with.
+    budget: operations (chain tests, clips) that the search from one side of a portal may take
+        before what it has not refuted counts as visible; the result is conservative at any value.
+    lines: random lines through each portal, where sampled.
+    exact: whether what floating point rejects by a hair is decided again in exact arithmetic;
+        otherwise lines of sight thinner than a rounding are not seen.
+    workers: threads, None for one per processor; never changes the result.
+    """
+
+    method: Literal["full", "fast", "sampled"] = "full"
+    budget: int = 200_000
+    lines: int = 1000
+    exact: bool = True
+    workers: int | None = None
+
+    def __post_init__(self) -> None:
+        wrong = f"budget {self.budget}" if self.budget < 0 else f"workers {self.workers}"
+        if self.budget < 0 or (self.workers is not None and self.workers < 1):
+            raise InputError(
+                "PTM-I402",
+                f"{wrong} is out of range",
+                remedy="give a budget of at least 0 and at least one worker",
+            )
+        if self.method not in ("full", "fast", "sampled") or self.lines < 1:
+            raise InputError(
+                "PTM-I402",
+                f"method {self.method!r} with {self.lines} lines is no way to compute visibility",
+                remedy="give full, fast or sampled, and at least one line",
+            )
