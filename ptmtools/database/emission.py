@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
 from ptmtools.database.cellfile import CellWriter
+from ptmtools.database.gltf import GLTF_FOLDER, GLTF_HINTS, UP, glb_file, gltf_files
 from ptmtools.database.hints import hints_text
 from ptmtools.database.model import EmitOptions, EmitReport, TextureRecord
 from ptmtools.database.names import CELL_FOLDER, HINTS, ROOT, cell_path
@@ -36,7 +38,8 @@ def emit(
     force: bool = False,
 ) -> EmitReport:
     """Writes `cells/c0000.wrl` …, `hints.json` and `root.wrl`, in this order, into the folder
-    ``out``. The textures themselves are written by the stage before.
+    ``out``; with ``options.format`` "gltf" the GLBs and `gltf/hints.json` before `hints.json`. The
+    textures themselves are written by the stage before.
 
     Parameters
     ----------
@@ -50,11 +53,13 @@ def emit(
         artifacts do not belong together.
     InputError: PTM-I600 a given viewpoint lies in no cell.
     OutputError: PTM-O001 to PTM-O003, see `ptmtools.files`.
+    LimitError: PTM-L600 a cell is longer than a GLB can be.
     """
     folder = Path(out)
     _check(scene, cells, pvs, ach, {t.image: t for t in textures})
+    gltf = options.format == "gltf"
     if not force:
-        for name in (ROOT, HINTS, CELL_FOLDER):
+        for name in (ROOT, HINTS, CELL_FOLDER, *([GLTF_FOLDER] if gltf else [])):
             if os.path.lexists(folder / name):
                 raise OutputError(
                     "PTM-O001",
@@ -66,13 +71,15 @@ def emit(
     writer = CellWriter(scene, cells, {t.image: t for t in textures}, options.fallback)
     with writing(folder):
         (folder / CELL_FOLDER).mkdir(parents=True, exist_ok=True)
+        if gltf:
+            (folder / GLTF_FOLDER).mkdir(exist_ok=True)
 
     files: list[str] = []
     size = shapes = triangles = 0
 
-    def write(name: str, text: str) -> None:
+    def write(name: str, content: str | bytes) -> None:
         nonlocal size
-        data = text.encode()
+        data = content.encode() if isinstance(content, str) else content
         write_bytes(folder / name, data, force=force)
         files.append(name)
         size += len(data)
@@ -88,10 +95,13 @@ def emit(
         shapes += cell.shapes
         triangles += cell.triangles
     progress(cells.cell_count, cells.cell_count, "cells")
-    write(
-        HINTS,
-        hints_text(scene.space, cells, pvs, ach, textures, images, viewpoints, options),
-    )
+    hints = partial(hints_text, scene.space, cells, pvs, ach, textures, images, viewpoints, options)
+    if gltf:
+        geometry, count = writer.geometry, cells.cell_count
+        for name, glb in gltf_files(scene, geometry, count, textures, options.fallback, progress):
+            write(name, glb)
+        write(GLTF_HINTS, hints(cell_url=glb_file, up=UP))
+    write(HINTS, hints())
     write(ROOT, root_text(viewpoints, boxes, options))
     return EmitReport(
         files=tuple(files),

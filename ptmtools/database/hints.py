@@ -7,7 +7,7 @@ so that a difference between two databases can be read.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 from urllib.parse import quote
 
@@ -37,8 +37,12 @@ def hints_text(
     images: Sequence[Sequence[int]],
     viewpoints: Sequence[Viewpoint],
     options: EmitOptions,
+    *,
+    cell_url: Callable[[int], str] = cell_path,
+    up: str = "",
 ) -> str:
-    """The contents of `hints.json`; ``images`` are the images that each cell uses.
+    """The contents of `hints.json`; ``images`` are the images that each cell uses. ``cell_url`` and
+    ``up``, the way to the served folder, are those of another place than that folder.
 
     Raises
     ------
@@ -60,7 +64,7 @@ def hints_text(
     rows = [
         {
             "name": cell_name(c),
-            "url": cell_path(c),
+            "url": cell_url(c),
             "leaves": [_leaf(cells, leaf) for leaf in cells.cell_leaves(c).tolist()],
             "textures": sorted(place[image] for image in images[c]),
             "adjacent": adjacent[c].tolist(),
@@ -76,7 +80,7 @@ def hints_text(
     ]
     lists: dict[str, Sequence[object]] = {
         "viewpoints": [_viewpoint(v) for v in viewpoints],
-        "textures": [_texture(record, options.fallback) for record in textures],
+        "textures": [_texture(record, options.fallback, up) for record in textures],
         "cells": rows,
     }
     lines = [f" {_json(k)}: {_json(v)}" for k, v in head.items()]
@@ -164,11 +168,11 @@ def _viewpoint(v: Viewpoint) -> dict[str, Any]:
     }
 
 
-def _texture(record: TextureRecord, fallback: bool) -> Mapping[str, Any]:
+def _texture(record: TextureRecord, fallback: bool, up: str) -> Mapping[str, Any]:
     png = record.fallback if fallback else None
     return {
-        "file": quote(record.file),
-        "fallback": None if png is None else quote(png),
+        "file": up + quote(record.file),
+        "fallback": None if png is None else up + quote(png),
         "width": record.width,
         "height": record.height,
         "components": record.components,

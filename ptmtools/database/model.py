@@ -111,6 +111,7 @@ class EmitOptions:
     avatar_size: NavigationInfo's: least distance to a wall, height of the eye above the floor,
         highest step, metres.
     field_of_view: of viewpoints that are no cameras, radians.
+    format: "gltf" writes a GLB for each cell, and hints for them, beside the VRML files.
     """
 
     title: str = "ptmtools database"
@@ -119,6 +120,7 @@ class EmitOptions:
     viewpoint_count: int = 4
     avatar_size: Vector = (0.25, 1.6, 0.75)
     field_of_view: float = 1.1
+    format: Literal["vrml", "gltf"] = "vrml"
 
     def __post_init__(self) -> None:
         wrong = None
@@ -128,6 +130,8 @@ class EmitOptions:
             wrong = "an avatar's sizes are metres of at least 0"
         elif self.viewpoint_count < 1:
             wrong = f"at most {self.viewpoint_count} viewpoints is none"
+        elif self.format not in ("vrml", "gltf"):
+            wrong = f"{self.format!r} is neither vrml nor gltf"
         if wrong:
             raise InputError("PTM-I603", wrong, remedy="leave the option out for its default")
 

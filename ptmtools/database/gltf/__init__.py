@@ -1,0 +1,12 @@
+"""Artifacts → glTF 2.0: a GLB for every cell, beside its VRML file; and back: their check.
+
+docs/gltf.md says what is in them. The textures are those of the VRML files, referred to by URI;
+no extension is used. `gltf/hints.json` is written by `ptmtools.database.hints`.
+"""
+
+from __future__ import annotations
+
+from ptmtools.database.gltf.cell import gltf_files
+from ptmtools.database.gltf.names import GLTF_FOLDER, GLTF_HINTS, UP, glb_file
+
+__all__ = ["GLTF_FOLDER", "GLTF_HINTS", "UP", "glb_file", "gltf_files"]

@@ -1,0 +1,106 @@
+"""The accessors of one GLB and the bytes behind them.
+
+One buffer view for each kind of data: positions, texture coordinates, wide indices, narrow ones.
+An array that was there before gets no second accessor. Vertices are in the order of their first
+use, so rectangles of all sizes share their six indices, and often their texture coordinates: in
+the sample museum that saves SHARED.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_FLOAT, _SHORT, _INT = 5126, 5123, 5125
+_VERTICES, _INDICES = 34962, 34963
+#: Narrow indices end before 65535, which restarts a primitive.
+_NARROW = 65535
+#: In the order of the views: component type, type, bytes of an element, target.
+_KINDS = (
+    (_FLOAT, "VEC3", 12, _VERTICES),
+    (_FLOAT, "VEC2", 8, _VERTICES),
+    (_INT, "SCALAR", 4, _INDICES),
+    (_SHORT, "SCALAR", 2, _INDICES),
+)
+_POSITION, _COORDINATE, _WIDE, _THIN = range(4)
+
+
+class BufferWriter:
+    """Gathers arrays; each method returns the index of the array's accessor."""
+
+    def __init__(self) -> None:
+        self._bytes: tuple[list[bytes], ...] = ([], [], [], [])
+        self._size = [0, 0, 0, 0]
+        self._accessors: list[dict[str, Any]] = []
+        self._known: dict[tuple[int, bytes], int] = {}
+
+    def positions(self, point: NDArray[np.float32]) -> int:
+        """(n, 3), with the bounds that glTF wants of them."""
+        bounds = {
+            "min": _numbers(point.min(axis=0)),
+            "max": _numbers(point.max(axis=0)),
+        }
+        return self._add(_POSITION, point.astype("<f4").tobytes(), bounds)
+
+    def coordinates(self, uv: NDArray[np.float32]) -> int:
+        """(n, 2)."""
+        return self._add(_COORDINATE, uv.astype("<f4").tobytes(), {})
+
+    def indices(self, triangle: NDArray[np.int64], vertices: int) -> int:
+        """(m, 3) indices into so many vertices."""
+        kind, form = (_THIN, "<u2") if vertices <= _NARROW else (_WIDE, "<u4")
+        return self._add(kind, triangle.astype(form).tobytes(), {})
+
+    def _add(self, kind: int, data: bytes, more: dict[str, Any]) -> int:
+        place = self._known.setdefault((kind, data), len(self._accessors))
+        if place == len(self._accessors):
+            component, form, size, _ = _KINDS[kind]
+            accessor: dict[str, Any] = {"bufferView": kind}
+            if self._size[kind]:
+                accessor["byteOffset"] = self._size[kind]
+            accessor |= {"componentType": component, "count": len(data) // size, "type": form}
+            self._accessors.append(accessor | more)
+            self._bytes[kind].append(data)
+            self._size[kind] += len(data)
+        return place
+
+    def finish(self) -> tuple[dict[str, Any], bytes]:
+        """The members "accessors", "bufferViews" and "buffers" of the document, and the bytes."""
+        if not self._accessors:
+            return {}, b""
+        views: list[dict[str, Any]] = []
+        place: dict[int, int] = {}
+        at = 0
+        for kind, (_, _, size, target) in enumerate(_KINDS):
+            if not self._size[kind]:
+                continue
+            place[kind] = len(views)
+            view: dict[str, Any] = {"buffer": 0}
+            if at:
+                view["byteOffset"] = at
+            view["byteLength"] = self._size[kind]
+            # Vertex data that several accessors share need it said, other data must not have it.
+            if target == _VERTICES and len(self._bytes[kind]) > 1:
+                view["byteStride"] = size
+            views.append(view | {"target": target})
+            at += self._size[kind]
+        members = {
+            "accessors": [a | {"bufferView": place[a["bufferView"]]} for a in self._accessors],
+            "bufferViews": views,
+            "buffers": [{"byteLength": at}],
+        }
+        return members, b"".join(part for parts in self._bytes for part in parts)
+
+
+def _numbers(values: NDArray[np.float32]) -> list[float]:
+    """As the shortest decimals that read back to the same float32."""
+    from ptmtools.database.numerals import numeral
+
+    shortest = [float(numeral(v)) for v in values]
+    return [int(v) if v.is_integer() and abs(v) < _WHOLE else v for v in shortest]
+
+
+#: Below this a whole number is not longer without its decimal point than with an exponent.
+_WHOLE = 1e15

@@ -1,0 +1,119 @@
+"""A cell as a GLB: a node and a mesh for each object, a primitive for each of its shapes.
+
+The shapes are those of the VRML file, in its order. Triangles are indexed; a vertex is a position
+with, where the material has an image, its texture coordinates, whose origin is the upper left in
+glTF. There are no normals: the scene has none, and surfaces without are flat (glTF 2.0, section
+3.7.2.1). One accessor of positions for each shape: a single one for the whole cell would be 2 %
+smaller, but clients take its bounds for the shape's, and some copy all of it for each shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.database.geometry import Geometry, Shape
+from ptmtools.database.gltf.buffer import BufferWriter
+from ptmtools.database.gltf.container import pack
+from ptmtools.database.gltf.material import MaterialWriter
+from ptmtools.database.gltf.names import glb_path
+from ptmtools.database.model import TextureRecord
+from ptmtools.database.names import cell_name
+from ptmtools.progress import Progress, silent
+from ptmtools.scene.model import Scene
+
+
+def gltf_files(
+    scene: Scene,
+    geometry: Geometry,
+    cells: int,
+    textures: Sequence[TextureRecord],
+    fallback: bool,
+    progress: Progress = silent,
+) -> Iterator[tuple[str, bytes]]:
+    """The GLB of every cell: its path relative to the served folder, and its bytes.
+
+    Parameters
+    ----------
+    cells: how many there are.
+    textures: in the order of the hints; one for every image that a material in use names.
+    fallback: refer to the PNG twins; without, materials only name the `.ptm` in their extras.
+
+    Raises
+    ------
+    LimitError: PTM-L600 a cell is longer than a GLB can be.
+    """
+    records = {record.image: (place, record) for place, record in enumerate(textures)}
+    for cell in range(cells):
+        progress(cell, cells, "glTF")
+        materials = MaterialWriter(scene.materials, records, fallback)
+        yield glb_path(cell), _glb(scene, geometry, cell, materials)
+    progress(cells, cells, "glTF")
+
+
+def flipped(uv: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Texture coordinates with the origin at the upper left instead of the lower, or back."""
+    turned = np.array(uv, dtype=np.float64)
+    turned[..., 1] = 1 - turned[..., 1]
+    return turned.astype(np.float32)
+
+
+def _glb(scene: Scene, geometry: Geometry, cell: int, materials: MaterialWriter) -> bytes:
+    buffer = BufferWriter()
+    nodes: list[dict[str, Any]] = []
+    meshes: list[dict[str, Any]] = []
+    last = -1
+    for shape in geometry.shapes(cell):
+        if shape.object != last:
+            last = shape.object
+            nodes.append({"name": scene.objects[shape.object], "mesh": len(meshes)})
+            meshes.append({"primitives": []})
+        meshes[-1]["primitives"].append(_primitive(scene, geometry, shape, buffer, materials))
+    top: dict[str, Any] = {"name": cell_name(cell), "extras": {"cell": cell}}
+    if nodes:
+        top["nodes"] = list(range(len(nodes)))
+    document: dict[str, Any] = {
+        "asset": {"version": "2.0", "generator": "ptmtools"},
+        "scene": 0,
+        "scenes": [top],
+    }
+    if nodes:
+        document |= {"nodes": nodes, "meshes": meshes}
+    members, binary = buffer.finish()
+    return pack(document | materials.members() | members, binary)
+
+
+def _primitive(
+    scene: Scene,
+    geometry: Geometry,
+    shape: Shape,
+    buffer: BufferWriter,
+    materials: MaterialWriter,
+) -> dict[str, Any]:
+    textured = scene.materials[shape.material].image >= 0
+    # A vertex for each distinct pair of position and texture coordinates.
+    width = len(shape.uv) if textured else 1
+    corner = shape.triangle * width + (shape.uv_triangle if textured else 0)
+    vertex, triangle = _by_first_use(corner)
+    attributes = {"POSITION": buffer.positions(geometry.point[shape.point[vertex // width]])}
+    if textured:
+        uv = geometry.uv[shape.uv[vertex % width]]
+        attributes["TEXCOORD_0"] = buffer.coordinates(flipped(uv))
+    return {
+        "attributes": attributes,
+        "indices": buffer.indices(triangle, len(vertex)),
+        "material": materials.take(shape.material, shape.two_sided),
+    }
+
+
+def _by_first_use(corner: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The distinct values of an (m, 3) array, in the order in which they come, and (m, 3) where
+    each is among them."""
+    distinct, first, place = np.unique(corner.ravel(), return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return distinct[order], rank[place.ravel()].reshape(-1, 3)
