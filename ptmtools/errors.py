@@ -15,6 +15,7 @@ status    meaning
 6         something that is not installed is needed (`MissingComponentError`)
 7         an input is beyond a limit (`LimitError`)
 8         a check found errors (``ptm validate``)
+9         processes or machines that should help cannot, or no longer (`WorkerError`)
 130       interrupted
 141       the reader of the output went away
 ========  ======================================================================
@@ -64,6 +65,14 @@ class PtmError(Exception):
             what += f"; {self.remedy}"
         return f"{what} [{self.code}]".replace("\r", " ").replace("\n", " ")
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """For errors that come from other processes: what else is needed than ``args``."""
+        return _restored, (type(self), str(self)), vars(self)
+
+
+def _restored(kind: type[PtmError], text: str) -> PtmError:
+    return kind.__new__(kind, text)
+
 
 class InputError(PtmError):
     """An input cannot be read, or is not what it should be. Codes PTM-Ixxx."""
@@ -99,6 +108,12 @@ class CheckError(PtmError):
     """A check that the user asked for found errors. Codes PTM-Cxxx."""
 
     exit_status = 8
+
+
+class WorkerError(PtmError):
+    """Processes or machines that should help cannot be had, or have ended. Codes PTM-Wxxx."""
+
+    exit_status = 9
 
 
 @contextmanager

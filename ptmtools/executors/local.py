@@ -1,0 +1,86 @@
+"""Several tasks at a time on this machine: threads where they can, processes where they must.
+
+Threads share all memory and start at once, but only where the interpreter's lock is released do
+they add speed. The processes are started anew ("spawn"), when there is first something for them,
+and kept. See `processes` for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import AbstractContextManager, nullcontext
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from ptmtools.executors.model import AHEAD, Executor, Sharing
+from ptmtools.executors.opening import processors
+from ptmtools.executors.order import in_order
+from ptmtools.executors.serial import SerialSharing
+
+if TYPE_CHECKING:
+    from ptmtools.executors.processes import Processes
+
+S = TypeVar("S")
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class Local(Executor):
+    """See `Executor`. ``workers`` threads or processes, 0 is one for each processor.
+
+    A script that has processes started needs ``if __name__ == "__main__"``.
+    """
+
+    def __init__(self, workers: int = 0) -> None:
+        self._workers = workers or processors()
+        self._threads: ThreadPoolExecutor | None = None
+        self._processes: Processes | None = None
+
+    @property
+    def workers(self) -> int:
+        """How many threads, or processes."""
+        return self._workers
+
+    def sharing(
+        self, shared: S, *, releases_lock: bool = False
+    ) -> AbstractContextManager[Sharing[S]]:
+        """See `Executor.sharing`."""
+        if self._workers == 1:
+            return nullcontext(SerialSharing(shared))
+        if releases_lock:
+            if self._threads is None:
+                self._threads = ThreadPoolExecutor(self._workers, "ptmtools")
+            return nullcontext(_InThreads(shared, self._threads, self._workers))
+        from ptmtools.executors.processes import Processes
+
+        if self._processes is None:
+            self._processes = Processes(self._workers)
+        return self._processes.sharing(shared)
+
+    def close(self) -> None:
+        """See `Executor.close`."""
+        if self._threads:
+            self._threads.shutdown(cancel_futures=True)
+            self._threads = None
+        if self._processes:
+            self._processes.close()
+            self._processes = None
+
+
+class _InThreads(SerialSharing[S]):
+    """See `Sharing`: the one copy is the caller's own, and threads read it."""
+
+    def __init__(self, shared: S, pool: ThreadPoolExecutor, workers: int) -> None:
+        super().__init__(shared)
+        self._pool, self._workers = pool, workers
+
+    def each(
+        self, function: Callable[[S, T], R], tasks: Iterable[T], *, chunk: int = 1
+    ) -> Iterator[R]:
+        """See `Sharing.each`. Nothing travels, so there are no chunks."""
+
+        def submit(task: T) -> Any:
+            return self._pool.submit(function, self._shared, task)
+
+        # Whoever is told of an error may change what the threads are still reading.
+        return in_order(submit, tasks, AHEAD * self._workers, wait)

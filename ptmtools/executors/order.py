@@ -1,0 +1,53 @@
+"""Results in the order of the tasks, with a bounded number of them under way."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from itertools import islice
+from typing import Any, Protocol, TypeVar
+
+T = TypeVar("T")
+R_co = TypeVar("R_co", covariant=True)
+R = TypeVar("R")
+
+
+class Pending(Protocol[R_co]):
+    """A task under way: a `concurrent.futures.Future`, or a cluster's."""
+
+    def result(self) -> R_co: ...
+
+    def cancel(self) -> object: ...
+
+
+def in_order(
+    submit: Callable[[T], Pending[R]],
+    tasks: Iterable[T],
+    ahead: int,
+    dropped: Callable[[list[Any]], object] | None = None,
+) -> Iterator[R]:
+    """The results of ``tasks``, of which at most ``ahead`` are submitted and not yet yielded.
+
+    When it ends early, those that have not begun are cancelled, and all that were under way are
+    handed to ``dropped``.
+    """
+    waiting: deque[Pending[R]] = deque()
+    try:
+        for task in tasks:
+            waiting.append(submit(task))
+            if len(waiting) >= ahead:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+    finally:
+        for pending in waiting:
+            pending.cancel()
+        if dropped and waiting:
+            dropped(list(waiting))
+
+
+def chunks(tasks: Iterable[T], size: int) -> Iterator[list[T]]:
+    """The tasks in lists of ``size``, the last one shorter."""
+    rest = iter(tasks)
+    while some := list(islice(rest, max(1, size))):
+        yield some

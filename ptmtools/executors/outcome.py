@@ -1,0 +1,50 @@
+"""What comes back from a worker: results of some tasks, and what stopped it."""
+
+from __future__ import annotations
+
+import pickle
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The results of the first tasks, and the exception of the one after, if any."""
+
+    results: list[Any]
+    fault: Exception | None = None
+
+    def __iter__(self) -> Iterator[Any]:
+        """The results; then raises the exception."""
+        yield from self.results
+        if self.fault:
+            raise self.fault
+
+
+def outcome(function: Callable[[Any, Any], Any], shared: Any, tasks: Sequence[Any]) -> Outcome:
+    """Does the tasks up to the first that fails."""
+    results: list[Any] = []
+    try:
+        for task in tasks:
+            results.append(function(shared, task))
+    except Exception as fault:
+        return Outcome(results, _travelling(fault))
+    return Outcome(results)
+
+
+def _travelling(fault: Exception) -> Exception:
+    """The exception with its traceback as a note, or one that says the same if it would not
+    survive the journey."""
+    fault.add_note("In a worker:\n" + "".join(traceback.format_exception(fault)))
+    fault.__cause__ = fault.__context__ = None
+    try:
+        if type(pickle.loads(pickle.dumps(fault))) is type(fault):
+            return fault
+    except Exception:  # whatever its class does
+        pass
+    plain = RuntimeError(f"{type(fault).__name__}: {fault}")
+    for note in fault.__notes__:
+        plain.add_note(note)
+    return plain
