@@ -1,4 +1,5 @@
-"""Writing a file so that it is, at any moment, either as it was before or whole.
+"""Writing a file so that it is, at any moment, either as it was before or whole; and reading what
+others name, which may be no file at all.
 
 The bytes go to a temporary file in the target's folder, are flushed to the disk, and take the
 target's name in one step. Whatever goes wrong, the temporary file is removed and the target is
@@ -19,7 +20,7 @@ import os
 import stat
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import IO
+from typing import IO, BinaryIO
 
 from ptmtools.errors import OutputError
 
@@ -112,6 +113,28 @@ def refuse_existing(path: str | os.PathLike[str]) -> None:
             file=path,
             remedy="use --force to replace it, or name another file",
         )
+
+
+def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
+    """A file opened for reading, if it is one: a named pipe would be waited for, and a device may
+    never end.
+
+    Raises OSError, EINVAL for what is no file and no folder. ValueError for a NUL in the name.
+    """
+    flags = os.O_RDONLY
+    for name in ("O_BINARY", "O_CLOEXEC", "O_NOCTTY", "O_NONBLOCK"):
+        flags |= getattr(os, name, 0)
+    descriptor = os.open(path, flags)
+    try:
+        mode = os.fstat(descriptor).st_mode
+        if stat.S_ISDIR(mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), os.fspath(path))
+        if not stat.S_ISREG(mode):
+            raise OSError(errno.EINVAL, "not a regular file", os.fspath(path))
+        return os.fdopen(descriptor, "rb")
+    except BaseException:
+        os.close(descriptor)
+        raise
 
 
 def real_folder(

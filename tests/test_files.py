@@ -12,7 +12,7 @@ from typing import IO
 import pytest
 
 from ptmtools.errors import OutputError
-from ptmtools.files import real_file, real_folder, write_bytes, write_with
+from ptmtools.files import open_regular, real_file, real_folder, write_bytes, write_with
 
 KILLED = """
 import os, signal, sys
@@ -173,3 +173,19 @@ def test_real_files(tmp_path: Path) -> None:
     for name in ("www/link", "alias/a"):
         with pytest.raises(OutputError, match="PTM-O005"):
             real_file(tmp_path, name)
+
+
+def test_only_files_are_opened(tmp_path: Path) -> None:
+    (tmp_path / "a").write_bytes(b"a")
+    (tmp_path / "link").symlink_to("a")
+    for name in ("a", "link"):
+        with open_regular(tmp_path / name) as file:
+            assert file.read() == b"a"
+    os.mkfifo(tmp_path / "fifo")  # nobody writes: opened for reading, it would block
+    for other in (tmp_path / "fifo", "/dev/zero", "/dev/null"):
+        with pytest.raises(OSError, match="not a regular file"):
+            open_regular(other)
+    with pytest.raises(IsADirectoryError):
+        open_regular(tmp_path)
+    with pytest.raises(FileNotFoundError):
+        open_regular(tmp_path / "b")
