@@ -20,6 +20,7 @@ import numpy as np
 
 from ptmtools.database.cellcheck import ReadCell, check_cell, read_cell
 from ptmtools.database.findings import Findings
+from ptmtools.database.gltf.check import GltfCheck
 from ptmtools.database.hintscheck import (
     ReadHints,
     check_against_cells,
@@ -92,6 +93,7 @@ class _Check:
         self._documents: dict[str, Document] = {}
         self._cells: dict[str, ReadCell] = {}
         self._hints: ReadHints | None = None
+        self._gltf = GltfCheck(SERVED, self.found)
         self._digests: dict[str, tuple[str, int]] = {}
 
     def run(self, progress: Progress) -> None:
@@ -115,6 +117,7 @@ class _Check:
         self._check_cells()
         root = self._check_root()
         self._check_hints(root)
+        self._gltf.compare(self._served, self._documents, self._resolve)
 
     def _read_manifest(self) -> bool:
         """Fills in what the stages wrote; whether `emit` was among them."""
@@ -160,6 +163,7 @@ class _Check:
             self.found.add("PTM-D652", name, "", "not what its stage wrote: the hash differs")
         if not name.startswith(f"{SERVED}/"):
             return
+        self._gltf.read(name, data)
         if name.endswith(".wrl"):
             try:
                 self._documents[name] = parse(data)

@@ -3,8 +3,9 @@
 The shapes are those of the VRML file, in its order. Triangles are indexed; a vertex is a position
 with, where the material has an image, its texture coordinates, whose origin is the upper left in
 glTF. There are no normals: the scene has none, and surfaces without are flat (glTF 2.0, section
-3.7.2.1). One accessor of positions for each shape: a single one for the whole cell would be 2 %
-smaller, but clients take its bounds for the shape's, and some copy all of it for each shape.
+3.7.2.1). Each shape has positions of its own: with one accessor for the whole cell the files of the
+sample museum are 13 % smaller, those of the hospital 5 %, but clients take its bounds for the
+shape's, and some copy all of it for each shape.
 """
 
 from __future__ import annotations
