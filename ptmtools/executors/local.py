@@ -83,4 +83,4 @@ class _InThreads(SerialSharing[S]):
             return self._pool.submit(function, self._shared, task)
 
         # Whoever is told of an error may change what the threads are still reading.
-        return in_order(submit, tasks, AHEAD * self._workers, wait)
+        return in_order(submit, tasks, lambda: AHEAD * self._workers, wait)

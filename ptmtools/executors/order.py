@@ -23,10 +23,10 @@ class Pending(Protocol[R_co]):
 def in_order(
     submit: Callable[[T], Pending[R]],
     tasks: Iterable[T],
-    ahead: int,
+    ahead: Callable[[], int],
     dropped: Callable[[list[Any]], object] | None = None,
 ) -> Iterator[R]:
-    """The results of ``tasks``, of which at most ``ahead`` are submitted and not yet yielded.
+    """The results of ``tasks``, of which at most ``ahead()`` are submitted and not yet yielded.
 
     When it ends early, those that have not begun are cancelled, and all that were under way are
     handed to ``dropped``.
@@ -35,7 +35,7 @@ def in_order(
     try:
         for task in tasks:
             waiting.append(submit(task))
-            if len(waiting) >= ahead:
+            while len(waiting) >= ahead():
                 yield waiting.popleft().result()
         while waiting:
             yield waiting.popleft().result()

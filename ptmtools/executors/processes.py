@@ -60,7 +60,9 @@ class Processes:
         """
         pool = self._opened()
         try:
-            yield from in_order(lambda job: pool.submit(_outcome, *job), jobs, AHEAD * self.workers)
+            yield from in_order(
+                lambda job: pool.submit(_outcome, *job), jobs, lambda: AHEAD * self.workers
+            )
         except BrokenProcessPool as fault:
             self.close()
             raise WorkerError(
