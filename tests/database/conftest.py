@@ -157,6 +157,12 @@ def finished(artifacts: Artifacts, tmp_path_factory: pytest.TempPathFactory) -> 
     return db
 
 
+@pytest.fixture(scope="session")
+def put_textures() -> Callable[[Path], tuple[TextureRecord, ...]]:
+    """``put_textures(www)`` writes the two textures and returns their records."""
+    return write_textures
+
+
 @pytest.fixture
 def seal() -> Callable[[Path], None]:
     """``seal(db)`` writes the manifest of what lies there now, faults included."""

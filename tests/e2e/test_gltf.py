@@ -1,0 +1,94 @@
+"""`--format gltf`: the Khronos validator finds nothing; the files go when not asked for."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from ptmtools.cli.main import main
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "tests" / "e2e")]
+from browsers import gltf_validator  # noqa: E402
+
+#: What the validator remarks of every image that is referred to.
+REMARKS = {"URI_GLB"}
+
+
+@pytest.fixture(scope="module")
+def khronos(require: Callable[[str, str], None]) -> Any:
+    if remedy := gltf_validator.missing():
+        require("the glTF validator", remedy)
+    return gltf_validator
+
+
+def clean(khronos: Any, database: Path) -> int:
+    """The triangles of all GLBs, once they are known to be without errors and warnings."""
+    www = database / "www"
+    found = khronos.validate(www / "gltf")
+    cells = json.loads((www / "hints.json").read_text())["cells"]
+    assert sorted(found) == sorted(f"{cell['name']}.glb" for cell in cells)
+    assert {name: file.complaints for name, file in found.items() if file.complaints} == {}
+    assert set().union(*(file.remarks for file in found.values())) <= REMARKS
+    for cell in cells:  # every image was fetched
+        assert found[f"{cell['name']}.glb"].images >= len(cell["textures"])
+    return sum(file.triangles for file in found.values())
+
+
+def counts(database: Path) -> dict[str, int]:
+    """The figures of the last stage."""
+    manifest = json.loads((database / "manifest.json").read_text())
+    return dict(manifest["stages"]["emit"]["counts"])
+
+
+def test_two_rooms(khronos: Any, database: Path, ptm: Any) -> None:
+    www = database / "www"
+    before = {p: p.read_bytes() for p in www.rglob("*") if p.is_file()}
+    assert ptm("emit", database, "--format", "gltf").status == 0
+    assert all(path.read_bytes() == data for path, data in before.items())
+    assert clean(khronos, database) == counts(database)["triangles"] > 0
+    assert ptm("validate", database).status == 0
+    assert ptm("emit", database).status == 0
+    assert not (www / "gltf").exists()
+    assert {p for p in www.rglob("*") if p.is_file()} == set(before)
+    assert ptm("validate", database).status == 0
+
+
+def test_museum(khronos: Any, tmp_path: Path) -> None:
+    script, options = ROOT / "sample_data" / "make_museum.py", ["--rooms", "1", "--textures", "9"]
+    model = [sys.executable, str(script), "-o", str(tmp_path / "model"), *options, "--size", "64"]
+    subprocess.run(model, check=True, capture_output=True)
+    db = tmp_path / "db"
+    built = ["-q", "build-scene", str(tmp_path / "model/museum.obj"), "-o", str(db), "-j", "1"]
+    assert main([*built, "--format", "gltf"]) == 0
+    assert clean(khronos, db) == counts(db)["triangles"]
+
+
+def test_hospital(khronos: Any, shared: Path, tmp_path: Path) -> None:
+    model, db = shared / "scenes/hospital/hospital.obj", tmp_path / "db"
+    quick = ["--cells", "leaf", "--samples", "2", "--face", "16", "--format", "gltf"]
+    assert main(["-q", "build-scene", str(model), "-o", str(db), *quick]) == 0
+    assert clean(khronos, db) == counts(db)["triangles"] > 10_000
+
+
+def test_the_validator_complains(khronos: Any, database: Path, ptm: Any, tmp_path: Path) -> None:
+    """Of a texture that is not there, of a number changed, of half a file."""
+    assert ptm("emit", database, "--format", "gltf").status == 0
+    www = Path(shutil.copytree(database / "www", tmp_path / "www"))
+    good = khronos.validate(www / "gltf")
+    textured = next(name for name, file in good.items() if file.images)
+    data = (www / "gltf" / textured).read_bytes()
+    for texture in (www / "textures").glob("*.png"):
+        texture.unlink()
+    assert "IO_ERROR" in khronos.validate(www / "gltf")[textured].complaints[0]
+    (www / "gltf" / textured).write_bytes(data.replace(b'"max":[', b'"max":[1', 1))
+    assert khronos.validate(www / "gltf")[textured].complaints
+    (www / "gltf" / textured).write_bytes(data[: len(data) // 2])
+    assert khronos.validate(www / "gltf")[textured].complaints
