@@ -45,7 +45,7 @@ from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.database import TextureRecord, emit
 from ptmtools.pipeline.archive import pack_arrays, unpack_arrays
-from ptmtools.scene import Scene, ingest
+from ptmtools.scene import Scene, SourceImage, ingest
 from ptmtools.tolerance import Tolerance
 from ptmtools.visibility import Pvs, compute_pvs
 
@@ -76,6 +76,8 @@ class Work:
         if isinstance(result, Scene | Cells | Pvs | Ach):
             (self.folder / f"{stage}.npz").write_bytes(pack_arrays(result.to_arrays()))
         if isinstance(result, Scene):
+            names = json.dumps([image.name for image in result.images])
+            (self.folder / "images.json").write_text(names)
             figures["triangles"] = len(result.triangles)
         if isinstance(result, Cells):
             figures |= {
@@ -90,7 +92,7 @@ class Work:
         """The stage as a function, its inputs read."""
         if stage == "scene":
             return lambda: ingest(self.model)
-        scene = Scene.from_arrays(self._arrays("scene"), lambda digest: b"")
+        scene = Scene.from_arrays(self._arrays("scene"), self._images())
         options = SubdivideOptions(wall_area=self.wall_area, max_cells=self.max_cells)
         if stage == "leaves":
             return lambda: subdivide(scene, replace(options, cells="leaf"))
@@ -111,6 +113,11 @@ class Work:
         )
         out = self.folder / "www"
         return lambda: emit(scene, cells, pvs, ach, textures, out, force=True)
+
+    def _images(self) -> list[SourceImage]:
+        """Their names; nothing here asks for their bytes."""
+        names = json.loads((self.folder / "images.json").read_text())
+        return [SourceImage(name, "", bytes) for name in names]
 
     def _arrays(self, stage: str) -> dict[str, Any]:
         file = self.folder / f"{stage}.npz"

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from ptmtools.cells.model import Cells
     from ptmtools.cells.options import SubdivideOptions
     from ptmtools.cells.structure import structural_triangles
-    from ptmtools.cells.subdivide import subdivide
+    from ptmtools.cells.subdivision import subdivide
 
 __all__ = ["Cells", "SubdivideOptions", "structural_triangles", "subdivide"]
 
@@ -20,6 +20,6 @@ __getattr__ = names(
         "Cells": "model",
         "SubdivideOptions": "options",
         "structural_triangles": "structure",
-        "subdivide": "subdivide",
+        "subdivide": "subdivision",
     },
 )

@@ -48,7 +48,7 @@ def _info_database(voice: Voice, target: str, as_json: bool) -> None:
                 "model": db.manifest.model,
                 "stages": {
                     name: {
-                        "software": record.software,
+                        "recipe": record.recipe,
                         "parameters": record.parameters,
                         "counts": record.counts,
                         "notes": record.notes,

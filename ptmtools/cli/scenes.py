@@ -13,26 +13,25 @@ from typing import Any
 
 import click
 
-from ptmtools.cells import SubdivideOptions
+from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cli.common import as_json, database, forced, new_database, voiced, workers
 from ptmtools.cli.output import Voice, count, size
 from ptmtools.cli.parameters import Numbers, options_of, take
 from ptmtools.coverage.options import AchOptions
-from ptmtools.database import EmitOptions, GivenViewpoint
-from ptmtools.pipeline import (
-    BuildOptions,
-    BuildReport,
-    TextureOptions,
+from ptmtools.database.model import EmitOptions, GivenViewpoint
+from ptmtools.pipeline.build import (
+    build_scene as build,
+)
+from ptmtools.pipeline.build import (
     make_ach,
     make_cells,
     make_files,
     make_pvs,
     make_textures,
 )
-from ptmtools.pipeline import (
-    build_scene as build,
-)
-from ptmtools.scene import IngestOptions
+from ptmtools.pipeline.options import BuildOptions, TextureOptions
+from ptmtools.pipeline.report import BuildReport
+from ptmtools.scene.options import IngestOptions
 from ptmtools.visibility.options import PvsOptions
 
 #: Notes that are shown without ``-v``.

@@ -11,8 +11,6 @@ from ptmtools.lazy import names
 
 if TYPE_CHECKING:
     from ptmtools.pipeline.build import (
-        BuildOptions,
-        BuildReport,
         build_scene,
         make_ach,
         make_cells,
@@ -21,17 +19,18 @@ if TYPE_CHECKING:
         make_textures,
     )
     from ptmtools.pipeline.folder import DatabaseFolder
-    from ptmtools.pipeline.run import Artifacts, StageReport
-    from ptmtools.pipeline.textures import TextureOptions
+    from ptmtools.pipeline.options import BuildOptions, TextureOptions
+    from ptmtools.pipeline.report import BuildReport, StageReport
+    from ptmtools.pipeline.run import Artifacts
     from ptmtools.pipeline.validation import shoot_segments, validate
 
 _HOME = {
     "Artifacts": "run",
-    "BuildOptions": "build",
-    "BuildReport": "build",
+    "BuildOptions": "options",
+    "BuildReport": "report",
     "DatabaseFolder": "folder",
-    "StageReport": "run",
-    "TextureOptions": "textures",
+    "StageReport": "report",
+    "TextureOptions": "options",
     "build_scene": "build",
     "make_ach": "build",
     "make_cells": "build",

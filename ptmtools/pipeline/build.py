@@ -1,33 +1,44 @@
 """The stages in their order: each one function, and `build_scene` all of them.
 
-Reading and subdividing go together: nothing is written before a model has proved to be one that
-can be cut into cells.
+Reading and subdividing go together: nothing is committed before a model has proved to be one that
+can be cut into cells. Textures depend on nothing that the stages between have to say; where there
+is more than one worker they are encoded meanwhile.
 """
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from threading import Event
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from ptmtools.cells import SubdivideOptions, subdivide
-from ptmtools.coverage.ach import compute_ach
-from ptmtools.coverage.model import Ach
-from ptmtools.coverage.options import AchOptions
-from ptmtools.database import EmitOptions
+from ptmtools.executors.model import Executor
+from ptmtools.executors.opening import open_executor, processors
+from ptmtools.pipeline.changes import reasons
 from ptmtools.pipeline.emission import put_files
-from ptmtools.pipeline.folder import DatabaseWriter, sha256
-from ptmtools.pipeline.run import IMAGES, Run, StageReport, peak_memory, work_of
-from ptmtools.pipeline.textures import TextureOptions, check_images, check_options, put_textures
+from ptmtools.pipeline.manifest import StageRecord
+from ptmtools.pipeline.options import BuildOptions, TextureOptions
+from ptmtools.pipeline.report import BuildReport, peak_memory
+from ptmtools.pipeline.run import Run, work_of
+from ptmtools.pipeline.scenes import put_scene
+from ptmtools.pipeline.stages import arrays_of
+from ptmtools.pipeline.textures import TextureStage
+from ptmtools.pipeline.transaction import Transaction
+from ptmtools.pipeline.writer import DatabaseWriter
 from ptmtools.progress import Progress, silent
-from ptmtools.scene import IngestOptions, Note, Scene, ingest
-from ptmtools.visibility.options import PvsOptions
-from ptmtools.visibility.pvs import compute_pvs
+from ptmtools.texture.options import check_options
+
+if TYPE_CHECKING:
+    from ptmtools.cells.options import SubdivideOptions
+    from ptmtools.coverage.model import Ach
+    from ptmtools.coverage.options import AchOptions
+    from ptmtools.database.model import EmitOptions
+    from ptmtools.scene.options import IngestOptions
+    from ptmtools.visibility.options import PvsOptions
 
 PathLike = str | os.PathLike[str]
 
@@ -35,61 +46,11 @@ PathLike = str | os.PathLike[str]
 CULLING_GAINS_LITTLE = 0.7
 
 
-@dataclass(frozen=True)
-class BuildOptions:
-    """The options of all stages.
-
-    Attributes
-    ----------
-    ingest, subdivide, pvs, ach, textures, emit: of each stage.
-    workers: threads or processes; 0 is one for each processor. Changes nothing in the result.
-    force: write into a folder that is not ours, or over the database of another model.
-    """
-
-    ingest: IngestOptions = field(default_factory=IngestOptions)
-    subdivide: SubdivideOptions = field(default_factory=SubdivideOptions)
-    pvs: PvsOptions = field(default_factory=PvsOptions)
-    ach: AchOptions = field(default_factory=AchOptions)
-    textures: TextureOptions = field(default_factory=TextureOptions)
-    emit: EmitOptions = field(default_factory=EmitOptions)
-    workers: int = 0
-    force: bool = False
-
-
-@dataclass(frozen=True)
-class BuildReport:
-    """What a run over a database did.
-
-    Attributes
-    ----------
-    model: the model's file name.
-    database: the folder.
-    stages: in the order in which they were dealt with.
-    seconds: of all together.
-    peak_memory: bytes, the most that this process ever held; 0 where the system does not tell.
-    """
-
-    model: str
-    database: str
-    stages: tuple[StageReport, ...]
-    seconds: float
-    peak_memory: int
-
-    def counts(self, stage: str) -> Mapping[str, Any]:
-        """The figures of a stage; empty if it was no part of this run."""
-        return next((s.counts for s in self.stages if s.stage == stage), {})
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What the stages have to say, in their order."""
-        return tuple(note for stage in self.stages for note in stage.notes)
-
-
 def build_scene(
     model: PathLike, db: PathLike, options: BuildOptions | None = None, progress: Progress = silent
 ) -> BuildReport:
-    """Builds a database, or brings it up to date: only stages whose inputs, options or software
-    changed are run.
+    """Builds a database, or brings it up to date: only stages whose inputs, options or recipe
+    changed are run, and in the textures stage only what has changed itself.
 
     Raises
     ------
@@ -97,15 +58,22 @@ def build_scene(
     OutputError, DatabaseError: what is wrong with the database, from `DatabaseWriter`.
     """
     options = options or BuildOptions()
-    workers = _workers(options.workers)
     start = time.perf_counter()
     check_options(options.textures)
-    with DatabaseWriter.open_for_model(db, Path(model).name, force=options.force) as writer:
+    with (
+        DatabaseWriter.open_for_model(db, Path(model).name, force=options.force) as writer,
+        _Workers(options.workers, options.scheduler) as workers,
+    ):
         run = Run(writer, progress)
-        _read_and_cut(run, Path(model), options.ingest, options.subdivide)
-        put_textures(run, options.textures, workers)
-        _look(run, replace(options.pvs, workers=workers))
-        _sample(run, replace(options.ach, workers=workers))
+        with _Beside(run, options.textures, workers) as textures:
+            _read_and_cut(
+                run, Path(model), options.ingest, options.subdivide, workers, textures.begin
+            )
+            textures.check()
+            _look(run, options.pvs, workers)
+            textures.check()
+            _sample(run, options.ach, workers)
+            textures.finish()
         put_files(run, options.emit)
         return _closing(run, start)
 
@@ -115,43 +83,49 @@ def make_cells(
     db: PathLike,
     ingest_options: IngestOptions | None = None,
     subdivide_options: SubdivideOptions | None = None,
+    workers: int = 0,
     *,
     force: bool = False,
     progress: Progress = silent,
 ) -> BuildReport:
-    """Reads a model and cuts it into cells: the first two stages of a database."""
+    """Reads a model and cuts it into cells: the first two stages of a database. ``workers`` decode
+    images."""
     start = time.perf_counter()
-    with DatabaseWriter.open_for_model(db, Path(model).name, force=force) as writer:
+    options = BuildOptions()
+    with (
+        DatabaseWriter.open_for_model(db, Path(model).name, force=force) as writer,
+        _Workers(workers, None) as local,
+    ):
         run = Run(writer, progress)
-        _read_and_cut(
-            run,
-            Path(model),
-            ingest_options or IngestOptions(),
-            subdivide_options or SubdivideOptions(),
-        )
+        read, cut = ingest_options or options.ingest, subdivide_options or options.subdivide
+        _read_and_cut(run, Path(model), read, cut, local, lambda: None)
         return _closing(run, start)
 
 
 def make_pvs(
-    db: PathLike, options: PvsOptions | None = None, workers: int = 0, progress: Progress = silent
+    db: PathLike,
+    options: PvsOptions | None = None,
+    workers: int = 0,
+    progress: Progress = silent,
+    scheduler: str | None = None,
 ) -> BuildReport:
-    """Runs the visibility stage of a database; ``workers`` as in `BuildOptions`."""
-    start = time.perf_counter()
-    with DatabaseWriter.open_for_stage(db) as writer:
-        run = Run(writer, progress)
-        _look(run, replace(options or PvsOptions(), workers=_workers(workers)))
-        return _closing(run, start)
+    """Runs the visibility stage of a database; ``workers`` and ``scheduler`` as in
+    `BuildOptions`."""
+    asked = options or BuildOptions().pvs
+    return _one_stage(db, workers, scheduler, progress, lambda run, w: _look(run, asked, w))
 
 
 def make_ach(
-    db: PathLike, options: AchOptions | None = None, workers: int = 0, progress: Progress = silent
+    db: PathLike,
+    options: AchOptions | None = None,
+    workers: int = 0,
+    progress: Progress = silent,
+    scheduler: str | None = None,
 ) -> BuildReport:
-    """Runs the coverage stage of a database; ``workers`` as in `BuildOptions`."""
-    start = time.perf_counter()
-    with DatabaseWriter.open_for_stage(db) as writer:
-        run = Run(writer, progress)
-        _sample(run, replace(options or AchOptions(), workers=_workers(workers)))
-        return _closing(run, start)
+    """Runs the coverage stage of a database; ``workers`` and ``scheduler`` as in
+    `BuildOptions`."""
+    asked = options or BuildOptions().ach
+    return _one_stage(db, workers, scheduler, progress, lambda run, w: _sample(run, asked, w))
 
 
 def make_textures(
@@ -159,124 +133,185 @@ def make_textures(
     options: TextureOptions | None = None,
     workers: int = 0,
     progress: Progress = silent,
+    scheduler: str | None = None,
 ) -> BuildReport:
-    """Runs the textures stage of a database; ``workers`` as in `BuildOptions`."""
-    start = time.perf_counter()
-    with DatabaseWriter.open_for_stage(db) as writer:
-        run = Run(writer, progress)
-        put_textures(run, options or TextureOptions(), _workers(workers))
-        return _closing(run, start)
+    """Runs the textures stage of a database; ``workers`` and ``scheduler`` as in
+    `BuildOptions`."""
+
+    def encode(run: Run, workers: _Workers) -> None:
+        stage = TextureStage(run, options or TextureOptions())
+        if not stage.current:
+            stage.encode(workers.executor())
+        stage.commit()
+
+    return _one_stage(db, workers, scheduler, progress, encode)
 
 
 def make_files(
     db: PathLike, options: EmitOptions | None = None, progress: Progress = silent
 ) -> BuildReport:
     """Writes the served files of a database."""
+    asked = options or BuildOptions().emit
+    return _one_stage(db, 1, None, progress, lambda run, _: put_files(run, asked))
+
+
+def _one_stage(
+    db: PathLike,
+    workers: int,
+    scheduler: str | None,
+    progress: Progress,
+    stage: Callable[[Run, _Workers], None],
+) -> BuildReport:
     start = time.perf_counter()
-    with DatabaseWriter.open_for_stage(db) as writer:
+    with DatabaseWriter.open_for_stage(db) as writer, _Workers(workers, scheduler) as used:
         run = Run(writer, progress)
-        put_files(run, options or EmitOptions())
+        stage(run, used)
         return _closing(run, start)
-
-
-def _workers(asked: int) -> int:
-    return asked or os.cpu_count() or 1
 
 
 def _closing(run: Run, start: float) -> BuildReport:
     return BuildReport(
         model=run.db.manifest.model,
         database=str(run.db.path),
-        stages=tuple(run.reports),
+        stages=run.reports,
         seconds=time.perf_counter() - start,
         peak_memory=peak_memory(),
     )
 
 
+class _Workers:
+    """Executors as the user wants them, opened when there is first something to do."""
+
+    def __init__(self, workers: int, scheduler: str | None) -> None:
+        self._asked = workers, scheduler
+        self._opened: Executor | None = None
+
+    @property
+    def here(self) -> int:
+        """How many threads of this machine may be used."""
+        return self._asked[0] or processors()
+
+    def executor(self) -> Executor:
+        """The one of this thread."""
+        if self._opened is None:
+            self._opened = self.another()
+        return self._opened
+
+    def another(self) -> Executor:
+        """One for another thread, which closes it."""
+        return open_executor(*self._asked)
+
+    def __enter__(self) -> _Workers:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._opened is not None:
+            self._opened.close()
+
+
+class _Beside:
+    """The textures stage, done by another thread while the other stages run.
+
+    With one worker it is done when they have ended instead.
+    """
+
+    def __init__(self, run: Run, options: TextureOptions, workers: _Workers) -> None:
+        self._run = run
+        self._options = options
+        self._workers = workers
+        self._stage: TextureStage | None = None
+        self._stop = Event()
+        self._pool = ThreadPoolExecutor(1, "textures")
+        self._task: Future[None] | None = None
+
+    def begin(self) -> None:
+        """To be called when the scene's images are known."""
+        self._stage = TextureStage(self._run, self._options)
+        if not self._stage.current and self._workers.here > 1:
+            self._task = self._pool.submit(self._encode, self._stage)
+
+    def check(self) -> None:
+        """Raises what has gone wrong so far."""
+        if self._task is not None and self._task.done():
+            self._task.result()
+
+    def finish(self) -> None:
+        """Waits for the textures, and commits them."""
+        assert self._stage is not None
+        if self._task is not None:
+            self._task.result()
+        elif not self._stage.current:
+            self._stage.encode(self._workers.executor())
+        self._stage.commit()
+
+    def _encode(self, stage: TextureStage) -> None:
+        with self._workers.another() as executor:
+            stage.encode(executor, self._stop)
+
+    def __enter__(self) -> _Beside:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._pool.shutdown()
+
+
 def _read_and_cut(
-    run: Run, model: Path, ingest_options: IngestOptions, subdivide_options: SubdivideOptions
+    run: Run,
+    model: Path,
+    ingest_options: IngestOptions,
+    subdivide_options: SubdivideOptions,
+    workers: _Workers,
+    read: Callable[[], None],
 ) -> None:
-    """The scene and the cells: one transaction, unless the scene is what it was."""
-    writer, start = run.writer, time.perf_counter()
-    before = writer.manifest.stages.get("scene")
-    files = tuple(before.inputs) if before else ()
-    work = work_of(ingest_options, _files_of(model, files))
-    records = {}
-    if not writer.is_current("scene", work):
-        scene = ingest(model, ingest_options, run.progress)
-        check_images(scene)
-        run.hold("scene", scene)
-        writer.put_arrays("scene", scene.to_arrays())
-        for image in scene.images:
-            writer.put(f"{IMAGES}/{image.sha256}", image.load())
-        records["scene"] = replace(
-            work_of(ingest_options, _files_of(model, scene.files)),
-            outputs=writer.pending(),
-            counts=_scene_counts(scene),
-            notes=[_line(note) for note in scene.notes],
-        )
-    read = time.perf_counter()
+    """The scene and the cells: one transaction, unless the scene is what it was. ``read`` is called
+    in between."""
+    start = time.perf_counter()
+    transaction = run.writer.begin("scene")
+    scene, why_scene = put_scene(run, transaction, model, ingest_options, workers.here)
+    records = {"scene": scene} if why_scene else {}
+    middle = time.perf_counter()
+    read()
 
-    outputs = records["scene"].outputs if records else writer.manifest.stages["scene"].outputs
-    work = work_of(subdivide_options, {"stages/scene.npz": outputs["stages/scene.npz"]})
-    cut = not writer.is_current("cells", work)
-    if cut:
-        cells = subdivide(run.scene, subdivide_options, run.progress)
-        run.hold("cells", cells)
-        held = set(writer.pending())
-        writer.put_arrays("cells", cells.to_arrays())
-        records["cells"] = replace(
-            work,
-            outputs={n: h for n, h in writer.pending().items() if n not in held},
-            counts={
-                "cells": cells.cell_count,
-                "leaves": cells.leaf_count,
-                "portals": cells.portal_count,
-                "pieces": len(cells.triangle),
-                "closed": cells.closed,
-            },
-            notes=cells.notes,
-        )
+    inputs = {arrays_of("scene"): scene.outputs[arrays_of("scene")]}
+    work = work_of("cells", subdivide_options, inputs)
+    why_cells = reasons(run.db.manifest.stages.get("cells"), work, run.db)
+    if why_cells:
+        records["cells"] = _cut(run, transaction, work, subdivide_options)
     if records:
-        writer.commit(records)
-    run.report("scene", "scene" in records, start, read)
-    run.report("cells", cut, read)
+        transaction.commit(records)
+    run.report("scene", why_scene, start, middle)
+    run.report("cells", why_cells, middle)
 
 
-def _files_of(model: Path, names: tuple[str, ...]) -> dict[str, str]:
-    """Name → SHA-256 of the files that a model consists of, "" where there is none."""
-    found = {}
-    for name in (model.name, *names):
-        file = model.parent / name
-        found[name] = sha256(file.read_bytes()) if file.is_file() else ""
-    return found
+def _cut(
+    run: Run, transaction: Transaction, work: StageRecord, options: SubdivideOptions
+) -> StageRecord:
+    from ptmtools.cells import subdivide
+
+    cells = subdivide(run.scene, options, run.progress)
+    run.hold("cells", cells)
+    return replace(
+        work,
+        outputs=transaction.put_arrays("cells", cells.to_arrays()),
+        counts={
+            "cells": cells.cell_count,
+            "leaves": cells.leaf_count,
+            "portals": cells.portal_count,
+            "pieces": len(cells.triangle),
+            "closed": cells.closed,
+        },
+        notes=cells.notes,
+    )
 
 
-def _scene_counts(scene: Scene) -> dict[str, Any]:
-    return {
-        "triangles": len(scene.triangles),
-        "objects": len(scene.objects),
-        "materials": len(scene.materials),
-        "images": len(scene.images),
-        "origin": list(scene.space.origin),
-        "metres": scene.space.metres,
-        "up": scene.space.up,
-        "unit_guessed": scene.space.unit_guessed,
-        "up_guessed": scene.space.up_guessed,
-    }
+def _look(run: Run, options: PvsOptions, workers: _Workers) -> None:
+    def compute(transaction: Transaction) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+        from ptmtools.visibility import compute_pvs
 
-
-def _line(note: Note) -> str:
-    where = f"{note.place}: " if note.place else ""
-    times = f" ({note.count:,} times)" if note.count > 1 else ""
-    return f"{where}{note.message}{times} [{note.code}]"
-
-
-def _look(run: Run, options: PvsOptions) -> None:
-    def compute() -> tuple[Mapping[str, Any], tuple[str, ...]]:
-        pvs = compute_pvs(run.cells, options, run.progress)
+        pvs = compute_pvs(run.cells, replace(options, workers=workers.here), run.progress)
         run.hold("pvs", pvs)
-        run.writer.put_arrays("pvs", pvs.to_arrays())
+        transaction.put_arrays("pvs", pvs.to_arrays())
         share = pvs.average_share
         notes = []
         if (
@@ -306,14 +341,19 @@ def _look(run: Run, options: PvsOptions) -> None:
         }
         return figures | {"conservative": pvs.conservative}, tuple(notes)
 
-    run.stage("pvs", options, run.inputs("cells"), compute)
+    run.stage("pvs", options, compute)
 
 
-def _sample(run: Run, options: AchOptions) -> None:
-    def compute() -> tuple[Mapping[str, Any], tuple[str, ...]]:
-        ach = compute_ach(run.scene, run.cells, run.pvs, options, run.progress)
+def _sample(run: Run, options: AchOptions, workers: _Workers) -> None:
+    def compute(transaction: Transaction) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+        import numpy as np
+
+        from ptmtools.coverage.ach import compute_ach
+
+        asked = replace(options, workers=workers.here)
+        ach = compute_ach(run.scene, run.cells, run.pvs, asked, run.progress)
         run.hold("ach", ach)
-        run.writer.put_arrays("ach", ach.to_arrays())
+        transaction.put_arrays("ach", ach.to_arrays())
         notes = _coverage_notes(ach, options)
         known = bool(np.isfinite(ach.uncertain).any())
         return {
@@ -325,7 +365,7 @@ def _sample(run: Run, options: AchOptions) -> None:
             "mean_uncertain": float(np.nanmean(ach.uncertain)) if known else None,
         }, notes
 
-    run.stage("ach", options, run.inputs("scene", "cells", "pvs"), compute)
+    run.stage("ach", options, compute)
 
 
 def _coverage_notes(ach: Ach, options: AchOptions) -> tuple[str, ...]:

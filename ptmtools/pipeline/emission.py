@@ -3,32 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ptmtools.database import EmitOptions, emit
+from ptmtools.errors import DatabaseError
 from ptmtools.pipeline.run import Run
-from ptmtools.pipeline.textures import SERVED, texture_records
+from ptmtools.pipeline.stages import SERVED
+from ptmtools.pipeline.textures import texture_inputs, texture_records
+from ptmtools.pipeline.transaction import Transaction
+
+if TYPE_CHECKING:
+    from ptmtools.database.model import EmitOptions
 
 
 def put_files(run: Run, options: EmitOptions) -> None:
     """Runs the stage `emit`; raises what `ptmtools.database.emit` and `Run.inputs` raise."""
     textures = run.db.record("textures")
-    inputs = run.inputs("scene", "cells", "pvs", "ach") | dict(textures.outputs)
+    if textures.inputs != texture_inputs(run.image_digests):
+        raise DatabaseError(
+            "PTM-D008",
+            "the textures stage was computed from another scene",
+            file=run.db.path,
+            remedy="run `ptm textures DB` or `ptm build-scene MODEL -o DB` first",
+        )
 
-    def compute() -> tuple[Mapping[str, Any], tuple[str, ...]]:
+    def compute(transaction: Transaction) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+        from ptmtools.database import emit
+
         report = emit(
             run.scene,
             run.cells,
             run.pvs,
             run.ach,
             texture_records(run),
-            run.writer.staging / SERVED,
+            transaction.folder / SERVED,
             options,
             run.progress,
             force=True,
         )
         for name in report.files:
-            run.writer.adopt(f"{SERVED}/{name}")
+            transaction.adopt(f"{SERVED}/{name}")
         return {
             "files": len(report.files),
             "bytes": report.bytes,
@@ -38,4 +51,4 @@ def put_files(run: Run, options: EmitOptions) -> None:
             "viewpoints": len(report.viewpoints),
         }, report.notes
 
-    run.stage("emit", options, inputs, compute)
+    run.stage("emit", options, compute, also=textures.outputs)

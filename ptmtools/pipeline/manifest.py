@@ -2,10 +2,10 @@
 
 ::
 
-    {"format": "ptmtools database", "schema": 1,
+    {"format": "ptmtools database", "schema": 2,
      "model": "museum.obj",                          the file's name, never its folder
      "stages": {"cells": {
-         "software": "0.1.0",                        the ptmtools that computed it
+         "recipe": 1,                                the version of what the stage does
          "parameters": {"wall_area": 1.0, …},        the options that can change the outputs
          "inputs":  {"stages/scene.npz": "9f86…"},   name → SHA-256 of what was read
          "outputs": {"stages/cells.npz": "60b7…"},   path in the database → SHA-256
@@ -14,8 +14,8 @@
      }, …}}
 
 Stages stand in the order in which they run. There is no time and no folder of the machine in it:
-the same model and options give the same manifest anywhere. A stage is current if the present
-software would run it with the same parameters on the same inputs, and its outputs are all there.
+the same model and options give the same manifest anywhere. A stage is current if it would be run
+by the same recipe with the same parameters on the same inputs, and its outputs are all there.
 """
 
 from __future__ import annotations
@@ -28,12 +28,13 @@ from os import PathLike
 from typing import Any
 
 from ptmtools.errors import DatabaseError
+from ptmtools.pipeline.stages import STAGES
 
 FORMAT = "ptmtools database"
-SCHEMA = 1
-#: The stages, in the order in which they run.
-STAGES = ("scene", "cells", "pvs", "ach", "textures", "emit")
+SCHEMA = 2
 
+#: The folders of a database that are written.
+_FOLDERS = ("stages", "www")
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 
 
@@ -44,20 +45,12 @@ class StageRecord:
     `inputs` may map to the empty string: a file that was looked for and not found.
     """
 
-    software: str
+    recipe: int
     parameters: Mapping[str, Any]
     inputs: Mapping[str, str]
     outputs: Mapping[str, str]
     counts: Mapping[str, Any] = field(default_factory=dict)
     notes: Sequence[str] = ()
-
-    def same_work(self, other: StageRecord) -> bool:
-        """Whether both were to do the same: software, parameters and inputs agree."""
-        return (self.software, dict(self.parameters), dict(self.inputs)) == (
-            other.software,
-            dict(other.parameters),
-            dict(other.inputs),
-        )
 
 
 @dataclass(frozen=True)
@@ -84,7 +77,7 @@ class Manifest:
             "model": self.model,
             "stages": {
                 name: {
-                    "software": record.software,
+                    "recipe": record.recipe,
                     "parameters": dict(record.parameters),
                     "inputs": dict(sorted(record.inputs.items())),
                     "outputs": dict(sorted(record.outputs.items())),
@@ -130,21 +123,28 @@ class Manifest:
 
 def _record(entry: object, stage: str, file: str | PathLike[str]) -> StageRecord:
     names = ("parameters", "inputs", "outputs", "counts")
-    if not isinstance(entry, dict) or not isinstance(entry.get("software"), str):
+    if not isinstance(entry, dict) or type(entry.get("recipe")) is not int:
         raise _damaged(file, f"stage {stage} is incomplete")
     notes = entry.get("notes")
     if not all(isinstance(entry.get(name), dict) for name in names) or not isinstance(notes, list):
         raise _damaged(file, f"stage {stage} is incomplete")
+    if not all(isinstance(note, str) for note in notes):
+        raise _damaged(file, f"stage {stage} has a note that is no text")
     for path, digest in entry["outputs"].items():
-        if not isinstance(digest, str) or not _SHA256.fullmatch(digest) or not _inside(path):
+        if not isinstance(digest, str) or not _SHA256.fullmatch(digest) or not _is_output(path):
             raise _damaged(file, f"stage {stage} has an impossible output {path!r}")
-    return StageRecord(entry["software"], **{name: entry[name] for name in names}, notes=notes)
+    for name, digest in entry["inputs"].items():
+        if digest != "" and not (isinstance(digest, str) and _SHA256.fullmatch(digest)):
+            raise _damaged(file, f"stage {stage} has an impossible input {name!r}")
+    return StageRecord(entry["recipe"], **{name: entry[name] for name in names}, notes=notes)
 
 
-def _inside(path: str) -> bool:
-    """Whether a relative path stays in the database, on every system."""
+def _is_output(path: str) -> bool:
+    """Whether a path is one that stages write to: inside of the database on every system, and
+    nothing that somebody else has put beside it."""
     parts = path.split("/")
-    return bool(path) and "\\" not in path and ":" not in path and not {"", ".", ".."} & set(parts)
+    inside = "\\" not in path and ":" not in path and "\0" not in path
+    return inside and len(parts) > 1 and parts[0] in _FOLDERS and not {"", ".", ".."} & set(parts)
 
 
 def _damaged(file: str | PathLike[str], what: str) -> DatabaseError:

@@ -2,49 +2,40 @@
 
 from __future__ import annotations
 
-import json
-import sys
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, fields, is_dataclass, replace
-from typing import Any, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ptmtools.cells.model import Cells
-from ptmtools.coverage.model import Ach
 from ptmtools.errors import DatabaseError
-from ptmtools.pipeline.folder import DatabaseFolder, DatabaseWriter
+from ptmtools.pipeline.changes import reasons
+from ptmtools.pipeline.folder import DatabaseFolder
 from ptmtools.pipeline.manifest import StageRecord
+from ptmtools.pipeline.report import StageReport
+from ptmtools.pipeline.stages import (
+    IMAGE_LIST,
+    IMAGES,
+    READS,
+    RECIPES,
+    STAGES,
+    arrays_of,
+    image_rows,
+    parameters,
+)
+from ptmtools.pipeline.transaction import Transaction
+from ptmtools.pipeline.writer import DatabaseWriter
 from ptmtools.progress import Progress, silent
-from ptmtools.scene.model import Scene
-from ptmtools.version import __version__
-from ptmtools.visibility.model import Pvs
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ptmtools.cells.model import Cells
+    from ptmtools.coverage.model import Ach
+    from ptmtools.scene.model import Scene, SourceImage
+    from ptmtools.visibility.model import Pvs
 
 T = TypeVar("T")
-
-IMAGES = "stages/images"
-
-
-@dataclass(frozen=True)
-class StageReport:
-    """What became of a stage.
-
-    Attributes
-    ----------
-    stage: its name.
-    ran: False if it was current and nothing had to be done.
-    seconds: that it took, checking included.
-    counts: the figures recorded in the manifest.
-    notes: what it has to say, one line each.
-    """
-
-    stage: str
-    ran: bool
-    seconds: float
-    counts: Mapping[str, Any]
-    notes: tuple[str, ...] = ()
 
 
 class Artifacts:
@@ -55,43 +46,102 @@ class Artifacts:
         self._held: dict[str, Any] = {}
 
     @property
+    def images(self) -> tuple[SourceImage, ...]:
+        """The scene's, each read when it is loaded; raises PTM-D004 to PTM-D006."""
+        from ptmtools.scene.model import SourceImage
+
+        if "images" not in self._held:
+            data = self.db.read_output("scene", IMAGE_LIST)
+
+            def loader(digest: str) -> Callable[[], bytes]:
+                return lambda: self.db.read(f"{IMAGES}/{digest}", digest)
+
+            with self._reading(IMAGE_LIST):
+                self._held["images"] = tuple(
+                    SourceImage(
+                        row["name"],
+                        row["sha256"],
+                        loader(row["sha256"]),
+                        tuple(row["files"]),
+                        row["plain"],
+                    )
+                    for row in image_rows(data)
+                )
+        images: tuple[SourceImage, ...] = self._held["images"]
+        return images
+
+    @property
+    def image_digests(self) -> dict[str, str]:
+        """Name → SHA-256 of the scene's images, in their order; raises as `images`."""
+        if "images" in self._held:
+            return {image.name: image.sha256 for image in self.images}
+        data = self.db.read_output("scene", IMAGE_LIST)
+        with self._reading(IMAGE_LIST):
+            return {row["name"]: row["sha256"] for row in image_rows(data)}
+
+    @property
     def scene(self) -> Scene:
         """Raises PTM-D004 to PTM-D006, as do the others."""
-        return self._artifact("scene", lambda arrays: Scene.from_arrays(arrays, self._image))
+        from ptmtools.scene.model import Scene
+
+        return self._artifact("scene", lambda arrays: Scene.from_arrays(arrays, self.images))
 
     @property
     def cells(self) -> Cells:
+        from ptmtools.cells.model import Cells
+
         return self._artifact("cells", Cells.from_arrays)
 
     @property
     def pvs(self) -> Pvs:
+        from ptmtools.visibility.model import Pvs
+
         return self._artifact("pvs", Pvs.from_arrays)
 
     @property
     def ach(self) -> Ach:
+        from ptmtools.coverage.model import Ach
+
         return self._artifact("ach", Ach.from_arrays)
 
     def hold(self, stage: str, result: Scene | Cells | Pvs | Ach) -> None:
         """Keeps a result that was just computed."""
         self._held[stage] = result
 
+    def hold_images(self, images: Sequence[SourceImage]) -> None:
+        """Keeps the images of a scene that was just read."""
+        self._held["images"] = tuple(images)
+
     def _artifact(self, stage: str, build: Callable[[Mapping[str, NDArray[np.generic]]], T]) -> T:
         if stage not in self._held:
             arrays = self.db.read_arrays(stage, "this command")
-            try:
+            with self._reading(arrays_of(stage)):
                 self._held[stage] = build(arrays)
-            except (KeyError, ValueError, TypeError, IndexError) as fault:
-                raise DatabaseError(
-                    "PTM-D006",
-                    f"damaged: {type(fault).__name__} {fault}",
-                    file=self.db.path / f"stages/{stage}.npz",
-                    remedy="run `ptm build-scene` again to rebuild it",
-                ) from fault
         result: T = self._held[stage]
         return result
 
-    def _image(self, digest: str) -> bytes:
-        return self.db.read(f"{IMAGES}/{digest}", digest)
+    def _reading(self, name: str) -> _Reading:
+        return _Reading(self.db, name)
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """What is wrong with the contents of a file of a database becomes PTM-D006."""
+
+    db: DatabaseFolder
+    name: str
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, fault: BaseException | None, trace: object) -> None:
+        if isinstance(fault, KeyError | ValueError | TypeError | IndexError):
+            raise DatabaseError(
+                "PTM-D006",
+                f"damaged: {type(fault).__name__} {fault}",
+                file=self.db.path / self.name,
+                remedy="run `ptm build-scene` again to rebuild it",
+            ) from fault
 
 
 class Run(Artifacts):
@@ -101,7 +151,12 @@ class Run(Artifacts):
         super().__init__(db)
         self.writer = db
         self.progress = progress
-        self.reports: list[StageReport] = []
+        self._reports: dict[str, StageReport] = {}
+
+    @property
+    def reports(self) -> tuple[StageReport, ...]:
+        """Of the stages that were dealt with, in their order."""
+        return tuple(self._reports[stage] for stage in STAGES if stage in self._reports)
 
     def inputs(self, *stages: str) -> dict[str, str]:
         """Name → SHA-256 of the arrays of these stages, for the record of one that reads them.
@@ -111,10 +166,10 @@ class Run(Artifacts):
         DatabaseError: PTM-D004 if one has not been run; PTM-D008 if one was computed from what
             has been replaced since.
         """
+        current = self.db.manifest.outputs()
         found = {}
         for stage in stages:
             record = self.db.record(stage)
-            current = self.db.manifest.outputs()
             for name, digest in record.inputs.items():
                 if stage != "scene" and name.startswith("stages/") and current.get(name) != digest:
                     raise DatabaseError(
@@ -123,58 +178,50 @@ class Run(Artifacts):
                         file=self.db.path,
                         remedy=f"run `ptm {stage} DB` or `ptm build-scene MODEL -o DB` first",
                     )
-            found[f"stages/{stage}.npz"] = record.outputs[f"stages/{stage}.npz"]
+            found[arrays_of(stage)] = record.outputs[arrays_of(stage)]
         return found
 
     def stage(
         self,
         name: str,
         options: Any,
-        inputs: Mapping[str, str],
-        compute: Callable[[], tuple[Mapping[str, Any], tuple[str, ...]]],
+        compute: Callable[[Transaction], tuple[Mapping[str, Any], Sequence[str]]],
+        also: Mapping[str, str] | None = None,
     ) -> None:
-        """Runs a stage unless it is current. ``compute`` puts its outputs into the database and
-        returns (counts, notes)."""
-        start = time.perf_counter()
-        work = work_of(options, inputs)
-        ran = not self.writer.is_current(name, work)
-        if ran:
-            counts, notes = compute()
-            outputs = self.writer.pending()
-            self.writer.commit({name: replace(work, outputs=outputs, counts=counts, notes=notes)})
-        self.report(name, ran, start)
+        """Runs a stage unless it is current.
 
-    def report(self, name: str, ran: bool, start: float, end: float | None = None) -> None:
-        """Notes for the final report that a stage has been dealt with, from ``start`` to ``end``
-        (now)."""
+        Parameters
+        ----------
+        compute: puts the outputs into the transaction that it is given, and returns counts and
+            notes.
+        also: inputs besides the arrays that the stage reads.
+        """
+        start = time.perf_counter()
+        work = work_of(name, options, {**self.inputs(*READS[name]), **(also or {})})
+        why = reasons(self.db.manifest.stages.get(name), work, self.db)
+        if why:
+            transaction = self.writer.begin(name)
+            counts, notes = compute(transaction)
+            outputs = transaction.pending()
+            transaction.commit({name: replace(work, outputs=outputs, counts=counts, notes=notes)})
+        self.report(name, why, start)
+
+    def report(
+        self,
+        name: str,
+        why: tuple[str, ...],
+        start: float,
+        end: float | None = None,
+        tasks: tuple[int, int, int] | None = None,
+    ) -> None:
+        """Notes that a stage has been dealt with, from ``start`` to ``end`` (now)."""
         record = self.db.manifest.stages[name]
         seconds = (time.perf_counter() if end is None else end) - start
-        self.reports.append(StageReport(name, ran, seconds, record.counts, tuple(record.notes)))
+        self._reports[name] = StageReport(
+            name, bool(why), seconds, record.counts, tuple(record.notes), why, tasks
+        )
 
 
-def work_of(options: Any, inputs: Mapping[str, str]) -> StageRecord:
+def work_of(stage: str, options: Any, inputs: Mapping[str, str]) -> StageRecord:
     """What a stage is to do, as its record will say; without outputs."""
-    return StageRecord(__version__, parameters(options), dict(inputs), {})
-
-
-def parameters(options: Any) -> dict[str, Any]:
-    """The options that can change an artifact, as JSON reads them back. How many workers share
-    the task is none of them."""
-    if not is_dataclass(options) or isinstance(options, type):
-        raise TypeError(f"{options!r} is not an options dataclass")
-    plain = asdict(options)
-    for field in fields(options):
-        if field.name == "workers" or not field.compare:
-            del plain[field.name]
-    result: dict[str, Any] = json.loads(json.dumps(plain))
-    return result
-
-
-def peak_memory() -> int:
-    """Most bytes that this process has held at once; 0 where the system does not tell."""
-    try:
-        import resource
-    except ImportError:
-        return 0
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak if sys.platform == "darwin" else peak * 1024
+    return StageRecord(RECIPES[stage], parameters(options), dict(inputs), {})

@@ -1,58 +1,53 @@
-"""The images of a scene become progressive textures, several at a time.
+"""The stage `textures`: the images of a scene become progressive textures, one task each.
 
-Threads serve: the compiled kernels and zlib let go of the interpreter, and the images stay in one
-process. An image whose bytes and options are those of the last run keeps its files.
+A texture of whose image and options the last run made its files keeps them, and one that an
+interrupted run has finished is taken over. The others are encoded by the executor, in threads where
+it is this machine's: the compiled kernels and zlib let go of the interpreter. Each is written as
+soon as it is there, so what waits is a few images for each worker.
 """
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Any
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from itertools import accumulate
+from pathlib import Path
+from threading import Event
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ptmtools.database import TextureLevel, TextureRecord
 from ptmtools.errors import naming
-from ptmtools.pipeline.run import Run, parameters
-from ptmtools.scene.model import Scene, SourceImage
-from ptmtools.texture import EncodeOptions, decode, encode, read_header, read_image
-from ptmtools.texture.images import png_bytes
-from ptmtools.version import __version__
+from ptmtools.executors.model import Executor
+from ptmtools.pipeline.changes import reasons
+from ptmtools.pipeline.folder import sha256
+from ptmtools.pipeline.manifest import StageRecord
+from ptmtools.pipeline.options import TextureOptions
+from ptmtools.pipeline.run import Run, work_of
+from ptmtools.pipeline.stages import SERVED
+from ptmtools.pipeline.transaction import Transaction
 
-SERVED = "www"
+if TYPE_CHECKING:
+    from ptmtools.database.model import TextureRecord
+    from ptmtools.texture.model import PtmHeader
+
 FOLDER = "textures"
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 
 
-@dataclass(frozen=True)
-class TextureOptions(EncodeOptions):
-    """How the images of a scene are encoded.
-
-    Attributes
-    ----------
-    fallback: write a PNG twin of each texture, for clients that cannot read `.ptm`.
-    """
-
-    fallback: bool = True
-
-
-def check_options(options: TextureOptions) -> None:
-    """Raises what `encode` raises for impossible options; tried on the smallest image."""
-    encode(np.zeros((1, 1, 1), dtype=np.uint8), options)
-
-
-def texture_names(images: Iterable[SourceImage]) -> list[str]:
+def texture_names(images: Iterable[str]) -> list[str]:
     """The name of each texture without suffix, unique without regard to case: the image's stem,
     and with its suffix where two images share a stem."""
-    names = [image.name.rpartition(".") for image in images]
+    names = [image.rpartition(".") for image in images]
     stems = [stem or suffix for stem, _, suffix in names]
+    often: dict[str, int] = {}
+    for stem in stems:
+        often[stem.casefold()] = often.get(stem.casefold(), 0) + 1
     taken: set[str] = set()
     found = []
     for (_, _, suffix), stem in zip(names, stems, strict=True):
-        shared = sum(other.casefold() == stem.casefold() for other in stems) > 1
+        shared = often[stem.casefold()] > 1
         wanted = f"{stem}_{re.sub('[^A-Za-z0-9]', '', suffix)}" if shared else stem
         name, count = wanted, 1
         while name.casefold() in taken:
@@ -63,100 +58,152 @@ def texture_names(images: Iterable[SourceImage]) -> list[str]:
     return found
 
 
-def check_images(scene: Scene) -> None:
-    """Raises what `read_image` raises for an image that cannot be stored exactly."""
-    for image in scene.images:
-        with naming(image.name):
-            read_image(image.load())
+def texture_files(images: Iterable[str]) -> list[str]:
+    """The `.ptm` of each image, by its name, relative to the served folder."""
+    return [f"{FOLDER}/{name}.ptm" for name in texture_names(images)]
 
 
-def put_textures(run: Run, options: TextureOptions, workers: int) -> None:
-    """Runs the stage `textures`; raises what `encode` raises."""
-    run.inputs("scene")
-    images = run.scene.images
-    names = texture_names(images)
-    inputs = {f"{FOLDER}/{n}.ptm": i.sha256 for n, i in zip(names, images, strict=True)}
+def texture_inputs(images: Mapping[str, str]) -> dict[str, str]:
+    """The inputs of the stage, for name → SHA-256 of the images: under the name of each `.ptm` the
+    digest of its image."""
+    return dict(zip(texture_files(images), images.values(), strict=True))
 
-    def compute() -> tuple[Mapping[str, Any], tuple[str, ...]]:
-        kept = _kept(run, options, inputs)
 
-        def work(job: tuple[str, SourceImage]) -> tuple[list[tuple[str, bytes]], int, int]:
-            name, image = job
-            held = kept.get(name)
-            files = held() if held else _encoded(name, image, options)
-            header = read_header(files[0][1])
-            finest = header.levels[-1]
-            raw = finest.width * finest.height * header.texel_bytes
-            return files, raw, len(files[0][1])
+def stale_textures(before: StageRecord | None, work: StageRecord) -> list[str]:
+    """The `.ptm`s, relative to the served folder, that the record does not hold as they would be
+    encoded."""
+    if before is None or (before.recipe, before.parameters) != (work.recipe, work.parameters):
+        return list(work.inputs)
+    return [name for name in work.inputs if before.inputs.get(name) != work.inputs[name]]
 
+
+class TextureStage:
+    """One run of the stage, in two steps, so that the first may be done beside other stages."""
+
+    def __init__(self, run: Run, options: TextureOptions) -> None:
+        self._run = run
+        self._options = options
+        self._start = self._end = time.perf_counter()
+        self._digests = run.image_digests
+        self._names = texture_files(self._digests)
+        self._before = run.db.manifest.stages.get("textures")
+        self._work = work_of("textures", options, texture_inputs(self._digests))
+        self._why = reasons(self._before, self._work, run.db)
+        self._transaction: Transaction | None = None
+        self._counts: Mapping[str, int] = {}
+        self._tasks = (len(self._names), len(self._names), 0)
+
+    @property
+    def current(self) -> bool:
+        """Whether there is nothing to do."""
+        return not self._why
+
+    def encode(self, executor: Executor, stop: Event | None = None) -> None:
+        """Encodes what is to be encoded; nothing is committed. ``stop`` ends it early, from
+        another thread.
+
+        Raises what `encode` raises.
+        """
+        if self.current:
+            return
+        transaction = self._run.writer.begin("textures")
+        files = [self._files(name) for name in self._names]
+        to_do, kept, resumed = [], 0, 0
+        stale = set(stale_textures(self._before, self._work))
+        for i, name in enumerate(self._names):
+            if name not in stale and self._keep(transaction, files[i]):
+                kept += 1
+            elif transaction.resume(self._task(i)):
+                resumed += 1
+            else:
+                to_do.append(i)
+        total = len(self._names)
+        sources = self._sources(to_do)
+        encoded = executor.each(encoded_image, self._options, sources, releases_lock=True)
+        for done, (i, result) in enumerate(zip(to_do, encoded, strict=True)):
+            self._run.progress(total - len(to_do) + done, total, "textures")
+            for name, data in zip(files[i], result, strict=True):
+                transaction.put(name, data)
+            transaction.finish(self._task(i), files[i])
+            if stop is not None and stop.is_set():
+                return
+        self._run.progress(total, total, "textures")
+        self._counts = self._counted(transaction, [ptm for ptm, *_ in files])
+        self._tasks = (total, kept, resumed)
+        self._transaction, self._end = transaction, time.perf_counter()
+
+    def commit(self) -> None:
+        """Makes what was encoded part of the database."""
+        if self._transaction is not None:
+            outputs = self._transaction.pending()
+            record = replace(self._work, outputs=outputs, counts=self._counts)
+            self._transaction.commit({"textures": record})
+        self._run.report("textures", self._why, self._start, self._end, self._tasks)
+
+    def _files(self, name: str) -> list[str]:
+        """The outputs of a texture, its `.ptm` first."""
+        suffixes = ("ptm", "png")[: 1 + self._options.fallback]
+        return [f"{SERVED}/{name.removesuffix('ptm')}{suffix}" for suffix in suffixes]
+
+    def _keep(self, transaction: Transaction, files: list[str]) -> bool:
+        outputs = self._before.outputs if self._before else {}
+        return all(name in outputs for name in files) and transaction.keep(
+            {name: outputs[name] for name in files}
+        )
+
+    def _task(self, i: int) -> str:
+        """A digest of all that the files of a texture depend on, their names included."""
+        name = self._names[i]
+        told = [self._work.recipe, self._work.parameters, name, self._work.inputs[name]]
+        return sha256(json.dumps(told, sort_keys=True).encode())
+
+    def _sources(self, to_do: list[int]) -> Iterator[tuple[str, bytes]]:
+        images = self._run.images
+        for i in to_do:
+            yield images[i].name, images[i].load()
+
+    def _counted(self, transaction: Transaction, files: list[str]) -> dict[str, int]:
         raw = stored = 0
-        with ThreadPoolExecutor(workers) as pool:
-            jobs = list(zip(names, images, strict=True))
-            for done, (files, *sizes) in enumerate(_ordered(pool, work, jobs, workers)):
-                run.progress(done, len(jobs), "textures")
-                raw, stored = raw + sizes[0], stored + sizes[1]
-                for name, data in files:
-                    run.writer.put(name, data)
-        run.progress(len(jobs), len(jobs), "textures")
-        return {"textures": len(jobs), "raw_bytes": raw, "ptm_bytes": stored}, ()
-
-    run.stage("textures", options, inputs, compute)
+        for file in files:
+            place = transaction.folder / file
+            header = _header(place if place.is_file() else self._run.db.path / file)
+            finest = header.levels[-1]
+            raw += finest.width * finest.height * header.texel_bytes
+            stored += header.file_size
+        return {"textures": len(files), "raw_bytes": raw, "ptm_bytes": stored}
 
 
-def texture_records(run: Run) -> tuple[TextureRecord, ...]:
-    """What the emitted files say of the textures of a database."""
-    images = run.scene.images
-    outputs = run.db.record("textures").outputs
-    records = []
-    for i, name in enumerate(texture_names(images)):
-        file, twin = f"{FOLDER}/{name}.ptm", f"{FOLDER}/{name}.png"
-        digest = outputs[f"{SERVED}/{file}"]
-        header = read_header(run.db.read(f"{SERVED}/{file}", digest))
-        levels = tuple(
-            TextureLevel(
-                width=level.width,
-                height=level.height,
-                offset=level.offset,
-                length=level.length,
-                gpu_bytes=level.width * level.height * header.texel_bytes,
-            )
-            for level in header.levels
-        )
-        served = f"{SERVED}/{twin}" in outputs
-        records.append(
-            TextureRecord(
-                image=i,
-                file=file,
-                fallback=twin if served else None,
-                fallback_level=len(levels) - 1 if served else None,
-                width=levels[-1].width,
-                height=levels[-1].height,
-                components=header.components,
-                levels=levels,
-                sha256=digest,
-            )
-        )
-    return tuple(records)
+def encoded_image(options: TextureOptions, image: tuple[str, bytes]) -> list[bytes]:
+    """An image, (name, bytes of its file), as the bytes of a `.ptm` and, if there is to be one, of
+    its PNG twin.
 
+    Raises what `encode` and `read_image` raise.
+    """
+    from ptmtools.texture import decode, encode, read_header, read_image
+    from ptmtools.texture.images import png_bytes
 
-Files = list[tuple[str, bytes]]
-
-
-def _encoded(name: str, image: SourceImage, options: TextureOptions) -> Files:
-    source = image.load()
-    with naming(image.name):
+    name, source = image
+    with naming(name):
         texels = read_image(source)
         data = encode(texels, options)
-    files = [(f"{SERVED}/{FOLDER}/{name}.ptm", data)]
-    if options.fallback:
-        if options.max_error or read_header(data).trimmed:
-            twin = png_bytes(decode(data))
-        elif source.startswith(PNG_MAGIC):
-            twin = bare_png(source)
-        else:
-            twin = png_bytes(texels)
-        files.append((f"{SERVED}/{FOLDER}/{name}.png", twin))
-    return files
+    if not options.fallback:
+        return [data]
+    header = read_header(data)
+    level = fallback_level(header, options.fallback_size)
+    if level < len(header.levels) - 1 or options.max_error or header.trimmed:
+        twin = png_bytes(decode(data, level=level))
+    elif source.startswith(PNG_MAGIC):
+        twin = bare_png(source)
+    else:
+        twin = png_bytes(texels)
+    return [data, twin]
+
+
+def fallback_level(header: PtmHeader, size: int) -> int:
+    """The level that a PNG twin of this size holds, see `TextureOptions`."""
+    sides = [max(level.width, level.height) for level in header.levels]
+    fitting = [n for n, side in enumerate(sides) if side <= size or not size]
+    return fitting[-1] if fitting else 0
 
 
 def bare_png(data: bytes) -> bytes:
@@ -177,41 +224,46 @@ def bare_png(data: bytes) -> bytes:
     return b"".join(kept)
 
 
-def _kept(
-    run: Run, options: TextureOptions, inputs: Mapping[str, str]
-) -> dict[str, Callable[[], Files]]:
-    """Name → what reads its files again, for textures that the last run made of the same image."""
-    before = run.db.manifest.stages.get("textures")
-    if before is None or before.software != __version__:
-        return {}
-    if dict(before.parameters) != parameters(options):
-        return {}
-    kept: dict[str, Callable[[], Files]] = {}
-    for file, digest in inputs.items():
-        name = file.removeprefix(f"{FOLDER}/").removesuffix(".ptm")
-        wanted = [f"{SERVED}/{FOLDER}/{name}.{s}" for s in ("ptm", "png")[: 1 + options.fallback]]
-        held = {n: before.outputs[n] for n in wanted if n in before.outputs}
-        if before.inputs.get(file) == digest and len(held) == len(wanted) and run.db.intact(held):
+def texture_records(run: Run) -> tuple[TextureRecord, ...]:
+    """What the emitted files say of the textures of a database."""
+    from ptmtools.database import TextureLevel, TextureRecord
 
-            def read(held: Mapping[str, str] = held) -> Files:
-                return [(n, run.db.read(n, h)) for n, h in held.items()]
+    record = run.db.record("textures")
+    size = record.parameters["fallback_size"]
+    records = []
+    for i, name in enumerate(texture_files(image.name for image in run.images)):
+        twin = f"{name.removesuffix('ptm')}png"
+        has_twin = f"{SERVED}/{twin}" in record.outputs
+        header = _header(run.db.path / SERVED / name)
+        texels = accumulate(level.width * level.height for level in header.levels)
+        levels = tuple(
+            TextureLevel(
+                width=level.width,
+                height=level.height,
+                offset=level.offset,
+                length=level.length,
+                gpu_bytes=count * header.texel_bytes,
+            )
+            for level, count in zip(header.levels, texels, strict=True)
+        )
+        records.append(
+            TextureRecord(
+                image=i,
+                file=name,
+                fallback=twin if has_twin else None,
+                width=levels[-1].width,
+                height=levels[-1].height,
+                components=header.components,
+                levels=levels,
+                sha256=record.outputs[f"{SERVED}/{name}"],
+                fallback_level=fallback_level(header, size) if has_twin else None,
+            )
+        )
+    return tuple(records)
 
-            kept[name] = read
-    return kept
 
+def _header(file: Path) -> PtmHeader:
+    from ptmtools.texture.container import HEAD_MAX, read_header
 
-def _ordered(
-    pool: ThreadPoolExecutor,
-    work: Callable[[tuple[str, SourceImage]], tuple[Files, int, int]],
-    jobs: list[tuple[str, SourceImage]],
-    workers: int,
-) -> Iterable[tuple[Files, int, int]]:
-    """Results in the order of the jobs, with few more in flight than there are workers: what
-    waits to be written is memory."""
-    ahead = [pool.submit(work, job) for job in jobs[: workers + 1]]
-    for following in range(workers + 1, len(jobs) + workers + 1):
-        if not ahead:
-            return
-        yield ahead.pop(0).result()
-        if following < len(jobs):
-            ahead.append(pool.submit(work, jobs[following]))
+    with open(file, "rb") as stream, naming(file):
+        return read_header(stream.read(HEAD_MAX))

@@ -1,28 +1,34 @@
 """The distinct images of a scene, their names, and which of their texels are not opaque.
 
-Each image is read and decoded once, one at a time, when the first face that uses it comes up:
-a file that cannot be decoded is found here and not hours later, and whether an alpha channel is
-more than 255s cannot be known otherwise. What is kept is the digest, the means to read the bytes
-again, and a mask of the texels that are not opaque where there are any.
+Each image that some face uses is read and decoded once, several at a time: a file that cannot be
+decoded is found here and not hours later, and whether an alpha channel is more than 255s cannot be
+known otherwise. What is kept is the digest, the means to read the bytes again, and a mask of the
+texels that are not opaque where there are any.
 """
 
 from __future__ import annotations
 
 import hashlib
 import io
+import os
 import re
 import unicodedata
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
+from ptmtools.progress import Progress
 from ptmtools.scene.model import SourceImage
-from ptmtools.scene.source import Findings, Texture
+from ptmtools.scene.reference import Folder
+from ptmtools.scene.source import FileRange, Findings, Texture
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -77,40 +83,93 @@ class Decoded:
     holes: NDArray[np.bool_] | None
 
 
-class ImageStore:
-    """Images by digest, in the order in which they were first asked for."""
+@dataclass(frozen=True)
+class _Examined:
+    """What was found out about an image: digest, Pillow's name for its format, whether it can be
+    other than opaque, `Decoded.holes`; or the fault that keeps it from being an image."""
 
-    def __init__(self, findings: Findings) -> None:
+    sha256: str = ""
+    format: str = ""
+    alpha: bool = False
+    holes: NDArray[np.bool_] | None = None
+    fault: str = ""
+
+
+class ImageStore:
+    """Images by digest, in the order in which they were first asked for.
+
+    ``folder`` is the model's, where files may have been found.
+    """
+
+    def __init__(self, findings: Findings, folder: Folder) -> None:
         self._findings = findings
-        self._found: dict[str, Decoded] = {}
+        self._folder = folder
+        self._examined: dict[Callable[[], bytes], _Examined] = {}
+        self._index: dict[str, int] = {}
         self._images: list[SourceImage] = []
+        self._files: list[set[str]] = []
+        self._opaque: list[bool] = []
+        self._masks: set[str] = set()
         self._stems: set[str] = set()
 
     @property
     def images(self) -> tuple[SourceImage, ...]:
-        return tuple(self._images)
+        return tuple(
+            replace(image, files=tuple(sorted(files)), plain=opaque and not files & self._masks)
+            for image, files, opaque in zip(self._images, self._files, self._opaque, strict=True)
+        )
+
+    def examine(self, textures: Iterable[Texture], workers: int, progress: Progress) -> None:
+        """Decodes the images of these textures, ``workers`` at a time, before they are added."""
+        reads = list(dict.fromkeys(texture.read for texture in textures))
+        with _unwarned(), ThreadPoolExecutor(workers) as pool:
+            for done, found in enumerate(pool.map(_examine, reads)):
+                progress(done, len(reads), "images")
+                self._examined[reads[done]] = found
+        progress(len(reads), len(reads), "images")
 
     def add(self, texture: Texture) -> Decoded | None:
         """The image of a texture, or None (and a miss is recorded) if it cannot be decoded."""
-        data = self._read(texture)
-        if data is None:
+        if texture.read not in self._examined:
+            with _unwarned():
+                self._examined[texture.read] = _examine(texture.read)
+        found = self._examined[texture.read]
+        if found.fault:
+            self._findings.miss("PTM-N206", f"{texture.what}: {found.fault}", texture.place)
             return None
-        digest = hashlib.sha256(data).hexdigest()
-        if digest not in self._found:
-            opened = self._decode(texture, data)
-            if opened is None:
-                return None
-            name = self._name(texture.label, opened.format or "")
-            load = VerifiedBytes(texture.read, digest, texture.label)
-            self._found[digest] = Decoded(len(self._images), _holes(opened))
-            self._images.append(SourceImage(name, digest, load))
-        return self._found[digest]
+        if found.sha256 not in self._index:
+            self._index[found.sha256] = len(self._images)
+            name = self._name(texture.label, found.format)
+            load = VerifiedBytes(texture.read, found.sha256, texture.label)
+            self._images.append(SourceImage(name, found.sha256, load))
+            self._files.append(set())
+            self._opaque.append(not found.alpha)
+        index = self._index[found.sha256]
+        if file := self._whole_file(texture):
+            self._files[index].add(file)
+        return Decoded(index, found.holes)
+
+    def _whole_file(self, texture: Texture) -> str | None:
+        """The file that an image is all of, relative to the model's folder."""
+        read = texture.read
+        if not isinstance(read, FileRange) or read.offset or read.length is not None:
+            return None
+        name = Path(os.path.relpath(read.path, self._folder.root)).as_posix()
+        return name if name in self._folder.sought else None
 
     def mask_holes(self, mask: Texture) -> NDArray[np.bool_] | None:
         """(H, W) which texels of a mask (``map_d``) are not opaque; all, if it is unreadable."""
-        data = self._read(mask)
-        opened = None if data is None else self._decode(mask, data)
-        if opened is None:
+        if file := self._whole_file(mask):
+            self._masks.add(file)
+        try:
+            with _unwarned():
+                opened = _decode(mask.read())
+        except _FaultError as fault:
+            self._findings.miss("PTM-N206", f"{mask.what}: {fault}", mask.place)
+            return np.ones((1, 1), dtype=bool)
+        except OSError as error:
+            reason = error.strerror or str(error)
+            self._findings.miss("PTM-N206", f"{mask.what}: {reason}", mask.place)
             return np.ones((1, 1), dtype=bool)
         if mask.channel in ("", "m") and opened.has_transparency_data:
             return _holes(opened)
@@ -122,33 +181,6 @@ class ImageStore:
         else:
             holes = np.asarray(opened.convert("L")) < 255
         return holes if holes.any() else None
-
-    def _read(self, texture: Texture) -> bytes | None:
-        try:
-            return texture.read()
-        except OSError as error:
-            reason = error.strerror or str(error)
-            self._findings.miss("PTM-N206", f"{texture.what}: {reason}", texture.place)
-            return None
-
-    def _decode(self, texture: Texture, data: bytes) -> Image.Image | None:
-        from PIL import Image
-
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                opened = Image.open(io.BytesIO(data))
-                opened.load()
-        except Image.DecompressionBombError:
-            reason = "too large to be a texture"
-        except Exception as error:  # Pillow's plug-ins raise whatever a damaged file provokes
-            reason = "empty file" if not data else "not a readable image"
-            if isinstance(error, OSError) and data and "identify" not in str(error):
-                reason = f"damaged image ({error})"
-        else:
-            return opened
-        self._findings.miss("PTM-N206", f"{texture.what}: {reason}", texture.place)
-        return None
 
     def _name(self, label: str, kind: str) -> str:
         """A safe name whose stem alone is unique without regard to case."""
@@ -164,7 +196,68 @@ class ImageStore:
             count += 1
             unique = f"{stem}_{count}"
         self._stems.add(unique.lower())
-        return f"{unique}.{_SUFFIX.get(kind, kind.lower())}"
+        return f"{unique}.{_suffix(kind)}"
+
+
+class _FaultError(Exception):
+    """What keeps a file from being an image."""
+
+
+def _examine(read: Callable[[], bytes]) -> _Examined:
+    try:
+        data = read()
+        opened = _decode(data)
+    except _FaultError as fault:
+        return _Examined(fault=str(fault))
+    except OSError as error:
+        return _Examined(fault=error.strerror or str(error))
+    return _Examined(
+        hashlib.sha256(data).hexdigest(),
+        opened.format or "",
+        opened.has_transparency_data,
+        _holes(opened),
+    )
+
+
+def is_plain(data: bytes, name: str) -> bool:
+    """Whether an image can take the place of a plain one of this name and change nothing else of
+    its scene: it can be decoded, has no alpha channel, and would have a name with that suffix."""
+    try:
+        with _unwarned():
+            opened = _decode(data)
+    except _FaultError:
+        return False
+    return not opened.has_transparency_data and name.endswith(f".{_suffix(opened.format or '')}")
+
+
+@contextmanager
+def _unwarned() -> Iterator[None]:
+    """Pillow's warnings are not shown. For all threads, so it is entered by the first of them."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def _decode(data: bytes) -> Image.Image:
+    """Raises _FaultError if that cannot be."""
+    from PIL import Image
+
+    try:
+        opened = Image.open(io.BytesIO(data))
+        opened.load()
+    except Image.DecompressionBombError:
+        reason = "too large to be a texture"
+    except Exception as error:  # Pillow's plug-ins raise whatever a damaged file provokes
+        reason = "empty file" if not data else "not a readable image"
+        if isinstance(error, OSError) and data and "identify" not in str(error):
+            reason = f"damaged image ({error})"
+    else:
+        return opened
+    raise _FaultError(reason)
+
+
+def _suffix(kind: str) -> str:
+    return _SUFFIX.get(kind, kind.lower())
 
 
 def _holes(opened: Image.Image) -> NDArray[np.bool_] | None:

@@ -48,6 +48,8 @@ def ingest(
     path: str | os.PathLike[str],
     options: IngestOptions = IngestOptions(),  # noqa: B008 - a frozen value
     progress: Progress = silent,
+    *,
+    workers: int = 1,
 ) -> Scene:
     """Read a model file.
 
@@ -55,7 +57,8 @@ def ingest(
     ----------
     path: an OBJ, GLB, glTF, PLY, STL, OFF, DAE, 3DS, 3MF, X3D, VRML or CTM file.
     options: see `IngestOptions`.
-    progress: called with bytes while reading, then with materials.
+    progress: called with bytes while reading, then with images and materials.
+    workers: threads that decode images; never changes the result.
 
     Returns
     -------
@@ -102,7 +105,9 @@ def ingest(
 
     used_material, triangle_material = _in_use(source.triangle_material[kept.source])
     used_object, triangle_object = _in_use(source.triangle_object[kept.source])
-    store = ImageStore(findings)
+    store = ImageStore(findings, folder)
+    given = [source.materials[index].texture for index in used_material.tolist()]
+    store.examine((texture for texture in given if texture is not None), workers, progress)
     materials = []
     for done, index in enumerate(used_material.tolist()):
         progress(done, len(used_material), "materials")

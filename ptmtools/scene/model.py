@@ -7,7 +7,7 @@ the origin (design, "Space"). Arrays are never modified in place.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -69,11 +69,17 @@ class SourceImage:
     name: file name with suffix, unique in the scene without regard to case, safe on any system.
     sha256: hex digest of the bytes; distinct images have distinct digests.
     load: returns the bytes.
+    files: the files that hold it and nothing else, relative to the model's folder, "/" between
+        names; none if it is part of a larger file.
+    plain: nothing of the scene but this image depends on its texels: it has no alpha channel and
+        is no mask.
     """
 
     name: str
     sha256: str
     load: Callable[[], bytes] = field(compare=False, repr=False)
+    files: tuple[str, ...] = ()
+    plain: bool = False
 
 
 @dataclass(frozen=True)
@@ -144,11 +150,11 @@ class Scene:
         return opaque[self.triangle_material]
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
-        """The scene as plain arrays, without the bytes of its images."""
+        """The scene as plain arrays, without its images: what is made of the arrays alone does
+        not depend on them."""
         about = {
             "objects": self.objects,
             "materials": [vars(m) for m in self.materials],
-            "images": [{"name": i.name, "sha256": i.sha256} for i in self.images],
             "cameras": [vars(c) for c in self.cameras],
             "space": vars(self.space),
             "notes": [vars(n) for n in self.notes],
@@ -166,14 +172,10 @@ class Scene:
 
     @staticmethod
     def from_arrays(
-        arrays: Mapping[str, NDArray[np.generic]], load_image: Callable[[str], bytes]
+        arrays: Mapping[str, NDArray[np.generic]], images: Sequence[SourceImage] = ()
     ) -> Scene:
-        """Inverse of `to_arrays`; ``load_image(sha256)`` returns the bytes of an image."""
+        """Inverse of `to_arrays`; ``images`` in the order in which materials count them."""
         about = json.loads(bytes(np.asarray(arrays["about"], dtype=np.uint8)).decode())
-
-        def loader(digest: str) -> Callable[[], bytes]:
-            return lambda: load_image(digest)
-
         return Scene(
             points=np.asarray(arrays["points"], dtype=np.float64),
             triangles=np.asarray(arrays["triangles"], dtype=np.int32),
@@ -185,9 +187,7 @@ class Scene:
             materials=tuple(
                 Material(**{**m, "color": tuple(m["color"])}) for m in about["materials"]
             ),
-            images=tuple(
-                SourceImage(i["name"], i["sha256"], loader(i["sha256"])) for i in about["images"]
-            ),
+            images=tuple(images),
             cameras=tuple(
                 Camera(c["name"], tuple(c["position"]), tuple(c["direction"]), c["field_of_view"])
                 for c in about["cameras"]

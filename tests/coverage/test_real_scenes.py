@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ptmtools.cells.options import SubdivideOptions
-from ptmtools.cells.subdivide import subdivide
+from ptmtools.cells.subdivision import subdivide
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.opengl import APT
 from ptmtools.coverage.options import AchOptions

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
 
 from ptmtools.errors import DatabaseError, OutputError
-from ptmtools.pipeline import folder as folders
-from ptmtools.pipeline.folder import MANIFEST, STAGING, DatabaseFolder, DatabaseWriter
+from ptmtools.pipeline.folder import MANIFEST, DatabaseFolder
 from ptmtools.pipeline.manifest import StageRecord
+from ptmtools.pipeline.writer import DatabaseWriter
 
 
 def state(folder: Path) -> dict[str, bytes]:
@@ -21,9 +20,10 @@ def state(folder: Path) -> dict[str, bytes]:
 
 def write(db: Path, files: dict[str, bytes], stage: str = "cells", model: str = "m.obj") -> None:
     with DatabaseWriter.open_for_model(db, model, force=True) as writer:
+        staged = writer.begin("some")
         for name, data in files.items():
-            writer.put(name, data)
-        writer.commit({stage: StageRecord("1", {}, {}, writer.pending())})
+            staged.put(name, data)
+        staged.commit({stage: StageRecord(1, {}, {}, staged.pending())})
 
 
 def test_commits_and_reads_back(tmp_path: Path) -> None:
@@ -31,7 +31,7 @@ def test_commits_and_reads_back(tmp_path: Path) -> None:
     db = DatabaseFolder.open(tmp_path / "a" / "db")
     outputs = db.record("cells").outputs
     assert db.read("stages/x", outputs["stages/x"]) == b"1"
-    assert db.intact(outputs)
+    assert db.damaged(outputs) is None
     assert set(state(db.path)) == {MANIFEST, "stages/x", "www/y"}
 
 
@@ -49,7 +49,7 @@ def test_without_a_commit_it_stays_what_it_was(tmp_path: Path) -> None:
 
     def update() -> None:
         with DatabaseWriter.open_for_model(tmp_path, "m.obj") as writer:
-            writer.put("www/a", b"2")
+            writer.begin("some").put("www/a", b"2")
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -59,48 +59,8 @@ def test_without_a_commit_it_stays_what_it_was(tmp_path: Path) -> None:
 
 def test_a_new_folder_goes_again_if_nothing_was_committed(tmp_path: Path) -> None:
     with DatabaseWriter.open_for_model(tmp_path / "a" / "db", "m.obj") as writer:
-        writer.put("www/a", b"2")
+        writer.begin("some").put("www/a", b"2")
     assert not list(tmp_path.iterdir())
-
-
-class KilledError(BaseException):
-    """Nothing catches it: as if the process had ended."""
-
-
-@pytest.mark.parametrize(
-    ("moves", "committed"), [(0, False), (1, False), (2, True), (3, True), (4, True)]
-)
-def test_killed_within_a_commit_the_next_run_finishes_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moves: int, committed: bool
-) -> None:
-    """Two outputs are staged, the commit is made, two outputs and the manifest are moved."""
-    write(tmp_path, {"www/a": b"1", "www/gone": b"1"})
-    before = state(tmp_path)
-    monkeypatch.setattr(folders.shutil, "rmtree", lambda *a, **k: None)  # the end is not reached
-    real, left = os.replace, moves
-
-    def replace(source: Path, target: Path) -> None:
-        nonlocal left
-        if Path(target).parent.name != STAGING:
-            if left == 0:
-                raise KilledError
-            left -= 1
-        real(source, target)
-
-    monkeypatch.setattr(os, "replace", replace)
-    with pytest.raises(KilledError):
-        write(tmp_path, {"www/a": b"2", "www/b": b"2"})
-    monkeypatch.undo()
-
-    with DatabaseWriter.open_for_model(tmp_path, "m.obj"):
-        pass
-    if committed:
-        assert set(state(tmp_path)) == {MANIFEST, "www/a", "www/b"}
-        db = DatabaseFolder.open(tmp_path)
-        assert db.intact(db.manifest.outputs())
-        assert (tmp_path / "www/a").read_bytes() == b"2"
-    else:
-        assert state(tmp_path) == before
 
 
 def test_two_writers_do_not_meet(tmp_path: Path) -> None:
@@ -146,4 +106,4 @@ def test_says_what_is_missing_or_damaged(tmp_path: Path) -> None:
     (tmp_path / "www/a").unlink()
     with pytest.raises(DatabaseError, match="PTM-D005"):
         db.read("www/a", db.record("cells").outputs["www/a"])
-    assert not db.intact(db.record("cells").outputs)
+    assert db.damaged(db.record("cells").outputs) == "www/a"

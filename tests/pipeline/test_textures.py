@@ -9,18 +9,13 @@ import pytest
 from PIL import Image, PngImagePlugin
 
 from ptmtools.pipeline.textures import bare_png, texture_names
-from ptmtools.scene.model import SourceImage
 from ptmtools.texture import read_image
 
 
-def images(*names: str) -> list[SourceImage]:
-    return [SourceImage(name, "", bytes) for name in names]
-
-
 def test_names_are_unique_without_regard_to_case() -> None:
-    assert texture_names(images("a.png", "b.tar.png", "c")) == ["a", "b.tar", "c"]
-    assert texture_names(images("a.png", "A.jpg", "a_png.tif")) == ["a_png", "A_jpg", "a_png_2"]
-    assert texture_names(images(".png")) == ["png"]
+    assert texture_names(("a.png", "b.tar.png", "c")) == ["a", "b.tar", "c"]
+    assert texture_names(("a.png", "A.jpg", "a_png.tif")) == ["a_png", "A_jpg", "a_png_2"]
+    assert texture_names((".png",)) == ["png"]
 
 
 @pytest.mark.parametrize("mode", ["1", "L", "LA", "P", "RGB", "RGBA"])

@@ -353,6 +353,6 @@ def test_bad_places_and_options(put: Put, tmp_path: Path) -> None:
 def test_progress_ends_at_its_total(textured: Textured) -> None:
     steps: list[tuple[int, int, str]] = []
     ingest(textured(""), progress=lambda *step: steps.append(step))
-    assert {what for _, _, what in steps} == {"reading", "materials"}
+    assert {what for _, _, what in steps} == {"reading", "images", "materials"}
     last = {what: (done, total) for done, total, what in steps}
     assert all(done == total for done, total in last.values())

@@ -1,0 +1,54 @@
+"""Why a stage has to be run: what it was told, or read, has changed, or what it wrote is gone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ptmtools.pipeline.folder import DatabaseFolder
+from ptmtools.pipeline.manifest import StageRecord
+
+#: Files that are named one by one.
+_NAMED = 3
+
+
+def reasons(before: StageRecord | None, work: StageRecord, db: DatabaseFolder) -> tuple[str, ...]:
+    """What makes a stage with this record do ``work``; empty if it is current."""
+    if before is None:
+        return ("has not been run",)
+    found = []
+    if before.recipe != work.recipe:
+        found.append(f"ptmtools does it in another way since (recipe {before.recipe})")
+    names = [*before.parameters, *(n for n in work.parameters if n not in before.parameters)]
+    for name in names:
+        old, new = before.parameters.get(name), work.parameters.get(name)
+        if old != new:
+            found.append(f"{name.replace('_', ' ')}: {_told(old)} → {_told(new)}")
+    for what, files in _changed(before.inputs, work.inputs).items():
+        if files:
+            found.append(f"{_listed(files)} {what}")
+    if not found and (lost := db.damaged(before.outputs)):
+        found.append(f"{lost} is missing or damaged")
+    return tuple(found)
+
+
+def _changed(before: Mapping[str, str], after: Mapping[str, str]) -> dict[str, list[str]]:
+    both = [n for n in after if n in before and after[n] != before[n]]
+    return {
+        "changed": [n for n in both if before[n] and after[n]],
+        "came": [n for n in both if not before[n]] + [n for n in after if n not in before],
+        "is gone": [n for n in both if not after[n]] + [n for n in before if n not in after],
+    }
+
+
+def _listed(files: list[str]) -> str:
+    more = f" and {len(files) - _NAMED:,} more" if len(files) > _NAMED else ""
+    return ", ".join(files[:_NAMED]) + more
+
+
+def _told(value: Any) -> str:
+    if value is None or value in ("", []):
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return str(value)

@@ -1,0 +1,138 @@
+"""SHA-256 of files, remembered from run to run as long as a file has not been touched.
+
+A build that has nothing to do must not read a terabyte to find that out. A digest is taken again
+unless the file's size, inode, and times of modification and of change are what they were when it
+was last taken; the time of change no program sets. A file that changed just before it was read
+could change once more within the same tick of the clock, so its digest is not remembered (Git
+calls such an entry racy). ``ptm validate`` never asks here: it reads every byte.
+
+What is remembered is no artifact. It lies in the user's cache folder (``XDG_CACHE_HOME``), a file
+for each database, and losing it costs time only.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+#: A clock may stand still for so long, in nanoseconds: most tick every 1 to 10 ms, some disks'
+#: every 2 s; theirs are told by whole seconds.
+TICK, COARSE_TICK = 50_000_000, 3_000_000_000
+#: Files for databases that were not built for so many days are removed.
+KEPT_DAYS = 90
+
+_FORMAT = 1
+Stamp = tuple[int, int, int, int]
+
+
+class Digests:
+    """Digests of files, by absolute path.
+
+    Parameters
+    ----------
+    database: the folder for which they are remembered.
+    """
+
+    def __init__(self, database: Path) -> None:
+        name = hashlib.sha256(os.fsencode(database.absolute())).hexdigest()[:32]
+        folder = _cache_folder()
+        self._file = None if folder is None else folder / f"{name}.json"
+        self._known: dict[str, tuple[Stamp, str]] = {}
+        self._noted: dict[str, tuple[Stamp, str]] = {}
+        self._used: set[str] = set()
+        self._changed = False
+        with suppress(OSError, ValueError, TypeError, RecursionError):
+            self._load()
+
+    def of(self, path: Path) -> str:
+        """Hex digest of a regular file.
+
+        Raises OSError if it cannot be read.
+        """
+        name = os.path.abspath(path)
+        stamp = _stamp(path)
+        known = self._known.get(name)
+        if known is not None and known[0] == stamp:
+            self._used.add(name)
+            return known[1]
+        before = time.time_ns()
+        with open(path, "rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+        if stamp == _stamp(path) and _settled(stamp, before):
+            self._known[name] = (stamp, digest)
+            self._used.add(name)
+            self._changed = True
+        return digest
+
+    def note(self, path: Path, digest: str) -> None:
+        """What was just written to a file; it counts from the next run on."""
+        with suppress(OSError):
+            self._noted[os.path.abspath(path)] = (_stamp(path), digest)
+
+    def save(self) -> None:
+        """Remembers what was found out; in silence if that cannot be."""
+        for name, (stamp, digest) in self._noted.items():
+            with suppress(OSError):
+                if stamp == _stamp(Path(name)) and _settled(stamp, time.time_ns()):
+                    self._known[name] = (stamp, digest)
+                    self._used.add(name)
+                    self._changed = True
+        self._noted = {}
+        if self._file is None or not self._changed:
+            return
+        rows = {
+            name: [*stamp, digest]
+            for name, (stamp, digest) in sorted(self._known.items())
+            if name in self._used or os.path.exists(name)
+        }
+        part = self._file.with_name(f".{self._file.name}.{os.getpid()}.part")
+        with suppress(OSError):
+            self._file.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                part.write_text(json.dumps({"format": _FORMAT, "files": rows}))
+                part.replace(self._file)
+            finally:
+                part.unlink(missing_ok=True)
+            _forget_old(self._file.parent)
+        self._changed = False
+
+    def _load(self) -> None:
+        if self._file is None:
+            return
+        document: Any = json.loads(self._file.read_bytes())
+        if document["format"] == _FORMAT:
+            self._known = {
+                str(name): ((int(a), int(b), int(c), int(d)), str(digest))
+                for name, (a, b, c, d, digest) in document["files"].items()
+            }
+
+
+def _stamp(path: Path) -> Stamp:
+    """Size, inode, and times of modification and of change in nanoseconds."""
+    found = os.stat(path)
+    return found.st_size, found.st_ino, found.st_mtime_ns, found.st_ctime_ns
+
+
+def _settled(stamp: Stamp, now: int) -> bool:
+    """Whether a change at the time ``now``, in nanoseconds, or later would show in the stamp."""
+    tick = COARSE_TICK if stamp[2] % 1_000_000_000 == 0 else TICK
+    return max(stamp[2:]) + tick < now
+
+
+def _cache_folder() -> Path | None:
+    # Not Path.home, which raises for a user without a home.
+    caches = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
+    return caches / "ptmtools" / "digests" if caches.is_absolute() else None
+
+
+def _forget_old(folder: Path) -> None:
+    oldest = time.time() - KEPT_DAYS * 86_400
+    for file in folder.glob("*.json"):
+        with suppress(OSError):
+            if file.stat().st_mtime < oldest:
+                file.unlink()
