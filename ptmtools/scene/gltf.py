@@ -1,11 +1,12 @@
 """Reads glTF 2.0 (.glb and .gltf).
 
-trimesh decodes accessors and the node graph. It is handed a reduced document in which every
-primitive is a mesh and a node of its own, and texture coordinates are a plain attribute, because
-it would otherwise (5.2) read only TEXCOORD_0, leave normalised integers unscaled, read sparse
-accessors as zeros, drop the mesh and children of a camera's node, and name nodes at random.
-Materials, samplers, images and cameras are read here from the JSON: trimesh keeps neither wrap
-modes nor the images' own bytes. Metres and Y up are fixed by the format.
+trimesh decodes accessors. It is handed a reduced document in which every primitive is a mesh and a
+node of its own, and texture coordinates are a plain attribute, because it would otherwise (5.2)
+read only TEXCOORD_0, leave normalised integers unscaled, read sparse accessors as zeros, drop the
+mesh and children of a camera's node, and name nodes at random. The node graph, materials, samplers,
+images and cameras are read here from the JSON: trimesh takes a time that grows with the third
+power of the graph's depth (six minutes for a file of 100 KB), and keeps neither wrap modes nor the
+images' own bytes. Metres and Y up are fixed by the format.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from ptmtools.scene.gltf_document import Document, damaged, natural, open_docume
 from ptmtools.scene.gltf_material import MaterialReader, Painted
 from ptmtools.scene.model import Camera
 from ptmtools.scene.reference import Folder
-from ptmtools.scene.source import MAX_VERTICES, Findings, Source
+from ptmtools.scene.source import MAX_VERTICES, Findings, Source, too_many_triangles
 
 #: Required extensions that change nothing that is read here, or that are read.
 _HARMLESS = {
@@ -39,7 +40,6 @@ _BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _ITEMS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 #: The greatest value of each integer type, which normalised means 1.
 _FULL = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
-_TRANSFORM = ("matrix", "translation", "rotation", "scale")
 
 
 @dataclass(frozen=True)
@@ -52,11 +52,19 @@ class _Draw:
     place: str
 
 
-def read_gltf(path: Path, folder: Folder, findings: Findings) -> Source:
-    """Read a glTF model; InputError where it is damaged or needs what is not supported."""
+def read_gltf(
+    path: Path, folder: Folder, findings: Findings, max_triangles: int = MAX_VERTICES
+) -> Source:
+    """Read a glTF model.
+
+    Raises InputError where it is damaged or needs what is not supported; LimitError for more
+    vertices than int32 can number (PTM-L200) or more than ``max_triangles`` (PTM-L203), each as
+    often as a node shows it, before anything is made of them.
+    """
     try:
-        return _read(path, open_document(path, folder), folder, findings)
+        return _read(path, open_document(path, folder), folder, findings, max_triangles)
     except (
+        RecursionError,
         LookupError,
         TypeError,
         ValueError,
@@ -69,7 +77,9 @@ def read_gltf(path: Path, folder: Folder, findings: Findings) -> Source:
         raise damaged(path, what.splitlines()[0] if what else type(error).__name__) from None
 
 
-def _read(path: Path, document: Document, folder: Folder, findings: Findings) -> Source:
+def _read(
+    path: Path, document: Document, folder: Folder, findings: Findings, max_triangles: int
+) -> Source:
     tree = document.tree
     unsupported = sorted(
         name
@@ -84,20 +94,21 @@ def _read(path: Path, document: Document, folder: Folder, findings: Findings) ->
             remedy="export it without compression",
         )
     order = _reachable(tree)
-    draws = _draws(path, tree, order, findings)
+    draws = _draws(path, tree, order, findings, max_triangles)
     if not draws:
         raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with triangles")
     painter = MaterialReader(path, document, folder, findings)
     painted = [painter.read(draw.primitive.get("material")) for draw in draws]
-    scene = _load(path, document, order, draws, painted)
+    world_of = _world_matrices(tree, order)
+    scene = _load(path, document, draws, painted)
 
     points: list[NDArray[np.float64]] = []
     triangles: list[NDArray[np.int64]] = []
     uv: list[NDArray[np.float64]] = []
     total = 0
     for index, (draw, paint) in enumerate(zip(draws, painted, strict=True)):
-        matrix, name = scene.graph.get(f"draw{index}")
-        mesh = scene.geometry[name]
+        matrix = world_of[draw.node]
+        mesh = scene.geometry[scene.graph.get(f"draw{index}")[1]]
         attributes = draw.primitive["attributes"]
         local = _values(mesh.vertices, tree["accessors"][attributes["POSITION"]])
         face = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
@@ -123,7 +134,7 @@ def _read(path: Path, document: Document, folder: Folder, findings: Findings) ->
         triangle_material=np.repeat(np.array([paint.index for paint in painted]), counts),
         objects=tuple(names.values()),
         materials=painter.materials,
-        cameras=_cameras(tree, order, scene, findings),
+        cameras=_cameras(tree, world_of, findings),
         metres=1.0,
         up="y",
     )
@@ -151,9 +162,11 @@ def _reachable(tree: dict[str, Any]) -> list[int]:
     return order
 
 
-def _draws(path: Path, tree: dict[str, Any], order: list[int], findings: Findings) -> list[_Draw]:
+def _draws(
+    path: Path, tree: dict[str, Any], order: list[int], findings: Findings, max_triangles: int
+) -> list[_Draw]:
     draws = []
-    vertices = 0
+    vertices = triangles = 0
     for node in order:
         entry = tree["nodes"][node]
         if "mesh" not in entry:
@@ -184,7 +197,14 @@ def _draws(path: Path, tree: dict[str, Any], order: list[int], findings: Finding
                 findings.say("PTM-N223", "vertex colours are not carried over", place)
             if primitive.get("targets"):
                 findings.say("PTM-N224", "morph targets are not carried over", place)
-            vertices += tree["accessors"][primitive["attributes"]["POSITION"]]["count"]
+            points = natural(tree["accessors"][primitive["attributes"]["POSITION"]]["count"])
+            corners = points
+            if "indices" in primitive:
+                corners = natural(tree["accessors"][primitive["indices"]]["count"])
+            vertices += points
+            triangles += corners // 3 if mode == _TRIANGLES else corners
+            if triangles > max_triangles:
+                raise too_many_triangles(max_triangles, path)
             draws.append(_Draw(node, name, primitive, place))
     if vertices > MAX_VERTICES:
         raise LimitError(
@@ -193,10 +213,38 @@ def _draws(path: Path, tree: dict[str, Any], order: list[int], findings: Finding
     return draws
 
 
-def _load(
-    path: Path, document: Document, order: list[int], draws: list[_Draw], painted: list[Painted]
-) -> Any:
-    """The trimesh scene of a reduced document: node i is called "i", draw k "drawk"."""
+def _world_matrices(tree: dict[str, Any], order: list[int]) -> dict[int, NDArray[np.float64]]:
+    """(4, 4) local to world of each node (section 3.5.3), in ``order``, parents first."""
+    world: dict[int, NDArray[np.float64]] = {}
+    above: dict[int, NDArray[np.float64]] = {}
+    with np.errstate(all="ignore"):
+        for node in order:
+            entry = tree["nodes"][node]
+            world[node] = above.get(node, np.eye(4)) @ _local_matrix(entry)
+            above.update(dict.fromkeys(entry.get("children", []), world[node]))
+    return world
+
+
+def _local_matrix(entry: dict[str, Any]) -> NDArray[np.float64]:
+    """(4, 4) of a node: its matrix, or scale, then rotation, then translation."""
+    if "matrix" in entry:
+        return np.array(entry["matrix"], dtype=np.float64).reshape(4, 4).T
+    x, y, z, w = np.array(entry.get("rotation", [0, 0, 0, 1]), dtype=np.float64).tolist()
+    n = x * x + y * y + z * z + w * w
+    s = 2 / n if n > 0 else 0.0
+    local = np.eye(4)
+    local[:3, :3] = [
+        [1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
+        [s * (x * y + z * w), 1 - s * (x * x + z * z), s * (y * z - x * w)],
+        [s * (x * z - y * w), s * (y * z + x * w), 1 - s * (x * x + y * y)],
+    ]
+    local[:3, :3] *= np.array(entry.get("scale", [1, 1, 1]), dtype=np.float64).reshape(3)
+    local[:3, 3] = np.array(entry.get("translation", [0, 0, 0]), dtype=np.float64).reshape(3)
+    return local
+
+
+def _load(path: Path, document: Document, draws: list[_Draw], painted: list[Painted]) -> Any:
+    """The trimesh scene of a reduced document: draw k is the mesh of the node "drawk"."""
     import trimesh
 
     tree = document.tree
@@ -219,21 +267,7 @@ def _load(
             reduced["indices"] = accessor(draw.primitive["indices"], draw.place)
         meshes.append({"primitives": [reduced]})
 
-    place = {node: k for k, node in enumerate(order)}
-    nodes: list[dict[str, Any]] = []
-    for node in order:
-        entry = tree["nodes"][node]
-        nodes.append(
-            {
-                "name": str(node),
-                "children": [place[child] for child in entry.get("children", [])],
-                **{key: entry[key] for key in _TRANSFORM if key in entry},
-            }
-        )
-    for index, draw in enumerate(draws):
-        nodes[place[draw.node]]["children"].append(len(nodes))
-        nodes.append({"name": f"draw{index}", "mesh": index})
-    below = {child for node in nodes for child in node.get("children", [])}
+    nodes = [{"name": f"draw{index}", "mesh": index} for index in range(len(draws))]
     reduced_tree = {
         "asset": {"version": "2.0"},
         "buffers": [{"uri": str(i)} for i in range(len(document.buffers))],
@@ -241,7 +275,7 @@ def _load(
         "accessors": [tree["accessors"][index] for index in needed],
         "meshes": meshes,
         "nodes": nodes,
-        "scenes": [{"nodes": [i for i in range(len(nodes)) if i not in below]}],
+        "scenes": [{"nodes": list(range(len(nodes)))}],
     }
     return trimesh.load_scene(
         io.BytesIO(json.dumps(reduced_tree).encode()),
@@ -266,8 +300,8 @@ def _check_accessor(path: Path, document: Document, index: int, place: str) -> N
     item = _BYTES[accessor["componentType"]] * _ITEMS[accessor["type"]]
     view = document.tree["bufferViews"][accessor["bufferView"]]
     stride = view.get("byteStride", item)
-    count, start = accessor["count"], accessor.get("byteOffset", 0)
-    if count < 1 or start < 0 or stride < item or start + (count - 1) * stride + item > length:
+    count, start = natural(accessor["count"]), natural(accessor.get("byteOffset", 0))
+    if count < 1 or natural(stride) < item or start + (count - 1) * stride + item > length:
         raise damaged(path, f"accessor {index} ends beyond its buffer view", place)
 
 
@@ -292,18 +326,18 @@ def _coords(mesh: Any, tree: dict[str, Any], draw: _Draw, paint: Painted) -> NDA
 
 
 def _cameras(
-    tree: dict[str, Any], order: list[int], scene: Any, findings: Findings
+    tree: dict[str, Any], world: dict[int, NDArray[np.float64]], findings: Findings
 ) -> tuple[Camera, ...]:
     cameras: list[Camera] = []
-    for node in order:
+    for node, matrix in world.items():
         entry = tree["nodes"][node]
         if "camera" not in entry:
             continue
         given = tree["cameras"][entry["camera"]]
         name = str(entry.get("name") or given.get("name") or f"camera {len(cameras)}")
-        matrix, _ = scene.graph.get(str(node))
         direction = -matrix[:3, 2]
-        length = float(np.linalg.norm(direction))
+        with np.errstate(all="ignore"):
+            length = float(np.linalg.norm(direction))
         position = matrix[:3, 3]
         yfov = given.get("perspective", {}).get("yfov", 0.0)
         usable = np.isfinite(position).all() and math.isfinite(length) and length > 0

@@ -1,7 +1,8 @@
 """The container of a glTF model: its JSON, its buffers, and where in which file they lie.
 
 GLB chunks, data URIs and separate files all become `Buffer`s; sizes and ranges are checked
-before anything is made of them (glTF 2.0, sections 3.6 and 4.4).
+before anything is made of them (glTF 2.0, sections 3.6 and 4.4). A file that several buffers name
+is read once, and no more of it than the longest of them.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+import re
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,10 +19,13 @@ from typing import Any
 from urllib.parse import unquote
 
 from ptmtools.errors import InputError
+from ptmtools.files import open_regular
 from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import FileRange, HeldBytes, decode
 
 _MAGIC, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
+#: How JSON writes halves of characters of UTF-16, of which one alone is no text.
+_HALF = re.compile(r"\\u[dD][89a-fA-F]")
 
 
 @dataclass(frozen=True)
@@ -87,7 +92,7 @@ def open_document(path: Path, folder: Folder) -> Document:
     else:
         text = data
     try:
-        tree = json.loads(decode(text))
+        tree = _parsed(decode(text))
     except (ValueError, RecursionError) as error:
         raise damaged(path, f"its JSON cannot be read ({error})") from None
     if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
@@ -96,21 +101,52 @@ def open_document(path: Path, folder: Folder) -> Document:
     if not version.startswith("2."):
         raise damaged(path, f"version {version!r}")
 
-    buffers = []
+    return Document(tree, tuple(_buffers(path, tree, folder, binary)))
+
+
+def _parsed(text: str) -> Any:
+    """JSON; ValueError for what is none, NaN among it. What is no text becomes question marks."""
+    tree = json.loads(text, parse_constant=_no_constant)
+    if _HALF.search(text):
+        tree = json.loads(json.dumps(tree, ensure_ascii=False).encode("utf-8", "replace"))
+    return tree
+
+
+def _no_constant(name: str) -> float:
+    raise ValueError(f"{name} is no JSON")
+
+
+def _buffers(
+    path: Path, tree: dict[str, Any], folder: Folder, binary: Buffer | None
+) -> list[Buffer]:
+    """The buffers of a document, in order."""
+    found: list[Buffer | Path] = []
+    lengths: list[int] = []
+    longest: dict[Path, int] = {}
     for index, entry in enumerate(tree.get("buffers", [])):
         place = f"buffer {index}"
+        lengths.append(natural(entry["byteLength"]))
         if "uri" not in entry:
             if binary is None or index:
                 raise damaged(path, "a buffer has no bytes", place)
-            buffer = binary
+            found.append(binary)
+        elif str(entry["uri"]).startswith("data:"):
+            found.append(Buffer(data_uri(path, entry["uri"], place), None))
         else:
-            buffer = _external(path, folder, str(entry["uri"]), place)
-        if len(buffer.data) < natural(entry["byteLength"]):
+            file = _external(path, folder, str(entry["uri"]), place)
+            found.append(file)
+            longest[file] = max(lengths[-1], longest.get(file, 0))
+    read: dict[Path, Buffer] = {}
+    for file, length in longest.items():
+        with open_regular(file) as stream:
+            read[file] = Buffer(stream.read(length), file)
+    buffers = [read[entry] if isinstance(entry, Path) else entry for entry in found]
+    for index, (buffer, length) in enumerate(zip(buffers, lengths, strict=True)):
+        if len(buffer.data) < length:
             raise damaged(
-                path, f"{entry['byteLength']} bytes expected, {len(buffer.data)} there", place
+                path, f"{length} bytes expected, {len(buffer.data)} there", f"buffer {index}"
             )
-        buffers.append(buffer)
-    return Document(tree, tuple(buffers))
+    return buffers
 
 
 def _chunks(path: Path, data: bytes) -> tuple[bytes, Buffer | None]:
@@ -142,9 +178,8 @@ def _chunks(path: Path, data: bytes) -> tuple[bytes, Buffer | None]:
     return text, binary
 
 
-def _external(path: Path, folder: Folder, uri: str, place: str) -> Buffer:
-    if uri.startswith("data:"):
-        return Buffer(data_uri(path, uri, place), None)
+def _external(path: Path, folder: Folder, uri: str, place: str) -> Path:
+    """The file of a buffer. Raises InputError PTM-I203, PTM-I205."""
     found = folder.find(unquote(uri))
     if found.path is None:
         outside = found.outcome == "outside"
@@ -155,7 +190,7 @@ def _external(path: Path, folder: Folder, uri: str, place: str) -> Buffer:
             place=place,
             remedy="allow reading outside of it" if outside else "put it beside the model",
         )
-    return Buffer(found.path.read_bytes(), found.path)
+    return found.path.resolve()
 
 
 def data_uri(path: Path, uri: str, place: str) -> bytes:

@@ -12,8 +12,12 @@ import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from ptmtools.errors import LimitError
+from ptmtools.files import open_regular
 from ptmtools.scene.source import Findings, decode
 
+#: Largest library that is read, MiB; those of whole cities have a few.
+LARGEST = 64
 #: Options of a texture statement with the least and the greatest number of their arguments.
 OPTIONS = {
     "-blendu": (1, 1),
@@ -139,11 +143,21 @@ class MtlMaterial:
 def read_mtl(path: Path, label: str, findings: Findings) -> dict[str, MtlMaterial]:
     """Materials by name, in the order of the file; of two with one name the first is kept.
 
-    ``label`` names the file in notes. A line that cannot be understood is a miss.
+    ``label`` names the file in notes. A line that cannot be understood is a miss. Raises LimitError
+    PTM-L204 for a library larger than `LARGEST`, and OSError.
     """
+    with open_regular(path) as stream:
+        data = stream.read((LARGEST << 20) + 1)
+    if len(data) > LARGEST << 20:
+        raise LimitError(
+            "PTM-L204",
+            f"is larger than {LARGEST} MiB",
+            file=path,
+            remedy="leave out the materials that are not used",
+        )
     materials: dict[str, MtlMaterial] = {}
     current: MtlMaterial | None = None
-    for index, line in enumerate(re.split(r"\r\n|\n|\r", decode(path.read_bytes())), start=1):
+    for index, line in enumerate(re.split(r"\r\n|\n|\r", decode(data)), start=1):
         words = line.strip(" \t").split(None, 1)
         if not words or words[0].startswith("#"):
             continue

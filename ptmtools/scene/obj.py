@@ -34,6 +34,7 @@ from ptmtools.scene.source import (
     Source,
     SourceMaterial,
     Texture,
+    too_many_triangles,
 )
 
 #: Statements that say nothing about surfaces, skipped without a word.
@@ -47,6 +48,8 @@ _SILENT = frozenset({
 #: Statements that would draw something that is not a surface of triangles.
 _NOT_DRAWN = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "surf": "surfaces"}
 _LINES_A_TICK = 1 << 16
+#: Longest line, with those that a backslash joins to it, in characters.
+LONGEST_LINE = 1 << 24
 #: A UTF-8 byte order mark, read as Latin-1.
 _MARK = "\u00ef\u00bb\u00bf"
 
@@ -70,13 +73,21 @@ class _Statements:
     unknown: dict[str, list[int]] = field(default_factory=dict)
 
 
-def read_obj(path: Path, folder: Folder, findings: Findings, progress: Progress = silent) -> Source:
+def read_obj(
+    path: Path,
+    folder: Folder,
+    findings: Findings,
+    progress: Progress = silent,
+    max_triangles: int = MAX_VERTICES,
+) -> Source:
     """Read an OBJ file with its materials.
 
     Raises InputError with the line for what cannot be read, and where there is no face at all;
-    LimitError for more vertices than int32 can number.
+    LimitError for more vertices than int32 can number (PTM-L200), a line longer than `LONGEST_LINE`
+    (PTM-L202), more than ``max_triangles`` (PTM-L203, before polygons are cut), and what `read_mtl`
+    raises.
     """
-    said = _read_statements(path, findings, progress)
+    said = _read_statements(path, findings, progress, max_triangles)
     for key, lines in said.unknown.items():
         what = _NOT_DRAWN.get(key, "not known")
         findings.say("PTM-N219", f"{key}: {what}, skipped", f"{path.name}:{lines[0]}", len(lines))
@@ -156,20 +167,35 @@ def _rest(line: str, key: str) -> str:
     return _name(line.strip(" \t\r\n")[len(key) :].strip(" \t"))
 
 
-def _logical_lines(stream: TextIO) -> Iterator[tuple[int, str]]:
-    """Lines with their numbers from 1; a backslash at the end joins the next one."""
+def _logical_lines(stream: TextIO, path: Path) -> Iterator[tuple[int, str]]:
+    """Lines with their numbers from 1; a backslash at the end joins the next one. Raises LimitError
+    PTM-L202."""
     number = 0
-    for line in stream:
+    while line := stream.readline(LONGEST_LINE + 1):
         number += 1
         first = number
-        while line.endswith("\\\n"):
-            number += 1
-            following = next(stream, "")
-            line = line[:-2] + " " + following
+        if line.endswith("\\\n"):
+            parts, length = [line[:-2]], len(line)
+            while line.endswith("\\\n") and length <= LONGEST_LINE:
+                number += 1
+                line = stream.readline(LONGEST_LINE + 1)
+                parts.append(line[:-2] if line.endswith("\\\n") else line)
+                length += len(line)
+            line = " ".join(parts)
+        if len(line) > LONGEST_LINE:
+            raise LimitError(
+                "PTM-L202",
+                f"is longer than {LONGEST_LINE} characters",
+                file=path,
+                place=f"line {first}",
+                remedy="if this is an OBJ file, split the face",
+            )
         yield first, line
 
 
-def _read_statements(path: Path, findings: Findings, progress: Progress) -> _Statements:
+def _read_statements(
+    path: Path, findings: Findings, progress: Progress, max_triangles: int
+) -> _Statements:
     said = _Statements()
     points, coords = said.points, said.coords
     size = path.stat().st_size
@@ -178,7 +204,7 @@ def _read_statements(path: Path, findings: Findings, progress: Progress) -> _Sta
     short: list[int] = []
 
     with open(path, "rb") as raw, TextIOWrapper(raw, encoding="latin-1") as stream:
-        for number, line in _logical_lines(stream):
+        for number, line in _logical_lines(stream, path):
             if not number % _LINES_A_TICK:
                 progress(raw.tell(), size, "reading")
             if number == 1:
@@ -212,6 +238,8 @@ def _read_statements(path: Path, findings: Findings, progress: Progress) -> _Sta
                     said.face_line.append(number)
                     said.face_object.append(object_index)
                     said.face_material.append(material_index)
+                    if len(said.corner_point) - 2 * len(said.face_line) > max_triangles:
+                        raise too_many_triangles(max_triangles, path)
                 elif key == "usemtl":
                     material_index = _material(said, _rest(line, "usemtl"), number)
                 elif key == "o":
@@ -290,6 +318,7 @@ def _materials(
 ) -> tuple[tuple[SourceMaterial, ...], dict[int, MapStatement]]:
     """All materials, and the map_Kd of those that have one."""
     defined: dict[str, MtlMaterial] = {}
+    read: set[Path] = set()
     for text, line in said.libraries:
         place = f"{path.name}:{line}"
         for name in _library_names(text):
@@ -305,6 +334,9 @@ def _materials(
             label = folder.label(found.path)
             if found.outcome == "elsewhere":
                 findings.say("PTM-N208", f"mtllib {name}: found as {label}", place)
+            if (real := found.path.resolve()) in read:
+                continue
+            read.add(real)
             for key, material in read_mtl(found.path, label, findings).items():
                 defined.setdefault(key, material)
 

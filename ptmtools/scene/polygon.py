@@ -5,6 +5,11 @@ fan would fold over takes its other diagonal. All others are cut by clipping ear
 their Newell normal (Meisters 1975), which also serves concave, slightly bent and keyhole outlines.
 Shapely's constrained Delaunay triangulation was rejected: it refuses outlines that touch
 themselves, and needs a GEOS newer than the one we ask for.
+
+Clipping takes a time that grows with the square of an outline, and for outlines made to be
+difficult faster. The steps that all of them together may take grow with the number of corners
+only; an outline for which they do not suffice becomes a fan, and is counted as tangled. That
+happens to single concave polygons from 15,000 corners on.
 """
 
 from __future__ import annotations
@@ -16,6 +21,11 @@ from numpy.typing import NDArray
 
 from ptmtools.tolerance import ROUNDING_SHARE
 
+#: Steps of clipping, of about 10 ns: for all outlines together and for each corner besides; of a
+#: look at a corner; of a search for what occupies an ear, which takes one more for each corner.
+_BASE_STEPS, _CORNER_STEPS = 200_000_000, 10_000
+_LOOK, _SEARCH = 300, 2_000
+
 
 @dataclass(frozen=True)
 class Triangulation:
@@ -25,7 +35,8 @@ class Triangulation:
     ----------
     corner: (T, 3) int64 indices into the corners, ordered by polygon.
     polygon: (T,) int64 the polygon of each triangle.
-    tangled: number of polygons whose outline crosses itself; they are cut as fans.
+    tangled: number of polygons whose outline crosses itself or is too intricate; they are cut as
+        fans.
     """
 
     corner: NDArray[np.int64]
@@ -45,6 +56,7 @@ def triangulate(corners: NDArray[np.float64], start: NDArray[np.int64]) -> Trian
     corner: list[NDArray[np.int64]] = []
     polygon: list[NDArray[np.int64]] = []
     tangled = 0
+    steps = _BASE_STEPS + _CORNER_STEPS * len(corners)
     for n in np.unique(size).tolist():
         which = np.flatnonzero(size == n)
         index = start[which][:, None] + np.arange(n)
@@ -58,7 +70,8 @@ def triangulate(corners: NDArray[np.float64], start: NDArray[np.int64]) -> Trian
         corner[-1] = corner[-1].reshape(-1, 3)
         polygon.append(np.repeat(which[done], n - 2))
         for row in np.flatnonzero(~done):
-            ears, simple = _clip_ears(shape[row])
+            ears, simple, taken = _clip_ears(shape[row], steps)
+            steps -= taken
             tangled += not simple
             corner.append(index[row][ears])
             polygon.append(np.full(len(ears), which[row]))
@@ -101,27 +114,30 @@ def _fans(shape: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.boo
     return cut, right
 
 
-def _clip_ears(shape: NDArray[np.float64]) -> tuple[NDArray[np.int64], bool]:
-    """Triangles (k, 3) of one polygon, and whether its outline is simple."""
+def _clip_ears(shape: NDArray[np.float64], steps: int) -> tuple[NDArray[np.int64], bool, int]:
+    """Triangles (k, 3) of one polygon, whether its outline is simple, and the steps taken, about
+    ``steps`` at most."""
     n = len(shape)
     cross = np.cross(shape[1:-1], shape[2:])
-    fan = np.array([[0, i, i + 1] for i in range(1, n - 1)], dtype=np.int64)
+    first = np.arange(1, n - 1)
+    fan = np.stack([np.zeros_like(first), first, first + 1], axis=1)
     if np.abs(cross).max() <= ROUNDING_SHARE:
-        return fan[:1], True  # a line or a point: one degenerate triangle stands for it
+        return fan[:1], True, 0  # a line or a point: one degenerate triangle stands for it
     normal = cross.sum(axis=0)
     axis = int(np.abs(normal).argmax())
-    if abs(normal[axis]) <= ROUNDING_SHARE:
-        return fan, False
+    if abs(normal[axis]) <= ROUNDING_SHARE or 3 * n * (_SEARCH + n) // 2 > steps:
+        return fan, False, 0
     flat = shape[:, [(axis + 1) % 3, (axis + 2) % 3]] * [1.0, np.sign(normal[axis])]
 
-    ring = list(range(n))
+    ring = _Ring(flat)
     ears: list[list[int]] = []
     at = tried = 0
-    while len(ring) > 2:
-        m = len(ring)
-        a, b, c = ring[(at - 1) % m], ring[at % m], ring[(at + 1) % m]
+    while len(ring.index) > 2:
+        m = len(ring.index)
+        a, b, c = ring.index[(at - 1) % m], ring.index[at % m], ring.index[(at + 1) % m]
         area = _turn(flat[a], flat[b], flat[c])
-        if area > ROUNDING_SHARE and not _occupied(flat, ring, a, b, c):
+        ring.steps += _LOOK
+        if area > ROUNDING_SHARE and not ring.occupied(a, b, c):
             ears.append([a, b, c])
             ring.pop(at % m)
             at, tried = at % m, 0
@@ -130,22 +146,54 @@ def _clip_ears(shape: NDArray[np.float64]) -> tuple[NDArray[np.int64], bool]:
             tried = 0
         else:
             at, tried = (at + 1) % m, tried + 1
-            if tried > 2 * m + 2:
-                ears += [[ring[0], ring[i], ring[i + 1]] for i in range(1, m - 1)]
-                return np.array(ears, dtype=np.int64), False
-    return np.array(ears, dtype=np.int64), True
+            if tried > 2 * m + 2 or ring.steps > steps:
+                ears += [[ring.index[0], ring.index[i], ring.index[i + 1]] for i in range(1, m - 1)]
+                return np.array(ears, dtype=np.int64), False, ring.steps
+    return np.array(ears, dtype=np.int64), True, ring.steps
+
+
+class _Ring:
+    """What is left of an outline.
+
+    Attributes
+    ----------
+    index: of the vertices left, in order.
+    steps: taken so far.
+    """
+
+    def __init__(self, flat: NDArray[np.float64]) -> None:
+        self.index = list(range(len(flat)))
+        self.steps = 0
+        self._flat = flat
+        self._left = flat.copy()
+        self._there = [True] * len(flat)
+        self._occupant: dict[tuple[int, int, int], int] = {}
+
+    def pop(self, at: int) -> None:
+        """Takes a vertex away, by its place in the ring."""
+        self._there[self.index.pop(at)] = False
+        left = len(self.index)
+        self._left[at:left] = self._left[at + 1 : left + 1]
+
+    def occupied(self, a: int, b: int, c: int) -> bool:
+        """Whether a vertex of the ring lies in the closed triangle, other than in its corners."""
+        known = self._occupant.get((a, b, c))
+        if known is not None and self._there[known]:
+            return True
+        left = len(self.index)
+        self.steps += _SEARCH + left
+        x, y = self._left[:left].T
+        inside = np.ones(left, dtype=bool)
+        for s, t in ((a, b), (b, c), (c, a)):
+            (ux, uy), (vx, vy) = self._flat[s].tolist(), self._flat[t].tolist()
+            inside &= (vx - ux) * (y - uy) - (vy - uy) * (x - ux) >= 0
+            inside &= (x != ux) | (y != uy)
+        found = int(inside.argmax())
+        if not inside[found]:
+            return False
+        self._occupant[a, b, c] = self.index[found]
+        return True
 
 
 def _turn(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> float:
     return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
-
-
-def _occupied(flat: NDArray[np.float64], ring: list[int], a: int, b: int, c: int) -> bool:
-    """Whether a vertex of the ring lies in the closed triangle, other than in its corners."""
-    p = flat[ring]
-    inside = np.ones(len(ring), dtype=bool)
-    for s, t in ((a, b), (b, c), (c, a)):
-        u, v = flat[s], flat[t]
-        inside &= (v[0] - u[0]) * (p[:, 1] - u[1]) - (v[1] - u[1]) * (p[:, 0] - u[0]) >= 0
-        inside &= (p != u).any(axis=1)
-    return bool(inside.any())

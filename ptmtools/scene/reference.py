@@ -3,7 +3,8 @@
 What a model says and what lies on the disk differ in known ways: backslashes, drive letters and
 leading slashes of the author's machine, upper and lower case, composed and decomposed umlauts.
 All of these are tried, inside the model's folder. Reads outside of that folder, also by way of a
-symbolic link, are refused unless asked for.
+symbolic link, are refused unless asked for. What is no file, such as a named pipe or a device, is
+never opened. A name is looked for in a bounded number of places, however it is made.
 """
 
 from __future__ import annotations
@@ -17,9 +18,19 @@ from typing import Literal
 
 Outcome = Literal["found", "elsewhere", "outside", "missing"]
 
+#: Longer names no system has, in characters.
+_LONGEST = 4096
+#: So many folders of a name's end are looked for under another folder than it says.
+_DEEPEST = 32
+
 
 def _fold(name: str) -> str:
     return unicodedata.normalize("NFC", name).casefold()
+
+
+def _unwritable(name: str) -> bool:
+    """Whether it is no text: half a character of UTF-16, which JSON may hold."""
+    return any("\ud800" <= letter <= "\udfff" for letter in name)
 
 
 @dataclass(frozen=True)
@@ -49,6 +60,7 @@ class Folder:
         self._roots = [root] if also is None else [root, also]
         self._real = [folder.resolve() for folder in self._roots]
         self._listing: dict[Path, dict[str, str]] = {}
+        self._known: dict[tuple[str, Path], Reference] = {}
 
     def find(self, reference: str, base: Path | None = None) -> Reference:
         """Find the file called ``reference`` in a file that lies in ``base`` (default: root).
@@ -58,6 +70,13 @@ class Folder:
         absolute paths of another machine.
         """
         base = self.root if base is None else base
+        if (reference, base) not in self._known:
+            self._known[reference, base] = self._find(reference, base)
+        return self._known[reference, base]
+
+    def _find(self, reference: str, base: Path) -> Reference:
+        if len(reference) > _LONGEST or _unwritable(reference):
+            return Reference("missing")
         bases = [base, *(folder for folder in self._roots if folder != base)]
         name = reference.strip(" \t\r\n")
         if len(name) > 1 and name[0] == name[-1] and name[0] in "\"'":
@@ -75,7 +94,7 @@ class Folder:
             tries += [(b, parts, "found") for b in bases]
         elif self.allow_outside:
             tries.append((Path("/"), parts, "found"))
-        for first in range(0 if absolute else 1, len(parts)):
+        for first in range(max(0 if absolute else 1, len(parts) - _DEEPEST), len(parts)):
             if ".." not in parts[first:]:
                 tries += [(b, parts[first:], "elsewhere") for b in bases]
         for start, steps, outcome in tries:

@@ -7,6 +7,7 @@ cleaned.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import InputError
+from ptmtools.errors import InputError, LimitError
+from ptmtools.files import open_regular
 from ptmtools.scene.model import Camera, Note, Wrap
 
 #: `Scene.triangles` is int32: more vertices cannot be numbered.
@@ -30,6 +32,16 @@ def decode(raw: bytes) -> str:
         return raw.decode("latin-1")
 
 
+def too_many_triangles(most: int, file: Path) -> LimitError:
+    """The error for a model of more triangles than are to be read, PTM-L203."""
+    return LimitError(
+        "PTM-L203",
+        f"has more than {most:,} triangles",
+        file=file,
+        remedy="raise the limit (--max-triangles), or split the model",
+    )
+
+
 @dataclass(frozen=True)
 class FileRange:
     """Reads bytes of a file: all of it, or ``length`` bytes from ``offset``."""
@@ -39,9 +51,14 @@ class FileRange:
     length: int | None = None
 
     def __call__(self) -> bytes:
-        with open(self.path, "rb") as stream:
+        with open_regular(self.path) as stream:
             stream.seek(self.offset)
             return stream.read() if self.length is None else stream.read(self.length)
+
+    def size(self) -> int:
+        """How many bytes there are, read or not. Raises OSError."""
+        there = max(0, os.stat(self.path).st_size - self.offset)
+        return there if self.length is None else min(there, self.length)
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from ptmtools.scene import polygon
 from ptmtools.scene.polygon import triangulate
 
 
@@ -55,6 +56,7 @@ def test_outlines_from_every_corner_and_both_sides(outline: list, lift: float) -
         assert len(triangles) <= len(turn) - 2
 
 
+@settings(deadline=None)
 @given(
     radius=st.lists(st.floats(0.2, 5), min_size=5, max_size=24),
     scale=st.sampled_from([1.0, 1e-150, 1e150]),
@@ -91,3 +93,28 @@ def test_nothing_that_a_file_may_hold_breaks_it(corners: np.ndarray, sizes: list
     start = np.cumsum([0, *sizes])
     assert (result.corner >= start[result.polygon][:, None]).all()
     assert (result.corner < start[result.polygon + 1][:, None]).all()
+
+
+def stars(corners: int, count: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    angle = np.linspace(0, 2 * np.pi, corners, endpoint=False)
+    reach = 1 + 0.5 * (np.arange(corners) % 2)
+    star = np.stack([reach * np.cos(angle), reach * np.sin(angle), 0 * angle], axis=1)
+    return np.tile(star, (count, 1)), np.arange(count + 1) * corners
+
+
+def test_a_polygon_of_a_million_corners_becomes_a_fan() -> None:
+    result = triangulate(*stars(1_000_000))
+    assert result.tangled == 1
+    assert len(result.corner) == 999_998
+    assert (result.corner[:, 0] == 0).all()
+
+
+def test_the_steps_of_clipping_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Steps are those of all outlines together; what they do not suffice for is a fan."""
+    assert triangulate(*stars(100, 4)).tangled == 0
+    steps = polygon._clip_ears(stars(100)[0], 1 << 60)[2]
+    monkeypatch.setattr(polygon, "_CORNER_STEPS", 0)
+    monkeypatch.setattr(polygon, "_BASE_STEPS", int(2.9 * steps))
+    result = triangulate(*stars(100, 4))
+    assert 1 <= result.tangled <= 2
+    assert np.bincount(result.polygon).tolist() == [98] * 4
