@@ -10,7 +10,7 @@ metallicFactor 0, roughness 1      nothing known: matt
 doubleSided                        the shape's sidedness
 alphaMode BLEND                    opacity below 1, or a used texel with alpha below 255
 extras.ptm, extras.texture         the image's `.ptm`, and its place in the hints' textures
-extras.wrapS, extras.wrapT         of a sampler, where there is no texture to have one
+extras.wrapS, extras.wrapT         the sampler's, for clients with textures of their own
 =================================  =======================================================
 
 The scene keeps no alpha cutoff, so MASK becomes BLEND. (Tried: the texture as emissiveTexture
@@ -92,11 +92,10 @@ class MaterialWriter:
             place, record = self._records[material.image]
             blends |= material.transparent and record.components in (2, 4)
             extras = {"ptm": UP + quote(record.file), "texture": place}
+            extras |= _wrap(material.wrap_s, material.wrap_t)
             if self._fallback and record.fallback is not None:
                 index = self._texture(UP + quote(record.fallback), material)
                 surface["baseColorTexture"] = {"index": index}
-            else:
-                extras |= _wrap(material.wrap_s, material.wrap_t)
         found: dict[str, Any] = {"name": material.name}
         found["pbrMetallicRoughness"] = surface | {"metallicFactor": 0}
         if blends:

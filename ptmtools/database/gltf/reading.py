@@ -246,17 +246,17 @@ class _Reader:
         extras = material.get("extras")
         if extras is not None:
             _object(extras, _EXTRAS, place)
-        image, wraps = None, extras or {}
+        wrap = self._wrap(extras or {}, place)
+        image = None
         if "baseColorTexture" in surface:
             use = _object(surface["baseColorTexture"], _USE, place)
             texture = self._row("textures", use["index"], _TEXTURE)
             image = self._row("images", texture["source"], _IMAGE)["uri"]
-            wraps = {}
+            sampler: dict[str, Any] = {}
             if "sampler" in texture:
-                wraps = self._row("samplers", texture["sampler"], _SAMPLER)
-        s, t = (wraps.get(name, WRAPS["repeat"]) for name in ("wrapS", "wrapT"))
-        if not {s, t} <= set(WRAPS.values()):
-            _foreign(place, f"wraps {s} and {t}")
+                sampler = self._row("samplers", texture["sampler"], _SAMPLER)
+            if self._wrap(sampler, place) != wrap:
+                _foreign(place, "its sampler wraps otherwise than its extras say")
         return ReadMaterial(
             factor=(factor[0], factor[1], factor[2], factor[3]),
             two_sided=material.get("doubleSided", False),
@@ -264,8 +264,15 @@ class _Reader:
             image=image,
             ptm=None if extras is None else extras["ptm"],
             texture=None if extras is None else extras["texture"],
-            wrap=(s, t),
+            wrap=wrap,
         )
+
+    @staticmethod
+    def _wrap(sampler: dict[str, Any], place: str) -> tuple[int, int]:
+        s, t = (sampler.get(name, WRAPS["repeat"]) for name in ("wrapS", "wrapT"))
+        if not {s, t} <= set(WRAPS.values()):
+            _foreign(place, f"wraps {s} and {t}")
+        return s, t
 
 
 def _object(value: object, members: tuple[_Members, _Members], place: str) -> dict[str, Any]:

@@ -209,7 +209,8 @@ FAULTS: list[tuple[str, str, Damage]] = [
         treed(lambda t: plain(t)["pbrMetallicRoughness"].pop("baseColorFactor")),
     ),
     ("PTM-D739", "opaque glass", treed(lambda t: [m.pop("alphaMode", 0) for m in t["materials"]])),
-    ("PTM-D739", "wrap", treed(lambda t: [r.clear() for r in t["samplers"]])),
+    ("PTM-D732", "sampler", treed(lambda t: [r.clear() for r in t["samplers"]])),
+    ("PTM-D739", "wrap", treed(repeat)),
     (
         "PTM-D739",
         "no image",
@@ -223,6 +224,14 @@ FAULTS: list[tuple[str, str, Damage]] = [
 
 def sides(tree: dict[str, Any]) -> bool:
     return not tree["materials"][0].get("doubleSided", False)
+
+
+def repeat(tree: dict[str, Any]) -> None:
+    """As if the model did not clamp."""
+    for sampler in tree["samplers"]:
+        sampler.clear()
+    for material in tree["materials"]:
+        material.get("extras", {}).pop("wrapS", None)
 
 
 def see_through(tree: dict[str, Any], uri: str) -> None:
