@@ -124,6 +124,14 @@ def lengthen(tree: dict[str, Any]) -> None:
     tree["accessors"][0]["count"] += 10**4
 
 
+def repeat(tree: dict[str, Any]) -> None:
+    """As if the model did not clamp."""
+    for sampler in tree["samplers"]:
+        sampler.clear()
+    for material in tree["materials"]:
+        material.get("extras", {}).pop("wrapS", None)
+
+
 def of_accessor(member: str, value: object) -> Damage:
     """Changes a member of the first accessor of positions."""
 
@@ -224,14 +232,6 @@ FAULTS: list[tuple[str, str, Damage]] = [
 
 def sides(tree: dict[str, Any]) -> bool:
     return not tree["materials"][0].get("doubleSided", False)
-
-
-def repeat(tree: dict[str, Any]) -> None:
-    """As if the model did not clamp."""
-    for sampler in tree["samplers"]:
-        sampler.clear()
-    for material in tree["materials"]:
-        material.get("extras", {}).pop("wrapS", None)
 
 
 def see_through(tree: dict[str, Any], uri: str) -> None:
