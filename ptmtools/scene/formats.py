@@ -1,24 +1,28 @@
 """Reads the other formats: PLY, STL and OFF through trimesh, the rest through pymeshlab.
 
-pymeshlab (GPL-3, needs libGL) does not tell which face has which texture, but writes it into an
-OBJ file; so it converts to OBJ in a temporary folder, and our own reader reads that. The same way
-is taken where trimesh gives up (mixed polygons in OFF) and for textured PLY, of which trimesh
-keeps one image. Both libraries cut polygons as fans.
+What pymeshlab reads it converts to OBJ in a temporary folder (`ptmtools.scene.meshlab`), and our
+own reader reads that. The same way is taken where trimesh gives up (mixed polygons in OFF) and for
+textured PLY, of which trimesh keeps one image. Both libraries cut polygons as fans.
 """
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ptmtools.errors import InputError, MissingComponentError
+from ptmtools.errors import InputError
+from ptmtools.scene.meshlab import convert
 from ptmtools.scene.reference import Folder
-from ptmtools.scene.source import Findings, Source, SourceMaterial
+from ptmtools.scene.source import (
+    MAX_VERTICES,
+    Findings,
+    Source,
+    SourceMaterial,
+    too_many_triangles,
+)
 
 TRIMESH = (".ply", ".stl", ".off")
 MESHLAB = (".3ds", ".3mf", ".ctm", ".dae", ".wrl", ".x3d")
@@ -27,11 +31,14 @@ SUPPORTED = (".obj", ".glb", ".gltf", *TRIMESH, *MESHLAB)
 _HEADER = 1 << 14
 
 
-def read_other(path: Path, folder: Folder, findings: Findings) -> Source:
+def read_other(
+    path: Path, folder: Folder, findings: Findings, max_triangles: int = MAX_VERTICES
+) -> Source:
     """Read a file that is neither OBJ nor glTF, by its suffix.
 
-    Raises InputError for unknown suffixes and for what no library can read, and
-    MissingComponentError if pymeshlab is needed and cannot be imported.
+    Raises InputError for unknown suffixes and for what no library can read, LimitError PTM-L203 for
+    more than ``max_triangles``, and MissingComponentError if pymeshlab is needed and cannot be
+    imported.
     """
     suffix = path.suffix.lower()
     if suffix not in SUPPORTED:
@@ -42,17 +49,23 @@ def read_other(path: Path, folder: Folder, findings: Findings) -> Source:
             remedy=f"give one of {' '.join(SUPPORTED)}",
         )
     if suffix not in TRIMESH or (suffix == ".ply" and _textured_ply(path)):
-        return _read_meshlab(path, folder, findings)
+        return _read_meshlab(path, folder, findings, max_triangles)
     try:
-        return _read_trimesh(path, findings)
+        source = _read_trimesh(path, findings)
+    except InputError:
+        raise
     except Exception as error:  # trimesh raises whatever a damaged file provokes
-        if isinstance(error, InputError):
-            raise
-        source = _read_meshlab(path, folder, findings)
+        if suffix == ".stl":  # there are no two kinds of triangles: it is damaged
+            raise InputError(
+                "PTM-I254", f"is damaged ({error})", file=path, remedy="export it again"
+            ) from None
+        source = _read_meshlab(path, folder, findings, max_triangles)
         findings.say(
             "PTM-N230", f"read through pymeshlab, as trimesh gave up ({type(error).__name__})"
         )
-        return source
+    if len(source.triangles) > max_triangles:
+        raise too_many_triangles(max_triangles, path)
+    return source
 
 
 def _textured_ply(path: Path) -> bool:
@@ -96,54 +109,16 @@ def _read_trimesh(path: Path, findings: Findings) -> Source:
     )
 
 
-def _pymeshlab() -> Any:
-    """The module. Without OpenGL it imports, prints a page of complaints and knows no format, so
-    the library is looked for first."""
-    import ctypes
-
-    try:
-        if sys.platform == "linux":
-            ctypes.CDLL("libOpenGL.so.0")
-        import pymeshlab
-    except (ImportError, OSError) as error:
-        raise MissingComponentError(
-            "PTM-M200",
-            f"pymeshlab cannot be used ({error})",
-            remedy="pip install pymeshlab; apt install libopengl0 libgl1; or convert to GLB",
-        ) from None
-    return pymeshlab
-
-
-def _read_meshlab(path: Path, folder: Folder, findings: Findings) -> Source:
-    pymeshlab = _pymeshlab()
+def _read_meshlab(path: Path, folder: Folder, findings: Findings, max_triangles: int) -> Source:
     from ptmtools.scene.obj import read_obj
 
-    meshes = pymeshlab.MeshSet()
     parts = []
-    try:
-        meshes.load_new_mesh(str(path))
-        with tempfile.TemporaryDirectory() as scratch:
-            near = Folder(folder.root, folder.allow_outside, also=Path(scratch))
-            near.sought = folder.sought
-            for mesh in meshes:
-                if not mesh.face_number():
-                    continue
-                meshes.set_current_mesh(mesh.id())
-                meshes.apply_matrix_freeze()
-                converted = Path(scratch) / f"{path.stem}_{mesh.id()}.obj"
-                meshes.save_current_mesh(
-                    str(converted),
-                    save_vertex_normal=False,
-                    save_vertex_color=False,
-                    save_textures=False,
-                )
-                part = read_obj(converted, near, findings)
-                parts.append(replace(part, objects=(mesh.label() or path.stem,)))
-    except pymeshlab.PyMeshLabException as error:
-        reason = str(error).splitlines()[0] if str(error) else "it gives no reason"
-        raise InputError(
-            "PTM-I254", f"pymeshlab cannot read it ({reason})", file=path, remedy="convert to GLB"
-        ) from None
+    with tempfile.TemporaryDirectory() as scratch:
+        near = Folder(folder.root, folder.allow_outside, also=Path(scratch))
+        near.sought = folder.sought
+        for converted, label in convert(path, Path(scratch)):
+            part = read_obj(converted, near, findings, max_triangles=max_triangles)
+            parts.append(replace(part, objects=(label or path.stem,)))
     if not parts:
         raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with faces")
     return _joined(parts)

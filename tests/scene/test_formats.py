@@ -11,8 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ptmtools.errors import MissingComponentError
-from ptmtools.scene import ingest
+from ptmtools.errors import InputError, LimitError, MissingComponentError
+from ptmtools.scene import ingest, meshlab
+from ptmtools.scene.formats import read_other
+from ptmtools.scene.reference import Folder
+from ptmtools.scene.source import Findings
 
 from .conftest import noise, png
 
@@ -39,7 +42,7 @@ MODELS = {
 
 
 @pytest.fixture
-def meshlab(require: Callable[[str, str], None]) -> None:
+def pymeshlab(require: Callable[[str, str], None]) -> None:
     if "linux" in sys.platform and find_library("OpenGL") is None:
         require("OpenGL", "apt install libopengl0 libgl1")
     if find_spec("pymeshlab") is None:
@@ -47,7 +50,7 @@ def meshlab(require: Callable[[str, str], None]) -> None:
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_a_wall(put: Put, meshlab: None, name: str) -> None:
+def test_a_wall(put: Put, pymeshlab: None, name: str) -> None:
     scene = ingest(put(name, MODELS[name]))
     assert len(scene.triangles) == 2
     assert scene.two_sided.all()
@@ -56,7 +59,7 @@ def test_a_wall(put: Put, meshlab: None, name: str) -> None:
     assert scene.materials[0].name in ("default", "material_0")
 
 
-def test_a_textured_ply_keeps_every_image(put: Put, meshlab: None) -> None:
+def test_a_textured_ply_keeps_every_image(put: Put, pymeshlab: None) -> None:
     put("maps/a.png", png(noise(1)))
     put("maps/b.png", png(noise(2)))
     header = PLY.format(
@@ -86,7 +89,7 @@ DAE = """<?xml version="1.0"?>
 """
 
 
-def test_collada(put: Put, meshlab: None) -> None:
+def test_collada(put: Put, pymeshlab: None) -> None:
     scene = ingest(put("Wand ä.dae", DAE))
     assert len(scene.triangles) == 2
     assert sorted(np.ptp(scene.points, axis=0)) == [0, 4, 10]
@@ -101,3 +104,73 @@ def test_without_pymeshlab(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_plain_models_do_not_need_pymeshlab(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pymeshlab", None)
     assert len(ingest(put("wall.stl", MODELS["wall.stl"])).triangles) == 2
+
+
+#: Heads that promise more than there is: of each format what its reader counts by.
+LIARS = {
+    "vertices.ply": PLY.format(more="", coords="")
+    .replace("ascii", "binary_little_endian")
+    .replace("vertex 4", "vertex 2000000000"),
+    "faces.ply": PLY.format(more="", coords="")
+    .replace("ascii", "binary_little_endian")
+    .replace("face 1", "face 1000000000000000000"),
+    "below zero.ply": PLY.format(more="", coords="")
+    .replace("ascii", "binary_little_endian")
+    .replace("vertex 4", "vertex -1"),
+    "vertices.off": f"OFF\n2000000000 1 0\n{CORNERS}3 0 1 2\n",
+    "triangles.stl": "x" * 80 + "\0\0\0\x7f" + "\0" * 50,
+    "no.dae": "<COLLADA><",
+    "bomb.dae": '<!DOCTYPE a [<!ENTITY a "aaaaaaaaaa">'
+    + "".join(f'<!ENTITY a{i} "{f"&a{i - 1 if i else chr(0)};" * 10}">' for i in range(9)).replace(
+        "\0", ""
+    )
+    + "]><COLLADA>&a8;</COLLADA>",
+}
+
+
+@pytest.mark.parametrize("name", LIARS)
+def test_heads_that_lie(put: Put, pymeshlab: None, name: str) -> None:
+    with pytest.raises(InputError, match=r"PTM-I2(54|47)") as caught:
+        ingest(put(name, LIARS[name]))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("program", "told"),
+    [
+        ("import os; os.abort()", "it ended with status -6"),
+        ("print('noise')", "it ended with status 0"),
+        ("import time; time.sleep(60)", "it did not end in 1 s"),
+        ("print('noise', '{\"fault\": \"no\"}', sep='\\n')", "cannot read it (no)"),
+    ],
+)
+def test_a_reader_that_fails_does_no_harm(
+    put: Put, pymeshlab: None, monkeypatch: pytest.MonkeyPatch, program: str, told: str
+) -> None:
+    path = put("a.dae", DAE)
+    command = put("python", f"#!{sys.executable}\n{program}\n")
+    command.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(command))
+    monkeypatch.setattr(meshlab, "_SECONDS", 1.0)
+    with pytest.raises(InputError, match=r"a\.dae.*PTM-I254") as caught:
+        ingest(path)
+    assert told in str(caught.value)
+
+
+def test_nothing_is_imported_from_the_present_folder(
+    put: Put, pymeshlab: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = put("a.dae", DAE)
+    put("json.py", "raise SystemExit('from the folder of the model')")
+    put("pymeshlab.py", "raise SystemExit('from the folder of the model')")
+    monkeypatch.chdir(path.parent)
+    assert len(ingest("a.dae").triangles) == 2
+
+
+@pytest.mark.parametrize("name", ["wall.stl", "mixed.off"])
+def test_triangles_are_counted(put: Put, pymeshlab: None, name: str) -> None:
+    path = put(name, MODELS[name])
+    folder = Folder(path.parent)
+    assert len(read_other(path, folder, Findings(path), 3).triangles) in (2, 3)
+    with pytest.raises(LimitError, match="PTM-L203"):
+        read_other(path, folder, Findings(path), 1)
