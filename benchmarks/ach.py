@@ -43,6 +43,7 @@ from ptmtools.coverage.opengl import OpenGLRenderer, create_context, is_software
 from ptmtools.coverage.options import PRESETS, AchOptions
 from ptmtools.coverage.sampling import CellHints
 from ptmtools.errors import MissingComponentError
+from ptmtools.executors import open_executor
 from ptmtools.scene import ingest
 from ptmtools.scene.model import Scene
 from ptmtools.tradeoff.experiment import Trade, run
@@ -286,9 +287,10 @@ def two_processes(report: Report, subjects: dict[str, Subject]) -> None:
     for name, subject in subjects.items():
         took = []
         for workers in (1, 2):
-            options = AchOptions(samples=16384, backend="embree", workers=workers)
+            options = AchOptions(samples=16384, backend="embree")
             start = time.perf_counter()
-            compute_ach(*subject, options)
+            with open_executor(workers) as executor:
+                compute_ach(*subject, options, executor=executor)
             took.append(time.perf_counter() - start)
         report.row((name, *(f"{t:.1f}" for t in took), f"{took[0] / took[1]:.2f}"))
 

@@ -26,6 +26,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.executors import open_executor
 from ptmtools.tolerance import Tolerance
 from ptmtools.visibility.decide import Decisions
 from ptmtools.visibility.flow import PortalFlow, Portals, geometry, portal_flow
@@ -207,7 +208,8 @@ def main(arguments: list[str] | None = None) -> int:
     )
     Decisions(geometry(portals)).passes((0, 2))
     cpu, wall = time.process_time(), time.perf_counter()
-    flow = portal_flow(portals, given.budget, given.workers, exact=given.exact)
+    with open_executor(given.workers) as executor:
+        flow = portal_flow(portals, given.budget, executor=executor, exact=given.exact)
     cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
     ours = visible_leafs(portals, flow, cluster)
     np.savez_compressed(given.output, shape=np.array(ours.shape), visible=np.packbits(ours, axis=1))

@@ -14,27 +14,32 @@ Such pixels are asked again, left out of the hints and reported as missed mass (
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.backend import open_renderer
+from ptmtools.coverage.embree import EmbreeRenderer
 from ptmtools.coverage.estimate import RULE_OF_THREE
 from ptmtools.coverage.item_buffer import VIEWS, Renderer, Surfaces
 from ptmtools.coverage.looking import Owners
 from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
-from ptmtools.coverage.processes import shared_out
 from ptmtools.coverage.sampling import CellHints, Sampler
 from ptmtools.errors import InputError
+from ptmtools.executors.model import Executor
+from ptmtools.executors.serial import Serial
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
 
 #: Rays that a process of its own is worth: it takes a second or two to start, as 5 million rays do.
 WORTH_A_PROCESS = 1e7
+#: Rays that are cast for one task: a tenth of a second.
+TASK = 2e5
 #: Sample points that a tolerance takes in most cells, at most.
 EXPECTED = 1024
 
@@ -45,12 +50,13 @@ def compute_ach(
     pvs: Pvs,
     options: AchOptions = AchOptions(),  # noqa: B008 - a frozen value
     progress: Progress = silent,
+    executor: Executor = Serial(),  # noqa: B008 - has no state
 ) -> Ach:
     """The coverage hints of every cell, aligned with ``pvs`` (paper §5).
 
-    Equal input and options give equal results whatever the number of workers; two backends
-    differ in a few edge pixels. More than one worker means processes, started anew: a script that
-    asks for them needs ``if __name__ == "__main__"``.
+    Equal input and options give equal results whatever the ``executor``; two backends differ in a
+    few edge pixels. Cells are tasks of their own with Embree, whose binding keeps the interpreter's
+    lock, so that here they mean processes; OpenGL draws them in this one.
 
     Raises `InputError` PTM-I501 if the three inputs do not belong together, and
     `MissingComponentError` PTM-M500 if the gl backend is asked for and there is no OpenGL.
@@ -58,32 +64,50 @@ def compute_ach(
     _check(scene, cells, pvs)
     surfaces = Surfaces.of(scene, cells)
     renderer = open_renderer(surfaces, cells, pvs, options)
+    points = options.points if options.tolerance is None else EXPECTED
+    rays = points * len(VIEWS) * options.side**2
+    count = cells.cell_count
+    apart = executor.workers > 1 and rays * count >= 2 * WORTH_A_PROCESS
     try:
+        if apart and renderer.backend == "embree":
+            renderer.close()
+            sampling = Sampling(replace(scene, images=()), cells, pvs, options)
+            chunk = int(max(1, min(TASK // rays, count // (4 * executor.workers))))
+            each = executor.each(_sampled, sampling, range(count), chunk=chunk)
+        else:
+            sampler = Sampler(scene, cells, pvs, options, surfaces, renderer)
+            each = map(sampler.of_cell, range(count))
         found: list[CellHints] = []
-        for hints in _each(scene, cells, pvs, options, surfaces, renderer):
+        for hints in each:
             found.append(hints)
-            progress(len(found), cells.cell_count, "coverage")
+            progress(len(found), count, "coverage")
     finally:
         renderer.close()
     return _gathered(pvs, found, Owners.of(surfaces, options.per_texture), renderer, options)
 
 
-def _each(
-    scene: Scene,
-    cells: Cells,
-    pvs: Pvs,
-    options: AchOptions,
-    surfaces: Surfaces,
-    renderer: Renderer,
-) -> Iterable[CellHints]:
-    """The hints of every cell, in order."""
-    points = options.points if options.tolerance is None else EXPECTED
-    rays = cells.cell_count * points * len(VIEWS) * options.side**2
-    workers = min(options.workers, int(rays / WORTH_A_PROCESS))
-    if renderer.backend == "embree" and workers > 1:
-        return shared_out(scene, cells, pvs, options, workers)
-    sampler = Sampler(scene, cells, pvs, options, surfaces, renderer)
-    return map(sampler.of_cell, range(cells.cell_count))
+@dataclass(frozen=True)
+class Sampling:
+    """What the tasks share. A scene without images, whose bytes are not needed."""
+
+    scene: Scene
+    cells: Cells
+    pvs: Pvs
+    options: AchOptions
+
+    @cached_property
+    def sampler(self) -> Sampler:
+        """Built once in each process, with trees of its own."""
+        surfaces = Surfaces.of(self.scene, self.cells)
+        renderer = EmbreeRenderer(surfaces, self.options.side)
+        return Sampler(self.scene, self.cells, self.pvs, self.options, surfaces, renderer)
+
+    def __getstate__(self) -> dict[str, object]:
+        return {name: value for name, value in vars(self).items() if name != "sampler"}
+
+
+def _sampled(sampling: Sampling, cell: int) -> CellHints:
+    return sampling.sampler.of_cell(cell)
 
 
 def _gathered(

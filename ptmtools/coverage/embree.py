@@ -87,7 +87,8 @@ class EmbreeRenderer:
 
     def close(self) -> None:
         """Drops the trees."""
-        del self._opaque, self._transparent
+        self.__dict__.pop("_opaque", None)
+        self.__dict__.pop("_transparent", None)
 
 
 class _Tree:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 from ptmtools.errors import InputError
@@ -49,7 +49,6 @@ class AchOptions:
         the least thickness that a cell may have.
     seed: which sequence of sample points is taken.
     per_texture: also measures how much of the view each texture of each visible cell covers.
-    workers: processes of the embree backend; never changes the result.
     """
 
     preset: Preset = "default"
@@ -63,7 +62,6 @@ class AchOptions:
     clearance: float | None = None
     seed: int = 0
     per_texture: bool = False
-    workers: int = field(default=1, compare=False)
 
     def __post_init__(self) -> None:
         """Raises `InputError` PTM-I500 for a value that makes no sense."""
@@ -75,7 +73,6 @@ class AchOptions:
         self._within("face", self.side, 1, MAX_FACE)
         self._within("seed", self.seed, 0, 2**32 - 1)
         self._within("gpu", self.gpu or 0, 0, 255)
-        self._within("workers", self.workers, 1, 1024)
         if self.clearance is not None and not 0 < self.clearance < float("inf"):
             raise InputError(
                 "PTM-I500",

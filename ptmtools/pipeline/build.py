@@ -309,7 +309,7 @@ def _look(run: Run, options: PvsOptions, workers: _Workers) -> None:
     def compute(transaction: Transaction) -> tuple[Mapping[str, Any], tuple[str, ...]]:
         from ptmtools.visibility import compute_pvs
 
-        pvs = compute_pvs(run.cells, replace(options, workers=workers.here), run.progress)
+        pvs = compute_pvs(run.cells, options, run.progress, workers.executor())
         run.hold("pvs", pvs)
         transaction.put_arrays("pvs", pvs.to_arrays())
         share = pvs.average_share
@@ -350,8 +350,8 @@ def _sample(run: Run, options: AchOptions, workers: _Workers) -> None:
 
         from ptmtools.coverage.ach import compute_ach
 
-        asked = replace(options, workers=workers.here)
-        ach = compute_ach(run.scene, run.cells, run.pvs, asked, run.progress)
+        given = run.scene, run.cells, run.pvs, options
+        ach = compute_ach(*given, run.progress, workers.executor())
         run.hold("ach", ach)
         transaction.put_arrays("ach", ach.to_arrays())
         notes = _coverage_notes(ach, options)

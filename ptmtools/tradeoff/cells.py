@@ -33,7 +33,7 @@ class CellsTrade:
     def __init__(self, scene: Scene, options: SubdivideOptions) -> None:
         self._scene, self._options = scene, options
         few = subdivide(scene, replace(options, max_cells=WARM))
-        compute_pvs(few, PvsOptions(method="fast", workers=1))  # now both are compiled
+        compute_pvs(few, PvsOptions(method="fast"))  # now both are compiled
 
     def settings(self) -> Sequence[Setting]:
         """See `Experiment.settings`."""
@@ -52,7 +52,7 @@ class CellsTrade:
         """See `Experiment.measure`."""
         options = replace(self._options, **setting.knobs)
         cells, seconds = timed(lambda: subdivide(self._scene, options))
-        seen = compute_pvs(cells, PvsOptions(method="fast", workers=1)).to_matrix()
+        seen = compute_pvs(cells, PvsOptions(method="fast")).to_matrix()
         volume = np.bincount(cells.leaf_cell, cells.leaf_volumes(), cells.cell_count)
         share = seen @ volume / max(float(volume.sum()), np.finfo(float).tiny)
         return Measured(

@@ -21,8 +21,8 @@ from ptmtools.visibility.pvs import compute_pvs
 AMPLE = 2_000_000
 #: Those that are tried, beside the one that the database was built with.
 BUDGETS = (200, 2_000, 20_000, 200_000)
-#: What settings do not say: near-ties decided exactly, one thread.
-_BASE = PvsOptions(exact=True, workers=1)
+#: What settings do not say: near-ties decided exactly.
+_BASE = PvsOptions(exact=True)
 
 
 class VisibilityTrade:

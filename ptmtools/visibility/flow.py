@@ -32,40 +32,24 @@ shown to miss p's (7.4 s, but 164.8 portals); shooting the lines first instead o
 
 from __future__ import annotations
 
-import os
-from collections import deque
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, LimitError
+from ptmtools.executors.model import Executor
+from ptmtools.executors.serial import Serial
 from ptmtools.progress import Progress, silent
 from ptmtools.tolerance import Tolerance
-from ptmtools.visibility.storage import Geometry, Scratch
-
-if TYPE_CHECKING:
-    from ptmtools.visibility.decide import Decisions
-
-Tool = TypeVar("Tool")
-Task = TypeVar("Task")
-Span = tuple[int, int]
-Rows = NDArray[np.uint64]
+from ptmtools.visibility.storage import Geometry
 
 #: Portals whose results appear to the others at once.
 BATCH = 64
+#: Portals from which floods start in one task.
+SPAN = 64
 #: Rounds of the bitwise pre-pass; the third changes next to nothing.
 ROUNDS = 3
-#: A sequence longer than this is not followed further (its possible set counts as seen).
-DEPTH = 1024
-#: Vertices that clipping may add to a portal before it is left unclipped.
-GROWTH = 24
-#: Words that remember which sequences a search rejected by a hair.
-HAIR = 1 << 16
 #: Bytes that the two bit matrices may take: 60,000 portals.
 MATRIX_BYTES = 1 << 32
 BITS_OF_BYTE = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1).sum(
@@ -125,8 +109,9 @@ class PortalFlow:
 def portal_flow(
     portals: Portals,
     budget: int,
-    workers: int | None = None,
     progress: Progress = silent,
+    executor: Executor = Serial(),  # noqa: B008 - has no state
+    *,
     exact: bool = True,
 ) -> PortalFlow:
     """Conservative visibility from portal to portal (Teller & Séquin; paper §3).
@@ -135,7 +120,7 @@ def portal_flow(
     ----------
     budget: operations for each search from a directed portal; see the module's head. With ``exact``
         a search may be repeated until three budgets are spent.
-    workers: threads; None takes one for each processor. The result is the same for any number.
+    executor: does the searches; see `searching`. The result is the same for any.
     exact: whether sequences rejected by a hair are decided again in exact arithmetic (`hairs`);
         otherwise lines of sight thinner than a rounding are not seen.
 
@@ -156,85 +141,46 @@ def portal_flow(
     if count == 0:
         return PortalFlow(np.zeros((0, words), dtype=np.uint64), cut, *counts)
 
-    from ptmtools.visibility.bits.kernels import drop_unreturned
-    from ptmtools.visibility.decide import Decisions
-    from ptmtools.visibility.hairs import searched
+    from ptmtools.visibility.searching import Searching, search_from, settle
 
     g = geometry(portals)
-    threads = min(workers or os.cpu_count() or 1, BATCH)
-    with ThreadPoolExecutor(threads) as pool:
-        storage = [(scratch(g, words), Decisions(g) if exact else None) for _ in range(threads)]
-        known = _prepass(g, [s for s, _ in storage], pool)
-        order = np.argsort(BITS_OF_BYTE[known.view(np.uint8)].sum(axis=1), kind="stable")
+    chunk = max(1, BATCH // (4 * executor.workers))
+    searching = Searching(g, _prepass(g, executor), budget, exact)
+    sizes = BITS_OF_BYTE[searching.known.view(np.uint8)].sum(axis=1)
+    order = np.argsort(sizes, kind="stable")
+    with executor.sharing(searching, releases_lock=True) as shared:
         for first in range(0, count, BATCH):
             batch = order[first : first + BATCH]
-            seen = np.zeros((len(batch), words), dtype=np.uint64)
-
-            def search(
-                tools: tuple[Scratch, Decisions | None],
-                i: int,
-                batch: NDArray[np.int64] = batch,
-                seen: NDArray[np.uint64] = seen,
-            ) -> None:
-                p = int(batch[i])
-                cut[p], *counts[:, p] = searched(g, *tools, known, p, budget, seen[i])
-
-            _each(pool, storage, range(len(batch)), search)
-            dropped = known[batch] & ~seen
-            known[batch] = seen
-            for p, row in zip(batch, dropped, strict=True):
-                drop_unreturned(known, p, row)
+            found = list(shared.each(search_from, batch.tolist(), chunk=chunk))
+            for p, (_, figures) in zip(batch, found, strict=True):
+                cut[p], *counts[:, p] = figures
+            shared.change(settle, (batch, np.stack([seen for seen, _ in found])))
             progress(min(first + BATCH, count), count, "portals")
-    return PortalFlow(known, cut[0::2] | cut[1::2], *(counts[:, 0::2] + counts[:, 1::2]))
+    return PortalFlow(searching.known, cut[0::2] | cut[1::2], *(counts[:, 0::2] + counts[:, 1::2]))
 
 
-def _each(
-    pool: ThreadPoolExecutor,
-    tools: Sequence[Tool],
-    tasks: Iterable[Task],
-    work: Callable[[Tool, Task], None],
-) -> None:
-    """Does all tasks, each worker with a tool of its own."""
-    waiting = deque(tasks)
+def _prepass(g: Geometry, executor: Executor) -> NDArray[np.uint64]:
+    """(2K, W) a first upper bound of what each directed portal sees, from planes and floods.
 
-    def serve(tool: Tool) -> None:
-        while True:
-            try:
-                task = waiting.popleft()
-            except IndexError:
-                return
-            work(tool, task)
-
-    list(pool.map(serve, tools))
-
-
-def _prepass(g: Geometry, storage: Sequence[Scratch], pool: ThreadPoolExecutor) -> Rows:
-    """(2K, W) a first upper bound of what each directed portal sees, from planes and floods."""
+    The rounds of bits take a hundredth of the time of the floods: they are not shared out.
+    """
     from ptmtools.visibility.bits.kernels import return_sight
-    from ptmtools.visibility.prepass.kernels import flood, tighten
+    from ptmtools.visibility.prepass.kernels import tighten
+    from ptmtools.visibility.searching import Searching, flood_from
 
-    count, words = len(g.leaf), storage[0].might.shape[1]
+    count = len(g.leaf)
+    words = (count + 63) // 64
     known, tighter = np.zeros((2, count, words), dtype=np.uint64)
-
-    def spans(length: int) -> Iterable[Span]:
-        return pairwise(np.linspace(0, length, 8 * len(storage) + 1).astype(np.int64).tolist())
-
-    def by_floods(s: Scratch, span: Span, rows: Rows = known) -> None:
-        flood(g, s, span[0], span[1], rows)
-
-    _each(pool, storage, spans(count), by_floods)
-    for left in range(ROUNDS, -1, -1):
-
-        def returned(_: Scratch, span: Span, rows: Rows = known) -> None:
-            return_sight(rows, span[0], span[1])
-
-        def by_neighbours(_: Scratch, span: Span, rows: Rows = known, to: Rows = tighter) -> None:
-            tighten(g, span[0], span[1], rows, to)
-
-        _each(pool, storage, spans(words), returned)
-        if left:
-            _each(pool, storage, spans(count), by_neighbours)
-            known, tighter = tighter, known
+    floods = Searching(g, known[:0], budget=0, exact=False)
+    spans = [(first, min(first + SPAN, count)) for first in range(0, count, SPAN)]
+    reached = executor.each(flood_from, floods, spans, releases_lock=True)
+    for (first, last), rows in zip(spans, reached, strict=True):
+        known[first:last] = rows
+    return_sight(known, 0, words)
+    for _ in range(ROUNDS):
+        tighten(g, 0, count, known, tighter)
+        known, tighter = tighter, known
+        return_sight(known, 0, words)
     return known
 
 
@@ -296,23 +242,4 @@ def geometry(portals: Portals) -> Geometry:
         out_start=np.searchsorted(leaves[out], np.arange(portals.leaf_count + 1)).astype(np.int64),
         out=out.astype(np.int64),
         slack=tolerance.rounding,
-    )
-
-
-def scratch(g: Geometry, words: int) -> Scratch:
-    """Working storage for one worker."""
-
-    depth = min(DEPTH, len(g.leaf) + 1)
-    vertices = int(np.diff(g.start).max()) + GROWTH
-    return Scratch(
-        polygon=np.zeros((2 * depth + 3, vertices, 3)),
-        size=np.zeros(2 * depth + 3, np.int64),
-        plane=np.zeros((depth + 1, 2 * vertices, 4)),
-        planes=np.zeros(depth + 1, np.int64),
-        might=np.zeros((depth, words), np.uint64),
-        via=np.zeros(depth + 1, np.int64),
-        at=np.zeros(depth, np.int64),
-        distance=np.zeros(vertices),
-        line=np.zeros((2, 3)),
-        hair=np.zeros(HAIR, np.int64),
     )

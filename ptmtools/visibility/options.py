@@ -22,22 +22,19 @@ class PvsOptions:
     lines: random lines through each portal, where sampled.
     exact: whether what floating point rejects by a hair is decided again in exact arithmetic;
         otherwise lines of sight thinner than a rounding are not seen.
-    workers: threads, None for one per processor; never changes the result.
     """
 
     method: Literal["full", "fast", "sampled"] = "full"
     budget: int = 200_000
     lines: int = 1000
     exact: bool = True
-    workers: int | None = None
 
     def __post_init__(self) -> None:
-        wrong = f"budget {self.budget}" if self.budget < 0 else f"workers {self.workers}"
-        if self.budget < 0 or (self.workers is not None and self.workers < 1):
+        if self.budget < 0:
             raise InputError(
                 "PTM-I402",
-                f"{wrong} is out of range",
-                remedy="give a budget of at least 0 and at least one worker",
+                f"budget {self.budget} is out of range",
+                remedy="give a budget of at least 0",
             )
         if self.method not in ("full", "fast", "sampled") or self.lines < 1:
             raise InputError(

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
+from ptmtools.executors.model import Executor
+from ptmtools.executors.serial import Serial
 from ptmtools.progress import Progress, silent
 from ptmtools.visibility.flow import PortalFlow, Portals, portal_flow
 from ptmtools.visibility.leaks import find_leaks
@@ -24,22 +26,24 @@ def compute_pvs(
     cells: Cells,
     options: PvsOptions = PvsOptions(),  # noqa: B008 - a frozen value
     progress: Progress = silent,
+    executor: Executor = Serial(),  # noqa: B008 - has no state
 ) -> Pvs:
     """Cell-to-cell visibility, symmetric (paper §3; Teller & Séquin).
 
     Unless it is sampled, a pair of cells is left out only if no straight line, but for hairlines
     thinner than the rounding of the coordinates (`Tolerance.rounding`), leads from one to the other
     through portals. Cells that share a portal always see each other. `Pvs.fallbacks` counts the
-    portals whose search was cut short.
+    portals whose search was cut short. ``executor`` does the searches; the result is the same for
+    any.
 
     Raises what `portal_flow` raises.
     """
     portals = portals_of(cells)
     if options.method == "sampled":
-        leaves = sampled_leaves(portals, options.lines, options.workers)
+        leaves = sampled_leaves(portals, options.lines, executor)
         return Pvs.from_matrix(_lifted(cells, leaves), conservative=False)
     budget = options.budget if options.method == "full" else 0
-    flow = portal_flow(portals, budget, options.workers, progress, options.exact)
+    flow = portal_flow(portals, budget, progress, executor, exact=options.exact)
     matrix = _lifted(cells, leaf_matrix(cells.leaf_count, portals.leaf, flow))
     leaks = [astuple(leak) for leak in find_leaks(cells, flow, matrix)]
     return Pvs.from_matrix(

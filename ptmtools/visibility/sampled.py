@@ -8,23 +8,48 @@ much (`confirmed`).
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.executors.model import Executor
+from ptmtools.executors.serial import Serial
 from ptmtools.visibility.flow import Portals, check, geometry
+from ptmtools.visibility.storage import Geometry
+
+#: Tasks that the lines are shared out to.
+SPANS = 64
+
+
+class Shooting(NamedTuple):
+    """What the tasks share: lines through each portal, and of which kind."""
+
+    geometry: Geometry
+    leaf_count: int
+    lines: int
+    seed: int
+
+
+class Aiming(NamedTuple):
+    """What the tasks share: (n, 2) pairs of leaves and tries for each."""
+
+    geometry: Geometry
+    pairs: NDArray[np.int32]
+    tries: int
 
 
 def sampled_leaves(
-    portals: Portals, lines: int, workers: int | None = None, seed: int = 0
+    portals: Portals,
+    lines: int,
+    executor: Executor = Serial(),  # noqa: B008 - has no state
+    seed: int = 0,
 ) -> NDArray[np.bool_]:
     """(L, L) which leaf sees which on one of ``lines`` random lines through each portal.
 
     Half of the lines aim at a random point of a random portal, half anywhere. Symmetric; each leaf
-    sees itself and its neighbours. The same for any number of ``workers``.
+    sees itself and its neighbours. The same for any ``executor``.
 
     Raises what `flow.check` raises.
     """
@@ -33,19 +58,10 @@ def sampled_leaves(
     matrix = np.eye(leaves, dtype=np.bool_)
     if count == 0:
         return matrix
-    from ptmtools.visibility.lines import kernels
-
-    g = geometry(portals)
-    threads = min(workers or os.cpu_count() or 1, count)
-    spans = list(pairwise(np.linspace(0, count, threads + 1).astype(np.int64).tolist()))
-
-    def shoot(span: tuple[int, int]) -> NDArray[np.uint64]:
-        sees = np.zeros((leaves, (leaves + 63) // 64), np.uint64)
-        kernels.shoot(g, span[0], span[1], lines, seed, sees)
-        return sees
-
-    with ThreadPoolExecutor(threads) as pool:
-        bits = np.bitwise_or.reduce(list(pool.map(shoot, spans)))
+    shooting = Shooting(geometry(portals), leaves, lines, seed)
+    bits = np.zeros((leaves, (leaves + 63) // 64), np.uint64)
+    for sees in executor.each(_shoot, shooting, _spans(count), releases_lock=True):
+        bits |= sees
     seen = np.unpackbits(bits.view(np.uint8), axis=1, count=leaves, bitorder="little")
     matrix |= seen.astype(np.bool_)
     one, other = portals.leaf.T
@@ -54,7 +70,10 @@ def sampled_leaves(
 
 
 def confirmed(
-    portals: Portals, pairs: NDArray[np.int32], tries: int, workers: int | None = None
+    portals: Portals,
+    pairs: NDArray[np.int32],
+    tries: int,
+    executor: Executor = Serial(),  # noqa: B008 - has no state
 ) -> NDArray[np.bool_]:
     """(n,) which pairs (n, 2) of leaves a line shows to see each other, of ``tries`` aimed ones.
 
@@ -66,16 +85,28 @@ def confirmed(
     check(portals)
     if len(pairs) == 0 or len(portals.leaf) == 0:
         return np.zeros(len(pairs), dtype=np.bool_)
+    aiming = Aiming(geometry(portals), pairs, tries)
+    hits = executor.each(_aim, aiming, _spans(len(pairs)), releases_lock=True)
+    return np.concatenate(list(hits)) > 0
+
+
+def _spans(count: int) -> Iterator[tuple[int, int]]:
+    """0 … count in a few parts."""
+    step = -(-count // SPANS)
+    return ((first, min(first + step, count)) for first in range(0, count, step))
+
+
+def _shoot(shared: Shooting, span: tuple[int, int]) -> NDArray[np.uint64]:
     from ptmtools.visibility.lines import kernels
 
-    g = geometry(portals)
-    threads = min(workers or os.cpu_count() or 1, len(pairs))
-    ends = np.linspace(0, len(pairs), threads + 1).astype(np.int64).tolist()
-    hit = np.zeros(len(pairs), np.int64)
+    sees = np.zeros((shared.leaf_count, (shared.leaf_count + 63) // 64), np.uint64)
+    kernels.shoot(shared.geometry, *span, shared.lines, shared.seed, sees)
+    return sees
 
-    def aim(span: tuple[int, int]) -> None:
-        kernels.confirm(g, pairs, span[0], span[1], tries, hit)
 
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(aim, pairwise(ends)))
-    return hit > 0
+def _aim(shared: Aiming, span: tuple[int, int]) -> NDArray[np.int64]:
+    from ptmtools.visibility.lines import kernels
+
+    hit = np.zeros(len(shared.pairs), np.int64)
+    kernels.confirm(shared.geometry, shared.pairs, *span, shared.tries, hit)
+    return hit[slice(*span)]

@@ -15,6 +15,7 @@ from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.coverage.placement import TRIES
 from ptmtools.errors import InputError, MissingComponentError
+from ptmtools.executors import Local
 from ptmtools.visibility.model import Pvs
 
 #: Eight points, at the middles of equal parts.
@@ -137,19 +138,11 @@ def test_workers_change_nothing(room_row, monkeypatch):
     scene, cells = room_row(5)
     calls: list[tuple[int, int, str]] = []
     options = AchOptions(backend="embree", preset="fast", per_texture=True)
-    runs = [
-        compute_ach(
-            scene,
-            cells,
-            all_visible(5),
-            replace(options, workers=n),
-            lambda *call: calls.append(call),
-        )
-        for n in (1, 2)
-    ]
+    given = scene, cells, all_visible(5), options, lambda *call: calls.append(call)
+    with Local(2) as local:
+        runs = [compute_ach(*given), compute_ach(*given, local)]
     assert_same(runs[0], runs[1])
     assert calls == [(i, 5, "coverage") for i in range(1, 6)] * 2
-    assert AchOptions(workers=1) == AchOptions(workers=2)
 
 
 def test_again_is_the_same(room_row, backend):
@@ -238,7 +231,6 @@ def test_clearance_keeps_points_off_the_walls(room_row):
         {"face": 0},
         {"face": 4096},
         {"seed": -1},
-        {"workers": 0},
         {"backend": "vulkan"},
         {"preset": "best"},
         {"placement": "grid"},

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ptmtools.executors import Local
 from ptmtools.tolerance import Tolerance
-from ptmtools.visibility import PvsOptions, compute_pvs, exact, flow, hairs
+from ptmtools.visibility import PvsOptions, compute_pvs, exact, hairs, searching
 from ptmtools.visibility.exact import ExactPortals
 from ptmtools.visibility.flow import Portals, geometry, portal_flow
 from ptmtools.visibility.pvs import portals_of
@@ -144,7 +145,7 @@ def test_too_many_to_decide_count_as_seen(build_rooms, monkeypatch):
 
 
 def test_too_many_to_note_count_as_seen(build_rooms, monkeypatch):
-    monkeypatch.setattr(flow, "HAIR", 2)
+    monkeypatch.setattr(searching, "HAIR", 2)
     pvs = compute_pvs(three_doors(build_rooms, 2.0 + 1e-11))
     assert pvs.to_matrix()[0, 3]
     assert pvs.fallbacks > 0
@@ -188,7 +189,9 @@ def test_a_search_cut_short_stays_cut(build_rooms):
 
 def test_exact_answers_do_not_depend_on_the_number_of_workers(build_rooms):
     portals = portals_of(raster(build_rooms, 6, 1e-12))
-    one, three = (portal_flow(portals, 200_000, workers) for workers in (1, 3))
+    one = portal_flow(portals, 200_000)
+    with Local(3) as local:
+        three = portal_flow(portals, 200_000, executor=local)
     assert one.decided.sum() > 10
     assert one.opened.sum() > 0
     for name in ("sees", "cut", "work", "ties", "decided", "opened"):

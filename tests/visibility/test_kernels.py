@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from ptmtools.visibility import kernels
 from ptmtools.visibility.bits import kernels as bits
-from ptmtools.visibility.flow import GROWTH, Portals, geometry, scratch
+from ptmtools.visibility.flow import Portals, geometry
 from ptmtools.visibility.prepass import kernels as prepass
+from ptmtools.visibility.searching import GROWTH, scratch
 from ptmtools.visibility.winding import kernels as winding
 
 SLACK = 1e-12

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ptmtools.executors import Local
 from ptmtools.visibility import PvsOptions
 from ptmtools.visibility.flow import portal_flow
 from ptmtools.visibility.pvs import leaf_matrix
@@ -26,7 +27,7 @@ def prt():
 @pytest.fixture(scope="module")
 def dm1(prt, shared):
     portals, cluster = prt.read_prt(shared / "prt" / "dm1.prt")
-    flow = portal_flow(portals, PvsOptions().budget, 2, exact=False)
+    flow = portal_flow(portals, PvsOptions().budget, exact=False)
     with np.load(shared / "prt" / "dm1.visible.npz") as stored:
         theirs = np.unpackbits(stored["visible"], axis=1, count=stored["shape"][1]).astype(bool)
     return portals, cluster, flow, theirs & theirs.T
@@ -55,7 +56,9 @@ def test_dm1_hides_nothing_that_a_line_reaches(prt, dm1):
 def test_dm1_is_the_same_for_any_number_of_workers(dm1):
     portals, _, flow, _ = dm1
     for budget, expected in ((PvsOptions().budget, flow), (500, None)):
-        one, three = (portal_flow(portals, budget, w, exact=False) for w in (1, 3))
+        with Local(3) as local:
+            three = portal_flow(portals, budget, executor=local, exact=False)
+        one = portal_flow(portals, budget, exact=False)
         for other in (three, expected or one):
             assert np.array_equal(one.sees, other.sees)
             assert np.array_equal(one.cut, other.cut)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError
+from ptmtools.executors import Local
 from ptmtools.visibility import Pvs, PvsOptions, check_conservative, compute_pvs
 from ptmtools.visibility.flow import Portals, portal_flow
 
@@ -153,9 +154,10 @@ def test_the_budget_only_loosens_and_is_reported(build_rooms):
 @pytest.mark.parametrize("budget", [0, 300, 200_000])
 def test_the_number_of_workers_changes_nothing(build_rooms, budget):
     rooms = random_grid(build_rooms, np.random.default_rng(5), (5, 3, 4), 0.9)
-    one = compute_pvs(rooms.cells, PvsOptions(budget=budget, workers=1))
-    for workers in (2, 5, None):
-        other = compute_pvs(rooms.cells, PvsOptions(budget=budget, workers=workers))
+    one = compute_pvs(rooms.cells, PvsOptions(budget=budget))
+    for workers in (2, 5):
+        with Local(workers) as local:
+            other = compute_pvs(rooms.cells, PvsOptions(budget=budget), executor=local)
         assert np.array_equal(one.start, other.start)
         assert np.array_equal(one.cell, other.cell)
         assert one.fallbacks == other.fallbacks
@@ -188,7 +190,7 @@ def random_grid(build_rooms, rng, shape, share):
 )
 def test_what_a_ray_sees_is_in_the_pvs(build_rooms, seed, shape, share, budget):
     rooms = random_grid(build_rooms, np.random.default_rng(seed), shape, share)
-    pvs = compute_pvs(rooms.cells, PvsOptions(budget=budget, workers=1))
+    pvs = compute_pvs(rooms.cells, PvsOptions(budget=budget))
     report = check_conservative(rooms.triangles, rooms.cells, pvs, 20_000, seed % 1000)
     assert report.missed == ()
 
@@ -207,7 +209,7 @@ def test_broken_input_is_an_error(build_rooms):
         with pytest.raises(InputError) as caught:
             compute_pvs(damaged)
         assert caught.value.code == code
-    for options in ({"budget": -1}, {"workers": 0}):
+    for options in ({"budget": -1}, {"lines": 0}):
         with pytest.raises(InputError, match="PTM-I402"):
             PvsOptions(**options)
 

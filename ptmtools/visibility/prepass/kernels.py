@@ -43,7 +43,7 @@ def ahead(g: Geometry, p: int, q: int) -> bool:
 
 @kernel
 def flood(g: Geometry, s: Scratch, first: int, last: int, rows: Bits) -> None:
-    """Rows first … last - 1 of ``rows`` (2K, W) become what floods from them reach.
+    """``rows`` (last - first, W), zeroed, become what floods from first … last - 1 reach.
 
     From p and each next portal r a flood goes on through what lies ahead of p and of the portal
     before it, and beyond the planes that separate p from r.
@@ -58,7 +58,7 @@ def flood(g: Geometry, s: Scratch, first: int, last: int, rows: Bits) -> None:
             r = g.out[i]
             if not ahead(g, p, r):
                 continue
-            rows[p, r >> 6] |= ONE << np.uint64(r & 63)
+            rows[p - first, r >> 6] |= ONE << np.uint64(r & 63)
             load(g.point, g.start, p >> 1, s.polygon, s.size, 0)
             load(g.point, g.start, r >> 1, s.polygon, s.size, 1)
             a, b = (1.0 if p & 1 == 0 else -1.0), (-1.0 if r & 1 == 0 else 1.0)
@@ -83,7 +83,7 @@ def flood(g: Geometry, s: Scratch, first: int, last: int, rows: Bits) -> None:
                     visited[q] = wave  # what the planes hide, they hide from wherever it is reached
                     now = beyond(g.point, g.start, g.ball, q >> 1, s.plane, 0, count, g.slack)
                     if now != EMPTY:
-                        rows[p, q >> 6] |= ONE << np.uint64(q & 63)
+                        rows[p - first, q >> 6] |= ONE << np.uint64(q & 63)
                         stack[top] = q
                         top += 1
 

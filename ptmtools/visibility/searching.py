@@ -1,0 +1,122 @@
+"""The searches of the portal flow as tasks for an executor.
+
+`Searching` is what they share; each borrows storage of its own from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.visibility.decide import Decisions
+from ptmtools.visibility.hairs import Searched, searched
+from ptmtools.visibility.storage import Geometry, Scratch
+
+#: A sequence longer than this is not followed further (its possible set counts as seen).
+DEPTH = 1024
+#: Vertices that clipping may add to a portal before it is left unclipped.
+GROWTH = 24
+#: Words that remember which sequences a search rejected by a hair.
+HAIR = 1 << 16
+
+Tools = tuple[Scratch, Decisions | None]
+
+
+class Searching:
+    """The portals, and what each may see by all that is known.
+
+    Attributes
+    ----------
+    geometry: the portals. budget, exact: see `portal_flow`.
+    known: (2K, W) uint64 rows of bits.
+    """
+
+    def __init__(
+        self, geometry: Geometry, known: NDArray[np.uint64], budget: int, exact: bool
+    ) -> None:
+        self.geometry, self.known, self.budget, self.exact = geometry, known, budget, exact
+        self._idle: list[Tools] = []
+
+    @property
+    def words(self) -> int:
+        """Words in a row."""
+        return (len(self.geometry.leaf) + 63) // 64
+
+    @contextmanager
+    def tools(self) -> Iterator[Tools]:
+        """Storage that no other thread uses meanwhile."""
+        try:
+            lent = self._idle.pop()
+        except IndexError:
+            exactly = Decisions(self.geometry) if self.exact else None
+            lent = scratch(self.geometry, self.words), exactly
+        try:
+            yield lent
+        finally:
+            self._idle.append(lent)
+
+    def __getstate__(self) -> dict[str, object]:
+        return vars(self) | {"_idle": []}
+
+
+class Found(NamedTuple):
+    """What one search found: a (W,) row of bits, and what it took."""
+
+    seen: NDArray[np.uint64]
+    figures: Searched
+
+
+def flood_from(shared: Searching, span: tuple[int, int]) -> NDArray[np.uint64]:
+    """As a task: (last - first, W) what floods reach from the directed portals ``span`` (first,
+    last)."""
+    from ptmtools.visibility.prepass.kernels import flood
+
+    first, last = span
+    rows = np.zeros((last - first, shared.words), np.uint64)
+    with shared.tools() as (storage, _):
+        flood(shared.geometry, storage, first, last, rows)
+    return rows
+
+
+def search_from(shared: Searching, source: int) -> Found:
+    """As a task: what the directed portal ``source`` sees."""
+    seen = np.zeros(shared.words, np.uint64)
+    with shared.tools() as (storage, exactly):
+        figures = searched(
+            shared.geometry, storage, exactly, shared.known, source, shared.budget, seen
+        )
+    return Found(seen, figures)
+
+
+def settle(shared: Searching, done: tuple[NDArray[np.int64], NDArray[np.uint64]]) -> None:
+    """As a change: the (B, W) rows that a batch of (B,) directed portals has found."""
+    from ptmtools.visibility.bits.kernels import drop_unreturned
+
+    batch, seen = done
+    dropped = shared.known[batch] & ~seen
+    shared.known[batch] = seen
+    for p, row in zip(batch, dropped, strict=True):
+        drop_unreturned(shared.known, p, row)
+
+
+def scratch(g: Geometry, words: int) -> Scratch:
+    """Working storage for one worker."""
+
+    depth = min(DEPTH, len(g.leaf) + 1)
+    vertices = int(np.diff(g.start).max()) + GROWTH
+    return Scratch(
+        polygon=np.zeros((2 * depth + 3, vertices, 3)),
+        size=np.zeros(2 * depth + 3, np.int64),
+        plane=np.zeros((depth + 1, 2 * vertices, 4)),
+        planes=np.zeros(depth + 1, np.int64),
+        might=np.zeros((depth, words), np.uint64),
+        via=np.zeros(depth + 1, np.int64),
+        at=np.zeros(depth, np.int64),
+        distance=np.zeros(vertices),
+        line=np.zeros((2, 3)),
+        hair=np.zeros(HAIR, np.int64),
+    )
