@@ -177,12 +177,8 @@ def cell_texts(
         i: TextureRecord(i, f"textures/{image.name}.ptm", f"{image.name}.png", 1, 1, 3, (), "")
         for i, image in enumerate(scene.images)
     }
-    writer = CellWriter(scene, cells, records, True)
-    adjacent = cells.adjacent()
-    return [
-        writer.cell(c, adjacent[c].tolist(), pvs.row(c).tolist(), hints[c])
-        for c in range(cells.cell_count)
-    ]
+    writer = CellWriter(scene, cells, pvs, np.concatenate(hints), records, True)
+    return [writer.cell(c) for c in range(cells.cell_count)]
 
 
 def load(cells: Cells, pvs: Pvs, way: Way, size: NDArray[np.int64]) -> Load:

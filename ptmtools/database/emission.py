@@ -68,7 +68,8 @@ def emit(
                     remedy="name another folder, or give --force to overwrite it",
                 )
     viewpoints, notes = place_viewpoints(scene, cells, options)
-    writer = CellWriter(scene, cells, {t.image: t for t in textures}, options.fallback)
+    records = {t.image: t for t in textures}
+    writer = CellWriter(scene, cells, pvs, ach.value, records, options.fallback)
     with writing(folder):
         (folder / CELL_FOLDER).mkdir(parents=True, exist_ok=True)
         if gltf:
@@ -85,10 +86,9 @@ def emit(
         size += len(data)
 
     boxes, images = [], []
-    adjacent = cells.adjacent()
     for c in range(cells.cell_count):
         progress(c, cells.cell_count, "cells")
-        cell = writer.cell(c, adjacent[c].tolist(), pvs.row(c).tolist(), ach.row(c))
+        cell = writer.cell(c)
         write(cell_path(c), cell.text)
         boxes.append(cell.box)
         images.append(cell.images)

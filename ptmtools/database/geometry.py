@@ -41,11 +41,20 @@ class Shape:
 
 
 class Geometry:
-    """All shapes of all cells.
+    """All shapes of all cells, by cell, object, material and sidedness.
+
+    Lists of varying length are CSR, as in `Cells`.
 
     Attributes
     ----------
     point, uv: (n, 3), (k, 2) float32, the distinct positions and texture coordinates.
+    cell_start: (C + 1,) the shapes of each cell.
+    object, material, two_sided: (S,) of each shape.
+    triangle, uv_triangle: (M, 3) corners as indices into `shape_point` and `shape_uv`, counted
+        from the shape's first.
+    triangle_start: (S + 1,) the triangles of each shape.
+    shape_point, point_start: (P,) rows of `point`, ascending; (S + 1,) those of each shape.
+    shape_uv, uv_start: the same for `uv`.
     collapsed: pieces dropped by the rounding, over all cells.
     """
 
@@ -67,34 +76,54 @@ class Geometry:
             ]
         )
         order = np.lexsort((piece, *key[::-1]))
-        self._key = key[:, order]
-        self._corner = corner[order]
-        self._uv_corner = uv_of[cells.triangle[piece[order]]].reshape(-1, 3)
-        change = (self._key[:, 1:] != self._key[:, :-1]).any(axis=0)
-        self._start = np.concatenate([[0], np.flatnonzero(change) + 1, [len(order)]])
-        self._first = np.searchsorted(
-            self._key[0, self._start[:-1]] if len(order) else np.zeros(0, np.int64),
-            np.arange(cells.cell_count + 1),
+        key = key[:, order]
+        change = np.ones(len(order), dtype=np.bool_)
+        change[1:] = (key[:, 1:] != key[:, :-1]).any(axis=0)
+        first = np.flatnonzero(change)
+        shape = np.cumsum(change) - 1
+        self.object, self.material = key[1, first], key[2, first]
+        self.two_sided = key[3, first] > 0
+        self.triangle_start = np.append(first, len(order))
+        self.cell_start = np.searchsorted(key[0, first], np.arange(cells.cell_count + 1))
+        self.shape_point, self.point_start, self.triangle = _indexed(
+            corner[order], shape, len(first), len(self.point)
+        )
+        uv_corner = uv_of[cells.triangle[piece[order]]].reshape(-1, 3)
+        self.shape_uv, self.uv_start, self.uv_triangle = _indexed(
+            uv_corner, shape, len(first), len(self.uv)
         )
 
     def shapes(self, cell: int) -> Iterator[Shape]:
-        """The shapes of a cell, by object, material and sidedness."""
-        for s in range(int(self._first[cell]), int(self._first[cell + 1])):
-            rows = slice(int(self._start[s]), int(self._start[s + 1]))
-            _, thing, material, two_sided = self._key[:, rows.start].tolist()
-            point, triangle = np.unique(self._corner[rows], return_inverse=True)
-            uv, uv_triangle = np.unique(self._uv_corner[rows], return_inverse=True)
+        """The shapes of a cell."""
+        for s in range(int(self.cell_start[cell]), int(self.cell_start[cell + 1])):
+            rows = slice(int(self.triangle_start[s]), int(self.triangle_start[s + 1]))
             yield Shape(
-                thing,
-                material,
-                bool(two_sided),
-                point,
-                uv,
-                triangle.reshape(-1, 3),
-                uv_triangle.reshape(-1, 3),
+                int(self.object[s]),
+                int(self.material[s]),
+                bool(self.two_sided[s]),
+                self.shape_point[self.point_start[s] : self.point_start[s + 1]],
+                self.shape_uv[self.uv_start[s] : self.uv_start[s + 1]],
+                self.triangle[rows],
+                self.uv_triangle[rows],
             )
 
 
+def _indexed(
+    corner: NDArray[np.int64], shape: NDArray[np.int64], shapes: int, count: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """What the triangles of each shape use, and where each shape's begins; and the (m, 3) corners
+    as indices into that, counted from the shape's first."""
+    used, place = np.unique(shape[:, None] * count + corner, return_inverse=True)
+    start = np.searchsorted(used, np.arange(shapes + 1) * count)
+    return used % max(count, 1), start, place.reshape(-1, 3) - start[shape][:, None]
+
+
 def _welded(rows: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    distinct, place = np.unique(rows, axis=0, return_inverse=True)
-    return distinct, place.ravel().astype(np.int64)
+    """The distinct rows in lexical order, and the place of each row among them."""
+    rank = np.zeros(len(rows), dtype=np.int64)
+    for column in rows.T:
+        distinct, place = np.unique(column, return_inverse=True)
+        _, rank = np.unique(rank * len(distinct) + place, return_inverse=True)
+    welded = np.empty((int(rank.max(initial=-1)) + 1, rows.shape[1]), dtype=np.float32)
+    welded[rank] = rows
+    return welded, rank

@@ -38,16 +38,17 @@ class DefNames:
 
     def __init__(self, prefix: str) -> None:
         self._prefix = prefix
-        self._taken: set[str] = set()
+        self._taken: dict[str, int] = {}
 
     def take(self, name: str) -> str:
         """A name for the object ``name``, used nowhere else in the file."""
         plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
         base = _ILLEGAL.sub("_", plain).strip("_")[:_LONGEST] or "shape"
         wanted = f"{self._prefix}_{base}"
-        unique, count = wanted, 1
+        unique, count = wanted, self._taken.get(wanted, 1)
         while unique in self._taken:
             count += 1
             unique = f"{wanted}_{count}"
-        self._taken.add(unique)
+        self._taken[wanted] = count
+        self._taken.setdefault(unique, 1)
         return unique

@@ -37,7 +37,7 @@ def root_text(
     parts = [
         HEADER,
         _PROTO,
-        f"WorldInfo {{\n  title {quoted(options.title)}\n  info {listed(info, 1, '  ')}\n}}\n",
+        f"WorldInfo {{\n  title {quoted(options.title)}\n  info {listed(info, 1)}\n}}\n",
         f'NavigationInfo {{ type [ "WALK", "ANY" ] avatarSize [ {avatar} ] headlight TRUE }}\n',
     ]
     parts += [_viewpoint(v) for v in viewpoints]

@@ -3,17 +3,120 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from fractions import Fraction
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ptmtools.database.numerals import listed, numeral, numerals, quoted, single
+from ptmtools.database.numerals import (
+    Rows,
+    field,
+    listed,
+    loops,
+    numeral,
+    numerals,
+    quoted,
+    single,
+)
+from ptmtools.database.numerals.decimals import LONGEST, shortest, written
 from ptmtools.database.wrl import HEADER, WrlError, parse
 from ptmtools.errors import DatabaseError
 
 FLOATS = st.floats(width=32, allow_nan=False, allow_infinity=False)
+
+
+def bits(*patterns: np.ndarray) -> np.ndarray:
+    """The finite numbers of these bit patterns, without the negative zero."""
+    values = np.concatenate(patterns).astype(np.uint32).view(np.float32)
+    return values[np.isfinite(values)] + np.float32(0)
+
+
+def hard() -> np.ndarray:
+    """Every power of two and its neighbours, every subnormal power, decimals of few digits in
+    every magnitude and their neighbours, whole numbers about the last that all are exact."""
+    binade = np.arange(256, dtype=np.int64) << 23
+    near = np.arange(-1, 2)
+    powers = np.concatenate([(binade[:, None] + near).ravel(), (1 << np.arange(24)), np.arange(64)])
+    digits = np.arange(1, 100)[:, None] * 10.0 ** np.arange(-46, 38)
+    whole = 2**24 + np.arange(-40, 40)
+    plain = np.concatenate([digits.ravel(), whole, np.arange(2000) / 8, np.arange(3000) / 100])
+    with np.errstate(over="ignore"):
+        plain = plain.astype(np.float32)
+    patterns = plain.view(np.uint32).astype(np.int64)
+    patterns = np.concatenate([powers, (patterns[:, None] + near).ravel()])
+    patterns = patterns[(patterns >= 0) & (patterns < 2**31)]
+    return bits(patterns, patterns | 2**31)
+
+
+def nearly_whole() -> np.ndarray:
+    """Of every binade the numbers that, or whose neighbours half way, come nearest to a multiple
+    of the power of ten that decides on their last digit, without being one."""
+    found = []
+    for binade in range(1, 255):
+        unit = Fraction(2) ** (binade - 150)
+        for ten in range(-46, 40):
+            quotient = unit / Fraction(10) ** ten / 2
+            if not 1 <= 2 * quotient < 100:
+                continue
+            # Best approximations from below and above, of up to 2^25 halves.
+            low, high, below, above = 1, 1, quotient % 1, 1 - quotient % 1
+            while below and above and max(low, high) < 2**25:
+                if below < above:
+                    above, high = above - below, high + low
+                else:
+                    below, low = below - above, low + high
+                for halves in (low, high):
+                    if 2**24 <= halves < 2**25:
+                        found += [(binade << 23) | ((halves + i >> 1) & 0x7FFFFF) for i in (0, 1)]
+    return bits(np.array(found, dtype=np.int64))
+
+
+def random_bits(count: int, seed: int) -> np.ndarray:
+    random = np.random.default_rng(seed)
+    return bits(random.integers(0, 2**32, count, dtype=np.uint32))
+
+
+def rows_by(values: np.ndarray, *, compiled: bool) -> list[str]:
+    """Every number through `Rows`."""
+    index = np.arange(len(values))
+    return Rows(values[:, None], compiled).list(index, per_line=5).replace("\n", ",").split(",")
+
+
+def exact(text: str) -> tuple[int, int]:
+    """(digits, exponent) of a numeral, without zeros at the end."""
+    mantissa, _, power = text.lstrip("-").partition("e")
+    whole, _, part = mantissa.partition(".")
+    digits, exponent = int(whole + part), int(power or 0) - len(part)
+    while digits and digits % 10 == 0:
+        digits, exponent = digits // 10, exponent + 1
+    return (digits, exponent) if digits else (0, 0)
+
+
+@pytest.mark.parametrize("values", [hard(), nearly_whole(), random_bits(60_000, 1)])
+def test_arrays_are_written_as_numpy_has_it(values: np.ndarray) -> None:
+    """Digit by digit: `numeral` is NumPy's Dragon4."""
+    wanted = [numeral(v) for v in values]
+    assert written(values) == wanted
+    assert rows_by(values, compiled=True) == wanted
+    digits, exponent = shortest(values)
+    assert list(zip(digits.tolist(), exponent.tolist(), strict=True)) == [*map(exact, wanted)]
+    assert max(map(len, wanted)) <= LONGEST
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_millions_read_back_and_both_ways_agree(seed: int) -> None:
+    values = random_bits(1_000_000, seed)
+    text = rows_by(values, compiled=True)
+    np.testing.assert_array_equal(np.array(text, dtype=np.float64).astype(np.float32), values)
+    some = values[:200_000]
+    assert written(some) == text[:200_000]
+
+
+def single_or_inf(text: str) -> np.float32:
+    with np.errstate(over="ignore"):
+        return np.float32(float(text))
 
 
 @given(FLOATS)
@@ -21,19 +124,49 @@ def test_a_number_reads_back_and_is_short(value: float) -> None:
     text = numeral(value)
     assert np.float32(float(text)) == np.float32(value)
     assert not text.startswith("-0") or text[:3] == "-0."
-    shorter = (f"{value:.{digits}g}" for digits in range(1, 9))
-    digits = len(text.partition("e")[0].strip("-").replace(".", "").strip("0"))
-    for other in shorter:
-        if np.float32(float(other)) == np.float32(value):
-            least = len(other.partition("e")[0].strip("-").replace(".", "").strip("0"))
-            assert digits <= least
-            break
+    digits = len(str(exact(text)[0]))
+    for fewer in range(1, digits):
+        assert single_or_inf(f"{value:.{fewer}g}") != value
+    others = (f"{value:.{digits - 1}e}", f"{value:.{digits - 1}f}", f"{value:.{digits}f}")
+    for other in (*others, str(int(value))):
+        if single_or_inf(other) == value:
+            assert len(text) <= len(other)
 
 
 def test_numbers_as_written() -> None:
-    values = np.array([1, -0.0, 0.1, 1e-5, 1.5e20, -2.5, 16777216, 1 / 3], np.float32)
-    wanted = ["1", "0", "0.1", "1e-5", "1.5e20", "-2.5", "1.6777216e7", "0.33333334"]
-    assert numerals(values) == wanted
+    wanted = {
+        1: "1", -0.0: "0", 0.1: "0.1", -2.5: "-2.5", 1 / 3: "0.33333334", 16777216: "16777216",
+        100: "100", 1000: "1e3", 120: "120", 12000: "12e3", 1.5e20: "15e19", 0.01: "0.01",
+        0.001: "1e-3", 0.0012: "12e-4", 0.0123: "0.0123", 1e-5: "1e-5",
+        1.2345678e-3: "0.0012345678", -1.2345678e-12: "-12345678e-19", 1.4e-45: "1e-45",
+        3.4028235e38: "34028235e31",
+    }  # fmt: skip
+    values = np.array(list(wanted), np.float32) + np.float32(0)
+    assert numerals(values) == list(wanted.values())
+    assert [numeral(v) for v in wanted] == list(wanted.values())
+    assert rows_by(values, compiled=True) == list(wanted.values())
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_rows_of_lists(compiled: bool) -> None:
+    values = np.array([[0, 1, 2], [0.5, -1, 1e7], [3, 3, 3]], np.float32)
+    index = np.array([2, 1, 0, 0, 1, 2, 0])
+    text = Rows(values, compiled).lists(index, np.array([0, 0, 2, 2, 7]), per_line=2)
+    assert text == ["", "3 3 3,0.5 -1 1e7", "", "0 1 2,0 1 2\n0.5 -1 1e7,3 3 3\n0 1 2"]
+    assert Rows(values, compiled).lists(index[:4], np.array([0, 4]), 2) == [
+        "3 3 3,0.5 -1 1e7\n0 1 2,0 1 2"
+    ]
+    assert Rows(values[:0], compiled).lists(index[:0], np.array([0, 0])) == [""]
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_loops(compiled: bool) -> None:
+    triangles = np.array([[0, 1, 2], [10, 123456, 9], [99, 100, 2**31 - 1], [5, 4, 3]])
+    some = triangles if compiled else triangles[[0, 1, 1, 3]]
+    last = "99 100 2147483647 -1" if compiled else "10 123456 9 -1"
+    text = loops(some, np.array([0, 3, 3, 4]), 2, compiled)
+    assert text == [f"0 1 2 -1,10 123456 9 -1\n{last}", "", "5 4 3 -1"]
+    assert loops(some[:0], np.array([0, 0]), 2, compiled) == [""]
 
 
 def test_not_finite_is_refused() -> None:
@@ -43,9 +176,9 @@ def test_not_finite_is_refused() -> None:
 
 
 def test_lists() -> None:
-    assert listed([], 3, "") == "[ ]"
-    assert listed("abc", 3, "") == "[ a, b, c ]"
-    assert listed("abcd", 3, "  ") == "[\n    a, b, c,\n    d\n  ]"
+    assert listed([], 3) == "[ ]"
+    assert listed("abc", 3) == "[ a, b, c ]"
+    assert listed("abcd", 3) == "[ a, b, c\nd ]"
 
 
 def document(body: str) -> bytes:
@@ -65,7 +198,7 @@ def test_strings_read_back(text: str) -> None:
 @given(st.lists(st.tuples(FLOATS, FLOATS, FLOATS), max_size=40))
 def test_points_read_back(points: list[tuple[float, float, float]]) -> None:
     array = np.array(points, np.float32).reshape(-1, 3)
-    text = listed([" ".join(numerals(p)) for p in array], 8, "  ")
+    text = field(Rows(array + np.float32(0)).list(np.arange(len(array))))
     data = document(
         f"Shape {{ geometry IndexedFaceSet {{ coord Coordinate {{ point {text} }} }} }}"
     )
