@@ -54,6 +54,16 @@ def workers(function: Command) -> Command:
     )(function)
 
 
+def many_machines(function: Command) -> Command:
+    """Adds ``-j`` and ``--scheduler``, the arguments of `open_executor`."""
+    return click.option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Have the tasks done by the cluster of this Dask scheduler, such as "
+        "tcp://10.0.0.1:8786; -j then says how many at a time, 0 as many as it has threads.",
+    )(workers(function))
+
+
 def limited(function: Command) -> Command:
     """Adds ``--limit`` as ``limits``."""
 
