@@ -30,6 +30,7 @@ COMMANDS = {
     "ach": ("scenes", "ach", "Measure how much of the view each visible cell covers."),
     "textures": ("scenes", "textures", "Encode the model's images as progressive textures."),
     "emit": ("scenes", "emit", "Write the VRML97 files and hints.json."),
+    "status": ("status", "status", "Say which stages of a database are done."),
     "validate": ("reports", "validate", "Check a database or a .ptm file."),
     "info": ("information", "info", "Say what is in a database or a .ptm file."),
     "plot": ("reports", "plot", "Draw the floor plan of a database."),

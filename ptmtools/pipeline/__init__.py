@@ -20,8 +20,10 @@ if TYPE_CHECKING:
     )
     from ptmtools.pipeline.folder import DatabaseFolder
     from ptmtools.pipeline.options import BuildOptions, TextureOptions
+    from ptmtools.pipeline.plan import StagePlan, plan_build
     from ptmtools.pipeline.report import BuildReport, StageReport
     from ptmtools.pipeline.run import Artifacts
+    from ptmtools.pipeline.status import DatabaseStatus, StageStatus, database_status
     from ptmtools.pipeline.validation import shoot_segments, validate
 
 _HOME = {
@@ -29,14 +31,19 @@ _HOME = {
     "BuildOptions": "options",
     "BuildReport": "report",
     "DatabaseFolder": "folder",
+    "DatabaseStatus": "status",
+    "StagePlan": "plan",
     "StageReport": "report",
+    "StageStatus": "status",
     "TextureOptions": "options",
     "build_scene": "build",
+    "database_status": "status",
     "make_ach": "build",
     "make_cells": "build",
     "make_files": "build",
     "make_pvs": "build",
     "make_textures": "build",
+    "plan_build": "plan",
     "shoot_segments": "validation",
     "validate": "validation",
 }
@@ -46,14 +53,19 @@ __all__ = [
     "BuildOptions",
     "BuildReport",
     "DatabaseFolder",
+    "DatabaseStatus",
+    "StagePlan",
     "StageReport",
+    "StageStatus",
     "TextureOptions",
     "build_scene",
+    "database_status",
     "make_ach",
     "make_cells",
     "make_files",
     "make_pvs",
     "make_textures",
+    "plan_build",
     "shoot_segments",
     "validate",
 ]

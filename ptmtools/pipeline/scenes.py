@@ -7,7 +7,7 @@ neither the cells nor what follows from them. If nothing but the contents of pla
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -99,6 +99,29 @@ def _read(
     )
 
 
+def repainted(
+    before: StageRecord, work: StageRecord, rows: Sequence[Mapping[str, Any]]
+) -> dict[int, str] | None:
+    """Which rows of the list of images have other contents, and the names of their files, if the
+    contents of plain images are all that has changed; else None."""
+    same = (before.recipe, before.parameters, set(before.inputs)) == (
+        work.recipe,
+        work.parameters,
+        set(work.inputs),
+    )
+    if not same:
+        return None
+    row_of = {row["files"][0]: i for i, row in enumerate(rows) if len(row["files"]) == 1}
+    changed = [name for name, digest in work.inputs.items() if before.inputs[name] != digest]
+    for name in changed:
+        row = rows[row_of[name]] if name in row_of else None
+        if row is None or not row["plain"] or row["sha256"] != before.inputs[name]:
+            return None
+    found = {row_of[name]: name for name in changed}
+    digests = {work.inputs[found[i]] if i in found else row["sha256"] for i, row in enumerate(rows)}
+    return found if len(digests) == len(rows) else None
+
+
 def _repainted(
     run: Run, transaction: Transaction, model: Path, before: StageRecord, work: StageRecord
 ) -> StageRecord | None:
@@ -107,49 +130,32 @@ def _repainted(
     from ptmtools.scene.model import SourceImage
     from ptmtools.scene.source import HeldBytes
 
-    same = (before.recipe, before.parameters, set(before.inputs)) == (
-        work.recipe,
-        work.parameters,
-        set(work.inputs),
-    )
-    if not same or IMAGE_LIST not in before.outputs:
-        return None
     try:
         rows = image_rows(run.db.read_output("scene", IMAGE_LIST))
     except (DatabaseError, ValueError, KeyError, TypeError):
         return None
-    row_of = {row["files"][0]: i for i, row in enumerate(rows) if len(row["files"]) == 1}
-    changed = [name for name, digest in work.inputs.items() if before.inputs[name] != digest]
+    changed = repainted(before, work, rows)
+    if changed is None:
+        return None
     fresh: dict[int, SourceImage] = {}
-    for name in changed:
-        row = rows[row_of[name]] if name in row_of else None
-        if row is None or not row["plain"] or row["sha256"] != before.inputs[name]:
-            return None
+    for i, name in changed.items():
         try:
             data = (model.parent / name).read_bytes()
         except OSError:
             return None
-        if sha256(data) != work.inputs[name] or not is_plain(data, row["name"]):
+        if sha256(data) != work.inputs[name] or not is_plain(data, rows[i]["name"]):
             return None
         held = HeldBytes(data)
-        fresh[row_of[name]] = SourceImage(row["name"], work.inputs[name], held, (name,), True)
-    rows = [_row(fresh[i]) if i in fresh else row for i, row in enumerate(rows)]
-    digests = [row["sha256"] for row in rows]
-    old = {f"{IMAGES}/{before.inputs[name]}" for name in changed} | {IMAGE_LIST}
-    kept = {name: digest for name, digest in before.outputs.items() if name not in old}
-    if len(set(digests)) < len(digests) or not transaction.keep(kept):
+        fresh[i] = SourceImage(rows[i]["name"], work.inputs[name], held, (name,), True)
+    old = {f"{IMAGES}/{before.inputs[name]}" for name in changed.values()} | {IMAGE_LIST}
+    if not transaction.keep({n: digest for n, digest in before.outputs.items() if n not in old}):
         return None
+    run.hold_images([fresh.get(i, image) for i, image in enumerate(run.images)])
     for image in fresh.values():
         _check_image(image)
         transaction.put(f"{IMAGES}/{image.sha256}", image.load())
-    transaction.put(IMAGE_LIST, image_list([dict(row) for row in rows]))
-    run.hold_images([fresh.get(i, image) for i, image in enumerate(run.images)])
-    return replace(
-        work,
-        outputs=transaction.pending(),
-        counts=before.counts,
-        notes=before.notes,
-    )
+    transaction.put(IMAGE_LIST, image_list([_row(image) for image in run.images]))
+    return replace(work, outputs=transaction.pending(), counts=before.counts, notes=before.notes)
 
 
 def _row(image: SourceImage) -> dict[str, Any]:

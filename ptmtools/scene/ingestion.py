@@ -75,7 +75,7 @@ def ingest(
     metres = None if options.unit is None else spaces.parse_unit(options.unit)
     if options.up not in (None, "y", "z"):
         raise InputError("PTM-I251", f"up axis {options.up!r} is not known", remedy="give y or z")
-    _check_file(model)
+    check_file(model)
     findings = Findings(model)
     folder = Folder(model.absolute().parent, options.allow_outside)
     source = _read(model, folder, findings, progress)
@@ -133,7 +133,8 @@ def ingest(
     )
 
 
-def _check_file(model: Path) -> None:
+def check_file(model: Path) -> None:
+    """Raises InputError if there is no file that could be a model."""
     try:
         if model.is_dir():
             raise InputError(
