@@ -13,6 +13,7 @@ import re
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 from ptmtools.errors import InputError, MissingComponentError
+from ptmtools.texture.images.declared import check_tile
 from ptmtools.texture.images.eight_bit import one_frame, with_key
 from ptmtools.texture.images.opening import ORIENTATION, described, load, opened
 from ptmtools.texture.images.picture import (
@@ -36,6 +37,8 @@ _GREY_ALPHA = 4
 #: Magic, width, height, largest sample of a PPM or PGM, with comments between.
 _PPM = re.compile(rb"P([2356])" + rb"(?:\s|#[^\n]*\n)+(\d+)" * 3 + rb"\s")
 _ICC = 34675
+#: Tag of libtiff's: an image may have several planes behind each other.
+_DEPTH = 32997
 #: So much of a plain PPM is read at a time, and so many digits are the most that a number has.
 _BLOCK, _DIGITS_MAX = 1 << 20, 10
 
@@ -56,7 +59,7 @@ def read_png(file: BinaryIO, image: ImageFile, colour: int, limits: Limits) -> P
     else:
         upper, lower = _HALVES[image.mode]
         halves = [_unpacked(image, image.mode, upper)]
-        halves.append(_unpacked(opened(file), image.mode, lower))
+        halves.append(_unpacked(opened(file, limits), image.mode, lower))
     keyed = key is not None and components in (1, 3)
 
     def strip(y0: int, y1: int) -> NDArray[Any]:
@@ -96,6 +99,8 @@ class TiffLayout(NamedTuple):
     pages: int
     orientation: int
     icc: bytes | None
+    tile: tuple[object, object]
+    depth: object
 
     @property
     def deep(self) -> bool:
@@ -135,6 +140,8 @@ def tiff_layout(file: BinaryIO) -> TiffLayout:
         2 if directory.next else 1,
         directory.get(ORIENTATION, 1),
         directory.get(_ICC) or None,
+        (directory.get(322), directory.get(323)),
+        directory.get(_DEPTH, 1),
     )
 
 
@@ -151,9 +158,11 @@ def read_tiff(file: BinaryIO, layout: TiffLayout, limits: Limits) -> Picture:
             f"{'/'.join(map(str, layout.bits))} bits of TIFF sample format "
             f"{layout.sample_format[0]}, photometric interpretation {layout.photometric}"
         )
-    check_size(layout.width, layout.height, components * np.dtype(dtype).itemsize, limits)
+    texel_bytes = components * np.dtype(dtype).itemsize
+    check_size(layout.width, layout.height, texel_bytes, limits)
+    check_tile(*layout.tile, texel_bytes, limits)
     if components == 1 and dtype != "float16":
-        image = opened(file)
+        image = opened(file, limits)
         one_frame(image)
         load(image)
 
@@ -170,7 +179,7 @@ def read_tiff(file: BinaryIO, layout: TiffLayout, limits: Limits) -> Picture:
             "a TIFF of more than one component deeper than 8 bits needs imagecodecs",
             remedy="pip install 'ptmtools[codecs]'",
         ) from None
-    if layout.pages > 1:
+    if layout.pages > 1 or layout.depth != 1:
         raise InputError(
             "PTM-I127",
             "holds several pages; a texture is one image",

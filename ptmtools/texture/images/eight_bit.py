@@ -52,11 +52,11 @@ def read(image: ImageFile, limits: Limits, depth: int) -> Picture:
 
 def one_frame(image: ImageFile) -> None:
     """Raise InputError PTM-I127 for an image of several."""
-    frames = getattr(image, "n_frames", 1)
-    if frames > 1:
+    # Not how many: the pages of a TIFF may be made to be costly to count.
+    if getattr(image, "is_animated", False):
         raise InputError(
             "PTM-I127",
-            f"holds {frames} frames or pages; a texture is one image",
+            "holds several frames or pages; a texture is one image",
             remedy="export the one you want as PNG",
         )
 

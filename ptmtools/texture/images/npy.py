@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     import numpy as np
 
 MAGIC = b"\x93NUMPY"
+#: Longest head that is read, bytes, and the largest side that is printed.
+_HEAD_MAX, _SIDE_MAX = 1 << 16, 1 << 63
 
 
 def read_npy(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
@@ -59,8 +61,15 @@ def _head(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     file.seek(0)
     try:
         version = npy.read_magic(file)
+        size = 2 if version == (1, 0) else 4
+        if int.from_bytes(file.read(size), "little") > _HEAD_MAX:
+            raise ValueError("a head that is too long")
+        file.seek(-size, 1)
         # The third version differs in the names of fields only, and texels have none.
         read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        return read(file)
+        shape, in_columns, dtype = read(file)
+        if not all(0 <= side < _SIDE_MAX for side in shape):
+            raise ValueError("an impossible shape")
+        return shape, in_columns, dtype
     except Exception as error:  # a head that is no literal, or ends too early
         raise damaged_image(error) from None

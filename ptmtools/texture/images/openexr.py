@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from ptmtools.errors import InputError, MissingComponentError, OutputError
+from ptmtools.texture.images.declared import check_file, check_tile
 from ptmtools.texture.images.picture import Picture, check_size, damaged_image, unsupported
 from ptmtools.texture.model import Limits
 
@@ -33,7 +34,8 @@ def read_exr(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
         with library.File(path, header_only=True) as exr:
             head = exr.parts[0].header
             parts = len(exr.parts)
-            low, high = head["dataWindow"]
+            low, high = ([int(n) for n in corner] for corner in head["dataWindow"])
+            tiles = head.get("tiles")
             names = {channel.name for channel in head["channels"]}
             sampled = any((c.xSampling, c.ySampling) != (1, 1) for c in head["channels"])
     except Exception as error:  # its errors have no class in common
@@ -47,7 +49,11 @@ def read_exr(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
     wanted = next((order for order in _CHANNELS.values() if set(order) == names), None)
     if wanted is None or sampled:
         raise unsupported(f"the channels {', '.join(sorted(names))}")
-    check_size(int(high[0] - low[0]) + 1, int(high[1] - low[1]) + 1, 4 * len(wanted), limits)
+    if high[0] < low[0] or high[1] < low[1]:
+        raise damaged_image("no texels")
+    check_size(high[0] - low[0] + 1, high[1] - low[1] + 1, 4 * len(wanted), limits)
+    if tiles is not None:
+        check_tile(int(tiles.xSize), int(tiles.ySize), 4 * len(wanted), limits)
     try:
         with library.File(path, separate_channels=True) as exr:
             planes = [exr.channels()[name].pixels for name in wanted]
@@ -92,6 +98,7 @@ def _from_memory(file: BinaryIO, limits: Limits) -> Picture:
     """The library reads files that have a name."""
     import tempfile
 
+    check_file(file, limits)
     file.seek(0)
     with tempfile.NamedTemporaryFile(suffix=".exr") as named:
         named.write(file.read())

@@ -14,8 +14,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 from ptmtools.errors import InputError, LimitError, PtmError
+from ptmtools.texture.images.declared import check_file, check_jpeg, check_tile, check_webp
 from ptmtools.texture.images.picture import damaged_image, unsupported
-from ptmtools.texture.model import Description
+from ptmtools.texture.model import Description, Limits
 
 if TYPE_CHECKING:
     from PIL.Image import Exif, Image
@@ -40,27 +41,42 @@ _PLUGINS = (
 READABLE = "PNG, JPEG, TIFF, TGA, BMP, GIF, WebP, PPM, PCX, Radiance, OpenEXR or .npy"
 #: The tag of EXIF and TIFF.
 ORIENTATION = 0x0112
+#: Tags of TIFF.
+_TILE_WIDTH, _TILE_LENGTH = 322, 323
 #: What Pillow calls layouts of 5 and 6 bits a sample, which it scales to 8.
 _HIGH_COLOUR = re.compile(r"BGRA?;(5|1[56])Z?")
 
 
-def opened(file: BinaryIO) -> ImageFile:
-    """An image whose header is read, and no texel yet. Raises what Pillow raises."""
+def opened(file: BinaryIO, limits: Limits) -> ImageFile:
+    """An image whose header is read, and no texel yet; its size is still to be checked.
+
+    Raises what Pillow raises; LimitError PTM-L104, PTM-L106 where opening or loading would take
+    what its size does not tell.
+    """
+    check_file(file, limits)
     file.seek(0)
-    first = file.read(8)
-    file.seek(0)
+    first = file.read(30)
     magic, module, name = next(plugin for plugin in _PLUGINS if first.startswith(plugin[0]))
+    if magic == b"RIFF":
+        check_webp(first, limits)
+    elif magic == b"\xff\xd8\xff":
+        check_jpeg(first + file.read())
+    file.seek(0)
     try:
         with warnings.catch_warnings():
             # Its limits are not ours.
             warnings.simplefilter("ignore")
-            return cast("ImageFile", getattr(import_module(f"PIL.{module}"), name)(file))
+            image = cast("ImageFile", getattr(import_module(f"PIL.{module}"), name)(file))
     except SyntaxError as error:
         if "pixel mode" in str(error):
             raise unsupported("a combination of samples that is not read") from None
         if len(magic) > 1:
             raise damaged_image(error) from None
         raise
+    if image.format == "TIFF":
+        tags: Any = image
+        check_tile(tags.tag_v2.get(_TILE_WIDTH), tags.tag_v2.get(_TILE_LENGTH), 4, limits)
+    return image
 
 
 def load(image: ImageFile) -> None:

@@ -14,6 +14,7 @@ import re
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from ptmtools.errors import OutputError
+from ptmtools.texture.images.declared import check_file
 from ptmtools.texture.images.picture import Picture, check_size, damaged_image, unsupported
 from ptmtools.texture.model import Limits
 
@@ -37,6 +38,7 @@ def read_hdr(file: BinaryIO, limits: Limits) -> Picture:
     """
     import numpy as np
 
+    check_file(file, limits)
     file.seek(0)
     data = file.read()
     end = data.find(b"\n\n", 0, _HEAD_MAX)

@@ -126,7 +126,7 @@ def _through_pillow(file: BinaryIO, path: str | None, first: bytes, limits: Limi
             check_chunks(file)
         if first.startswith(_TIFF) and (layout := deep.tiff_layout(file)).deep:
             return deep.read_tiff(file, layout, limits)
-        image = opened(file)
+        image = opened(file, limits)
         eight_bit.one_frame(image)
         depth = 8
         if first.startswith(_PNG):
