@@ -104,22 +104,22 @@ class Transaction:
         if outputs is None:
             return False
         for name, digest in outputs.items():
-            with suppress(OSError):
-                if sha256((self.folder / name).read_bytes()) == digest:
-                    continue
-            return False
+            if not self._staged(name, digest) and not self.keep({name: digest}):
+                return False
         self._pending.update(outputs)
         return True
 
     def finish(self, task: str, names: Iterable[str]) -> None:
         """Notes in the journal that a task is done, whose outputs were put."""
-        outputs = {name: self._pending[name] for name in names}
-        if not all(os.path.lexists(self.folder / name) for name in outputs):
-            return  # they stand in the database
-        line = json.dumps({"task": task, "outputs": outputs}) + "\n"
+        line = json.dumps({"task": task, "outputs": {name: self._pending[name] for name in names}})
         folder = self._real()
         with writing(folder), open(folder / _JOURNAL, "a", encoding="utf-8") as journal:
-            journal.write(line)
+            journal.write(line + "\n")
+
+    def _staged(self, name: str, digest: str) -> bool:
+        with suppress(OSError):
+            return sha256((self.folder / name).read_bytes()) == digest
+        return False
 
     def pending(self) -> dict[str, str]:
         """What was put: name → SHA-256."""

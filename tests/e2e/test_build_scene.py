@@ -187,7 +187,6 @@ def test_a_build_that_was_stopped_is_resumed(
         told = process.stderr.read()
     if process.returncode == 130:
         assert told.startswith("ptm: interrupted")
-        assert not (db / ".ptm-new").exists()
     else:
         assert process.returncode in (0, -signal.SIGKILL)
     report = build(model, db)
