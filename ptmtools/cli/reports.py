@@ -8,19 +8,29 @@ from typing import Any
 import click
 
 from ptmtools.cli.batch import no_name
-from ptmtools.cli.common import as_json, database, forced, voiced
+from ptmtools.cli.common import as_json, database, forced, limited, voiced, workers
 from ptmtools.cli.output import Voice, count, size
 from ptmtools.cli.parameters import options_of, take
 from ptmtools.database import PlotOptions, ValidationReport
 from ptmtools.errors import CheckError
 from ptmtools.pipeline import Artifacts, DatabaseFolder, shoot_segments
 from ptmtools.pipeline import validate as check
+from ptmtools.texture.model import Limits
 from ptmtools.visibility import SegmentReport
 
 #: Findings that are shown without ``-v``.
 SHOWN_ISSUES = 20
 
 target = click.argument("target", metavar="FILE|DB", type=click.Path())
+
+
+def _tell_codes(context: click.Context, option: click.Option, asked: bool) -> None:
+    if asked:
+        from ptmtools.database.findings import CODES
+
+        for code, (severity, meaning) in sorted(CODES.items()):
+            click.echo(f"{code}  {severity:<7}  {meaning}")
+        context.exit()
 
 
 @click.command("validate")
@@ -33,9 +43,27 @@ target = click.argument("target", metavar="FILE|DB", type=click.Path())
     help="Also shoot N random segments: what sees each other must be potentially visible.",
 )
 @click.option("--strict / --no-strict", help="Warnings are errors.")
+@click.option(
+    "--codes",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_tell_codes,
+    help="List what can be found, and end.",
+)
+@limited
+@workers
 @as_json
 @voiced
-def validate(voice: Voice, target: str, segments: int, strict: bool, as_json: bool) -> None:
+def validate(
+    voice: Voice,
+    target: str,
+    segments: int,
+    strict: bool,
+    limits: Limits,
+    workers: int,
+    as_json: bool,
+) -> None:
     """Check a database or a .ptm file.
 
     Exits with 8 if it finds an error.
@@ -43,11 +71,14 @@ def validate(voice: Voice, target: str, segments: int, strict: bool, as_json: bo
     if not target:
         raise no_name()
     with voice.progress() as progress:
-        report = check(target, progress)
+        report = check(target, progress, limits=limits, workers=workers)
         shot = shoot_segments(target, segments, progress) if segments else None
-    _tell_findings(voice, target, report, shot, as_json)
-    failed = len(report.errors) + (len(report.warnings) if strict else 0)
+    failed = report.error_count + (report.warning_count if strict else 0)
     failed += len(shot.missed) if shot else 0
+    if as_json:
+        voice.emit_json(_document(target, report, shot, failed == 0))
+    else:
+        _tell_findings(voice, target, report, shot)
     if failed:
         raise CheckError("PTM-C001", f"{count(failed, 'finding')} to be mended", file=target)
 
@@ -77,18 +108,29 @@ def plot(voice: Voice, db: str, output: str, force: bool, **values: Any) -> None
     voice.say(f"{output}: the floor plan of {db}, {count(len(report.floors), 'storey')}")
 
 
+def _document(
+    target: str, report: ValidationReport, shot: SegmentReport | None, ok: bool
+) -> dict[str, Any]:
+    """The report as JSON has it; its schema is published."""
+    return {
+        "format": "ptmtools validation",
+        "schema": 1,
+        "target": target,
+        "ok": ok,
+        "counts": {
+            "files": report.files,
+            "bytes": report.bytes,
+            "errors": report.error_count,
+            "warnings": report.warning_count,
+        },
+        "issues": [asdict(issue) for issue in report.issues],
+        **({"segments": asdict(shot)} if shot else {}),
+    }
+
+
 def _tell_findings(
-    voice: Voice,
-    target: str,
-    report: ValidationReport,
-    shot: SegmentReport | None,
-    as_json: bool,
+    voice: Voice, target: str, report: ValidationReport, shot: SegmentReport | None
 ) -> None:
-    if as_json:
-        ok = report.ok and not (shot and shot.missed)
-        segments = {"segments": asdict(shot)} if shot else {}
-        voice.emit_json({"ok": ok, **asdict(report), **segments})
-        return
     shown = report.issues if voice.verbose else report.issues[:SHOWN_ISSUES]
     for issue in shown:
         voice.say(str(issue))
@@ -104,5 +146,5 @@ def _tell_findings(
         )
     voice.say(
         f"{target}: {count(report.files, 'file')}, {size(report.bytes)}; "
-        f"{count(len(report.errors), 'error')}, {count(len(report.warnings), 'warning')}"
+        f"{count(report.error_count, 'error')}, {count(report.warning_count, 'warning')}"
     )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from ptmtools.database.findings import Findings
 from ptmtools.database.hull import convex_hull
+from ptmtools.database.listcheck import check_list, check_shares
+from ptmtools.database.solidcheck import MOST_CORNERS, SolidError, farthest, solid_planes
 from ptmtools.database.wrl import Document, Node
 from ptmtools.errors import DatabaseError
 from ptmtools.tolerance import Tolerance
@@ -38,6 +40,7 @@ class ReadCell:
     adjacent, visible: URLs as written, relative to the cell's file.
     ach: (n,) float64.
     hull: (h, 3) the hull's points.
+    box: (2, 3) least and greatest corner of the hull and all shapes.
     leaves: the (n, 3) points of each leaf; empty if the cell is a single one.
     textures: the URL lists of its image textures, each once, in the order of the file.
     """
@@ -47,6 +50,7 @@ class ReadCell:
     visible: tuple[str, ...]
     ach: NDArray[np.float64]
     hull: NDArray[np.float64]
+    box: NDArray[np.float64]
     leaves: tuple[NDArray[np.float64], ...]
     textures: tuple[tuple[str, ...], ...]
 
@@ -65,16 +69,21 @@ def read_cell(document: Document, file: str, found: Findings) -> ReadCell | None
         found.add("PTM-D663", file, f"line {nodes[0].line}", f"PTMCell lacks {missing[0]}")
         return None
     textures: dict[tuple[str, ...], None] = {}
+    held = [fields["hullPoint"]]
     for shape in document.of_type("Shape"):
-        texture = _child(shape, "appearance", "texture")
+        texture, coord = _child(shape, "appearance", "texture"), _child(shape, "geometry", "coord")
         if texture is not None:
             textures[texture.fields.get("url", ())] = None
+        if coord is not None and "point" in coord.fields:
+            held.append(coord.fields["point"])
+    points = np.concatenate(held) if any(map(len, held)) else np.zeros((1, 3))
     return ReadCell(
         name=fields["cellName"],
         adjacent=fields["adjacentUrl"],
         visible=fields["visibleUrl"],
         ach=fields["ach"],
         hull=fields["hullPoint"],
+        box=np.stack([points.min(axis=0), points.max(axis=0)]),
         leaves=tuple(np.split(fields["leafPoint"], fields["leafStart"][1:]))
         if "leafPoint" in fields
         else (),
@@ -99,60 +108,96 @@ def check_cell(
     """
     node = document.of_type("PTMCell")[0]
     place = f"line {node.line}"
-    planes = _check_hull(cell.hull, node.fields["hullIndex"], tolerance, file, place, found)
-    bodies = [planes[~_in_box_face(planes, box, tolerance)]]
-    if "leafPoint" in node.fields and "leafStart" in node.fields:
-        points, start = node.fields["leafPoint"], node.fields["leafStart"]
-        if len(start) < 2 or start[0] != 0 or (np.diff([*start, len(points)]) < 4).any():
-            found.add("PTM-D685", file, place, "leafStart does not cut leafPoint into leaves")
-        else:
-            leaves = np.split(points, start[1:])
-            bodies += [p[~_in_box_face(p, box, tolerance)] for p in _leaf_planes(leaves, tolerance)]
-        _check_inside([planes], points, tolerance, file, place, "a leaf", found)
+    body = _Body(node, box, tolerance)
+    for code, fault in body.faults:
+        found.add(code, file, place, fault)
     for shape in document.of_type("Shape"):
         where = f"line {shape.line}" + (f", {shape.name}" if shape.name else "")
         _check_shape(shape, file, where, found)
         coord = _child(shape, "geometry", "coord")
-        if coord is not None:
-            points = coord.fields.get("point", np.zeros((0, 3)))
-            _check_inside(bodies, points, tolerance, file, where, "geometry", found)
+        if coord is not None and "point" in coord.fields:
+            far = body.outside(coord.fields["point"])
+            if far > tolerance.cluster:
+                found.add("PTM-D684", file, where, f"geometry lies {far:.3g} m outside of the hull")
     own = file.rpartition("/")[2]
     if f"{cell.name}.wrl" != own:
         found.add("PTM-D698", file, place, f"cellName is {cell.name!r}")
-    if not cell.visible or cell.visible[0] != own:
-        found.add("PTM-D690", file, place, f"visibleUrl does not begin with {own}")
-    for name, urls, rest in (
-        ("adjacentUrl", cell.adjacent, cell.adjacent),
-        ("visibleUrl", cell.visible, cell.visible[1:]),
-    ):
-        if len(set(urls)) < len(urls) or own in rest:
-            found.add("PTM-D697", file, place, f"{name} names a cell twice or the cell itself")
-    if hidden := sorted(set(cell.adjacent) - set(cell.visible)):
-        found.add("PTM-D696", file, place, f"{hidden[0]} is adjacent, but not visible")
+    check_list("adjacentUrl", own, cell.adjacent, file, place, found)
+    check_list("visibleUrl", own, cell.visible, file, place, found)
     if len(cell.ach) != len(cell.visible):
-        found.add(
-            "PTM-D691",
-            file,
-            place,
-            f"{len(cell.ach)} ach values for {len(cell.visible)} visible cells",
-        )
+        told = f"{len(cell.ach)} ach values for {len(cell.visible)} visible cells"
+        found.add("PTM-D691", file, place, told)
     check_shares(cell.ach, ACH_SLACK, file, place, ("PTM-D692", "PTM-D693"), found)
 
 
-def check_shares(
-    ach: NDArray[np.float64],
-    slack: float,
-    file: str,
-    place: str,
-    codes: tuple[str, str],
-    found: Findings,
-) -> None:
-    """Values in [0, 1] that sum to 1."""
-    if ((ach < 0) | (ach > 1)).any():
-        found.add(codes[0], file, place, "an ach value is outside 0 to 1")
-    total = float(ach.sum())
-    if not abs(total - 1) <= slack:
-        found.add(codes[1], file, place, f"the ach values sum to {total:.9g}")
+class _Body:
+    """The convex body of a cell, and if it has several, its leaves.
+
+    Attributes
+    ----------
+    faults: codes and what is wrong.
+    """
+
+    def __init__(self, node: Node, box: NDArray[np.float64], tolerance: Tolerance) -> None:
+        self.faults: list[tuple[str, str]] = []
+        self._box, self._tolerance = box, tolerance
+        self._leaves: list[NDArray[np.float64]] = []
+        hull = np.zeros((0, 4))
+        points, fields = node.fields["hullPoint"], node.fields
+        triangles = _loops(fields["hullIndex"], len(points))
+        if triangles is None or len(triangles) < 4:
+            self.faults.append(("PTM-D683", "hullIndex is no list of triangles over hullPoint"))
+        else:
+            try:
+                hull = solid_planes(points, triangles.tolist(), tolerance)
+            except SolidError as fault:
+                self.faults.append(("PTM-D683", f"the hull {fault}"))
+        self._hull = self._without_rim(hull)
+        if "leafPoint" in fields and "leafStart" in fields:
+            leaves = np.split(fields["leafPoint"], fields["leafStart"][1:])
+            sizes = [len(leaf) for leaf in leaves]
+            start = np.cumsum([0, *sizes[:-1]])
+            cut = len(fields["leafStart"]) > 1 and np.array_equal(fields["leafStart"], start)
+            if not cut or min(sizes) < 4 or max(sizes) > MOST_CORNERS:
+                self.faults.append(("PTM-D685", "leafStart does not cut leafPoint into leaves"))
+            else:
+                self._leaves = leaves
+            far = farthest(hull, fields["leafPoint"]).max(initial=0.0)
+            if far > tolerance.cluster:
+                told = f"a leaf lies {far:.3g} m outside of the hull"
+                self.faults.append(("PTM-D684", told))
+
+    def outside(self, points: NDArray[np.float64]) -> float:
+        """How far the farthest of (n, 3) points lies outside, metres; 0 if none does."""
+        far = farthest(self._hull, points)
+        if not (far > self._tolerance.cluster).any():
+            return 0.0
+        for planes in self._leaf_planes:
+            far = np.minimum(far, farthest(planes, points))
+        return float(far.max(initial=0.0))
+
+    @cached_property
+    def _leaf_planes(self) -> list[NDArray[np.float64]]:
+        """Of each leaf that is not flat. Most cells have nothing outside of their hulls, and never
+        ask."""
+        bodies = []
+        for leaf in self._leaves:
+            try:
+                points, triangles = convex_hull(leaf.astype(np.float32))
+                planes = solid_planes(
+                    points.astype(np.float64), triangles.tolist(), self._tolerance
+                )
+            except (DatabaseError, SolidError):
+                continue
+            bodies.append(self._without_rim(planes))
+        return bodies
+
+    def _without_rim(self, planes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Planes, but for those of the faces of the box."""
+        box, tolerance = self._box, self._tolerance
+        faces = np.concatenate([-planes[:, 3:] - box[1], -planes[:, 3:] + box[0]], axis=1)
+        outwards = np.concatenate([planes[:, :3], -planes[:, :3]], axis=1) >= tolerance.cosine
+        return planes[~(outwards & (abs(faces) <= tolerance.plane)).any(axis=1)]
 
 
 def _child(node: Node, *path: str) -> Node | None:
@@ -232,90 +277,3 @@ def _check_colours(
             found.add("PTM-D682", file, place, f"colorIndex is no colour for each of {count} faces")
     if any(((v < 0) | (v > 1)).any() for v in values):
         found.add("PTM-D682", file, place, "a colour or transparency is outside 0 to 1")
-
-
-def _check_hull(
-    points: NDArray[np.float64],
-    index: NDArray[np.int64],
-    tolerance: Tolerance,
-    file: str,
-    place: str,
-    found: Findings,
-) -> NDArray[np.float64]:
-    """(f, 4) unit planes of the hull, empty if it is no polyhedron."""
-    none = np.zeros((0, 4))
-    triangles = _loops(index, len(points))
-    if triangles is None or len(triangles) < 4:
-        found.add("PTM-D683", file, place, "hullIndex is no list of triangles over hullPoint")
-        return none
-    edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).tolist()
-    directed = {(a, b) for a, b in edges}
-    if len(directed) < len(edges) or any((b, a) not in directed for a, b in directed):
-        found.add("PTM-D683", file, place, "the hull is not closed")
-        return none
-    planes = _unit_planes(points, triangles, tolerance)
-    if len(planes) == 0:
-        found.add("PTM-D683", file, place, "the hull is flat")
-        return none
-    if _outside(planes, points).max(initial=0.0) > tolerance.plane:
-        found.add("PTM-D683", file, place, "the hull is not convex")
-        return none
-    return planes
-
-
-def _unit_planes(
-    points: NDArray[np.float64], triangles: NDArray[np.integer], tolerance: Tolerance
-) -> NDArray[np.float64]:
-    """(f, 4) planes of the triangles, outwards. A sliver's normal says nothing and is left out; its
-    neighbours bound the hull."""
-    a, b, c = np.moveaxis(points[triangles], 1, 0)
-    normal = np.cross(b - a, c - a)
-    length = np.linalg.norm(normal, axis=1)
-    longest = np.max(np.linalg.norm([b - a, c - b, a - c], axis=2), axis=0)
-    sound = length > 2 * tolerance.plane * longest
-    normal = normal[sound] / length[sound, None]
-    return np.column_stack([normal, -np.einsum("ij,ij->i", normal, a[sound])])
-
-
-def _leaf_planes(
-    leaves: Sequence[NDArray[np.float64]], tolerance: Tolerance
-) -> Iterator[NDArray[np.float64]]:
-    """The planes of each leaf that is not flat."""
-    for leaf in leaves:
-        try:
-            points, triangles = convex_hull(leaf.astype(np.float32))
-        except DatabaseError:
-            continue
-        yield _unit_planes(points.astype(np.float64), triangles, tolerance)
-
-
-def _in_box_face(
-    planes: NDArray[np.float64], box: NDArray[np.float64], tolerance: Tolerance
-) -> NDArray[np.bool_]:
-    """(f,) whether a plane, its normal outwards, is that of a face of the box."""
-    faces = np.concatenate([-planes[:, 3:] - box[1], -planes[:, 3:] + box[0]], axis=1)
-    outwards = np.concatenate([planes[:, :3], -planes[:, :3]], axis=1) >= tolerance.cosine
-    return np.asarray((outwards & (abs(faces) <= tolerance.plane)).any(axis=1))
-
-
-def _outside(planes: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) how far each point lies in front of the plane that it is farthest in front of."""
-    far = np.full(len(points), -np.inf)
-    for plane in planes:
-        far = np.maximum(far, points @ plane[:3] + plane[3])
-    return far
-
-
-def _check_inside(
-    bodies: Sequence[NDArray[np.float64]],
-    points: NDArray[np.float64],
-    tolerance: Tolerance,
-    file: str,
-    place: str,
-    what: str,
-    found: Findings,
-) -> None:
-    """Every point lies in one of the bodies, given by their planes; the first is the hull."""
-    far = np.min([_outside(planes, points) for planes in bodies], axis=0).max(initial=0.0)
-    if far > tolerance.cluster:
-        found.add("PTM-D684", file, place, f"{what} lies {far:.3g} m outside of the hull")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from ptmtools.database.model import Issue, Severity
 
 #: Code → (severity, what it means). docs/database.md repeats this table.
@@ -13,6 +15,9 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D654": ("error", "a file cannot be read"),
     "PTM-D655": ("warning", "the database is not finished: nothing was emitted yet"),
     "PTM-D656": ("error", "a stage is stale: what it was made from has changed since"),
+    "PTM-D657": ("error", "a link leads out of the served folder"),
+    "PTM-D658": ("error", "a pipe, a device or a linked folder lies where files are served"),
+    "PTM-D659": ("error", "a count in the manifest is not that of the files"),
     "PTM-D660": ("error", "a VRML file is not UTF-8"),
     "PTM-D661": ("error", "a VRML file is not in the emission pattern"),
     "PTM-D662": ("error", "a number in a VRML file is not finite"),
@@ -20,51 +25,56 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D670": ("error", "a URL leads out of the served folder"),
     "PTM-D671": ("error", "a URL names a file that is not there"),
     "PTM-D672": ("error", "a cell file is missing"),
+    "PTM-D673": ("error", "a URL is malformed"),
+    "PTM-D674": ("error", "two entries of a list name the same file"),
+    "PTM-D675": ("warning", "names of served files differ in nothing but case"),
+    "PTM-D676": ("error", "a .gz twin is damaged, or is not that of the file beside it"),
+    "PTM-D677": ("warning", "a file is served that no other names"),
     "PTM-D680": ("error", "coordIndex is out of range, or no list of triangles"),
     "PTM-D681": ("error", "texCoordIndex is out of range, or does not match coordIndex"),
     "PTM-D682": ("error", "a colour or transparency is outside 0 to 1, or colorIndex is wrong"),
     "PTM-D683": ("error", "a hull is not a closed convex polyhedron"),
     "PTM-D684": ("error", "a hull does not hold its cell's geometry or leaves"),
     "PTM-D685": ("error", "leafPoint and leafStart do not describe leaves"),
-    "PTM-D690": ("error", "visibleUrl does not begin with the cell itself"),
+    "PTM-D690": ("error", "a list of visible cells does not begin with the cell itself"),
     "PTM-D691": ("error", "ach and visibleUrl differ in length"),
     "PTM-D692": ("error", "an ach value is outside 0 to 1"),
     "PTM-D693": ("error", "the ach values do not sum to 1"),
     "PTM-D694": ("error", "adjacency is not symmetric"),
     "PTM-D695": ("error", "visibility is not symmetric"),
     "PTM-D696": ("error", "an adjacent cell is not visible"),
-    "PTM-D697": ("error", "a list of cells names one twice, or the cell itself out of place"),
+    "PTM-D697": ("error", "a list of cells names one twice or out of order, or the cell itself"),
     "PTM-D698": ("error", "a cell's name is not its file's"),
-    "PTM-D699": ("error", "the root file and the cells disagree"),
-    "PTM-D700": ("error", "hints.json is damaged"),
+    "PTM-D699": ("error", "the root file contradicts itself or the cells"),
+    "PTM-D700": ("error", "hints.json is not as its schema says, or an index is out of range"),
     "PTM-D701": ("error", "hints.json and the cell files disagree"),
     "PTM-D702": ("error", "the ach values in hints.json are not a share of 1"),
     "PTM-D703": ("warning", "coverage fell on cells outside the PVS: missed mass"),
     "PTM-D704": ("error", "hints.json and a texture file disagree"),
     "PTM-D705": ("error", "portals in hints.json are wrong, or not those of the adjacent cells"),
-    "PTM-D706": ("error", "hints.json and the viewpoints of the root file disagree"),
+    "PTM-D706": ("error", "viewpoints in hints.json are wrong, or not those of the root file"),
     "PTM-D707": ("error", "the statistics of the coverage in hints.json do not fit it"),
+    "PTM-D708": ("warning", "a texture is listed in hints.json that no cell uses"),
+    "PTM-D709": ("error", "a leaf in hints.json is no convex polyhedron, or lies in another"),
     "PTM-D710": ("error", "a .ptm file is damaged"),
     "PTM-D711": ("error", "a .ptm file and its PNG twin show different images"),
     "PTM-D712": ("error", "a PNG twin cannot be read"),
-    "PTM-D730": ("error", "the GLBs are not those of the cells, or gltf/hints.json is missing"),
-    "PTM-D731": ("error", "a GLB is damaged: its header, its chunks or its JSON"),
-    "PTM-D732": ("error", "a GLB is not in the emission pattern"),
-    "PTM-D733": ("error", "an accessor of a GLB leads out of its bytes, or is misaligned"),
-    "PTM-D734": ("error", "an index of a GLB is out of range, or they are no list of triangles"),
-    "PTM-D735": ("error", "a number in a GLB is not finite, or bounds are not those of the data"),
-    "PTM-D736": ("error", "a GLB and hints.json disagree about a texture"),
-    "PTM-D737": ("error", "gltf/hints.json and hints.json disagree"),
-    "PTM-D738": ("error", "a GLB and its cell's VRML file have different triangles"),
-    "PTM-D739": ("error", "a material of a GLB is not that of its shape in the VRML file"),
+    "PTM-D713": ("warning", "a file is too large to be checked beyond its checksums"),
+    "PTM-D720": ("error", "the arrays of a stage cannot be read"),
+    "PTM-D721": ("error", "the arrays of the stages do not belong together"),
 }
 
 
 class Findings:
-    """Gathers issues; a fault that repeats all over a file is told so often and then summed up."""
+    """Gathers issues; a fault that repeats all over a file is told so often and then summed up.
+
+    What is told comes from files that may hold anything: it is made printable, and cut.
+    """
 
     #: Issues of one code told one by one, per file.
     MOST = 5
+    #: Characters of a place or message.
+    LONGEST = 300
 
     def __init__(self) -> None:
         self._issues: dict[tuple[str, str], list[Issue]] = {}
@@ -72,22 +82,35 @@ class Findings:
 
     def add(self, code: str, file: str, place: str, message: str) -> None:
         """One issue; its severity is the code's."""
-        key = (file, code)
-        told = self._issues.setdefault(key, [])
-        if len(told) < self.MOST:
-            told.append(Issue(code, CODES[code][0], file, place, message))
-        else:
-            self._untold[key] = self._untold.get(key, 0) + 1
+        self._take(Issue(code, CODES[code][0], _line(file), _line(place), _line(message)))
 
-    def has(self, code: str, file: str) -> bool:
-        return (file, code) in self._issues
+    def take(self, issues: Iterable[Issue]) -> None:
+        """Issues that others found."""
+        for issue in issues:
+            self._take(issue)
+
+    def _take(self, issue: Issue) -> None:
+        key = (issue.file, issue.code)
+        told = self._issues.setdefault(key, [])
+        if len(told) < self.MOST and issue.count == 1:
+            told.append(issue)
+        else:
+            self._untold[key] = self._untold.get(key, 0) + issue.count
 
     def issues(self) -> tuple[Issue, ...]:
         """All of them, by file and code."""
         ordered: list[Issue] = []
-        for key in sorted(self._issues):
-            ordered += self._issues[key]
-            if more := self._untold.get(key):
-                last = self._issues[key][-1]
-                ordered.append(Issue(key[1], last.severity, key[0], "", f"{more} more of these"))
+        for (file, code), told in sorted(self._issues.items()):
+            ordered += told
+            if more := self._untold.get((file, code)):
+                message = f"{more} more of these"
+                ordered.append(Issue(code, CODES[code][0], file, "", message, more))
         return tuple(ordered)
+
+
+def _line(text: str) -> str:
+    """Text on one line that any terminal prints."""
+    text = text if len(text) <= Findings.LONGEST else f"{text[: Findings.LONGEST]}…"
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

@@ -106,8 +106,10 @@ class EmitOptions:
     title: WorldInfo's title in the root file.
     fallback: name the PNG twin of a texture first in its URLs, the `.ptm` second; without it
         only the `.ptm`.
-    viewpoints: asked for; empty takes the scene's cameras, or chooses if there are none.
-    viewpoint_count: how many to choose, at most.
+    viewpoints: where to begin; empty takes the scene's cameras, or a place in the largest room if
+        there are none.
+    viewpoint_count: how many more rooms get a viewpoint, at most, the largest first; in the order
+        of a walk.
     avatar_size: NavigationInfo's: least distance to a wall, height of the eye above the floor,
         highest step, metres.
     field_of_view: of viewpoints that are no cameras, radians.
@@ -117,7 +119,7 @@ class EmitOptions:
     title: str = "ptmtools database"
     fallback: bool = True
     viewpoints: tuple[GivenViewpoint, ...] = ()
-    viewpoint_count: int = 4
+    viewpoint_count: int = 32
     avatar_size: Vector = (0.25, 1.6, 0.75)
     field_of_view: float = 1.1
     format: Literal["vrml", "gltf"] = "vrml"
@@ -128,8 +130,8 @@ class EmitOptions:
             wrong = f"a field of view of {self.field_of_view:g} is not between 0 and pi radians"
         elif not all(0 <= size < math.inf for size in self.avatar_size):
             wrong = "an avatar's sizes are metres of at least 0"
-        elif self.viewpoint_count < 1:
-            wrong = f"at most {self.viewpoint_count} viewpoints is none"
+        elif self.viewpoint_count < 0:
+            wrong = f"at most {self.viewpoint_count} viewpoints is less than none"
         elif self.format not in ("vrml", "gltf"):
             wrong = f"{self.format!r} is neither vrml nor gltf"
         if wrong:
@@ -173,6 +175,7 @@ class Issue:
     file: relative to the database, or the path that was given.
     place: where in the file, "" for all of it.
     message: one line.
+    count: faults that it stands for, see `ptmtools.database.findings`.
     """
 
     code: str
@@ -180,6 +183,7 @@ class Issue:
     file: str
     place: str
     message: str
+    count: int = 1
 
     def __str__(self) -> str:
         where = f"{self.file}: {self.place}" if self.place else self.file
@@ -207,6 +211,16 @@ class ValidationReport:
     @property
     def warnings(self) -> tuple[Issue, ...]:
         return tuple(i for i in self.issues if i.severity == "warning")
+
+    @property
+    def error_count(self) -> int:
+        """Errors, those summed up included."""
+        return sum(i.count for i in self.errors)
+
+    @property
+    def warning_count(self) -> int:
+        """Warnings, likewise."""
+        return sum(i.count for i in self.warnings)
 
     @property
     def ok(self) -> bool:

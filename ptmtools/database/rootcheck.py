@@ -1,17 +1,22 @@
-"""What `root.wrl` must satisfy beside the cells."""
+"""What `root.wrl` must satisfy: by itself, beside the cells, and beside the hints."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.database.findings import Findings
-from ptmtools.database.wrl import Document
+from ptmtools.database.rootfile import PATTERN
+from ptmtools.database.wrl import Document, Node
+from ptmtools.tolerance import PARALLEL_COSINE
 
 _PROTO = {"viewpoint": "SFString", "cellUrl": "MFString"}
+#: What a Viewpoint and a viewpoint of the hints both have, under the same names.
+_POSE = ("position", "orientation", "fieldOfView", "description")
 
 
 @dataclass(frozen=True)
@@ -21,11 +26,13 @@ class ReadRoot:
     Attributes
     ----------
     viewpoints: DEF name of each viewpoint → URL of its cell.
-    inlines: URL → (2, 3) centre and size of its bounding box, as written.
+    poses: DEF name → the viewpoint.
+    inlines: URL → (2, 3) centre and size of its bounding box, as written, if it has one.
     """
 
     viewpoints: dict[str, str]
-    inlines: dict[str, NDArray[np.float64]]
+    poses: dict[str, Node]
+    inlines: dict[str, NDArray[np.float64] | None]
 
 
 def read_root(document: Document, file: str, found: Findings) -> ReadRoot:
@@ -33,42 +40,100 @@ def read_root(document: Document, file: str, found: Findings) -> ReadRoot:
     for type in ("WorldInfo", "NavigationInfo"):
         if len(document.of_type(type)) != 1:
             found.add("PTM-D663", file, "", f"not one {type}")
-    names = {v.name for v in document.of_type("Viewpoint")}
+    poses = {v.name: v for v in document.of_type("Viewpoint")}
+    for name, pose in poses.items():
+        if missing := [field for field in _POSE if field not in pose.fields]:
+            found.add("PTM-D663", file, f"line {pose.line}", f"{name} lacks {missing[0]}")
     viewpoints: dict[str, str] = {}
     if document.protos.get("PTMViewpointCell") == _PROTO:
         for node in document.of_type("PTMViewpointCell"):
             name, urls = node.fields.get("viewpoint", ""), node.fields.get("cellUrl", ())
-            if name not in names or name in viewpoints or len(urls) != 1:
+            if name not in poses or name in viewpoints or len(urls) != 1:
                 found.add("PTM-D699", file, f"line {node.line}", f"{name!r} names no one viewpoint")
             else:
                 viewpoints[name] = urls[0]
     else:
         found.add("PTM-D663", file, "", "PROTO PTMViewpointCell is not the pattern's")
-    if not names or set(viewpoints) != names:
+    if not poses or set(viewpoints) != set(poses):
         found.add("PTM-D699", file, "", "not every viewpoint has a cell, or there is none")
-    inlines: dict[str, NDArray[np.float64]] = {}
+    wanted = {f"ptm:viewpoint {name} {url}" for name, url in viewpoints.items()}
+    for node in document.of_type("WorldInfo"):
+        info = node.fields.get("info", ())
+        if info[:1] != (f"ptm:database {PATTERN}",):
+            found.add("PTM-D663", file, f"line {node.line}", "info does not begin with the pattern")
+        if {line for line in info if line.startswith("ptm:viewpoint ")} != wanted:
+            told = "info does not say the same of the viewpoints as PTMViewpointCell"
+            found.add("PTM-D699", file, f"line {node.line}", told)
+    inlines: dict[str, NDArray[np.float64] | None] = {}
     for node in document.of_type("Inline"):
         fields, place = node.fields, f"line {node.line}"
         url = fields.get("url", ())
-        if len(url) != 1 or not {"bboxCenter", "bboxSize"} <= set(fields):
+        boxed = {"bboxCenter", "bboxSize"} <= set(fields)
+        if len(url) != 1 or not boxed:
             found.add("PTM-D663", file, place, "an Inline without a URL or a bounding box")
-        elif url[0] in inlines:
+        if len(url) == 1 and url[0] in inlines:
             found.add("PTM-D699", file, place, f"{url[0]} stands here twice")
-        else:
-            inlines[url[0]] = np.stack([fields["bboxCenter"], fields["bboxSize"]])
-    return ReadRoot(viewpoints, inlines)
+        elif len(url) == 1:
+            box = np.stack([fields["bboxCenter"], fields["bboxSize"]]) if boxed else None
+            inlines[url[0]] = box
+    return ReadRoot(viewpoints, poses, inlines)
 
 
 def check_root(
-    root: ReadRoot, hulls: Mapping[str, NDArray[np.float64]], file: str, found: Findings
+    root: ReadRoot, boxes: Mapping[str, NDArray[np.float64]], file: str, found: Findings
 ) -> None:
-    """Compares with the cells, given as URL → hull points."""
-    for url, hull in hulls.items():
-        box = root.inlines.get(url)
-        if box is None:
+    """Compares with the cells, given as URL → (2, 3) bounds of all that they hold."""
+    for url, box in boxes.items():
+        if url not in root.inlines:
             found.add("PTM-D699", file, "", f"{url} is not inlined")
+        written = root.inlines.get(url)
+        if written is None:
             continue
-        centre, size = box.astype(np.float32).astype(np.float64)
-        slack = np.spacing(np.abs(hull).max(axis=0, initial=0).astype(np.float32))
-        if len(hull) and (np.abs(hull - centre) > size / 2 + slack).any():
-            found.add("PTM-D699", file, url, "the bounding box does not hold the cell's hull")
+        centre, size = written.astype(np.float32).astype(np.float64)
+        slack = np.spacing(np.abs(box).max(axis=0).astype(np.float32))
+        if not (np.abs(box - centre) <= size / 2 + slack).all():
+            found.add("PTM-D699", file, url, "the bounding box does not hold the cell")
+
+
+def check_viewpoints(
+    root: ReadRoot,
+    viewpoints: Sequence[Mapping[str, Any]],
+    urls: Sequence[str],
+    file: str,
+    found: Findings,
+) -> None:
+    """Compares with the viewpoints of the hints and the URLs of their cells."""
+    wanted = {view["name"]: url for view, url in zip(viewpoints, urls, strict=True)}
+    if wanted != root.viewpoints or len(wanted) < len(viewpoints):
+        found.add("PTM-D706", file, "viewpoints", "not those of the root file")
+    for i, view in enumerate(viewpoints):
+        pose = root.poses.get(view["name"])
+        written = {} if pose is None else pose.fields
+        for name in _POSE:
+            if name in written and not _same(written[name], view[name]):
+                told = "is not that of the root file"
+                found.add("PTM-D706", file, f"viewpoints[{i}].{name}", told)
+        if not _turns(view["orientation"], view["direction"]):
+            told = "does not turn -Z to the direction"
+            found.add("PTM-D706", file, f"viewpoints[{i}].orientation", told)
+
+
+def _same(written: Any, full: Any) -> bool:
+    if isinstance(written, str):
+        return bool(written == " ".join(full.split()))
+    single = np.asarray(full, np.float64).astype(np.float32)
+    return bool((np.asarray(written).astype(np.float32) == single).all())
+
+
+def _turns(orientation: Sequence[float], direction: Sequence[float]) -> bool:
+    """Whether a rotation, axis and angle, brings -Z to a direction, both of them unit vectors."""
+    axis, angle = np.array(orientation[:3], np.float64), orientation[3]
+    ahead = np.array([0.0, 0.0, -1.0])
+    turned = (
+        ahead * np.cos(angle)
+        + np.cross(axis, ahead) * np.sin(angle)
+        + axis * (axis @ ahead) * (1 - np.cos(angle))
+    )
+    slack = 1 - PARALLEL_COSINE
+    units = abs(axis @ axis - 1) <= slack and abs(np.dot(direction, direction) - 1) <= slack
+    return bool(units and turned @ direction >= PARALLEL_COSINE)

@@ -2,58 +2,171 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.database.findings import Findings
-from ptmtools.errors import PtmError
+from ptmtools.errors import LimitError, PtmError
+
+if TYPE_CHECKING:
+    from ptmtools.texture import Limits, PtmHeader
+
+    Samples = NDArray[Any]
+
+_PNG = b"\x89PNG\r\n\x1a\n"
+#: Of the first chunk of a PNG: its length and kind, width and height.
+_IHDR = struct.Struct(">I4sII")
+#: What the hints say of a level, in the order of the header.
+_LEVEL = ("width", "height", "offset", "length", "gpuBytes")
 
 
-def check_ptm(data: bytes, file: str, found: Findings) -> None:
-    """A `.ptm` by itself, every group of it."""
-    from ptmtools.texture import check
+@dataclass(frozen=True)
+class ReadTexture:
+    """What the hints may say of a `.ptm`.
 
-    for fault in check(data):
-        found.add("PTM-D710", file, "", fault)
+    Attributes
+    ----------
+    header: of the file.
+    sha256: hex digest of its bytes.
+    twin_level: the level that has the size of the PNG twin; None if there is no twin, or no such.
+    """
+
+    header: PtmHeader
+    sha256: str
+    twin_level: int | None = None
 
 
-def check_twin(data: bytes, twin: Path, file: str, twin_file: str, found: Findings) -> None:
-    """A `.ptm` decoded, beside its PNG. A damaged `.ptm` is told by `check_ptm` already."""
-    from PIL import Image
+def read_texture(
+    data: bytes, digest: str, twin: bytes | None, file: str, limits: Limits, found: Findings
+) -> ReadTexture | None:
+    """A `.ptm` and its PNG twin, if there is one. None, told as PTM-D710, without a sound head."""
+    from ptmtools.texture import read_header
 
-    from ptmtools.texture import decode
-
+    texels = check_ptm(data, file, limits, found)
     try:
-        pixels = decode(data)
+        header = read_header(data)
     except PtmError:
-        return
+        return None
+    level = None if twin is None else _check_twin(twin, data, header, texels, file, limits, found)
+    return ReadTexture(header, digest, level)
+
+
+def check_ptm(data: bytes, file: str, limits: Limits, found: Findings) -> Samples | None:
+    """A `.ptm` by itself, every group of it. Returns its finest level, if nothing is wrong."""
+    from ptmtools.texture.codec import examine
+
     try:
-        with Image.open(twin) as image:
-            other = np.asarray(image.convert("RGBA"))
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as fault:
-        found.add("PTM-D712", twin_file, "", f"cannot be read ({fault})")
-        return
-    plain = pixels[:, :, 0] if pixels.shape[2] == 1 else pixels
-    if not np.array_equal(np.asarray(Image.fromarray(plain).convert("RGBA")), other):
-        found.add("PTM-D711", file, "", f"decoded, it differs from {twin_file}")
+        faults, texels = examine(data, limits)
+    except LimitError as limit:
+        # More than is allowed here is no damage; more than the format allows is.
+        found.add("PTM-D713" if limit.code == "PTM-L103" else "PTM-D710", file, "", str(limit))
+        return None
+    for fault in faults:
+        found.add("PTM-D710", file, "", fault)
+    return texels
+
+
+def read_png(data: bytes, file: str, limits: Limits, found: Findings) -> Samples | None:
+    """The texels of a PNG, (h, w, c); None, told as PTM-D712 or PTM-D713, if it is none."""
+    from ptmtools.texture import load_image
+
+    if _png_size(data) is None:
+        found.add("PTM-D712", file, "", "is no PNG")
+        return None
+    try:
+        return load_image(data, limits).array()
+    except PtmError as fault:
+        code = "PTM-D713" if isinstance(fault, LimitError) else "PTM-D712"
+        found.add(code, file, "", f"cannot be read ({fault})")
+        return None
 
 
 def check_record(
-    record: Mapping[str, Any], digest: str, size: int, file: str, place: str, found: Findings
+    record: Mapping[str, Any],
+    texture: ReadTexture,
+    file: str,
+    place: str,
+    found: Findings,
 ) -> None:
-    """A row of `textures` in `hints.json` beside the bytes of its `.ptm`."""
-    levels = record["levels"]
-    if record["sha256"] != digest:
-        found.add("PTM-D704", file, place, "sha256 is not the file's")
-    end = 0
-    for n, level in enumerate(levels):
-        if level["offset"] < end or level["length"] < 0:
-            found.add("PTM-D704", file, place, f"level {n} overlaps the one before")
-        end = level["offset"] + level["length"]
-    if not levels or end != size:
-        found.add("PTM-D704", file, place, f"the levels end at byte {end} of {size}")
-    elif (levels[-1]["width"], levels[-1]["height"]) != (record["width"], record["height"]):
-        found.add("PTM-D704", file, place, "the finest level has another size")
+    """A row of `textures` in `hints.json` beside its `.ptm`."""
+    header, levels = texture.header, record["levels"]
+    finest = len(header.levels) - 1
+    size = (header.levels[-1].width, header.levels[-1].height)
+    faults = []
+    if record["sha256"] != texture.sha256:
+        faults.append("sha256 is not the file's")
+    if record["components"] != header.components:
+        faults.append(f"the file has {header.components} components")
+    if (record["width"], record["height"]) != size:
+        faults.append(f"the finest level is {size[0]} x {size[1]}")
+    if len(levels) != finest + 1:
+        faults.append(f"the file has {finest + 1} levels")
+    for n, (level, true) in enumerate(zip(levels, header.levels, strict=False)):
+        wanted = (true.width, true.height, true.offset, true.length, true.gpu_bytes)
+        for name, value in zip(_LEVEL, wanted, strict=True):
+            if level[name] != value:
+                faults.append(f"level {n}: {name} is {value} in the file")
+    twin = record.get("fallbackLevel", finest)
+    if record["fallback"] is None:
+        if record.get("fallbackLevel") is not None:
+            faults.append("fallbackLevel without a fallback")
+    elif texture.twin_level not in (None, twin):
+        faults.append(f"the fallback holds level {texture.twin_level}, not {twin}")
+    for fault in faults:
+        found.add("PTM-D704", file, place, fault)
+
+
+def _check_twin(
+    twin: bytes,
+    data: bytes,
+    header: PtmHeader,
+    texels: Samples | None,
+    file: str,
+    limits: Limits,
+    found: Findings,
+) -> int | None:
+    """The level that the twin has the size of. Whatever else it says, a PNG of another size is
+    not decoded."""
+    from ptmtools.texture import decode
+
+    twin_file = f"{file.removesuffix('.ptm')}.png"
+    size, levels = _png_size(twin), header.levels
+    level = next((n for n, v in enumerate(levels) if (v.width, v.height) == size), None)
+    if size is not None and level is None:
+        found.add("PTM-D711", file, "", f"{twin_file} is {size[0]} x {size[1]}, as is no level")
+        return None
+    other = read_png(twin, twin_file, limits, found)
+    if level is None or texels is None or other is None:
+        return level
+    if level < len(levels) - 1:
+        texels = decode(data, level, limits)
+    if not _same_image(texels, other):
+        found.add("PTM-D711", file, f"level {level}", f"it differs from {twin_file}")
+    return level
+
+
+def _png_size(data: bytes) -> tuple[int, int] | None:
+    if not data.startswith(_PNG) or len(data) < len(_PNG) + _IHDR.size:
+        return None
+    length, kind, width, height = _IHDR.unpack_from(data, len(_PNG))
+    return (width, height) if (length, kind) == (13, b"IHDR") else None
+
+
+def _same_image(one: Samples, other: Samples) -> bool:
+    if one.shape[2] != other.shape[2]:
+        one, other = _rgba(one), _rgba(other)
+    return one.dtype == other.dtype and np.array_equal(one, other)
+
+
+def _rgba(texels: Samples) -> Samples:
+    """Texels of integers, (h, w, 1 to 4), as red, green, blue and alpha."""
+    count = texels.shape[2]
+    top = np.iinfo(texels.dtype).max if texels.dtype.kind == "u" else 1
+    colour = texels[:, :, :3] if count > 2 else np.repeat(texels[:, :, :1], 3, axis=2)
+    alpha = texels[:, :, count - 1 :] if count in (2, 4) else np.full_like(colour[:, :, :1], top)
+    return np.concatenate([colour, alpha], axis=2)

@@ -3,22 +3,35 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells import Cells, SubdivideOptions, structural_triangles
-from ptmtools.database import ValidationReport, validate_database, validate_ptm
+from ptmtools.database import Issue, ValidationReport, validate_database, validate_ptm
 from ptmtools.errors import DatabaseError
 from ptmtools.pipeline.folder import DatabaseFolder
 from ptmtools.pipeline.run import Artifacts
+from ptmtools.pipeline.stagecheck import check_stages
 from ptmtools.progress import Progress, silent
+from ptmtools.texture.model import Limits
 from ptmtools.visibility import Pvs, SegmentReport, check_conservative
 
+_LIMITS = Limits()
 
-def validate(target: str | os.PathLike[str], progress: Progress = silent) -> ValidationReport:
+
+def validate(
+    target: str | os.PathLike[str],
+    progress: Progress = silent,
+    *,
+    limits: Limits = _LIMITS,
+    workers: int = 0,
+) -> ValidationReport:
     """Checks a database folder or a `.ptm` file; what is wrong stands in the report.
+
+    ``limits`` and ``workers`` as for `validate_database`.
 
     Raises
     ------
@@ -26,13 +39,16 @@ def validate(target: str | os.PathLike[str], progress: Progress = silent) -> Val
     InputError: PTM-I602 the file cannot be read.
     """
     if not Path(target).is_dir():
-        return validate_ptm(target)
+        return validate_ptm(target, limits=limits)
+    stages: tuple[Issue, ...] = ()
     try:
-        DatabaseFolder.open(target)
+        stages = check_stages(Path(target), DatabaseFolder.open(target).manifest)
     except DatabaseError as fault:
         if fault.code != "PTM-D002":  # a damaged manifest is a finding among others
             raise
-    return validate_database(target, progress)
+    report = validate_database(target, progress, limits=limits, workers=workers)
+    issues = sorted((*report.issues, *stages), key=lambda issue: (issue.file, issue.code))
+    return replace(report, issues=tuple(issues))
 
 
 def shoot_segments(

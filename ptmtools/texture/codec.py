@@ -1,10 +1,10 @@
-"""A whole `.ptm` in one call: `decode` and `check`, around `PtmReader`."""
+"""A whole `.ptm` in one call: `decode`, `check` and `examine`, around `PtmReader`."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ptmtools.errors import InputError
+from ptmtools.errors import InputError, LimitError
 from ptmtools.texture import reader
 from ptmtools.texture.container import whole_levels
 from ptmtools.texture.model import Limits
@@ -50,6 +50,18 @@ def check(data: bytes, limits: Limits = _LIMITS) -> list[str]:
 
     Also decodes every level, so that a group is found whose checksum is right and contents wrong.
     """
+    try:
+        return examine(data, limits)[0]
+    except LimitError as error:
+        return [str(error)]
+
+
+def examine(data: bytes, limits: Limits = _LIMITS) -> tuple[list[str], NDArray[Any] | None]:
+    """As `check`, and the finest level; None if something is wrong.
+
+    Raises LimitError, those of `ptmtools.texture.open` and `PtmReader.level`: nothing is wrong as
+    far as the checksums tell.
+    """
     problems: list[str] = []
     try:
         with reader.open(data, limits=limits) as ptm:
@@ -63,7 +75,9 @@ def check(data: bytes, limits: Limits = _LIMITS) -> list[str]:
             problems += ptm.wrong_checksums()
             if not problems:
                 ptm.description()
-                ptm.level()
+                return [], ptm.level()
+    except LimitError:
+        raise
     except InputError as error:
         problems.append(str(error))
-    return problems
+    return problems, None

@@ -131,15 +131,16 @@ def write_manifest(db: Path) -> None:
     }
     document = {
         "format": "ptmtools database",
-        "schema": 1,
+        "schema": 2,
         "model": "rooms.obj",
         "stages": {
             name: {
-                "software": "0",
+                "recipe": 1,
                 "parameters": {},
                 "inputs": {},
                 "outputs": outputs,
                 "counts": {},
+                "notes": [],
             }
             for name, outputs in stages.items()
         },
@@ -163,7 +164,7 @@ def put_textures() -> Callable[[Path], tuple[TextureRecord, ...]]:
     return write_textures
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def seal() -> Callable[[Path], None]:
     """``seal(db)`` writes the manifest of what lies there now, faults included."""
     return write_manifest

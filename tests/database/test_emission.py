@@ -14,17 +14,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ptmtools.database import EmitOptions, GivenViewpoint, TextureRecord, emit, validate_database
+from ptmtools.database import (
+    EmitOptions,
+    GivenViewpoint,
+    TextureLevel,
+    TextureRecord,
+    emit,
+    validate_database,
+)
 from ptmtools.database.names import DefNames
 from ptmtools.database.wrl import Node, parse
 from ptmtools.errors import DatabaseError, InputError, OutputError
 from ptmtools.scene.model import Material
 from ptmtools.visibility.model import Pvs
 
+ONE_LEVEL = (TextureLevel(1, 1, 0, 100, 3),)
+
 
 def records() -> tuple[TextureRecord, ...]:
     return tuple(
-        TextureRecord(i, f"textures/{n}.ptm", f"textures/{n}.png", 1, 1, 3, (), "0" * 64)
+        TextureRecord(i, f"textures/{n}.ptm", f"textures/{n}.png", 1, 1, 3, ONE_LEVEL, "0" * 64)
         for i, n in enumerate("ab")
     )
 

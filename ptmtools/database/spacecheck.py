@@ -1,0 +1,152 @@
+"""What the hints must satisfy in space: leaves, portals between them, and viewpoints inside."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.database.findings import Findings
+from ptmtools.database.solidcheck import (
+    Planes,
+    Points,
+    SolidError,
+    farthest,
+    polygon_area,
+    polygon_plane,
+    solid_planes,
+)
+from ptmtools.tolerance import TIE_SHARE, Tolerance
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class _Leaf:
+    """A leaf of the hints: its cell, its name in findings, (n, 3) points, planes if it is sound."""
+
+    cell: int
+    place: str
+    points: Points
+    planes: Planes | None
+
+
+def check_space(
+    cells: Sequence[Row], viewpoints: Sequence[Row], file: str, found: Findings
+) -> None:
+    """Checks `cells` and `viewpoints` of the hints, whose indices are in range."""
+    read = [
+        (i, f"cells[{i}].leaves[{k}]", leaf, np.array(leaf["points"], np.float64))
+        for i, cell in enumerate(cells)
+        for k, leaf in enumerate(cell["leaves"])
+    ]
+    tolerance = Tolerance.for_points(np.concatenate([points for *_, points in read]))
+    leaves: list[_Leaf] = []
+    for cell, place, leaf, points in read:
+        try:
+            planes = solid_planes(points, leaf["faces"], tolerance)
+        except SolidError as fault:
+            found.add("PTM-D709", file, place, str(fault))
+            planes = None
+        leaves.append(_Leaf(cell, place, points, planes))
+    _check_apart(leaves, tolerance, file, found)
+    bodies: list[list[Planes]] = [[] for _ in cells]
+    for each in leaves:
+        if each.planes is not None:
+            bodies[each.cell].append(each.planes)
+    _check_portals(cells, bodies, tolerance, file, found)
+    for i, view in enumerate(viewpoints):
+        inside = _inside(bodies[view["cell"]], np.array([view["position"]], np.float64), tolerance)
+        if bodies[view["cell"]] and not inside:
+            told = f"does not lie in cell {view['cell']}"
+            found.add("PTM-D706", file, f"viewpoints[{i}].position", told)
+
+
+def _check_apart(leaves: Sequence[_Leaf], tolerance: Tolerance, file: str, found: Findings) -> None:
+    """The middle of a leaf lies in no other leaf."""
+    middles = np.array([leaf.points.mean(axis=0) for leaf in leaves])
+    for k, leaf in enumerate(leaves):
+        if leaf.planes is None:
+            continue
+        low, high = leaf.points.min(axis=0), leaf.points.max(axis=0)
+        near = np.flatnonzero(((middles > low) & (middles < high)).all(axis=1))
+        within = near[farthest(leaf.planes, middles[near]) < -tolerance.rounding]
+        for other in within[within != k].tolist():
+            found.add("PTM-D709", file, leaves[other].place, f"lies in {leaf.place}")
+
+
+def _check_portals(
+    cells: Sequence[Row],
+    bodies: Sequence[Sequence[Planes]],
+    tolerance: Tolerance,
+    file: str,
+    found: Findings,
+) -> None:
+    openings: list[Counter[tuple[Any, ...]]] = [Counter() for _ in cells]
+    for i, cell in enumerate(cells):
+        to = {portal["neighbour"] for portal in cell["portals"]}
+        if to != set(cell["adjacent"]):
+            told = "they lead to other cells than the adjacent"
+            found.add("PTM-D705", file, f"cells[{i}].portals", told)
+        for k, portal in enumerate(cell["portals"]):
+            polygon = tuple(map(tuple, portal["polygon"]))
+            openings[i][(portal["neighbour"], polygon, portal["area"])] += 1
+            place = f"cells[{i}].portals[{k}]"
+            # The other half of the portals is the same turned round.
+            if i < portal["neighbour"] and (
+                fault := _misplaced(portal, bodies[i], bodies[portal["neighbour"]], tolerance)
+            ):
+                found.add("PTM-D705", file, place, fault)
+    for i, of_cell in enumerate(openings):
+        for (neighbour, polygon, area), count in of_cell.items():
+            if openings[neighbour][(i, polygon[::-1], area)] != count:
+                told = f"a portal to cell {neighbour} does not stand there, turned round"
+                found.add("PTM-D705", file, f"cells[{i}].portals", told)
+
+
+def _misplaced(
+    portal: Row, here: Sequence[Planes], beyond: Sequence[Planes], tolerance: Tolerance
+) -> str:
+    """What is wrong with a portal from a cell to another, given by their leaves; or ""."""
+    polygon = np.array(portal["polygon"], np.float64)
+    try:
+        plane = polygon_plane(polygon, tolerance)
+    except SolidError as fault:
+        return str(fault)
+    slack = tolerance.plane * tolerance.extent
+    if not portal["area"] <= polygon_area(polygon) * (1 + TIE_SHARE) + slack:
+        return "is said to be open for more than its polygon"
+    for bodies, inwards, whose in ((here, 1.0, "this cell"), (beyond, -1.0, "its neighbour")):
+        if not bodies:  # no leaf of it is sound, which is told
+            continue
+        if not any(_in_face(planes, polygon, plane, inwards, tolerance) for planes in bodies):
+            return (
+                f"does not lie in a face of {whose}, counter-clockwise seen from inside the first"
+            )
+    return ""
+
+
+def _in_face(
+    planes: Planes,
+    polygon: Points,
+    plane: NDArray[np.float64] | None,
+    inwards: float,
+    tolerance: Tolerance,
+) -> bool:
+    """Whether a polygon lies in a face of a body, its normal times ``inwards`` into the body. Of a
+    sliver it is enough that it lies in the body: the face may be one, too."""
+    if not farthest(planes, polygon).max() <= tolerance.plane:
+        return False
+    if plane is None:
+        return True
+    distance = np.abs(polygon @ planes[:, :3].T + planes[:, 3]).max(axis=0)
+    turned = planes[:, :3] @ plane[:3] * inwards <= -tolerance.cosine
+    return bool((turned & (distance <= tolerance.plane)).any())
+
+
+def _inside(bodies: Sequence[Planes], points: Points, tolerance: Tolerance) -> bool:
+    return any((farthest(planes, points) <= tolerance.plane).all() for planes in bodies)
