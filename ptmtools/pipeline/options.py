@@ -21,10 +21,12 @@ class TextureOptions(EncodeOptions):
     fallback: write a PNG twin of each texture, for clients that cannot read `.ptm`.
     fallback_size: the twin holds the finest level whose longer side is at most this, texels, or the
         coarsest if none is: a browser that knows no `.ptm` loads all of them. 0 is the finest.
+    limit: as in `IngestOptions`.
     """
 
     fallback: bool = True
     fallback_size: int = 0
+    limit: int = field(default=1024, compare=False)
 
 
 @dataclass(frozen=True)

@@ -59,23 +59,25 @@ def put_scene(
     why = reasons(before, work, run.db)
     if before is not None and not why:
         return before, ()
-    if before is not None and (record := _repainted(run, transaction, model, before, work)):
+    if before is not None and (
+        record := _repainted(run, transaction, model, options, before, work)
+    ):
         return record, why
     return _read(run, transaction, model, options, workers), why
 
 
-def check_images(images: Iterable[SourceImage], workers: int) -> None:
+def check_images(images: Iterable[SourceImage], options: IngestOptions, workers: int) -> None:
     """Raises what `read_image` raises for an image that cannot be stored exactly."""
     with ThreadPoolExecutor(workers) as pool:
-        for _ in pool.map(_check_image, images):
+        for _ in pool.map(lambda image: _check_image(image, options), images):
             pass
 
 
-def _check_image(image: SourceImage) -> None:
-    from ptmtools.texture import read_image
+def _check_image(image: SourceImage, options: IngestOptions) -> None:
+    from ptmtools.texture import Limits, read_image
 
     with naming(image.name):
-        read_image(image.load())
+        read_image(image.load(), Limits(options.limit << 20))
 
 
 def _read(
@@ -84,7 +86,7 @@ def _read(
     from ptmtools.scene import ingest
 
     scene = ingest(model, options, run.progress, workers=workers)
-    check_images(scene.images, workers)
+    check_images(scene.images, options, workers)
     run.hold("scene", scene)
     run.hold_images(scene.images)
     transaction.put_arrays("scene", scene.to_arrays())
@@ -123,12 +125,17 @@ def repainted(
 
 
 def _repainted(
-    run: Run, transaction: Transaction, model: Path, before: StageRecord, work: StageRecord
+    run: Run,
+    transaction: Transaction,
+    model: Path,
+    options: IngestOptions,
+    before: StageRecord,
+    work: StageRecord,
 ) -> StageRecord | None:
     """The record of a scene of which nothing but plain images has changed; None if it has."""
     from ptmtools.scene.images import is_plain
     from ptmtools.scene.model import SourceImage
-    from ptmtools.scene.source import HeldBytes
+    from ptmtools.scene.source import FileRange, HeldBytes
 
     try:
         rows = image_rows(run.db.read_output("scene", IMAGE_LIST))
@@ -140,10 +147,11 @@ def _repainted(
     fresh: dict[int, SourceImage] = {}
     for i, name in changed.items():
         try:
-            data = (model.parent / name).read_bytes()
+            data = FileRange(model.parent / name)()
         except OSError:
             return None
-        if sha256(data) != work.inputs[name] or not is_plain(data, rows[i]["name"]):
+        limit = options.limit << 20
+        if sha256(data) != work.inputs[name] or not is_plain(data, rows[i]["name"], limit):
             return None
         held = HeldBytes(data)
         fresh[i] = SourceImage(rows[i]["name"], work.inputs[name], held, (name,), True)
@@ -152,7 +160,7 @@ def _repainted(
         return None
     run.hold_images([fresh.get(i, image) for i, image in enumerate(run.images)])
     for image in fresh.values():
-        _check_image(image)
+        _check_image(image, options)
         transaction.put(f"{IMAGES}/{image.sha256}", image.load())
     transaction.put(IMAGE_LIST, image_list([_row(image) for image in run.images]))
     return replace(work, outputs=transaction.pending(), counts=before.counts, notes=before.notes)

@@ -179,19 +179,20 @@ def encoded_image(options: TextureOptions, image: tuple[str, bytes]) -> list[byt
 
     Raises what `encode` and `read_image` raise.
     """
-    from ptmtools.texture import decode, encode, read_header, read_image
+    from ptmtools.texture import Limits, decode, encode, read_header, read_image
     from ptmtools.texture.images import png_bytes
 
     name, source = image
     with naming(name):
-        texels = read_image(source)
+        texels = read_image(source, Limits(options.limit << 20))
         data = encode(texels, options)
     if not options.fallback:
         return [data]
     header = read_header(data)
     level = fallback_level(header, options.fallback_size)
     if level < len(header.levels) - 1 or options.max_error or header.trimmed:
-        twin = png_bytes(decode(data, level=level))
+        # Decoding takes more than the image, which is within the limit.
+        twin = png_bytes(decode(data, level=level, limits=Limits(64 * texels.nbytes + (1 << 20))))
     elif source.startswith(PNG_MAGIC):
         twin = bare_png(source)
     else:

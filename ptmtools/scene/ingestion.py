@@ -68,17 +68,23 @@ def ingest(
     ------
     InputError: the file is absent, empty, damaged, of an unknown kind, or has no usable face;
         with ``strict`` also for anything that it asks for and does not get.
-    LimitError: more vertices than int32 can number, or a size that cannot be right.
+    LimitError: PTM-L200 more vertices than int32 can number, PTM-L201 a size that cannot be right,
+        PTM-L202 and PTM-L204 a line or a library of materials that is too long, PTM-L203 more
+        triangles and PTM-L104 an image of more texels than ``options`` allow, PTM-L106.
     MissingComponentError: a format needs a library that is not installed.
     """
     model = Path(path)
     metres = None if options.unit is None else spaces.parse_unit(options.unit)
     if options.up not in (None, "y", "z"):
         raise InputError("PTM-I251", f"up axis {options.up!r} is not known", remedy="give y or z")
+    if options.limit < 1 or options.max_triangles < 1:
+        raise InputError(
+            "PTM-I257", "a limit is below 1", remedy="give --limit and --max-triangles of 1 or more"
+        )
     check_file(model)
     findings = Findings(model)
     folder = Folder(model.absolute().parent, options.allow_outside)
-    source = _read(model, folder, findings, progress)
+    source = _read(model, folder, findings, progress, options.max_triangles)
     if len(source.points) > MAX_VERTICES or len(source.triangles) > MAX_VERTICES:
         raise LimitError("PTM-L200", f"more than {MAX_VERTICES} vertices or faces", file=model)
 
@@ -105,13 +111,15 @@ def ingest(
 
     used_material, triangle_material = _in_use(source.triangle_material[kept.source])
     used_object, triangle_object = _in_use(source.triangle_object[kept.source])
-    store = ImageStore(findings, folder)
+    store = ImageStore(findings, folder, options.limit << 20)
     given = [source.materials[index].texture for index in used_material.tolist()]
     store.examine((texture for texture in given if texture is not None), workers, progress)
     materials = []
+    grouped = np.argsort(triangle_material, kind="stable")
+    ends = np.cumsum(np.bincount(triangle_material))
     for done, index in enumerate(used_material.tolist()):
         progress(done, len(used_material), "materials")
-        faces = triangle_material == done
+        faces = grouped[ends[done - 1] if done else 0 : ends[done]]
         materials.append(_material(source, index, uv, faces, store, findings))
     progress(len(used_material), len(used_material), "materials")
     if options.strict:
@@ -153,20 +161,22 @@ def check_file(model: Path) -> None:
         raise InputError("PTM-I240", f"no such file ({error})", file=model) from None
 
 
-def _read(model: Path, folder: Folder, findings: Findings, progress: Progress) -> Source:
+def _read(
+    model: Path, folder: Folder, findings: Findings, progress: Progress, max_triangles: int
+) -> Source:
     suffix = model.suffix.lower()
     try:
         if suffix == ".obj":
             from ptmtools.scene.obj import read_obj
 
-            return read_obj(model, folder, findings, progress)
+            return read_obj(model, folder, findings, progress, max_triangles)
         if suffix in (".glb", ".gltf"):
             from ptmtools.scene.gltf import read_gltf
 
-            return read_gltf(model, folder, findings)
+            return read_gltf(model, folder, findings, max_triangles)
         from ptmtools.scene.formats import read_other
 
-        return read_other(model, folder, findings)
+        return read_other(model, folder, findings, max_triangles)
     except OSError as error:
         raise InputError(
             "PTM-I256", error.strerror or str(error), file=error.filename or model
@@ -281,11 +291,11 @@ def _material(
     source: Source,
     index: int,
     uv: NDArray[np.float64],
-    faces: NDArray[np.bool_],
+    faces: NDArray[np.int64],
     store: ImageStore,
     findings: Findings,
 ) -> Material:
-    """The material as its kept ``faces`` (T,) need it."""
+    """The material as its kept ``faces``, by number, need it."""
     given = source.materials[index]
     texture = given.texture
     image = -1

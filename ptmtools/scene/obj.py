@@ -132,10 +132,12 @@ def read_obj(
     face_material = np.frombuffer(said.face_material, dtype=np.int64)
     materials, maps = _materials(path, said, folder, findings, np.unique(face_material))
     triangle_material = face_material[cut.polygon]
+    grouped = np.argsort(triangle_material, kind="stable")
+    ends = np.cumsum(np.bincount(triangle_material, minlength=len(materials)))
     for index, statement in maps.items():
-        which = triangle_material == index
+        which = grouped[ends[index - 1] if index else 0 : ends[index]]
         uv[which] = uv[which] * statement.scale + statement.offset
-        bare = np.unique(cut.polygon[which & (coord < 0).any(axis=1)])
+        bare = np.unique(cut.polygon[which[(coord[which] < 0).any(axis=1)]])
         if len(bare):
             findings.say(
                 "PTM-N229",
@@ -173,16 +175,16 @@ def _logical_lines(stream: TextIO, path: Path) -> Iterator[tuple[int, str]]:
     number = 0
     while line := stream.readline(LONGEST_LINE + 1):
         number += 1
-        first = number
+        first, length = number, len(line)
         if line.endswith("\\\n"):
-            parts, length = [line[:-2]], len(line)
+            parts = [line[:-2]]
             while line.endswith("\\\n") and length <= LONGEST_LINE:
                 number += 1
                 line = stream.readline(LONGEST_LINE + 1)
                 parts.append(line[:-2] if line.endswith("\\\n") else line)
                 length += len(line)
             line = " ".join(parts)
-        if len(line) > LONGEST_LINE:
+        if length > LONGEST_LINE:
             raise LimitError(
                 "PTM-L202",
                 f"is longer than {LONGEST_LINE} characters",

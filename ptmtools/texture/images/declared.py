@@ -33,7 +33,11 @@ _BARE = (0xD8, 0x01)
 
 def check_file(file: BinaryIO, limits: Limits) -> None:
     """Raise LimitError PTM-L104 for a file larger than one of as many texels as are allowed."""
-    size = file.seek(0, 2)
+    check_bytes(file.seek(0, 2), limits)
+
+
+def check_bytes(size: int, limits: Limits) -> None:
+    """As `check_file`, for a file of ``size`` bytes."""
     if size > _BYTES * limits.decoded_bytes + _BYTES_BESIDES:
         raise LimitError(
             "PTM-L104",

@@ -65,14 +65,16 @@ def load_image(source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS)
         return _load(file, None if isinstance(file, io.BytesIO) else path, limits)
 
 
-def read_image(source: str | os.PathLike[str] | bytes) -> NDArray[np.uint8]:
+def read_image(
+    source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS
+) -> NDArray[np.uint8]:
     """An image file of 8 bits a component as (h, w, c) uint8, rows from the top.
 
     As `load_image`, for those who have a use for nothing else.
 
     Raises what `load_image` raises; InputError PTM-I126 also for deeper samples.
     """
-    picture = load_image(source)
+    picture = load_image(source, limits)
     with naming(None if isinstance(source, bytes) else source):
         if picture.texels.dtype.name != "uint8":
             raise InputError(
