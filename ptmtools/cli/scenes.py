@@ -56,7 +56,7 @@ viewpoints = click.option(
 @options_of(SubdivideOptions, omit=["viewpoints"])
 @options_of(PvsOptions, omit=["workers"])
 @options_of(AchOptions, omit=["workers"])
-@options_of(TextureOptions)
+@options_of(TextureOptions, omit=["limit"])
 @options_of(EmitOptions, omit=["viewpoints", "fallback"])
 @viewpoints
 @workers
@@ -72,7 +72,7 @@ def build_scene(
     build is computed again.
     """
     options = BuildOptions(
-        ingest=take(IngestOptions, values),
+        ingest=take(IngestOptions, values, share=["limit"]),
         subdivide=take(SubdivideOptions, values, viewpoints=_positions(viewpoints)),
         pvs=take(PvsOptions, values, omit=["workers"]),
         ach=take(AchOptions, values, omit=["workers"]),
