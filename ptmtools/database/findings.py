@@ -62,6 +62,16 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D713": ("warning", "a file is too large to be checked beyond its checksums"),
     "PTM-D720": ("error", "the arrays of a stage cannot be read"),
     "PTM-D721": ("error", "the arrays of the stages do not belong together"),
+    "PTM-D730": ("error", "the GLBs are not those of the cells, or gltf/hints.json is missing"),
+    "PTM-D731": ("error", "a GLB is damaged: its header, its chunks or its JSON"),
+    "PTM-D732": ("error", "a GLB is not in the emission pattern"),
+    "PTM-D733": ("error", "an accessor of a GLB leads out of its bytes, or is misaligned"),
+    "PTM-D734": ("error", "an index of a GLB is out of range, or they are no list of triangles"),
+    "PTM-D735": ("error", "a number in a GLB is not finite, or bounds are not those of the data"),
+    "PTM-D736": ("error", "a GLB and hints.json disagree about a texture"),
+    "PTM-D737": ("error", "gltf/hints.json and hints.json disagree"),
+    "PTM-D738": ("error", "a GLB and its cell's VRML file have different triangles"),
+    "PTM-D739": ("error", "a material of a GLB is not that of its shape in the VRML file"),
 }
 
 
