@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.numerals import numeral
-
 _FLOAT, _SHORT, _INT = 5126, 5123, 5125
 _VERTICES, _INDICES = 34962, 34963
 #: Narrow indices end before 65535, which restarts a primitive.
@@ -100,5 +98,5 @@ class BufferWriter:
 
 def _numbers(values: NDArray[np.float32]) -> list[float]:
     """As the shortest decimals that read back to the same float32."""
-    shortest = [float(numeral(v)) for v in values]
+    shortest = [float(str(v)) for v in values]
     return [int(v) if v.is_integer() and abs(v) < _WHOLE else v for v in shortest]

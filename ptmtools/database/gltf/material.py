@@ -21,6 +21,7 @@ find no base colour texture to put their own in, and alpha still needs one.)
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 from urllib.parse import quote
 
@@ -28,7 +29,6 @@ import numpy as np
 
 from ptmtools.database.gltf.names import UP
 from ptmtools.database.model import TextureRecord
-from ptmtools.database.numerals import numeral
 from ptmtools.scene.model import Material, Wrap
 
 #: A sampler's number for each way to go on beyond [0, 1]; the first is the default.
@@ -36,11 +36,12 @@ WRAPS: dict[Wrap, int] = {"repeat": 10497, "clamp": 33071}
 WHITE = [1.0, 1.0, 1.0, 1.0]
 
 
+@lru_cache(maxsize=4096)
 def linear(color: float) -> float:
     """A component encoded as sRGB (IEC 61966-2-1) as linear light, single precision."""
     held = min(max(color, 0.0), 1.0)
     light = held / 12.92 if held <= 0.04045 else ((held + 0.055) / 1.055) ** 2.4
-    return float(numeral(np.float32(light)))
+    return float(str(np.float32(light)))
 
 
 class MaterialWriter:
@@ -84,7 +85,7 @@ class MaterialWriter:
 
     def _material(self, material: Material, two_sided: bool) -> dict[str, Any]:
         alpha = min(max(material.opacity, 0.0), 1.0)
-        factor = [*map(linear, material.color), float(numeral(alpha))]
+        factor = [*map(linear, material.color), float(str(np.float32(alpha)))]
         surface: dict[str, Any] = {} if factor == WHITE else {"baseColorFactor": factor}
         extras: dict[str, Any] = {}
         blends = alpha < 1
