@@ -176,6 +176,7 @@ def _closing(run: Run, start: float) -> BuildReport:
         stages=run.reports,
         seconds=time.perf_counter() - start,
         peak_memory=peak_memory(),
+        peak_memory_of_workers=peak_memory(of_workers=True),
     )
 
 

@@ -45,6 +45,8 @@ class BuildReport:
     stages: in their order.
     seconds: of all together.
     peak_memory: bytes, the most that this process ever held; 0 where the system does not tell.
+    peak_memory_of_workers: bytes, the most that any process held that this one started and that
+        has ended; 0 if there was none.
     """
 
     model: str
@@ -52,6 +54,7 @@ class BuildReport:
     stages: tuple[StageReport, ...]
     seconds: float
     peak_memory: int
+    peak_memory_of_workers: int = 0
 
     def counts(self, stage: str) -> Mapping[str, Any]:
         """The figures of a stage; empty if it was no part of this run."""
@@ -63,11 +66,13 @@ class BuildReport:
         return tuple(note for stage in self.stages for note in stage.notes)
 
 
-def peak_memory() -> int:
-    """Most bytes that this process has held at once; 0 where the system does not tell."""
+def peak_memory(*, of_workers: bool = False) -> int:
+    """Most bytes that this process has held at once, or one of those that it started and that have
+    ended; 0 where the system does not tell."""
     try:
         import resource
     except ImportError:
         return 0
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    who = resource.RUSAGE_CHILDREN if of_workers else resource.RUSAGE_SELF
+    peak = resource.getrusage(who).ru_maxrss
     return peak if sys.platform == "darwin" else peak * 1024

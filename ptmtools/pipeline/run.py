@@ -81,7 +81,7 @@ class Artifacts:
 
     @property
     def scene(self) -> Scene:
-        """Raises PTM-D004 to PTM-D006, as do the others."""
+        """Raises PTM-D004 to PTM-D006, as do the others: also where they do not fit together."""
         from ptmtools.scene.model import Scene
 
         return self._artifact("scene", lambda arrays: Scene.from_arrays(arrays, self.images))
@@ -116,9 +116,28 @@ class Artifacts:
         if stage not in self._held:
             arrays = self.db.read_arrays(stage, "this command")
             with self._reading(arrays_of(stage)):
-                self._held[stage] = build(arrays)
+                made = build(arrays)
+                self._fit({**self._held, stage: made})
+            self._held[stage] = made
         result: T = self._held[stage]
         return result
+
+    @staticmethod
+    def _fit(held: Mapping[str, Any]) -> None:
+        """Raises ValueError if one artifact counts what another has not."""
+        scene, cells, pvs, ach = (held.get(name) for name in ("scene", "cells", "pvs", "ach"))
+        if scene and cells and (cells.triangle_source >= len(scene.triangles)).any():
+            raise ValueError("a piece is of no triangle of the scene")
+        if cells and pvs and cells.cell_count != pvs.cell_count:
+            raise ValueError("the sets are of other cells")
+        if (
+            pvs
+            and ach
+            and not (len(pvs.start) == len(ach.start) and (pvs.start == ach.start).all())
+        ):
+            raise ValueError("the hints are of other sets")
+        if scene and ach and (ach.texture >= len(scene.images)).any():
+            raise ValueError("a share is of no image")
 
     def _reading(self, name: str) -> _Reading:
         return _Reading(self.db, name)

@@ -16,7 +16,6 @@ Nothing is removed but what a manifest of ours lists, and `.ptm-new/` itself. No
 from __future__ import annotations
 
 import json
-import os
 import shutil
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
