@@ -7,13 +7,15 @@ Changes go to all workers at once. What a lost worker was doing, others do again
 
 from __future__ import annotations
 
-import asyncio
+import logging
 import pickle
+import socket
 import time
 import uuid
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -21,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import MissingComponentError, WorkerError
-from ptmtools.executors.cluster_worker import Behind, Work, check, forget, perform, receive
+from ptmtools.executors.cluster_worker import Behind, Work, check_in, forget, perform, receive
 from ptmtools.executors.model import AHEAD, Executor
 from ptmtools.executors.order import chunks, in_order
 from ptmtools.executors.outcome import Outcome
@@ -37,9 +39,11 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 #: Seconds to wait for the scheduler, and then for its first worker.
-PATIENCE = 10
+PATIENCE = 15
 #: Seconds after which the workers are counted again.
 COUNTED_FOR = 5
+#: How often what was under way is handed out again after all workers that had the data were lost.
+AGAIN = 3
 #: Bytes of a call above which it does not pass through the scheduler.
 LARGE = 1 << 20
 
@@ -62,7 +66,7 @@ class Cluster(Executor):
         self._counted, self._threads = -np.inf, 0
         self._last: tuple[bytes, Future[NDArray[np.uint8]]] | None = None
         try:
-            self._wait_for_workers()
+            self.wait_for_workers()
             self._check_software()
         except BaseException:
             self.close()
@@ -98,7 +102,7 @@ class Cluster(Executor):
         if self._last is None or self._last[0] != digest:
             self._last = None
             # Never under a name that there was: it might just be being forgotten.
-            name = f"ptmtools-{uuid.uuid4().hex}"
+            name = _name()
             self._last = digest, self._client.scatter({name: block}, broadcast=True)[name]
         return self._last[1]
 
@@ -109,22 +113,27 @@ class Cluster(Executor):
 
         try:
             yield
-        except KilledWorker as fault:
-            raise WorkerError(
-                "PTM-W004",
-                "workers ended in the middle of a task, one after the other",
-                file=self.address,
-                remedy="if they were killed for want of memory, start fewer on each machine",
-            ) from fault
-        except (OSError, CancelledError, asyncio.CancelledError, TimeoutError) as fault:
+        except (KilledWorker, CancelledError, OSError, TimeoutError) as fault:
+            if isinstance(fault, KilledWorker) or self._client.status == "running":
+                raise WorkerError(
+                    "PTM-W004",
+                    "workers ended in the middle of their work, again and again",
+                    file=self.address,
+                    remedy="if they were killed for want of memory, start fewer on each machine",
+                ) from fault
             raise WorkerError(
                 "PTM-W001",
-                "the scheduler, or every worker that had the data, was lost",
+                "the scheduler was lost",
                 file=self.address,
                 remedy="start it again and run the same command, which resumes",
             ) from fault
 
-    def _wait_for_workers(self) -> None:
+    def forget_last(self) -> None:
+        """Ships the last value again, if it is asked for."""
+        self._last = None
+
+    def wait_for_workers(self) -> None:
+        """Raises WorkerError PTM-W002 if none come."""
         if not self._client.nthreads():
             announce(f"waiting for workers of {self.address}")
         try:
@@ -138,7 +147,7 @@ class Cluster(Executor):
             ) from fault
 
     def _check_software(self) -> None:
-        told = self._client.run(check, software(), on_error="return")
+        told = self._client.run(check_in, software(), on_error="return")
         for worker, fault in sorted(told.items()):
             if isinstance(fault, WorkerError):
                 raise fault
@@ -157,9 +166,10 @@ class _OnCluster(Generic[S]):
     def __init__(self, cluster: Cluster, client: Client, shared: S, *, alone: bool) -> None:
         self._cluster, self._client = cluster, client
         self._shared, self._alone = shared, alone
-        self._name = f"ptmtools-{uuid.uuid4().hex}"
+        self._name = _name()
         self._there: Future[NDArray[np.uint8]] | None = None
         self._changes: list[bytes] = []
+        self._again = 0
         self.under_way: list[_Pending] = []
 
     def each(
@@ -218,27 +228,45 @@ class _OnCluster(Generic[S]):
         from distributed import wait
 
         with self._cluster.naming_losses():
-            with self._client.as_current():
-                wait([wanted.future])
-            if wanted.future.status != "finished":
-                wanted.future.result()  # raises what went wrong
-            done = [p for p in self.under_way if p.future.status == "finished"]
-            found = self._client.gather([p.future for p in done], direct=True)
+            try:
+                with self._client.as_current():
+                    wait([wanted.future])
+                if wanted.future.status != "finished":
+                    wanted.future.result()  # raises what went wrong
+                done = [p for p in self.under_way if p.future.status == "finished"]
+                found = self._client.gather([p.future for p in done], direct=True)
+            except CancelledError:
+                if self._again == AGAIN:
+                    raise
+                self._hand_out_again()
+                return
         for pending, came in zip(done, found, strict=True):
             self.under_way.remove(pending)
             pending.came = came
+
+    def _hand_out_again(self) -> None:
+        """All workers that had the shared value are lost: brings it to those that there are now."""
+        self._again += 1
+        self._cluster.wait_for_workers()
+        self._cluster.forget_last()
+        self._there = None
+        # The caller's own is as changed as it is for all that is under way.
+        self._name, self._changes = _name(), []
+        for pending in self.under_way:
+            pending.work = replace(pending.work, sharing=self._name, version=0)
+            pending.future = self.submit(pending.work)
 
 
 class _Pending:
     """See `order.Pending`: some tasks on their way."""
 
     def __init__(self, sharing: _OnCluster[Any], work: Work) -> None:
-        self._sharing, self._work = sharing, work
+        self._sharing, self.work = sharing, work
         self.came: Outcome | Behind | None = None
         self._submit()
 
     def _submit(self) -> None:
-        self.future = self._sharing.submit(self._work)
+        self.future = self._sharing.submit(self.work)
         self._sharing.under_way.append(self)
 
     def result(self) -> Outcome:
@@ -253,26 +281,52 @@ class _Pending:
                 self._submit()
 
     def cancel(self) -> None:
-        if self.came is None:
+        if self in self._sharing.under_way:
             self._sharing.under_way.remove(self)
-        with suppress(Exception):  # of a lost cluster
-            self.future.cancel()
+        self.future.release()  # nobody wants it now, so the scheduler drops it
+
+
+def _name() -> str:
+    """One that there has never been."""
+    return f"ptmtools-{uuid.uuid4().hex}"
 
 
 def _connected(address: str) -> Client:
     """Raises MissingComponentError PTM-M700, WorkerError PTM-W001."""
     try:
         from distributed import Client
+        from distributed.comm import get_address_host_port
     except ImportError as fault:
         raise MissingComponentError(
             "PTM-M700", "a cluster needs Dask", remedy="pip install 'ptmtools[cluster]'"
         ) from fault
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # it is raised below
     try:
+        host, port = get_address_host_port(address)
+        _wait_for_answer(host, port)
         return Client(address, timeout=PATIENCE, set_as_default=False, name="ptmtools")
     except (OSError, ValueError) as fault:
         raise WorkerError(
             "PTM-W001",
             "no scheduler answers",
             file=address,
-            remedy="start one: dask scheduler; its address is such as tcp://10.0.0.1:8786",
+            remedy="start one with `dask scheduler`, and give the address that it prints, such as "
+            "tcp://10.0.0.1:8786",
         ) from fault
+
+
+def _wait_for_answer(host: str, port: int) -> None:
+    """Waits until somebody listens: the scheduler may be starting beside us. (Dask's client, asked
+    in vain, complains once more much later, when it is collected.) Raises OSError."""
+    began, told = time.monotonic(), False
+    while True:
+        try:
+            socket.create_connection((host, port), timeout=PATIENCE).close()
+            return
+        except OSError:
+            if time.monotonic() - began > PATIENCE:
+                raise
+        if not told:
+            announce(f"waiting for the scheduler at {host}:{port}")
+            told = True
+        time.sleep(0.5)

@@ -11,6 +11,7 @@ import threading
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +69,7 @@ def perform(block: NDArray[np.uint8], work: Work) -> Outcome | Behind:
 
     Raises WorkerError PTM-W003 where the software is another.
     """
-    check(work.software)
+    check(work.software, _address())
     with _lock:
         if work.sharing not in _copies:
             _copies[work.sharing] = _Copy(block)
@@ -99,7 +100,7 @@ def forget(sharing: str) -> None:
     _changes.pop(sharing, None)
 
 
-def check(theirs: tuple[str, ...]) -> None:
+def check(theirs: tuple[str, ...], here: str) -> None:
     """Raises WorkerError PTM-W003 unless this process computes with the same as the asking one."""
     ours = software()
     for one, other in zip(theirs, ours, strict=False):
@@ -107,9 +108,14 @@ def check(theirs: tuple[str, ...]) -> None:
             raise WorkerError(
                 "PTM-W003",
                 f"the worker has {other}, this process {one}",
-                file=_address(),
+                file=here,
                 remedy="install the same software on all machines",
             )
+
+
+def check_in(theirs: tuple[str, ...], dask_worker: Any) -> None:
+    """`check`, to be run by Dask outside any task."""
+    check(theirs, dask_worker.address)
 
 
 def _address() -> str:

@@ -1,0 +1,100 @@
+"""Functions that worker processes can import."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+import uuid
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ptmtools.errors import InputError
+
+
+def slower_at_first(delay: float, i: int) -> int:
+    """Finishes in another order than it begins."""
+    time.sleep(delay if i % 4 == 0 else 0)
+    return i * i
+
+
+def at(array: np.ndarray, i: int) -> float:
+    return float(array[i])
+
+
+def add(array: np.ndarray, change: tuple[int, float]) -> None:
+    i, more = change
+    array[i] += more
+
+
+def spoil(array: np.ndarray, _: int) -> int:
+    """Against the contract: to see whose array it is."""
+    array[:] = -1
+    return os.getpid()
+
+
+def refuse(bad: int, i: int) -> int:
+    if i == bad:
+        raise InputError("PTM-I999", f"no {i}", file="a.png", place="byte 7", remedy="take another")
+    return i
+
+
+class OddError(Exception):
+    """Cannot be built again from its arguments."""
+
+    def __init__(self, one: int, other: int) -> None:
+        super().__init__(f"{one} and {other}")
+
+
+def fail_oddly(_: Any, i: int) -> None:
+    raise OddError(i, i)
+
+
+class Marked:
+    """A value that leaves a file for every time that it is unpickled."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.array = np.arange(10_000.0)
+        self.kept: list[int] = []
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        (self.folder / uuid.uuid4().hex).touch()
+
+
+def keep(marked: Marked, i: int) -> tuple[int, int]:
+    """(process, how many tasks the one object has met there)."""
+    marked.kept.append(i)
+    time.sleep(0.02)
+    return os.getpid(), len(marked.kept)
+
+
+def alone(folder: Path, i: int) -> bool:
+    """Whether no other call runs in this process."""
+    mine = folder / str(os.getpid())
+    try:
+        mine.mkdir()
+    except FileExistsError:
+        return False
+    time.sleep(0.02)
+    mine.rmdir()
+    return True
+
+
+def die(where: int, i: int) -> int:
+    if i == where:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return i
+
+
+def note_and_sleep(folder: Path, seconds: float) -> None:
+    (folder / str(os.getpid())).touch()
+    time.sleep(seconds)
+
+
+def process(_: Any, i: int) -> int:
+    time.sleep(0.02)
+    return os.getpid()

@@ -1,0 +1,74 @@
+"""A cluster that is not there, not right, or dying."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import sys
+
+import executor_tasks as tasks
+import numpy as np
+import pytest
+
+from ptmtools.errors import MissingComponentError, WorkerError
+from ptmtools.executors import cluster as module
+from ptmtools.executors import open_executor
+from ptmtools.executors.software import software
+
+
+def test_without_dask(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(MissingComponentError, match=r"pip install 'ptmtools\[cluster\]'.*PTM-M700"):
+        open_executor(scheduler="tcp://127.0.0.1:1")
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "tcp://", "ftp://x:1", ""])
+def test_without_a_scheduler(address, monkeypatch):
+    monkeypatch.setattr(module, "PATIENCE", 0.1)
+    with pytest.raises(WorkerError, match=r"no scheduler answers.*PTM-W001"):
+        open_executor(scheduler=address)
+
+
+def test_limits(scheduler):
+    with open_executor(scheduler=scheduler) as all_, open_executor(3, scheduler) as three:
+        assert (all_.workers, three.workers) == (4, 3)
+
+
+def test_workers_with_other_software(scheduler, cluster, monkeypatch):
+    ours = software()
+    monkeypatch.setattr(module, "software", lambda: ("ptmtools 0.0.1", *ours[1:]))
+    with pytest.raises(WorkerError, match=r"has ptmtools .*, this process ptmtools 0\.0\.1.*W003"):
+        open_executor(scheduler=scheduler)
+    with pytest.raises(WorkerError, match="PTM-W003"):  # one that joined since
+        list(cluster.each(tasks.refuse, 0, [1]))
+
+
+def test_dying_workers(require, monkeypatch):
+    """One worker, then both: others do the tasks again, with all that has changed."""
+    from distributed import LocalCluster
+
+    monkeypatch.setattr(module, "PATIENCE", 0.5)
+    settings = {"host": "127.0.0.1", "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
+    with LocalCluster(n_workers=0, **settings) as machines:
+        with pytest.raises(WorkerError, match="PTM-W002"):
+            open_executor(scheduler=machines.scheduler_address)
+        monkeypatch.undo()
+        machines.scale(2)
+        machines.wait_for_workers(2)
+        array = np.zeros(5000)
+        with (
+            open_executor(scheduler=machines.scheduler_address) as executor,
+            executor.sharing(array) as shared,
+        ):
+            processes = set(shared.each(tasks.process, range(20)))
+            for victims in (1, 2):
+                shared.change(tasks.add, (7, 1.0))
+                found = shared.each(tasks.at, [7] * 40)
+                assert next(found) == victims
+                for process in list(processes)[:victims]:
+                    os.kill(process, signal.SIGKILL)
+                assert list(found) == [victims] * 39
+                processes = set(executor.each(tasks.process, None, range(20)))
+            with pytest.raises(WorkerError, match="PTM-W004"):
+                list(executor.each(tasks.die, 1, [0, 1]))

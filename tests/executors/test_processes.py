@@ -1,0 +1,131 @@
+"""Worker processes on this machine: how they end, and what they leave."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import executor_tasks as tasks
+import pytest
+
+from ptmtools.errors import OutputError, WorkerError
+from ptmtools.executors import Local, Serial, open_executor
+
+HERE = Path(__file__).parent / "tasks"
+
+#: Starts two workers that sleep, and one more task after them.
+SCRIPT = """
+import sys
+from pathlib import Path
+sys.path.append(sys.argv[1])
+import executor_tasks as tasks
+from ptmtools.executors import Local
+
+{guard}
+    with Local(2) as local:
+        print("go", flush=True)
+        for _ in local.each(tasks.note_and_sleep, Path(sys.argv[2]), [{seconds}, {seconds}, 0]):
+            pass
+"""
+
+
+def started(
+    tmp_path: Path, seconds: float = 60, guard: str = "if __name__ == '__main__':"
+) -> subprocess.Popen[str]:
+    """The script, with its temporary files in a folder of its own."""
+    (tmp_path / "pids").mkdir()
+    (tmp_path / "temporary").mkdir()
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT.format(seconds=seconds, guard=guard))
+    return subprocess.Popen(
+        [sys.executable, str(script), str(HERE), str(tmp_path / "pids")],
+        env=os.environ | {"TMPDIR": str(tmp_path / "temporary")},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def workers(tmp_path: Path) -> list[int]:
+    """The processes of the two workers, once both are at work."""
+    pids = tmp_path / "pids"
+    until(lambda: len(list(pids.iterdir())) == 2)
+    return [int(file.name) for file in pids.iterdir()]
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Waits for what would otherwise never be: a minute is longer than any machine takes."""
+    for _ in range(1200):
+        if condition():
+            return
+        time.sleep(0.05)
+    pytest.fail("waited in vain")
+
+
+def gone(process: int) -> bool:
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return True
+    return state == "Z"
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="another system")
+def test_a_killed_parent_leaves_neither_processes_nor_files(tmp_path):
+    parent = started(tmp_path)
+    children = workers(tmp_path)
+    assert not any(gone(child) for child in children)
+    assert list((tmp_path / "temporary").iterdir()) == []
+    parent.kill()
+    parent.wait()
+    until(lambda: all(gone(child) for child in children))
+    assert list((tmp_path / "temporary").iterdir()) == []
+
+
+def test_ctrl_c_ends_all_at_once_and_only_the_parent_speaks(tmp_path):
+    parent = started(tmp_path)
+    children = workers(tmp_path)
+    os.killpg(parent.pid, signal.SIGINT)  # as a terminal does
+    _, told = parent.communicate()
+    assert told.count("KeyboardInterrupt") == 1
+    assert "Process Spawn" not in told
+    until(lambda: all(gone(child) for child in children))
+
+
+def test_a_worker_that_is_killed_is_an_error_and_not_the_end(local):
+    found = local.each(tasks.die, 3, range(100))
+    with pytest.raises(WorkerError, match="PTM-W004"):
+        list(found)
+    assert list(local.each(tasks.die, 3, range(3))) == [0, 1, 2]
+
+
+def test_a_script_without_a_guard_is_told_what_it_needs(tmp_path):
+    parent = started(tmp_path, 0, "if True:")
+    _, told = parent.communicate()
+    assert parent.returncode == 1
+    assert "needs `if __name__ == '__main__'` [PTM-W004]" in told
+
+
+def test_a_full_disk_is_told(local, monkeypatch):
+    import ptmtools.executors.processes as processes
+
+    def full(*_args, **_settings):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(processes.tempfile, "TemporaryFile", full)
+    with pytest.raises(OutputError, match="PTM-O003"):
+        list(local.each(tasks.die, 9, range(3)))
+
+
+def test_which_executor():
+    assert isinstance(open_executor(1), Serial)
+    with open_executor(3) as three, open_executor() as all_:
+        assert three.workers == 3
+        assert all_.workers == len(os.sched_getaffinity(0))
+        assert isinstance(three, Local)
