@@ -53,6 +53,11 @@ def fastest(runs: int, once: Callable[[], Taken]) -> Taken:
     return min((once() for _ in range(runs)), key=lambda taken: taken.seconds)
 
 
+def shares(taken: Taken, full: dict[int, Taken]) -> str:
+    """What share of a build anew it took."""
+    return ", ".join(f"{taken.seconds / full[j].seconds:.1%} of -j {j}" for j in (1, 2))
+
+
 def told(stages: list[dict[str, Any]]) -> str:
     return ", ".join(f"{stage['stage']} {stage['seconds']:.2f}" for stage in stages)
 
@@ -73,9 +78,8 @@ def main() -> int:
         anew(1)
         full = {workers: fastest(asked.runs, lambda w=workers: anew(w)) for workers in (1, 2)}
         for workers, taken in full.items():
-            print(
-                f"-j {workers}: {taken.seconds:.2f} s ({told(taken.report['stages'])}); {taken.peaks}"
-            )
+            stages = told(taken.report["stages"])
+            print(f"-j {workers}: {taken.seconds:.2f} s ({stages}); {taken.peaks}")
         same = state(folder / "j1") == state(folder / "j2")
         ratio = full[1].seconds / full[2].seconds
         print(f"-j 2 is {ratio:.2f} times as fast; {'the same' if same else 'OTHER'} bytes")
@@ -87,8 +91,7 @@ def main() -> int:
         assert not any(stage["ran"] for stage in nothing.report["stages"])
         print(
             f"again, nothing to do: {nothing.seconds:.3f} s, "
-            f"{nothing.seconds / full[2].seconds:.1%} of -j 2, "
-            f"{nothing.seconds / full[1].seconds:.1%} of -j 1; {nothing.peaks}"
+            f"{shares(nothing, full)}; {nothing.peaks}"
         )
 
         images = json.loads((db / "stages/images.json").read_text())["images"]
@@ -107,7 +110,7 @@ def main() -> int:
         assert [stage["stage"] for stage in ran] == ["scene", "textures", "emit"]
         print(
             f"1 of {len(images)} textures painted over: {one.seconds:.2f} s ({told(ran)}), "
-            f"{one.seconds / full[2].seconds:.1%} of -j 2, {one.seconds / full[1].seconds:.1%} of -j 1"
+            f"{shares(one, full)}"
         )
         build(model, folder / "fresh")
         updated = state(db) == state(folder / "fresh")
