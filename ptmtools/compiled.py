@@ -17,6 +17,7 @@ from collections.abc import Callable
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
+from threading import Lock
 from typing import Any, TypeVar, cast
 
 from ptmtools.progress import announce
@@ -92,17 +93,22 @@ def _prefetch(_: Any, array: Any, index: Any) -> Any:
 prefetch: Any = numba.extending.intrinsic(_prefetch)
 
 
+#: The folder is a setting of the whole process, and kernels may be imported by several threads.
+_setting = Lock()
+
+
 def _compiled(function: Function, **options: bool) -> Function:
     settings: Any = numba.config
-    before = settings.CACHE_DIR
-    settings.CACHE_DIR = before or _folder()
-    try:
-        compile_: Any = numba.njit
-        compiled: Any = compile_(
-            cache=bool(settings.CACHE_DIR), nogil=True, fastmath=False, **options
-        )(function)
-    finally:
-        settings.CACHE_DIR = before
+    with _setting:
+        before = settings.CACHE_DIR
+        settings.CACHE_DIR = before or _folder()
+        try:
+            compile_: Any = numba.njit
+            compiled: Any = compile_(
+                cache=bool(settings.CACHE_DIR), nogil=True, fastmath=False, **options
+            )(function)
+        finally:
+            settings.CACHE_DIR = before
     return cast("Function", compiled)
 
 
