@@ -42,9 +42,12 @@ def leaf_section(cells: Cells, leaf: int, height: float) -> NDArray[np.float64]:
     points = cells.leaf_points(leaf)
     if not points[:, 1].min() <= height < points[:, 1].max():
         return np.zeros((0, 2))
-    loops = cells.leaf_faces(leaf)
-    start = cells.leaf_point[np.concatenate(loops)]
-    end = cells.leaf_point[np.concatenate([np.roll(loop, -1) for loop in loops])]
+    first, last = cells.leaf_face_start[leaf : leaf + 2].tolist()
+    loop = cells.face_start[first : last + 1]
+    index = cells.face_index[loop[0] : loop[-1]]
+    following = np.roll(index, -1)
+    following[loop[1:] - 1 - loop[0]] = index[loop[:-1] - loop[0]]
+    start, end = cells.leaf_point[index], cells.leaf_point[following]
     # Each edge stands in two loops, upwards in one of them.
     upward = (start[:, 1] < height) & (end[:, 1] >= height)
     corners = _crossing(start[upward], end[upward], height)

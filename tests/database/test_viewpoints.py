@@ -10,8 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ptmtools.database import EmitOptions, GivenViewpoint
+from ptmtools.database.ground import Ground
+from ptmtools.database.outlook import longest_views
 from ptmtools.database.section import area, leaf_section, polygon_section, triangle_section
 from ptmtools.database.storeys import storeys
+from ptmtools.database.tour import storeys as storeys_of
+from ptmtools.database.tour import walk
 from ptmtools.database.viewpoints import orientation, place_viewpoints
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Camera
@@ -69,6 +73,128 @@ def test_only_so_many(room_row) -> None:
     scene, cells = room_row(3)
     views, _ = place_viewpoints(scene, cells, EmitOptions(viewpoint_count=2))
     assert [v.name for v in views] == ["VP_0", "VP_1"]
+    (view,), _ = place_viewpoints(scene, cells, EmitOptions(viewpoint_count=0))
+    assert view == views[0]
+    with pytest.raises(InputError, match="PTM-I603"):
+        EmitOptions(viewpoint_count=-1)
+
+
+def test_from_room_to_room(room_row) -> None:
+    """Rooms in the order of a walk; those that have a viewpoint already get no second one."""
+    scene, cells = room_row(6)
+    views, _ = place_viewpoints(scene, cells, EmitOptions())
+    assert [v.cell for v in views] == [0, 1, 2, 3, 4, 5]
+    assert [v.description for v in views] == [f"Room {i}" for i in range(1, 7)]
+    begin = EmitOptions(viewpoints=(GivenViewpoint((14.0, 1.0, 0.0)),))
+    views, _ = place_viewpoints(scene, cells, begin)
+    assert [v.cell for v in views] == [3, 4, 5, 2, 1, 0], "the shorter branch first"
+    assert [v.name for v in views] == [f"VP_{i}" for i in range(6)]
+    assert [v.description for v in views[:3]] == ["Viewpoint 1", "Room 1", "Room 2"]
+    views, _ = place_viewpoints(scene, cells, replace(begin, viewpoint_count=0))
+    assert [v.cell for v in views] == [3]
+    shut = replace(cells, portal_point=cells.portal_point * [1, 0.3, 1])
+    views, _ = place_viewpoints(scene, shut, begin)
+    assert len(views) == 6, "low openings are still ways"
+    walled = replace(cells, portal_leaf=cells.portal_leaf[:0], portal_start=cells.portal_start[:1])
+    views, _ = place_viewpoints(scene, walled, begin)
+    assert [v.cell for v in views] == [3, 0, 1, 2, 4, 5], "nothing leads there: last, by index"
+
+
+def test_a_low_opening_is_a_long_way(room_row) -> None:
+    """Rooms 0 and 2 are joined by a hatch: the walk still goes through room 1."""
+    _, cells = room_row(3)
+    hatch = cells.portal(0) * [1, 0.2, 1]
+    joined = replace(
+        cells,
+        portal_leaf=np.append(cells.portal_leaf, [[0, 2]], axis=0).astype(np.int32),
+        portal_plane=np.append(cells.portal_plane, cells.portal_plane[:1], axis=0),
+        portal_point=np.append(cells.portal_point, hatch, axis=0),
+        portal_start=np.append(cells.portal_start, cells.portal_start[-1] + len(hatch)),
+    )
+    assert walk(joined, 0, [2, 1], 1.6) == [1, 0]
+    assert walk(joined, 0, [2, 1], 0.1) == [1, 0], "the farther branch last"
+    assert walk(joined, 1, [2, 0, 1], 1.6) == [2, 1, 0]
+    assert walk(cells, 0, [], 1.6) == []
+
+
+def test_storeys_one_after_the_other(room_row) -> None:
+    """Every second room is lifted by a storey: those of the lower one come first."""
+    scene, cells = room_row(4)
+    corner = cells.leaf_point.copy()
+    corner[8:16, 1] += 4
+    corner[24:, 1] += 4
+    lifted = replace(cells, leaf_point=corner, root_box=np.array([[0, 0, -2], [16, 8, 2.0]]))
+    floor = np.array([[0, 4, -2], [0, 4, 2], [4, 4, 2], [4, 4, -2]])
+    quads = [floor * [1, 0, 1] + [4 * i, 4 * (i % 2), 0] for i in range(4)]
+    level = replace(scene, points=np.concatenate([*quads, scene.points[16:] * 0]))
+    views, _ = place_viewpoints(level, lifted, EmitOptions())
+    assert [v.description for v in views] == [
+        "Storey 1, room 1",
+        "Storey 1, room 2",
+        "Storey 2, room 1",
+        "Storey 2, room 2",
+    ]
+    assert [v.cell for v in views] == [0, 2, 1, 3]
+    assert [v.position[1] for v in views] == [1.6, 1.6, 5.6, 5.6]
+
+
+def test_storeys_of_heights() -> None:
+    assert storeys_of([0.0, 4.0, 0.2, 4.1, 1.7], 1.6) == [0, 1, 0, 1, 0]
+    assert storeys_of([], 1.6) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_floor_below(room_row, seed: int) -> None:
+    """Against every triangle, one after the other."""
+    random = np.random.default_rng(seed)
+    scene, _ = room_row(1)
+    corners = random.uniform(-5, 5, (120, 1, 3)) + random.normal(0, 2, (120, 3, 3)) * [1, 0.1, 1]
+    scene = replace(
+        scene,
+        points=corners.reshape(-1, 3),
+        triangles=np.arange(360, dtype=np.int32).reshape(-1, 3),
+        two_sided=random.random(120) < 0.5,
+    )
+    points = random.uniform(-9, 9, (40, 3))
+    wanted = []
+    for p in points:
+        heights = [-np.inf]
+        for (a, b, c), both in zip(corners, scene.two_sided, strict=True):
+            normal = np.cross(b - a, c - a)
+            slope = normal[1] / np.linalg.norm(normal)
+            height = a[1] - (normal[[0, 2]] @ (p - a)[[0, 2]]) / normal[1]
+            turns = [np.cross(v - u, p - u)[1] for u, v in ((a, b), (b, c), (c, a))]
+            inside = min(turns) >= 0 or max(turns) <= 0
+            if (abs(slope) if both else slope) > np.cos(np.pi / 4) and inside and height <= p[1]:
+                heights.append(height)
+        wanted.append(max(heights))
+    np.testing.assert_allclose(Ground(scene).below(points), wanted, atol=1e-9)
+    assert np.isfinite(wanted).sum() > 5
+    assert Ground(scene).below(points[:0]).shape == (0,)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_longest_view(seed: int) -> None:
+    """Against every direction with every wall."""
+    random = np.random.default_rng(seed)
+    walls = random.uniform(-5, 5, (40, 1, 2)) + random.normal(0, 1, (40, 2, 2))
+    walls = np.concatenate(
+        [walls, [[[-9, -9], [9, -9.1]], [[9, -9.1], [9.1, 9]], [[9.1, 9], [-9, 9.1]]]]
+    )
+    places = random.uniform(-4, 4, (5, 2))
+    yaws = 2 * np.pi * np.arange(72) / 72
+    ray = np.stack([-np.sin(yaws), -np.cos(yaws)], axis=1)
+    for place, *found in zip(places, *longest_views(places, walls), strict=True):
+        free = np.full(72, np.inf)
+        for a, b in walls:
+            for i, way in enumerate(ray):
+                far, share = np.linalg.solve(np.stack([way, a - b], axis=1), a - place)
+                if far > 0 and 0 <= share <= 1:
+                    free[i] = min(free[i], far)
+        free[np.isinf(free)] = 0
+        mean = [np.roll(free, 3 - i)[:7].mean() for i in range(72)]
+        np.testing.assert_allclose(found, (yaws[np.argmax(mean)], max(mean)))
+    assert longest_views(places[:2], walls[:0])[1].tolist() == [0, 0]
 
 
 def test_nowhere_to_stand(room_row) -> None:
@@ -80,7 +206,7 @@ def test_nowhere_to_stand(room_row) -> None:
         (scene, EmitOptions(avatar_size=(0.25, 9.0, 0.75))),
     ):
         (view,) = place_viewpoints(bare, cells, options)[0]
-        assert view.cell == 0
+        assert (view.cell, view.description) == (0, "Room 1")
         np.testing.assert_allclose(view.position, (2, 2, 0))
 
 
@@ -121,7 +247,8 @@ def test_cameras_come_first(room_row) -> None:
         Camera("door", (5.0, 1.8, 0.0), (-2.0, 0.0, 0.0), 7.0),
     )
     views, notes = place_viewpoints(replace(scene, cameras=cameras), cells, EmitOptions())
-    (view,) = views
+    view, room = views
+    assert (room.name, room.description, room.cell) == ("VP_1", "Room 1", 0)
     assert (view.name, view.description, view.cell) == ("VP_0", "door", 1)
     assert view.position == (5.0, 1.6, 0.0)
     assert view.direction == (-1.0, 0.0, 0.0)

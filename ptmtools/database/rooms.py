@@ -1,0 +1,156 @@
+"""Places to stand in the rooms of a scene: one in each of the cells with the largest floors, at
+eye height, as far from the walls as the cell allows, with the longest view."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.model import Cells
+from ptmtools.database.ground import Ground
+from ptmtools.database.model import Vector
+from ptmtools.database.outlook import longest_views
+from ptmtools.database.section import area, leaf_section, triangle_section
+
+#: Leaves in which a place is looked for, the largest first: of one cell, and of all, at least and
+#: for every room that is wanted.
+_OF_A_CELL = 3
+_LEAVES = 96
+_PER_ROOM = 4
+#: Places tried in a leaf, along each axis of its plan.
+_GRID = 7
+#: Places of a leaf whose view is measured, the freest first.
+_TRIES = 8
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where to stand in a cell.
+
+    Attributes
+    ----------
+    cell: its index.
+    position: (3,) of the eye.
+    yaw: radians, counter-clockwise from -Z, along the longest view.
+    floor: the height of what one stands on.
+    """
+
+    cell: int
+    position: NDArray[np.float64]
+    yaw: float
+    floor: float
+
+
+@dataclass(frozen=True)
+class _Room:
+    """A leaf in which one can stand: its floor's height, and its section at the eye's."""
+
+    leaf: int
+    floor: float
+    section: NDArray[np.float64]
+
+
+class Walls:
+    """The sections of a scene's opaque triangles, each made once: rooms of a storey share one."""
+
+    def __init__(self, opaque: NDArray[np.float64]) -> None:
+        self._opaque = opaque
+        self._held: dict[float, NDArray[np.float64]] = {}
+
+    def at(self, height: float) -> NDArray[np.float64]:
+        """(m, 2, 2) segments in plan."""
+        if height not in self._held:
+            self._held[height] = triangle_section(self._opaque, height)
+        return self._held[height]
+
+
+def places(
+    cells: Cells, ground: Ground, walls: Walls, avatar_size: Vector, count: int
+) -> list[Place]:
+    """At most ``count``, those with the largest floors first."""
+    eye = avatar_size[1]
+    rooms = []
+    leaves = largest_leaves(cells, max(_LEAVES, _PER_ROOM * count))
+    middle = np.array([cells.leaf_points(leaf).mean(axis=0) for leaf in leaves])
+    for leaf, floor in zip(leaves, ground.below(middle).tolist(), strict=True):
+        section = leaf_section(cells, leaf, floor + eye)
+        if len(section) >= 3:
+            rooms.append(_Room(leaf, floor, section))
+    found: dict[int, Place] = {}
+    for room in sorted(rooms, key=lambda room: (-area(room.section), room.leaf)):
+        cell = int(cells.leaf_cell[room.leaf])
+        if len(found) == count:
+            break
+        if cell not in found:
+            place = _place_in(room, cells, ground, walls.at(room.floor + eye), avatar_size)
+            if place is not None:
+                found[cell] = place
+    return list(found.values())
+
+
+def largest_leaves(cells: Cells, count: int) -> list[int]:
+    """At most so many leaves, by the volume of their boxes; of a cell the largest few."""
+    boxes = [np.ptp(cells.leaf_points(i), axis=0).prod() for i in range(cells.leaf_count)]
+    taken = np.zeros(cells.cell_count, dtype=np.int64)
+    found = []
+    for leaf in np.argsort(-np.array(boxes), kind="stable").tolist():
+        cell = cells.leaf_cell[leaf]
+        if taken[cell] < _OF_A_CELL:
+            taken[cell] += 1
+            found.append(leaf)
+        if len(found) == count:
+            break
+    return found
+
+
+def _place_in(
+    room: _Room, cells: Cells, ground: Ground, walls: NDArray[np.float64], avatar_size: Vector
+) -> Place | None:
+    keep_off, eye, step = avatar_size
+    grid = _grid(room.section)
+    # A wall outside of the section is farther off than the section's own sides.
+    least, most = room.section.min(axis=0), room.section.max(axis=0)
+    near = ((walls.max(axis=1) >= least) & (walls.min(axis=1) <= most)).all(axis=1)
+    clearance = np.minimum(_distance(grid, walls[near]), _distance(grid, _sides(room.section)))
+    grid = grid[np.argsort(-clearance, kind="stable")][: int((clearance >= keep_off).sum())]
+    position = np.insert(grid, 1, room.floor + eye, axis=1)
+    floor = ground.below(position)
+    position[:, 1] = floor + eye
+    good = (abs(floor - room.floor) <= step) & (cells.locate_leaf(position) == room.leaf)
+    tried = np.flatnonzero(good)[:_TRIES]
+    if len(tried) == 0:
+        return None
+    yaw, view = longest_views(grid[tried], walls)
+    best = int(view.argmax())
+    cell, i = int(cells.leaf_cell[room.leaf]), tried[best]
+    return Place(cell, position[i], float(yaw[best]), float(floor[i]))
+
+
+def _grid(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 2) points of a regular grid that lie inside a convex counter-clockwise polygon."""
+    share = (np.arange(_GRID) + 0.5) / _GRID
+    least, most = polygon.min(axis=0), polygon.max(axis=0)
+    grid = np.stack(np.meshgrid(share, share, indexing="ij"), axis=-1).reshape(-1, 2)
+    points = least + grid * (most - least)
+    a, b = polygon, np.roll(polygon, -1, axis=0)
+    edge, to = b - a, points[:, None] - a
+    inside = np.all(edge[:, 0] * to[..., 1] - edge[:, 1] * to[..., 0] > 0, axis=1)
+    kept: NDArray[np.float64] = points[inside]
+    return kept if len(kept) else polygon.mean(axis=0)[None]
+
+
+def _sides(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.stack([polygon, np.roll(polygon, -1, axis=0)], axis=1)
+
+
+def _distance(points: NDArray[np.float64], segments: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) distance of each (n, 2) point to the nearest of (m, 2, 2) segments; inf if none."""
+    a, along = segments[:, 0], segments[:, 1] - segments[:, 0]
+    length = np.maximum((along**2).sum(axis=1), np.finfo(np.float64).tiny)
+    to = points[:, None] - a
+    share = np.clip((to * along).sum(axis=2) / length, 0, 1)
+    off = share[..., None] * along - to
+    nearest: NDArray[np.float64] = np.sqrt((off**2).sum(axis=2)).min(axis=1, initial=np.inf)
+    return nearest
