@@ -18,7 +18,7 @@ from ptmtools.executors import Local, Serial, open_executor
 
 HERE = Path(__file__).parent / "tasks"
 
-#: Starts two workers that sleep, and one more task after them.
+#: Starts two workers that sleep, and one that soon waits for more.
 SCRIPT = """
 import sys
 from pathlib import Path
@@ -27,7 +27,7 @@ import executor_tasks as tasks
 from ptmtools.executors import Local
 
 {guard}
-    with Local(2) as local:
+    with Local(3) as local:
         print("go", flush=True)
         for _ in local.each(tasks.note_and_sleep, Path(sys.argv[2]), [{seconds}, {seconds}, 0]):
             pass
@@ -53,9 +53,9 @@ def started(
 
 
 def workers(tmp_path: Path) -> list[int]:
-    """The processes of the two workers, once both are at work."""
+    """The processes of the workers, once all have begun."""
     pids = tmp_path / "pids"
-    until(lambda: len(list(pids.iterdir())) == 2)
+    until(lambda: len(list(pids.iterdir())) == 3)
     return [int(file.name) for file in pids.iterdir()]
 
 
