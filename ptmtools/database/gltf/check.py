@@ -213,12 +213,17 @@ def _difference(own: object, other: dict[str, Any]) -> str:
         return "document"
     for name in sorted(own.keys() | other.keys()):
         one, two = own.get(name), other.get(name)
-        if one != two or (name in own) != (name in other):
+        if (name in own) != (name in other) or not _same(one, two):
             if isinstance(one, list) and isinstance(two, list):
-                rows = (i for i, (a, b) in enumerate(zip(one, two, strict=False)) if a != b)
+                rows = (i for i, ab in enumerate(zip(one, two, strict=False)) if not _same(*ab))
                 return f"{name}[{next(rows, min(len(one), len(two)))}]"
             return name
     return ""
+
+
+def _same(one: object, other: object) -> bool:
+    """Whether two values of JSON are the same; for Python, 1 is true."""
+    return json.dumps(one, sort_keys=True) == json.dumps(other, sort_keys=True)
 
 
 def _stems(files: Collection[str], folder: str, suffix: str) -> set[str]:

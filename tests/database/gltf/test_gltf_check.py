@@ -203,6 +203,7 @@ FAULTS: list[tuple[str, str, Damage]] = [
     ("PTM-D737", "a URL", hinted(lambda d: d["cells"][1].update(url="c0002.glb"))),
     ("PTM-D737", "a texture's URL", hinted(lambda d: d["textures"][0].update(file="a.ptm"))),
     ("PTM-D737", "a member", hinted(lambda d: d.pop("unit"))),
+    ("PTM-D737", "true for 1", hinted(lambda d: d.update(schema=True))),
     ("PTM-D737", "one more", hinted(lambda d: d["viewpoints"].append({}))),
     ("PTM-D737", "no JSON", written("gltf/hints.json", b"{")),
     ("PTM-D737", "no object", written("gltf/hints.json", b"[]")),
