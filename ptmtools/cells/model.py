@@ -16,6 +16,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.stored import Stored, texts
+
 #: A child of a BSP node that is no node: ``OUTSIDE``, or leaf i as ``-2 - i``.
 OUTSIDE = -1
 
@@ -172,8 +174,51 @@ class Cells:
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> Cells:
-        """Inverse of `to_arrays`."""
-        about = json.loads(bytes(np.asarray(arrays["about"], dtype=np.uint8)).decode())
-        names = [f.name for f in fields(Cells) if f.name not in ("closed", "notes")]
-        plain = {name: np.asarray(arrays[name]) for name in names}
-        return Cells(**plain, closed=bool(about["closed"]), notes=tuple(about["notes"]))
+        """Inverse of `to_arrays`.
+
+        Raises KeyError, TypeError or ValueError for what no subdivision has. `triangle_source` is
+        compared with nothing: the scene is not at hand.
+        """
+        stored = Stored(arrays)
+        about = json.loads(stored.array("about", np.uint8, None).tobytes().decode())
+        leaf_cell = stored.array("leaf_cell", np.int32, None)
+        leaves = len(leaf_cell)
+        stored.indices("leaf_cell", np.int32, leaves, low=-1, high=leaves)
+        leaf_point = stored.array("leaf_point", np.float64, None, 3, finite=True)
+        face_index = stored.indices("face_index", np.int32, None, high=len(leaf_point))
+        face_start = stored.starts("face_start", None, len(face_index))
+        node_plane = stored.array("node_plane", np.float64, None, 4, finite=True)
+        nodes = len(node_plane)
+        node_child = stored.indices("node_child", np.int32, nodes, 2, low=-1 - leaves, high=nodes)
+        if ((node_child >= 0) & (node_child <= np.arange(nodes)[:, None])).any():
+            raise ValueError("node_child leads back")
+        portal_point = stored.array("portal_point", np.float64, None, 3, finite=True)
+        portal_leaf = stored.indices("portal_leaf", np.int32, None, 2, high=leaves)
+        portals = len(portal_leaf)
+        vertex = stored.array("vertex", np.float64, None, 3, finite=True)
+        triangle = stored.indices("triangle", np.int32, None, 3, high=len(vertex))
+        n = len(triangle)
+        cells = int(leaf_cell.max()) + 1 if leaves else 0
+        return Cells(
+            node_plane=node_plane,
+            node_child=node_child,
+            root_box=stored.array("root_box", np.float64, 2, 3, finite=True),
+            leaf_cell=leaf_cell,
+            leaf_point=leaf_point,
+            leaf_point_start=stored.starts("leaf_point_start", leaves, len(leaf_point)),
+            face_index=face_index,
+            face_start=face_start,
+            leaf_face_start=stored.starts("leaf_face_start", leaves, len(face_start) - 1),
+            portal_leaf=portal_leaf,
+            portal_plane=stored.array("portal_plane", np.float64, portals, 4, finite=True),
+            portal_point=portal_point,
+            portal_start=stored.starts("portal_start", portals, len(portal_point)),
+            portal_area=stored.array("portal_area", np.float64, portals, finite=True),
+            vertex=vertex,
+            vertex_uv=stored.array("vertex_uv", np.float64, len(vertex), 2, finite=True),
+            triangle=triangle,
+            triangle_source=stored.indices("triangle_source", np.int32, n, high=1 << 31),
+            triangle_cell=stored.indices("triangle_cell", np.int32, n, 2, low=-1, high=cells),
+            closed=bool(about["closed"]),
+            notes=texts(about["notes"], "notes"),
+        )

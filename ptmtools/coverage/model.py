@@ -9,6 +9,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.stored import Stored, texts
+
 
 @dataclass(frozen=True)
 class Ach:
@@ -86,8 +88,38 @@ class Ach:
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> Ach:
-        """Inverse of `to_arrays`."""
-        about = json.loads(bytes(np.asarray(arrays["about"], dtype=np.uint8)).decode())
-        names = [f.name for f in fields(Ach) if f.name not in ("backend", "renderer")]
-        plain = {name: np.asarray(arrays[name]) for name in names}
-        return Ach(**plain, backend=about["backend"], renderer=about["renderer"])
+        """Inverse of `to_arrays`.
+
+        Raises KeyError, TypeError or ValueError for what no hints have.
+        """
+        stored = Stored(arrays)
+        about = json.loads(stored.array("about", np.uint8, None).tobytes().decode())
+        backend, renderer = texts([about["backend"], about["renderer"]], "backend and renderer")
+        value = stored.array("value", np.float64, None, finite=True)
+        n = len(value)
+        start = stored.starts("start", None, n)
+        cells = len(start) - 1
+        textures = stored.indices("texture", np.int32, None, low=-1, high=1 << 31)
+        texture_start = stored.array("texture_start", np.int64, None)
+        if len(texture_start) or len(textures):
+            stored.starts("texture_start", n, len(textures))
+        return Ach(
+            start=start,
+            value=value,
+            pixels=stored.array("pixels", np.float64, n, finite=True),
+            error=stored.array("error", np.float64, n),
+            p95=stored.array("p95", np.float64, n),
+            seen=stored.array("seen", np.float64, n),
+            views=stored.array("views", np.float64, n, 6),
+            missed=stored.array("missed", np.float64, cells),
+            samples=stored.array("samples", np.int32, cells),
+            rejected=stored.array("rejected", np.int32, cells),
+            uncertain=stored.array("uncertain", np.float64, cells),
+            unseen_below=stored.array("unseen_below", np.float64, cells),
+            floor=stored.array("floor", np.float64, cells),
+            texture_start=texture_start,
+            texture=textures,
+            texture_value=stored.array("texture_value", np.float64, len(textures)),
+            backend=backend,
+            renderer=renderer,
+        )

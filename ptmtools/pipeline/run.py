@@ -154,7 +154,15 @@ class _Reading:
         pass
 
     def __exit__(self, kind: object, fault: BaseException | None, trace: object) -> None:
-        if isinstance(fault, KeyError | ValueError | TypeError | IndexError):
+        kinds = (
+            ArithmeticError,
+            AttributeError,
+            LookupError,
+            RecursionError,
+            TypeError,
+            ValueError,
+        )
+        if isinstance(fault, kinds):
             raise DatabaseError(
                 "PTM-D006",
                 f"damaged: {type(fault).__name__} {fault}",

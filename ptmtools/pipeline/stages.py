@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import asdict, fields, is_dataclass
 from typing import Any
@@ -26,6 +27,9 @@ RECIPES = {"scene": 2, "cells": 1, "pvs": 1, "ach": 1, "textures": 2, "emit": 2}
 IMAGES, IMAGE_LIST = "stages/images", "stages/images.json"
 SERVED = "www"
 
+_IMAGE_NAME = re.compile(r"[A-Za-z0-9_-]+\.[A-Za-z0-9]+")
+_SHA256 = re.compile(r"[0-9a-f]{64}")
+
 
 def arrays_of(stage: str) -> str:
     """The file of a stage's arrays."""
@@ -48,13 +52,15 @@ def parameters(options: Any) -> dict[str, Any]:
 def image_rows(data: bytes) -> list[Mapping[str, Any]]:
     """The rows of the list of images: name, sha256, files and plain, as in `SourceImage`.
 
-    Raises ValueError, KeyError or TypeError if it is no such list.
+    Raises ValueError, KeyError, TypeError or RecursionError if it is no such list. Names and
+    digests become names of files, and are those that ingest gives.
     """
     rows: list[Mapping[str, Any]] = json.loads(data)["images"]
     for row in rows:
-        if not (isinstance(row["name"], str) and isinstance(row["sha256"], str)):
-            raise TypeError("an image without a name or a digest")
-        if not isinstance(row["files"], list) or not isinstance(row["plain"], bool):
+        if not (_IMAGE_NAME.fullmatch(row["name"]) and _SHA256.fullmatch(row["sha256"])):
+            raise ValueError("an image of an impossible name or digest")
+        texts = isinstance(row["files"], list) and all(isinstance(f, str) for f in row["files"])
+        if not texts or not isinstance(row["plain"], bool):
             raise TypeError("an image without a list of files")
     return rows
 

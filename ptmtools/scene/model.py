@@ -9,10 +9,12 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ptmtools.stored import Stored, numbers, texts, whole
 
 Wrap = Literal["repeat", "clamp"]
 
@@ -174,24 +176,63 @@ class Scene:
     def from_arrays(
         arrays: Mapping[str, NDArray[np.generic]], images: Sequence[SourceImage] = ()
     ) -> Scene:
-        """Inverse of `to_arrays`; ``images`` in the order in which materials count them."""
-        about = json.loads(bytes(np.asarray(arrays["about"], dtype=np.uint8)).decode())
+        """Inverse of `to_arrays`; ``images`` in the order in which materials count them.
+
+        Raises KeyError, TypeError or ValueError for what no scene has.
+        """
+        stored = Stored(arrays)
+        about = json.loads(stored.array("about", np.uint8, None).tobytes().decode())
+        objects = texts(about["objects"], "objects")
+        materials = tuple(_material(row, len(images)) for row in about["materials"])
+        points = stored.array("points", np.float64, None, 3, finite=True)
+        triangles = stored.indices("triangles", np.int32, None, 3, high=len(points))
+        n = len(triangles)
         return Scene(
-            points=np.asarray(arrays["points"], dtype=np.float64),
-            triangles=np.asarray(arrays["triangles"], dtype=np.int32),
-            uv=np.asarray(arrays["uv"], dtype=np.float64),
-            triangle_object=np.asarray(arrays["triangle_object"], dtype=np.int32),
-            triangle_material=np.asarray(arrays["triangle_material"], dtype=np.int32),
-            two_sided=np.asarray(arrays["two_sided"], dtype=np.bool_),
-            objects=tuple(about["objects"]),
-            materials=tuple(
-                Material(**{**m, "color": tuple(m["color"])}) for m in about["materials"]
-            ),
+            points=points,
+            triangles=triangles,
+            uv=stored.array("uv", np.float64, n, 3, 2, finite=True),
+            triangle_object=stored.indices("triangle_object", np.int32, n, high=len(objects)),
+            triangle_material=stored.indices("triangle_material", np.int32, n, high=len(materials)),
+            two_sided=stored.array("two_sided", np.bool_, n),
+            objects=objects,
+            materials=materials,
             images=tuple(images),
-            cameras=tuple(
-                Camera(c["name"], tuple(c["position"]), tuple(c["direction"]), c["field_of_view"])
-                for c in about["cameras"]
-            ),
-            space=Space(**{**about["space"], "origin": tuple(about["space"]["origin"])}),
-            notes=tuple(Note(**n) for n in about["notes"]),
+            cameras=tuple(_camera(row) for row in about["cameras"]),
+            space=_space(about["space"]),
+            notes=tuple(_note(row) for row in about["notes"]),
         )
+
+
+def _material(row: Mapping[str, Any], images: int) -> Material:
+    r, g, b = numbers(row["color"], 3, "colours")
+    (opacity,) = numbers([row["opacity"]], 1, "opacities")
+    name, wrap_s, wrap_t = texts([row["name"], row["wrap_s"], row["wrap_t"]], "names")
+    if not all(0 <= share <= 1 for share in (r, g, b, opacity)):
+        raise ValueError("a colour or an opacity is no share")
+    if not {wrap_s, wrap_t} <= {"repeat", "clamp"} or not isinstance(row["transparent"], bool):
+        raise ValueError("a material is none")
+    image = whole(row["image"], -1, images, "an image")
+    s, t = cast("tuple[Wrap, Wrap]", (wrap_s, wrap_t))
+    return Material(name, (r, g, b), opacity, image, s, t, row["transparent"])
+
+
+def _camera(row: Mapping[str, Any]) -> Camera:
+    (name,) = texts([row["name"]], "names")
+    (angle,) = numbers([row["field_of_view"]], 1, "fields of view")
+    x, y, z = numbers(row["position"], 3, "positions")
+    dx, dy, dz = numbers(row["direction"], 3, "directions")
+    return Camera(name, (x, y, z), (dx, dy, dz), angle)
+
+
+def _space(row: Mapping[str, Any]) -> Space:
+    x, y, z = numbers(row["origin"], 3, "origins")
+    (metres,) = numbers([row["metres"]], 1, "metres")
+    up: Any = row["up"]
+    if up not in ("y", "z") or metres <= 0:
+        raise ValueError("an impossible space")
+    return Space((x, y, z), metres, up, bool(row["unit_guessed"]), bool(row["up_guessed"]))
+
+
+def _note(row: Mapping[str, Any]) -> Note:
+    code, message, place = texts([row["code"], row["message"], row["place"]], "notes")
+    return Note(code, message, place, whole(row["count"], 0, 1 << 63, "a count"))

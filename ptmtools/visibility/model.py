@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.stored import Stored
+
 
 @dataclass(frozen=True)
 class Pvs:
@@ -91,15 +93,28 @@ class Pvs:
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> Pvs:
-        """Inverse of `to_arrays`."""
+        """Inverse of `to_arrays`.
+
+        Raises KeyError or ValueError for what no visibility has.
+        """
+        stored = Stored(arrays)
+        entries = stored.array("cell", np.int32, None)
+        start = stored.starts("start", None, len(entries))
+        cells = len(start) - 1
+        stored.indices("cell", np.int32, len(entries), high=cells)
+        if (np.diff(start) < 1).any() or (entries[start[:-1]] != np.arange(cells)).any():
+            raise ValueError("a row of cell does not begin with its own")
+        leak = stored.array("leak", np.int32, None, 4)
+        if len(leak) and not 0 <= int(leak[:, 0].min()) <= int(leak[:, 0].max()) < cells:
+            raise ValueError("leak has an index out of range")
         return Pvs(
-            np.asarray(arrays["start"], dtype=np.int64),
-            np.asarray(arrays["cell"], dtype=np.int32),
-            np.asarray(arrays["work"], dtype=np.int64),
-            np.asarray(arrays["cut"], dtype=np.bool_),
-            np.asarray(arrays["ties"], dtype=np.int64),
-            np.asarray(arrays["decided"], dtype=np.int64),
-            np.asarray(arrays["opened"], dtype=np.int64),
-            np.asarray(arrays["leak"], dtype=np.int32).reshape(-1, 4),
-            bool(arrays["conservative"][0]),
+            start,
+            entries,
+            stored.array("work", np.int64, None),
+            stored.array("cut", np.bool_, None),
+            stored.array("ties", np.int64, None),
+            stored.array("decided", np.int64, None),
+            stored.array("opened", np.int64, None),
+            leak,
+            bool(stored.array("conservative", np.bool_, 1)[0]),
         )

@@ -183,7 +183,11 @@ def test_what_the_hash_tells_is_not_told_again(stages: Arrays, tmp_path: Path) -
         ("D720", b"{}"),
         ("D720", b'{"images": [{"name": 3}]}'),
         ("D720", b"[" * 100_000),
-        ("D721", b'{"images": [{"name": "b", "sha256": "00", "files": [], "plain": true}]}'),
+        (
+            "D721",
+            b'{"images": [{"name": "b.png", "sha256": "%s", "files": [], "plain": true}]}'
+            % (b"0" * 64),
+        ),
         ("D659", b'{"images": []}'),
     ],
 )
