@@ -37,6 +37,9 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+#: What damaged contents make their readers raise.
+_FAULTS = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
+
 
 class Artifacts:
     """The results of the stages of a database, read when they are first asked for."""
@@ -154,15 +157,7 @@ class _Reading:
         pass
 
     def __exit__(self, kind: object, fault: BaseException | None, trace: object) -> None:
-        kinds = (
-            ArithmeticError,
-            AttributeError,
-            LookupError,
-            RecursionError,
-            TypeError,
-            ValueError,
-        )
-        if isinstance(fault, kinds):
+        if isinstance(fault, _FAULTS):
             raise DatabaseError(
                 "PTM-D006",
                 f"damaged: {type(fault).__name__} {fault}",
