@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from ptmtools.cells.options import SubdivideOptions
-from ptmtools.cli.common import as_json, database, forced, new_database, voiced, workers
+from ptmtools.cli.common import as_json, database, forced, many_machines, new_database, voiced
 from ptmtools.cli.output import Voice, count, size
 from ptmtools.cli.parameters import Numbers, options_of, take
 from ptmtools.coverage.options import AchOptions
@@ -30,7 +30,7 @@ from ptmtools.pipeline.build import (
     make_textures,
 )
 from ptmtools.pipeline.options import BuildOptions, TextureOptions
-from ptmtools.pipeline.report import BuildReport
+from ptmtools.pipeline.report import BuildReport, StageReport
 from ptmtools.scene.options import IngestOptions
 from ptmtools.visibility.options import PvsOptions
 
@@ -54,17 +54,24 @@ viewpoints = click.option(
 @new_database
 @options_of(IngestOptions)
 @options_of(SubdivideOptions, omit=["viewpoints"])
-@options_of(PvsOptions, omit=["workers"])
-@options_of(AchOptions, omit=["workers"])
+@options_of(PvsOptions)
+@options_of(AchOptions)
 @options_of(TextureOptions, omit=["limit"])
 @options_of(EmitOptions, omit=["viewpoints", "fallback"])
 @viewpoints
-@workers
+@many_machines
 @forced
+@click.option("--dry-run", is_flag=True, help="Say what would be done, and why; write nothing.")
 @as_json
 @voiced
 def build_scene(
-    voice: Voice, model: str, db: str, as_json: bool, viewpoints: Any, **values: Any
+    voice: Voice,
+    model: str,
+    db: str,
+    as_json: bool,
+    viewpoints: Any,
+    dry_run: bool,
+    **values: Any,
 ) -> None:
     """Build the database DB from MODEL, or bring it up to date.
 
@@ -74,12 +81,18 @@ def build_scene(
     options = BuildOptions(
         ingest=take(IngestOptions, values, share=["limit"]),
         subdivide=take(SubdivideOptions, values, viewpoints=_positions(viewpoints)),
-        pvs=take(PvsOptions, values, omit=["workers"]),
-        ach=take(AchOptions, values, omit=["workers"]),
+        pvs=take(PvsOptions, values),
+        ach=take(AchOptions, values),
         emit=take(EmitOptions, values, share=["fallback"], viewpoints=_given(viewpoints)),
         textures=take(TextureOptions, values),
         **values,
     )
+    if dry_run:
+        from ptmtools.cli.status import tell_plan
+        from ptmtools.pipeline.plan import plan_build
+
+        tell_plan(voice, plan_build(model, db, options), as_json)
+        return
     with voice.progress() as progress:
         report = build(model, db, options, progress)
     _tell(voice, report, as_json)
@@ -107,7 +120,7 @@ def cells(
 
 @click.command("pvs")
 @database
-@options_of(PvsOptions, omit=["workers"])
+@options_of(PvsOptions)
 @click.option(
     "--report",
     "wanted",
@@ -115,13 +128,21 @@ def cells(
     help="Say what the sets look like: sizes, the "
     "costliest portals, and openings that show suspiciously much.",
 )
-@workers
+@many_machines
 @as_json
 @voiced
-def pvs(voice: Voice, db: str, as_json: bool, workers: int, wanted: bool, **values: Any) -> None:
+def pvs(
+    voice: Voice,
+    db: str,
+    as_json: bool,
+    workers: int,
+    scheduler: str | None,
+    wanted: bool,
+    **values: Any,
+) -> None:
     """Find which cells of DB may see each other."""
     with voice.progress() as progress:
-        done = make_pvs(db, take(PvsOptions, values), workers, progress)
+        done = make_pvs(db, take(PvsOptions, values), workers, progress, scheduler)
     if not wanted:
         _tell(voice, done, as_json)
         return
@@ -140,27 +161,31 @@ def pvs(voice: Voice, db: str, as_json: bool, workers: int, wanted: bool, **valu
 
 @click.command("ach")
 @database
-@options_of(AchOptions, omit=["workers"])
-@workers
+@options_of(AchOptions)
+@many_machines
 @as_json
 @voiced
-def ach(voice: Voice, db: str, as_json: bool, workers: int, **values: Any) -> None:
+def ach(
+    voice: Voice, db: str, as_json: bool, workers: int, scheduler: str | None, **values: Any
+) -> None:
     """Measure how much of the view from each cell of DB each visible cell covers."""
     with voice.progress() as progress:
-        report = make_ach(db, take(AchOptions, values), workers, progress)
+        report = make_ach(db, take(AchOptions, values), workers, progress, scheduler)
     _tell(voice, report, as_json)
 
 
 @click.command("textures")
 @database
 @options_of(TextureOptions)
-@workers
+@many_machines
 @as_json
 @voiced
-def textures(voice: Voice, db: str, as_json: bool, workers: int, **values: Any) -> None:
+def textures(
+    voice: Voice, db: str, as_json: bool, workers: int, scheduler: str | None, **values: Any
+) -> None:
     """Encode the images of DB as progressive textures."""
     with voice.progress() as progress:
-        report = make_textures(db, take(TextureOptions, values), workers, progress)
+        report = make_textures(db, take(TextureOptions, values), workers, progress, scheduler)
     _tell(voice, report, as_json)
 
 
@@ -192,7 +217,12 @@ def _tell(voice: Voice, report: BuildReport, as_json: bool) -> None:
         return
     for stage in report.stages:
         done = f"{stage.seconds:7.1f} s" if stage.ran else "unchanged"
-        voice.say(f"{stage.stage:<9}{done:>10}   {figures(stage.stage, stage.counts)}")
+        voice.say(
+            f"{stage.stage:<9}{done:>10}   {figures(stage.stage, stage.counts)}{_tasks(stage)}"
+        )
+        if voice.verbose:
+            for reason in stage.reasons:
+                voice.say(f"{'':<22}because {reason}")
     memory = f", at most {size(report.peak_memory)} of memory" if report.peak_memory else ""
     voice.say(f"{'all':<9}{report.seconds:>8.1f} s{memory}")
     shown = report.notes if voice.verbose else report.notes[:SHOWN_NOTES]
@@ -210,6 +240,17 @@ def _tell(voice: Voice, report: BuildReport, as_json: bool) -> None:
             (f"python3 -m http.server -d {db}/www", "serve it; start at root.wrl"),
         ):
             voice.say(f"  {command:<50} {told}")
+
+
+def _tasks(stage: StageReport) -> str:
+    """How many tasks of a stage had been done before, if it ran for the rest."""
+    if not stage.ran or stage.tasks is None:
+        return ""
+    total, kept, resumed = stage.tasks
+    if not kept and not resumed:
+        return ""
+    taken = f", {resumed:,} by the run that was interrupted" if resumed else ""
+    return f"; {total - kept - resumed:,} encoded, {kept:,} as they were{taken}"
 
 
 def _invoked() -> str:
