@@ -14,7 +14,15 @@ from typing import Any
 import click
 
 from ptmtools.cells.options import SubdivideOptions
-from ptmtools.cli.common import as_json, database, forced, many_machines, new_database, voiced
+from ptmtools.cli.common import (
+    as_json,
+    database,
+    forced,
+    many_machines,
+    new_database,
+    voiced,
+    workers,
+)
 from ptmtools.cli.output import Voice, count, size
 from ptmtools.cli.parameters import Numbers, options_of, take
 from ptmtools.coverage.options import AchOptions
@@ -104,17 +112,25 @@ def build_scene(
 @options_of(IngestOptions)
 @options_of(SubdivideOptions, omit=["viewpoints"])
 @viewpoints
+@workers
 @forced
 @as_json
 @voiced
 def cells(
-    voice: Voice, model: str, db: str, as_json: bool, force: bool, viewpoints: Any, **values: Any
+    voice: Voice,
+    model: str,
+    db: str,
+    as_json: bool,
+    force: bool,
+    workers: int,
+    viewpoints: Any,
+    **values: Any,
 ) -> None:
     """Read MODEL and cut it into cells and portals: the first stage of the database DB."""
     read = take(IngestOptions, values)
     cut = take(SubdivideOptions, values, viewpoints=_positions(viewpoints))
     with voice.progress() as progress:
-        report = make_cells(model, db, read, cut, force=force, progress=progress)
+        report = make_cells(model, db, read, cut, workers, force=force, progress=progress)
     _tell(voice, report, as_json)
 
 

@@ -190,7 +190,13 @@ class _Workers:
     @property
     def here(self) -> int:
         """How many threads of this machine may be used."""
-        return self._asked[0] or processors()
+        workers, scheduler = self._asked
+        return processors() if scheduler else workers or processors()
+
+    @property
+    def several(self) -> bool:
+        """Whether textures can be encoded while this thread does something else."""
+        return self._asked[1] is not None or self.here > 1
 
     def executor(self) -> Executor:
         """The one of this thread."""
@@ -228,7 +234,7 @@ class _Beside:
     def begin(self) -> None:
         """To be called when the scene's images are known."""
         self._stage = TextureStage(self._run, self._options)
-        if not self._stage.current and self._workers.here > 1:
+        if not self._stage.current and self._workers.several:
             self._task = self._pool.submit(self._encode, self._stage)
 
     def check(self) -> None:
