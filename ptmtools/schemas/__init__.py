@@ -54,6 +54,9 @@ class ShapeError(Exception):
         self.path: list[str | int] = []
         super().__init__(message)
 
+    def __str__(self) -> str:
+        return f"{self.place}: {self.message}" if self.path else self.message
+
     @property
     def place(self) -> str:
         """The path as text, "cells[3].ach[1]"; "" for all of the document."""
