@@ -117,16 +117,17 @@ def _misplaced(
         plane = polygon_plane(polygon, tolerance)
     except SolidError as fault:
         return str(fault)
+    area = polygon_area(polygon)
     slack = tolerance.plane * tolerance.extent
-    if not portal["area"] <= polygon_area(polygon) * (1 + TIE_SHARE) + slack:
+    if not portal["area"] <= area * (1 + TIE_SHARE) + slack:
         return "is said to be open for more than its polygon"
+    # Within a face that is a sliver, which says nothing of its plane.
+    if area <= 2 * tolerance.plane * float(np.linalg.norm(np.ptp(polygon, axis=0))):
+        plane = None
     for bodies, inwards, whose in ((here, 1.0, "this cell"), (beyond, -1.0, "its neighbour")):
-        if not bodies:  # no leaf of it is sound, which is told
-            continue
-        if not any(_in_face(planes, polygon, plane, inwards, tolerance) for planes in bodies):
-            return (
-                f"does not lie in a face of {whose}, counter-clockwise seen from inside the first"
-            )
+        # Where no leaf is sound, that has been told.
+        if bodies and not any(_in_face(b, polygon, plane, inwards, tolerance) for b in bodies):
+            return f"does not lie in a face of {whose}, or faces the wrong way"
     return ""
 
 
@@ -137,8 +138,8 @@ def _in_face(
     inwards: float,
     tolerance: Tolerance,
 ) -> bool:
-    """Whether a polygon lies in a face of a body, its normal times ``inwards`` into the body. Of a
-    sliver it is enough that it lies in the body: the face may be one, too."""
+    """Whether a polygon lies in a face of a body, its normal times ``inwards`` into the body; of a
+    sliver, without a plane, whether it lies in the body."""
     if not farthest(planes, polygon).max() <= tolerance.plane:
         return False
     if plane is None:

@@ -37,7 +37,7 @@ class Urls:
     def resolve(self, file: str, url: str) -> str | None:
         """The file that a URL names, relative to the served folder; None, and told, if there is
         none. ``file`` has the URL in it and is named relative to the database."""
-        base = posixpath.dirname(file.removeprefix(f"{self._folder}/"))
+        base = file.removeprefix(f"{self._folder}/").rpartition("/")[0]
         key = (base, url)
         if key not in self._known:
             self._known[key] = self._find(base, url)
