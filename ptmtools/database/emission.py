@@ -17,9 +17,10 @@ from ptmtools.database.hints import hints_text
 from ptmtools.database.model import EmitOptions, EmitReport, TextureRecord
 from ptmtools.database.names import CELL_FOLDER, HINTS, ROOT, cell_path
 from ptmtools.database.rootfile import root_text
+from ptmtools.database.served import ServedFiles
 from ptmtools.database.viewpoints import place_viewpoints
 from ptmtools.errors import DatabaseError, OutputError
-from ptmtools.files import write_bytes, writing
+from ptmtools.files import writing
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
@@ -37,14 +38,14 @@ def emit(
     *,
     force: bool = False,
 ) -> EmitReport:
-    """Writes `cells/c0000.wrl` …, `hints.json` and `root.wrl`, in this order, into the folder
-    ``out``; with ``options.format`` "gltf" the GLBs and `gltf/hints.json` before `hints.json`. The
-    textures themselves are written by the stage before.
+    """Writes `cells/c0000.wrl` …, `hints.json` and, when all else is there, `root.wrl` into the
+    folder ``out``; with ``options.format`` "gltf" the GLBs and `gltf/hints.json` before
+    `hints.json`. The textures themselves are written by the stage before.
 
     Parameters
     ----------
     textures: one record for every image that a material in use names.
-    force: overwrite files of these names.
+    force: overwrite files of these names, compressed twins included.
 
     Raises
     ------
@@ -75,41 +76,40 @@ def emit(
         if gltf:
             (folder / GLTF_FOLDER).mkdir(exist_ok=True)
 
-    files: list[str] = []
-    size = shapes = triangles = 0
-
-    def write(name: str, content: str | bytes) -> None:
-        nonlocal size
-        data = content.encode() if isinstance(content, str) else content
-        write_bytes(folder / name, data, force=force)
-        files.append(name)
-        size += len(data)
-
+    count = cells.cell_count
     boxes, images = [], []
-    for c in range(cells.cell_count):
-        progress(c, cells.cell_count, "cells")
-        cell = writer.cell(c)
-        write(cell_path(c), cell.text)
-        boxes.append(cell.box)
-        images.append(cell.images)
-        shapes += cell.shapes
-        triangles += cell.triangles
-    progress(cells.cell_count, cells.cell_count, "cells")
-    hints = partial(hints_text, scene.space, cells, pvs, ach, textures, images, viewpoints, options)
-    if gltf:
-        geometry, count = writer.geometry, cells.cell_count
-        for name, glb in gltf_files(scene, geometry, count, textures, options.fallback, progress):
-            write(name, glb)
-        write(GLTF_HINTS, hints(cell_url=glb_file, up=UP))
-    write(HINTS, hints())
-    write(ROOT, root_text(viewpoints, boxes, options))
+    shapes = triangles = 0
+    with ServedFiles(folder, force=force, twins=options.gzip) as files:
+        for c in range(count):
+            progress(c, count, "cells")
+            cell = writer.cell(c)
+            files.put(cell_path(c), cell.text)
+            boxes.append(cell.box)
+            images.append(cell.images)
+            shapes += cell.shapes
+            triangles += cell.triangles
+        progress(count, count, "cells")
+        hints = partial(
+            hints_text, scene.space, cells, pvs, ach, textures, images, viewpoints, options
+        )
+        if gltf:
+            fallback = options.fallback
+            for name, glb in gltf_files(
+                scene, writer.geometry, count, textures, fallback, progress
+            ):
+                files.put(name, glb)
+            files.put(GLTF_HINTS, hints(cell_url=glb_file, up=UP))
+        files.put(HINTS, hints())
+        root = root_text(viewpoints, boxes, options)
+        files.settle()  # a root leads to files that are there
+        files.put(ROOT, root)
     return EmitReport(
-        files=tuple(files),
+        files=tuple(files.names),
         viewpoints=viewpoints,
         shapes=shapes,
         triangles=triangles,
         collapsed=writer.geometry.collapsed,
-        bytes=size,
+        bytes=files.bytes,
         notes=notes,
     )
 

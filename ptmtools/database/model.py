@@ -45,7 +45,8 @@ class TextureRecord:
     width, height, components: of the finest level stored.
     levels: coarsest first.
     sha256: hex digest of the `.ptm`'s bytes.
-    fallback_level: index into `levels` of the one that the PNG twin holds, or None.
+    fallback_level: index into `levels` of the one that the PNG twin holds; None if there is no
+        twin, or if it is the finest.
     """
 
     image: int
@@ -113,6 +114,7 @@ class EmitOptions:
     avatar_size: NavigationInfo's: least distance to a wall, height of the eye above the floor,
         highest step, metres.
     field_of_view: of viewpoints that are no cameras, radians.
+    gzip: write a twin of each VRML file and of the hints, compressed, under its name with ".gz".
     format: "gltf" writes a GLB for each cell, and hints for them, beside the VRML files.
     """
 
@@ -122,6 +124,7 @@ class EmitOptions:
     viewpoint_count: int = 32
     avatar_size: Vector = (0.25, 1.6, 0.75)
     field_of_view: float = 1.1
+    gzip: bool = False
     format: Literal["vrml", "gltf"] = "vrml"
 
     def __post_init__(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,39 +40,46 @@ def root_text(
         f"WorldInfo {{\n  title {quoted(options.title)}\n  info {listed(info, 1)}\n}}\n",
         f'NavigationInfo {{ type [ "WALK", "ANY" ] avatarSize [ {avatar} ] headlight TRUE }}\n',
     ]
-    parts += [_viewpoint(v) for v in viewpoints]
+    parts += _viewpoints(viewpoints)
     parts += [
         f"PTMViewpointCell {{ viewpoint {quoted(v.name)} cellUrl [ {quoted(cell_path(v.cell))} ]"
         " }\n"
         for v in viewpoints
     ]
-    for cell, box in enumerate(boxes):
-        centre, size = _centred(box)
-        parts.append(
-            f"Inline {{ url [ {quoted(cell_path(cell))} ]"
-            f" bboxCenter {_vector(centre)} bboxSize {_vector(size)} }}\n"
-        )
+    for cell, (centre, size) in enumerate(_vectors(*_centred(np.array(boxes)))):
+        url = quoted(cell_path(cell))
+        parts.append(f"Inline {{ url [ {url} ] bboxCenter {centre} bboxSize {size} }}\n")
     return "".join(parts)
 
 
-def _viewpoint(v: Viewpoint) -> str:
-    position = single(v.position, f"viewpoint {v.name}")
-    turn = single(v.orientation, f"viewpoint {v.name}")
-    return (
-        f"DEF {v.name} Viewpoint {{ position {_vector(position)} orientation {_vector(turn)}"
-        f" fieldOfView {numeral(v.field_of_view)} description {quoted(v.description)} }}\n"
-    )
+def _viewpoints(viewpoints: Sequence[Viewpoint]) -> Iterator[str]:
+    numbers = [
+        single([getattr(v, field) for v in viewpoints], "viewpoints").reshape(len(viewpoints), -1)
+        for field in ("position", "orientation", "field_of_view")
+    ]
+    for v, (position, turn, field) in zip(viewpoints, _vectors(*numbers), strict=True):
+        yield (
+            f"DEF {v.name} Viewpoint {{ position {position} orientation {turn}"
+            f" fieldOfView {field} description {quoted(v.description)} }}\n"
+        )
 
 
-def _vector(v: NDArray[np.float32]) -> str:
-    return " ".join(numerals(v))
+def _vectors(*arrays: NDArray[np.float32]) -> Iterator[tuple[str, ...]]:
+    """Row by row the text of each of (n, k) arrays."""
+    text = numerals(np.concatenate([array.ravel() for array in arrays]))
+    rows, at = [], 0
+    for n, k in (array.shape for array in arrays):
+        rows.append([" ".join(text[i : i + k]) for i in range(at, at + n * k, k)])
+        at += n * k
+    return zip(*rows, strict=True)
 
 
-def _centred(box: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Centre and size in float32 that together hold the box: the size is rounded up."""
-    low, high = box.astype(np.float64)
-    centre = single((low + high) / 2, "bounding box")
+def _centred(boxes: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Centres and sizes (n, 3) in float32 that together hold the boxes (n, 2, 3): sizes are rounded
+    up."""
+    low, high = np.moveaxis(boxes.astype(np.float64), 1, 0)
+    centre = single((low + high) / 2, "bounding boxes")
     half = np.maximum(high - centre, centre - low)
-    size = single(2 * half, "bounding box")
+    size = single(2 * half, "bounding boxes")
     short = size.astype(np.float64) < 2 * half
     return centre, np.where(short, np.nextafter(size, np.float32(np.inf)), size)

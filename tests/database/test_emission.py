@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import os
 import re
@@ -19,10 +20,14 @@ from ptmtools.database import (
     GivenViewpoint,
     TextureLevel,
     TextureRecord,
+    cellfile,
     emit,
     validate_database,
 )
+from ptmtools.database.cellfile import CellWriter
 from ptmtools.database.names import DefNames
+from ptmtools.database.rounding import significant
+from ptmtools.database.served import compressed
 from ptmtools.database.wrl import Node, parse
 from ptmtools.errors import DatabaseError, InputError, OutputError
 from ptmtools.scene.model import Material
@@ -139,6 +144,100 @@ def test_same_bytes_again(artifacts, tmp_path: Path) -> None:
     for name in first.files:
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
     assert first.bytes == sum((tmp_path / "a" / n).stat().st_size for n in first.files)
+
+
+def test_compressed_twins(artifacts, tmp_path: Path) -> None:
+    """Of each text a gzip file without name and time, listed after it; the texts are the same."""
+    plain = write(artifacts, tmp_path / "plain", EmitOptions(format="gltf"))
+    options = EmitOptions(format="gltf", gzip=True)
+    twice = [write(artifacts, tmp_path / n, options) for n in ("a", "b")]
+    assert twice[0] == twice[1]
+    text = [n for n in plain.files if n.endswith((".wrl", ".json"))]
+    assert len(text) == 3 + 3, "cells, a root and two hints"
+    wanted = [twin for n in plain.files for twin in ([n, f"{n}.gz"] if n in text else [n])]
+    assert list(twice[0].files) == wanted
+    for name in plain.files:
+        data = (tmp_path / "plain" / name).read_bytes()
+        assert (tmp_path / "a" / name).read_bytes() == data
+        if name in text:
+            packed = (tmp_path / "a" / f"{name}.gz").read_bytes()
+            assert gzip.decompress(packed) == data
+            assert packed[:10] == bytes([0x1F, 0x8B, 8, 0, 0, 0, 0, 0, 2, 255])
+            assert (tmp_path / "b" / f"{name}.gz").read_bytes() == packed
+            assert len(packed) < len(data)
+    assert twice[0].bytes == sum((tmp_path / "a" / n).stat().st_size for n in wanted)
+    a = artifacts
+    emit(a.scene, a.cells, a.pvs, a.ach, records(), tmp_path / "a", EmitOptions(), force=True)
+    assert not list((tmp_path / "a").glob("*.gz")), "none is left of another emission"
+
+
+def test_compressing_nothing_and_much() -> None:
+    for data in (b"", bytes(3_000_000), os.urandom(100_000)):
+        assert gzip.decompress(compressed(data)) == data
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_compiled_loops_write_the_same(artifacts, finished: Path, compiled: bool) -> None:
+    a = artifacts
+    of_image = {record.image: record for record in records()}
+    writer = CellWriter(a.scene, a.cells, a.pvs, a.ach.value, of_image, True, compiled)
+    for c in (2, 0, 1):
+        wanted = (finished / f"www/cells/c000{c}.wrl").read_text()
+        assert writer.cell(c).text == wanted
+
+
+def test_batches_of_shapes(artifacts, finished: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many shapes are written at a time, a file is the same."""
+    a = artifacts
+    of_image = {record.image: record for record in records()}
+    for size in (1, 9, 30):
+        monkeypatch.setattr(cellfile, "_BATCH", size)
+        writer = CellWriter(a.scene, a.cells, a.pvs, a.ach.value, of_image, True)
+        for c in (0, 1, 2):
+            wanted = (finished / f"www/cells/c000{c}.wrl").read_text()
+            assert writer.cell(c).text == wanted
+
+
+def test_the_level_of_the_twin(artifacts, tmp_path: Path) -> None:
+    a, (first, second) = artifacts, records()
+    level = TextureLevel(1, 1, 64, 5, 3)
+    given = (replace(first, levels=(level,) * 3), replace(second, levels=(level,) * 4))
+    lower = (replace(given[0], fallback_level=1), replace(given[1], fallback=None))
+    for some, fallback, levels in (
+        (given, True, [2, 3]),
+        (lower, True, [1, None]),
+        (lower, False, [None, None]),
+    ):
+        out = tmp_path / f"{fallback}{levels}"
+        emit(a.scene, a.cells, a.pvs, a.ach, some, out, EmitOptions(fallback=fallback))
+        hints = json.loads((out / "hints.json").read_text())
+        assert [t["fallbackLevel"] for t in hints["textures"]] == levels
+
+
+def test_significant_digits() -> None:
+    """As text rounds, ties and all."""
+    random = np.random.default_rng(1)
+    whole = random.integers(0, 10**6, 4000)
+    patterns = random.integers(0, 2**64, 4000, dtype=np.uint64).view(np.float64)
+    values = np.concatenate(
+        [
+            random.random(4000),
+            10.0 ** random.uniform(-320, 308, 4000),
+            whole + 0.5,
+            whole * 10 + 5,
+            (whole * 10 + 5) / 10.0 ** random.integers(0, 20, 4000),
+            patterns[np.isfinite(patterns)],
+            [0.0, -0.0, 5e-324, 99999.5, 99999.4999, 1e22, 1e23, 1.7e308],
+        ]
+    )
+    values = np.concatenate([values, -values, np.nextafter(values, 0), np.nextafter(values, 1e300)])
+    for digits in (1, 5, 8):
+        wanted = np.array([float(f"{v:.{digits}g}") for v in values])
+        np.testing.assert_array_equal(
+            significant(values, digits).view(np.int64), wanted.view(np.int64)
+        )
+    odd = np.array([[np.nan, np.inf], [-np.inf, 1.23456]])
+    np.testing.assert_array_equal(significant(odd, 2), [[np.nan, np.inf], [-np.inf, 1.2]])
 
 
 def test_an_empty_cell_has_a_file(artifacts, tmp_path: Path) -> None:
