@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from ptmtools.errors import InputError
@@ -13,8 +15,14 @@ if TYPE_CHECKING:
     import numpy as np
 
 MAGIC = b"\x93NUMPY"
-#: Longest head that is read, bytes, and the largest side that is printed.
-_HEAD_MAX, _SIDE_MAX = 1 << 16, 1 << 63
+#: Longest head that is read, bytes, and the largest side that an array may have.
+_HEAD_MAX, _SIDE_MAX = 1 << 16, (1 << 63) - 1
+#: The fields of a head; old numpys wrote an L behind numbers.
+_FIELDS = (
+    re.compile(rb"""['"]descr['"]\s*:\s*['"]([<>=|]?[A-Za-z]\d{0,4})['"]"""),
+    re.compile(rb"""['"]fortran_order['"]\s*:\s*(True|False)"""),
+    re.compile(rb"""['"]shape['"]\s*:\s*\(((?:\s*\d{1,19}L?\s*,){0,9}\s*(?:\d{1,19}L?)?)\s*\)"""),
+)
 
 
 def read_npy(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
@@ -55,21 +63,33 @@ def read_npy(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
 
 
 def _head(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-    """Shape, whether columns come first, type; the file then stands at the samples."""
-    from numpy.lib import format as npy
+    """Shape, whether columns come first, type; the file then stands at the samples.
 
-    file.seek(0)
+    The head is Python's notation of a dictionary. It is matched: numpy's reader evaluates it, which
+    some heads make run out of memory.
+    """
+    import numpy as np
+
+    file.seek(len(MAGIC))
     try:
-        version = npy.read_magic(file)
-        size = 2 if version == (1, 0) else 4
-        if int.from_bytes(file.read(size), "little") > _HEAD_MAX:
-            raise ValueError("a head that is too long")
-        file.seek(-size, 1)
-        # The third version differs in the names of fields only, and texels have none.
-        read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        shape, in_columns, dtype = read(file)
-        if not all(0 <= side < _SIDE_MAX for side in shape):
-            raise ValueError("an impossible shape")
-        return shape, in_columns, dtype
-    except Exception as error:  # a head that is no literal, or ends too early
-        raise damaged_image(error) from None
+        major, _ = file.read(2)
+        size = int.from_bytes(file.read(2 if major == 1 else 4), "little")
+        if not 1 <= major <= 3 or size > _HEAD_MAX:
+            raise ValueError("a head of another version, or too long")
+        text = file.read(size)
+        descr, order, sides = (found[1].decode() for found in map(_field(text), _FIELDS))
+        shape = tuple(int(side.rstrip("L")) for side in sides.replace(" ", "").split(",") if side)
+        if len(text) < size or max(shape, default=0) > _SIDE_MAX:
+            raise ValueError("an impossible shape, or the end of the file")
+        return shape, order == "True", np.dtype(descr)
+    except (TypeError, ValueError) as error:
+        raise damaged_image(error or "in its head") from None
+
+
+def _field(text: bytes) -> Callable[[re.Pattern[bytes]], re.Match[bytes]]:
+    def find(field: re.Pattern[bytes]) -> re.Match[bytes]:
+        if found := field.search(text):
+            return found
+        raise ValueError("a head that is none of an array of numbers")
+
+    return find
