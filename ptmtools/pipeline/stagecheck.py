@@ -7,7 +7,7 @@ although the hash is right: a manifest repaired by hand, a stage replaced by tha
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -128,8 +128,11 @@ class _DamageError(Exception):
         super().__init__(message)
 
 
-def check_stages(folder: Path, manifest: Manifest) -> tuple[Issue, ...]:
-    """What is wrong with the stages that have run, as far as their hashes are right."""
+def check_stages(
+    folder: Path, manifest: Manifest, astray: Collection[str] = ()
+) -> tuple[Issue, ...]:
+    """What is wrong with the stages that have run, as far as their hashes are right; ``astray``
+    are files of which that is known not to be so."""
     found = Findings()
     sizes: dict[str, int] = {}
     true: dict[str, dict[str, Any]] = {}
@@ -149,7 +152,7 @@ def check_stages(folder: Path, manifest: Manifest) -> tuple[Issue, ...]:
     if "scene" in manifest.stages:
         true.setdefault("scene", {})["images"] = _check_images(folder, manifest, found)
     for stage in ("textures", "emit"):
-        if stage in manifest.stages:
+        if stage in manifest.stages and not manifest.stages[stage].outputs.keys() & set(astray):
             true[stage] = _sizes_on_disk(folder, manifest, stage)
     for stage, figures in true.items():
         counts = manifest.stages[stage].counts

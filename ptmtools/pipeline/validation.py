@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells import Cells, SubdivideOptions, structural_triangles
-from ptmtools.database import Issue, ValidationReport, validate_database, validate_ptm
+from ptmtools.database import ValidationReport, validate_database, validate_ptm
 from ptmtools.errors import DatabaseError
 from ptmtools.pipeline.folder import DatabaseFolder
 from ptmtools.pipeline.run import Artifacts
@@ -40,15 +40,19 @@ def validate(
     """
     if not Path(target).is_dir():
         return validate_ptm(target, limits=limits)
-    stages: tuple[Issue, ...] = ()
+    manifest = None
     try:
-        stages = check_stages(Path(target), DatabaseFolder.open(target).manifest)
+        manifest = DatabaseFolder.open(target).manifest
     except DatabaseError as fault:
         if fault.code != "PTM-D002":  # a damaged manifest is a finding among others
             raise
     report = validate_database(target, progress, limits=limits, workers=workers)
-    issues = sorted((*report.issues, *stages), key=lambda issue: (issue.file, issue.code))
-    return replace(report, issues=tuple(issues))
+    if manifest is None:
+        return report
+    astray = {issue.file for issue in report.issues}
+    issues = (*report.issues, *check_stages(Path(target), manifest, astray))
+    by_file = sorted(issues, key=lambda issue: (issue.file, issue.code))
+    return replace(report, issues=tuple(by_file))
 
 
 def shoot_segments(

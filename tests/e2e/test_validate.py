@@ -1,0 +1,177 @@
+"""`ptm validate` as a user runs it: what the builds leave is good, and faults end it with 8."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from ptmtools import schemas
+from ptmtools.pipeline.folder import sha256
+from tests.e2e.conftest import TWO_ROOMS, Ptm
+
+ROOT = Path(__file__).parents[2]
+MODEL = TWO_ROOMS / "two_rooms.obj"
+
+
+def issues(ptm: Ptm, db: Path, *options: str) -> tuple[int, set[str]]:
+    """The exit status, and the codes of what is found."""
+    done = ptm("validate", db, "--json", *options)
+    report = json.loads(done.out)
+    schemas.check(report, schemas.VALIDATION)
+    assert report["ok"] is (done.status == 0)
+    return done.status, {issue["code"] for issue in report["issues"]}
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        "",
+        "--cells leaf",
+        "--no-fallback",
+        "--fallback-size 100",
+        "--gzip",
+        "--format gltf --gzip",
+        "--per-texture --samples 4",
+        "--unit 1e-6",
+        "--unit 1e6",
+    ],
+)
+def test_what_is_built_is_good(ptm: Ptm, tmp_path: Path, options: str) -> None:
+    db = tmp_path / "db"
+    assert ptm("-q", "build-scene", MODEL, "-o", db, *options.split()).status == 0
+    assert issues(ptm, db, "--strict") == (0, set())
+
+
+def test_the_smallest_museum_is_good(ptm: Ptm, tmp_path: Path) -> None:
+    script, sizes = ROOT / "sample_data/make_museum.py", "--rooms 1 --textures 9 --size 64"
+    made = [sys.executable, str(script), "-o", str(tmp_path / "model"), *sizes.split()]
+    subprocess.run(made, check=True, capture_output=True, timeout=300)
+    db = tmp_path / "db"
+    model = tmp_path / "model/museum.obj"
+    assert ptm("-q", "build-scene", model, "-o", db, "--gzip", "--format", "gltf").status == 0
+    assert issues(ptm, db, "--strict") == (0, set())
+
+
+Damage = Callable[[Path], object]
+
+
+def resealed(*damages: Damage) -> Damage:
+    """Damages, of which the manifest knows nothing: hashes and counts are brought up to date."""
+
+    def damage(db: Path) -> None:
+        for each in damages:
+            each(db)
+        path = db / "manifest.json"
+        document = json.loads(path.read_text())
+        stages = document["stages"]
+        for stage in stages.values():
+            stage["outputs"] = {n: sha256((db / n).read_bytes()) for n in stage["outputs"]}
+        known = {name: h for stage in stages.values() for name, h in stage["outputs"].items()}
+        for stage in stages.values():
+            stage["inputs"] = {n: known.get(n, h) for n, h in stage["inputs"].items()}
+        emitted = stages["emit"]
+        emitted["counts"]["bytes"] = sum((db / n).stat().st_size for n in emitted["outputs"])
+        path.write_text(json.dumps(document))
+
+    return damage
+
+
+def replaced(name: str, old: str, new: str) -> Damage:
+    def damage(db: Path) -> None:
+        path = db / name
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new, 1))
+
+    return damage
+
+
+def spoilt(name: str) -> Damage:
+    def damage(db: Path) -> None:
+        path = db / name
+        data = bytearray(path.read_bytes())
+        data[len(data) // 2] ^= 1
+        path.write_bytes(data)
+
+    return damage
+
+
+def stages(change: Callable[[dict], object]) -> Damage:
+    """Changes the stages in the manifest."""
+
+    def damage(db: Path) -> None:
+        path = db / "manifest.json"
+        document = json.loads(path.read_text())
+        change(document["stages"])
+        path.write_text(json.dumps(document))
+
+    return damage
+
+
+def copied(name: str, other: str) -> Damage:
+    return lambda db: shutil.copy(db / name, db / other)
+
+
+C0 = "www/cells/c0000.wrl"
+FAULTS: dict[str, tuple[int, str, Damage]] = {
+    "a file is gone": (8, "D651 D672", lambda db: (db / "www/cells/c0001.wrl").unlink()),
+    "a file is changed": (8, "D652", replaced("www/root.wrl", "ptmtools database", "Museum")),
+    "a file is put there": (0, "D653", lambda db: (db / "www/mine").write_text("mine")),
+    "a stage is exchanged": (8, "D652", spoilt("stages/pvs.npz")),
+    "a stage is damaged, its hash not": (8, "D720", resealed(spoilt("stages/cells.npz"))),
+    "a count is wrong": (8, "D659", stages(lambda s: s["cells"]["counts"].update(leaves=4))),
+    "a stage is stale": (
+        8,
+        "D656",
+        stages(lambda s: s["pvs"]["inputs"].update({"stages/cells.npz": "0" * 64})),
+    ),
+    "a URL leads nowhere": (8, "D671", resealed(replaced(C0, "room_a.ptm", "room_c.ptm"))),
+    "a cell does not see another": (
+        8,
+        "D691 D695 D696 D701",
+        resealed(replaced(C0, '[ "c0000.wrl", "c0001.wrl" ]', '[ "c0000.wrl" ]')),
+    ),
+    "hints are no hints": (8, "D700", resealed(replaced("www/hints.json", '"unit"', '"units"'))),
+    "a texture is damaged": (8, "D704 D710", resealed(spoilt("www/textures/floor.ptm"))),
+    "a twin is another image": (
+        8,
+        "D711",
+        resealed(copied("www/textures/room_b.png", "www/textures/room_a.png")),
+    ),
+    "a twin is too much": (
+        0,
+        "D653 D677",
+        copied("www/textures/floor.png", "www/textures/more.png"),
+    ),
+    "a bomb": (
+        8,
+        "D653 D676",
+        lambda db: (db / "www/root.wrl.gz").write_bytes(gzip.compress(bytes(1 << 24))),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_planted_faults(ptm: Ptm, database: Path, name: str) -> None:
+    status, expected, damage = FAULTS[name]
+    damage(database)
+    codes = {f"PTM-{code}" for code in expected.split()}
+    assert issues(ptm, database) == (status, codes)
+    assert issues(ptm, database, "--strict") == (8, codes)
+    told = ptm("validate", database)
+    assert told.status == status
+    assert all(code in told.out for code in codes)
+    assert ("PTM-C001" in told.err) is (status == 8)
+
+
+def test_what_is_no_database(ptm: Ptm, tmp_path: Path) -> None:
+    done = ptm("validate", tmp_path)
+    assert (done.status, done.out) == (5, "")
+    assert "PTM-D001" in done.err
