@@ -34,12 +34,14 @@ class FileReading:
     ----------
     found: what is wrong with it by itself.
     size: bytes; None if it could not be read.
+    intact: whether its hash is the one in the manifest.
     document, hints, texture: what it holds, if it is such a file and could be read.
     kept: its bytes, if the check of the glTF files asks for them.
     """
 
     found: Findings = field(default_factory=Findings)
     size: int | None = None
+    intact: bool = False
     document: Document | None = None
     hints: ReadHints | None = None
     texture: ReadTexture | None = None
@@ -82,6 +84,7 @@ class FileReader:
             reading.found.add("PTM-D654", name, "", told)
             return reading
         reading.size = size
+        reading.intact = self._outputs.get(name) == digest
         if self._outputs and name not in self._outputs:
             reading.found.add("PTM-D653", name, "", "served, but no stage wrote it")
         elif self._outputs.get(name, digest) != digest:

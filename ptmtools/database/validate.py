@@ -13,11 +13,13 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ptmtools import schemas
 from ptmtools.database.cellcheck import ReadCell, check_cell, read_cell
+from ptmtools.database.countcheck import check_counts
 from ptmtools.database.filecheck import check_names, served_files
 from ptmtools.database.filereading import SERVED, FileReader
 from ptmtools.database.findings import Findings
@@ -108,6 +110,8 @@ class _Check:
         self._folder = folder
         self._limits = limits
         self._outputs: dict[str, str] = {}
+        self._stages: dict[str, dict[str, Any]] = {}
+        self._sizes: dict[str, int] = {}
         self._served: set[str] = set()
         self._urls = Urls(SERVED, (), self.found)
         self._documents: dict[str, Document] = {}
@@ -132,6 +136,7 @@ class _Check:
         self._check_cells()
         root = self._check_root()
         self._check_hints(root)
+        check_counts(self._stages, self._sizes, self._textures, self._documents, self.found)
         self._gltf.compare(self._served, self._documents, self._urls.resolve)
         for name in sorted(self._served - self._urls.named):
             if name.startswith(f"{TEXTURE_FOLDER}/"):
@@ -156,6 +161,7 @@ class _Check:
                 told = f"another stage has written {name}, too"
                 self.found.add("PTM-D650", MANIFEST, f"stages.{stage}", told)
             self._outputs |= record["outputs"]
+            self._stages[stage] = record
         for stage, record in stages.items():
             for name, digest in record["inputs"].items():
                 if self._outputs.get(name, digest) != digest:
@@ -176,10 +182,12 @@ class _Check:
                 continue
             self.files += 1
             self.bytes += reading.size
+            if reading.intact:
+                self._sizes[name] = reading.size
             if reading.document is not None:
                 self._documents[name] = reading.document
             if reading.texture is not None:
-                self._textures[name.removeprefix(f"{SERVED}/")] = reading.texture
+                self._textures[name] = reading.texture
             if reading.hints is not None:
                 self._hints = reading.hints
             if reading.kept is not None:
@@ -239,7 +247,7 @@ class _Check:
         for i, (record, path) in enumerate(zip(hints.textures, files, strict=True)):
             twin = record["fallback"]
             images.append((path,) if twin is None else (urls.resolve(name, twin), path))
-            texture = None if path is None else self._textures.get(path)
+            texture = None if path is None else self._textures.get(f"{SERVED}/{path}")
             if texture is not None:
                 check_record(record, texture, name, f"textures[{i}]", self.found)
         check_against_cells(hints, known, images, self._cells, cell_images, name, self.found)

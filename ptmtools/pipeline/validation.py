@@ -40,17 +40,16 @@ def validate(
     """
     if not Path(target).is_dir():
         return validate_ptm(target, limits=limits)
-    manifest = None
+    db = None
     try:
-        manifest = DatabaseFolder.open(target).manifest
+        db = DatabaseFolder.open(target)
     except DatabaseError as fault:
         if fault.code != "PTM-D002":  # a damaged manifest is a finding among others
             raise
     report = validate_database(target, progress, limits=limits, workers=workers)
-    if manifest is None:
+    if db is None:
         return report
-    astray = {issue.file for issue in report.issues}
-    issues = (*report.issues, *check_stages(Path(target), manifest, astray))
+    issues = (*report.issues, *check_stages(db, {issue.file for issue in report.issues}))
     by_file = sorted(issues, key=lambda issue: (issue.file, issue.code))
     return replace(report, issues=tuple(by_file))
 

@@ -562,7 +562,7 @@ def test_shares_of_known_textures_are_no_fault(
     assert told(database) == []
 
 
-# Faults of which the hashes are the witness
+# Faults of which the manifest is the witness
 
 
 def test_what_the_manifest_says(database: Path) -> None:
@@ -603,6 +603,38 @@ def with_stage(db: Path, name: str, **record: object) -> None:
     for field, value in record.items():
         stage[field] |= value
     path.write_text(json.dumps(document))
+
+
+GOOD_COUNTS = {
+    "textures": {"textures": 2, "ptm_bytes": None, "raw_bytes": 16 * 24 * 3 + 9 * 5 * 4},
+    "emit": {"files": 5, "bytes": None, "shapes": None, "triangles": None, "viewpoints": 3},
+}
+
+
+@pytest.mark.parametrize("stage", GOOD_COUNTS)
+def test_counts(database: Path, stage: str) -> None:
+    served = database / "www"
+    counts = dict(GOOD_COUNTS[stage])
+    if stage == "textures":
+        counts["ptm_bytes"] = sum(p.stat().st_size for p in served.glob("textures/*.ptm"))
+    else:
+        text = "".join(p.read_text() for p in served.glob("cells/*.wrl"))
+        files = (*served.glob("*.*"), *served.glob("cells/*.wrl"))
+        counts["bytes"] = sum(p.stat().st_size for p in files)
+        counts["shapes"] = text.count(" Shape {")
+        counts["triangles"] = sum(
+            index.count("-1") for index in re.findall(r" coordIndex [^]]*", text)
+        )
+    with_stage(database, stage, counts=counts)
+    assert told(database) == []
+    for name, count in counts.items():
+        with_stage(database, stage, counts={name: count + 1})
+        (issue,) = validate_database(database).issues
+        assert (issue.code, issue.place) == ("PTM-D659", f"stages.{stage}.counts.{name}")
+        with_stage(database, stage, counts={name: count})
+    appended("textures/b.ptm" if stage == "textures" else ROOT, b"\n")(database)
+    with_stage(database, stage, counts=dict.fromkeys(counts, -1))
+    assert "PTM-D659" not in codes(database), "where a file is not as it was, nothing is counted"
 
 
 def test_a_stale_stage(database: Path) -> None:
