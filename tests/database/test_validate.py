@@ -472,6 +472,7 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D704", hinted(lambda d: d["textures"][0].update(components=4))),
     ("D704", hinted(lambda d: d["textures"][0].update(fallbackLevel=0))),
     ("D704", hinted(lambda d: d["textures"][0].update(fallbackLevel=99))),
+    ("D704", hinted(lambda d: d["textures"][0].update(fallbackLevel=None))),
     ("D704", coarser(1)),
     ("D704 D711", recoded(lambda texels: texels[:, ::-1])),
     ("D705", cell(1, lambda c: c["portals"].pop())),

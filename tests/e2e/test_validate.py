@@ -35,7 +35,7 @@ def issues(ptm: Ptm, db: Path, *options: str) -> tuple[int, set[str]]:
         "",
         "--cells leaf",
         "--no-fallback",
-        "--fallback-size 100",
+        "--fallback-size 16",
         "--gzip",
         "--format gltf --gzip",
         "--per-texture --samples 4",
