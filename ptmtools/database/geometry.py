@@ -67,24 +67,21 @@ class Geometry:
         self.collapsed = int(flat.sum())
         piece, cell, corner = piece[~flat], cell[~flat], corner[~flat]
         source = cells.triangle_source[piece]
-        key = np.stack(
-            [
-                cell,
-                scene.triangle_object[source],
-                scene.triangle_material[source],
-                scene.two_sided[source],
-            ]
-        )
-        order = np.lexsort((piece, *key[::-1]))
-        key = key[:, order]
+        thing, material = scene.triangle_object[source], scene.triangle_material[source]
+        things, materials = max(len(scene.objects), 1), max(len(scene.materials), 1)
+        key = cell.astype(np.int64) * things + thing
+        key = (key * materials + material) * 2 + scene.two_sided[source]
+        order = np.argsort(key, kind="stable")
+        key = key[order]
         change = np.ones(len(order), dtype=np.bool_)
-        change[1:] = (key[:, 1:] != key[:, :-1]).any(axis=0)
+        change[1:] = key[1:] != key[:-1]
         first = np.flatnonzero(change)
         shape = np.cumsum(change) - 1
-        self.object, self.material = key[1, first], key[2, first]
-        self.two_sided = key[3, first] > 0
+        one = order[first]
+        self.object, self.material = thing[one], material[one]
+        self.two_sided = scene.two_sided[source[one]]
         self.triangle_start = np.append(first, len(order))
-        self.cell_start = np.searchsorted(key[0, first], np.arange(cells.cell_count + 1))
+        self.cell_start = np.searchsorted(cell[one], np.arange(cells.cell_count + 1))
         self.shape_point, self.point_start, self.triangle = _indexed(
             corner[order], shape, len(first), len(self.point)
         )
@@ -119,11 +116,17 @@ def _indexed(
 
 
 def _welded(rows: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """The distinct rows in lexical order, and the place of each row among them."""
-    rank = np.zeros(len(rows), dtype=np.int64)
-    for column in rows.T:
-        distinct, place = np.unique(column, return_inverse=True)
-        _, rank = np.unique(rank * len(distinct) + place, return_inverse=True)
-    welded = np.empty((int(rank.max(initial=-1)) + 1, rows.shape[1]), dtype=np.float32)
-    welded[rank] = rows
-    return welded, rank
+    """The distinct rows of (n, 2 or more) in lexical order, and the place of each row among them.
+
+    Floats become integers of the same order, two of which are sorted as one.
+    """
+    bits = np.ascontiguousarray(rows.T).view(np.uint32)
+    negative = bits >> np.uint32(31) == 1
+    columns = np.where(negative, ~bits, bits | np.uint32(1 << 31)).astype(np.uint64)
+    rank = columns[0]
+    for column in columns[1:]:
+        _, place = np.unique((rank << np.uint64(32)) | column, return_inverse=True)
+        rank = place.astype(np.uint64)
+    welded = np.empty((int(place.max(initial=-1)) + 1, rows.shape[1]), dtype=np.float32)
+    welded[place] = rows
+    return welded, place.astype(np.int64)

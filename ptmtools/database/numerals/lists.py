@@ -1,8 +1,9 @@
 """The rows of arrays as the contents of multiple-valued fields, many lists at a time.
 
 Rows are parted by a comma, or by a line's end after so many of them: one character, which VRML97
-reads as white space. A scene of usual size takes longer to load the compiled loops (0.3 s) than to
-write; there every distinct row becomes a string once, and lists are joined. The text is the same.
+reads as white space. A scene of usual size takes less time than loading the compiled loops (0.5 s
+with numba itself): there every distinct row becomes a string once, and lists are joined. The text
+is the same.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from ptmtools.database.numerals.decimals import LONGEST, numerals
 
 #: From this many numbers in the lists on the compiled loops are worth their loading.
-WORTHWHILE = 600_000
+WORTHWHILE = 1_500_000
 
 
 class Rows:
