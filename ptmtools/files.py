@@ -24,6 +24,9 @@ from typing import IO, BinaryIO
 
 from ptmtools.errors import OutputError
 
+#: So many folders may lie in each other below a root.
+_DEEPEST = 64
+
 
 def write_bytes(path: str | os.PathLike[str], data: bytes, *, force: bool = False) -> None:
     """Write ``data`` to ``path``; an existing file is replaced only with ``force``.
@@ -194,10 +197,16 @@ def _steps(root: Path, relative: str | os.PathLike[str]) -> list[str]:
     """The components of a relative name, none of which leads out on any system."""
     name = Path(relative).as_posix() if isinstance(relative, os.PathLike) else relative
     steps = [] if name in ("", ".") else name.split("/")
-    if "\\" in name or "\0" in name or ":" in name or {"", ".", ".."} & set(steps):
+    if (
+        "\\" in name
+        or "\0" in name
+        or ":" in name
+        or {"", ".", ".."} & set(steps)
+        or len(steps) > _DEEPEST
+    ):
         raise OutputError(
             "PTM-O002",
-            f"{name!r} would lead out of the folder",
+            f"{name[:80]!r} would lead out of the folder, or too deep into it",
             file=root,
             remedy="nothing was written; the name comes from a damaged file",
         )

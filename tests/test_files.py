@@ -149,7 +149,19 @@ def test_a_file_in_place_of_a_folder_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["..", "a/../b", "/etc", "a//b", "./a", "a/", "a\\b", "C:a", "\\\\host\\share", "a\0b"],
+    [
+        "a/" * 64 + "b",
+        "..",
+        "a/../b",
+        "/etc",
+        "a//b",
+        "./a",
+        "a/",
+        "a\\b",
+        "C:a",
+        "\\\\host\\share",
+        "a\0b",
+    ],
 )
 def test_names_that_lead_out_are_refused(name: str, tmp_path: Path) -> None:
     for what in (real_folder, real_file):

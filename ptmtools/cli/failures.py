@@ -7,6 +7,7 @@ import sys
 
 import click
 
+from ptmtools.cli.output import printable
 from ptmtools.errors import PtmError
 
 #: Exit statuses beside those of the error classes; see `ptmtools.errors`.
@@ -22,7 +23,7 @@ def report(fault: BaseException, verbose: bool) -> int:
     """Says what went wrong, with ``verbose`` where; returns the exit status."""
     status, line = describe(fault)
     if line:
-        print(f"ptm: {line}", file=sys.stderr)
+        print(f"ptm: {printable(line)}", file=sys.stderr)
     if verbose and not isinstance(fault, click.ClickException | SystemExit):
         import traceback
 

@@ -32,11 +32,11 @@ class Voice:
     def say(self, text: str) -> None:
         """A line of the result, on stdout."""
         if not self.quiet:
-            click.echo(text, err=self.aside)
+            click.echo(printable(text), err=self.aside)
 
     def warn(self, text: str) -> None:
         """A line on stderr, of what is wrong and does not stop the command."""
-        click.echo(f"ptm: {text}", err=True)
+        click.echo(f"ptm: {printable(text)}", err=True)
 
     def emit_json(self, document: Any) -> None:
         """The result as JSON on stdout; ``--quiet`` does not silence what was asked for. What is
@@ -44,7 +44,7 @@ class Voice:
         import json
 
         text = json.dumps(_finite(document), indent=1, ensure_ascii=False, allow_nan=False)
-        click.echo(text, err=self.aside)
+        click.echo(text.encode("utf-8", "backslashreplace"), err=self.aside)
 
     @contextmanager
     def progress(self) -> Iterator[Progress]:
@@ -68,6 +68,17 @@ class Voice:
                 bars.update(task[what], completed=done, total=total)
 
             yield tell
+
+
+def printable(text: str) -> str:
+    """A text without what terminals obey, which names of models and files may hold; line ends and
+    tabs stay. What no file can be written with is escaped too."""
+    if text.isprintable():
+        return text
+    return "".join(
+        letter if letter.isprintable() or letter in "\n\t" else ascii(letter)[1:-1]
+        for letter in text
+    )
 
 
 def _finite(value: Any) -> Any:

@@ -281,8 +281,14 @@ def _invoked() -> str:
 
 
 def figures(stage: str, counts: Mapping[str, Any]) -> str:
-    """What a stage made, on one line."""
-    n = counts
+    """What a stage made, on one line. A manifest may say anything."""
+    try:
+        return _figures(stage, counts)
+    except (ArithmeticError, LookupError, TypeError, ValueError):
+        return "figures that make no sense"
+
+
+def _figures(stage: str, n: Mapping[str, Any]) -> str:
     match stage:
         case "scene":
             guessed = [w for w, k in (("unit", "unit_guessed"), ("up axis", "up_guessed")) if n[k]]

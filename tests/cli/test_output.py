@@ -1,0 +1,70 @@
+"""What is said: nothing that a terminal obeys, and nothing that cannot be written."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from ptmtools.cli.main import main
+from ptmtools.cli.output import Voice, printable
+from ptmtools.cli.scenes import figures
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("Tür ☃ 壁\tund\nmehr", "Tür ☃ 壁\tund\nmehr"),
+        ("\x1b[2J\x07", "\\x1b[2J\\x07"),
+        ("a\rb\x00\x7f\x9b", "a\\rb\\x00\\x7f\\x9b"),
+        ("\u202egnp.a", "\\u202egnp.a"),
+        (os.fsdecode(b"\xff.png") + "\ud800", "\\udcff.png\\ud800"),
+    ],
+)
+def test_names_are_shown_harmlessly(
+    text: str, shown: str, capsysbinary: pytest.CaptureFixture[bytes]
+) -> None:
+    assert printable(text) == shown
+    Voice().say(text)
+    Voice().warn(text)
+    told = capsysbinary.readouterr()
+    assert told.out.decode() == shown + "\n"
+    assert told.err.decode() == f"ptm: {shown}\n"
+
+
+def test_json_of_what_is_no_text(capsysbinary: pytest.CaptureFixture[bytes]) -> None:
+    document = {"name": "\ud800\x1b ☃"}
+    Voice().emit_json(document)
+    out = capsysbinary.readouterr().out
+    assert json.loads(out) == document
+    assert "☃".encode() in out
+    assert b"\x1b" not in out
+
+
+@pytest.mark.parametrize("name", [b"\x1b[2J.png", b"\xff.png", b"a\nb.png"])
+def test_errors_about_odd_files(
+    name: bytes, tmp_path: Path, capsysbinary: pytest.CaptureFixture[bytes]
+) -> None:
+    path = tmp_path / os.fsdecode(name)
+    path.write_bytes(b"no image\n")
+    assert main(["encode", str(path)]) == 3
+    err = capsysbinary.readouterr().err
+    assert err.count(b"\n") == 1
+    assert b"\x1b" not in err
+    err.decode()
+
+
+@pytest.mark.parametrize("stage", ["scene", "cells", "pvs", "ach", "textures", "emit"])
+@pytest.mark.parametrize("value", [None, "x", {}, [], "9", float("inf")])
+def test_figures_of_a_damaged_manifest(stage: str, value: object) -> None:
+    """Whatever the manifest says, a line comes out."""
+    names = (
+        *("triangles", "objects", "images", "metres", "up", "unit_guessed", "up_guessed", "closed"),
+        *("cells", "leaves", "portals", "average_share", "samples", "backend", "renderer"),
+        *("textures", "raw_bytes", "ptm_bytes", "files", "bytes", "viewpoints"),
+    )
+    assert isinstance(figures(stage, dict.fromkeys(names, value)), str)
+    assert figures(stage, {}) == "figures that make no sense"
+    assert isinstance(figures(stage, dict.fromkeys(names, 10**400)), str)
