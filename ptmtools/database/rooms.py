@@ -23,6 +23,16 @@ _PER_ROOM = 4
 _GRID = 7
 #: Places of a leaf whose view is measured, the freest first.
 _TRIES = 8
+#: A browser stands on what is highest around the eye: X_ITE in a square of half that side, turned
+#: with the view. A bench or a step beside the feet would lift the eye, by this or more, metres.
+_LIFT = 0.01
+_AROUND = np.array(
+    [
+        (share * np.cos(turn), share * np.sin(turn))
+        for share in (np.sqrt(2), 1.0, 0.5)
+        for turn in np.arange(16) * np.pi / 8
+    ]
+)
 
 
 @dataclass(frozen=True)
@@ -119,6 +129,7 @@ def _place_in(
     floor = ground.below(position)
     position[:, 1] = floor + eye
     good = (abs(floor - room.floor) <= step) & (cells.locate_leaf(position) == room.leaf)
+    good[good] = _level(position[good], floor[good], ground, keep_off)
     tried = np.flatnonzero(good)[:_TRIES]
     if len(tried) == 0:
         return None
@@ -126,6 +137,16 @@ def _place_in(
     best = int(view.argmax())
     cell, i = int(cells.leaf_cell[room.leaf]), tried[best]
     return Place(cell, position[i], float(yaw[best]), float(floor[i]))
+
+
+def _level(
+    position: NDArray[np.float64], floor: NDArray[np.float64], ground: Ground, radius: float
+) -> NDArray[np.bool_]:
+    """(n,) whether no floor around (n, 3) positions lies above the one at the position itself."""
+    around = np.repeat(position[:, None], len(_AROUND), axis=1)
+    around[..., [0, 2]] += radius * _AROUND
+    height = ground.below(around.reshape(-1, 3)).reshape(len(position), len(_AROUND))
+    return np.asarray((height < floor[:, None] + _LIFT).all(axis=1))
 
 
 def _grid(polygon: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -210,6 +210,30 @@ def test_nowhere_to_stand(room_row) -> None:
         np.testing.assert_allclose(view.position, (2, 2, 0))
 
 
+def test_nothing_beside_the_feet_lifts_the_eye(room_row) -> None:
+    """Browsers stand on what is highest within the avatar's width: a bench of 0.5 m, say."""
+    scene, cells = room_row(1)
+    (free,) = place_viewpoints(scene, cells, EmitOptions())[0]
+    x, _, z = free.position
+    bench = np.array([[x + a, 0.5, z + b] for a, b in ((0.1, -1), (0.1, 1), (0.6, 1), (0.6, -1))])
+    beside = replace(
+        scene,
+        points=np.concatenate([scene.points, bench]),
+        triangles=np.concatenate(
+            [scene.triangles, len(scene.points) + np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)]
+        ),
+        uv=np.concatenate([scene.uv, np.zeros((2, 3, 2))]),
+        triangle_object=np.append(scene.triangle_object, [0, 0]).astype(np.int32),
+        triangle_material=np.append(scene.triangle_material, [0, 0]).astype(np.int32),
+        two_sided=np.append(scene.two_sided, [True, True]),
+    )
+    (moved,) = place_viewpoints(beside, cells, EmitOptions())[0]
+    off = np.maximum(np.abs(np.array(moved.position)[[0, 2]] - (x + 0.35, z)) - (0.25, 1), 0)
+    assert moved.position != free.position
+    assert np.linalg.norm(off) > 0.25 * np.sqrt(2)
+    assert moved.position[1] == 1.6
+
+
 def test_one_sided_ceilings_are_no_floors(room_row) -> None:
     scene, cells = room_row(1)
     scene = replace(scene, two_sided=np.zeros_like(scene.two_sided))
