@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -25,13 +24,15 @@ def check_list(
         rest = entries[1:]
     if own in rest:
         found.add("PTM-D697", file, place, f"{name} has {own} itself in it")
-    elif any(_rank(a) >= _rank(b) for a, b in pairwise(rest)):
+    elif list(rest) != _ascending(rest):
         found.add("PTM-D697", file, place, f"{name} has an entry twice or out of order")
 
 
-def _rank(entry: int | str) -> tuple[int, int | str]:
-    # "c9999.wrl" comes before "c10000.wrl".
-    return (len(entry), entry) if isinstance(entry, str) else (0, entry)
+def _ascending(entries: Sequence[Any]) -> list[Any]:
+    ordered = sorted(set(entries))
+    if ordered and isinstance(ordered[0], str):
+        ordered.sort(key=len)  # "c9999.wrl" comes before "c10000.wrl"
+    return ordered
 
 
 def check_graph(

@@ -270,7 +270,10 @@ class _Reader:
         if not self._text.startswith("]", self._at):
             self._fail("no string")
         self._at += 1
-        return tuple(_ESCAPED.sub(r"\1", s) for s in _STRING.findall(found.group()))
+        strings = _STRING.findall(found.group())
+        if "\\" in found.group():
+            strings = [_ESCAPED.sub(r"\1", string) for string in strings]
+        return tuple(strings)
 
     def _string(self) -> str:
         self._skip()
