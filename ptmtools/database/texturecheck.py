@@ -117,58 +117,6 @@ def check_record(
     elif twin is not None and texture.twin_level not in (None, level):
         faults.append(f"the fallback holds level {texture.twin_level}, not {level}")
     for fault in faults:
-        found.add("PTM-D710", file, "", fault)
-    return texels
-
-
-def read_png(data: bytes, file: str, limits: Limits, found: Findings) -> Samples | None:
-    """The texels of a PNG, (h, w, c); None, told as PTM-D712 or PTM-D713, if it is none."""
-    from ptmtools.texture import load_image
-
-    if _png_size(data) is None:
-        found.add("PTM-D712", file, "", "is no PNG")
-        return None
-    try:
-        return load_image(data, limits).array()
-    except PtmError as fault:
-        code = "PTM-D713" if isinstance(fault, LimitError) else "PTM-D712"
-        found.add(code, file, "", f"cannot be read ({fault})")
-        return None
-
-
-def check_record(
-    record: Mapping[str, Any],
-    texture: ReadTexture,
-    file: str,
-    place: str,
-    found: Findings,
-) -> None:
-    """A row of `textures` in `hints.json` beside its `.ptm`."""
-    header, levels = texture.header, record["levels"]
-    finest = len(header.levels) - 1
-    size = (header.levels[-1].width, header.levels[-1].height)
-    faults = []
-    if record["sha256"] != texture.sha256:
-        faults.append("sha256 is not the file's")
-    if record["components"] != header.components:
-        faults.append(f"the file has {header.components} components")
-    if (record["width"], record["height"]) != size:
-        faults.append(f"the finest level is {size[0]} x {size[1]}")
-    if len(levels) != finest + 1:
-        faults.append(f"the file has {finest + 1} levels")
-    for n, (row, true) in enumerate(zip(levels, header.levels, strict=False)):
-        wanted = (true.width, true.height, true.offset, true.length, true.gpu_bytes)
-        for name, value in zip(_LEVEL, wanted, strict=True):
-            if row[name] != value:
-                faults.append(f"level {n}: {name} is {value} in the file")
-    if (record["fallback"] is None) != (record["fallbackLevel"] is None):
-        faults.append("fallback and fallbackLevel do not go together")
-    elif record["fallback"] is not None and texture.twin_level not in (
-        None,
-        record["fallbackLevel"],
-    ):
-        faults.append(f"the fallback holds level {texture.twin_level}")
-    for fault in faults:
         found.add("PTM-D704", file, place, fault)
 
 
