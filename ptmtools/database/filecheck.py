@@ -24,6 +24,8 @@ def served_files(folder: Path, name: str, found: Findings) -> list[str]:
     is told and left out, and no link to a folder is followed.
     """
     top = os.path.realpath(folder)
+    if folder.is_symlink():
+        found.add("PTM-D657", name, "", f"is a link to {top}")
     files: list[str] = []
     folders = [""]
     while folders:

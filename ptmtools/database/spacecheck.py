@@ -69,11 +69,14 @@ def check_space(
 def _check_apart(leaves: Sequence[_Leaf], tolerance: Tolerance, file: str, found: Findings) -> None:
     """The middle of a leaf lies in no other leaf."""
     middles = np.array([leaf.points.mean(axis=0) for leaf in leaves])
+    order = np.argsort(middles[:, 0], kind="stable")
+    along = middles[order, 0]
     for k, leaf in enumerate(leaves):
         if leaf.planes is None:
             continue
         low, high = leaf.points.min(axis=0), leaf.points.max(axis=0)
-        near = np.flatnonzero(((middles > low) & (middles < high)).all(axis=1))
+        near = order[np.searchsorted(along, low[0]) : np.searchsorted(along, high[0], "right")]
+        near = near[((middles[near] >= low) & (middles[near] <= high)).all(axis=1)]
         within = near[farthest(leaf.planes, middles[near]) < -tolerance.rounding]
         for other in within[within != k].tolist():
             found.add("PTM-D709", file, leaves[other].place, f"lies in {leaf.place}")

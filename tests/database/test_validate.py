@@ -588,6 +588,8 @@ def test_what_the_manifest_says(database: Path) -> None:
         ("D652", rewritten(C0, lambda data: data.replace(b"0.8 0.8 0.8", b"0.8 0.8 0.7"))),
         ("D653", put("notes.txt")),
         ("D653", put("gone/away.txt")),
+        ("D653", put("\udcff\n.txt")),
+        ("D657", lambda db: (db / "www").rename(db / "w") and (db / "www").symlink_to("w")),
     ],
 )
 def test_only_the_manifest_tells(database: Path, expected: str, damage: Damage) -> None:

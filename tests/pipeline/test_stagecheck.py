@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import random
 from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
@@ -168,6 +169,26 @@ def test_planted_faults(
 def test_no_archive(stages: Arrays, tmp_path: Path, damage: Callable[[bytes], bytes]) -> None:
     manifest = written(tmp_path, stages, damage)
     assert found(tmp_path, manifest) == {("PTM-D720", "stages/pvs.npz", "")}
+
+
+def test_mutations(stages: Arrays, tmp_path: Path) -> None:
+    """Whatever the bytes are, they are told of or harmless."""
+    told = 0
+    for round in range(300):
+        rng = random.Random(round)
+
+        def damage(data: bytes, rng: random.Random = rng) -> bytes:
+            changed = bytearray(data)
+            for _ in range(rng.choice((1, 2, 20))):
+                changed[rng.randrange(len(changed))] ^= 1 << rng.randrange(8)
+            at = rng.randrange(len(changed))
+            return bytes(changed[:at] if rng.random() < 0.2 else changed)
+
+        manifest = written(tmp_path / str(round), stages, damage)
+        codes = {code for code, *_ in found(tmp_path / str(round), manifest)}
+        assert codes <= {"PTM-D720", "PTM-D721", "PTM-D659"}
+        told += bool(codes)
+    assert told > 200
 
 
 def test_what_the_hash_tells_is_not_told_again(stages: Arrays, tmp_path: Path) -> None:
