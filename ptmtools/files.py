@@ -19,8 +19,9 @@ import errno
 import os
 import stat
 from collections.abc import Callable, Iterator
+from io import BufferedReader
 from pathlib import Path
-from typing import IO, BinaryIO
+from typing import IO
 
 from ptmtools.errors import OutputError
 
@@ -45,7 +46,9 @@ def write_with(
     The file can be read and can seek.
     """
     target = Path(path)
-    if target.exists() and not target.is_file():  # renaming would replace a device
+    with writing(target):
+        in_the_way = target.exists() and not target.is_file()
+    if in_the_way:  # renaming would replace a device
         kind = "a folder" if target.is_dir() else "a device"
         raise OutputError(
             "PTM-O002", f"is {kind}, not a file", file=target, remedy="name a file instead"
@@ -118,7 +121,7 @@ def refuse_existing(path: str | os.PathLike[str]) -> None:
         )
 
 
-def open_regular(path: str | os.PathLike[str]) -> BinaryIO:
+def open_regular(path: str | os.PathLike[str]) -> BufferedReader:
     """A file opened for reading, if it is one: a named pipe would be waited for, and a device may
     never end.
 

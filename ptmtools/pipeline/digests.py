@@ -20,6 +20,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from ptmtools.files import open_regular
+
 #: A clock may stand still for so long, in nanoseconds: most tick every 1 to 10 ms, some disks'
 #: every 2 s; theirs are told by whole seconds.
 TICK, COARSE_TICK = 50_000_000, 3_000_000_000
@@ -61,7 +63,7 @@ class Digests:
             self._used.add(name)
             return known[1]
         before = time.time_ns()
-        with open(path, "rb") as file:
+        with open_regular(path) as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
         if stamp == _stamp(path) and _settled(stamp, before):
             self._known[name] = (stamp, digest)

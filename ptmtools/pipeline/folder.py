@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ptmtools.errors import DatabaseError
+from ptmtools.files import open_regular
 from ptmtools.pipeline.digests import Digests
 from ptmtools.pipeline.manifest import Manifest, StageRecord
 from ptmtools.pipeline.stages import arrays_of
@@ -87,7 +88,8 @@ class DatabaseFolder:
         """
         file = self.path / name
         try:
-            data = file.read_bytes()
+            with open_regular(file) as stream:
+                data = stream.read()
         except OSError as fault:
             raise DatabaseError(
                 "PTM-D005",
@@ -139,7 +141,8 @@ def read_manifest(folder: Path) -> Manifest | None:
     """
     file = folder / MANIFEST
     try:
-        data = file.read_bytes()
+        with open_regular(file) as stream:
+            data = stream.read()
     except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as fault:

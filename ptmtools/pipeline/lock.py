@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ptmtools.errors import DatabaseError
-from ptmtools.files import writing
+from ptmtools.files import open_regular, writing
 
 LOCK = ".ptm-lock"
 #: Who only looks whether a lock is held holds it for a moment: how often to try, and the pause.
@@ -103,7 +103,7 @@ def acquire(folder: Path) -> Lock:
 def holder(folder: Path) -> Holder | None:
     """Whom the lock file of a folder names, whether or not he is still there."""
     try:
-        with open(folder / LOCK, "rb") as file:
+        with open_regular(folder / LOCK) as file:
             found = json.loads(file.read(4096))
         return Holder(int(found["pid"]), str(found["host"]))
     except (OSError, ValueError, KeyError, TypeError):
@@ -113,7 +113,7 @@ def holder(folder: Path) -> Holder | None:
 def is_held(folder: Path) -> bool:
     """Whether a process is writing in the folder at this moment."""
     try:
-        descriptor = os.open(folder / LOCK, os.O_RDONLY | os.O_NOFOLLOW)
+        descriptor = os.open(folder / LOCK, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
     except OSError:
         return False
     try:

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 from ptmtools.errors import naming
 from ptmtools.executors.model import Executor
+from ptmtools.files import open_regular
 from ptmtools.pipeline.changes import reasons
 from ptmtools.pipeline.folder import sha256
 from ptmtools.pipeline.manifest import StageRecord
@@ -266,5 +267,5 @@ def texture_records(run: Run) -> tuple[TextureRecord, ...]:
 def _header(file: Path) -> PtmHeader:
     from ptmtools.texture.container import HEAD_MAX, read_header
 
-    with open(file, "rb") as stream, naming(file):
+    with open_regular(file) as stream, naming(file):
         return read_header(stream.read(HEAD_MAX))

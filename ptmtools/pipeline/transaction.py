@@ -23,7 +23,7 @@ from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
 
-from ptmtools.errors import DatabaseError
+from ptmtools.errors import DatabaseError, OutputError
 from ptmtools.files import real_file, real_folder, write_bytes, writing
 from ptmtools.pipeline.folder import MANIFEST, DatabaseFolder, read_manifest, sha256
 from ptmtools.pipeline.manifest import Manifest, StageRecord
@@ -116,8 +116,9 @@ class Transaction:
             journal.write(line + "\n")
 
     def _staged(self, name: str, digest: str) -> bool:
-        with suppress(OSError):
-            return sha256((self.folder / name).read_bytes()) == digest
+        with suppress(OSError, OutputError):
+            file = real_file(self.folder, name)
+            return file is not None and sha256(file.read_bytes()) == digest
         return False
 
     def pending(self) -> dict[str, str]:
@@ -152,7 +153,7 @@ def recover(folder: Path) -> None:
         for entry in sorted(staging.iterdir()):
             if entry.is_symlink() or not entry.is_dir():
                 entry.unlink()
-            elif (entry / MANIFEST).is_file():
+            elif real_file(entry, MANIFEST):
                 _complete(folder, f"{STAGING}/{entry.name}")
             elif not _read_journal(entry):
                 shutil.rmtree(entry)

@@ -6,6 +6,7 @@ The checksums of a database may have been made with it, so each change stands in
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -278,3 +279,12 @@ def test_names_and_digests_of_images(database: Path, row: dict[str, Any]) -> Non
                 _ = artifacts.images
         else:
             assert len(artifacts.images) == 1
+
+
+@pytest.mark.parametrize("place", ["manifest.json", "stages/scene.npz", "stages/images.json"])
+def test_pipes_in_place_of_files_are_not_waited_for(database: Path, place: str) -> None:
+    (database / place).unlink()
+    os.mkfifo(database / place)
+    with pytest.raises(DatabaseError, match=r"PTM-D00[15]"):
+        opened(database)
+    assert main(["-q", "status", str(database)]) in (0, 5)

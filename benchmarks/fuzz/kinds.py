@@ -1,0 +1,34 @@
+"""The kinds of input, with the share that each has of all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from benchmarks.fuzz.databases import Interrupted, ManifestText, Npz, Served, Vrml
+from benchmarks.fuzz.models import Gltf, Mesh, Mtl, Obj
+from benchmarks.fuzz.textures import Images, Ptm
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What makes a target, and how many of a hundred inputs are its."""
+
+    make: Callable[..., Any]
+    weight: int
+
+
+KINDS: dict[str, Kind] = {
+    "ptm": Kind(Ptm, 20),
+    "npz": Kind(Npz, 15),
+    "manifest": Kind(ManifestText, 12),
+    "mtl": Kind(Mtl, 12),
+    "obj": Kind(Obj, 14),
+    "gltf": Kind(Gltf, 8),
+    "mesh": Kind(Mesh, 3),
+    "image": Kind(Images, 10),
+    "vrml": Kind(Vrml, 3),
+    "staged": Kind(Interrupted, 2),
+    "served": Kind(Served, 1),
+}
