@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -58,6 +60,18 @@ def two_rooms(_built: Path, tmp_path: Path) -> Path:
 def database(_built: Path, tmp_path: Path) -> Path:
     """A copy of its database."""
     return Path(shutil.copytree(_built / "db", tmp_path / "db"))
+
+
+@pytest.fixture(scope="session")
+def gltf_museum(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The database of the smallest museum, with glTF files; not to be changed."""
+    folder = tmp_path_factory.mktemp("museum")
+    script, options = TWO_ROOMS.parent / "make_museum.py", ["--rooms", "1", "--textures", "9"]
+    model = [sys.executable, str(script), "-o", str(folder / "model"), *options, "--size", "64"]
+    subprocess.run(model, check=True, capture_output=True)
+    built = ["-q", "build-scene", str(folder / "model/museum.obj"), "-o", str(folder / "db")]
+    assert main([*built, "-j", "1", "--format", "gltf"]) == 0
+    return folder / "db"
 
 
 def listing(folder: Path) -> dict[str, bytes | None]:
