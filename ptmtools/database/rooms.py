@@ -21,7 +21,8 @@ _LEAVES = 96
 _PER_ROOM = 4
 #: Places tried in a leaf, along each axis of its plan.
 _GRID = 7
-#: Places of a leaf whose view is measured, the freest first.
+#: Places of a leaf whose view is measured, the freest first: where a walk begins, and elsewhere.
+_TRIES_FIRST = 24
 _TRIES = 8
 #: A browser stands on what is highest around the eye: X_ITE in a square of half that side, turned
 #: with the view. A bench or a step beside the feet would lift the eye, by this or more, metres.
@@ -94,7 +95,8 @@ def places(
         if len(found) == count:
             break
         if cell not in found:
-            place = _place_in(room, cells, ground, walls.at(room.floor + eye), avatar_size)
+            tries = _TRIES if found else _TRIES_FIRST
+            place = _place_in(room, cells, ground, walls.at(room.floor + eye), avatar_size, tries)
             if place is not None:
                 found[cell] = place
     return list(found.values())
@@ -116,7 +118,12 @@ def largest_leaves(cells: Cells, count: int) -> list[int]:
 
 
 def _place_in(
-    room: _Room, cells: Cells, ground: Ground, walls: NDArray[np.float64], avatar_size: Vector
+    room: _Room,
+    cells: Cells,
+    ground: Ground,
+    walls: NDArray[np.float64],
+    avatar_size: Vector,
+    tries: int,
 ) -> Place | None:
     keep_off, eye, step = avatar_size
     grid = _grid(room.section)
@@ -130,7 +137,7 @@ def _place_in(
     position[:, 1] = floor + eye
     good = (abs(floor - room.floor) <= step) & (cells.locate_leaf(position) == room.leaf)
     good[good] = _level(position[good], floor[good], ground, keep_off)
-    tried = np.flatnonzero(good)[:_TRIES]
+    tried = np.flatnonzero(good)[:tries]
     if len(tried) == 0:
         return None
     yaw, view = longest_views(grid[tried], walls)
