@@ -79,10 +79,12 @@ def orientation(direction: NDArray[np.float64]) -> tuple[float, float, float, fl
         v = np.zeros(3)
         v[[i, j, k]] = 1 + 2 * t[i] - t[3], m[j, i] + m[i, j], m[k, i] + m[i, k]
         w = m[k, j] - m[j, k]
-    sine = float(np.linalg.norm(v))
-    if sine == 0:
+    most = float(abs(v).max())
+    if most == 0:
         return (0.0, 1.0, 0.0, 0.0)
-    axis, angle = v / sine + 0.0, float(2 * np.arctan2(sine, w))
+    axis = v / most  # whose square may be less than a float can be
+    length = float(np.linalg.norm(axis))
+    axis, angle = axis / length + 0.0, float(2 * np.arctan2(most * length, w))
     if angle > np.pi:
         angle -= 2 * np.pi
     return (float(axis[0]), float(axis[1]), float(axis[2]), angle)

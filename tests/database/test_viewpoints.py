@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from ptmtools.database import EmitOptions, GivenViewpoint
@@ -31,6 +31,7 @@ UNIT = st.floats(-1, 1)
 
 
 @given(st.tuples(UNIT, UNIT, UNIT))
+@example((0.0, 5.60179522222552e-162, -1.0))
 def test_orientation_turns_minus_z(direction: tuple[float, float, float]) -> None:
     length = np.linalg.norm(direction)
     if length < 1e-3:
