@@ -7,8 +7,8 @@ compile. Two things are stricter than the draft: an integer is written without a
 2.0), and a number must be finite as a float64.
 
 A schema becomes nested functions, once. Lists of numbers, which are most of a large document, are
-checked by their set of types, their least and their greatest: 30 million numbers a second, where
-one by one it is 3 million.
+checked by their set of types, their least and their greatest, ten times as fast as one by one: the
+whole check takes about as long as parsing the JSON.
 """
 
 from __future__ import annotations
