@@ -136,8 +136,11 @@ def _place_in(
     floor = ground.below(position)
     position[:, 1] = floor + eye
     good = (abs(floor - room.floor) <= step) & (cells.locate_leaf(position) == room.leaf)
-    good[good] = _level(position[good], floor[good], ground, keep_off)
-    tried = np.flatnonzero(good)[:tries]
+    left, tried = np.flatnonzero(good), np.zeros(0, dtype=np.int64)
+    while len(left) and len(tried) < tries:
+        some, left = left[:tries], left[tries:]
+        level = _level(position[some], floor[some], ground, keep_off)
+        tried = np.append(tried, some[level])[:tries]
     if len(tried) == 0:
         return None
     yaw, view = longest_views(grid[tried], walls)
