@@ -25,8 +25,6 @@ from benchmarks.fuzz.watch import (
     most_memory,
 )
 
-#: Processor time that an input may take, seconds.
-SLOW = 5.0
 #: What a reader may take besides its limit, bytes: tables, copies, and the input itself many times.
 ALLOWANCE = 1 << 28
 #: Address space beyond what the process has when it begins. Reserving it is no fault; not getting
@@ -62,11 +60,12 @@ def generator(seed: int, name: str, number: int) -> Random:
 
 
 def work(
-    make: Any, name: str, folder: str, seed: int, start: int, stop: int, step: int,
+    make: Any, name: str, folder: str, seed: int, start: int, stop: int, step: int, slow: float,
     current: Any, told: Connection,
 ) -> None:  # fmt: skip
     """Reads the inputs ``start``, ``start + step``, … below ``stop``; runs in a process of its own.
 
+    slow: processor time that an input may take, seconds.
     current: shared number of the input that is being read.
     told: where a `Told` goes after every batch; None is the end.
     """
@@ -75,20 +74,20 @@ def work(
     watch = Watch(inside, outside)
     target: Target = make(inside, outside)
     warm(target, seed, name)
-    for kind in (resource.RLIMIT_AS,):
-        with open("/proc/self/statm", "rb") as file:
-            taken = int(file.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
-        resource.setrlimit(kind, (taken + ADDRESSES, taken + ADDRESSES))
+    with open("/proc/self/statm", "rb") as file:
+        taken = int(file.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    resource.setrlimit(resource.RLIMIT_AS, (taken + ADDRESSES, taken + ADDRESSES))
     before = listing(outside) | listing(elsewhere)
     batch = Told()
     numbers = range(start, stop, step)
     for count, number in enumerate(numbers, 1):
         current.value = number
         case = target.make(generator(seed, name, number))
-        read(target, watch, case, number, batch)
-        if not count % BATCH or count == len(numbers):
+        read(target, watch, case, number, slow, batch)
+        # At once if there is a finding: the next input may end this process.
+        if batch.findings or not count % BATCH or count == len(numbers):
             if listing(outside) | listing(elsewhere) != before:
-                batch.findings.append((number, "something changed beside the folder, or was read"))
+                batch.findings.append((number, "something changed beside the folder"))
                 before = listing(outside) | listing(elsewhere)
             batch.done = number + step
             told.send(batch)
@@ -123,7 +122,7 @@ def warm(target: Target, seed: int, name: str) -> None:
             target.read(target.make(generator(seed, name, number)))
 
 
-def read(target: Target, watch: Watch, case: Case, number: int, batch: Told) -> None:
+def read(target: Target, watch: Watch, case: Case, number: int, slow: float, batch: Told) -> None:
     """Reads one input and notes what came of it."""
     from ptmtools.errors import PtmError
 
@@ -151,7 +150,7 @@ def read(target: Target, watch: Watch, case: Case, number: int, batch: Told) -> 
     if fault:
         batch.findings.append((number, fault))
     batch.findings += [(number, deed) for deed in done[:3]]
-    if took > SLOW:
+    if took > slow:
         batch.findings.append((number, f"took {took:.1f} s"))
     if grown > target.limit + ALLOWANCE:
         batch.findings.append((number, f"took {grown / 1e6:,.0f} MB"))

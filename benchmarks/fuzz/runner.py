@@ -12,13 +12,13 @@ from typing import Any
 
 from benchmarks.fuzz.child import Told, work
 
-#: An input that takes longer, in seconds of the clock, hangs: on a busy machine, several times the
-#: processor time that it may take.
-HANGS = 60.0
+#: Processor time that an input may take, seconds; and after how many of the clock it hangs, several
+#: times as many on a busy machine.
+SLOW, HANGS = 5.0, 60.0
 #: Setting a target up takes this long at most.
 SETUP = 600.0
 #: After so many findings of one kind of input the rest of it is left.
-ENOUGH = 40
+ENOUGH = 200
 
 
 @dataclass
@@ -37,13 +37,21 @@ class Summary:
 
 
 def run(
-    name: str, make: Callable[..., Any], seed: int, start: int, count: int, jobs: int = 1
+    name: str,
+    make: Callable[..., Any],
+    seed: int,
+    start: int,
+    count: int,
+    jobs: int = 1,
+    slow: float = SLOW,
+    hangs: float = HANGS,
 ) -> Summary:
     """Reads ``count`` inputs from number ``start`` on, in ``jobs`` processes."""
     summary = Summary(name, count)
     begun = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix=f"fuzz-{name}-") as scratch:
-        parts = [_Part(name, make, Path(scratch) / str(j), seed, start + j, start + count, jobs)
+        parts = [_Part(name, make, Path(scratch) / str(j), seed, start + j, start + count, jobs,
+                       slow, hangs)
                  for j in range(min(jobs, count))]  # fmt: skip
         while any(part.running for part in parts):
             for part in parts:
@@ -64,15 +72,16 @@ class _Part:
 
     def __init__(
         self, name: str, make: Callable[..., Any], folder: Path, seed: int,
-        start: int, stop: int, step: int,
+        start: int, stop: int, step: int, slow: float, hangs: float,
     ) -> None:  # fmt: skip
         self._settings: Mapping[str, Any] = {
-            "make": make, "name": name, "seed": seed, "stop": stop, "step": step
+            "make": make, "name": name, "seed": seed, "stop": stop, "step": step, "slow": slow
         }  # fmt: skip
         self._folder = folder
         self._next = start
         self._step = step
         self._stop = stop
+        self._hangs = hangs
         self._lives = 0
         self.running = True
         self._begin()
@@ -110,7 +119,7 @@ class _Part:
         if number != self._seen:
             self._seen, self._since = number, time.monotonic()
         waited = time.monotonic() - self._since
-        if waited > (HANGS if number >= 0 else SETUP):
+        if waited > (self._hangs if number >= 0 else SETUP):
             if number < 0:
                 told.findings.append((number, "could not be set up"))
                 self.stop()

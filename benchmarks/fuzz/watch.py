@@ -68,10 +68,12 @@ class Watch:
         if isinstance(path, int) or path is None:
             return
         real = os.path.realpath(os.fsdecode(path))
-        if self._within(real, self._outside):
-            self._faults.append(f"opened {real}")
-        elif isinstance(flags, int) and flags & _WRITE and not self._mine(real):
+        if isinstance(flags, int) and flags & os.O_NOFOLLOW:
+            real = _itself(os.fsdecode(path))
+        if isinstance(flags, int) and flags & _WRITE and not self._mine(real):
             self._faults.append(f"opened {real} for writing")
+        elif self._within(real, self._outside):
+            self._faults.append(f"opened {real}")
 
     def _changed(self, event: str, path: Any, descriptor: Any) -> None:
         if isinstance(path, int):
@@ -79,8 +81,7 @@ class Watch:
         told = os.fsdecode(path)
         if isinstance(descriptor, int) and descriptor >= 0 and not os.path.isabs(told):
             told = os.path.join(os.path.realpath(f"/proc/self/fd/{descriptor}"), told)
-        folder, name = os.path.split(os.path.abspath(told))
-        real = os.path.join(os.path.realpath(folder), name)  # a link itself, not where it leads
+        real = _itself(told)
         if not self._mine(real):
             self._faults.append(f"{event} {real}")
 
@@ -91,6 +92,12 @@ class Watch:
     @staticmethod
     def _within(path: str, folder: str) -> bool:
         return path == folder or path.startswith(folder + os.sep)
+
+
+def _itself(path: str) -> str:
+    """Where a path leads, a link at its end being itself."""
+    folder, name = os.path.split(os.path.abspath(path))
+    return os.path.join(os.path.realpath(folder), name)
 
 
 def listing(folder: Path) -> dict[str, tuple[int, int, int]]:
