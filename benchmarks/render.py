@@ -2,11 +2,20 @@
 
     python benchmarks/render.py MODEL|DB --eye 2 1.6 3 --look 0 1.6 0 -o out.png
 
-One ray a pixel (``--samples 2`` for 2 × 2) through Embree; texture bilinear from the full image,
-repeated or clamped, times the material's colour; transparent surfaces are looked through.
-``--shading headlight`` darkens all by the cosine between surface and ray; ``browser`` only what
-has no image, by the cosine to the direction of view, before a black sky, as VRML97 browsers do
-with the emitted files; ``flat`` nothing.
+One ray a pixel (``--samples 2`` for 2 × 2) through Embree; transparent surfaces are looked
+through, and a face that is not two-sided shows on its front only, as in the emitted files.
+``--look-of`` says how surfaces look:
+
+===========  ======================================================================
+headlight    all darkened by the cosine between surface and ray; bilinear texture
+x_ite        what VRML97 browsers make of the emitted files (cellfile.py): only what
+             has a Material is lit, by the cosine to the direction of view, and glows
+             if it has no image; trilinear texture; a black sky
+view3dscene  the same, with what Castle Game Engine adds of its own where a file says
+             nothing: an ambient light of 0.2, of which a Material takes its
+             ambientIntensity of 0.2, and a dark grey sky
+flat         nothing lit; bilinear texture
+===========  ======================================================================
 
 It shares nothing with the stages but ingest's arrays, so that it can be held against what
 browsers make of the emitted files. Coordinates are the world's: metres, Y up, origin at the
@@ -16,26 +25,152 @@ centre of the model's floor; ``--model-space`` takes the model's own.
 from __future__ import annotations
 
 import argparse
+import functools
 import io
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from ptmtools.errors import PtmError
-from ptmtools.scene.model import Material, Scene, Space
+sys.path[:0] = [str(Path(__file__).parent)]
+from mipmap import Pyramid  # noqa: E402
 
-SKY = (0.62, 0.74, 0.88)
-#: What the emitted materials shine by themselves, a share of their colour.
-GLOW = 0.25
+from ptmtools.errors import PtmError  # noqa: E402
+from ptmtools.scene.model import Scene, Space  # noqa: E402
+
 #: Transparent surfaces looked through before a ray gives up.
 LAYERS = 12
 Vector = Sequence[float] | NDArray[np.float64]
-Shading = Literal["headlight", "browser", "flat"]
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a surface looks like.
+
+    Attributes
+    ----------
+    lit: which surfaces: all, none, or those emitted with a Material.
+    parallel: the headlight's rays are parallel to the direction of view.
+    glow: what an untextured surface shines by itself, a share of its colour.
+    ambient: what a lit surface shines besides the headlight's part.
+    sky: (r, g, b) in 0…1 where nothing is.
+    mipmaps: textures are looked up as graphics cards do.
+    """
+
+    lit: Literal["all", "material", "none"] = "all"
+    parallel: bool = False
+    glow: float = 0.0
+    ambient: float = 0.0
+    sky: tuple[float, float, float] = (0.62, 0.74, 0.88)
+    mipmaps: bool = False
+
+
+X_ITE = Look("material", parallel=True, glow=0.25, sky=(0, 0, 0), mipmaps=True)
+LOOKS: Mapping[str, Look] = {
+    "headlight": Look(),
+    "x_ite": X_ITE,
+    "view3dscene": replace(X_ITE, ambient=0.2 * 0.2, sky=(0.1, 0.1, 0.1)),
+    "flat": Look("none"),
+}
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera: ``eye`` in world metres; ``fov`` in radians over the smaller side, as in VRML97."""
+
+    eye: Vector
+    direction: Vector
+    fov: float = np.pi / 4
+    width: int = 800
+    height: int = 600
+    up: Vector = (0, 1, 0)
+
+    @staticmethod
+    def of_hint(entry: Mapping[str, Any], width: int, height: int) -> View:
+        """One of the viewpoints of a ``hints.json``."""
+        return View(entry["position"], entry["direction"], entry["fieldOfView"], width, height)
+
+    def frame(self) -> NDArray[np.float64]:
+        """(3, 3) rows: one pixel right, one pixel up, and the unit vector ahead."""
+        ahead = np.asarray(self.direction, dtype=np.float64)
+        ahead = ahead / np.linalg.norm(ahead)
+        right = np.cross(ahead, self.up)
+        right /= np.linalg.norm(right)
+        scale = 2 * np.tan(self.fov / 2) / min(self.width, self.height)
+        return np.stack([scale * right, scale * np.cross(right, ahead), ahead])
+
+    def rays(self, samples: int = 1) -> NDArray[np.float64]:
+        """(height × samples × width × samples, 3) unit directions, rows from the top."""
+        n, m = self.width * samples, self.height * samples
+        x = (np.arange(n) + 0.5 - n / 2) / samples
+        y = (m / 2 - np.arange(m) - 0.5) / samples
+        right, above, ahead = self.frame()
+        rays = ahead + x[None, :, None] * right + y[:, None, None] * above
+        rays = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+        return np.asarray(rays.reshape(-1, 3))
+
+
+@dataclass(frozen=True)
+class Hits:
+    """The surfaces that rays meet next.
+
+    Attributes
+    ----------
+    ray: (n,) which of the rays meet one; the others leave the scene.
+    face: (n,) the scene's triangle.
+    weight: (n, 3) barycentric coordinates there.
+    distance: (n,) metres from where the ray started.
+    """
+
+    ray: NDArray[np.int64]
+    face: NDArray[np.int64]
+    weight: NDArray[np.float64]
+    distance: NDArray[np.float64]
+
+
+class Tracer:
+    """A scene as seen from one point: without the faces that turn their only side away.
+
+    The eye is subtracted in float64 before anything goes to Embree's float32.
+    """
+
+    def __init__(self, scene: Scene, eye: Vector) -> None:
+        from embreex import rtcore_scene
+        from embreex.mesh_construction import TriangleMesh
+
+        self.scene = scene
+        self.corners = scene.corners - np.asarray(eye, dtype=np.float64)
+        a, b, c = self.corners.transpose(1, 0, 2)
+        self.cross = np.cross(b - a, c - a)
+        size = np.linalg.norm(self.cross, axis=1, keepdims=True)
+        self.normals = self.cross / np.maximum(size, np.finfo(float).tiny)
+        self._shown = np.flatnonzero(scene.two_sided | ((self.cross * a).sum(axis=1) < 0))
+        self._embree = rtcore_scene.EmbreeScene()
+        TriangleMesh(self._embree, np.ascontiguousarray(self.corners[self._shown], np.float32))
+        #: How far behind a surface the next one is looked for, metres.
+        self.nudge = 1e-5 * max(1.0, float(np.abs(self.corners).max()))
+
+    def first(self, start: NDArray[np.float64], rays: NDArray[np.float64]) -> Hits:
+        """The first surface from (n, 3) ``start``, relative to the eye, along (n, 3) ``rays``."""
+        hit = self._embree.run(start.astype(np.float32), rays.astype(np.float32), output=1)
+        ray = np.flatnonzero(np.asarray(hit["primID"]) >= 0)
+        u, v, t = (np.asarray(hit[k], dtype=np.float64)[ray] for k in ("u", "v", "tfar"))
+        face = self._shown[np.asarray(hit["primID"], dtype=np.int64)[ray]]
+        return Hits(ray, face, np.stack([1 - u - v, u, v], axis=1), t)
+
+    def uv_gradient(self, face: NDArray[np.int64]) -> NDArray[np.float64]:
+        """(n, 2, 3) how uv, which is affine in the plane of a face, changes by the metre."""
+        corners, cross, uv = self.corners[face], self.cross[face], self.scene.uv[face]
+        first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        area = np.maximum((cross * cross).sum(axis=1), np.finfo(float).tiny)[:, None]
+        gradient = np.einsum("ni,nj->nij", uv[:, 1] - uv[:, 0], np.cross(second, cross) / area)
+        gradient += np.einsum("ni,nj->nij", uv[:, 2] - uv[:, 0], np.cross(cross, first) / area)
+        return np.asarray(gradient)
 
 
 def load(path: Path) -> Scene:
@@ -56,130 +191,98 @@ def to_world(space: Space, point: Vector) -> NDArray[np.float64]:
     return np.array([x, z, -y] if space.up == "z" else [x, y, z])
 
 
-def texels(scene: Scene) -> list[NDArray[np.float32]]:
-    """(h, w, 4) in 0…1, rows from the top, for every image."""
-    images = []
-    for source in scene.images:
+@functools.lru_cache(maxsize=2)
+def _pyramids(images: tuple[Any, ...]) -> tuple[Pyramid, ...]:
+    """Of every image of a scene; kept, since one scene is looked at from many places."""
+    pyramids = []
+    for source in images:
         with Image.open(io.BytesIO(source.load())) as image:
-            images.append(np.asarray(image.convert("RGBA"), dtype=np.float32) / np.float32(255))
-    return images
-
-
-def sample(
-    image: NDArray[np.float32], uv: NDArray[np.float64], material: Material
-) -> NDArray[np.float32]:
-    """(n, 4) bilinear samples at (n, 2) texture coordinates, v upwards."""
-    h, w = image.shape[:2]
-    corners = []
-    for t, n, wrap in ((uv[:, 0], w, material.wrap_s), (1 - uv[:, 1], h, material.wrap_t)):
-        x = t * n - 0.5
-        low = np.floor(x)
-        pair = [low.astype(np.int64), low.astype(np.int64) + 1]
-        pair = [i % n if wrap == "repeat" else np.clip(i, 0, n - 1) for i in pair]
-        corners.append((*pair, (x - low).astype(np.float32)[:, None]))
-    (x0, x1, fx), (y0, y1, fy) = corners
-    top = image[y0, x0] * (1 - fx) + image[y0, x1] * fx
-    bottom = image[y1, x0] * (1 - fx) + image[y1, x1] * fx
-    return np.asarray(top * (1 - fy) + bottom * fy, dtype=np.float32)
-
-
-def camera_rays(
-    ahead: NDArray[np.float64], up: Vector, fov: float, width: int, height: int
-) -> NDArray[np.float64]:
-    """(height × width, 3) unit directions through pixel centres around the unit vector ``ahead``.
-
-    As VRML97 has it, ``fov`` (radians) is the angle over the smaller side of the picture.
-    """
-    right = np.cross(ahead, up)
-    right /= np.linalg.norm(right)
-    above = np.cross(right, ahead)
-    scale = 2 * np.tan(fov / 2) / min(width, height)
-    x = (np.arange(width) + 0.5 - width / 2) * scale
-    y = (height / 2 - np.arange(height) - 0.5) * scale
-    rays = ahead + x[None, :, None] * right + y[:, None, None] * above
-    rays = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
-    return np.asarray(rays.reshape(-1, 3))
+            pyramids.append(Pyramid.of(np.asarray(image.convert("RGBA"))))
+    return tuple(pyramids)
 
 
 def render(
-    scene: Scene,
-    eye: Vector,
-    direction: Vector,
-    *,
-    up: Vector = (0, 1, 0),
-    fov: float = np.pi / 4,
-    width: int = 800,
-    height: int = 600,
-    samples: int = 1,
-    shading: Shading = "headlight",
+    scene: Scene, view: View, look: Look, *, samples: int = 1, side: int = 0
 ) -> NDArray[np.uint8]:
-    """(height, width, 3) picture from ``eye`` (world metres) along ``direction``.
+    """(height, width, 3) picture, of textures with at most ``side`` texels a side if that is
+    given."""
+    pyramids = tuple(pyramid.reduced(side) for pyramid in _pyramids(scene.images))
+    tracer = Tracer(scene, view.eye)
+    material = np.array([m.image < 0 or m.opacity < 1 for m in scene.materials])
+    lit = {"all": material | True, "material": material, "none": material & False}[look.lit]
+    glow = np.array([look.glow if m.image < 0 else 0 for m in scene.materials], dtype=np.float32)
 
-    The eye is subtracted in float64 before anything goes to Embree's float32.
-    """
-    from embreex import rtcore_scene
-    from embreex.mesh_construction import TriangleMesh
-
-    origin = np.asarray(eye, dtype=np.float64)
-    corners = scene.corners - origin
-    tracer = rtcore_scene.EmbreeScene()
-    TriangleMesh(tracer, np.ascontiguousarray(corners, dtype=np.float32))
-    images = texels(scene)
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
-
-    plain = np.array([m.image < 0 for m in scene.materials])[scene.triangle_material]
-    sky, glow = ((0, 0, 0), GLOW) if shading == "browser" else (SKY, 0.0)
-    lit = {"headlight": plain | True, "browser": plain, "flat": plain & False}[shading]
-
-    ahead = np.asarray(direction, dtype=np.float64)
-    ahead = ahead / np.linalg.norm(ahead)
-    rays = camera_rays(ahead, up, fov, width * samples, height * samples)
+    rays = view.rays(samples)
     color = np.zeros((len(rays), 3), dtype=np.float32)
     left = np.ones(len(rays), dtype=np.float32)
     start = np.zeros_like(rays)
     active = np.arange(len(rays))
-    nudge = 1e-5 * max(1.0, float(np.abs(corners).max()))
     for _ in range(LAYERS):
-        hit = tracer.run(
-            start[active].astype(np.float32), rays[active].astype(np.float32), output=1
-        )
-        face = np.asarray(hit["primID"], dtype=np.int64)
-        gone = face < 0
-        color[active[gone]] += left[active[gone], None] * np.asarray(sky, dtype=np.float32)
-        u, v, t = (np.asarray(hit[k], dtype=np.float64)[~gone] for k in ("u", "v", "tfar"))
-        active, face = active[~gone], face[~gone]
+        hits = tracer.first(start[active], rays[active])
+        gone = np.ones(len(active), dtype=bool)
+        gone[hits.ray] = False
+        color[active[gone]] += left[active[gone], None] * np.asarray(look.sky, dtype=np.float32)
+        active = active[hits.ray]
         if not len(active):
             break
-        rgba = _shaded(scene, images, face, np.stack([1 - u - v, u, v], 1))
-        light = ahead if shading == "browser" else rays[active]
-        facing = np.abs((normals[face] * light).sum(axis=1)).astype(np.float32)
-        rgba[:, :3] *= np.where(lit[face], facing + np.float32(glow), np.float32(1))[:, None]
+        ray, which = rays[active], scene.triangle_material[hits.face]
+        footprint = _footprints(tracer, view, hits.face, ray) / samples if look.mipmaps else None
+        rgba = _unlit(scene, pyramids, hits, footprint)
+        normal = tracer.normals[hits.face]
+        normal = normal * np.sign((normal * ray).sum(axis=1, keepdims=True))
+        # A wall that the eye sees from the side may have turned its back on parallel light.
+        light = view.frame()[2] if look.parallel else ray
+        facing = np.maximum((normal * light).sum(axis=1), 0).astype(np.float32)
+        shade = np.where(lit[which], facing + look.ambient + glow[which], np.float32(1))
+        # A browser clips the light that leaves a surface, then blends.
+        rgba[:, :3] = np.minimum(rgba[:, :3] * shade[:, None], 1)
         color[active] += (left[active] * rgba[:, 3])[:, None] * rgba[:, :3]
         left[active] *= 1 - rgba[:, 3]
-        start[active] += rays[active] * (t + nudge)[:, None]
+        start[active] += ray * (hits.distance + tracer.nudge)[:, None]
         active = active[left[active] > 1 / 512]
-    picture = color.reshape(height, samples, width, samples, 3).mean(axis=(1, 3))
+    picture = color.reshape(view.height, samples, view.width, samples, 3).mean(axis=(1, 3))
     return np.asarray(np.clip(picture * 255 + 0.5, 0, 255).astype(np.uint8))
 
 
-def _shaded(
+def _footprints(
+    tracer: Tracer, view: View, face: NDArray[np.int64], rays: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(n, 2, 2) by how much uv changes from a pixel to the next one right, and up.
+
+    That is uv's gradient, times the derivative of the point where a ray meets the plane,
+    P = (c·n / d·n) d, with c a corner and d the ray.
+    """
+    cross = tracer.cross[face]
+    frame = view.frame()
+    ray = rays / (rays @ frame[2])[:, None]
+    slope = (ray * cross).sum(axis=1)
+    slope = np.where(slope == 0, np.finfo(float).tiny, slope)
+    depth = (tracer.corners[face, 0] * cross).sum(axis=1) / slope
+    steps = [step - ray * (cross @ step / slope)[:, None] for step in frame[:2]]
+    moved = depth[:, None, None] * np.stack(steps, axis=1)
+    return np.asarray(np.einsum("nij,nkj->nki", tracer.uv_gradient(face), moved))
+
+
+def _unlit(
     scene: Scene,
-    images: list[NDArray[np.float32]],
-    face: NDArray[np.int64],
-    weights: NDArray[np.float64],
+    pyramids: tuple[Pyramid, ...],
+    hits: Hits,
+    footprint: NDArray[np.float64] | None,
 ) -> NDArray[np.float32]:
-    """(n, 4) unlit colour and opacity where rays hit ``face`` at barycentric ``weights``."""
-    uv = np.einsum("ij,ijk->ik", weights, scene.uv[face])
-    which = scene.triangle_material[face]
-    out = np.empty((len(face), 4), dtype=np.float32)
+    """(n, 4) colour and opacity of the surfaces without light, in 0…1."""
+    uv = np.einsum("ij,ijk->ik", hits.weight, scene.uv[hits.face])
+    which = scene.triangle_material[hits.face]
+    out = np.empty((len(which), 4), dtype=np.float32)
     for m in np.unique(which):
         material, chosen = scene.materials[m], which == m
         tint = np.asarray([*material.color, material.opacity], dtype=np.float32)
-        if material.image >= 0:
-            out[chosen] = sample(images[material.image], uv[chosen], material) * tint
-        else:
+        if material.image < 0:
             out[chosen] = tint
+        elif footprint is None:
+            out[chosen] = pyramids[material.image].bilinear(0, uv[chosen], material) * tint
+        else:
+            pyramid = pyramids[material.image]
+            out[chosen] = pyramid.trilinear(uv[chosen], footprint[chosen], material) * tint
     return out
 
 
@@ -192,7 +295,7 @@ def main(arguments: list[str] | None = None) -> int:
     add("--fov", type=float, default=60, help="degrees over the smaller side (default 60)")
     add("--size", default="800x600", help="WIDTHxHEIGHT (default 800x600)")
     add("--samples", type=int, default=2, help="rays along a pixel's side (default 2)")
-    add("--shading", choices=("headlight", "browser", "flat"), default="headlight")
+    add("--look-of", choices=tuple(LOOKS), default="headlight", help="default headlight")
     add("--model-space", action="store_true", help="eye and look are in the model's coordinates")
     add("-o", "--output", type=Path, required=True)
     given = parser.parse_args(arguments)
@@ -207,16 +310,8 @@ def main(arguments: list[str] | None = None) -> int:
     eye, look = np.asarray(given.eye), np.asarray(given.look)
     if given.model_space:
         eye, look = to_world(scene.space, eye), to_world(scene.space, look)
-    picture = render(
-        scene,
-        eye,
-        look - eye,
-        fov=np.radians(given.fov),
-        width=width,
-        height=height,
-        samples=given.samples,
-        shading=given.shading,
-    )
+    view = View(eye, look - eye, np.radians(given.fov), width, height)
+    picture = render(scene, view, LOOKS[given.look_of], samples=given.samples)
     Image.fromarray(picture).save(given.output)
     return 0
 

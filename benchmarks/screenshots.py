@@ -1,102 +1,229 @@
-"""One database in three renderers: our own rays, view3dscene, and X_ITE in headless Chromium.
+"""Databases in real browsers, held against our own rays from the same viewpoints.
 
-    python benchmarks/screenshots.py DB -o DIR [--viewpoint K] [--size 640x480]
+    python benchmarks/screenshots.py DB… [-o build/bench/browsers] [--viewpoints 0 3 5]
 
-Writes `own.png`, `view3dscene.png`, `x_ite.png` and all of them side by side, `side_by_side.png`,
-and prints what the browsers complained about. The browsers show the emitted VRML files; the first
-picture is cast from the scene that ingest made, so whatever differs was lost or bent on the way.
-Another viewpoint than the first is shown through a copy of `root.wrl` with that one in front.
+Prints, for each viewpoint of `root.wrl` in view3dscene and in X_ITE in headless Chromium, how like
+the picture is to ours (likeness.py) and what the browser complained about, and in the end the
+worst and the middle of each scene; writes a contact sheet for each database (ours, the browser's,
+twice the difference around grey with what is left out as an edge in black). The browsers show the
+emitted VRML files; ours is cast from the scene that ingest made, so whatever differs was lost or
+bent on the way. view3dscene also reads every file by itself.
+
+X_ITE in a software renderer takes minutes for large textures; databases built with
+``--fallback-size 512`` are shown faster, and ours uses the same level of them.
 """
 
 from __future__ import annotations
 
 import argparse
+import io
 import json
-import shutil
 import sys
 import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "tests" / "e2e")]
 from browsers import view3dscene, x_ite  # noqa: E402
-from render import load, render  # noqa: E402
+from likeness import Likeness, Outline, likeness, outline  # noqa: E402
+from render import LOOKS, View, load, render  # noqa: E402
 
 from ptmtools.errors import PtmError  # noqa: E402
+from ptmtools.scene.model import Scene  # noqa: E402
+
+Picture = NDArray[np.uint8]
 
 
-def reordered(root: str, number: int) -> str:
-    """``root.wrl`` with its viewpoint ``number`` before the others: browsers bind the first."""
-    lines = root.splitlines()
-    where = [k for k, line in enumerate(lines) if " Viewpoint { " in line]
-    lines.insert(where[0], lines.pop(where[number]))
-    return "\n".join(lines) + "\n"
+@dataclass(frozen=True)
+class Album:
+    """What a browser made of a database.
+
+    Attributes
+    ----------
+    pictures: (height, width, 3) each, of the viewpoints asked for.
+    complaints: its warnings and errors.
+    """
+
+    pictures: tuple[Picture, ...]
+    complaints: tuple[str, ...]
+
+    @staticmethod
+    def of(files: Sequence[bytes], complaints: Sequence[str]) -> Album:
+        """From the bytes of PNG files."""
+        pictures = []
+        for png in files:
+            with Image.open(io.BytesIO(png)) as image:
+                pictures.append(np.asarray(image.convert("RGB")))
+        return Album(tuple(pictures), tuple(complaints))
 
 
-def side_by_side(pictures: list[tuple[str, Path]], output: Path) -> None:
-    images = [(name, Image.open(path).convert("RGB")) for name, path in pictures if path.exists()]
-    width, height = images[0][1].size
-    sheet = Image.new("RGB", (width * len(images), height + 24), (255, 255, 255))
-    draw = ImageDraw.Draw(sheet)
-    for k, (name, image) in enumerate(images):
-        sheet.paste(image.resize((width, height)), (k * width, 24))
-        draw.text((k * width + 6, 4), name, fill=(0, 0, 0), font=ImageFont.load_default(14))
-    sheet.save(output)
+@dataclass(frozen=True)
+class Database:
+    """A database folder, and what of it pictures are compared by."""
+
+    www: Path
+    scene: Scene
+    viewpoints: tuple[Mapping[str, Any], ...]
+
+    @staticmethod
+    def open(folder: Path) -> Database:
+        hints = json.loads((folder / "www" / "hints.json").read_text())
+        return Database(folder / "www", load(folder), tuple(hints["viewpoints"]))
+
+    @property
+    def root(self) -> Path:
+        return self.www / "root.wrl"
+
+    @property
+    def side(self) -> int:
+        """The longest side of a PNG twin, texels; 0 if there is none."""
+        longest = 0
+        for twin in (self.www / "textures").glob("*.png"):
+            with Image.open(twin) as image:
+                longest = max(longest, *image.size)
+        return longest
+
+    def view(self, viewpoint: int, size: tuple[int, int]) -> View:
+        return View.of_hint(self.viewpoints[viewpoint], *size)
+
+    def own(self, viewpoint: int, size: tuple[int, int], browser: str) -> Picture:
+        """Our picture of a viewpoint, as that browser should show it."""
+        return render(self.scene, self.view(viewpoint, size), LOOKS[browser], side=self.side)
+
+
+def by_view3dscene(database: Database, chosen: Sequence[int], size: tuple[int, int]) -> Album:
+    files, complaints = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for viewpoint in chosen:
+            shot = Path(folder) / f"{viewpoint}.png"
+            width, height = size
+            complaints += view3dscene.screenshot(
+                database.root, shot, viewpoint=viewpoint, width=width, height=height
+            )
+            files.append(shot.read_bytes())
+    return Album.of(files, complaints)
+
+
+def by_x_ite(
+    database: Database, chosen: Sequence[int], size: tuple[int, int], seconds: float = 1200
+) -> Album:
+    names = [database.viewpoints[viewpoint]["name"] for viewpoint in chosen]
+    width, height = size
+    shots = x_ite.show(database.root, names, width=width, height=height, seconds=seconds)
+    return Album.of(shots.pictures, shots.messages)
+
+
+BROWSERS: Mapping[str, Callable[[Database, Sequence[int], tuple[int, int]], Album]] = {
+    "view3dscene": by_view3dscene,
+    "x_ite": by_x_ite,
+}
+
+
+def strip(shown: Picture, own: Picture, outline: Outline) -> Picture:
+    """(height, 3 width, 3): ours, the browser's, twice the difference."""
+    difference = 128 + 2 * (shown.astype(np.int64) - own)
+    difference[outline.edge] = 0
+    return np.concatenate([own, shown, np.clip(difference, 0, 255).astype(np.uint8)], axis=1)
+
+
+def sheet(strips: Sequence[tuple[str, Picture]], output: Path) -> None:
+    """One strip below the other, each with its title."""
+    height, width = strips[0][1].shape[:2]
+    image = Image.new("RGB", (width, (height + 20) * len(strips)), (255, 255, 255))
+    draw = ImageDraw.Draw(image)
+    for k, (title, picture) in enumerate(strips):
+        draw.text((6, k * (height + 20) + 3), title, (0, 0, 0), ImageFont.load_default(13))
+        image.paste(Image.fromarray(picture), (0, k * (height + 20) + 20))
+    image.save(output)
+
+
+def row(name: str, viewpoint: int, browser: str, found: Likeness) -> str:
+    return (
+        f"| {name} | {viewpoint} | {browser} | {found.psnr:.1f} | {found.whole:.1f} "
+        f"| {found.masked:.1%} | {found.sky:.1%} | {found.stray:.2%} | {found.off:.3%} |"
+    )
+
+
+def summary(found: Mapping[tuple[str, str], Sequence[Likeness]]) -> str:
+    """One row for each scene and browser."""
+    lines = [
+        "| scene | browser | views | dB outside edges, least | median | dB whole, least "
+        "| edges, most | stray, most | off, most |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for (name, browser), all_found in found.items():
+        outside = [each.psnr for each in all_found]
+        lines.append(
+            f"| {name} | {browser} | {len(all_found)} | {min(outside):.1f} "
+            f"| {np.median(outside):.1f} | {min(each.whole for each in all_found):.1f} "
+            f"| {max(each.masked for each in all_found):.1%} "
+            f"| {max(each.stray for each in all_found):.2%} "
+            f"| {max(each.off for each in all_found):.3%} |"
+        )
+    return "\n".join(lines)
 
 
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(description="Pictures of a database by three renderers.")
+    parser = argparse.ArgumentParser(description="Databases in browsers, held against our rays.")
     add = parser.add_argument
-    add("database", type=Path, metavar="DB")
-    add("-o", "--output", type=Path, required=True, metavar="DIR")
-    add("--viewpoint", type=int, default=0, metavar="K", help="number of the viewpoint, from 0")
-    add("--size", default="640x480", help="WIDTHxHEIGHT (default 640x480)")
+    add("databases", type=Path, nargs="+", metavar="DB")
+    add("-o", "--output", type=Path, default=Path("build/bench/browsers"), metavar="DIR")
+    add("--viewpoints", type=int, nargs="+", metavar="K", help="their numbers, from 0; else all")
+    add("--size", default="480x360", help="WIDTHxHEIGHT (default 480x360)")
+    add("--only", choices=tuple(BROWSERS), help="one of the browsers")
     given = parser.parse_args(arguments)
     width, height = (int(n) for n in given.size.split("x"))
     given.output.mkdir(parents=True, exist_ok=True)
-    www = given.database / "www"
-    try:
-        scene = load(given.database)
-    except PtmError as error:
-        parser.exit(error.exit_status, f"screenshots: {error}\n")
-    views = json.loads((www / "hints.json").read_text())["viewpoints"]
-    if not 0 <= given.viewpoint < len(views):
-        parser.error(f"--viewpoint {given.viewpoint}: there are {len(views)}")
-    view = views[given.viewpoint]
+    lacking = {"view3dscene": view3dscene.missing(), "x_ite": x_ite.missing()}
+    names = [name for name in BROWSERS if given.only in (None, name)]
+    for name in names:
+        if lacking[name]:
+            print(f"{name}: left out; to be installed: {lacking[name]}")
+    names = [name for name in names if not lacking[name]]
 
-    own, castle, web = (given.output / f"{n}.png" for n in ("own", "view3dscene", "x_ite"))
-    picture = render(
-        scene,
-        view["position"],
-        view["direction"],
-        fov=view["fieldOfView"],
-        width=width,
-        height=height,
-        samples=2,
-        shading="browser",
+    print(
+        "| scene | viewpoint | browser | dB outside edges | dB whole | edges | sky | stray | off |"
     )
-    Image.fromarray(np.ascontiguousarray(picture)).save(own)
-    with tempfile.TemporaryDirectory() as folder:
-        copy = Path(shutil.copytree(www, Path(folder) / "www"))
-        root = copy / "root.wrl"
-        root.write_text(reordered(root.read_text(), given.viewpoint))
-        if view3dscene.missing():
-            print(f"view3dscene: left out, apt install {view3dscene.missing()}")
-        else:
-            for line in view3dscene.screenshot(root, castle, width=width, height=height):
-                print(f"view3dscene: {line}")
-        if x_ite.missing():
-            print(f"X_ITE: left out, {x_ite.missing()}")
-        else:
-            shot = x_ite.screenshot(root, width=width, height=height, seconds=500)
-            web.write_bytes(shot.png)
-            for line in shot.messages:
-                print(f"X_ITE: {line}")
-    labels = [("own rays", own), ("view3dscene", castle), ("X_ITE", web)]
-    side_by_side(labels, given.output / "side_by_side.png")
-    print(given.output / "side_by_side.png")
+    print("|---|---|---|---|---|---|---|---|---|")
+    warnings = 0
+    every: dict[tuple[str, str], list[Likeness]] = {}
+    for folder in given.databases:
+        try:
+            database = Database.open(folder)
+        except PtmError as error:
+            parser.exit(error.exit_status, f"screenshots: {error}\n")
+        title, size = folder.resolve().stem, (width, height)
+        count = len(database.viewpoints)
+        chosen = [k for k in given.viewpoints or range(count) if k < count]
+        albums = {name: BROWSERS[name](database, chosen, size) for name in names}
+        strips: list[tuple[str, Picture]] = []
+        for k, viewpoint in enumerate(chosen):
+            what = outline(database.scene, database.view(viewpoint, size))
+            for name, album in albums.items():
+                own = database.own(viewpoint, size, name)
+                found = likeness(album.pictures[k], own, what, LOOKS[name])
+                print(row(title, viewpoint, name, found), flush=True)
+                every.setdefault((title, name), []).append(found)
+                label = f"{title}, viewpoint {viewpoint}: ours, {name}, difference; "
+                label += f"{found.psnr:.1f} dB outside edges"
+                strips.append((label, strip(album.pictures[k], own, what)))
+        if strips:
+            sheet(strips, given.output / f"{title}.png")
+        said = [f"{name}: {line}" for name, album in albums.items() for line in album.complaints]
+        if "view3dscene" in names:
+            for file, lines in view3dscene.check_all(database.www).items():
+                said += [f"view3dscene: {file}: {line}" for line in lines]
+        files = len(list(database.www.rglob("*.wrl")))
+        print(f"{title}: {files} files, textures to {database.side}², {len(said)} warnings")
+        print("".join(f"  {line}\n" for line in said), end="", flush=True)
+        warnings += len(said)
+    print(f"\n{summary(every)}\n\n{warnings} warnings; pictures in {given.output}")
     return 0
 
 

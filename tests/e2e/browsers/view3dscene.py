@@ -76,9 +76,18 @@ def check_all(www: Path) -> dict[str, list[str]]:
 
 
 def screenshot(
-    path: Path, picture: Path, *, width: int = 640, height: int = 480, seconds: float = 120
+    path: Path,
+    picture: Path,
+    *,
+    viewpoint: int = 0,
+    width: int = 640,
+    height: int = 480,
+    seconds: float = 120,
 ) -> list[str]:
-    """Writes a PNG of the first viewpoint; returns the complaints, unreadable textures included."""
-    arguments = [path.name, "--geometry", f"{width}x{height}"]
+    """Writes a PNG of a viewpoint, counted from 0 in the order of view3dscene's menu.
+
+    Returns the complaints, unreadable textures included.
+    """
+    arguments = [path.name, "--geometry", f"{width}x{height}", "--viewpoint", str(viewpoint)]
     arguments += ["--screenshot", "0", str(picture.resolve())]
     return _run(arguments, path.parent, display=True, seconds=seconds)

@@ -1,36 +1,30 @@
-"""X_ITE in headless Chromium: the picture of a file's first viewpoint, as a web page shows it.
+"""X_ITE in headless Chromium: the pictures of a file's viewpoints, as a web page shows them.
 
-A server on this machine hands out the page, X_ITE and the files; the page posts what the console
-said and, once nothing is loading any more and two pictures in a row are equal, the canvas as PNG.
-So nothing waits for a guessed time: Chromium's virtual time and its own ``--screenshot`` fire
-before WebGL has drawn. Only the loopback address can be reached.
+The page binds one viewpoint after the other, as a script in the scene would, and, once nothing is
+loading any more and two pictures in a row are equal, hands over the canvas as PNG. So nothing
+waits for a guessed time: Chromium's virtual time and its own ``--screenshot`` fire before WebGL
+has drawn.
 
-X_ITE makes a texture of its own for every ImageTexture node, one per shape. The sample museum has
-1,145 of them: 6 GB at 1024² in a software renderer, and no picture within 200 s. So the server
-hands out PNG files reduced to `TEXTURE_SIDE` unless told otherwise; the VRML files are untouched.
+X_ITE's own TextureQuality, MEDIUM, picks single texels of a pyramid's levels, which sparkle; the
+page asks for HIGH, which blends them as view3dscene does. X_ITE makes a texture of its own for
+every ImageTexture node, one per shape: the sample museum's 419 take 2.3 GB at 1024². Twins of
+``--fallback-size 256`` are for such browsers.
 """
 
 from __future__ import annotations
 
 import base64
-import functools
-import io
 import json
 import os
-import shutil
-import signal
-import subprocess
-import tempfile
-import threading
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote
 
-from PIL import Image
+from browsers import web
 
-TEXTURE_SIDE = 256
+#: The viewpoint after the bound one, as by Page Down.
+NEXT = ">"
 X_ITE_VERSION = "15.0.1"
 ROOT = Path(__file__).resolve().parents[3]
 DIST = Path("build/browsers/node_modules/x_ite/dist")
@@ -40,56 +34,65 @@ INSTALL = (
 )
 
 PAGE = """\
-<!DOCTYPE html>
-<meta charset="utf-8">
-<style>
-body {{ margin: 0 }}
-x3d-canvas {{ display: block; width: {width}px; height: {height}px }}
-</style>
-<script>
-const post = (where, what) => fetch(where, {{ method: "POST", body: what }});
-for (const kind of ["warn", "error"]) {{
-  const say = console[kind];
-  console[kind] = (...what) => {{ post("/say", `${{kind}}: ${{what.join(" ")}}`); say(...what); }};
-}}
-addEventListener("error", (event) => post("/say", `error: ${{event.message}}`));
-addEventListener("unhandledrejection", (event) => post("/say", `error: ${{event.reason}}`));
-</script>
+<style>x3d-canvas {{ display: block; width: {width}px; height: {height}px }}</style>
 <x3d-canvas preserveDrawingBuffer="true" splashScreen="false" notifications="false"
             contextMenu="false" contentScale="1"></x3d-canvas>
 <!-- After the element: X_ITE reads preserveDrawingBuffer once, when the element is made. -->
 <script src="/x_ite/x_ite.min.js"></script>
 <script>
+// To the next viewpoint X_ITE flies for a second.
+const FLIGHT = 1500;
 const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 (async () => {{
   const canvas = document.querySelector("x3d-canvas");
   while (!canvas.browser) await pause(20);
-  try {{
-    await canvas.browser.loadURL(new X3D.MFString({url}));
+  const browser = canvas.browser, pictures = [];
+  let menu = [];
+  const steady = async () => {{
     let last = "", picture = "";
     do {{
       last = picture;
-      for (let k = 0; k < 5; ++k) await canvas.browser.nextFrame();
+      for (let k = 0; k < 3; ++k) await browser.nextFrame();
       await pause(150);
       picture = canvas.toDataURL("image/png");
     }} while (picture !== last);
-    await post("/done", picture);
+    return picture;
+  }};
+  try {{
+    browser.setBrowserOption("TextureQuality", "HIGH");
+    await browser.loadURL(new X3D.MFString({url}));
+    menu = browser.getActiveLayer().getUserViewpoints().map(
+      (viewpoint) => viewpoint.getDescriptions().join(" "));
+    for (const name of {names}) {{
+      if (name === ">") {{
+        browser.nextViewpoint();
+        await pause(FLIGHT);
+      }} else if (name !== null) browser.currentScene.getNamedNode(name).set_bind = true;
+      pictures.push(await steady());
+    }}
   }} catch (fault) {{
     await post("/say", `error: ${{fault}}`);
-    await post("/done", "");
   }}
+  await post("/done", JSON.stringify({{ pictures, menu }}));
 }})();
 </script>
 """
 
 
-@dataclass
-class Shot:
-    """A picture as PNG bytes (empty if there is none) and the lines of the console."""
+@dataclass(frozen=True)
+class Shots:
+    """What a page showed.
 
-    png: bytes = b""
-    messages: list[str] = field(default_factory=list)
-    done: threading.Event = field(default_factory=threading.Event)
+    Attributes
+    ----------
+    pictures: one PNG file's bytes for each viewpoint asked for; fewer if something failed.
+    menu: the descriptions of the viewpoints that X_ITE offers, in its order.
+    messages: the lines of the console.
+    """
+
+    pictures: tuple[bytes, ...]
+    menu: tuple[str, ...]
+    messages: tuple[str, ...]
 
 
 def dist() -> Path | None:
@@ -98,160 +101,40 @@ def dist() -> Path | None:
     return folder if (folder / "x_ite.min.js").is_file() else None
 
 
-def chromium() -> str | None:
-    names = ("chromium", "chromium-browser", "google-chrome")
-    return next((found for name in names if (found := shutil.which(name))), None)
-
-
 def missing() -> str | None:
     """What to install first, or None."""
-    lacking = [] if chromium() else ["apt install chromium"]
+    lacking = [] if web.chromium() else ["apt install chromium"]
     lacking += [] if dist() else [f"in the checkout: {INSTALL}"]
     return "; ".join(lacking) or None
 
 
-class _Handler(SimpleHTTPRequestHandler):
-    """/page; /x_ite/… and /db/… from their folders; what the page posts goes into the shot."""
-
-    def __init__(
-        self,
-        *arguments: object,
-        page: str,
-        folders: dict[str, Path],
-        shot: Shot,
-        reduced: Callable[[Path], bytes],
-    ) -> None:
-        self.page, self.folders, self.shot, self.reduced = page, folders, shot, reduced
-        super().__init__(*arguments, directory=str(folders["db"]))  # type: ignore[arg-type]
-
-    def guess_type(self, path: str | os.PathLike[str]) -> str:
-        return "model/vrml" if str(path).endswith(".wrl") else super().guess_type(path)
-
-    def do_GET(self) -> None:
-        path = urlsplit(self.path).path
-        file = Path(self.translate_path(path))
-        if path == "/page":
-            self._answer("text/html; charset=utf-8", self.page.encode())
-        elif path.startswith("/db/") and file.suffix == ".png" and file.is_file():
-            self._answer("image/png", self.reduced(file))
-        else:
-            super().do_GET()
-
-    def _answer(self, kind: str, body: bytes) -> None:
-        self.send_response(200)
-        self.send_header("Content-Type", kind)
-        self.send_header("Content-Length", str(len(body)))
-        self.end_headers()
-        self.wfile.write(body)
-
-    def translate_path(self, path: str) -> str:
-        _, name, rest = (path + "//").split("/", 2)
-        self.directory = str(self.folders.get(name, self.folders["db"] / "no such folder"))
-        return super().translate_path("/" + rest.rstrip("/"))
-
-    def do_POST(self) -> None:
-        body = self.rfile.read(int(self.headers["Content-Length"]))
-        self.send_response(204)
-        self.end_headers()
-        if self.path == "/done":
-            self.shot.png = base64.b64decode(body.partition(b",")[2])
-            self.shot.done.set()
-        else:
-            self.shot.messages.append(body.decode(errors="replace"))
-
-    def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        if "favicon" not in self.path:
-            self.shot.messages.append(f"error: {code} {self.path}")
-        super().send_error(code, message, explain)
-
-    def log_message(self, format: str, *arguments: object) -> None:
-        pass
-
-
-def _reducer(side: int | None) -> Callable[[Path], bytes]:
-    """Reads a PNG file, reduced to at most ``side`` texels, once."""
-    lock = threading.Lock()
-    held: dict[Path, bytes] = {}
-
-    def read(path: Path) -> bytes:
-        with lock:
-            if path not in held:
-                out = io.BytesIO(path.read_bytes())
-                with Image.open(out) as image:
-                    if side is not None and max(image.size) > side:
-                        image.thumbnail((side, side), Image.Resampling.BOX)
-                        out = io.BytesIO()
-                        image.save(out, "PNG")
-                held[path] = out.getvalue()
-        return held[path]
-
-    return read
-
-
-def screenshot(
+def show(
     path: Path,
+    viewpoints: Sequence[str | None] = (None,),
     *,
     width: int = 640,
     height: int = 480,
-    seconds: float = 120,
-    texture_side: int | None = TEXTURE_SIDE,
-) -> Shot:
+    seconds: float = 300,
+) -> Shots:
     """Shows a file, whose folder is served with all that is below it.
 
-    Raises FileNotFoundError without Chromium or X_ITE, TimeoutError if no picture comes.
+    A picture is taken of each of the ``viewpoints``: DEF names, `NEXT`, or None for what shows.
+    Raises FileNotFoundError without Chromium or X_ITE, TimeoutError if no pictures come.
     """
-    program, library = chromium(), dist()
-    if program is None or library is None:
+    library = dist()
+    if library is None:
         raise FileNotFoundError(missing())
-    shot = Shot()
-    url = json.dumps(f"/db/{quote(path.name)}")
-    page = PAGE.format(width=width, height=height, url=url)
-    folders = {"x_ite": library, "db": path.parent}
-    handler = functools.partial(
-        _Handler, page=page, folders=folders, shot=shot, reduced=_reducer(texture_side)
+    page = web.REPORTING + PAGE.format(
+        width=width,
+        height=height,
+        url=json.dumps(f"/db/{quote(path.name)}"),
+        names=json.dumps(list(viewpoints)),
     )
-    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    thread = threading.Thread(target=server.serve_forever, daemon=True)
-    thread.start()
-    try:
-        with tempfile.TemporaryDirectory(prefix="chromium-", ignore_cleanup_errors=True) as home:
-            command = [
-                program,
-                "--headless",
-                "--no-sandbox",
-                "--use-gl=angle",
-                "--use-angle=swiftshader",
-                "--enable-unsafe-swiftshader",
-                "--disable-quic",
-                "--disable-background-networking",
-                "--disable-component-update",
-                "--disable-sync",
-                "--disable-dev-shm-usage",
-                "--no-first-run",
-                "--host-resolver-rules=MAP * ~NOTFOUND , EXCLUDE 127.0.0.1",
-                f"--user-data-dir={home}",
-                f"--window-size={width},{height + 100}",
-                f"http://127.0.0.1:{server.server_port}/page",
-            ]
-            quiet = subprocess.DEVNULL
-            process = subprocess.Popen(
-                command,
-                stdin=quiet,
-                stdout=quiet,
-                stderr=quiet,
-                start_new_session=True,
-                env={**os.environ, "HOME": home},
-            )
-            try:
-                if not shot.done.wait(seconds):
-                    said = "; ".join(shot.messages) or "and the console said nothing"
-                    raise TimeoutError(f"no picture of {path} within {seconds:.0f} s: {said}")
-            finally:
-                # A profile of its own: nothing is lost, and asked kindly it takes 10 s.
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
-    finally:
-        server.shutdown()
-        server.server_close()
-        thread.join()
-    return shot
+    folders = {"x_ite": library, "db": path.parent}
+    seen = web.visit(page, folders, width=width, height=height, seconds=seconds)
+    told = json.loads(seen.body)
+    return Shots(
+        pictures=tuple(base64.b64decode(p.partition(",")[2]) for p in told["pictures"]),
+        menu=tuple(told["menu"]),
+        messages=tuple(seen.messages),
+    )
