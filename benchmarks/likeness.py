@@ -11,8 +11,8 @@ neighbours. Texture is no edge: what a browser makes of that is modelled (mipmap
 Sky is left out of the PSNR too, since to show nothing where nothing is would raise it; how much of
 the sky shows something else is told apart.
 
-(Tried: a threshold on the colour's gradient as well, so that texture seams are masked. It masks
-a third of a parquet floor and changes no PSNR by more than 1 dB.)
+(Tried: a threshold of 40 levels on the colour's step to the next pixel as well. It masks up to 4 %
+more of a picture and changes no PSNR by more than 1 dB.)
 """
 
 from __future__ import annotations
