@@ -3,9 +3,11 @@
 Atlases often have an alpha channel that is below 255 only where no face takes its colours from,
 so the whole image says nothing, and neither do the bounding boxes of faces. A summed-area table
 sorts out, for all triangles at once, those whose box holds no such texel; the others are tested
-texel by texel. A texel counts as used if the triangle reaches into the square that bilinear
-filtering spreads it over, two texels wide. Rasterising with Pillow was rejected: its polygons
-miss texels at slivers and corners, and that errs to the wrong side.
+row by row. A texel counts as used if the triangle reaches into the square that bilinear filtering
+spreads it over, two texels wide; those of a row are one run, in which the table counts. (Tried:
+texel by texel. A thousand large triangles beside the holes of an image of 4096², files of 50 KB,
+take a quarter of an hour. Rasterising with Pillow: its polygons miss texels at slivers and corners,
+and that errs to the wrong side.)
 """
 
 from __future__ import annotations
@@ -17,8 +19,9 @@ from ptmtools.scene.model import Wrap
 
 #: A triangle repeating the image more often than this, counted in images, is taken to use all.
 _MANY_TILES = 16
-#: Texels tested at once.
-_BATCH = 1 << 20
+#: How far, as a share of a texel or of its distance from the origin, a run is widened so that
+#: rounding does not shorten it.
+_SLACK = 1e-9
 
 
 def uses_holes(
@@ -76,60 +79,79 @@ def uses_holes(
     # The smallest first: a used hole is found soonest where there is little to test.
     spans = (box[:, 2] - box[:, 0]) * (box[:, 3] - box[:, 1])
     return any(
-        _touches(holes, texel[t], box[t])
+        _touches(table, texel[t], box[t])
         for t in candidates[np.argsort(spans[candidates], kind="stable")]
     )
 
 
-def _table(holes: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _table(holes: NDArray[np.bool_]) -> NDArray[np.uint32]:
     """(H + 1, W + 1) number of holes above and to the left."""
-    table = np.zeros((holes.shape[0] + 1, holes.shape[1] + 1), dtype=np.int64)
-    table[1:, 1:] = holes.cumsum(axis=0, dtype=np.int64).cumsum(axis=1)
+    table = np.zeros((holes.shape[0] + 1, holes.shape[1] + 1), dtype=np.uint32)
+    inner = table[1:, 1:]
+    inner[:] = holes
+    np.cumsum(inner, axis=0, out=inner)
+    np.cumsum(inner, axis=1, out=inner)
     return table
 
 
 def _up_to(
-    table: NDArray[np.int64], x: NDArray[np.int64], y: NDArray[np.int64]
+    table: NDArray[np.uint32], x: NDArray[np.int64], y: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """Holes in [0, x) × [0, y) of the plane tiled with the image."""
     height, width = table.shape[0] - 1, table.shape[1] - 1
     tiles_x, rest_x = np.divmod(x, width)
     tiles_y, rest_y = np.divmod(y, height)
     count: NDArray[np.int64] = (
-        tiles_x * tiles_y * table[-1, -1]
-        + tiles_x * table[rest_y, -1]
-        + tiles_y * table[-1, rest_x]
+        tiles_x * tiles_y * int(table[-1, -1])
+        + tiles_x * table[rest_y, -1].astype(np.int64)
+        + tiles_y * table[-1, rest_x].astype(np.int64)
         + table[rest_y, rest_x]
     )
     return count
 
 
 def _touches(
-    holes: NDArray[np.bool_],
-    triangle: NDArray[np.float64],
-    box: NDArray[np.int64],
+    table: NDArray[np.uint32], triangle: NDArray[np.float64], box: NDArray[np.int64]
 ) -> bool:
-    """Whether a triangle in texels reaches into the square of a hole within its box."""
-    height, width = holes.shape
+    """Whether a (3, 2) triangle in texels reaches into the square of a hole within its box."""
+    height, width = table.shape[0] - 1, table.shape[1] - 1
     x0, y0, x1, y1 = box.tolist()
-    columns, rows = np.arange(x0, x1), np.arange(y0, y1)
-    column_of, row_of = columns % width, rows % height
     (ax, ay), (bx, by), (cx, cy) = triangle.tolist()
     if (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) < 0:
         bx, by, cx, cy = cx, cy, bx, by
-    step = max(1, _BATCH // max(1, len(columns)))
-    for start in range(0, len(rows), step):
-        window = holes[row_of[start : start + step]][:, column_of]
-        y, x = np.nonzero(window)
-        # The middle of each texel; its square reaches one texel to every side.
-        px, py = columns[x] + 0.5, rows[start + y] + 0.5
-        hit = (min(ax, bx, cx) < px + 1) & (max(ax, bx, cx) > px - 1)
-        hit &= (min(ay, by, cy) < py + 1) & (max(ay, by, cy) > py - 1)
-        for ux, uy, vx, vy in ((ax, ay, bx, by), (bx, by, cx, cy), (cx, cy, ax, ay)):
-            ex, ey = vx - ux, vy - uy
-            reach = abs(ex) + abs(ey)
-            # Outside only if the whole square lies strictly on the wrong side of an edge.
-            hit &= ex * (py - uy) - ey * (px - ux) + reach >= 0
-        if hit.any():
-            return True
-    return False
+    rows = np.arange(y0, y1)
+    # The middle of each texel; its square reaches one texel to every side.
+    py = rows + 0.5
+    reached = (min(ay, by, cy) < py + 1) & (max(ay, by, cy) > py - 1)
+    # Columns likewise, to the last bit: the corners of an atlas often lie in the middle of texels.
+    columns = np.arange(x0, x1)
+    within = (min(ax, bx, cx) < columns + 1.5) & (max(ax, bx, cx) > columns - 0.5)
+    if not within.any():
+        return False
+    x0, x1 = x0 + int(within.argmax()), x1 - int(within[::-1].argmax())
+    low, high = np.full(len(rows), -np.inf), np.full(len(rows), np.inf)
+    for ux, uy, vx, vy in ((ax, ay, bx, by), (bx, by, cx, cy), (cx, cy, ax, ay)):
+        ex, ey = vx - ux, vy - uy
+        # Outside only if the whole square lies strictly on the wrong side of an edge.
+        room = ex * (py - uy) + abs(ex) + abs(ey)
+        if ey > 0:
+            high = np.minimum(high, ux + room / ey)
+        elif ey < 0:
+            low = np.maximum(low, ux + room / ey)
+        else:
+            reached &= room >= 0
+    slack = _SLACK * (1 + max(abs(x0), abs(x1)))
+    first = np.clip(np.ceil(low - slack - 0.5), x0, x1).astype(np.int64)
+    end = np.clip(np.floor(high + slack - 0.5) + 1, x0, x1).astype(np.int64)
+    reached &= end > first
+    row = rows[reached] % height
+
+    def before(column: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Holes of each row to the left of a column of the tiled plane."""
+        tiles, rest = np.divmod(column, width)
+        whole = table[row + 1, -1].astype(np.int64) - table[row, -1]
+        part = table[row + 1, rest].astype(np.int64) - table[row, rest]
+        count: NDArray[np.int64] = tiles * whole + part
+        return count
+
+    return bool((before(end[reached]) > before(first[reached])).any())
