@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from heapq import heappop, heappush
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
 
@@ -65,19 +64,22 @@ def storeys(floors: Sequence[float], apart: float) -> list[int]:
 
 def _ways(cells: Cells, start: int, tall: float) -> tuple[list[float], list[int]]:
     """For each leaf how far it is from ``start``, and the leaf before it on the way, -1 if none."""
-    count = np.diff(cells.leaf_point_start)
-    total = np.add.reduceat(cells.leaf_point, cells.leaf_point_start[:-1])
-    middle: NDArray[np.float64] = total / count[:, None]
     edges: list[list[tuple[int, float]]] = [[] for _ in range(cells.leaf_count)]
-    for k in range(cells.portal_count):
-        a, b = cells.portal_leaf[k].tolist()
-        polygon = cells.portal(k)
-        door = polygon.mean(axis=0)
-        way = float(np.linalg.norm(middle[[a, b]] - door, axis=1).sum())
-        if abs(cells.portal_plane[k, 1]) < _LEVEL and np.ptp(polygon[:, 1]) < tall:
-            way *= _CLIMB
-        edges[a].append((b, way))
-        edges[b].append((a, way))
+    if cells.portal_count:
+        middle, door = (
+            np.add.reduceat(point, start[:-1]) / np.diff(start)[:, None]
+            for point, start in (
+                (cells.leaf_point, cells.leaf_point_start),
+                (cells.portal_point, cells.portal_start),
+            )
+        )
+        up, begin = cells.portal_point[:, 1], cells.portal_start[:-1]
+        rise = np.maximum.reduceat(up, begin) - np.minimum.reduceat(up, begin)
+        way = np.linalg.norm(middle[cells.portal_leaf] - door[:, None], axis=2).sum(axis=1)
+        way[(abs(cells.portal_plane[:, 1]) < _LEVEL) & (rise < tall)] *= _CLIMB
+        for (a, b), far in zip(cells.portal_leaf.tolist(), way.tolist(), strict=True):
+            edges[a].append((b, far))
+            edges[b].append((a, far))
     length, before = [np.inf] * cells.leaf_count, [-1] * cells.leaf_count
     length[start] = 0.0
     waiting = [(0.0, start)]

@@ -1,0 +1,236 @@
+"""How fast a database is emitted, and how long its files are beside those of others.
+
+    python benchmarks/emission.py [MODEL…]
+
+First the formatting of numbers alone, in megabytes of text a second: the compiled loops, the same
+in NumPy, and Python's own conversion. Then for every model the VRML and GLB files of a database
+beside what pymeshlab (VRML97) and trimesh (GLB) write of the model itself, images left out; the
+last three columns are their ratios to ours: of bytes, of bytes a triangle, and of seconds. A
+database has more triangles than the model, since cells cut them, and what hangs in a boundary is
+in two files; and its VRML files also hold the hulls, visible sets and hints of the cells. Last the
+first model again with its triangles quartered until there are many.
+
+Seconds are of the processor, the best of three; waiting for the disk is not among them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from PIL import Image
+
+from ptmtools import AchOptions, compute_ach
+from ptmtools.cells import Cells, subdivide
+from ptmtools.coverage.model import Ach
+from ptmtools.database import TextureRecord, emit
+from ptmtools.database.geometry import Geometry
+from ptmtools.database.gltf import gltf_files
+from ptmtools.database.numerals import Rows, loops
+from ptmtools.database.served import compressed
+from ptmtools.scene import Scene, ingest
+from ptmtools.visibility import Pvs, compute_pvs
+
+ROOT = Path(__file__).resolve().parent.parent
+SHARED = Path(os.environ.get("PTM_SHARED", ROOT.parent / "shared"))
+MODELS = (
+    ROOT / "build/museum/museum.obj",
+    *(SHARED / f"scenes/{name}/{name}.obj" for name in ("hospital", "gallery")),
+)
+#: Each thing is timed so many times, and the best counts.
+TIMES = 3
+#: The large scene has at least so many triangles.
+MANY = 400_000
+
+
+def best(work: Callable[[], object]) -> float:
+    """Seconds."""
+    taken = []
+    for _ in range(TIMES):
+        begin = time.process_time()
+        work()
+        taken.append(time.process_time() - begin)
+    return min(taken)
+
+
+def numerals() -> None:
+    random = np.random.default_rng(1)
+    n = 150_000
+    bits = random.integers(0, 2**32, n, dtype=np.uint32).view(np.float32)
+    kinds = {
+        "any bits": np.where(np.isfinite(bits), bits, 1),
+        "metres, full precision": random.normal(0, 20, n),
+        "metres, whole millimetres": np.round(random.normal(0, 20, n), 3),
+        "whole metres": random.integers(-99, 99, n),
+        "texture coordinates": random.random(n),
+    }
+    print("numbers as text, MB/s       compiled  NumPy  Python")
+    index, start = np.arange(n // 3), np.array([0, n // 3])
+    for name, values in kinds.items():
+        points = (values.astype(np.float32) + np.float32(0)).reshape(-1, 3)
+        text = Rows(points, True).list(index)
+        fast = best(lambda points=points: Rows(points, True).list(index))
+        slow = best(lambda points=points: Rows(points).list(index))
+        some = points[: n // 30].ravel()
+        own = best(lambda some=some: ",".join([str(v) for v in some])) * 10
+        rates = (f"{len(text) / t / 1e6:8.1f}" for t in (fast, slow, own))
+        print(f"{name:27}{'  '.join(rates)}")
+    triangles = random.integers(0, 20_000, (n // 3, 3))
+    text = loops(triangles, start, compiled=True)[0]
+    fast = best(lambda: loops(triangles, start, compiled=True))
+    slow = best(lambda: loops(triangles, start))
+    own = best(lambda: ",".join([f"{a} {b} {c} -1" for a, b, c in triangles.tolist()]))
+    rates = (f"{len(text) / t / 1e6:8.1f}" for t in (fast, slow, own))
+    print(f"{'indices':27}{'  '.join(rates)}\n", flush=True)
+
+
+def records(scene: Scene) -> tuple[TextureRecord, ...]:
+    """As if every image had been encoded."""
+    return tuple(
+        TextureRecord(i, f"textures/{i}.ptm", f"textures/{i}.png", 1, 1, 3, (), "0" * 64)
+        for i in range(len(scene.images))
+    )
+
+
+def quartered(cells: Cells) -> Cells:
+    """Every piece cut into four, at the middles of its edges."""
+    a, b, c = cells.triangle.T
+    n, m = len(cells.vertex), len(cells.triangle)
+    ab, bc, ca = (n + m * i + np.arange(m) for i in range(3))
+    quarters = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
+
+    def with_middles(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.concatenate(
+            [rows, *((rows[p] + rows[q]) / 2 for p, q in ((a, b), (b, c), (c, a)))]
+        )
+
+    return replace(
+        cells,
+        vertex=with_middles(cells.vertex),
+        vertex_uv=with_middles(cells.vertex_uv),
+        triangle=np.concatenate([np.stack(q, axis=1) for q in quarters]).astype(np.int32),
+        triangle_source=np.tile(cells.triangle_source, 4),
+        triangle_cell=np.tile(cells.triangle_cell, (4, 1)),
+    )
+
+
+@dataclass(frozen=True)
+class Written:
+    """What a writer made: its files, without images, and the seconds that it took."""
+
+    triangles: int
+    files: list[bytes]
+    seconds: float
+
+    @property
+    def size(self) -> int:
+        return sum(map(len, self.files))
+
+    def row(self, name: str, other: Written | None = None) -> None:
+        packed = sum(len(compressed(data)) for data in self.files)
+        line = (
+            f"  {name:24}{self.triangles:9}{self.size / 1e3:10.1f}{packed / 1e3:9.1f}"
+            f"{self.size / self.triangles:9.1f}{self.seconds:9.3f}"
+            f"{self.size / self.seconds / 1e6:8.1f}"
+        )
+        if other:
+            line += f"{self.size / other.size:9.2f}"
+            line += f"{self.size / self.triangles / (other.size / other.triangles):10.2f}"
+            line += f"{self.seconds / other.seconds:9.2f}"
+        print(line, flush=True)
+
+
+def heading(name: str) -> None:
+    print(
+        f"{name:26}triangles        kB  gzip -9  B/tri.  seconds    MB/s"
+        "  × bytes  × B/tri.  × seconds"
+    )
+
+
+def emitted(scene: Scene, cells: Cells, pvs: Pvs, ach: Ach, folder: Path) -> Written:
+    """The VRML files and the hints, as they are on the disk."""
+    some, out = records(scene), folder / "www"
+    seconds = best(lambda: emit(scene, cells, pvs, ach, some, out, force=True))
+    report = emit(scene, cells, pvs, ach, some, out, force=True)
+    return Written(report.triangles, [(out / name).read_bytes() for name in report.files], seconds)
+
+
+def emitted_gltf(scene: Scene, cells: Cells) -> Written:
+    def work() -> list[bytes]:
+        geometry = Geometry(scene, cells)
+        return [glb for _, glb in gltf_files(scene, geometry, cells.cell_count, some, True)]
+
+    some = records(scene)
+    return Written(len(cells.emitted(scene.two_sided)[0]), work(), best(work))
+
+
+def by_trimesh(model: Path) -> Written:
+    """Its GLB of the model, every image a single texel."""
+    loaded = trimesh.load(model, force="scene")
+    for shape in loaded.geometry.values():
+        material = getattr(shape.visual, "material", None)
+        if getattr(material, "image", None) is not None:
+            material.image = Image.new("RGB", (1, 1))
+    data: bytes = loaded.export(file_type="glb")
+    seconds = best(lambda: loaded.export(file_type="glb"))
+    return Written(sum(len(g.faces) for g in loaded.geometry.values()), [data], seconds)
+
+
+def by_pymeshlab(model: Path, folder: Path) -> Written:
+    """Its VRML97 of the model; raises ImportError where it lacks libGL."""
+    import pymeshlab
+
+    meshes = pymeshlab.MeshSet(verbose=False)
+    meshes.load_new_mesh(str(model))
+    out = folder / "model.wrl"
+    seconds = best(lambda: meshes.save_current_mesh(str(out), save_textures=False))
+    return Written(meshes.current_mesh().face_number(), [out.read_bytes()], seconds)
+
+
+def compare(model: Path, folder: Path) -> None:
+    scene = ingest(model)
+    cells = subdivide(scene)
+    pvs = compute_pvs(cells)
+    ach = compute_ach(scene, cells, pvs, AchOptions(samples=8, face=8))
+    heading(model.stem)
+    ours = emitted(scene, cells, pvs, ach, folder)
+    ours.row("VRML and hints")
+    vrml = Written(ours.triangles, ours.files[: cells.cell_count], ours.seconds)
+    hints = Written(ours.triangles, ours.files[-2:-1], ours.seconds)
+    vrml.row("  of them the cells")
+    hints.row("  of them the hints")
+    try:
+        by_pymeshlab(model, folder).row("pymeshlab VRML", vrml)
+    except ImportError as fault:
+        print(f"  pymeshlab cannot be loaded: {fault}")
+    glb = emitted_gltf(scene, cells)
+    glb.row("GLBs")
+    by_trimesh(model).row("trimesh GLB", glb)
+    if len(cells.triangle) < MANY and model.stem == MODELS[0].stem:
+        while len(cells.triangle) < MANY:
+            cells = quartered(cells)
+        heading(f"\n{model.stem}, quartered")
+        emitted(scene, cells, pvs, ach, folder).row("VRML and hints")
+    print()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("models", nargs="*", type=Path, help="default: museum, hospital, gallery")
+    models = [model for model in parser.parse_args().models or MODELS if model.is_file()]
+    numerals()
+    with tempfile.TemporaryDirectory(prefix="emission-") as folder:
+        for model in models:
+            compare(model, Path(folder) / model.stem)
+
+
+if __name__ == "__main__":
+    main()
