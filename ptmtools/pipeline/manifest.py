@@ -121,6 +121,24 @@ class Manifest:
         return Manifest(model, {s: _record(stages[s], s, file) for s in STAGES if s in stages})
 
 
+def listed_before(data: bytes) -> tuple[str, set[str]] | None:
+    """The model, and the files that are listed, of a manifest of an earlier schema; None if it is
+    no such manifest.
+
+    Of such a database nothing can be used but the knowledge of what is ours in its folder.
+    """
+    try:
+        document = json.loads(data)
+        schema, model = document["schema"], document["model"]
+        earlier = type(schema) is int and 0 < schema < SCHEMA
+        if document["format"] != FORMAT or not earlier or not isinstance(model, str):
+            return None
+        listed = [path for stage in document["stages"].values() for path in stage["outputs"]]
+        return model, {path for path in listed if isinstance(path, str) and _is_output(path)}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
+
+
 def _record(entry: object, stage: str, file: str | PathLike[str]) -> StageRecord:
     names = ("parameters", "inputs", "outputs", "counts")
     if not isinstance(entry, dict) or type(entry.get("recipe")) is not int:

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING
 from ptmtools.errors import DatabaseError, OutputError
 from ptmtools.files import real_file, real_folder, write_bytes, writing
 from ptmtools.pipeline.folder import MANIFEST, DatabaseFolder, read_manifest, sha256
-from ptmtools.pipeline.manifest import Manifest, StageRecord
+from ptmtools.pipeline.manifest import Manifest, StageRecord, listed_before
 from ptmtools.pipeline.stages import arrays_of
 
 if TYPE_CHECKING:
@@ -201,10 +201,7 @@ def _complete(folder: Path, relative: str) -> None:
     with writing(folder):
         data = (staging / MANIFEST).read_bytes()
         after = Manifest.from_bytes(data, file=staging / MANIFEST).outputs()
-        before: Mapping[str, str] = {}
-        with suppress(DatabaseError):  # a damaged one, which is replaced
-            manifest = read_manifest(folder)
-            before = manifest.outputs() if manifest else {}
+        before = _listed(folder)
         for name in after:
             parent, _, base = name.rpartition("/")
             if source := real_file(staging, name):
@@ -216,6 +213,19 @@ def _complete(folder: Path, relative: str) -> None:
         shutil.rmtree(staging)
         with suppress(OSError):
             staging.parent.rmdir()
+
+
+def _listed(folder: Path) -> Iterable[str]:
+    """The files that the manifest of a database lists, or one of an earlier schema; none of a
+    damaged one, which is replaced."""
+    try:
+        manifest = read_manifest(folder)
+    except DatabaseError:
+        with suppress(OSError):
+            earlier = listed_before((folder / MANIFEST).read_bytes())
+            return sorted(earlier[1]) if earlier else ()
+        return ()
+    return manifest.outputs() if manifest else ()
 
 
 def _remove(folder: Path, name: str) -> None:

@@ -12,7 +12,7 @@ from ptmtools.errors import DatabaseError, OutputError, PtmError
 from ptmtools.files import writing
 from ptmtools.pipeline.folder import MANIFEST, DatabaseFolder, read_manifest
 from ptmtools.pipeline.lock import LOCK, Lock, acquire
-from ptmtools.pipeline.manifest import Manifest
+from ptmtools.pipeline.manifest import Manifest, listed_before
 from ptmtools.pipeline.transaction import STAGING, Transaction, discard, recover
 
 
@@ -104,14 +104,16 @@ class DatabaseWriter(DatabaseFolder):
 
 
 def admitted(folder: Path, model: str, *, force: bool) -> Manifest:
-    """The manifest that a build of ``model`` starts from (design, "Overwriting").
+    """The manifest that a build of ``model`` starts from (design, "Overwriting"): an empty one if
+    there is none, or one of an earlier schema.
 
     Raises as `DatabaseWriter.open_for_model`.
     """
     try:
         manifest = read_manifest(folder)
     except DatabaseError:
-        if not force:
+        earlier = listed_before((folder / MANIFEST).read_bytes())
+        if not force and (earlier is None or earlier[0] != model):
             raise
         return Manifest(model)
     if manifest is None:

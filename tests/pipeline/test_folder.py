@@ -8,7 +8,7 @@ import pytest
 
 from ptmtools.errors import DatabaseError, OutputError
 from ptmtools.pipeline.folder import MANIFEST, DatabaseFolder
-from ptmtools.pipeline.manifest import StageRecord
+from ptmtools.pipeline.manifest import SCHEMA, StageRecord
 from ptmtools.pipeline.writer import DatabaseWriter
 
 
@@ -89,6 +89,28 @@ def test_force_guards_what_is_not_ours(tmp_path: Path) -> None:
     file.write_text("mine")
     with pytest.raises(OutputError, match="PTM-O001"):
         DatabaseWriter.open_for_model(file, "m.obj", force=True)
+
+
+def test_a_database_of_an_earlier_schema_is_built_again(tmp_path: Path) -> None:
+    write(tmp_path, {"www/old/a": b"1", "www/keep": b"2"})
+    (tmp_path / "www" / "mine.txt").write_text("mine")
+    manifest = tmp_path / MANIFEST
+    now = f'"schema": {SCHEMA}'
+    earlier = manifest.read_text().replace(now, '"schema": 1')
+    manifest.write_text(earlier)
+    with pytest.raises(DatabaseError, match="PTM-D003"):
+        DatabaseFolder.open(tmp_path)
+    with pytest.raises(DatabaseError, match="PTM-D003"):
+        DatabaseWriter.open_for_model(tmp_path, "other.obj")
+    with DatabaseWriter.open_for_model(tmp_path, "m.obj") as writer:
+        assert writer.manifest.stages == {}
+        staged = writer.begin("some")
+        staged.put("www/keep", b"3")
+        staged.commit({"cells": StageRecord(1, {}, {}, staged.pending())})
+    assert set(state(tmp_path)) == {MANIFEST, "www/keep", "www/mine.txt"}
+    manifest.write_text(earlier.replace('"schema": 1', f'"schema": {SCHEMA + 1}'))
+    with pytest.raises(DatabaseError, match="PTM-D003"):
+        DatabaseWriter.open_for_model(tmp_path, "m.obj")
 
 
 def test_says_what_is_missing_or_damaged(tmp_path: Path) -> None:
