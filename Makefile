@@ -5,6 +5,7 @@
 # make bench-codec   only those of the texture codec, beside other formats (about an hour)
 # make bench-pvs     cells and visibility, what is traded for what (a quarter of an hour)
 # make bench-ach     coverage hints: what accuracy costs (a quarter of an hour)
+# make fuzz    100,000 damaged and hostile files for every reader (half an hour)
 # make sample  only the sample museum
 # make setup   only the virtual environment
 # make clean   remove what was built, except the virtual environment
@@ -23,7 +24,7 @@ JOBS ?= 2
 PYTEST_ARGS ?=
 export PTM_SHARED ?= $(abspath ../shared)
 
-.PHONY: help setup demo test lint bench bench-codec bench-pvs bench-ach sample clean
+.PHONY: help setup demo test lint bench bench-codec bench-pvs bench-ach fuzz sample clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -83,7 +84,7 @@ bench-codec: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/codec/near_lossless.py
 	$(BIN)/python benchmarks/codec/huge.py
 	$(BIN)/python benchmarks/codec/startup.py
-	$(BIN)/python benchmarks/codec/fuzz.py
+	$(BIN)/python -m benchmarks.fuzz --count 100000 --jobs $(JOBS) --only ptm
 
 bench-pvs: build/museum/.made $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/pvs_trade.py
@@ -100,6 +101,11 @@ bench: $(VENV)/.installed-dev
 	    --reference "$${map%.prt}.visible.npz"; { set +x; } 2>/dev/null; done
 	@[ ! -d build/museum.db ] || { set -x; $(BIN)/python benchmarks/false_negatives.py build/museum.db; }
 	$(BIN)/python benchmarks/ach.py sample_data/two_rooms/two_rooms.obj --only accuracy speed
+	$(BIN)/python benchmarks/emission.py
+	$(BIN)/python -m benchmarks.fuzz --count 5000 --jobs $(JOBS)
+
+fuzz: $(VENV)/.installed-dev
+	$(BIN)/python -m benchmarks.fuzz --jobs $(JOBS)
 
 clean:
 	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

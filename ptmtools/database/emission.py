@@ -20,7 +20,7 @@ from ptmtools.database.rootfile import root_text
 from ptmtools.database.served import ServedFiles
 from ptmtools.database.viewpoints import place_viewpoints
 from ptmtools.errors import DatabaseError, OutputError
-from ptmtools.files import writing
+from ptmtools.files import real_folder
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
@@ -53,7 +53,7 @@ def emit(
         PTM-D602 an image has no record; PTM-D603 a cell is flat in float32; PTM-D604 the
         artifacts do not belong together.
     InputError: PTM-I600 a given viewpoint lies in no cell.
-    OutputError: PTM-O001 to PTM-O003, see `ptmtools.files`.
+    OutputError: PTM-O001 to PTM-O003, PTM-O005, see `ptmtools.files`.
     LimitError: PTM-L600 a cell is longer than a GLB can be.
     """
     folder = Path(out)
@@ -71,10 +71,8 @@ def emit(
     viewpoints, notes = place_viewpoints(scene, cells, options)
     records = {t.image: t for t in textures}
     writer = CellWriter(scene, cells, pvs, ach.value, records, options.fallback)
-    with writing(folder):
-        (folder / CELL_FOLDER).mkdir(parents=True, exist_ok=True)
-        if gltf:
-            (folder / GLTF_FOLDER).mkdir(exist_ok=True)
+    for inner in (CELL_FOLDER, *([GLTF_FOLDER] if gltf else [])):
+        real_folder(folder, inner)
 
     count = cells.cell_count
     boxes, images = [], []

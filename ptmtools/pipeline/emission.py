@@ -35,7 +35,7 @@ def put_files(run: Run, options: EmitOptions) -> None:
             run.pvs,
             run.ach,
             texture_records(run),
-            transaction.folder / SERVED,
+            transaction.made(SERVED),
             options,
             run.progress,
             force=True,

@@ -73,6 +73,13 @@ class Transaction:
             write_bytes(self._real(folder) / base, data, force=True)
         self._pending[name] = digest
 
+    def made(self, name: str) -> Path:
+        """A folder below `folder`, made where it is absent, for others to write in.
+
+        Raises OutputError PTM-O002, PTM-O003, PTM-O005.
+        """
+        return self._real(name)
+
     def put_arrays(self, stage: str, arrays: Mapping[str, NDArray[np.generic]]) -> dict[str, str]:
         """Stages the arrays of a stage; returns the outputs that they are."""
         from ptmtools.pipeline.archive import pack_arrays

@@ -36,6 +36,8 @@ _HARMLESS = {
     "KHR_texture_transform",
 }
 _TRIANGLES, _STRIP = 4, 5
+#: So many vertices may there be for each triangle that is allowed.
+_VERTICES_A_TRIANGLE = 10
 _BYTES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _ITEMS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 #: The greatest value of each integer type, which normalised means 1.
@@ -206,9 +208,13 @@ def _draws(
             if triangles > max_triangles:
                 raise too_many_triangles(max_triangles, path)
             draws.append(_Draw(node, name, primitive, place))
-    if vertices > MAX_VERTICES:
+    most = min(MAX_VERTICES, _VERTICES_A_TRIANGLE * max_triangles)
+    if vertices > most:
         raise LimitError(
-            "PTM-L200", f"more than {MAX_VERTICES} vertices", file=path, remedy="split the model"
+            "PTM-L200",
+            f"more than {most} vertices, those that several primitives share counted for each",
+            file=path,
+            remedy="raise the limit (--max-triangles), or split the model",
         )
     return draws
 

@@ -200,6 +200,20 @@ CASES: dict[str, tuple[Prepare, str, int, str]] = {
     "texture missing, strict": (without("model/floor.png"), BUILD + " --strict", 3, "I204"),
     "texture empty, strict": (file("model/floor.png", b""), BUILD + " --strict", 3, "I206"),
     "texture outside the folder, strict": (outside, BUILD + " --strict", 3, "I205"),
+    "texture that promises the moon": (
+        file("model/floor.png", png(60_000)), BUILD, 7, "L104"
+    ),
+    "texture beyond the limit": (
+        image("model/floor.png", "RGB", "PNG", (600, 600)), BUILD + " --limit 1", 7, "L104"
+    ),
+    "more triangles than allowed": (nothing, BUILD + " --max-triangles 9", 7, "L203"),
+    "limit of nothing": (nothing, BUILD + " --limit 0", 3, "I257"),
+    "the same, cells alone": (
+        image("model/floor.png", "RGB", "PNG", (600, 600)),
+        "cells model/two_rooms.obj -o new --limit 1",
+        7,
+        "L104",
+    ),
     "texture of 16 bits": (deep_png("model/floor.png"), BUILD, 3, "I126"),
     "unknown unit": (nothing, BUILD + " --unit cubit", 3, "I"),
     "impossible unit": (nothing, BUILD + " --unit 0", 3, "I"),

@@ -288,3 +288,13 @@ def test_pipes_in_place_of_files_are_not_waited_for(database: Path, place: str) 
     with pytest.raises(DatabaseError, match=r"PTM-D00[15]"):
         opened(database)
     assert main(["-q", "status", str(database)]) in (0, 5)
+
+
+def test_limits_change_nothing_that_is_built(built: Path, tmp_path: Path) -> None:
+    db = Path(shutil.copytree(built, tmp_path / "db"))
+    model = built.parent / "model" / "two_rooms.obj"
+    before = (db / "manifest.json").read_bytes()
+    options = ["--samples", "16", "--backend", "embree", "-j", "1", "--limit", "7"]
+    assert main(["-q", "build-scene", str(model), "-o", str(db), *options]) == 0
+    assert (db / "manifest.json").read_bytes() == before
+    assert b'"limit"' not in before

@@ -14,11 +14,13 @@ from pathlib import Path
 
 import pytest
 
+from ptmtools.cli.main import main
 from ptmtools.errors import PtmError
 from ptmtools.pipeline.folder import sha256
 from ptmtools.pipeline.manifest import Manifest, StageRecord
 from ptmtools.pipeline.writer import DatabaseWriter
 
+TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"
 OLD, NEW, SECRET = b"old", b"new", b"secret"
 NAME = "www/textures/a.ptm"
 
@@ -138,6 +140,24 @@ def test_names_of_outputs(db: Path, name: str) -> None:
     assert {p for p in db.parent.rglob("*") if db not in p.parents} == {
         p for p in before if db not in p.parents
     }
+
+
+@pytest.mark.parametrize("inner", ["www", "www/cells", "www/gltf"])
+def test_links_where_cells_are_to_be_written(tmp_path: Path, inner: str) -> None:
+    """What an interrupted run has finished is kept, and with it whatever lies beside it."""
+    shutil.copytree(TWO_ROOMS, tmp_path / "model")
+    build = ["-q", "build-scene", str(tmp_path / "model/two_rooms.obj"), "-o", str(tmp_path / "db")]
+    options = ["--samples", "16", "--backend", "embree", "-j", "1", "--format", "gltf"]
+    assert main([*build, *options]) == 0
+    begun = tmp_path / "db/.ptm-new/emit"
+    begun.mkdir(parents=True)
+    task = {"task": "ab" * 32, "outputs": {"www/x": "ab" * 32}}
+    (begun / "journal").write_text(json.dumps(task) + "\n")
+    (tmp_path / "outside").mkdir()
+    (begun / inner).parent.mkdir(parents=True, exist_ok=True)
+    (begun / inner).symlink_to(tmp_path / "outside")
+    assert main([*build, *options, "--samples", "32"]) == 4
+    assert not list((tmp_path / "outside").iterdir())
 
 
 def test_the_database_itself_may_be_reached_through_a_link(db: Path) -> None:

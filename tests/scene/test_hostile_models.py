@@ -378,6 +378,19 @@ def test_instances_are_counted_before_they_are_made(put: Put) -> None:
     assert len(ingest(put("a.glb", placed(5).glb()), IngestOptions(max_triangles=10)).points) == 4
     with pytest.raises(LimitError, match="PTM-L203"):
         ingest(put("a.glb", placed(6).glb()), IngestOptions(max_triangles=10))
+    # Vertices that are shared are read for each.
+    doc = Gltf()
+    quads = [doc.quad() for _ in range(9)]
+    for quad in quads:
+        quad["attributes"] = quads[0]["attributes"]
+        quad["indices"] = doc.add(np.array([0, 1, 2], np.uint16))
+    doc.tree["accessors"][0]["count"] = 4
+    corners = doc.add(np.tile(np.eye(3, dtype=np.float32) * 9, (20, 1)))
+    quads[0]["attributes"] = {"POSITION": corners}
+    doc.place(*[{**quad, "attributes": {"POSITION": corners}} for quad in quads])
+    assert len(ingest(put("a.glb", doc.glb()), IngestOptions(max_triangles=54)).triangles) == 1
+    with pytest.raises(LimitError, match=r"more than 530 vertices.*PTM-L200"):
+        ingest(put("a.glb", doc.glb()), IngestOptions(max_triangles=53))
     # A strip has nearly as many triangles as corners.
     doc = Gltf()
     doc.place(doc.quad(mode=5))
