@@ -42,7 +42,7 @@ R = TypeVar("R")
 PATIENCE = 15
 #: Seconds after which the workers are counted again.
 COUNTED_FOR = 5
-#: How often what was under way is handed out again after all workers that had the data were lost.
+#: How often in turn what was under way is handed out again after workers that had data were lost.
 AGAIN = 3
 #: Bytes of a call above which it does not pass through the scheduler.
 LARGE = 1 << 20
@@ -199,9 +199,11 @@ class _OnCluster(Generic[S]):
 
     def close(self) -> None:
         """Frees the workers' memory."""
-        if self._there is None:
-            return
-        self._there = None
+        if self._there is not None:
+            self._there = None
+            self._forget()
+
+    def _forget(self) -> None:
         with suppress(Exception):  # of a lost cluster
             self._client.run(forget, self._name, on_error="ignore")
 
@@ -240,6 +242,7 @@ class _OnCluster(Generic[S]):
                     raise
                 self._hand_out_again()
                 return
+        self._again = 0
         for pending, came in zip(done, found, strict=True):
             self.under_way.remove(pending)
             pending.came = came
@@ -250,6 +253,7 @@ class _OnCluster(Generic[S]):
         self._cluster.wait_for_workers()
         self._cluster.forget_last()
         self._there = None
+        self._forget()
         # The caller's own is as changed as it is for all that is under way.
         self._name, self._changes = _name(), []
         for pending in self.under_way:
