@@ -169,7 +169,7 @@ def emitted_gltf(scene: Scene, cells: Cells) -> Written:
         return [glb for _, glb in gltf_files(scene, geometry, cells.cell_count, some, True)]
 
     some = records(scene)
-    return Written(len(cells.emitted(scene.two_sided)[0]), work(), best(work))
+    return Written(len(Geometry(scene, cells).triangle), work(), best(work))
 
 
 def by_trimesh(model: Path) -> Written:

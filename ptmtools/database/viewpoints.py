@@ -8,9 +8,9 @@ so it is put there beforehand: at the height of the eye above the nearest upward
 below.
 
 (Tried: an Anchor on every portal, with a transparent polygon to click on. view3dscene 4.2 and
-X_ITE 15 draw nothing of it, to the last pixel; but on it the mouse no longer walks, and at the
-museum's first viewpoint that is 42 % of the picture. Readers that know no transparency show a wall
-in every door.)
+X_ITE 15 draw nothing of it, to the last pixel; but in X_ITE a drag that begins on it jumps instead
+of walking, and at the museum's first viewpoint that is 42 % of the picture. Readers that know no
+transparency show a wall in every door.)
 """
 
 from __future__ import annotations
