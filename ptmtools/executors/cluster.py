@@ -73,6 +73,11 @@ class Cluster(Executor):
             raise
 
     @property
+    def remote(self) -> bool:
+        """See `Executor.remote`."""
+        return True
+
+    @property
     def workers(self) -> int:
         """The threads of all workers that there are now, or as many as were asked for."""
         if time.monotonic() - self._counted > COUNTED_FOR:

@@ -70,6 +70,11 @@ class Executor(ABC):
     def workers(self) -> int:
         """How many tasks are done at a time."""
 
+    @property
+    def remote(self) -> bool:
+        """Whether tasks may be done on other machines, which may see the disks of this one."""
+        return False
+
     def each(
         self,
         function: Callable[[S, T], R],

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from ptmtools.texture.model import PtmHeader
 
 FOLDER = "textures"
+#: Images that are named together at most: a message costs a few ms.
+AT_A_DESK = 4
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 
 
@@ -119,12 +121,8 @@ class TextureStage:
             else:
                 to_do.append(i)
         total = len(self._names)
-        sources = self._sources(to_do)
-        encoded = executor.each(encoded_image, self._options, sources, releases_lock=True)
-        for done, (i, result) in enumerate(zip(to_do, encoded, strict=True)):
+        for done, i in enumerate(self._encoded(transaction, executor, to_do, files)):
             self._run.progress(total - len(to_do) + done, total, "textures")
-            for name, data in zip(files[i], result, strict=True):
-                transaction.put(name, data)
             transaction.finish(self._task(i), files[i])
             if stop is not None and stop.is_set():
                 return
@@ -158,10 +156,29 @@ class TextureStage:
         told = [self._work.recipe, self._work.parameters, name, self._work.inputs[name]]
         return sha256(json.dumps(told, sort_keys=True).encode())
 
-    def _sources(self, to_do: list[int]) -> Iterator[tuple[str, bytes]]:
+    def _encoded(
+        self, transaction: Transaction, executor: Executor, to_do: list[int], files: list[list[str]]
+    ) -> Iterator[int]:
+        """The numbers of the images, each once its files are staged."""
+        from ptmtools.pipeline.desk import Picture, desk_of, encoded_there
+
         images = self._run.images
-        for i in to_do:
-            yield images[i].name, images[i].load()
+        with desk_of(transaction, self._run.db.path, self._options, executor) as desk:
+            if desk is None:
+                sources = ((images[i].name, images[i].load()) for i in to_do)
+                made = executor.each(encoded_image, self._options, sources, releases_lock=True)
+                for i, result in zip(to_do, made, strict=True):
+                    for name, data in zip(files[i], result, strict=True):
+                        transaction.put(name, data)
+                    yield i
+                return
+            pictures = (Picture(images[i].name, images[i].sha256, str(i)) for i in to_do)
+            chunk = max(1, min(AT_A_DESK, len(to_do) // (8 * executor.workers)))
+            left = executor.each(encoded_there, desk, pictures, releases_lock=True, chunk=chunk)
+            for i, leavings in zip(to_do, left, strict=True):
+                for name, (file, digest) in zip(files[i], leavings, strict=True):
+                    transaction.take(name, Path(file), digest)
+                yield i
 
     def _counted(self, transaction: Transaction, files: list[str]) -> dict[str, int]:
         raw = stored = 0

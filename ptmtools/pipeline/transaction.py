@@ -95,6 +95,21 @@ class Transaction:
             (self.folder / name).unlink()
         self._pending[name] = digest
 
+    def take(self, name: str, file: Path, digest: str) -> None:
+        """Stages a file of this digest that a worker wrote into a `subfolder`, unless it stands in
+        the database; moves it, or removes it."""
+        with writing(file):
+            if self.keep({name: digest}):
+                file.unlink()
+            else:
+                folder, _, base = name.rpartition("/")
+                file.replace(self._real(folder) / base)
+        self._pending[name] = digest
+
+    def subfolder(self, name: str) -> Path:
+        """A folder below `folder`, for `take`. It goes with the transaction."""
+        return self._real(name)
+
     def keep(self, outputs: Mapping[str, str]) -> bool:
         """Takes outputs that stand in the database as they are; False if one does not."""
         same = all(self._standing.get(name) == digest for name, digest in outputs.items())
