@@ -107,12 +107,21 @@ class DatabaseFolder:
         return data
 
     def read_output(self, stage: str, name: str, needed_for: str = "this") -> bytes:
-        """The bytes of an output that a stage must have; raises as `record` and `read` do, and
+        """The bytes of an output that a stage must have; raises as `output` and `read` do."""
+        return self.read(name, self.output(stage, name, needed_for))
+
+    def output(self, stage: str, name: str, needed_for: str = "this") -> str:
+        """The recorded hash of an output that a stage must have; raises as `record` does, and
         PTM-D002 if it has no such output."""
         digest = self.record(stage, needed_for).outputs.get(name)
         if digest is None:
-            raise DatabaseError("PTM-D002", f"the {stage} stage lists no {name}", file=self.path)
-        return self.read(name, digest)
+            raise DatabaseError(
+                "PTM-D002",
+                f"damaged manifest: the {stage} stage lists no {name}",
+                file=self.path / MANIFEST,
+                remedy="restore it, or build the database again with --force",
+            )
+        return digest
 
     def read_arrays(self, stage: str, needed_for: str) -> dict[str, NDArray[np.generic]]:
         """The arrays of a stage; raises as `read_output` does."""

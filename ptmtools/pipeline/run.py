@@ -185,8 +185,8 @@ class Run(Artifacts):
 
         Raises
         ------
-        DatabaseError: PTM-D004 if one has not been run; PTM-D008 if one was computed from what
-            has been replaced since.
+        DatabaseError: PTM-D002 if one has no arrays; PTM-D004 if one has not been run; PTM-D008 if
+            one was computed from what has been replaced since.
         """
         current = self.db.manifest.outputs()
         found = {}
@@ -200,7 +200,7 @@ class Run(Artifacts):
                         file=self.db.path,
                         remedy=f"run `ptm {stage} DB` or `ptm build-scene MODEL -o DB` first",
                     )
-            found[arrays_of(stage)] = record.outputs[arrays_of(stage)]
+            found[arrays_of(stage)] = self.db.output(stage, arrays_of(stage))
         return found
 
     def stage(

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from ptmtools.cells import Cells, SubdivideOptions, structural_triangles
 from ptmtools.database import ValidationReport, validate_database, validate_ptm
 from ptmtools.errors import DatabaseError
-from ptmtools.pipeline.folder import DatabaseFolder
+from ptmtools.pipeline.folder import MANIFEST, DatabaseFolder
 from ptmtools.pipeline.run import Artifacts
 from ptmtools.pipeline.stagecheck import check_stages
 from ptmtools.progress import Progress, silent
+from ptmtools.stored import texts
 from ptmtools.texture.model import Limits
 from ptmtools.visibility import Pvs, SegmentReport, check_conservative
 
@@ -73,9 +74,18 @@ def structure_of(db: str | os.PathLike[str]) -> tuple[NDArray[np.float64], Cells
     Raises as `shoot_segments`.
     """
     held = Artifacts(DatabaseFolder.open(db))
-    cut = held.db.record("cells").parameters
-    options = SubdivideOptions(
-        structural=tuple(cut.get("structural", ())), detail=tuple(cut.get("detail", ()))
-    )
+    told = held.db.record("cells").parameters
+    try:
+        options = SubdivideOptions(
+            structural=texts(told.get("structural", []), "structural"),
+            detail=texts(told.get("detail", []), "detail"),
+        )
+    except ValueError as fault:
+        raise DatabaseError(
+            "PTM-D002",
+            f"damaged manifest: stage cells: {fault}",
+            file=held.db.path / MANIFEST,
+            remedy="restore it, or build the database again with --force",
+        ) from fault
     corners = held.scene.corners[structural_triangles(held.scene, options)]
     return corners, held.cells, held.pvs

@@ -298,3 +298,40 @@ def test_limits_change_nothing_that_is_built(built: Path, tmp_path: Path) -> Non
     assert main(["-q", "build-scene", str(model), "-o", str(db), *options]) == 0
     assert (db / "manifest.json").read_bytes() == before
     assert b'"limit"' not in before
+
+
+COMMANDS = {
+    "info": [],
+    "status": [],
+    "pvs": ["-j", "1"],
+    "ach": ["-j", "1", "--samples", "8", "--backend", "embree"],
+    "textures": ["-j", "1"],
+    "emit": [],
+    "validate": ["--segments", "20"],
+}
+#: What a manifest may say of a stage, with sound names and hashes otherwise.
+SAID: list[tuple[str, dict[str, Any]]] = [
+    *((stage, {"outputs": {}}) for stage in ("scene", "cells", "pvs", "ach", "textures")),
+    *((stage, {"inputs": {}}) for stage in ("scene", "cells", "textures", "emit")),
+    *((stage, {"parameters": {}}) for stage in ("scene", "cells", "textures", "emit")),
+    *((stage, {"counts": {}}) for stage in ("scene", "cells", "pvs", "ach", "textures", "emit")),
+    ("scene", {"counts": {"triangles": "x", "metres": [], "images": None}}),
+    ("textures", {"counts": {"textures": {}, "raw_bytes": "x", "ptm_bytes": 10**400}}),
+    ("cells", {"parameters": {"structural": 5, "detail": None}}),
+    ("cells", {"parameters": {"structural": [5], "detail": []}}),
+    ("textures", {"parameters": {"fallback_size": "x", "fallback": None}}),
+    ("cells", {"recipe": 10**400}),
+]
+
+
+@pytest.mark.parametrize("number", range(len(SAID)))
+def test_commands_of_a_manifest_that_lies(
+    database: Path, number: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stage, said = SAID[number]
+    document = json.loads((database / "manifest.json").read_bytes())
+    document["stages"][stage].update(said)
+    for command, options in COMMANDS.items():
+        (database / "manifest.json").write_text(json.dumps(document))
+        assert main([command, str(database), *options]) in (0, 5, 8)
+        assert "internal error" not in capsys.readouterr().err
