@@ -46,6 +46,8 @@ from ptmtools.visibility.storage import Geometry
 
 #: Portals whose results appear to the others at once.
 BATCH = 64
+#: Operations that are worth a message to another machine, some 20 ms.
+TASK = 80_000
 #: Portals from which floods start in one task.
 SPAN = 64
 #: Rounds of the bitwise pre-pass; the third changes next to nothing.
@@ -144,16 +146,18 @@ def portal_flow(
     from ptmtools.visibility.searching import Searching, search_from, settle
 
     g = geometry(portals)
-    chunk = max(1, BATCH // (4 * executor.workers))
+    together = BATCH // 8
     searching = Searching(g, _prepass(g, executor), budget, exact)
     sizes = BITS_OF_BYTE[searching.known.view(np.uint8)].sum(axis=1)
     order = np.argsort(sizes, kind="stable")
     with executor.sharing(searching, releases_lock=True) as shared:
         for first in range(0, count, BATCH):
             batch = order[first : first + BATCH]
-            found = list(shared.each(search_from, batch.tolist(), chunk=chunk))
+            found = list(shared.each(search_from, batch.tolist(), chunk=together))
             for p, (_, figures) in zip(batch, found, strict=True):
                 cut[p], *counts[:, p] = figures
+            each = max(1, int(counts[0, batch].mean()))
+            together = max(1, min(BATCH // 2, TASK // each))  # the next ones take about as long
             shared.change(settle, (batch, np.stack([seen for seen, _ in found])))
             progress(min(first + BATCH, count), count, "portals")
     return PortalFlow(searching.known, cut[0::2] | cut[1::2], *(counts[:, 0::2] + counts[:, 1::2]))
