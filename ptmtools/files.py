@@ -46,6 +46,8 @@ def write_with(
     The file can be read and can seek.
     """
     target = Path(path)
+    if "\0" in os.fspath(target):
+        raise OutputError("PTM-O002", "has a NUL in its name", file=target)
     with writing(target):
         in_the_way = target.exists() and not target.is_file()
     if in_the_way:  # renaming would replace a device

@@ -100,10 +100,13 @@ def test_a_target_that_is_a_link_is_replaced_itself(tmp_path: Path) -> None:
     assert (tmp_path / "kept").read_bytes() == b"theirs"
 
 
-def test_a_name_that_is_too_long(tmp_path: Path) -> None:
+def test_names_that_no_file_has(tmp_path: Path) -> None:
     for force in (False, True):
         with pytest.raises(OutputError, match="PTM-O002"):
             write_bytes(tmp_path / ("a" * 5000), b"", force=force)
+        with pytest.raises(OutputError, match="PTM-O002"):
+            write_bytes(tmp_path / "a\0b", b"", force=force)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_dangling_link_leads_nowhere(tmp_path: Path) -> None:

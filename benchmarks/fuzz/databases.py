@@ -303,12 +303,12 @@ class Interrupted:
             inner = rng.choice((".", "www", "journal", "manifest.json", names[0]))
             outer = rng.choice(("www", "stages", ".ptm-new", ".ptm-lock", "www/textures", names[1]))
             place = rng.choice((begun / inner, self._db / outer))
-            if place.is_symlink() or place.is_file():
-                place.unlink()
-            elif place.is_dir():
+            if place.parent.resolve() != place.parent or not place.parent.is_dir():
+                continue  # it is there no more, or lies beyond a link
+            if place.is_dir() and not place.is_symlink():
                 place.rename(self._db / f"moved{rng.randrange(1 << 30)}")
-            if not place.parent.is_dir():
-                continue
+            elif os.path.lexists(place):
+                place.unlink()
             match rng.randrange(4):
                 case 0:
                     os.symlink(self._outside, place)
