@@ -86,7 +86,12 @@ def validate_ptm(path: str | os.PathLike[str], *, limits: Limits = _LIMITS) -> V
     InputError: PTM-I602 if it cannot be read. All else is told in the report.
     """
     file = Path(path)
+    found = Findings()
     try:
+        size = os.stat(file).st_size
+        if size > limits.decoded_bytes:  # a pipe has none
+            found.add("PTM-D713", os.fspath(path), "", f"{size} bytes")
+            return ValidationReport(found.issues(), 1, size)
         data = file.read_bytes()
     except OSError as fault:
         raise InputError(
@@ -95,7 +100,6 @@ def validate_ptm(path: str | os.PathLike[str], *, limits: Limits = _LIMITS) -> V
             file=file,
             remedy="check the name and the rights",
         ) from fault
-    found = Findings()
     check_ptm(data, os.fspath(path), limits, found)
     return ValidationReport(found.issues(), 1, len(data))
 

@@ -124,7 +124,10 @@ def read_obj(
     cut = triangulate(points[corner_point], start)
     if cut.tangled:
         findings.say(
-            "PTM-N221", "polygons cross themselves and were cut as fans", path.name, cut.tangled
+            "PTM-N221",
+            "polygons that cross themselves, or are too intricate, were cut as fans",
+            path.name,
+            cut.tangled,
         )
     coord = corner_coord[cut.corner]
     uv = np.zeros((len(coord), 3, 2))

@@ -342,3 +342,12 @@ def test_commands_of_a_manifest_that_lies(
         (database / "manifest.json").write_text(json.dumps(document))
         assert main([command, str(database), *options]) in (0, 5, 8), command
         assert "internal error" not in capsys.readouterr().err
+
+
+def test_a_sparse_texture_of_a_terabyte_is_not_read(tmp_path: Path) -> None:
+    texture = tmp_path / "a.ptm"
+    texture.write_bytes(b"\x89PTM\r\n\x1a\n")
+    os.truncate(texture, 1 << 40)
+    assert main(["validate", str(texture)]) == 0  # a warning: it was not looked into
+    assert main(["info", str(texture)]) == 3
+    assert main(["decode", str(texture), "-o", str(tmp_path / "a.png")]) == 3
