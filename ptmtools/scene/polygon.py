@@ -22,9 +22,12 @@ from numpy.typing import NDArray
 from ptmtools.tolerance import ROUNDING_SHARE
 
 #: Steps of clipping, of about 10 ns: for all outlines together and for each corner besides; of a
-#: look at a corner; of a search for what occupies an ear, which takes one more for each corner.
+#: look at a corner; of a search for what occupies an ear, which takes one more for each corner; of
+#: a corner where there are few, which are searched one by one.
 _BASE_STEPS, _CORNER_STEPS = 200_000_000, 10_000
-_LOOK, _SEARCH = 300, 2_000
+_LOOK, _SEARCH, _CORNER = 150, 2_000, 40
+#: So many corners are few.
+_FEW = 40
 
 
 @dataclass(frozen=True)
@@ -135,7 +138,7 @@ def _clip_ears(shape: NDArray[np.float64], steps: int) -> tuple[NDArray[np.int64
     while len(ring.index) > 2:
         m = len(ring.index)
         a, b, c = ring.index[(at - 1) % m], ring.index[at % m], ring.index[(at + 1) % m]
-        area = _turn(flat[a], flat[b], flat[c])
+        area = _turn(*(ring.points[i] for i in (a, b, c)))
         ring.steps += _LOOK
         if area > ROUNDING_SHARE and not ring.occupied(a, b, c):
             ears.append([a, b, c])
@@ -158,13 +161,14 @@ class _Ring:
     Attributes
     ----------
     index: of the vertices left, in order.
+    points: of all vertices.
     steps: taken so far.
     """
 
     def __init__(self, flat: NDArray[np.float64]) -> None:
         self.index = list(range(len(flat)))
         self.steps = 0
-        self._flat = flat
+        self.points: list[list[float]] = flat.tolist()
         self._left = flat.copy()
         self._there = [True] * len(flat)
         self._occupant: dict[tuple[int, int, int], int] = {}
@@ -180,20 +184,42 @@ class _Ring:
         known = self._occupant.get((a, b, c))
         if known is not None and self._there[known]:
             return True
+        found = (self._one_by_one if len(self.index) <= _FEW else self._at_once)(a, b, c)
+        if found < 0:
+            return False
+        self._occupant[a, b, c] = found
+        return True
+
+    def _at_once(self, a: int, b: int, c: int) -> int:
+        """The first vertex of the ring that occupies a triangle, -1 if none does."""
         left = len(self.index)
         self.steps += _SEARCH + left
         x, y = self._left[:left].T
         inside = np.ones(left, dtype=bool)
         for s, t in ((a, b), (b, c), (c, a)):
-            (ux, uy), (vx, vy) = self._flat[s].tolist(), self._flat[t].tolist()
+            (ux, uy), (vx, vy) = self.points[s], self.points[t]
             inside &= (vx - ux) * (y - uy) - (vy - uy) * (x - ux) >= 0
             inside &= (x != ux) | (y != uy)
         found = int(inside.argmax())
-        if not inside[found]:
-            return False
-        self._occupant[a, b, c] = self.index[found]
-        return True
+        return self.index[found] if inside[found] else -1
+
+    def _one_by_one(self, a: int, b: int, c: int) -> int:
+        """The same by the same arithmetic."""
+        corners = self.points[a], self.points[b], self.points[c]
+        (ax, ay), (bx, by), (cx, cy) = corners
+        px, py, qx, qy, rx, ry = bx - ax, by - ay, cx - bx, cy - by, ax - cx, ay - cy
+        for i in self.index:
+            self.steps += _CORNER
+            x, y = point = self.points[i]
+            if (
+                px * (y - ay) - py * (x - ax) >= 0
+                and qx * (y - by) - qy * (x - bx) >= 0
+                and rx * (y - cy) - ry * (x - cx) >= 0
+                and point not in corners
+            ):
+                return i
+        return -1
 
 
-def _turn(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> float:
-    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+def _turn(a: list[float], b: list[float], c: list[float]) -> float:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
