@@ -171,6 +171,17 @@ def test_compressed_twins(artifacts, tmp_path: Path) -> None:
     assert not list((tmp_path / "a").glob("*.gz")), "none is left of another emission"
 
 
+@pytest.mark.parametrize("name", ["cells/c0000.wrl", "cells/c0002.wrl", "hints.json"])
+def test_a_file_that_cannot_be_written(artifacts, tmp_path: Path, name: str) -> None:
+    """The fault is told, and there is no root that leads to it."""
+    (tmp_path / name).mkdir(parents=True)
+    a = artifacts
+    with pytest.raises(OutputError, match="PTM-O002") as fault:
+        emit(a.scene, a.cells, a.pvs, a.ach, records(), tmp_path, force=True)
+    assert name in str(fault.value)
+    assert not (tmp_path / "root.wrl").exists()
+
+
 def test_compressing_nothing_and_much() -> None:
     for data in (b"", bytes(3_000_000), os.urandom(100_000)):
         assert gzip.decompress(compressed(data)) == data

@@ -77,6 +77,25 @@ def test_any_points(points: list[tuple[float, float, float]]) -> None:
         check(array)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_many_points(seed: int) -> None:
+    """Of which most lie inside: in a ball, in a thin slab, and in a slab far from the origin."""
+    random = np.random.default_rng(seed)
+    ball = random.normal(0, 1, (70, 3))
+    ball /= np.maximum(np.linalg.norm(ball, axis=1), 1)[:, None]
+    points = [ball, ball * [9, 1e-6, 9], np.round(ball * 3) * [1, 0.0625, 1] + 1e6][seed]
+    hull, _ = check(points.astype(np.float32))
+    assert len(hull) < 70
+
+
+def test_the_outermost_may_be_flat() -> None:
+    """The outermost in every direction that is tried lie in a plane: all points are kept."""
+    grid = np.array([(2 * i + 3 * j, -i, -j) for i in range(9) for j in range(9)], np.float32)
+    bump = grid[40] + np.float32(0.0625) * np.array([1, 2, 3], np.float32)
+    hull, _ = check(np.concatenate([grid, [bump]]))
+    assert len(hull) == 5
+
+
 def test_flat_points_are_refused() -> None:
     for flat in (
         np.zeros((5, 3)),
