@@ -83,8 +83,8 @@ def orientation(direction: NDArray[np.float64]) -> tuple[float, float, float, fl
     if most == 0:
         return (0.0, 1.0, 0.0, 0.0)
     axis = v / most  # whose square may be less than a float can be
-    length = float(np.linalg.norm(axis))
-    axis, angle = axis / length + 0.0, float(2 * np.arctan2(most * length, w))
+    size = float(np.linalg.norm(axis))
+    axis, angle = axis / size + 0.0, float(2 * np.arctan2(most * size, w))
     if angle > np.pi:
         angle -= 2 * np.pi
     return (float(axis[0]), float(axis[1]), float(axis[2]), angle)
