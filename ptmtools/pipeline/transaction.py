@@ -232,9 +232,7 @@ def _complete(folder: Path, relative: str) -> None:
             if name not in after:
                 _remove(folder, name)
         (staging / MANIFEST).replace(folder / MANIFEST)
-        shutil.rmtree(staging)
-        with suppress(OSError):
-            staging.parent.rmdir()
+        shutil.rmtree(staging)  # not its parent, in which another transaction may just be beginning
 
 
 def _listed(folder: Path) -> Iterable[str]:
