@@ -6,11 +6,13 @@ import logging
 import os
 import signal
 import sys
+from pathlib import Path
 
 import executor_tasks as tasks
 import numpy as np
 import pytest
 
+from ptmtools.cli.main import main
 from ptmtools.errors import MissingComponentError, WorkerError
 from ptmtools.executors import cluster as module
 from ptmtools.executors import open_executor
@@ -72,3 +74,17 @@ def test_dying_workers(require, monkeypatch):
                 processes = set(executor.each(tasks.process, None, range(20)))
             with pytest.raises(WorkerError, match="PTM-W004"):
                 list(executor.each(tasks.die, 1, [0, 1]))
+
+
+def test_the_command(tmp_path, capfd, monkeypatch):
+    """One line, its own exit status, and no database."""
+    monkeypatch.setattr(module, "PATIENCE", 0.1)
+    model = Path(__file__).resolve().parents[2] / "sample_data/two_rooms/two_rooms.obj"
+    arguments = ["build-scene", str(model), "-o", str(tmp_path / "db")]
+    assert main([*arguments, "--scheduler", "tcp://127.0.0.1:1"]) == 9
+    lines = capfd.readouterr().err.splitlines()
+    assert lines[-1].startswith("ptm: tcp://127.0.0.1:1: no scheduler answers; start one")
+    assert lines[-1].endswith("[PTM-W001]")
+    for stage in ("pvs", "ach", "textures"):
+        assert main([stage, "--help"]) == 0
+        assert "--scheduler ADDRESS" in capfd.readouterr().out
