@@ -132,6 +132,15 @@ def test_what_stands_is_not_written_again(tmp_path: Path) -> None:
     assert (tmp_path / "www/adopted").stat() == stamp
 
 
+def test_a_commit_leaves_the_folder_of_those_that_are_beginning(tmp_path: Path) -> None:
+    with DatabaseWriter.open_for_model(tmp_path, "m.obj") as writer:
+        staged = writer.begin("one")
+        staged.put("www/a", b"1")
+        staged.commit({"cells": StageRecord(1, {}, {}, staged.pending())})
+        assert (tmp_path / STAGING).is_dir()
+    assert not (tmp_path / STAGING).exists()
+
+
 @pytest.mark.parametrize("link", ["www", "stages", STAGING])
 def test_links_are_not_followed(tmp_path: Path, link: str) -> None:
     elsewhere = tmp_path / "elsewhere"
