@@ -18,7 +18,7 @@ from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
 
-from ptmtools.errors import naming
+from ptmtools.errors import DatabaseError, naming
 from ptmtools.executors.model import Executor
 from ptmtools.files import open_regular
 from ptmtools.pipeline.changes import reasons
@@ -248,7 +248,14 @@ def texture_records(run: Run) -> tuple[TextureRecord, ...]:
     from ptmtools.database import TextureLevel, TextureRecord
 
     record = run.db.record("textures")
-    size = record.parameters["fallback_size"]
+    size = record.parameters.get("fallback_size")
+    if type(size) is not int:
+        raise DatabaseError(
+            "PTM-D002",
+            "damaged manifest: stage textures has no fallback_size",
+            file=run.db.path,
+            remedy="run `ptm textures DB` again",
+        )
     records = []
     for i, name in enumerate(texture_files(image.name for image in run.images)):
         twin = f"{name.removesuffix('ptm')}png"
@@ -274,7 +281,7 @@ def texture_records(run: Run) -> tuple[TextureRecord, ...]:
                 height=levels[-1].height,
                 components=header.components,
                 levels=levels,
-                sha256=record.outputs[f"{SERVED}/{name}"],
+                sha256=run.db.output("textures", f"{SERVED}/{name}"),
                 fallback_level=fallback_level(header, size) if has_twin else None,
             )
         )
