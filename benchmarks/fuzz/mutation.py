@@ -142,6 +142,8 @@ def twisted(rng: Random, tree: Any, names: Sequence[str] = NAMES) -> Any:
         places = list(_places(tree))
         if not places:
             return tree
+        if len(json.dumps(tree)) > LONGEST:
+            break
         holder, key = rng.choice(places)
         value = holder[key]
         match rng.randrange(10):
@@ -157,7 +159,8 @@ def twisted(rng: Random, tree: Any, names: Sequence[str] = NAMES) -> Any:
                 if other is not holder:
                     holder[key] = json.loads(json.dumps(other[name]))
             case 5 if isinstance(value, list) and value:
-                holder[key] = value * min(rng.choice((2, 100, 3000)), 1 + 30_000 // len(value))
+                size = len(json.dumps(value))
+                holder[key] = value * min(rng.choice((2, 100, 3000)), 1 + LONGEST // size)
             case 6 if isinstance(value, (int, float)) and not isinstance(value, bool):
                 holder[key] = rng.choice((value + 1, value - 1, -value, value * 2, value / 2))
             case 7 if isinstance(value, str):
@@ -173,7 +176,7 @@ def twisted(rng: Random, tree: Any, names: Sequence[str] = NAMES) -> Any:
 
 def dumped(rng: Random, tree: Any) -> bytes:
     """The text of a document; sometimes with what no serialiser writes."""
-    text = json.dumps(tree, ensure_ascii=rng.random() < 0.5)
+    text = json.dumps(tree, ensure_ascii=rng.random() < 0.5)[: 4 * LONGEST]
     match rng.randrange(12):
         case 0:
             text = text.replace("0", rng.choice(("NaN", "1e999", "-Infinity", "9" * 5000)), 1)

@@ -36,6 +36,8 @@ SCHEMA = 2
 #: The folders of a database that are written.
 _FOLDERS = ("stages", "www")
 _SHA256 = re.compile(r"[0-9a-f]{64}")
+#: So many lists and objects lie in each other at most.
+_DEEPEST = 16
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,8 @@ class Manifest:
             document = json.loads(data)
         except (ValueError, RecursionError) as fault:
             raise _damaged(file, f"not JSON ({fault})") from fault
+        if _nested(document):
+            raise _damaged(file, f"lists in lists, more than {_DEEPEST}")
         if not isinstance(document, dict) or document.get("format") != FORMAT:
             raise DatabaseError(
                 "PTM-D001", "not a ptmtools database", file=file, remedy="give a database folder"
@@ -137,6 +141,22 @@ def listed_before(data: bytes) -> tuple[str, set[str]] | None:
         return model, {path for path in listed if isinstance(path, str) and _is_output(path)}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
+
+
+def _nested(document: object) -> bool:
+    """Whether something lies deeper in it than any option or figure does. It would be written a
+    line for each, indented."""
+    level = [document] if isinstance(document, dict | list) else []
+    for _ in range(_DEEPEST):
+        level = [
+            inner
+            for value in level
+            for inner in (value.values() if isinstance(value, dict) else value)
+            if isinstance(inner, dict | list)
+        ]
+        if not level:
+            return False
+    return True
 
 
 def _record(entry: object, stage: str, file: str | PathLike[str]) -> StageRecord:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+import os
 import re
 import struct
 from collections.abc import Callable
@@ -139,7 +140,9 @@ def _buffers(
     read: dict[Path, Buffer] = {}
     for file, length in longest.items():
         with open_regular(file) as stream:
-            read[file] = Buffer(stream.read(length), file)
+            # Reading takes memory for all that is asked for.
+            there = os.fstat(stream.fileno()).st_size
+            read[file] = Buffer(stream.read(min(length, there)), file)
     buffers = [read[entry] if isinstance(entry, Path) else entry for entry in found]
     for index, (buffer, length) in enumerate(zip(buffers, lengths, strict=True)):
         if len(buffer.data) < length:

@@ -8,6 +8,7 @@ quoting, so the name of a texture is all that follows the last option, spaces in
 from __future__ import annotations
 
 import math
+import os
 import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -147,14 +148,14 @@ def read_mtl(path: Path, label: str, findings: Findings) -> dict[str, MtlMateria
     PTM-L204 for a library larger than `LARGEST`, and OSError.
     """
     with open_regular(path) as stream:
-        data = stream.read((LARGEST << 20) + 1)
-    if len(data) > LARGEST << 20:
-        raise LimitError(
-            "PTM-L204",
-            f"is larger than {LARGEST} MiB",
-            file=path,
-            remedy="leave out the materials that are not used",
-        )
+        if os.fstat(stream.fileno()).st_size > LARGEST << 20:
+            raise LimitError(
+                "PTM-L204",
+                f"is larger than {LARGEST} MiB",
+                file=path,
+                remedy="leave out the materials that are not used",
+            )
+        data = stream.read()
     materials: dict[str, MtlMaterial] = {}
     current: MtlMaterial | None = None
     for index, line in enumerate(re.split(r"\r\n|\n|\r", decode(data)), start=1):

@@ -79,10 +79,15 @@ def _implausible(width: float, height: float, unit: str) -> float:
     w, h = width * UNITS[unit], height * UNITS[unit]
     cost = PRIOR[unit]
     if w > 0:
-        cost += 2 * max(0.0, math.log(WIDTHS[0] / w), math.log(w / WIDTHS[1]))
+        cost += 2 * max(0.0, _orders(WIDTHS[0], w), _orders(w, WIDTHS[1]))
     if h > 0:
-        cost += max(0.0, 4 * math.log(HEIGHTS[0] / h), 0.25 * math.log(h / HEIGHTS[1]))
+        cost += max(0.0, 4 * _orders(HEIGHTS[0], h), 0.25 * _orders(h, HEIGHTS[1]))
     return cost
+
+
+def _orders(a: float, b: float) -> float:
+    """The logarithm of a / b, which itself may be too small or too large for a number."""
+    return math.log(a) - math.log(b)
 
 
 def turned(vectors: NDArray[np.float64], up: Literal["y", "z"]) -> NDArray[np.float64]:

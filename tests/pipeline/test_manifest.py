@@ -71,6 +71,9 @@ def broken(change: dict[str, Any]) -> bytes:
         (broken({"outputs": {"../x.npz": DIGEST}}), "PTM-D002"),
         (broken({"outputs": {"/etc/x": DIGEST}}), "PTM-D002"),
         (broken({"outputs": {"c:\\x": DIGEST}}), "PTM-D002"),
+        # Written again, a line for each element, indented, this would be hundreds of megabytes.
+        (broken({"parameters": {"a": json.loads("[" * 300 + "0" + "]" * 300)}}), "PTM-D002"),
+        (broken({"counts": {"a": json.loads('{"a":' * 14 + "[[]]" + "}" * 14)}}), "PTM-D002"),
     ],
 )
 def test_refuses_what_it_did_not_write(data: bytes, code: str) -> None:

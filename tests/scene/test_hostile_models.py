@@ -435,6 +435,9 @@ def test_a_buffer_that_many_name_is_read_once(put: Put, monkeypatch: pytest.Monk
         def __exit__(self, *arguments: object) -> None:
             self.file.close()
 
+        def fileno(self) -> int:
+            return self.file.fileno()
+
         def read(self, length: int) -> bytes:
             assert length == len(doc.blob)
             return self.file.read(length)
@@ -442,6 +445,26 @@ def test_a_buffer_that_many_name_is_read_once(put: Put, monkeypatch: pytest.Monk
     monkeypatch.setattr(gltf_document, "open_regular", Counted)
     assert len(ingest(put("a.gltf", json.dumps(tree))).triangles) == 2
     assert len(opened) == 1
+
+
+@pytest.mark.parametrize("length", [2**31, 2**40, 2**62, 2**70])
+def test_a_buffer_that_declares_more_than_its_file_has(put: Put, length: int) -> None:
+    doc = Gltf()
+    doc.place(doc.quad())
+    put("a.bin", doc.blob)
+    import json
+    import tracemalloc
+
+    tree = json.loads(doc.gltf("a.bin"))
+    tree["buffers"][0]["byteLength"] = length
+    path = put("a.gltf", json.dumps(tree))
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match=r"PTM-I249"):
+            ingest(path)
+        assert tracemalloc.get_traced_memory()[1] < 1 << 24
+    finally:
+        tracemalloc.stop()
 
 
 def changed(change: Callable[[Gltf], object]) -> bytes:

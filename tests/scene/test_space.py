@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -74,3 +76,10 @@ def test_turning_is_a_rotation() -> None:
 
 def test_each_unit_can_be_guessed_or_given() -> None:
     assert list(UNITS) == ["m", "cm", "mm", "in", "ft"]
+
+
+@pytest.mark.parametrize("size", [0.0, 5e-324, 1e-300, 1e300, 1.7e308, math.inf])
+def test_sizes_at_the_ends_of_numbers_have_a_unit(size: float) -> None:
+    for other in (1.0, size):
+        assert guess_unit(size, other)[0] in UNITS
+        assert guess_unit(other, size)[0] in UNITS
