@@ -22,6 +22,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -98,6 +99,7 @@ class Database:
 
 
 def by_view3dscene(database: Database, chosen: Sequence[int], size: tuple[int, int]) -> Album:
+    """One run of the program for each viewpoint."""
     files, complaints = [], []
     with tempfile.TemporaryDirectory() as folder:
         for viewpoint in chosen:
@@ -111,11 +113,19 @@ def by_view3dscene(database: Database, chosen: Sequence[int], size: tuple[int, i
 
 
 def by_x_ite(
-    database: Database, chosen: Sequence[int], size: tuple[int, int], seconds: float = 1200
+    database: Database,
+    chosen: Sequence[int],
+    size: tuple[int, int],
+    *,
+    smooth: bool = True,
+    seconds: float = 1200,
 ) -> Album:
+    """One page for all viewpoints."""
     names = [database.viewpoints[viewpoint]["name"] for viewpoint in chosen]
     width, height = size
-    shots = x_ite.show(database.root, names, width=width, height=height, seconds=seconds)
+    shots = x_ite.show(
+        database.root, names, width=width, height=height, smooth=smooth, seconds=seconds
+    )
     return Album.of(shots.pictures, shots.messages)
 
 
@@ -177,11 +187,15 @@ def main(arguments: list[str] | None = None) -> int:
     add("--viewpoints", type=int, nargs="+", metavar="K", help="their numbers, from 0; else all")
     add("--size", default="480x360", help="WIDTHxHEIGHT (default 480x360)")
     add("--only", choices=tuple(BROWSERS), help="one of the browsers")
+    add("--no-smoothing", action="store_true", help="X_ITE without its antialiasing")
     given = parser.parse_args(arguments)
     width, height = (int(n) for n in given.size.split("x"))
     given.output.mkdir(parents=True, exist_ok=True)
     lacking = {"view3dscene": view3dscene.missing(), "x_ite": x_ite.missing()}
-    names = [name for name in BROWSERS if given.only in (None, name)]
+    browsers = dict(BROWSERS)
+    if given.no_smoothing:
+        browsers["x_ite"] = partial(by_x_ite, smooth=False)
+    names = [name for name in browsers if given.only in (None, name)]
     for name in names:
         if lacking[name]:
             print(f"{name}: left out; to be installed: {lacking[name]}")
@@ -201,7 +215,7 @@ def main(arguments: list[str] | None = None) -> int:
         title, size = folder.resolve().stem, (width, height)
         count = len(database.viewpoints)
         chosen = [k for k in given.viewpoints or range(count) if k < count]
-        albums = {name: BROWSERS[name](database, chosen, size) for name in names}
+        albums = {name: browsers[name](database, chosen, size) for name in names}
         strips: list[tuple[str, Picture]] = []
         for k, viewpoint in enumerate(chosen):
             what = outline(database.scene, database.view(viewpoint, size))

@@ -36,7 +36,7 @@ INSTALL = (
 PAGE = """\
 <style>x3d-canvas {{ display: block; width: {width}px; height: {height}px }}</style>
 <x3d-canvas preserveDrawingBuffer="true" splashScreen="false" notifications="false"
-            contextMenu="false" contentScale="1"></x3d-canvas>
+            contextMenu="false" contentScale="1" antialiased="{smooth}"></x3d-canvas>
 <!-- After the element: X_ITE reads preserveDrawingBuffer once, when the element is made. -->
 <script src="/x_ite/x_ite.min.js"></script>
 <script>
@@ -114,11 +114,13 @@ def show(
     *,
     width: int = 640,
     height: int = 480,
+    smooth: bool = True,
     seconds: float = 300,
 ) -> Shots:
     """Shows a file, whose folder is served with all that is below it.
 
-    A picture is taken of each of the ``viewpoints``: DEF names, `NEXT`, or None for what shows.
+    A picture is taken of each of the ``viewpoints``: DEF names, `NEXT`, or None for what shows;
+    ``smooth`` is X_ITE's antialiasing, on unless a page turns it off.
     Raises FileNotFoundError without Chromium or X_ITE, TimeoutError if no pictures come.
     """
     library = dist()
@@ -127,6 +129,7 @@ def show(
     page = web.REPORTING + PAGE.format(
         width=width,
         height=height,
+        smooth=json.dumps(smooth),
         url=json.dumps(f"/db/{quote(path.name)}"),
         names=json.dumps(list(viewpoints)),
     )
