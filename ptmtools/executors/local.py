@@ -28,11 +28,14 @@ R = TypeVar("R")
 class Local(Executor):
     """See `Executor`. ``workers`` threads or processes, 0 is one for each processor.
 
-    A script that has processes started needs ``if __name__ == "__main__"``.
+    Without ``threads`` all is done by processes, for a caller beside whom another thread of this
+    process keeps the interpreter's lock. A script that has processes started needs
+    ``if __name__ == "__main__"``.
     """
 
-    def __init__(self, workers: int = 0) -> None:
+    def __init__(self, workers: int = 0, *, threads: bool = True) -> None:
         self._workers = workers or processors()
+        self._by_threads = threads
         self._threads: ThreadPoolExecutor | None = None
         self._processes: Processes | None = None
 
@@ -45,9 +48,9 @@ class Local(Executor):
         self, shared: S, *, releases_lock: bool = False
     ) -> AbstractContextManager[Sharing[S]]:
         """See `Executor.sharing`."""
-        if self._workers == 1:
+        if self._by_threads and self._workers == 1:
             return nullcontext(SerialSharing(shared))
-        if releases_lock:
+        if self._by_threads and releases_lock:
             if self._threads is None:
                 self._threads = ThreadPoolExecutor(self._workers, "ptmtools")
             return nullcontext(_InThreads(shared, self._threads, self._workers))

@@ -1,8 +1,8 @@
 """The stages in their order: each one function, and `build_scene` all of them.
 
 Reading and subdividing go together: nothing is committed before a model has proved to be one that
-can be cut into cells. Textures depend on nothing that the stages between have to say; where there
-is more than one worker they are encoded meanwhile.
+can be cut into cells. Textures depend on nothing that the stages between have to say, and cutting
+is the work of one thread; so textures are encoded meanwhile by what workers there are besides.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Any
 
+from ptmtools.executors.local import Local
 from ptmtools.executors.model import Executor
 from ptmtools.executors.opening import open_executor, processors
 from ptmtools.pipeline.changes import reasons
@@ -44,6 +45,8 @@ PathLike = str | os.PathLike[str]
 
 #: Above this share of cells visible on average, culling by cells does not pay.
 CULLING_GAINS_LITTLE = 0.7
+#: So many textures are worth starting a process, which takes a second.
+WORTH_A_PROCESS = 8
 
 
 def build_scene(
@@ -98,7 +101,7 @@ def make_cells(
     ):
         run = Run(writer, progress)
         read, cut = ingest_options or options.ingest, subdivide_options or options.subdivide
-        _read_and_cut(run, Path(model), read, cut, local, lambda: None)
+        _read_and_cut(run, Path(model), read, cut, local, lambda _: None)
         return _closing(run, start)
 
 
@@ -140,7 +143,8 @@ def make_textures(
 
     def encode(run: Run, workers: _Workers) -> None:
         stage = TextureStage(run, options or TextureOptions())
-        if not stage.current:
+        stage.begin()
+        if stage.left:
             stage.encode(workers.executor())
         stage.commit()
 
@@ -193,20 +197,20 @@ class _Workers:
         workers, scheduler = self._asked
         return processors() if scheduler else workers or processors()
 
-    @property
-    def several(self) -> bool:
-        """Whether textures can be encoded while this thread does something else."""
-        return self._asked[1] is not None or self.here > 1
-
     def executor(self) -> Executor:
         """The one of this thread."""
         if self._opened is None:
-            self._opened = self.another()
+            self._opened = open_executor(*self._asked)
         return self._opened
 
-    def another(self) -> Executor:
-        """One for another thread, which closes it."""
-        return open_executor(*self._asked)
+    def beside(self, tasks: int) -> Executor | None:
+        """One for another thread, which closes it, while this thread keeps the interpreter's lock;
+        None if there is no worker to spare, or the tasks are few."""
+        workers, scheduler = self._asked
+        if scheduler:
+            return open_executor(workers, scheduler) if tasks else None
+        spare = min(self.here - 1, tasks // WORTH_A_PROCESS)
+        return Local(spare, threads=False) if spare else None
 
     def __enter__(self) -> _Workers:
         return self
@@ -217,10 +221,7 @@ class _Workers:
 
 
 class _Beside:
-    """The textures stage, done by another thread while the other stages run.
-
-    With one worker it is done when they have ended instead.
-    """
+    """The textures stage, done by another thread while this one runs other stages."""
 
     def __init__(self, run: Run, options: TextureOptions, workers: _Workers) -> None:
         self._run = run
@@ -231,11 +232,13 @@ class _Beside:
         self._pool = ThreadPoolExecutor(1, "textures")
         self._task: Future[None] | None = None
 
-    def begin(self) -> None:
-        """To be called when the scene's images are known."""
+    def begin(self, cutting: bool) -> None:
+        """To be called when the scene's images are known; ``cutting`` if cells are cut next."""
         self._stage = TextureStage(self._run, self._options)
-        if not self._stage.current and self._workers.several:
-            self._task = self._pool.submit(self._encode, self._stage)
+        self._stage.begin()
+        executor = self._workers.beside(self._stage.left) if cutting else None
+        if executor:
+            self._task = self._pool.submit(self._encode, self._stage, executor)
 
     def check(self) -> None:
         """Raises what has gone wrong so far."""
@@ -243,16 +246,17 @@ class _Beside:
             self._task.result()
 
     def finish(self) -> None:
-        """Waits for the textures, and commits them."""
+        """Encodes with all workers what is left, and commits."""
         assert self._stage is not None
         if self._task is not None:
+            self._stop.set()
             self._task.result()
-        elif not self._stage.current:
+        if self._stage.left:
             self._stage.encode(self._workers.executor())
         self._stage.commit()
 
-    def _encode(self, stage: TextureStage) -> None:
-        with self._workers.another() as executor:
+    def _encode(self, stage: TextureStage, executor: Executor) -> None:
+        with executor:
             stage.encode(executor, self._stop)
 
     def __enter__(self) -> _Beside:
@@ -269,20 +273,19 @@ def _read_and_cut(
     ingest_options: IngestOptions,
     subdivide_options: SubdivideOptions,
     workers: _Workers,
-    read: Callable[[], None],
+    read: Callable[[bool], None],
 ) -> None:
     """The scene and the cells: one transaction, unless the scene is what it was. ``read`` is called
-    in between."""
+    in between, and told whether cells are to be cut."""
     start = time.perf_counter()
     transaction = run.writer.begin("scene")
     scene, why_scene = put_scene(run, transaction, model, ingest_options, workers.here)
     records = {"scene": scene} if why_scene else {}
     middle = time.perf_counter()
-    read()
-
     inputs = {arrays_of("scene"): scene.outputs[arrays_of("scene")]}
     work = work_of("cells", subdivide_options, inputs)
     why_cells = reasons(run.db.manifest.stages.get("cells"), work, run.db)
+    read(bool(why_cells))
     if why_cells:
         records["cells"] = _cut(run, transaction, work, subdivide_options)
     if records:

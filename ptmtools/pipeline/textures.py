@@ -11,9 +11,10 @@ from __future__ import annotations
 import json
 import re
 import time
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from itertools import accumulate
+from itertools import accumulate, takewhile
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
@@ -81,7 +82,7 @@ def stale_textures(before: StageRecord | None, work: StageRecord) -> list[str]:
 
 
 class TextureStage:
-    """One run of the stage, in two steps, so that the first may be done beside other stages."""
+    """One run of the stage, in steps, so that the long one may be done beside other stages."""
 
     def __init__(self, run: Run, options: TextureOptions) -> None:
         self._run = run
@@ -93,7 +94,7 @@ class TextureStage:
         self._work = work_of("textures", options, texture_inputs(self._digests))
         self._why = reasons(self._before, self._work, run.db)
         self._transaction: Transaction | None = None
-        self._counts: Mapping[str, int] = {}
+        self._left: deque[int] = deque()
         self._tasks = (len(self._names), len(self._names), 0)
 
     @property
@@ -101,41 +102,48 @@ class TextureStage:
         """Whether there is nothing to do."""
         return not self._why
 
-    def encode(self, executor: Executor, stop: Event | None = None) -> None:
-        """Encodes what is to be encoded; nothing is committed. ``stop`` ends it early, from
-        another thread.
+    @property
+    def left(self) -> int:
+        """How many textures are left to encode."""
+        return len(self._left)
 
-        Raises what `encode` raises.
-        """
+    def begin(self) -> None:
+        """Keeps what the last run made, and takes over what an interrupted one left."""
         if self.current:
             return
-        transaction = self._run.writer.begin("textures")
-        files = [self._files(name) for name in self._names]
-        to_do, kept, resumed = [], 0, 0
+        self._transaction = transaction = self._run.writer.begin("textures")
+        kept, resumed = 0, 0
         stale = set(stale_textures(self._before, self._work))
         for i, name in enumerate(self._names):
-            if name not in stale and self._keep(transaction, files[i]):
+            if name not in stale and self._keep(transaction, self._files(name)):
                 kept += 1
             elif transaction.resume(self._task(i)):
                 resumed += 1
             else:
-                to_do.append(i)
+                self._left.append(i)
+        self._tasks = (len(self._names), kept, resumed)
+
+    def encode(self, executor: Executor, stop: Event | None = None) -> None:
+        """Encodes what is left, once begun; nothing is committed. With ``stop``, from another
+        thread, no more images are taken.
+
+        Raises what `encode` raises.
+        """
+        if self._transaction is None:
+            return
         total = len(self._names)
-        for done, i in enumerate(self._encoded(transaction, executor, to_do, files)):
-            self._run.progress(total - len(to_do) + done, total, "textures")
-            transaction.finish(self._task(i), files[i])
-            if stop is not None and stop.is_set():
-                return
-        self._run.progress(total, total, "textures")
-        self._counts = self._counted(transaction, [ptm for ptm, *_ in files])
-        self._tasks = (total, kept, resumed)
-        self._transaction, self._end = transaction, time.perf_counter()
+        wanted = takewhile(lambda _: stop is None or not stop.is_set(), tuple(self._left))
+        for files in self._staged(self._transaction, executor, wanted):
+            self._run.progress(total - len(self._left), total, "textures")
+            self._transaction.finish(self._task(self._left.popleft()), files)
+        self._run.progress(total - len(self._left), total, "textures")
+        self._end = time.perf_counter()
 
     def commit(self) -> None:
-        """Makes what was encoded part of the database."""
+        """Makes what was encoded, all of it, part of the database."""
         if self._transaction is not None:
             outputs = self._transaction.pending()
-            record = replace(self._work, outputs=outputs, counts=self._counts)
+            record = replace(self._work, outputs=outputs, counts=self._counted(self._transaction))
             self._transaction.commit({"textures": record})
         self._run.report("textures", self._why, self._start, self._end, self._tasks)
 
@@ -156,39 +164,44 @@ class TextureStage:
         told = [self._work.recipe, self._work.parameters, name, self._work.inputs[name]]
         return sha256(json.dumps(told, sort_keys=True).encode())
 
-    def _encoded(
-        self, transaction: Transaction, executor: Executor, to_do: list[int], files: list[list[str]]
-    ) -> Iterator[int]:
-        """The numbers of the images, each once its files are staged."""
+    def _staged(
+        self, transaction: Transaction, executor: Executor, wanted: Iterator[int]
+    ) -> Iterator[list[str]]:
+        """The names of the files of each image, once they are staged; in order, so it is always the
+        first of what is left."""
         from ptmtools.pipeline.desk import Picture, desk_of, encoded_there
 
         images = self._run.images
         with desk_of(transaction, self._run.db.path, self._options, executor) as desk:
             if desk is None:
-                sources = ((images[i].name, images[i].load()) for i in to_do)
-                made = executor.each(encoded_image, self._options, sources, releases_lock=True)
-                for i, result in zip(to_do, made, strict=True):
-                    for name, data in zip(files[i], result, strict=True):
+                sources = ((images[i].name, images[i].load()) for i in wanted)
+                for made in executor.each(
+                    encoded_image, self._options, sources, releases_lock=True
+                ):
+                    files = self._files(self._names[self._left[0]])
+                    for name, data in zip(files, made, strict=True):
                         transaction.put(name, data)
-                    yield i
+                    yield files
                 return
-            pictures = (Picture(images[i].name, images[i].sha256, str(i)) for i in to_do)
-            chunk = max(1, min(AT_A_DESK, len(to_do) // (8 * executor.workers)))
-            left = executor.each(encoded_there, desk, pictures, releases_lock=True, chunk=chunk)
-            for i, leavings in zip(to_do, left, strict=True):
-                for name, (file, digest) in zip(files[i], leavings, strict=True):
+            chunk = max(1, min(AT_A_DESK, len(self._left) // (8 * executor.workers)))
+            pictures = (Picture(images[i].name, images[i].sha256, str(i)) for i in wanted)
+            for left in executor.each(
+                encoded_there, desk, pictures, releases_lock=True, chunk=chunk
+            ):
+                files = self._files(self._names[self._left[0]])
+                for name, (file, digest) in zip(files, left, strict=True):
                     transaction.take(name, Path(file), digest)
-                yield i
+                yield files
 
-    def _counted(self, transaction: Transaction, files: list[str]) -> dict[str, int]:
+    def _counted(self, transaction: Transaction) -> dict[str, int]:
         raw = stored = 0
-        for file in files:
-            place = transaction.folder / file
-            header = _header(place if place.is_file() else self._run.db.path / file)
+        for ptm, *_ in map(self._files, self._names):
+            place = transaction.folder / ptm
+            header = _header(place if place.is_file() else self._run.db.path / ptm)
             finest = header.levels[-1]
             raw += finest.width * finest.height * header.texel_bytes
             stored += header.file_size
-        return {"textures": len(files), "raw_bytes": raw, "ptm_bytes": stored}
+        return {"textures": len(self._names), "raw_bytes": raw, "ptm_bytes": stored}
 
 
 def encoded_image(options: TextureOptions, image: tuple[str, bytes]) -> list[bytes]:

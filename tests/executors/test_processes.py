@@ -123,6 +123,13 @@ def test_a_full_disk_is_told(local, monkeypatch):
         list(local.each(tasks.die, 9, range(3)))
 
 
+def test_without_threads_even_one_worker_is_another_process():
+    with Local(1, threads=False) as one:
+        found = set(one.each(tasks.process, None, range(3), releases_lock=True))
+    assert len(found) == 1
+    assert os.getpid() not in found
+
+
 def test_which_executor():
     assert isinstance(open_executor(1), Serial)
     with open_executor(3) as three, open_executor() as all_:

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
 from PIL import Image, PngImagePlugin
 
-from ptmtools.pipeline.textures import bare_png, texture_names
+from ptmtools.executors import Serial
+from ptmtools.pipeline import TextureOptions, build, make_cells
+from ptmtools.pipeline.run import Run
+from ptmtools.pipeline.textures import TextureStage, bare_png, texture_names
+from ptmtools.pipeline.writer import DatabaseWriter
 from ptmtools.texture import read_image
+
+TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data/two_rooms/two_rooms.obj"
 
 
 def test_names_are_unique_without_regard_to_case() -> None:
@@ -36,3 +44,32 @@ def test_a_bare_png_has_the_same_texels_and_nothing_else(mode: str, transparent:
     assert len(bare) < len(out.getvalue())
     assert not any(kind in bare for kind in (b"tEXt", b"gAMA", b"pHYs"))
     assert bare_png(bare + b"behind the end") == bare
+
+
+def test_what_is_left_when_it_is_stopped_is_done_later(tmp_path: Path) -> None:
+    make_cells(TWO_ROOMS, tmp_path / "db")
+    with DatabaseWriter.open_for_stage(tmp_path / "db") as writer:
+        run = Run(writer, lambda done, *_: stop.set() if done == 1 else None)
+        stop = Event()
+        stage = TextureStage(run, TextureOptions())
+        stage.begin()
+        images = stage.left
+        stage.encode(Serial(), stop)
+        assert 0 < stage.left < images
+        stage.encode(Serial())
+        assert stage.left == 0
+        stage.commit()
+        assert run.reports[-1].tasks == (images, 0, 0)
+        assert run.db.record("textures").counts["textures"] == images
+
+
+def test_many_textures_are_encoded_beside_the_cells(tmp_path, monkeypatch) -> None:
+    """The same bytes from one worker, from workers beside, and where some are left for later."""
+    found = {}
+    for workers, least in ((1, 8), (2, 1), (2, 10**9)):
+        monkeypatch.setattr(build, "WORTH_A_PROCESS", least)
+        db = tmp_path / f"{workers} {least}"
+        build.build_scene(TWO_ROOMS, db, build.BuildOptions(workers=workers))
+        found[db] = {f.relative_to(db): f.read_bytes() for f in db.rglob("*") if f.is_file()}
+    one, *others = found.values()
+    assert all(other == one for other in others)
