@@ -8,9 +8,9 @@ through, and a face that is not two-sided shows on its front only, as in the emi
 
 ===========  ======================================================================
 headlight    all darkened by the cosine between surface and ray; bilinear texture
-x_ite        what VRML97 browsers make of the emitted files (cellfile.py): only what
-             has a Material is lit, by the cosine to the direction of view, and glows
-             if it has no image; trilinear texture; a black sky
+x_ite        what VRML97 browsers make of the emitted files (`database.vrml.cell`):
+             only what has a Material is lit, by the cosine to the direction of view,
+             and glows if it has no image; trilinear texture; a black sky
 view3dscene  the same, with what Castle Game Engine adds of its own where a file says
              nothing: an ambient light of 0.2, of which a Material takes its
              ambientIntensity of 0.2, and a dark grey sky

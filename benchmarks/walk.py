@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ptmtools.cells import Cells
 from ptmtools.database import TextureRecord
-from ptmtools.database.cellfile import CellText, CellWriter
+from ptmtools.database.vrml import CellText, CellWriter
 from ptmtools.scene import Scene
 from ptmtools.tolerance import Tolerance
 from ptmtools.visibility import Pvs

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
         ValidationReport,
         Viewpoint,
     )
-    from ptmtools.database.plan import plot_plan
-    from ptmtools.database.validate import validate_database, validate_ptm
+    from ptmtools.database.plans import plot_plan
+    from ptmtools.database.validation import validate_database, validate_ptm
 
 __all__ = [
     "EmitOptions",
@@ -52,9 +52,9 @@ _HOME = {
     "ValidationReport": "model",
     "Viewpoint": "model",
     "emit": "emission",
-    "plot_plan": "plan",
-    "validate_database": "validate",
-    "validate_ptm": "validate",
+    "plot_plan": "plans",
+    "validate_database": "validation",
+    "validate_ptm": "validation",
 }
 
 __getattr__ = names(__name__, _HOME)

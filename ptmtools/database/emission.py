@@ -11,14 +11,13 @@ import numpy as np
 
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
-from ptmtools.database.cellfile import CellWriter
 from ptmtools.database.gltf import GLTF_FOLDER, GLTF_HINTS, UP, glb_file, gltf_files
 from ptmtools.database.hints import hints_text
 from ptmtools.database.model import EmitOptions, EmitReport, TextureRecord
 from ptmtools.database.names import CELL_FOLDER, HINTS, ROOT, cell_path
-from ptmtools.database.rootfile import root_text
 from ptmtools.database.served import ServedFiles
 from ptmtools.database.viewpoints import place_viewpoints
+from ptmtools.database.vrml import CellWriter, root_text
 from ptmtools.errors import DatabaseError, OutputError
 from ptmtools.files import real_folder
 from ptmtools.progress import Progress, silent

@@ -178,7 +178,7 @@ class Issue:
     file: relative to the database, or the path that was given.
     place: where in the file, "" for all of it.
     message: one line.
-    count: faults that it stands for, see `ptmtools.database.findings`.
+    count: faults that it stands for, see `ptmtools.database.validation`.
     """
 
     code: str

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from ptmtools.database import EmitOptions, emit, validate_database
-from ptmtools.database.findings import CODES
-from ptmtools.database.wrl import WrlError, parse
+from ptmtools.database.validation import CODES
+from ptmtools.database.vrml import WrlError, parse
 
 #: So many mutations of each kind of file; PTM_FUZZ asks for more.
 ROUNDS = int(os.environ.get("PTM_FUZZ", "40"))

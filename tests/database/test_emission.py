@@ -20,15 +20,13 @@ from ptmtools.database import (
     GivenViewpoint,
     TextureLevel,
     TextureRecord,
-    cellfile,
     emit,
     validate_database,
 )
-from ptmtools.database.cellfile import CellWriter
 from ptmtools.database.names import DefNames
 from ptmtools.database.rounding import significant
 from ptmtools.database.served import compressed
-from ptmtools.database.wrl import Node, parse
+from ptmtools.database.vrml import CellWriter, Node, parse
 from ptmtools.errors import DatabaseError, InputError, OutputError
 from ptmtools.scene.model import Material
 from ptmtools.visibility.model import Pvs
@@ -202,7 +200,7 @@ def test_batches_of_shapes(artifacts, finished: Path, monkeypatch: pytest.Monkey
     a = artifacts
     of_image = {record.image: record for record in records()}
     for size in (1, 9, 30):
-        monkeypatch.setattr(cellfile, "_BATCH", size)
+        monkeypatch.setattr("ptmtools.database.vrml.cell._BATCH", size)
         writer = CellWriter(a.scene, a.cells, a.pvs, a.ach.value, of_image, True)
         for c in (0, 1, 2):
             wanted = (finished / f"www/cells/c000{c}.wrl").read_text()

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ptmtools.database.hull import convex_hull
+from ptmtools.database.vrml.hull import convex_hull
 from ptmtools.errors import DatabaseError
 
 

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from ptmtools.database import PlotOptions, plot_plan
-from ptmtools.database.leakmarks import LEAK
+from ptmtools.database.plans.leaks import LEAK
 from ptmtools.errors import InputError, MissingComponentError, OutputError
 
 SMALL = PlotOptions(width=6, dpi=60)

@@ -21,7 +21,7 @@ from ptmtools.database.numerals import (
     single,
 )
 from ptmtools.database.numerals.decimals import LONGEST, shortest, written
-from ptmtools.database.wrl import HEADER, WrlError, parse
+from ptmtools.database.vrml.reader import HEADER, WrlError, parse
 from ptmtools.errors import DatabaseError
 
 FLOATS = st.floats(width=32, allow_nan=False, allow_infinity=False)

@@ -18,7 +18,7 @@ import pytest
 from PIL import Image
 
 from ptmtools.database import EmitOptions, emit, validate_database, validate_ptm
-from ptmtools.database.findings import CODES
+from ptmtools.database.validation import CODES
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.texture import EncodeOptions, Limits, decode, encode, read_header
 from ptmtools.visibility.model import Pvs

@@ -10,13 +10,12 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from ptmtools.database import EmitOptions, GivenViewpoint
-from ptmtools.database.ground import Ground
-from ptmtools.database.outlook import longest_views
+from ptmtools.database.plans.storeys import storeys
 from ptmtools.database.section import area, leaf_section, polygon_section, triangle_section
-from ptmtools.database.storeys import storeys
-from ptmtools.database.tour import storeys as storeys_of
-from ptmtools.database.tour import walk
-from ptmtools.database.viewpoints import orientation, place_viewpoints
+from ptmtools.database.viewpoints.ground import Ground
+from ptmtools.database.viewpoints.outlook import longest_views
+from ptmtools.database.viewpoints.placement import orientation, place_viewpoints
+from ptmtools.database.viewpoints.tour import storey_numbers, walk
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Camera
 
@@ -140,8 +139,8 @@ def test_storeys_one_after_the_other(room_row) -> None:
 
 
 def test_storeys_of_heights() -> None:
-    assert storeys_of([0.0, 4.0, 0.2, 4.1, 1.7], 1.6) == [0, 1, 0, 1, 0]
-    assert storeys_of([], 1.6) == []
+    assert storey_numbers([0.0, 4.0, 0.2, 4.1, 1.7], 1.6) == [0, 1, 0, 1, 0]
+    assert storey_numbers([], 1.6) == []
 
 
 @pytest.mark.parametrize("seed", range(3))

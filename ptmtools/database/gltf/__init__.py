@@ -1,4 +1,4 @@
-"""Artifacts → glTF 2.0: a GLB for every cell, beside its VRML file; and back: their check.
+"""Artifacts → glTF 2.0: a GLB for every cell, beside its VRML file; and back: their strict reader.
 
 docs/gltf.md says what is in them. The textures are those of the VRML files, referred to by URI;
 no extension is used. `gltf/hints.json` is written by `ptmtools.database.hints`.

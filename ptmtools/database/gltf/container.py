@@ -26,7 +26,7 @@ _LARGEST = 2**32 - 1
 
 
 class GlbError(Exception):
-    """The first thing in a file that is wrong: a code of `findings`, where, and what."""
+    """The first thing in a file that is wrong: a code of `validation`, where, and what."""
 
     def __init__(self, code: str, place: str, message: str) -> None:
         self.code = code

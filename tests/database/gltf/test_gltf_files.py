@@ -20,8 +20,8 @@ from ptmtools.database import EmitOptions, validate_database
 from ptmtools.database.gltf.buffer import BufferWriter
 from ptmtools.database.gltf.container import GlbError, pack, unpack
 from ptmtools.database.gltf.material import linear
-from ptmtools.database.gltf.reading import read_glb
-from ptmtools.database.wrl import Node, parse
+from ptmtools.database.gltf.reader import read_glb
+from ptmtools.database.vrml import Node, parse
 from ptmtools.errors import InputError, LimitError, OutputError
 from ptmtools.scene.model import Material
 

@@ -1,9 +1,10 @@
 """The check of a database on disk, or of one `.ptm`: everything that a client may rely on.
 
 Each file is read once, held against the hash in the manifest, and then against the others. The
-VRML files are read by `wrl`, which knows nothing but the emission pattern, JSON by the published
-schemas; what is found is told with a code of the table in `findings`. A finding never ends the
-check: what cannot be read is left out of the comparisons that need it.
+VRML files and the GLBs are read by `vrml.reader` and `gltf.reader`, which know nothing but what
+`emit` writes, JSON by the published schemas; what is found is told with a code of the table in
+`findings`. A finding never ends the check: what cannot be read is left out of the comparisons that
+need it.
 
 Files are read by several threads, since decoding textures and hashing, most of the work, leave the
 interpreter free. Their findings are gathered in the order of the files.
@@ -18,25 +19,25 @@ from typing import Any
 import numpy as np
 
 from ptmtools import schemas
-from ptmtools.database.cellcheck import ReadCell, check_cell, read_cell
-from ptmtools.database.countcheck import check_counts
-from ptmtools.database.filecheck import check_names, served_files
-from ptmtools.database.filereading import SERVED, FileReader
-from ptmtools.database.findings import Findings
-from ptmtools.database.gltf.check import GltfCheck
-from ptmtools.database.hintscheck import (
+from ptmtools.database.model import ValidationReport
+from ptmtools.database.names import CELL_FOLDER, HINTS, ROOT
+from ptmtools.database.validation.cells import ReadCell, check_cell, read_cell
+from ptmtools.database.validation.counts import check_counts
+from ptmtools.database.validation.files import check_names, served_files
+from ptmtools.database.validation.findings import Findings
+from ptmtools.database.validation.gltf import GltfCheck
+from ptmtools.database.validation.hints import (
     Images,
     ReadHints,
     check_against_cells,
     check_hints,
 )
-from ptmtools.database.listcheck import check_graph
-from ptmtools.database.model import ValidationReport
-from ptmtools.database.names import CELL_FOLDER, HINTS, ROOT
-from ptmtools.database.rootcheck import ReadRoot, check_root, check_viewpoints, read_root
-from ptmtools.database.texturecheck import ReadTexture, check_ptm, check_record
-from ptmtools.database.urlcheck import Urls
-from ptmtools.database.wrl import Document
+from ptmtools.database.validation.lists import check_graph
+from ptmtools.database.validation.reading import SERVED, FileReader
+from ptmtools.database.validation.root import ReadRoot, check_root, check_viewpoints, read_root
+from ptmtools.database.validation.textures import ReadTexture, check_ptm, check_record
+from ptmtools.database.validation.urls import Urls
+from ptmtools.database.vrml import Document
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.files import open_regular
 from ptmtools.progress import Progress, silent

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ptmtools.database.filecheck import TWIN, check_twin
-from ptmtools.database.findings import Findings
 from ptmtools.database.gltf.names import GLTF_FOLDER
-from ptmtools.database.hintscheck import ReadHints, read_hints
 from ptmtools.database.names import HINTS
-from ptmtools.database.texturecheck import ReadTexture, read_png, read_texture
-from ptmtools.database.wrl import Document, WrlError, parse
+from ptmtools.database.validation.files import TWIN, check_twin
+from ptmtools.database.validation.findings import Findings
+from ptmtools.database.validation.hints import ReadHints, read_hints
+from ptmtools.database.validation.textures import ReadTexture, read_png, read_texture
+from ptmtools.database.vrml import Document, WrlError, parse
 from ptmtools.files import open_regular
 from ptmtools.texture.model import Limits
 

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.findings import Findings
-from ptmtools.database.rootfile import PATTERN
-from ptmtools.database.wrl import Document, Node
+from ptmtools.database.validation.findings import Findings
+from ptmtools.database.vrml import PATTERN, Document, Node
 from ptmtools.tolerance import PARALLEL_COSINE
 
 _PROTO = {"viewpoint": "SFString", "cellUrl": "MFString"}

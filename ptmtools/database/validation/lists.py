@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.findings import Findings
+from ptmtools.database.validation.findings import Findings
 
 
 def check_list(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ptmtools.database.findings import Findings
-from ptmtools.database.texturecheck import ReadTexture
-from ptmtools.database.wrl import Document, Node
+from ptmtools.database.validation.findings import Findings
+from ptmtools.database.validation.textures import ReadTexture
+from ptmtools.database.vrml import Document, Node
 
 MANIFEST = "manifest.json"
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.cellfile import HEADER
 from ptmtools.database.model import EmitOptions, Viewpoint
 from ptmtools.database.names import cell_path
 from ptmtools.database.numerals import listed, numeral, numerals, quoted, single
+from ptmtools.database.vrml.cell import HEADER
 
 #: The version of the emission pattern, in WorldInfo's first info string.
 PATTERN = 1

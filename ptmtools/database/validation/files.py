@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Iterable
 from pathlib import Path
 
-from ptmtools.database.findings import Findings
+from ptmtools.database.validation.findings import Findings
 
 #: Suffix of a gzip twin.
 TWIN = ".gz"

@@ -33,7 +33,6 @@ from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
 from ptmtools.database.geometry import Geometry
-from ptmtools.database.hull import convex_hull
 from ptmtools.database.model import TextureRecord
 from ptmtools.database.names import DefNames, cell_file, cell_name
 from ptmtools.database.numerals import (
@@ -47,6 +46,7 @@ from ptmtools.database.numerals import (
     quoted,
     single,
 )
+from ptmtools.database.vrml.hull import convex_hull
 from ptmtools.scene.model import Material, Scene
 from ptmtools.visibility.model import Pvs
 

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.findings import Findings
-from ptmtools.database.hull import convex_hull
-from ptmtools.database.listcheck import check_list, check_shares
-from ptmtools.database.solidcheck import MOST_CORNERS, SolidError, farthest, solid_planes
-from ptmtools.database.wrl import Document, Node
+from ptmtools.database.validation.findings import Findings
+from ptmtools.database.validation.lists import check_list, check_shares
+from ptmtools.database.validation.solids import MOST_CORNERS, SolidError, farthest, solid_planes
+from ptmtools.database.vrml import Document, Node, convex_hull
 from ptmtools.errors import DatabaseError
 from ptmtools.tolerance import Tolerance
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.findings import Findings
+from ptmtools.database.validation.findings import Findings
 from ptmtools.errors import LimitError, PtmError
 
 if TYPE_CHECKING:

@@ -52,7 +52,7 @@ def walk(cells: Cells, start: int, stops: Sequence[int], tall: float) -> list[in
     return order + sorted(set(range(len(stops))) - set(order))
 
 
-def storeys(floors: Sequence[float], apart: float) -> list[int]:
+def storey_numbers(floors: Sequence[float], apart: float) -> list[int]:
     """The storey of each of these heights, from 0 for the lowest: a new one begins where a height
     is more than ``apart`` metres above the next lower one."""
     order = np.argsort(floors, kind="stable")

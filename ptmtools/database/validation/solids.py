@@ -17,7 +17,7 @@ from ptmtools.tolerance import Tolerance
 Points = NDArray[np.float64]
 Planes = NDArray[np.float64]
 
-#: Corners of a body beyond which it is none of ours: `hull` takes time by the square of them.
+#: Corners of a body beyond which it is none of ours: `vrml.hull` takes time by their square.
 MOST_CORNERS = 1 << 14
 #: Distances computed at a time.
 _BATCH = 1 << 22

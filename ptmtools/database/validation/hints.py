@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools import schemas
-from ptmtools.database.cellcheck import ReadCell
-from ptmtools.database.findings import Findings
-from ptmtools.database.listcheck import check_graph, check_list, check_shares
-from ptmtools.database.spacecheck import check_space
+from ptmtools.database.validation.cells import ReadCell
+from ptmtools.database.validation.findings import Findings
+from ptmtools.database.validation.lists import check_graph, check_list, check_shares
+from ptmtools.database.validation.space import check_space
 
 #: How far sums of statistics, which are rounded, may be off.
 ROUNDED = 1e-3

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
-from ptmtools.database.leakmarks import LEAK, draw_leaks, leaks_by_portal
 from ptmtools.database.model import PlotOptions, PlotReport
+from ptmtools.database.plans.leaks import LEAK, draw_leaks, leaks_by_portal
+from ptmtools.database.plans.storeys import cut_height, storeys
 from ptmtools.database.section import area, leaf_section, polygon_section, triangle_section
-from ptmtools.database.storeys import cut_height, storeys
 from ptmtools.errors import DatabaseError, InputError, MissingComponentError
 from ptmtools.files import write_bytes
 from ptmtools.scene.model import Scene

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.findings import Findings
-from ptmtools.database.solidcheck import (
+from ptmtools.database.validation.findings import Findings
+from ptmtools.database.validation.solids import (
     Planes,
     Points,
     SolidError,

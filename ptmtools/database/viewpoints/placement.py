@@ -22,11 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
-from ptmtools.database.ground import Ground
 from ptmtools.database.model import EmitOptions, Vector, Viewpoint
-from ptmtools.database.outlook import longest_views
-from ptmtools.database.rooms import Walls, largest_leaves, places
-from ptmtools.database.tour import storeys, walk
+from ptmtools.database.viewpoints.ground import Ground
+from ptmtools.database.viewpoints.outlook import longest_views
+from ptmtools.database.viewpoints.rooms import Walls, largest_leaves, places
+from ptmtools.database.viewpoints.tour import storey_numbers, walk
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import ROUNDING_SHARE
@@ -187,7 +187,7 @@ def _touring(
     start = int(cells.locate_leaf(np.array(begun[0].position))[0]) if begun else leaf[0]
     eye = options.avatar_size[1]
     order = walk(cells, start, leaf, eye)
-    storey = storeys([place.floor for place in found], eye)
+    storey = storey_numbers([place.floor for place in found], eye)
     first = list(dict.fromkeys(storey[i] for i in order))
     order.sort(key=lambda i: first.index(storey[i]))
     number: Counter[int] = Counter()

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.findings import Findings
 from ptmtools.database.gltf.cell import flipped
 from ptmtools.database.gltf.container import GlbError
 from ptmtools.database.gltf.material import WRAPS, linear
 from ptmtools.database.gltf.names import GLTF_FOLDER, GLTF_HINTS, UP
-from ptmtools.database.gltf.reading import ReadGlb, ReadMaterial, read_glb
+from ptmtools.database.gltf.reader import ReadGlb, ReadMaterial, read_glb
 from ptmtools.database.names import CELL_FOLDER, HINTS, cell_name
-from ptmtools.database.wrl import Document, Node
+from ptmtools.database.validation.findings import Findings
+from ptmtools.database.vrml import Document, Node
 
 #: How far a colour may be off that went through the decimals of VRML.
 _SLACK = 1e-5

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
-from ptmtools.database.ground import Ground
 from ptmtools.database.model import Vector
-from ptmtools.database.outlook import longest_views
 from ptmtools.database.section import area, leaf_section, triangle_section
+from ptmtools.database.viewpoints.ground import Ground
+from ptmtools.database.viewpoints.outlook import longest_views
 
 #: Leaves in which a place is looked for, the largest first: of one cell, and of all, at least and
 #: for every room that is wanted.
