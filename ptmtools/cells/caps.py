@@ -20,6 +20,7 @@ from ptmtools.cells.nearby import Nearby
 from ptmtools.cells.planar import difference, unite, without_cracks
 from ptmtools.cells.polyhedron import Polyhedron, section
 from ptmtools.cells.structure import Frame, WallPlane, lying_in, planes_of
+from ptmtools.cells.vectors import cross
 from ptmtools.tolerance import Tolerance, ranked
 
 #: Areas are compared with this share to spare before polygons are.
@@ -48,7 +49,7 @@ class Caps:
         slack = self._tolerance.plane
         apart = (self._low[near] > high + slack) | (self._high[near] < low - slack)
         near = near[~apart.any(axis=1)]
-        inside = near[self._reaching_into(body, near)]
+        inside = self._reaching_into(body, near)
         areas = self._areas[inside]
         needed = _section_areas(body, self._planes[inside]) * (1 - _SPARE)
         free = needed <= areas.sum()
@@ -67,15 +68,12 @@ class Caps:
         return [cap for _, cap in sorted(found, key=lambda one: one[0])]
 
     def _reaching_into(self, body: Polyhedron, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Rows of those triangles that have a point farther inside each face than lies in its
+        """Those triangles that have a point farther inside each face than lies in its
         plane: all that have a part inside, and few others."""
-        found = np.flatnonzero(self._areas[triangles] > 0)
-        for loop in body.faces:
-            p = body.points[loop]
-            normal = np.cross(p[1:-1] - p[0], p[2:] - p[0]).sum(axis=0)
-            normal /= np.linalg.norm(normal)
-            height = self._corners[triangles[found]] @ normal
-            found = found[height.min(axis=1) < p[0] @ normal - self._tolerance.plane]
+        found = triangles[self._areas[triangles] > 0]
+        for plane in body.bounds:
+            height = self._corners[found] @ plane[:3] + plane[3]
+            found = found[height.min(axis=1) < -self._tolerance.plane]
         return found
 
     def _in_plane(
@@ -114,8 +112,7 @@ class Caps:
 def _section_areas(body: Polyhedron, planes: NDArray[np.float64]) -> NDArray[np.float64]:
     """(n,) areas (m²) of a body's sections with (n, 4) planes, but for rounding; infinite where a
     plane does not cut it."""
-    edge = np.concatenate([np.stack([loop, np.roll(loop, -1)], axis=1) for loop in body.faces])
-    one, other = edge[edge[:, 0] < edge[:, 1]].T
+    one, other = body.edges.T
     areas = np.full(len(planes), np.inf)
     for first in range(0, len(planes), _CHUNK):
         plane = planes[first : first + _CHUNK]
@@ -136,9 +133,9 @@ def _section_areas(body: Polyhedron, planes: NDArray[np.float64]) -> NDArray[np.
 def _around(points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
     """(n,) areas of the convex polygons with corners (n, k, 3), in any order, about 0."""
     axis = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
-    u = np.cross(axis, normals)
+    u = cross(axis, normals)
     u /= np.linalg.norm(u, axis=1, keepdims=True)
-    v = np.cross(normals, u)
+    v = cross(normals, u)
     x, y = np.einsum("nki,ni->nk", points, u), np.einsum("nki,ni->nk", points, v)
     order = np.argsort(np.arctan2(y, x), axis=1)
     x, y = np.take_along_axis(x, order, 1), np.take_along_axis(y, order, 1)

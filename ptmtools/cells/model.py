@@ -16,6 +16,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.cells.vectors import cross
 from ptmtools.stored import Stored, texts
 
 #: A child of a BSP node that is no node: ``OUTSIDE``, or leaf i as ``-2 - i``.
@@ -114,7 +115,7 @@ class Cells:
                 [[(r[0], r[i], r[i + 1]) for i in range(1, len(r) - 1)] for r in loops]
             )
             a, b, c = np.moveaxis(self.leaf_point[fan] - self.leaf_points(leaf).mean(axis=0), 1, 0)
-            total[leaf] = np.einsum("ij,ij->", np.cross(a, b), c) / 6
+            total[leaf] = np.einsum("ij,ij->", cross(a, b), c) / 6
         return total
 
     def adjacent(self) -> list[NDArray[np.int32]]:

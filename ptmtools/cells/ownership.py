@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.bsp import Tree
+from ptmtools.cells.vectors import cross
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance
 
@@ -65,7 +66,7 @@ class _Batch:
 def cut_to_leaves(scene: Scene, tree: Tree, tolerance: Tolerance) -> Pieces:
     """Cut all triangles of a scene along the planes of a tree."""
     corners = scene.corners
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     count = len(corners)
     whole = _Batch(
         points=corners,

@@ -118,7 +118,8 @@ def _polygonal(shapes: Geometry) -> Geometry:
 
     every = np.array(shapes, dtype=object).reshape(-1)
     flat = shapely.get_dimensions(every) < 2
-    every[flat] = shapely.Polygon()
+    if flat.any():
+        every[flat] = shapely.Polygon()
     for i in np.flatnonzero((shapely.get_type_id(every) == _COLLECTION) & ~flat):
         every[i] = shapely.multipolygons(_polygons_in(every[i]))
     return every if np.ndim(shapes) else every[0]

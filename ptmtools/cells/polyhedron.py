@@ -7,9 +7,12 @@ into portals later. Cutting snaps: a vertex within the rounding distance of the 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ptmtools.cells.vectors import cross
 
 #: Tag of a face that lies in the root box.
 BOX_FACE = -1
@@ -42,17 +45,33 @@ class Polyhedron:
         loops = tuple(np.array(loop) for loop in _BOX_LOOPS)
         return Polyhedron(points, loops, (BOX_FACE,) * 6)
 
+    @cached_property
+    def edges(self) -> NDArray[np.int64]:
+        """(e, 2) the ends of each edge, the lower first, in the order in which faces have them."""
+        loops = [loop.tolist() for loop in self.faces]
+        pairs = (pair for r in loops for pair in zip(r, r[1:] + r[:1], strict=True))
+        return np.array(list({(min(a, b), max(a, b)): None for a, b in pairs}))
+
     @property
     def volume(self) -> float:
         """Volume in m³, by tetrahedra from the centroid of the vertices."""
-        centre = self.points.mean(axis=0)
-        total = 0.0
-        for loop in self.faces:
-            p = self.points[loop] - centre
-            total += float(
-                np.einsum("ij,ij->", np.cross(p[1:-1], p[2:]), np.tile(p[0], (len(p) - 2, 1)))
-            )
-        return total / 6.0
+        a, b, c = self._fan(self.points - self.points.mean(axis=0))
+        return float(np.einsum("ij,ij->", cross(a, b), c)) / 6.0
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """(f, 4) the planes of the faces, unit normals pointing outwards."""
+        a, b, c = self._fan(self.points)
+        start = np.cumsum([0] + [len(loop) - 2 for loop in self.faces[:-1]])
+        normals = np.add.reduceat(cross(b - a, c - a), start)
+        normals /= np.sqrt(np.einsum("ij,ij->i", normals, normals))[:, None]
+        return np.column_stack([normals, -np.einsum("ij,ij->i", normals, a[start])])
+
+    def _fan(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+        """The (m, 3) corners of the faces' triangles, face by face, taken from ``points``."""
+        loops = [loop.tolist() for loop in self.faces]
+        fan = [(r[0], r[i], r[i + 1]) for r in loops for i in range(1, len(r) - 1)]
+        return tuple(points[np.array(fan).T])
 
 
 def cut(
@@ -104,11 +123,16 @@ def cut(
 
 def section(body: Polyhedron, plane: NDArray[np.float64], rounding: float) -> NDArray[np.float64]:
     """(n, 3) convex polygon in which a plane cuts the body, counter-clockwise against the normal;
-    (0, 3) where it does not cut the interior."""
-    front, back = cut(body, plane, BOX_FACE, rounding)
-    if front is None or back is None:
+    (0, 3) where it does not cut the interior. The rim of the face that `cut` would make."""
+    distance = body.points @ plane[:3] + plane[3]
+    side = np.where(np.abs(distance) <= rounding, 0, np.sign(distance))
+    if side.max() <= 0 or side.min() >= 0:
         return np.zeros((0, 3))
-    return back.points[back.faces[-1]]
+    i, j = body.edges[side[body.edges[:, 0]] * side[body.edges[:, 1]] < 0].T
+    t = (distance[i] / (distance[i] - distance[j]))[:, None]
+    crossing = body.points[i] + t * (body.points[j] - body.points[i])
+    rim = np.concatenate([body.points[side == 0], crossing])
+    return rim[_around(rim, list(range(len(rim))), plane[:3])]
 
 
 def clip_polygon(
@@ -136,17 +160,15 @@ def _around(points: NDArray[np.float64], loop: list[int], normal: NDArray[np.flo
     p = points[loop]
     p = p - p.mean(axis=0)
     u = p[np.argmax(np.einsum("ij,ij->i", p, p))]
-    v = np.cross(normal, u)
-    order = np.argsort(np.arctan2(p @ v, p @ u), kind="stable")
-    return [loop[i] for i in order]
+    angle = np.arctan2(p @ cross(normal, u), p @ u).tolist()
+    return [loop[i] for i in sorted(range(len(loop)), key=angle.__getitem__)]
 
 
 def _compact(points: NDArray[np.float64], faces: list[tuple[list[int], int]]) -> Polyhedron:
-    used = np.unique(np.concatenate([np.array(loop) for loop, _ in faces]))
-    rename = np.full(len(points), -1)
-    rename[used] = np.arange(len(used))
+    used = sorted({i for loop, _ in faces for i in loop})
+    rename = {old: new for new, old in enumerate(used)}
     return Polyhedron(
         points[used],
-        tuple(rename[np.array(loop)] for loop, _ in faces),
+        tuple(np.array([rename[i] for i in loop]) for loop, _ in faces),
         tuple(tag for _, tag in faces),
     )

@@ -99,11 +99,5 @@ def _bounds(body: Polyhedron, planes: list[NDArray[np.float64]]) -> list[NDArray
     """The planes of a body's faces: those of the BSP, and those of the root box, in which the
     outer faces of a building lie when the box is clipped to it."""
     bounds = [planes[tag] for tag in sorted({tag for tag in body.tags if tag != BOX_FACE})]
-    for loop, tag in zip(body.faces, body.tags, strict=True):
-        if tag == BOX_FACE:
-            p = body.points[loop]
-            arm = p - p[0]
-            normal = np.cross(arm[1:-1], arm[2:]).sum(axis=0)
-            normal /= np.linalg.norm(normal)
-            bounds.append(np.append(normal, -normal @ p[0]))
-    return bounds
+    outer = [face for face, tag in enumerate(body.tags) if tag == BOX_FACE]
+    return bounds + list(body.bounds[outer])

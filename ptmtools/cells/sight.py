@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
+from ptmtools.cells.vectors import cross
 
 #: Lines over all portals, and the least and the most through one of them.
 LINES = 2**20
@@ -88,7 +89,7 @@ def _lines(
         edge = np.roll(polygon, -1, axis=0) - polygon
         right = edge[np.argmax(np.linalg.norm(edge, axis=1))]
     right = right / np.linalg.norm(right)
-    upward = np.cross(normal, right)
+    upward = cross(normal, right)
     frame = np.stack([right, upward, normal])
     flat = (polygon - polygon[0]) @ frame[:2].T
     height = np.unique(flat[:, 1])

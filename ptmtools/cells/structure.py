@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from ptmtools.cells.nearby import Nearby
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
+from ptmtools.cells.vectors import cross
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
 
@@ -60,9 +61,9 @@ class Frame:
         normal = plane[:3]
         axis = np.zeros(3)
         axis[np.argmin(np.abs(normal))] = 1.0
-        u = np.cross(axis, normal)
+        u = cross(axis, normal)
         u /= np.linalg.norm(u)
-        return Frame(plane, -plane[3] * normal, u, np.cross(normal, u))
+        return Frame(plane, -plane[3] * normal, u, cross(normal, u))
 
     def to_plane(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """(…, 2) coordinates of (…, 3) points, projected along the normal."""
@@ -153,7 +154,7 @@ def planes_of(
     corners: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(n, 4) planes with one sign for both windings, and (n,) areas, of (n, 3, 3) triangles."""
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     double = np.linalg.norm(normal, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         normal = np.where(double[:, None] > 0, normal / double[:, None], 0.0)

@@ -156,7 +156,7 @@ def _divide(
         every = np.ones(len(tree.leaves), dtype=bool)
         start = largest_with_floor(tree, every, corners) or _largest(tree)
     reach = flood(tree, portals, corners, start)
-    if tree.capped:
+    if tree.capped and (whole or reach.closed):  # else it is thrown away
         joint = rejoined(tree, reach.reached)
         portals = portals_rejoined(portals, tree, joint, tolerance)
         tree, reach = joint.tree, reach.renamed(joint.leaf)

@@ -8,7 +8,6 @@ neither the cells nor what follows from them. If nothing but the contents of pla
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -52,7 +51,7 @@ def put_scene(
 ) -> tuple[StageRecord, tuple[str, ...]]:
     """The record of the scene, and why it was made anew; empty if it stands as it is.
 
-    Raises what `ingest` and `read_image` raise.
+    Raises what `ingest` and `check_image` raise.
     """
     before = run.db.manifest.stages.get("scene")
     work = scene_work(model, options, before, run.db.digests)
@@ -66,33 +65,18 @@ def put_scene(
     return _read(run, transaction, model, options, workers), why
 
 
-def check_images(images: Iterable[SourceImage], options: IngestOptions, workers: int) -> None:
-    """Raises what `read_image` raises for an image that cannot be stored exactly."""
-    with ThreadPoolExecutor(workers) as pool:
-        for _ in pool.map(lambda image: _check_image(image, options), images):
-            pass
-
-
-def _check_image(image: SourceImage, options: IngestOptions) -> None:
-    from ptmtools.texture import Limits, read_image
-
-    with naming(image.name):
-        read_image(image.load(), Limits(options.limit << 20))
-
-
 def _read(
     run: Run, transaction: Transaction, model: Path, options: IngestOptions, workers: int
 ) -> StageRecord:
     from ptmtools.scene import ingest
 
     scene = ingest(model, options, run.progress, workers=workers)
-    check_images(scene.images, options, workers)
     run.hold("scene", scene)
     run.hold_images(scene.images)
     transaction.put_arrays("scene", scene.to_arrays())
     transaction.put(IMAGE_LIST, image_list([_row(image) for image in scene.images]))
     for image in scene.images:
-        transaction.put(f"{IMAGES}/{image.sha256}", image.load())
+        _put_image(transaction, image, options)
     return replace(
         work_of("scene", options, files_of(model, scene.files, run.db.digests)),
         outputs=transaction.pending(),
@@ -160,10 +144,20 @@ def _repainted(
         return None
     run.hold_images([fresh.get(i, image) for i, image in enumerate(run.images)])
     for image in fresh.values():
-        _check_image(image, options)
-        transaction.put(f"{IMAGES}/{image.sha256}", image.load())
+        _put_image(transaction, image, options)
     transaction.put(IMAGE_LIST, image_list([_row(image) for image in run.images]))
     return replace(work, outputs=transaction.pending(), counts=before.counts, notes=before.notes)
+
+
+def _put_image(transaction: Transaction, image: SourceImage, options: IngestOptions) -> None:
+    """Stages a copy of an image that has been decoded; raises what `check_image` raises."""
+    from ptmtools.texture.images import check_image
+    from ptmtools.texture.model import Limits
+
+    data = image.load()
+    with naming(image.name):
+        check_image(data, Limits(options.limit << 20))
+    transaction.put(f"{IMAGES}/{image.sha256}", data)
 
 
 def _row(image: SourceImage) -> dict[str, Any]:

@@ -11,13 +11,14 @@ from __future__ import annotations
 
 from ptmtools.texture.images.picture import Picture
 from ptmtools.texture.images.png import png_bytes
-from ptmtools.texture.images.reading import SUFFIXES, load_image, read_image, read_ptm
+from ptmtools.texture.images.reading import SUFFIXES, check_image, load_image, read_image, read_ptm
 from ptmtools.texture.images.writing import WRITTEN, write_image, write_png, write_to
 
 __all__ = [
     "SUFFIXES",
     "WRITTEN",
     "Picture",
+    "check_image",
     "load_image",
     "png_bytes",
     "read_image",

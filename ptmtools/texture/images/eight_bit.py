@@ -21,16 +21,21 @@ if TYPE_CHECKING:
 _COMPONENTS = {"1": 1, "L": 1, "LA": 2, "P": 3, "PA": 4, "RGB": 3, "RGBA": 4}
 
 
-def read(image: ImageFile, limits: Limits, depth: int) -> Picture:
-    """An opened image, texels exactly as stored; ``depth`` is that of its samples, bits.
-
-    Raises InputError PTM-I126, LimitError PTM-L104, and what Pillow raises.
-    """
-    import numpy as np
-
+def check(image: ImageFile, limits: Limits) -> None:
+    """Raise InputError PTM-I126, LimitError PTM-L104 for what an opened image cannot be read as."""
     if image.mode not in _COMPONENTS:
         raise unsupported(f"the colour model {image.mode}")
     check_size(*image.size, _COMPONENTS[image.mode], limits)
+
+
+def read(image: ImageFile, depth: int) -> Picture:
+    """An opened image that was checked, texels exactly as stored; ``depth`` is that of its samples,
+    bits.
+
+    Raises what Pillow raises.
+    """
+    import numpy as np
+
     # Before loading: Pillow drops or rewrites some of it while converting.
     key = _full_scale(image.info.get("transparency"), image, depth)
     load(image)

@@ -19,6 +19,7 @@ from ptmtools.texture.sources import open_file
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+    from PIL.ImageFile import ImageFile
 
 #: Of the files that are taken for images where a folder is named.
 SUFFIXES = (
@@ -76,13 +77,26 @@ def read_image(
     """
     picture = load_image(source, limits)
     with naming(None if isinstance(source, bytes) else source):
-        if picture.texels.dtype.name != "uint8":
-            raise InputError(
-                "PTM-I126",
-                f"has {picture.texels.dtype.name} samples; only 8-bit images are used here",
-                remedy="convert it to 8-bit RGB yourself, so that you see what that changes",
-            )
+        _check_depth(picture)
         return picture.array()
+
+
+def check_image(source: bytes, limits: Limits = _LIMITS) -> None:
+    """Raises what `read_image` would raise for an image that Pillow has been seen to decode: its
+    texels are not unpacked once more."""
+    file = cast("BinaryIO", io.BytesIO(source))
+    found = _opened(file, None, limits)
+    if isinstance(found, Picture):
+        _check_depth(found)
+
+
+def _check_depth(picture: Picture) -> None:
+    if picture.texels.dtype.name != "uint8":
+        raise InputError(
+            "PTM-I126",
+            f"has {picture.texels.dtype.name} samples; only 8-bit images are used here",
+            remedy="convert it to 8-bit RGB yourself, so that you see what that changes",
+        )
 
 
 def read_ptm(path: str | os.PathLike[str]) -> bytes:
@@ -98,6 +112,19 @@ def read_ptm(path: str | os.PathLike[str]) -> bytes:
 
 
 def _load(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
+    from ptmtools.texture.images import eight_bit
+    from ptmtools.texture.images.opening import pillow_faults
+
+    found = _opened(file, path, limits)
+    if isinstance(found, Picture):
+        return found
+    with pillow_faults():
+        return eight_bit.read(*found)
+
+
+def _opened(file: BinaryIO, path: str | None, limits: Limits) -> Picture | tuple[ImageFile, int]:
+    """An image; one of 8 bits as Pillow has opened it, not loaded but found good, and the depth of
+    its samples in the file, bits."""
     first = file.read(HEAD_MAX)
     if not first:
         raise InputError("PTM-I123", "is empty", remedy="fetch or export it again")
@@ -114,10 +141,12 @@ def _load(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
         return radiance.read_hdr(file, limits)
     if first.startswith(openexr.MAGIC):
         return openexr.read_exr(file, path, limits)
-    return _through_pillow(file, path, first, limits)
+    return _by_pillow(file, path, first, limits)
 
 
-def _through_pillow(file: BinaryIO, path: str | None, first: bytes, limits: Limits) -> Picture:
+def _by_pillow(
+    file: BinaryIO, path: str | None, first: bytes, limits: Limits
+) -> Picture | tuple[ImageFile, int]:
     from ptmtools.texture.images import deep, eight_bit
     from ptmtools.texture.images.opening import high_colour, opened, pillow_faults
 
@@ -139,7 +168,8 @@ def _through_pillow(file: BinaryIO, path: str | None, first: bytes, limits: Limi
             raise unsupported("samples that do not fill their bits")
         elif high_colour(image):
             raise unsupported("samples of 5 or 6 bits")
-        return eight_bit.read(image, limits, depth)
+        eight_bit.check(image, limits)
+        return image, depth
 
 
 def _rescaled(tiles: list[Any]) -> bool:
