@@ -13,6 +13,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import get_args
 
 import numpy as np
@@ -32,6 +33,7 @@ from ptmtools.cells.rejoin import rejoined
 from ptmtools.cells.reveals import Reveals
 from ptmtools.cells.structure import WallPlane, find_walls, structural_triangles
 from ptmtools.errors import InputError
+from ptmtools.executors import Executor, Serial
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance
@@ -40,6 +42,40 @@ from ptmtools.tolerance import Tolerance
 BOX_MARGIN = 0.01
 #: A model is open above if less than this share of its floor has something over it.
 ROOFED = 0.5
+
+
+@dataclass(frozen=True)
+class _Model:
+    """What is subdivided; ``corners`` are those of the structural triangles, (T, 3, 3)."""
+
+    corners: NDArray[np.float64]
+    walls: list[WallPlane]
+    options: SubdivideOptions
+    tolerance: Tolerance
+
+    @cached_property
+    def reveals(self) -> Reveals:
+        return Reveals(self.corners, self.options.wall_thickness, self.tolerance)
+
+    @cached_property
+    def caps(self) -> Caps:
+        return Caps(self.corners, self.tolerance)
+
+    def __getstate__(self) -> dict[str, object]:
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+
+@dataclass(frozen=True)
+class _Box:
+    """A root box, (2, 3) ``bounds``. Its sides run along the rows of ``axes`` (3, 3); without them
+    it is parallel to the coordinate axes, and leaves at it count as inside."""
+
+    bounds: NDArray[np.float64]
+    axes: NDArray[np.float64] | None = None
+
+    @property
+    def inside(self) -> bool:
+        return self.axes is None
 
 
 @dataclass(frozen=True)
@@ -53,9 +89,15 @@ class _Space:
 
 
 def subdivide(
-    scene: Scene, options: SubdivideOptions | None = None, progress: Progress = silent
+    scene: Scene,
+    options: SubdivideOptions | None = None,
+    progress: Progress = silent,
+    executor: Executor | None = None,
 ) -> Cells:
     """Subdivide a scene into convex leaves, and those into cells.
+
+    ``executor`` subdivides the second root box beside the first; by default it is done afterwards,
+    if the model is open.
 
     Raises
     ------
@@ -66,20 +108,20 @@ def subdivide(
     _check(scene, options)
     axes = main_axes(scene.corners)
     tolerance = Tolerance.for_points(scene.points @ axes.T).for_walls(options.wall_thickness)
-    walls = find_walls(scene, options, tolerance)
     corners = scene.corners[structural_triangles(scene, options)]
-    reveals = Reveals(corners, options.wall_thickness, tolerance)
-    caps = Caps(corners, tolerance)
+    model = _Model(corners, find_walls(scene, options, tolerance), options, tolerance)
     low, high = _bounds(scene.corners @ axes.T)
     margin = BOX_MARGIN * tolerance.extent
-    wide = np.array([low - margin, high + margin])
-    space = _divide(wide, walls, reveals, caps, corners, options, tolerance, progress, axes)
+    wide = _Box(np.array([low - margin, high + margin]), axes)
+    tight = _Box(_thickened(*_bounds(corners if len(corners) else scene.corners), tolerance))
+    clipped = (executor or Serial()).later(_divide, model, tight)
+    space = _divide(model, wide, progress)
     notes: list[str] = []
-    if not space.reach.closed:
-        roofed = roofed_share(corners, options.wall_area)
-        tight = _thickened(*_bounds(corners if len(corners) else scene.corners), tolerance)
-        notes.append(_open_note(space, roofed, tight))
-        space = _divide(tight, walls, reveals, caps, corners, options, tolerance, progress)
+    if space.reach.closed:
+        clipped.cancel()
+    else:
+        notes.append(_open_note(space, roofed_share(corners, options.wall_area), tight.bounds))
+        space = clipped.result()
     if space.tree.unsplit:
         notes.append(
             f"the limit of {options.max_cells:,} leaves was reached: {space.tree.unsplit:,} leaves "
@@ -131,32 +173,22 @@ def _matches(scene: Scene, pattern: str) -> bool:
     return any(fnmatchcase(name, pattern) for name in names)
 
 
-def _divide(
-    box: NDArray[np.float64],
-    walls: list[WallPlane],
-    reveals: Reveals,
-    caps: Caps,
-    corners: NDArray[np.float64],
-    options: SubdivideOptions,
-    tolerance: Tolerance,
-    progress: Progress,
-    axes: NDArray[np.float64] | None = None,
-) -> _Space:
-    """Subdivide a root box and flood it. Its sides run along the rows of ``axes`` (3, 3); without
-    them it is parallel to the coordinate axes, and leaves at it count as inside."""
-    whole = axes is None
+def _divide(model: _Model, root: _Box, progress: Progress = silent) -> _Space:
+    """Subdivide a root box and flood it."""
+    corners, options, tolerance = model.corners, model.options, model.tolerance
+    box = root.bounds
     body = Polyhedron.box(box[0], box[1])
-    if axes is not None:
-        body = Polyhedron(body.points @ axes, body.faces, body.tags)
+    if root.axes is not None:
+        body = Polyhedron(body.points @ root.axes, body.faces, body.tags)
         box = np.stack(_bounds(body.points))
-    tree = build_tree(body, walls, reveals, caps, options, tolerance, progress)
+    tree = build_tree(body, model.walls, model.reveals, model.caps, options, tolerance, progress)
     portals = find_portals(tree, tolerance)
     start = _viewpoint_leaves(tree, box, options)
-    if not start and whole:
+    if not start and root.inside:
         every = np.ones(len(tree.leaves), dtype=bool)
         start = largest_with_floor(tree, every, corners) or _largest(tree)
     reach = flood(tree, portals, corners, start)
-    if tree.capped and (whole or reach.closed):  # else it is thrown away
+    if tree.capped and (root.inside or reach.closed):  # else it is thrown away
         joint = rejoined(tree, reach.reached)
         portals = portals_rejoined(portals, tree, joint, tolerance)
         tree, reach = joint.tree, reach.renamed(joint.leaf)

@@ -33,6 +33,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import Protocol, Self, TypeVar
@@ -41,9 +42,20 @@ S = TypeVar("S")
 S_co = TypeVar("S_co", covariant=True)
 T = TypeVar("T")
 R = TypeVar("R")
+R_co = TypeVar("R_co", covariant=True)
 
 #: For each worker so many tasks are taken ahead at most: one that it does, one that waits for it.
 AHEAD = 2
+
+
+class Pending(Protocol[R_co]):
+    """A task under way: a `concurrent.futures.Future`, or what does as one does."""
+
+    def result(self) -> R_co:
+        """Waits for it, and returns or raises what it did."""
+
+    def cancel(self) -> object:
+        """Its result is not wanted: if it has not begun, it never will."""
 
 
 class Sharing(Protocol[S_co]):
@@ -63,7 +75,8 @@ class Sharing(Protocol[S_co]):
 
 
 class Executor(ABC):
-    """Does tasks, several at a time. Not to be used by two threads at once."""
+    """Does tasks, several at a time. Not to be used by two threads at once, but for what `later`
+    has under way."""
 
     @property
     @abstractmethod
@@ -96,6 +109,15 @@ class Executor(ABC):
         self, shared: S, *, releases_lock: bool = False
     ) -> AbstractContextManager[Sharing[S]]:
         """Sends ``shared`` to the workers, for several rounds of tasks, until the context ends."""
+
+    def later(self, function: Callable[[S, T], R], shared: S, task: T) -> Pending[R]:
+        """``function(shared, task)``, done beside what the caller does meanwhile, for a result that
+        may turn out not to be wanted; where nothing can be done beside it, once it is asked for.
+        """
+        thread = ThreadPoolExecutor(1, "later")
+        pending = thread.submit(lambda: next(iter(self.each(function, shared, [task]))))
+        thread.shutdown(wait=False)
+        return pending
 
     @abstractmethod
     def close(self) -> None:

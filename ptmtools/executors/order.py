@@ -5,19 +5,12 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
+
+from ptmtools.executors.model import Pending
 
 T = TypeVar("T")
-R_co = TypeVar("R_co", covariant=True)
 R = TypeVar("R")
-
-
-class Pending(Protocol[R_co]):
-    """A task under way: a `concurrent.futures.Future`, or a cluster's."""
-
-    def result(self) -> R_co: ...
-
-    def cancel(self) -> object: ...
 
 
 def in_order(

@@ -44,6 +44,7 @@ class Processes:
 
     def __init__(self, workers: int) -> None:
         self.workers = workers
+        self._starting = threading.Lock()
         self._pool: ProcessPoolExecutor | None = None
         self._lifeline: Connection | None = None
 
@@ -81,11 +82,12 @@ class Processes:
         self._pool = self._lifeline = None
 
     def _opened(self) -> ProcessPoolExecutor:
-        if self._pool is None:
-            context = get_context("spawn")
-            theirs, self._lifeline = context.Pipe(duplex=False)
-            self._pool = ProcessPoolExecutor(self.workers, context, _begin, (theirs,))
-        return self._pool
+        with self._starting:
+            if self._pool is None:
+                context = get_context("spawn")
+                theirs, self._lifeline = context.Pipe(duplex=False)
+                self._pool = ProcessPoolExecutor(self.workers, context, _begin, (theirs,))
+            return self._pool
 
 
 class _InProcesses(Generic[S]):

@@ -11,6 +11,7 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from ptmtools.executors.local import Local
 from ptmtools.executors.model import Executor
 from ptmtools.executors.opening import open_executor, processors
+from ptmtools.executors.serial import Serial
 from ptmtools.pipeline.changes import reasons
 from ptmtools.pipeline.emission import put_files
 from ptmtools.pipeline.manifest import StageRecord
@@ -47,6 +49,8 @@ PathLike = str | os.PathLike[str]
 CULLING_GAINS_LITTLE = 0.7
 #: So many textures are worth starting a process, which takes a second.
 WORTH_A_PROCESS = 8
+#: So many triangles take as long to subdivide as two processes to start.
+LARGE = 4000
 
 
 def build_scene(
@@ -101,7 +105,7 @@ def make_cells(
     ):
         run = Run(writer, progress)
         read, cut = ingest_options or options.ingest, subdivide_options or options.subdivide
-        _read_and_cut(run, Path(model), read, cut, local, lambda _: None)
+        _read_and_cut(run, Path(model), read, cut, local, lambda _: local.spare(0))
         return _closing(run, start)
 
 
@@ -190,6 +194,7 @@ class _Workers:
     def __init__(self, workers: int, scheduler: str | None) -> None:
         self._asked = workers, scheduler
         self._opened: Executor | None = None
+        self._spare: Executor | None = None
 
     @property
     def here(self) -> int:
@@ -203,21 +208,31 @@ class _Workers:
             self._opened = open_executor(*self._asked)
         return self._opened
 
-    def beside(self, tasks: int) -> Executor | None:
-        """One for another thread, which closes it, while this thread keeps the interpreter's lock;
-        None if there is no worker to spare, or the tasks are few."""
+    @property
+    def several(self) -> bool:
+        """Whether textures can be encoded while this thread does something else."""
+        return self._asked[1] is not None or self.here > 1
+
+    def spare(self, textures: int) -> Executor:
+        """For what can be done beside this thread while it keeps the interpreter's lock: processes
+        that two threads may use, so many as ``textures`` are worth. Serial if none is to spare."""
+        if self._spare is None:
+            count = min(self.here - 1, max(1, textures // WORTH_A_PROCESS))
+            self._spare = Local(count, threads=False) if count else Serial()
+        return self._spare
+
+    def another(self, textures: int) -> AbstractContextManager[Executor]:
+        """What encodes textures beside this thread."""
         workers, scheduler = self._asked
-        if scheduler:
-            return open_executor(workers, scheduler) if tasks else None
-        spare = min(self.here - 1, tasks // WORTH_A_PROCESS)
-        return Local(spare, threads=False) if spare else None
+        return open_executor(workers, scheduler) if scheduler else nullcontext(self.spare(textures))
 
     def __enter__(self) -> _Workers:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._opened is not None:
-            self._opened.close()
+        for executor in (self._opened, self._spare):
+            if executor is not None:
+                executor.close()
 
 
 class _Beside:
@@ -232,13 +247,15 @@ class _Beside:
         self._pool = ThreadPoolExecutor(1, "textures")
         self._task: Future[None] | None = None
 
-    def begin(self, cutting: bool) -> None:
-        """To be called when the scene's images are known; ``cutting`` if cells are cut next."""
-        self._stage = TextureStage(self._run, self._options)
-        self._stage.begin()
-        executor = self._workers.beside(self._stage.left) if cutting else None
-        if executor:
-            self._task = self._pool.submit(self._encode, self._stage, executor)
+    def begin(self, cutting: bool) -> Executor:
+        """To be called when the scene's images are known, and whether cells are cut next; returns
+        what can be used beside the thread that cuts them."""
+        stage = self._stage = TextureStage(self._run, self._options)
+        stage.begin()
+        spare = self._workers.spare(stage.left)
+        if cutting and self._workers.several and stage.left >= WORTH_A_PROCESS:
+            self._task = self._pool.submit(self._encode, stage)
+        return spare
 
     def check(self) -> None:
         """Raises what has gone wrong so far."""
@@ -255,8 +272,8 @@ class _Beside:
             self._stage.encode(self._workers.executor())
         self._stage.commit()
 
-    def _encode(self, stage: TextureStage, executor: Executor) -> None:
-        with executor:
+    def _encode(self, stage: TextureStage) -> None:
+        with self._workers.another(stage.left) as executor:
             stage.encode(executor, self._stop)
 
     def __enter__(self) -> _Beside:
@@ -273,10 +290,10 @@ def _read_and_cut(
     ingest_options: IngestOptions,
     subdivide_options: SubdivideOptions,
     workers: _Workers,
-    read: Callable[[bool], None],
+    read: Callable[[bool], Executor],
 ) -> None:
     """The scene and the cells: one transaction, unless the scene is what it was. ``read`` is called
-    in between, and told whether cells are to be cut."""
+    in between, is told whether cells are to be cut, and gives what may be used for it besides."""
     start = time.perf_counter()
     transaction = run.writer.begin("scene")
     scene, why_scene = put_scene(run, transaction, model, ingest_options, workers.here)
@@ -285,9 +302,9 @@ def _read_and_cut(
     inputs = {arrays_of("scene"): scene.outputs[arrays_of("scene")]}
     work = work_of("cells", subdivide_options, inputs)
     why_cells = reasons(run.db.manifest.stages.get("cells"), work, run.db)
-    read(bool(why_cells))
+    spare = read(bool(why_cells))
     if why_cells:
-        records["cells"] = _cut(run, transaction, work, subdivide_options)
+        records["cells"] = _cut(run, transaction, work, subdivide_options, spare)
     if records:
         transaction.commit(records)
     run.report("scene", why_scene, start, middle)
@@ -295,11 +312,16 @@ def _read_and_cut(
 
 
 def _cut(
-    run: Run, transaction: Transaction, work: StageRecord, options: SubdivideOptions
+    run: Run,
+    transaction: Transaction,
+    work: StageRecord,
+    options: SubdivideOptions,
+    spare: Executor,
 ) -> StageRecord:
     from ptmtools.cells import subdivide
 
-    cells = subdivide(run.scene, options, run.progress)
+    large = len(run.scene.triangles) >= LARGE
+    cells = subdivide(run.scene, options, run.progress, spare if large else None)
     run.hold("cells", cells)
     return replace(
         work,
