@@ -129,10 +129,9 @@ class CellWriter:
         self._objects = scene.objects
         self._materials = scene.materials
         self._image = np.array([m.image for m in scene.materials], dtype=np.int64)
-        self._image_text = {
+        self._textures = {
             image: f"url {listed(_urls(record, fallback), 2)}" for image, record in textures.items()
         }
-        self._look: dict[int, str] = {}
         self._pvs = pvs
         self._adjacent = cells.adjacent()
         self._url = [quoted(cell_file(c)) for c in range(cells.cell_count)]
@@ -181,8 +180,10 @@ class CellWriter:
 
         names = DefNames(f"C{cell}")
         first, last = g.cell_start[cell : cell + 2].tolist()
-        for shape in range(first, last):
-            parts.append(self._shape(shape, names.take(self._objects[g.object[shape]])))
+        taken = [names.take(self._objects[i]) for i in g.object[first:last].tolist()]
+        textures = _Textures(self._textures, names)
+        for shape, name in zip(range(first, last), taken, strict=True):
+            parts.append(self._shape(shape, name, textures))
         used = g.point[g.shape_point[g.point_start[first] : g.point_start[last]]]
         images = np.unique(self._image[g.material[first:last]])
         return CellText(
@@ -193,17 +194,15 @@ class CellWriter:
             triangles=int(g.triangle_start[last] - g.triangle_start[first]),
         )
 
-    def _shape(self, shape: int, name: str) -> str:
+    def _shape(self, shape: int, name: str, textures: _Textures) -> str:
         g = self.geometry
         lists = self._lists_of(shape)
         at = shape - lists.first
-        place = int(g.material[shape])
-        material = self._materials[place]
-        if place not in self._look:
-            self._look[place] = self._appearance(material)
+        material = self._materials[int(g.material[shape])]
         parts = [
             f"DEF {name} Shape {{\n  appearance Appearance {{\n",
-            self._look[place],
+            _surface(material),
+            textures.of(material),
             "  }\n  geometry IndexedFaceSet {\n",
             "    solid FALSE\n" if g.two_sided[shape] else "",
             f"    coord Coordinate {{ point {field(lists.point[at])} }}\n",
@@ -253,20 +252,39 @@ class CellWriter:
     def _cell_urls(self, cells: NDArray[np.int32]) -> str:
         return listed([self._url[c] for c in cells.tolist()], 8)
 
-    def _appearance(self, material: Material) -> str:
-        text = ""
-        if material.image < 0 or material.opacity < 1:
-            fields = f"diffuseColor {_color(material)}"
-            if material.image < 0:
-                fields += f" emissiveColor {_color(material, _GLOW)}"
-            if material.opacity < 1:
-                fields += f" transparency {numeral(1 - min(max(material.opacity, 0.0), 1.0))}"
-            text += f"    material Material {{ {fields} }}\n"
-        if material.image >= 0:
-            wrap = " repeatS FALSE" if material.wrap_s == "clamp" else ""
-            wrap += " repeatT FALSE" if material.wrap_t == "clamp" else ""
-            text += f"    texture ImageTexture {{ {self._image_text[material.image]}{wrap} }}\n"
-        return text
+
+class _Textures:
+    """The ImageTexture nodes of one file, each written once and then named: some browsers make a
+    texture of every node, whatever its file."""
+
+    def __init__(self, urls: Mapping[int, str], names: DefNames) -> None:
+        self._urls = urls
+        self._names = names
+        self._written: dict[tuple[int, str, str], str] = {}
+
+    def of(self, material: Material) -> str:
+        """The field of an Appearance; "" where there is no texture."""
+        if material.image < 0:
+            return ""
+        key = material.image, material.wrap_s, material.wrap_t
+        if key in self._written:
+            return f"    texture USE {self._written[key]}\n"
+        name = self._written[key] = self._names.take("texture")
+        wrap = " repeatS FALSE" if material.wrap_s == "clamp" else ""
+        wrap += " repeatT FALSE" if material.wrap_t == "clamp" else ""
+        return f"    texture DEF {name} ImageTexture {{ {self._urls[material.image]}{wrap} }}\n"
+
+
+def _surface(material: Material) -> str:
+    """The material of an Appearance; "" where it is that of no Material node."""
+    if material.image >= 0 and material.opacity >= 1:
+        return ""
+    fields = f"diffuseColor {_color(material)}"
+    if material.image < 0:
+        fields += f" emissiveColor {_color(material, _GLOW)}"
+    if material.opacity < 1:
+        fields += f" transparency {numeral(1 - min(max(material.opacity, 0.0), 1.0))}"
+    return f"    material Material {{ {fields} }}\n"
 
 
 def _color(material: Material, share: float = 1.0) -> str:

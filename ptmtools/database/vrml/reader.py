@@ -123,7 +123,7 @@ class _Reader:
         self._at = 0
         self._counted = (0, 1)
         self._types = dict(NODES)
-        self._names: set[str] = set()
+        self._names: dict[str, Node | None] = {}
 
     def document(self) -> Document:
         if self._text.partition("\n")[0] != HEADER:
@@ -171,7 +171,7 @@ class _Reader:
             name = self._word("a DEF name")
             if name in self._names:
                 self._fail(f"the DEF name {name} is used twice")
-            self._names.add(name)
+            self._names[name] = None
             type = self._word("a node")
         known = self._types.get(type)
         if known is None:
@@ -187,11 +187,22 @@ class _Reader:
                 self._fail(f"{type} has two fields {field!r}")
             fields[field] = self._value(known[field])
         self._take("}")
-        return Node(type, name, fields, line)
+        node = Node(type, name, fields, line)
+        if name:
+            self._names[name] = node
+        return node
+
+    def _used(self) -> Node:
+        name = self._word("a DEF name")
+        node = self._names.get(name)
+        if node is None:
+            self._fail(f"no node above is called {name}")
+        return node
 
     def _value(self, type: str) -> Any:
         if type in self._types:
-            node = self._node(self._word("a node"))
+            word = self._word("a node")
+            node = self._used() if word == "USE" else self._node(word)
             if node.type != type:
                 self._fail(f"a {node.type} stands where a {type} belongs")
             return node

@@ -7,8 +7,8 @@ has drawn.
 
 X_ITE's own TextureQuality, MEDIUM, picks single texels of a pyramid's levels, which sparkle; the
 page asks for HIGH, which blends them as view3dscene does. X_ITE makes a texture of its own for
-every ImageTexture node, one per shape: the sample museum's 419 take 2.3 GB at 1024². Twins of
-``--fallback-size 256`` are for such browsers.
+every ImageTexture node, so each cell of the sample museum has its own, 179 in all: 1 GB at 1024².
+Twins of ``--fallback-size 256`` are for such browsers.
 """
 
 from __future__ import annotations
