@@ -12,8 +12,9 @@ class IngestOptions:
 
     Attributes
     ----------
-    unit: m, cm, mm, in, ft or the metres in one unit; None guesses from the size.
-    up: the model's up axis, "y" or "z"; None guesses from floor area and size.
+    unit: m, cm, mm, in, ft or the metres in one unit; if not given, it is guessed from the size.
+    up: the model's up axis, "y" or "z"; if not given, it is guessed from floor area and
+        size.
     strict: missing files, unknown materials, unreadable images and dropped faces are errors.
     allow_outside: the model may name files outside its own folder.
     limit: an image of the model whose texels would take more memory than this, MiB, is refused.
