@@ -87,7 +87,7 @@ class TextureStage:
     def __init__(self, run: Run, options: TextureOptions) -> None:
         self._run = run
         self._options = options
-        self._start = self._end = time.perf_counter()
+        self._seconds = 0.0
         self._digests = run.image_digests
         self._names = texture_files(self._digests)
         self._before = run.db.manifest.stages.get("textures")
@@ -131,13 +131,14 @@ class TextureStage:
         """
         if self._transaction is None:
             return
+        start = time.perf_counter()
         total = len(self._names)
         wanted = takewhile(lambda _: stop is None or not stop.is_set(), tuple(self._left))
         for files in self._staged(self._transaction, executor, wanted):
             self._run.progress(total - len(self._left), total, "textures")
             self._transaction.finish(self._task(self._left.popleft()), files)
         self._run.progress(total - len(self._left), total, "textures")
-        self._end = time.perf_counter()
+        self._seconds += time.perf_counter() - start
 
     def commit(self) -> None:
         """Makes what was encoded, all of it, part of the database."""
@@ -145,7 +146,7 @@ class TextureStage:
             outputs = self._transaction.pending()
             record = replace(self._work, outputs=outputs, counts=self._counted(self._transaction))
             self._transaction.commit({"textures": record})
-        self._run.report("textures", self._why, self._start, self._end, self._tasks)
+        self._run.report("textures", self._why, 0.0, self._seconds, self._tasks)
 
     def _files(self, name: str) -> list[str]:
         """The outputs of a texture, its `.ptm` first."""
