@@ -244,9 +244,13 @@ class _Extents:
         middle = self._middle @ plane[:3] + (plane[3] - tolerance.plane)
         half = self._half @ np.abs(plane[:3]) + tolerance.rounding
         found: NDArray[np.bool_] = middle > half
-        for i in np.flatnonzero(~found & (middle > -half)).tolist():
-            points = self._points[self._start[i] : self._start[i + 1]]
-            found[i] = np.any(points @ plane[:3] + plane[3] > tolerance.plane)
+        unsure = np.flatnonzero(~found & (middle > -half))
+        if len(unsure):
+            count = self._start[unsure + 1] - self._start[unsure]
+            first = np.cumsum(count) - count
+            row = np.repeat(self._start[unsure] - first, count) + np.arange(count.sum())
+            distance = self._points[row] @ plane[:3] + plane[3]
+            found[unsure] = np.maximum.reduceat(distance, first) > tolerance.plane
         return found
 
 
