@@ -18,7 +18,7 @@ import signal
 import tempfile
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -60,10 +60,13 @@ class Processes:
         Raises WorkerError PTM-W004 if a process ends.
         """
         pool = self._opened()
+
+        def submit(job: tuple[Any, ...]) -> Future[Outcome]:
+            with _ctrl_c_blocked():
+                return pool.submit(_outcome, *job)
+
         try:
-            yield from in_order(
-                lambda job: pool.submit(_outcome, *job), jobs, lambda: AHEAD * self.workers
-            )
+            yield from in_order(submit, jobs, lambda: AHEAD * self.workers)
         except BrokenProcessPool as fault:
             self.close()
             raise WorkerError(
@@ -74,12 +77,14 @@ class Processes:
             ) from fault
 
     def close(self) -> None:
-        """Ends the processes, whatever they are doing."""
-        if self._lifeline:
-            self._lifeline.close()
-        if self._pool:
-            self._pool.shutdown(cancel_futures=True)
-        self._pool = self._lifeline = None
+        """Ends the processes, whatever they are doing. Any thread may."""
+        with self._starting:
+            pool, lifeline = self._pool, self._lifeline
+            self._pool = self._lifeline = None
+        if lifeline:
+            lifeline.close()
+        if pool:
+            pool.shutdown(cancel_futures=True)
 
     def _opened(self) -> ProcessPoolExecutor:
         with self._starting:
@@ -206,6 +211,19 @@ def _outcome(place: _Place, function: Callable[[Any, Any], Any], tasks: list[Any
         _copy = None  # before the next one takes memory
         _copy = _Copy(place)
     return outcome(function, _copy.value(place.end), tasks)
+
+
+@contextmanager
+def _ctrl_c_blocked() -> Iterator[None]:
+    """A process that this thread starts hears of no Ctrl-C, not even while it is being started."""
+    if not hasattr(signal, "pthread_sigmask"):  # not POSIX
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin(lifeline: Connection) -> None:

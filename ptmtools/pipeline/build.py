@@ -229,10 +229,14 @@ class _Workers:
     def __enter__(self) -> _Workers:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def close(self) -> None:
+        """Ends what they are doing."""
         for executor in (self._opened, self._spare):
             if executor is not None:
                 executor.close()
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
 
 class _Beside:
@@ -279,8 +283,10 @@ class _Beside:
     def __enter__(self) -> _Beside:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._stop.set()
+        if kind is not None:
+            self._workers.close()  # whoever waits for a task of theirs waits no longer
         self._pool.shutdown()
 
 
