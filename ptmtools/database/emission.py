@@ -11,7 +11,7 @@ import numpy as np
 
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
-from ptmtools.database.gltf import GLTF_FOLDER, GLTF_HINTS, UP, glb_file, gltf_files
+from ptmtools.database.gltf import GLTF_FOLDER, GLTF_HINTS, UP, glb_file
 from ptmtools.database.hints import hints_text
 from ptmtools.database.model import EmitOptions, EmitReport, TextureRecord
 from ptmtools.database.names import CELL_FOLDER, HINTS, ROOT, cell_path
@@ -90,6 +90,8 @@ def emit(
             hints_text, scene.space, cells, pvs, ach, textures, images, viewpoints, options
         )
         if gltf:
+            from ptmtools.database.gltf import gltf_files
+
             fallback = options.fallback
             for name, glb in gltf_files(
                 scene, writer.geometry, count, textures, fallback, progress

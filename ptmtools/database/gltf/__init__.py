@@ -6,7 +6,23 @@ no extension is used. `gltf/hints.json` is written by `ptmtools.database.hints`.
 
 from __future__ import annotations
 
-from ptmtools.database.gltf.cell import gltf_files
-from ptmtools.database.gltf.names import GLTF_FOLDER, GLTF_HINTS, UP, glb_file
+from typing import TYPE_CHECKING
+
+from ptmtools.lazy import names
+
+if TYPE_CHECKING:
+    from ptmtools.database.gltf.cell import gltf_files
+    from ptmtools.database.gltf.names import GLTF_FOLDER, GLTF_HINTS, UP, glb_file
 
 __all__ = ["GLTF_FOLDER", "GLTF_HINTS", "UP", "glb_file", "gltf_files"]
+
+__getattr__ = names(
+    __name__,
+    {
+        "GLTF_FOLDER": "names",
+        "GLTF_HINTS": "names",
+        "UP": "names",
+        "glb_file": "names",
+        "gltf_files": "cell",
+    },
+)
