@@ -33,7 +33,7 @@ from ptmtools.cells.rejoin import rejoined
 from ptmtools.cells.reveals import Reveals
 from ptmtools.cells.structure import WallPlane, find_walls, structural_triangles
 from ptmtools.errors import InputError
-from ptmtools.executors import Executor, Serial
+from ptmtools.executors.aside import Begin, asked
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance
@@ -92,12 +92,12 @@ def subdivide(
     scene: Scene,
     options: SubdivideOptions | None = None,
     progress: Progress = silent,
-    executor: Executor | None = None,
+    begin: Begin[_Model, _Box, _Space] = asked,
 ) -> Cells:
     """Subdivide a scene into convex leaves, and those into cells.
 
-    ``executor`` subdivides the second root box beside the first; by default it is done afterwards,
-    if the model is open.
+    ``begin`` is how the second root box is subdivided: after the first, if the model proves to be
+    open; with `ptmtools.executors.Aside` beside the first, by another process.
 
     Raises
     ------
@@ -114,14 +114,16 @@ def subdivide(
     margin = BOX_MARGIN * tolerance.extent
     wide = _Box(np.array([low - margin, high + margin]), axes)
     tight = _Box(_thickened(*_bounds(corners if len(corners) else scene.corners), tolerance))
-    clipped = (executor or Serial()).later(_divide, model, tight)
-    space = _divide(model, wide, progress)
     notes: list[str] = []
-    if space.reach.closed:
+    clipped = begin(_divide, model, tight)
+    try:
+        space = _divide(model, wide, progress)
+        if not space.reach.closed:
+            roofed = roofed_share(corners, options.wall_area)
+            notes.append(_open_note(space, roofed, tight.bounds))
+            space = clipped.result()
+    finally:
         clipped.cancel()
-    else:
-        notes.append(_open_note(space, roofed_share(corners, options.wall_area), tight.bounds))
-        space = clipped.result()
     if space.tree.unsplit:
         notes.append(
             f"the limit of {options.max_cells:,} leaves was reached: {space.tree.unsplit:,} leaves "

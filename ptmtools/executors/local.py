@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, nullcontext
-from threading import Lock
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ptmtools.executors.model import AHEAD, Executor, Sharing
@@ -31,13 +30,12 @@ class Local(Executor):
 
     Without ``threads`` all is done by processes, for a caller beside whom another thread of this
     process keeps the interpreter's lock. A script that has processes started needs
-    ``if __name__ == "__main__"``. Two threads may share one of processes alone.
+    ``if __name__ == "__main__"``.
     """
 
     def __init__(self, workers: int = 0, *, threads: bool = True) -> None:
         self._workers = workers or processors()
         self._by_threads = threads
-        self._starting = Lock()
         self._threads: ThreadPoolExecutor | None = None
         self._processes: Processes | None = None
 
@@ -58,9 +56,8 @@ class Local(Executor):
             return nullcontext(_InThreads(shared, self._threads, self._workers))
         from ptmtools.executors.processes import Processes
 
-        with self._starting:
-            if self._processes is None:
-                self._processes = Processes(self._workers)
+        if self._processes is None:
+            self._processes = Processes(self._workers)
         return self._processes.sharing(shared)
 
     def close(self) -> None:
@@ -70,7 +67,6 @@ class Local(Executor):
             self._threads = None
         if self._processes:
             self._processes.close()
-            self._processes = None
 
 
 class _InThreads(SerialSharing[S]):

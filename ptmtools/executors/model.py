@@ -33,7 +33,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import Protocol, Self, TypeVar
@@ -75,8 +74,7 @@ class Sharing(Protocol[S_co]):
 
 
 class Executor(ABC):
-    """Does tasks, several at a time. Not to be used by two threads at once, but for what `later`
-    has under way."""
+    """Does tasks, several at a time. Not to be used by two threads at once."""
 
     @property
     @abstractmethod
@@ -109,15 +107,6 @@ class Executor(ABC):
         self, shared: S, *, releases_lock: bool = False
     ) -> AbstractContextManager[Sharing[S]]:
         """Sends ``shared`` to the workers, for several rounds of tasks, until the context ends."""
-
-    def later(self, function: Callable[[S, T], R], shared: S, task: T) -> Pending[R]:
-        """``function(shared, task)``, done beside what the caller does meanwhile, for a result that
-        may turn out not to be wanted; where nothing can be done beside it, once it is asked for.
-        """
-        thread = ThreadPoolExecutor(1, "later")
-        pending = thread.submit(lambda: next(iter(self.each(function, shared, [task]))))
-        thread.shutdown(wait=False)
-        return pending
 
     @abstractmethod
     def close(self) -> None:

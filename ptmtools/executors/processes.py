@@ -44,7 +44,8 @@ class Processes:
 
     def __init__(self, workers: int) -> None:
         self.workers = workers
-        self._starting = threading.Lock()
+        self._changing = threading.Lock()
+        self._closed = False
         self._pool: ProcessPoolExecutor | None = None
         self._lifeline: Connection | None = None
 
@@ -68,7 +69,7 @@ class Processes:
         try:
             yield from in_order(submit, jobs, lambda: AHEAD * self.workers)
         except BrokenProcessPool as fault:
-            self.close()
+            self._drop()
             raise WorkerError(
                 "PTM-W004",
                 "a worker process ended in the middle of its work",
@@ -77,17 +78,23 @@ class Processes:
             ) from fault
 
     def close(self) -> None:
-        """Ends the processes, whatever they are doing. Any thread may."""
-        with self._starting:
+        """Ends the processes, whatever they are doing; no more are started. Any thread may."""
+        self._drop(for_good=True)
+
+    def _drop(self, for_good: bool = False) -> None:
+        with self._changing:
             pool, lifeline = self._pool, self._lifeline
             self._pool = self._lifeline = None
+            self._closed |= for_good
         if lifeline:
             lifeline.close()
         if pool:
             pool.shutdown(cancel_futures=True)
 
     def _opened(self) -> ProcessPoolExecutor:
-        with self._starting:
+        with self._changing:
+            if self._closed:
+                raise RuntimeError("these processes have been closed")
             if self._pool is None:
                 context = get_context("spawn")
                 theirs, self._lifeline = context.Pipe(duplex=False)

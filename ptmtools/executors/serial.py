@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from ptmtools.executors.model import Executor, Pending, Sharing
+from ptmtools.executors.model import Executor, Sharing
 
 S = TypeVar("S")
 T = TypeVar("T")
 R = TypeVar("R")
-R_co = TypeVar("R_co", covariant=True)
 
 
 class Serial(Executor):
@@ -29,22 +27,8 @@ class Serial(Executor):
         """See `Executor.sharing`."""
         return nullcontext(SerialSharing(shared))
 
-    def later(self, function: Callable[[S, T], R], shared: S, task: T) -> Pending[R]:
-        """See `Executor.later`."""
-        return _Asked(lambda: function(shared, task))
-
     def close(self) -> None:
         """Nothing was started."""
-
-
-@dataclass(frozen=True)
-class _Asked(Generic[R_co]):
-    """See `Pending`: done when it is asked for."""
-
-    result: Callable[[], R_co]
-
-    def cancel(self) -> None:
-        pass
 
 
 class SerialSharing(Generic[S]):

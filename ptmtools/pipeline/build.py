@@ -11,16 +11,15 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Any
 
+from ptmtools.executors.aside import Aside, Begin, asked
 from ptmtools.executors.local import Local
 from ptmtools.executors.model import Executor
 from ptmtools.executors.opening import open_executor, processors
-from ptmtools.executors.serial import Serial
 from ptmtools.pipeline.changes import reasons
 from ptmtools.pipeline.emission import put_files
 from ptmtools.pipeline.manifest import StageRecord
@@ -76,9 +75,7 @@ def build_scene(
             _read_and_cut(
                 run, Path(model), options.ingest, options.subdivide, workers, textures.begin
             )
-            textures.check()
             _look(run, options.pvs, workers)
-            textures.check()
             _sample(run, options.ach, workers)
             textures.finish()
         put_files(run, options.emit)
@@ -105,7 +102,7 @@ def make_cells(
     ):
         run = Run(writer, progress)
         read, cut = ingest_options or options.ingest, subdivide_options or options.subdivide
-        _read_and_cut(run, Path(model), read, cut, local, lambda _: local.spare(0))
+        _read_and_cut(run, Path(model), read, cut, local, lambda _, large: local.aside(large))
         return _closing(run, start)
 
 
@@ -194,7 +191,6 @@ class _Workers:
     def __init__(self, workers: int, scheduler: str | None) -> None:
         self._asked = workers, scheduler
         self._opened: Executor | None = None
-        self._spare: Executor | None = None
 
     @property
     def here(self) -> int:
@@ -202,41 +198,43 @@ class _Workers:
         workers, scheduler = self._asked
         return processors() if scheduler else workers or processors()
 
+    @property
+    def one_spare(self) -> bool:
+        """Whether what is done `aside` and textures must take turns."""
+        return self._asked[1] is None and self.here == 2
+
     def executor(self) -> Executor:
         """The one of this thread."""
         if self._opened is None:
             self._opened = open_executor(*self._asked)
         return self._opened
 
-    @property
-    def several(self) -> bool:
-        """Whether textures can be encoded while this thread does something else."""
-        return self._asked[1] is not None or self.here > 1
+    def aside(
+        self, worthwhile: bool, ended: Callable[[], object] = lambda: None
+    ) -> Begin[Any, Any, Any]:
+        """How a task is begun beside this thread, if there is a worker for it; ``ended`` is called
+        when that is free again."""
+        if self.here == 1 or not worthwhile:
+            ended()
+            return asked
+        return lambda function, shared, task: Aside(function, shared, task, ended)
 
-    def spare(self, textures: int) -> Executor:
-        """For what can be done beside this thread while it keeps the interpreter's lock: processes
-        that two threads may use, so many as ``textures`` are worth. Serial if none is to spare."""
-        if self._spare is None:
-            count = min(self.here - 1, max(1, textures // WORTH_A_PROCESS))
-            self._spare = Local(count, threads=False) if count else Serial()
-        return self._spare
-
-    def another(self, textures: int) -> AbstractContextManager[Executor]:
-        """What encodes textures beside this thread."""
+    def beside(self, textures: int) -> Executor | None:
+        """Who encodes so many textures while this thread keeps the interpreter's lock, and `aside`
+        one worker: others, if it is worth while, to be closed after use."""
         workers, scheduler = self._asked
-        return open_executor(workers, scheduler) if scheduler else nullcontext(self.spare(textures))
+        if textures < WORTH_A_PROCESS or (self.here == 1 and not scheduler):
+            return None
+        if scheduler:
+            return open_executor(workers, scheduler)
+        return Local(min(max(1, self.here - 2), textures // WORTH_A_PROCESS), threads=False)
 
     def __enter__(self) -> _Workers:
         return self
 
-    def close(self) -> None:
-        """Ends what they are doing."""
-        for executor in (self._opened, self._spare):
-            if executor is not None:
-                executor.close()
-
     def __exit__(self, *_: object) -> None:
-        self.close()
+        if self._opened is not None:
+            self._opened.close()
 
 
 class _Beside:
@@ -247,46 +245,58 @@ class _Beside:
         self._options = options
         self._workers = workers
         self._stage: TextureStage | None = None
-        self._stop = Event()
+        self._stop, self._free = Event(), Event()
         self._pool = ThreadPoolExecutor(1, "textures")
+        self._executor: Executor | None = None
         self._task: Future[None] | None = None
+        self._progress = run.progress
 
-    def begin(self, cutting: bool) -> Executor:
-        """To be called when the scene's images are known, and whether cells are cut next; returns
-        what can be used beside the thread that cuts them."""
+    def begin(self, cutting: bool, large: bool) -> Begin[Any, Any, Any]:
+        """To be called when the scene's images are known, and whether cells are cut next, of a
+        ``large`` model; returns how a task is to be begun beside the thread that cuts them."""
         stage = self._stage = TextureStage(self._run, self._options)
         stage.begin()
-        spare = self._workers.spare(stage.left)
-        if cutting and self._workers.several and stage.left >= WORTH_A_PROCESS:
-            self._task = self._pool.submit(self._encode, stage)
-        return spare
+        self._executor = self._workers.beside(stage.left) if cutting else None
+        if self._executor:
+            self._task = self._pool.submit(self._encode, stage, self._executor)
+        if not self._workers.one_spare:
+            self._free.set()
+        return self._workers.aside(large, self._free.set)
 
-    def check(self) -> None:
-        """Raises what has gone wrong so far."""
+    def _watched(self, done: int, total: int, what: str) -> None:
+        """`Progress` that raises what has gone wrong so far."""
         if self._task is not None and self._task.done():
             self._task.result()
+        self._progress(done, total, what)
 
     def finish(self) -> None:
         """Encodes with all workers what is left, and commits."""
         assert self._stage is not None
         if self._task is not None:
-            self._stop.set()
+            self._end()
             self._task.result()
         if self._stage.left:
             self._stage.encode(self._workers.executor())
         self._stage.commit()
 
-    def _encode(self, stage: TextureStage) -> None:
-        with self._workers.another(stage.left) as executor:
+    def _encode(self, stage: TextureStage, executor: Executor) -> None:
+        self._free.wait()
+        with executor:
             stage.encode(executor, self._stop)
 
+    def _end(self) -> None:
+        self._stop.set()
+        self._free.set()
+
     def __enter__(self) -> _Beside:
+        self._run.progress = self._watched
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self._stop.set()
-        if kind is not None:
-            self._workers.close()  # whoever waits for a task of theirs waits no longer
+        self._run.progress = self._progress
+        self._end()
+        if kind is not None and self._executor:
+            self._executor.close()  # whoever waits for one of its tasks waits no longer
         self._pool.shutdown()
 
 
@@ -296,10 +306,11 @@ def _read_and_cut(
     ingest_options: IngestOptions,
     subdivide_options: SubdivideOptions,
     workers: _Workers,
-    read: Callable[[bool], Executor],
+    read: Callable[[bool, bool], Begin[Any, Any, Any]],
 ) -> None:
     """The scene and the cells: one transaction, unless the scene is what it was. ``read`` is called
-    in between, is told whether cells are to be cut, and gives what may be used for it besides."""
+    in between, told whether cells are to be cut and whether the model is large, and says how a task
+    is begun beside."""
     start = time.perf_counter()
     transaction = run.writer.begin("scene")
     scene, why_scene = put_scene(run, transaction, model, ingest_options, workers.here)
@@ -308,9 +319,9 @@ def _read_and_cut(
     inputs = {arrays_of("scene"): scene.outputs[arrays_of("scene")]}
     work = work_of("cells", subdivide_options, inputs)
     why_cells = reasons(run.db.manifest.stages.get("cells"), work, run.db)
-    spare = read(bool(why_cells))
+    begin = read(bool(why_cells), int(scene.counts["triangles"]) >= LARGE)
     if why_cells:
-        records["cells"] = _cut(run, transaction, work, subdivide_options, spare)
+        records["cells"] = _cut(run, transaction, work, subdivide_options, begin)
     if records:
         transaction.commit(records)
     run.report("scene", why_scene, start, middle)
@@ -322,12 +333,11 @@ def _cut(
     transaction: Transaction,
     work: StageRecord,
     options: SubdivideOptions,
-    spare: Executor,
+    begin: Begin[Any, Any, Any],
 ) -> StageRecord:
     from ptmtools.cells import subdivide
 
-    large = len(run.scene.triangles) >= LARGE
-    cells = subdivide(run.scene, options, run.progress, spare if large else None)
+    cells = subdivide(run.scene, options, run.progress, begin)
     run.hold("cells", cells)
     return replace(
         work,

@@ -8,7 +8,7 @@ from pathlib import Path
 from threading import Lock as Turn
 from types import TracebackType
 
-from ptmtools.errors import DatabaseError, OutputError, PtmError
+from ptmtools.errors import DatabaseError, InputError, LimitError, OutputError
 from ptmtools.files import writing
 from ptmtools.pipeline.folder import MANIFEST, DatabaseFolder, read_manifest
 from ptmtools.pipeline.lock import LOCK, Lock, acquire
@@ -88,11 +88,10 @@ class DatabaseWriter(DatabaseFolder):
         trace: TracebackType | None,
     ) -> None:
         begun = (self.path / MANIFEST).exists()
-        # A model that nothing was ever made of leaves nothing behind.
+        # A model of which nothing can be made leaves nothing behind.
+        hopeless = kind is not None and issubclass(kind, InputError | LimitError)
         with suppress(OSError):
-            discard(
-                self.path, also_finished=kind is None or (not begun and issubclass(kind, PtmError))
-            )
+            discard(self.path, also_finished=kind is None or (not begun and hopeless))
         self.digests.save()
         self._lock.release()
         if not begun:

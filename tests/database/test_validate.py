@@ -180,6 +180,14 @@ def rewritten(name: str, change: Callable[[bytes], bytes]) -> Damage:
     return damage
 
 
+def all_of(*damages: Damage) -> Damage:
+    def damage(db: Path) -> None:
+        for each in damages:
+            each(db)
+
+    return damage
+
+
 def removed(name: str) -> Damage:
     return lambda db: (db / "www" / name).unlink()
 
@@ -347,7 +355,14 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D661", put(C0, b"")),
     ("D661", replaced(C0, r"texture USE \w+", "texture USE nowhere")),
     ("D661", replaced(C0, r"texture USE \w+", "texture USE C0_floor")),
-    ("D661", replaced(C0, r"material Material \{", "material USE C0_texture {")),
+    ("D661", replaced(C0, r"coord Coordinate \{[^}]*\}", "coord USE C0_texture")),
+    (
+        "D661",
+        all_of(
+            replaced(C0, r"geometry IndexedFaceSet", "geometry DEF G IndexedFaceSet"),
+            appended(C0, b"Shape { geometry USE G }\n"),
+        ),
+    ),
     ("D661", rewritten(C0, lambda data: b"\xef\xbb\xbf" + data)),
     ("D661", rewritten(C0, lambda data: data.replace(b"\n", b"\r\n"))),
     ("D661", rewritten(C0, lambda data: data[: len(data) // 2])),

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from ptmtools.errors import InputError
-from ptmtools.executors import Serial
 from ptmtools.executors.model import AHEAD
 
 #: Whether the function may run in threads.
@@ -107,21 +106,3 @@ def test_copies_can_be_written_and_are_copies(executor):
 
 def test_functions_that_keep_the_lock_are_alone_in_their_process(executor, tmp_path):
     assert all(executor.each(tasks.alone, tmp_path, range(8)))
-
-
-def test_what_is_begun_for_later_may_be_asked_for_or_not(executor, tmp_path):
-    """A result, an exception, and what nobody asks for; other tasks do not wait for it."""
-    wanted = executor.later(tasks.slower_at_first, 0.02, 4)
-    refused = executor.later(tasks.refuse, 5, 5)
-    forgotten = executor.later(tasks.slower_at_first, 0.02, 8)
-    forgotten.cancel()
-    assert wanted.result() == 16
-    with pytest.raises(InputError, match="PTM-I999"):
-        refused.result()
-
-
-def test_serially_what_is_for_later_is_not_done_unless_asked_for(tmp_path):
-    pending = Serial().later(tasks.note_and_sleep, tmp_path, 0.0)
-    assert not list(tmp_path.iterdir())
-    pending.result()
-    assert list(tmp_path.iterdir())

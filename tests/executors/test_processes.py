@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -13,8 +14,9 @@ from pathlib import Path
 import executor_tasks as tasks
 import pytest
 
-from ptmtools.errors import OutputError, WorkerError
-from ptmtools.executors import Local, Serial, open_executor
+from ptmtools.errors import InputError, OutputError, WorkerError
+from ptmtools.executors import Aside, Local, Serial, open_executor
+from ptmtools.executors.aside import asked
 
 HERE = Path(__file__).parent / "tasks"
 
@@ -128,6 +130,37 @@ def test_without_threads_even_one_worker_is_another_process():
         found = set(one.each(tasks.process, None, range(3), releases_lock=True))
     assert len(found) == 1
     assert os.getpid() not in found
+
+
+def test_one_task_aside():
+    ended = threading.Event()
+    assert Aside(tasks.slower_at_first, 0.02, 4, ended.set).result() == 16
+    until(ended.is_set)
+    with pytest.raises(InputError, match="PTM-I999"):
+        Aside(tasks.refuse, 5, 5).result()
+    with pytest.raises(WorkerError, match="PTM-W004"):
+        Aside(tasks.die, 7, 7).result()
+
+
+@pytest.mark.parametrize("begun", [False, True])
+def test_an_unwanted_task_aside_is_ended(tmp_path, begun):
+    """In the middle, or before its process was even started."""
+    ended = threading.Event()
+    aside = Aside(tasks.note_and_sleep, tmp_path, 1e6, ended.set)
+    if begun:
+        until(lambda: any(tmp_path.iterdir()))
+    aside.cancel()
+    until(ended.is_set)
+    until(lambda: all(gone(int(file.name)) for file in tmp_path.iterdir()))
+    with pytest.raises((WorkerError, RuntimeError)):
+        aside.result()
+
+
+def test_what_is_only_asked_for_is_not_done_before(tmp_path):
+    pending = asked(tasks.note_and_sleep, tmp_path, 0.0)
+    assert not list(tmp_path.iterdir())
+    pending.result()
+    assert list(tmp_path.iterdir())
 
 
 def test_which_executor():

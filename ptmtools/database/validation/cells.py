@@ -67,12 +67,12 @@ def read_cell(document: Document, file: str, found: Findings) -> ReadCell | None
     if missing := [f for f in declared if f not in fields]:
         found.add("PTM-D663", file, f"line {nodes[0].line}", f"PTMCell lacks {missing[0]}")
         return None
-    textures: dict[tuple[str, ...], None] = {}
+    textures: dict[int, Node] = {}
     held = [fields["hullPoint"]]
     for shape in document.of_type("Shape"):
         texture, coord = _child(shape, "appearance", "texture"), _child(shape, "geometry", "coord")
         if texture is not None:
-            textures[texture.fields.get("url", ())] = None
+            textures[id(texture)] = texture
         if coord is not None and "point" in coord.fields:
             held.append(coord.fields["point"])
     points = np.concatenate(held) if any(map(len, held)) else np.zeros((1, 3))
@@ -86,7 +86,7 @@ def read_cell(document: Document, file: str, found: Findings) -> ReadCell | None
         leaves=tuple(np.split(fields["leafPoint"], fields["leafStart"][1:]))
         if "leafPoint" in fields
         else (),
-        textures=tuple(textures),
+        textures=tuple(dict.fromkeys(t.fields.get("url", ()) for t in textures.values())),
     )
 
 

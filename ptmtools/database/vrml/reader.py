@@ -54,6 +54,8 @@ NODES: dict[str, dict[str, str]] = {
     "TextureCoordinate": {"point": "MFVec2f"},
     "Color": {"color": "MFColor"},
 }
+#: Nodes that may stand for themselves again: what they hold does not grow with the file.
+USED = ("ImageTexture",)
 #: Numbers in one value of a numeric type.
 _WIDTH = {"Float": 1, "Int32": 1, "Vec2f": 2, "Vec3f": 3, "Color": 3, "Rotation": 4}
 _PLAIN = {"SFBool", "SFString", "MFString", *(n + t for n in ("SF", "MF") for t in _WIDTH)}
@@ -202,7 +204,7 @@ class _Reader:
     def _value(self, type: str) -> Any:
         if type in self._types:
             word = self._word("a node")
-            node = self._used() if word == "USE" else self._node(word)
+            node = self._used() if word == "USE" and type in USED else self._node(word)
             if node.type != type:
                 self._fail(f"a {node.type} stands where a {type} belongs")
             return node
