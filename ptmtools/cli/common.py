@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from functools import wraps
 from typing import Any
@@ -11,6 +12,8 @@ import click
 from ptmtools.cli.output import Voice
 
 Command = Callable[..., Any]
+
+_ADDRESS = re.compile(r"\w+://.+:\d+")
 
 
 def voiced(function: Command) -> Command:
@@ -59,9 +62,16 @@ def many_machines(function: Command) -> Command:
     return click.option(
         "--scheduler",
         metavar="ADDRESS",
+        callback=_address,
         help="Have the tasks done by the cluster of this Dask scheduler, such as "
         "tcp://10.0.0.1:8786; -j then says how many at a time, 0 as many as it has threads.",
     )(workers(function))
+
+
+def _address(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
+    if value is not None and not _ADDRESS.fullmatch(value):
+        raise click.BadParameter(f"{value!r} is no address such as tcp://10.0.0.1:8786")
+    return value
 
 
 def limited(function: Command) -> Command:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+import warnings
 from collections.abc import Sequence
 
 import click
@@ -88,6 +89,7 @@ def ptm(ctx: click.Context, quiet: bool, verbose: bool) -> None:
 def main(arguments: Sequence[str]) -> int:
     """Runs one command; returns its exit status. Never raises."""
     voice = Voice()
+    warnings.filterwarnings("ignore", module=r"PIL\.")  # whatever matters becomes an error of ours
     try:
         status = ptm.main(list(arguments), "ptm", standalone_mode=False, obj=voice)
         sys.stdout.flush()

@@ -37,6 +37,7 @@ from ptmtools.pipeline.build import (
     make_pvs,
     make_textures,
 )
+from ptmtools.pipeline.changes import NEVER_RUN
 from ptmtools.pipeline.options import BuildOptions, TextureOptions
 from ptmtools.pipeline.report import BuildReport, StageReport
 from ptmtools.scene.options import IngestOptions
@@ -236,7 +237,7 @@ def _tell(voice: Voice, report: BuildReport, as_json: bool) -> None:
         voice.say(
             f"{stage.stage:<9}{done:>10}   {figures(stage.stage, stage.counts)}{_tasks(stage)}"
         )
-        if voice.verbose:
+        if voice.verbose or stage.reasons != NEVER_RUN:
             for reason in stage.reasons:
                 voice.say(f"{'':<22}because {reason}")
     memory = f", at most {size(report.peak_memory)} of memory" if report.peak_memory else ""

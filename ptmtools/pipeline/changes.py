@@ -10,12 +10,14 @@ from ptmtools.pipeline.manifest import StageRecord
 
 #: Files that are named one by one.
 _NAMED = 3
+#: Why a stage is run for the first time.
+NEVER_RUN = ("has not been run",)
 
 
 def reasons(before: StageRecord | None, work: StageRecord, db: DatabaseFolder) -> tuple[str, ...]:
     """What makes a stage with this record do ``work``; empty if it is current."""
     if before is None:
-        return ("has not been run",)
+        return NEVER_RUN
     found = []
     if before.recipe != work.recipe:
         found.append(f"ptmtools does it in another way since (recipe {before.recipe})")

@@ -39,7 +39,8 @@ def validate(
     DatabaseError: PTM-D001 no database there; PTM-D003 schema of another version.
     InputError: PTM-I602 the file cannot be read.
     """
-    if not Path(target).is_dir():
+    file = Path(target)
+    if not file.is_dir() and (file.exists() or file.suffix == ".ptm"):
         return validate_ptm(target, limits=limits)
     db = None
     try:
