@@ -4,7 +4,7 @@ tasks       CPU seconds of each task: encoding an image of the sample museum (or
             the portal searches and hints of a museum of ``--rooms``, and of what one process does
             alone. Also the portal searches of a Quake map, ``--map``.
 collection  What one texture more costs the process that builds, whoever encodes it: reading,
-            checking, hashing, writing, the manifest, the emitted files; the textures also with a
+            decoding, hashing, writing, the manifest, the emitted files; the textures also with a
             cluster that sees the disk, so that only names travel. From rooms with ``--pictures`` of
             4 × 4 texels and with four times as many.
 overhead    What a task without work, a megabyte there or back, and a round of tasks take on a Dask
@@ -76,7 +76,7 @@ WORKERS = (1, 2, 4, 8, 16, 32, 64, 128, 256)
 TEXTURES = (10**3, 10**4, 10**5, 10**6)
 #: Tasks under way at a time.
 UNDER_WAY = (4, 32, 256)
-#: Processors of the machine that builds, which checks the images with all of them.
+#: Processors of the machine that builds, which decodes the images with all of them.
 PROCESSORS = 16
 
 
@@ -152,7 +152,7 @@ def tasks(given: argparse.Namespace) -> dict[str, Any]:
         stages[f"pvs {given.map.stem}"] = _stage(recorder, all_)
 
     head("Tasks, CPU seconds", ("task", "number", "sum", "median", "most"))
-    for name in ("encode", "check"):
+    for name in ("encode", "decode"):
         _row_of(f"{name} an image of the museum", [image[name] for image in images])
     for name, stage in stages.items():
         _row_of(f"{name}: tasks", list(chain(*stage["rounds"])))
@@ -200,9 +200,9 @@ def _row_of(name: str, took: list[float]) -> None:
 
 def _image(name: str, source: bytes) -> dict[str, float]:
     made, encoding = cpu(lambda: encoded_image(TextureOptions(), (name, source)))
-    _, checking = cpu(lambda: read_image(source))
+    _, decoding = cpu(lambda: read_image(source))
     sent, received = len(source), sum(map(len, made))
-    return {"encode": encoding, "check": checking, "sent": sent, "received": received}
+    return {"encode": encoding, "decode": decoding, "sent": sent, "received": received}
 
 
 # collection
@@ -461,11 +461,11 @@ def simulate_textures(known: dict[str, Any], gigabits: float) -> None:
     message = known["overhead"]["task"][str(UNDER_WAY[-1])]
     travelling = known["overhead"]["megabyte"] / 1e6 + 8e-9 / gigabits
     drawn = np.random.default_rng(0).integers(0, len(images), max(TEXTURES))
-    encode, check, out, back = (
+    encode, decode, out, back = (
         np.array([image[name] for image in images])[drawn]
-        for name in ("encode", "check", "sent", "received")
+        for name in ("encode", "decode", "sent", "received")
     )
-    before = each["scene and cells"][0] + out.mean() * handling + check.mean() / PROCESSORS
+    before = each["scene and cells"][0] + out.mean() * handling + decode.mean() / PROCESSORS
     after = each["emit"][0] + each["pvs and ach"][0]
     by_name = np.full(len(drawn), each["textures, by name"][0] / 2)
     kept = back * handling + each["textures"][0]
@@ -475,7 +475,7 @@ def simulate_textures(known: dict[str, Any], gigabits: float) -> None:
         "encoding, by a worker": encode.mean(),
         "through the process that builds": float(np.mean(sending + receiving)),
         "by name": 2 * by_name.mean(),
-        "reading and checking first": before,
+        "reading and decoding first": before,
         "all other stages": after,
     }.items():
         row(name, f"{1e3 * seconds:.1f}")
