@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -47,21 +48,27 @@ def in_session(leader: int) -> list[int]:
     return found
 
 
-def interrupted(museum: Path, db: Path, begun: Callable[[subprocess.Popen[str]], bool]) -> str:
-    """What a build has told when it was interrupted, as a terminal does it, at a moment."""
+Build = subprocess.Popen[str]
+
+
+def disturbed(
+    museum: Path, db: Path, moment: Callable[[Build], bool], deed: Callable[[Build], object]
+) -> tuple[int, str]:
+    """The status of a build to which something is done at a moment, and what it has told."""
     command = [*PTM, "build-scene", museum, "-o", db, "-j", "2", "-q"]
     with subprocess.Popen(
         command, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as build:
-        until(lambda: begun(build))
-        os.killpg(build.pid, signal.SIGINT)
+        until(lambda: moment(build))
+        deed(build)
         _, told = build.communicate()
-    assert build.returncode == 130
     until(lambda: not in_session(build.pid))
-    return told
+    return build.returncode, told
 
 
-@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="another system")
+pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="another system")
+
+
 def test_all_end_at_once_and_only_the_parent_speaks(tmp_path: Path, museum: Path) -> None:
     db = tmp_path / "db"
     staged = db / ".ptm-new/textures"
@@ -69,9 +76,34 @@ def test_all_end_at_once_and_only_the_parent_speaks(tmp_path: Path, museum: Path
         lambda build: len(in_session(build.pid)) > 1,  # one is being started
         lambda _: any(staged.rglob("*.ptm")),
     ):
-        told = interrupted(museum, db, begun)
+        status, told = disturbed(
+            museum, db, begun, lambda build: os.killpg(build.pid, signal.SIGINT)
+        )
+        assert status == 130
         assert told == "ptm: interrupted; run the same command again to resume [PTM-X130]\n"
     again = [*PTM, "build-scene", museum, "-q", "-o"]
     subprocess.run([*again, db, "-j", "2"], check=True)
     subprocess.run([*again, tmp_path / "whole", "-j", "1"], check=True)
     assert listing(db) == listing(tmp_path / "whole")
+
+
+def test_a_lost_worker_ends_the_build_and_leaves_what_is_finished(
+    tmp_path: Path, museum: Path
+) -> None:
+    db = tmp_path / "db"
+    staged = db / ".ptm-new/textures"
+
+    def kill_the_workers(build: Build) -> None:
+        for process in in_session(build.pid):
+            if b"spawn_main" in Path(f"/proc/{process}/cmdline").read_bytes():
+                os.kill(process, signal.SIGKILL)
+
+    status, told = disturbed(museum, db, lambda _: any(staged.rglob("*.ptm")), kill_the_workers)
+    assert (status, told.count("\n")) == (9, 1), told
+    assert "PTM-W004" in told
+    again = [*PTM, "build-scene", museum, "-o", db, "--json"]
+    done = subprocess.run(again, check=True, stdout=subprocess.PIPE)
+    (textures,) = (s for s in json.loads(done.stdout)["stages"] if s["stage"] == "textures")
+    _, kept, resumed = textures["tasks"]
+    assert kept == 0
+    assert resumed > 0
