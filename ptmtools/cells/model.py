@@ -200,20 +200,31 @@ class Cells:
         triangle = stored.indices("triangle", np.int32, None, 3, high=len(vertex))
         n = len(triangle)
         cells = int(leaf_cell.max()) + 1 if leaves else 0
+        leaf_point_start = stored.starts("leaf_point_start", leaves, len(leaf_point))
+        leaf_face_start = stored.starts("leaf_face_start", leaves, len(face_start) - 1)
+        portal_start = stored.starts("portal_start", portals, len(portal_point))
+        for what, start, least in (
+            ("face", face_start, 3),
+            ("leaf", leaf_point_start, 4),
+            ("leaf", leaf_face_start, 4),
+            ("portal", portal_start, 3),
+        ):
+            if (np.diff(start) < least).any():
+                raise ValueError(f"a {what} is flat")
         return Cells(
             node_plane=node_plane,
             node_child=node_child,
             root_box=stored.array("root_box", np.float64, 2, 3, finite=True),
             leaf_cell=leaf_cell,
             leaf_point=leaf_point,
-            leaf_point_start=stored.starts("leaf_point_start", leaves, len(leaf_point)),
+            leaf_point_start=leaf_point_start,
             face_index=face_index,
             face_start=face_start,
-            leaf_face_start=stored.starts("leaf_face_start", leaves, len(face_start) - 1),
+            leaf_face_start=leaf_face_start,
             portal_leaf=portal_leaf,
             portal_plane=stored.array("portal_plane", np.float64, portals, 4, finite=True),
             portal_point=portal_point,
-            portal_start=stored.starts("portal_start", portals, len(portal_point)),
+            portal_start=portal_start,
             portal_area=stored.array("portal_area", np.float64, portals, finite=True),
             vertex=vertex,
             vertex_uv=stored.array("vertex_uv", np.float64, len(vertex), 2, finite=True),

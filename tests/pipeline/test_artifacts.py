@@ -102,6 +102,16 @@ def fallen(name: str) -> Change:
     return change
 
 
+def starting(name: str, row: int, at: int) -> Change:
+    """A row that begins elsewhere."""
+
+    def change(arrays: Arrays) -> None:
+        arrays[name] = arrays[name].copy()
+        arrays[name][row] = at
+
+    return change
+
+
 def raw(data: bytes) -> Change:
     return lambda arrays: arrays.update(about=np.frombuffer(data, np.uint8))
 
@@ -150,6 +160,10 @@ CHANGES: dict[str, list[Change]] = {
         about(lambda d: d.update(materials=None)),
     ],
     "cells": [
+        *(
+            starting(name, 1, 1)
+            for name in ("face_start", "leaf_face_start", "leaf_point_start", "portal_start")
+        ),
         first("leaf_cell", 99),
         first("leaf_cell", -2),
         first("face_index", 10**6),
