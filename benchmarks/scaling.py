@@ -56,12 +56,14 @@ from ptmtools.executors.serial import SerialSharing
 from ptmtools.files import write_bytes
 from ptmtools.pipeline import (
     TextureOptions,
-    build,
     make_ach,
     make_cells,
     make_files,
     make_pvs,
     make_textures,
+)
+from ptmtools.pipeline import (
+    workers as workers_of,
 )
 from ptmtools.pipeline.textures import encoded_image
 from ptmtools.scene import ingest
@@ -238,7 +240,7 @@ def collection(given: argparse.Namespace) -> dict[str, Any]:
 def _at_a_desk(model: Path, db: Path, address: str) -> dict[str, tuple[float, float]]:
     """CPU and wall seconds of the textures, where workers see the disk; the scheduler's included,
     which runs in this process."""
-    build.open_executor = open_executor
+    workers_of.open_executor = open_executor
     make_cells(model, db, workers=1)
     start = time.perf_counter()
     _, took = cpu(lambda: make_textures(db, scheduler=address))
@@ -248,7 +250,7 @@ def _at_a_desk(model: Path, db: Path, address: str) -> dict[str, tuple[float, fl
 def _stages(model: Path, db: Path) -> dict[str, tuple[float, float]]:
     """CPU and wall seconds of each stage without its tasks."""
     recorder = Recorder()
-    build.open_executor = lambda *_: recorder  # type: ignore[assignment]
+    workers_of.open_executor = lambda *_: recorder  # type: ignore[assignment]
     hints = AchOptions(samples=1, backend="embree")
     found = {}
     for name, stage in {

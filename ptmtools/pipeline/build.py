@@ -10,16 +10,12 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from threading import Event
 from typing import TYPE_CHECKING, Any
 
-from ptmtools.executors.aside import Aside, Begin, asked
-from ptmtools.executors.local import Local
-from ptmtools.executors.model import Executor
-from ptmtools.executors.opening import open_executor, processors
+from ptmtools.executors.aside import Begin
+from ptmtools.pipeline.beside import TexturesBeside
 from ptmtools.pipeline.changes import reasons
 from ptmtools.pipeline.emission import put_files
 from ptmtools.pipeline.manifest import StageRecord
@@ -30,6 +26,7 @@ from ptmtools.pipeline.scenes import put_scene
 from ptmtools.pipeline.stages import arrays_of
 from ptmtools.pipeline.textures import TextureStage
 from ptmtools.pipeline.transaction import Transaction
+from ptmtools.pipeline.workers import Workers
 from ptmtools.pipeline.writer import DatabaseWriter
 from ptmtools.progress import Progress, silent
 from ptmtools.texture.options import check_options
@@ -46,8 +43,6 @@ PathLike = str | os.PathLike[str]
 
 #: Above this share of cells visible on average, culling by cells does not pay.
 CULLING_GAINS_LITTLE = 0.7
-#: So many textures are worth starting a process, which takes a second.
-WORTH_A_PROCESS = 8
 #: So many triangles take as long to subdivide as two processes to start.
 LARGE = 4000
 
@@ -68,10 +63,10 @@ def build_scene(
     check_options(options.textures)
     with (
         DatabaseWriter.open_for_model(db, Path(model).name, force=options.force) as writer,
-        _Workers(options.workers, options.scheduler) as workers,
+        Workers(options.workers, options.scheduler) as workers,
     ):
         run = Run(writer, progress)
-        with _Beside(run, options.textures, workers) as textures:
+        with TexturesBeside(run, options.textures, workers) as textures:
             _read_and_cut(
                 run, Path(model), options.ingest, options.subdivide, workers, textures.begin
             )
@@ -98,7 +93,7 @@ def make_cells(
     options = BuildOptions()
     with (
         DatabaseWriter.open_for_model(db, Path(model).name, force=force) as writer,
-        _Workers(workers, None) as local,
+        Workers(workers, None) as local,
     ):
         run = Run(writer, progress)
         read, cut = ingest_options or options.ingest, subdivide_options or options.subdivide
@@ -142,7 +137,7 @@ def make_textures(
     """Runs the textures stage of a database; ``workers`` and ``scheduler`` as in
     `BuildOptions`."""
 
-    def encode(run: Run, workers: _Workers) -> None:
+    def encode(run: Run, workers: Workers) -> None:
         stage = TextureStage(run, options or TextureOptions())
         stage.begin()
         if stage.left:
@@ -165,10 +160,10 @@ def _one_stage(
     workers: int,
     scheduler: str | None,
     progress: Progress,
-    stage: Callable[[Run, _Workers], None],
+    stage: Callable[[Run, Workers], None],
 ) -> BuildReport:
     start = time.perf_counter()
-    with DatabaseWriter.open_for_stage(db) as writer, _Workers(workers, scheduler) as used:
+    with DatabaseWriter.open_for_stage(db) as writer, Workers(workers, scheduler) as used:
         run = Run(writer, progress)
         stage(run, used)
         return _closing(run, start)
@@ -185,127 +180,12 @@ def _closing(run: Run, start: float) -> BuildReport:
     )
 
 
-class _Workers:
-    """Executors as the user wants them, opened when there is first something to do."""
-
-    def __init__(self, workers: int, scheduler: str | None) -> None:
-        self._asked = workers, scheduler
-        self._opened: Executor | None = None
-
-    @property
-    def here(self) -> int:
-        """How many threads of this machine may be used."""
-        workers, scheduler = self._asked
-        return processors() if scheduler else workers or processors()
-
-    @property
-    def one_spare(self) -> bool:
-        """Whether what is done `aside` and textures must take turns."""
-        return self._asked[1] is None and self.here == 2
-
-    def executor(self) -> Executor:
-        """The one of this thread."""
-        if self._opened is None:
-            self._opened = open_executor(*self._asked)
-        return self._opened
-
-    def aside(
-        self, worthwhile: bool, ended: Callable[[], object] = lambda: None
-    ) -> Begin[Any, Any, Any]:
-        """How a task is begun beside this thread, if there is a worker for it; ``ended`` is called
-        when that is free again."""
-        if self.here == 1 or not worthwhile:
-            ended()
-            return asked
-        return lambda function, shared, task: Aside(function, shared, task, ended)
-
-    def beside(self, textures: int) -> Executor | None:
-        """Who encodes so many textures while this thread keeps the interpreter's lock, and `aside`
-        one worker: others, if it is worth while, to be closed after use."""
-        workers, scheduler = self._asked
-        if textures < WORTH_A_PROCESS or (self.here == 1 and not scheduler):
-            return None
-        if scheduler:
-            return open_executor(workers, scheduler)
-        return Local(min(max(1, self.here - 2), textures // WORTH_A_PROCESS), threads=False)
-
-    def __enter__(self) -> _Workers:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._opened is not None:
-            self._opened.close()
-
-
-class _Beside:
-    """The textures stage, done by another thread while this one runs other stages."""
-
-    def __init__(self, run: Run, options: TextureOptions, workers: _Workers) -> None:
-        self._run = run
-        self._options = options
-        self._workers = workers
-        self._stage: TextureStage | None = None
-        self._stop, self._free = Event(), Event()
-        self._pool = ThreadPoolExecutor(1, "textures")
-        self._executor: Executor | None = None
-        self._task: Future[None] | None = None
-        self._progress = run.progress
-
-    def begin(self, cutting: bool, large: bool) -> Begin[Any, Any, Any]:
-        """To be called when the scene's images are known, and whether cells are cut next, of a
-        ``large`` model; returns how a task is to be begun beside the thread that cuts them."""
-        stage = self._stage = TextureStage(self._run, self._options)
-        stage.begin()
-        self._executor = self._workers.beside(stage.left) if cutting else None
-        if self._executor:
-            self._task = self._pool.submit(self._encode, stage, self._executor)
-        if not self._workers.one_spare:
-            self._free.set()
-        return self._workers.aside(large, self._free.set)
-
-    def _watched(self, done: int, total: int, what: str) -> None:
-        """`Progress` that raises what has gone wrong so far."""
-        if self._task is not None and self._task.done():
-            self._task.result()
-        self._progress(done, total, what)
-
-    def finish(self) -> None:
-        """Encodes with all workers what is left, and commits."""
-        assert self._stage is not None
-        if self._task is not None:
-            self._end()
-            self._task.result()
-        if self._stage.left:
-            self._stage.encode(self._workers.executor())
-        self._stage.commit()
-
-    def _encode(self, stage: TextureStage, executor: Executor) -> None:
-        self._free.wait()
-        with executor:
-            stage.encode(executor, self._stop)
-
-    def _end(self) -> None:
-        self._stop.set()
-        self._free.set()
-
-    def __enter__(self) -> _Beside:
-        self._run.progress = self._watched
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self._run.progress = self._progress
-        self._end()
-        if kind is not None and self._executor:
-            self._executor.close()  # whoever waits for one of its tasks waits no longer
-        self._pool.shutdown()
-
-
 def _read_and_cut(
     run: Run,
     model: Path,
     ingest_options: IngestOptions,
     subdivide_options: SubdivideOptions,
-    workers: _Workers,
+    workers: Workers,
     read: Callable[[bool, bool], Begin[Any, Any, Any]],
 ) -> None:
     """The scene and the cells: one transaction, unless the scene is what it was. ``read`` is called
@@ -353,7 +233,7 @@ def _cut(
     )
 
 
-def _look(run: Run, options: PvsOptions, workers: _Workers) -> None:
+def _look(run: Run, options: PvsOptions, workers: Workers) -> None:
     def compute(transaction: Transaction) -> tuple[Mapping[str, Any], tuple[str, ...]]:
         from ptmtools.visibility import compute_pvs
 
@@ -392,7 +272,7 @@ def _look(run: Run, options: PvsOptions, workers: _Workers) -> None:
     run.stage("pvs", options, compute)
 
 
-def _sample(run: Run, options: AchOptions, workers: _Workers) -> None:
+def _sample(run: Run, options: AchOptions, workers: Workers) -> None:
     def compute(transaction: Transaction) -> tuple[Mapping[str, Any], tuple[str, ...]]:
         import numpy as np
 

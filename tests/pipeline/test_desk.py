@@ -10,7 +10,7 @@ import pytest
 
 from ptmtools.errors import OutputError, WorkerError
 from ptmtools.executors import Serial
-from ptmtools.pipeline import BuildOptions, TextureOptions, build, build_scene
+from ptmtools.pipeline import BuildOptions, TextureOptions, build_scene, workers
 from ptmtools.pipeline.desk import Picture, _sees, desk_of, encoded_there
 from ptmtools.pipeline.folder import sha256
 from ptmtools.pipeline.writer import DatabaseWriter
@@ -45,7 +45,7 @@ class Blind(Remote):
 
 
 def built(folder: Path, monkeypatch: pytest.MonkeyPatch, executor: Serial) -> dict[str, bytes]:
-    monkeypatch.setattr(build, "open_executor", lambda *_: executor)
+    monkeypatch.setattr(workers, "open_executor", lambda *_: executor)
     build_scene(TWO_ROOMS / "two_rooms.obj", folder, BuildOptions(scheduler="somewhere"))
     return {
         file.relative_to(folder).as_posix(): file.read_bytes()

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image, PngImagePlugin
 
 from ptmtools.executors import Serial
-from ptmtools.pipeline import TextureOptions, build, make_cells
+from ptmtools.pipeline import BuildOptions, TextureOptions, build_scene, make_cells, workers
 from ptmtools.pipeline.run import Run
 from ptmtools.pipeline.textures import TextureStage, bare_png, texture_names
 from ptmtools.pipeline.writer import DatabaseWriter
@@ -66,10 +66,10 @@ def test_what_is_left_when_it_is_stopped_is_done_later(tmp_path: Path) -> None:
 def test_many_textures_are_encoded_beside_the_cells(tmp_path, monkeypatch) -> None:
     """The same bytes from one worker, from workers beside, and where some are left for later."""
     found = {}
-    for workers, least in ((1, 8), (2, 1), (2, 10**9)):
-        monkeypatch.setattr(build, "WORTH_A_PROCESS", least)
-        db = tmp_path / f"{workers} {least}"
-        build.build_scene(TWO_ROOMS, db, build.BuildOptions(workers=workers))
+    for count, least in ((1, 8), (2, 1), (2, 10**9)):
+        monkeypatch.setattr(workers, "WORTH_A_PROCESS", least)
+        db = tmp_path / f"{count} {least}"
+        build_scene(TWO_ROOMS, db, BuildOptions(workers=count))
         found[db] = {f.relative_to(db): f.read_bytes() for f in db.rglob("*") if f.is_file()}
     one, *others = found.values()
     assert all(other == one for other in others)
