@@ -57,7 +57,12 @@ def disturbed(
     """The status of a build to which something is done at a moment, and what it has told."""
     command = [*PTM, "build-scene", museum, "-o", db, "-j", "2", "-q"]
     with subprocess.Popen(
-        command, stderr=subprocess.PIPE, text=True, start_new_session=True
+        command,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # What is started in the background may have been told to ignore Ctrl-C.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as build:
         until(lambda: moment(build))
         deed(build)

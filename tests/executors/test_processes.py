@@ -51,6 +51,8 @@ def started(
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        # What is started in the background may have been told to ignore Ctrl-C.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
 
 

@@ -223,5 +223,8 @@ def test_the_attacks_fail_for_what_is_wrong_with_them() -> None:
     assert list(unpack_arrays(member("a.npy", GOOD), file="x.npz")) == ["a"]
     assert list(unpack_arrays(patched(16, b""), file="x.npz")) == ["a", "b"]
     assert len(unpack_arrays(overlapping(1), file="x.npz")) == 1
-    with np.load(io.BytesIO(overlapping())) as archive:
+    with (
+        suppress(zipfile.BadZipFile),  # some Pythons refuse it themselves
+        np.load(io.BytesIO(overlapping())) as archive,
+    ):
         assert sum(archive[name].nbytes for name in archive.files) > 10 * len(overlapping())
