@@ -5,9 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from ptmtools.executors.model import Pending
+from ptmtools.executors.outcome import outcome
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+    from multiprocessing.process import BaseProcess
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -29,8 +34,9 @@ class Aside(Generic[R]):
     """See `Pending`: ``function(shared, task)`` in a process of its own, which ends with it.
 
     ``ended`` is called then, by another thread. Whoever begins one must ask for its result or
-    cancel it. As for those of an executor, what travels must be picklable, and a script needs ``if
-    __name__ == "__main__"``.
+    cancel it. What travels must be picklable, and a script needs ``if __name__ == "__main__"``.
+
+    Not a pool of one: that waits for ever for what is left of a result whose sender was ended.
     """
 
     def __init__(
@@ -40,12 +46,11 @@ class Aside(Generic[R]):
         task: T,
         ended: Callable[[], object] = lambda: None,
     ) -> None:
-        from ptmtools.executors.processes import Processes
-
-        self._processes = Processes(1)
         self._ended = ended
+        self._process: BaseProcess | None = None
+        self._cancelled = False
         waiting = ThreadPoolExecutor(1, "aside")
-        self._done = waiting.submit(self._do, function, shared, task)
+        self._done = waiting.submit(self._wait, function, shared, task)
         waiting.shutdown(wait=False)
 
     def result(self) -> R:
@@ -54,15 +59,49 @@ class Aside(Generic[R]):
 
     def cancel(self) -> None:
         """Ends the process, in the middle of the task if need be."""
-        self._processes.close()
+        self._cancelled = True
+        if self._process:
+            self._process.kill()
 
-    def _do(self, function: Callable[[S, T], R], shared: S, task: T) -> R:
+    def _wait(self, function: Callable[[S, T], R], shared: S, task: T) -> R:
+        from multiprocessing import get_context, resource_tracker
+
+        from ptmtools.executors.processes import ctrl_c_blocked, lost
+
+        context = get_context("spawn")
+        ours, theirs = context.Pipe()
+        follows, lifeline = context.Pipe(duplex=False)
+        process = context.Process(target=_do, args=(follows, theirs), daemon=True)
+        resource_tracker.ensure_running()  # which lets Ctrl-C through again when it starts
         try:
-            with self._processes.sharing(shared) as sharing:
-                return next(iter(sharing.each(function, [task])))
+            with ours, lifeline:
+                with follows, theirs, ctrl_c_blocked():
+                    process.start()
+                self._process = process
+                if self._cancelled:
+                    process.kill()
+                try:
+                    ours.send((function, shared, task))
+                    (result,) = ours.recv()
+                except (EOFError, OSError) as fault:
+                    raise lost() from fault
+                finally:
+                    process.kill()
+                    process.join()
+            found: R = result
+            return found
         finally:
-            self._processes.close()
             self._ended()
+
+
+def _do(lifeline: Connection, parent: Connection) -> None:
+    """In the process: the task comes, and its result goes, through a pipe of which the parent
+    holds one end alone, so that neither waits for one who has ended."""
+    from ptmtools.executors.processes import begin
+
+    begin(lifeline)
+    function, shared, task = parent.recv()
+    parent.send(outcome(function, shared, [task]))
 
 
 #: How `Aside` and `Asked` are begun: ``begin(function, shared, task)``.

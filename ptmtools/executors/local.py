@@ -44,6 +44,12 @@ class Local(Executor):
         """How many threads, or processes."""
         return self._workers
 
+    @property
+    def remote(self) -> bool:
+        """See `Executor.remote`. What is on the disk need not go through a pipe: in Python 3.11.2
+        a pool whose worker ends waits for ever to be rid of a task that is too long for one."""
+        return not self._by_threads
+
     def sharing(
         self, shared: S, *, releases_lock: bool = False
     ) -> AbstractContextManager[Sharing[S]]:

@@ -83,7 +83,7 @@ class Executor(ABC):
 
     @property
     def remote(self) -> bool:
-        """Whether tasks may be done on other machines, which may see the disks of this one."""
+        """Whether all tasks are done elsewhere, by who may see the disks of this machine."""
         return False
 
     def each(

@@ -63,19 +63,14 @@ class Processes:
         pool = self._opened()
 
         def submit(job: tuple[Any, ...]) -> Future[Outcome]:
-            with _ctrl_c_blocked():
+            with ctrl_c_blocked():
                 return pool.submit(_outcome, *job)
 
         try:
             yield from in_order(submit, jobs, lambda: AHEAD * self.workers)
         except BrokenProcessPool as fault:
             self._drop()
-            raise WorkerError(
-                "PTM-W004",
-                "a worker process ended in the middle of its work",
-                remedy="if it was killed for want of memory, take fewer workers (-j 1); a script "
-                "that starts processes needs `if __name__ == '__main__'`",
-            ) from fault
+            raise lost() from fault
 
     def close(self) -> None:
         """Ends the processes, whatever they are doing; no more are started. Any thread may."""
@@ -98,7 +93,7 @@ class Processes:
             if self._pool is None:
                 context = get_context("spawn")
                 theirs, self._lifeline = context.Pipe(duplex=False)
-                self._pool = ProcessPoolExecutor(self.workers, context, _begin, (theirs,))
+                self._pool = ProcessPoolExecutor(self.workers, context, begin, (theirs,))
             return self._pool
 
 
@@ -220,8 +215,18 @@ def _outcome(place: _Place, function: Callable[[Any, Any], Any], tasks: list[Any
     return outcome(function, _copy.value(place.end), tasks)
 
 
+def lost() -> WorkerError:
+    """The error for a process that is no more, PTM-W004."""
+    return WorkerError(
+        "PTM-W004",
+        "a worker process ended in the middle of its work",
+        remedy="if it was killed for want of memory, take fewer workers (-j 1); a script "
+        "that starts processes needs `if __name__ == '__main__'`",
+    )
+
+
 @contextmanager
-def _ctrl_c_blocked() -> Iterator[None]:
+def ctrl_c_blocked() -> Iterator[None]:
     """A process that this thread starts hears of no Ctrl-C, not even while it is being started."""
     if not hasattr(signal, "pthread_sigmask"):  # not POSIX
         yield
@@ -233,7 +238,7 @@ def _ctrl_c_blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _begin(lifeline: Connection) -> None:
+def begin(lifeline: Connection) -> None:
     """In a worker, first of all: end with the parent, and leave Ctrl-C to it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 

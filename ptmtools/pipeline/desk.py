@@ -1,4 +1,4 @@
-"""Encoding by workers on other machines that see the disk of the database.
+"""Encoding by processes, of this machine or others, that see the disk of the database.
 
 Only names and digests travel then: a worker reads the image where it lies and leaves what it makes
 in a folder of this run, from which it is moved to its place. (Through the process that builds, the
