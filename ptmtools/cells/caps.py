@@ -71,7 +71,7 @@ class Caps:
         """Those triangles that have a point farther inside each face than lies in its
         plane: all that have a part inside, and few others."""
         found = triangles[self._areas[triangles] > 0]
-        for plane in body.bounds:
+        for plane in body.planes:
             height = self._corners[found] @ plane[:3] + plane[3]
             found = found[height.min(axis=1) < -self._tolerance.plane]
         return found

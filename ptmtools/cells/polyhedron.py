@@ -59,7 +59,7 @@ class Polyhedron:
         return float(np.einsum("ij,ij->", cross(a, b), c)) / 6.0
 
     @property
-    def bounds(self) -> NDArray[np.float64]:
+    def planes(self) -> NDArray[np.float64]:
         """(f, 4) the planes of the faces, unit normals pointing outwards."""
         a, b, c = self._fan(self.points)
         start = np.cumsum([0] + [len(loop) - 2 for loop in self.faces[:-1]])

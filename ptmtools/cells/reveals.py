@@ -100,4 +100,4 @@ def _bounds(body: Polyhedron, planes: list[NDArray[np.float64]]) -> list[NDArray
     outer faces of a building lie when the box is clipped to it."""
     bounds = [planes[tag] for tag in sorted({tag for tag in body.tags if tag != BOX_FACE})]
     outer = [face for face, tag in enumerate(body.tags) if tag == BOX_FACE]
-    return bounds + list(body.bounds[outer])
+    return bounds + list(body.planes[outer])
