@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,20 +9,13 @@ from typing import TYPE_CHECKING
 
 from ptmtools.errors import DatabaseError
 from ptmtools.files import open_regular
-from ptmtools.pipeline.digests import Digests
-from ptmtools.pipeline.manifest import Manifest, StageRecord
-from ptmtools.pipeline.stages import arrays_of
+from ptmtools.store.digests import Digests
+from ptmtools.store.layout import MANIFEST, arrays_of, sha256
+from ptmtools.store.manifest import Manifest, StageRecord
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-MANIFEST = "manifest.json"
-
-
-def sha256(data: bytes) -> str:
-    """Hex digest."""
-    return hashlib.sha256(data).hexdigest()
 
 
 class DatabaseFolder:
@@ -70,12 +62,11 @@ class DatabaseFolder:
         """
         record = self.manifest.stages.get(stage)
         if record is None:
-            command = "cells MODEL -o" if stage in ("scene", "cells") else stage
             raise DatabaseError(
                 "PTM-D004",
                 f"the {stage} stage has not been run, {needed_for} needs it",
                 file=self.path,
-                remedy=f"run `ptm {command} DB` or `ptm build-scene MODEL -o DB` first",
+                remedy="run `ptm build-scene MODEL -o DB` first",
             )
         return record
 
@@ -125,7 +116,7 @@ class DatabaseFolder:
 
     def read_arrays(self, stage: str, needed_for: str) -> dict[str, NDArray[np.generic]]:
         """The arrays of a stage; raises as `read_output` does."""
-        from ptmtools.pipeline.archive import unpack_arrays
+        from ptmtools.store.archive import unpack_arrays
 
         name = arrays_of(stage)
         return unpack_arrays(self.read_output(stage, name, needed_for), file=self.path / name)

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
 from ptmtools.errors import DatabaseError
-from ptmtools.pipeline.archive import pack_arrays, unpack_arrays
+from ptmtools.store.archive import pack_arrays, unpack_arrays
 
 DTYPES = st.sampled_from(["<f8", "<i4", "<i8", "|u1", "|b1"])
 ARRAYS = st.dictionaries(

@@ -10,10 +10,11 @@ from types import TracebackType
 
 from ptmtools.errors import DatabaseError, InputError, LimitError, OutputError
 from ptmtools.files import writing
-from ptmtools.pipeline.folder import MANIFEST, DatabaseFolder, read_manifest
-from ptmtools.pipeline.lock import LOCK, Lock, acquire
-from ptmtools.pipeline.manifest import Manifest, listed_before
-from ptmtools.pipeline.transaction import STAGING, Transaction, discard, recover
+from ptmtools.store.folder import DatabaseFolder, read_manifest
+from ptmtools.store.layout import LOCK, MANIFEST, STAGING
+from ptmtools.store.lock import Lock, acquire
+from ptmtools.store.manifest import Manifest, listed_before
+from ptmtools.store.transaction import Transaction, discard, recover
 
 
 class DatabaseWriter(DatabaseFolder):

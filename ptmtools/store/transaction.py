@@ -25,15 +25,14 @@ from typing import TYPE_CHECKING
 
 from ptmtools.errors import DatabaseError, OutputError
 from ptmtools.files import real_file, real_folder, write_bytes, writing
-from ptmtools.pipeline.folder import MANIFEST, DatabaseFolder, read_manifest, sha256
-from ptmtools.pipeline.manifest import Manifest, StageRecord, listed_before
-from ptmtools.pipeline.stages import arrays_of
+from ptmtools.store.folder import DatabaseFolder, read_manifest
+from ptmtools.store.layout import MANIFEST, STAGING, arrays_of, sha256
+from ptmtools.store.manifest import Manifest, StageRecord, listed_before
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-STAGING = ".ptm-new"
 _JOURNAL = "journal"
 
 
@@ -82,7 +81,7 @@ class Transaction:
 
     def put_arrays(self, stage: str, arrays: Mapping[str, NDArray[np.generic]]) -> dict[str, str]:
         """Stages the arrays of a stage; returns the outputs that they are."""
-        from ptmtools.pipeline.archive import pack_arrays
+        from ptmtools.store.archive import pack_arrays
 
         name = arrays_of(stage)
         self.put(name, pack_arrays(arrays))
@@ -150,9 +149,7 @@ class Transaction:
     def commit(self, records: Mapping[str, StageRecord]) -> None:
         """Makes what was put the outputs of these stages, and records them."""
         with self._turn:
-            manifest = self._db.manifest
-            for stage, record in records.items():
-                manifest = manifest.with_stage(stage, record)
+            manifest = self._db.manifest.with_stages(records)
             write_bytes(self._real() / MANIFEST, manifest.to_bytes(), force=True)
             _complete(self._db.path, self._relative)
             self._db.manifest = manifest

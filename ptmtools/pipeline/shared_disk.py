@@ -19,15 +19,14 @@ from pathlib import Path
 from ptmtools.errors import WorkerError
 from ptmtools.executors.model import Executor
 from ptmtools.files import write_bytes
-from ptmtools.pipeline.folder import sha256
+from ptmtools.pipeline.encoding import encoded_image
 from ptmtools.pipeline.options import TextureOptions
-from ptmtools.pipeline.stages import IMAGES
-from ptmtools.pipeline.textures import encoded_image
-from ptmtools.pipeline.transaction import STAGING, Transaction
+from ptmtools.store.layout import IMAGES, STAGING, sha256
+from ptmtools.store.transaction import Transaction
 
 
 @dataclass(frozen=True)
-class Desk:
+class SharedDisk:
     """What the tasks share.
 
     Attributes
@@ -43,7 +42,7 @@ class Desk:
 
 
 @dataclass(frozen=True)
-class Picture:
+class ImageTask:
     """A task: an image of the database, and the name of what is made of it, without suffix."""
 
     name: str
@@ -52,10 +51,10 @@ class Picture:
 
 
 @contextmanager
-def desk_of(
+def shared_disk(
     transaction: Transaction, database: Path, options: TextureOptions, executor: Executor
-) -> Iterator[Desk | None]:
-    """The desk, if the tasks are done on machines that see this disk; else None, and bytes travel.
+) -> Iterator[SharedDisk | None]:
+    """The disk, if the tasks are done on machines that see this disk; else None, and bytes travel.
 
     Raises WorkerError PTM-W005 if some do and some do not.
     """
@@ -63,50 +62,50 @@ def desk_of(
         yield None
         return
     out = transaction.subfolder(f"out-{secrets.token_hex(8)}")
-    desk = Desk(options, str(database.resolve()), str(out.resolve()))
+    disk = SharedDisk(options, str(database.resolve()), str(out.resolve()))
     try:
         tries = range(4 * executor.workers)
-        seen = list(executor.each(_sees, desk, tries, releases_lock=True))
+        seen = list(executor.each(_sees, disk, tries, releases_lock=True))
         if any(seen) and not all(seen):
-            raise _half_seen(desk)
-        yield desk if all(seen) else None
+            raise _half_seen(disk)
+        yield disk if all(seen) else None
     finally:
         shutil.rmtree(out, ignore_errors=True)
 
 
-def encoded_there(desk: Desk, picture: Picture) -> list[tuple[str, str]]:
-    """As a task: `encoded_image`, its results written to the desk: (file, SHA-256) of each.
+def encoded_there(disk: SharedDisk, image: ImageTask) -> list[tuple[str, str]]:
+    """As a task: `encoded_image`, its results written to the shared disk: (file, SHA-256) of each.
 
     Raises what that raises; WorkerError PTM-W005 where the disk is not to be seen.
     """
-    results = encoded_image(desk.options, (picture.name, _image(desk, picture)))
+    results = encoded_image(disk.options, (image.name, _image(disk, image)))
     made = []
     for number, data in enumerate(results):
-        file = Path(desk.out, f"{picture.made}-{number}")
+        file = Path(disk.out, f"{image.made}-{number}")
         write_bytes(file, data, force=True)
         made.append((str(file), sha256(data)))
     return made
 
 
-def _image(desk: Desk, picture: Picture) -> bytes:
+def _image(disk: SharedDisk, image: ImageTask) -> bytes:
     """Its bytes, from their place or, until the scene is committed, from where they wait for it."""
-    place = f"{IMAGES}/{picture.sha256}"
+    place = f"{IMAGES}/{image.sha256}"
     for folder in ("", f"{STAGING}/scene", ""):
         with suppress(OSError):
-            data = Path(desk.database, folder, place).read_bytes()
-            if sha256(data) == picture.sha256:
+            data = Path(disk.database, folder, place).read_bytes()
+            if sha256(data) == image.sha256:
                 return data
-    raise _half_seen(desk)
+    raise _half_seen(disk)
 
 
-def _sees(desk: Desk, _: int) -> bool:
-    return Path(desk.out).is_dir()
+def _sees(disk: SharedDisk, _: int) -> bool:
+    return Path(disk.out).is_dir()
 
 
-def _half_seen(desk: Desk) -> WorkerError:
+def _half_seen(disk: SharedDisk) -> WorkerError:
     return WorkerError(
         "PTM-W005",
         "some workers see the disk of the database and others do not",
-        file=desk.database,
+        file=disk.database,
         remedy="mount it in the same place on all machines, or put it where only this one sees it",
     )

@@ -16,9 +16,9 @@ import pytest
 
 from ptmtools.cli.main import main
 from ptmtools.errors import PtmError
-from ptmtools.pipeline.folder import sha256
-from ptmtools.pipeline.manifest import Manifest, StageRecord
-from ptmtools.pipeline.writer import DatabaseWriter
+from ptmtools.store.layout import sha256
+from ptmtools.store.manifest import Manifest, StageRecord
+from ptmtools.store.writer import DatabaseWriter
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"
 OLD, NEW, SECRET = b"old", b"new", b"secret"

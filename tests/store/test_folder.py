@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from ptmtools.errors import DatabaseError, OutputError
-from ptmtools.pipeline.folder import MANIFEST, DatabaseFolder
-from ptmtools.pipeline.manifest import SCHEMA, StageRecord
-from ptmtools.pipeline.writer import DatabaseWriter
+from ptmtools.store.folder import DatabaseFolder
+from ptmtools.store.layout import MANIFEST
+from ptmtools.store.manifest import SCHEMA, StageRecord
+from ptmtools.store.writer import DatabaseWriter
 
 
 def state(folder: Path) -> dict[str, bytes]:

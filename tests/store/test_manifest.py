@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from ptmtools.errors import DatabaseError
-from ptmtools.pipeline.manifest import FORMAT, SCHEMA, Manifest, StageRecord
+from ptmtools.store.manifest import FORMAT, SCHEMA, Manifest, StageRecord
 
 DIGEST = "ab" * 32
 RECORD = StageRecord(
@@ -57,6 +57,10 @@ def broken(change: dict[str, Any]) -> bytes:
         (json.dumps({"format": FORMAT, "schema": SCHEMA + 1}).encode(), "PTM-D003"),
         (json.dumps({"format": FORMAT, "schema": SCHEMA}).encode(), "PTM-D002"),
         (json.dumps({**document(), "stages": {"other": {}}}).encode(), "PTM-D002"),
+        (
+            json.dumps({**document(), "stages": {"../a": document()["stages"]["cells"]}}).encode(),
+            "PTM-D002",
+        ),
         (json.dumps({**document(), "stages": {"cells": 5}}).encode(), "PTM-D002"),
         (broken({"recipe": None}), "PTM-D002"),
         (broken({"recipe": True}), "PTM-D002"),

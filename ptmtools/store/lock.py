@@ -21,8 +21,8 @@ from pathlib import Path
 
 from ptmtools.errors import DatabaseError
 from ptmtools.files import open_regular, writing
+from ptmtools.store.layout import LOCK
 
-LOCK = ".ptm-lock"
 #: Who only looks whether a lock is held holds it for a moment: how often to try, and the pause.
 _TRIES, _PAUSE = 5, 0.02
 

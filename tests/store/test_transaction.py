@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from ptmtools.errors import OutputError
-from ptmtools.pipeline.folder import MANIFEST
-from ptmtools.pipeline.manifest import StageRecord
-from ptmtools.pipeline.transaction import STAGING, finished_tasks
-from ptmtools.pipeline.writer import DatabaseWriter
+from ptmtools.store.layout import MANIFEST, STAGING
+from ptmtools.store.manifest import StageRecord
+from ptmtools.store.transaction import finished_tasks
+from ptmtools.store.writer import DatabaseWriter
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Replaces the outputs of one stage: one stays as it is, one changes, one goes, one is new.
@@ -22,8 +22,8 @@ import sys
 from pathlib import Path
 sys.path.insert(0, {benchmarks!r})
 from kills import dying
-from ptmtools.pipeline.manifest import StageRecord
-from ptmtools.pipeline.writer import DatabaseWriter
+from ptmtools.store.manifest import StageRecord
+from ptmtools.store.writer import DatabaseWriter
 
 dying({n}, Path({db!r}))
 with DatabaseWriter.open_for_model({db!r}, "m.obj") as writer:

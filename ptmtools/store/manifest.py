@@ -13,7 +13,7 @@
          "notes":   ["open above: …"]                what it had to say, one line each
      }, …}}
 
-Stages stand in the order in which they run. There is no time and no folder of the machine in it:
+Stages stand in the order of their names. There is no time and no folder of the machine in it:
 the same model and options give the same manifest anywhere. A stage is current if it would be run
 by the same recipe with the same parameters on the same inputs, and its outputs are all there.
 """
@@ -21,22 +21,19 @@ by the same recipe with the same parameters on the same inputs, and its outputs 
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from os import PathLike
 from typing import Any
 
+from ptmtools import schemas
 from ptmtools.errors import DatabaseError
-from ptmtools.pipeline.stages import STAGES
+from ptmtools.store.layout import WRITTEN
 
 FORMAT = "ptmtools database"
 SCHEMA = 2
 
-#: The folders of a database that are written.
-_FOLDERS = ("stages", "www")
-_SHA256 = re.compile(r"[0-9a-f]{64}")
-#: So many lists and objects lie in each other at most.
+#: Lists and objects may be nested this deep at most.
 _DEEPEST = 16
 
 
@@ -62,10 +59,9 @@ class Manifest:
     model: str
     stages: Mapping[str, StageRecord] = field(default_factory=dict)
 
-    def with_stage(self, name: str, record: StageRecord) -> Manifest:
-        """This manifest with one stage recorded anew."""
-        stages = {**self.stages, name: record}
-        return Manifest(self.model, {s: stages[s] for s in STAGES if s in stages})
+    def with_stages(self, records: Mapping[str, StageRecord]) -> Manifest:
+        """This manifest with some stages recorded anew."""
+        return Manifest(self.model, {**self.stages, **records})
 
     def outputs(self) -> dict[str, str]:
         """Every file of the database with its SHA-256, except the manifest itself."""
@@ -73,22 +69,11 @@ class Manifest:
 
     def to_bytes(self) -> bytes:
         """The text of `manifest.json`."""
-        document = {
-            "format": FORMAT,
-            "schema": SCHEMA,
-            "model": self.model,
-            "stages": {
-                name: {
-                    "recipe": record.recipe,
-                    "parameters": dict(record.parameters),
-                    "inputs": dict(sorted(record.inputs.items())),
-                    "outputs": dict(sorted(record.outputs.items())),
-                    "counts": dict(record.counts),
-                    "notes": list(record.notes),
-                }
-                for name, record in self.stages.items()
-            },
-        }
+        stages = {name: asdict(self.stages[name]) for name in sorted(self.stages)}
+        for record in stages.values():
+            for part in ("inputs", "outputs"):
+                record[part] = dict(sorted(record[part].items()))
+        document = {"format": FORMAT, "schema": SCHEMA, "model": self.model, "stages": stages}
         return (json.dumps(document, indent=1, ensure_ascii=False) + "\n").encode()
 
     @staticmethod
@@ -105,7 +90,7 @@ class Manifest:
         except (ValueError, RecursionError) as fault:
             raise _damaged(file, f"not JSON ({fault})") from fault
         if _nested(document):
-            raise _damaged(file, f"lists in lists, more than {_DEEPEST}")
+            raise _damaged(file, f"nested more than {_DEEPEST} deep")
         if not isinstance(document, dict) or document.get("format") != FORMAT:
             raise DatabaseError(
                 "PTM-D001", "not a ptmtools database", file=file, remedy="give a database folder"
@@ -117,12 +102,18 @@ class Manifest:
                 file=file,
                 remedy="build the database again, or use the ptmtools that wrote it",
             )
-        model, stages = document.get("model"), document.get("stages")
-        if not isinstance(model, str) or not isinstance(stages, dict):
-            raise _damaged(file, "no model or no stages")
-        if unknown := sorted(set(stages) - set(STAGES)):
-            raise _damaged(file, f"unknown stage {unknown[0]!r}")
-        return Manifest(model, {s: _record(stages[s], s, file) for s in STAGES if s in stages})
+        try:
+            schemas.check(document, schemas.MANIFEST)
+        except schemas.ShapeError as fault:
+            raise _damaged(file, str(fault)) from fault
+        names = StageRecord.__dataclass_fields__
+        return Manifest(
+            document["model"],
+            {
+                stage: StageRecord(**{name: entry[name] for name in names})
+                for stage, entry in document["stages"].items()
+            },
+        )
 
 
 def listed_before(data: bytes) -> tuple[str, set[str]] | None:
@@ -159,30 +150,12 @@ def _nested(document: object) -> bool:
     return True
 
 
-def _record(entry: object, stage: str, file: str | PathLike[str]) -> StageRecord:
-    names = ("parameters", "inputs", "outputs", "counts")
-    if not isinstance(entry, dict) or type(entry.get("recipe")) is not int:
-        raise _damaged(file, f"stage {stage} is incomplete")
-    notes = entry.get("notes")
-    if not all(isinstance(entry.get(name), dict) for name in names) or not isinstance(notes, list):
-        raise _damaged(file, f"stage {stage} is incomplete")
-    if not all(isinstance(note, str) for note in notes):
-        raise _damaged(file, f"stage {stage} has a note that is no text")
-    for path, digest in entry["outputs"].items():
-        if not isinstance(digest, str) or not _SHA256.fullmatch(digest) or not _is_output(path):
-            raise _damaged(file, f"stage {stage} has an impossible output {path!r}")
-    for name, digest in entry["inputs"].items():
-        if digest != "" and not (isinstance(digest, str) and _SHA256.fullmatch(digest)):
-            raise _damaged(file, f"stage {stage} has an impossible input {name!r}")
-    return StageRecord(entry["recipe"], **{name: entry[name] for name in names}, notes=notes)
-
-
 def _is_output(path: str) -> bool:
     """Whether a path is one that stages write to: inside of the database on every system, and
     nothing that somebody else has put beside it."""
     parts = path.split("/")
     inside = "\\" not in path and ":" not in path and "\0" not in path
-    return inside and len(parts) > 1 and parts[0] in _FOLDERS and not {"", ".", ".."} & set(parts)
+    return inside and len(parts) > 1 and parts[0] in WRITTEN and not {"", ".", ".."} & set(parts)
 
 
 def _damaged(file: str | PathLike[str], what: str) -> DatabaseError:

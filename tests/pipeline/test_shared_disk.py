@@ -10,10 +10,10 @@ import pytest
 
 from ptmtools.errors import OutputError, WorkerError
 from ptmtools.executors import Serial
-from ptmtools.pipeline import BuildOptions, TextureOptions, build_scene, workers
-from ptmtools.pipeline.desk import Picture, _sees, desk_of, encoded_there
-from ptmtools.pipeline.folder import sha256
-from ptmtools.pipeline.writer import DatabaseWriter
+from ptmtools.pipeline import TextureOptions, background, build_scene
+from ptmtools.pipeline.shared_disk import ImageTask, _sees, encoded_there, shared_disk
+from ptmtools.store.layout import sha256
+from ptmtools.store.writer import DatabaseWriter
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"
 
@@ -45,8 +45,8 @@ class Blind(Remote):
 
 
 def built(folder: Path, monkeypatch: pytest.MonkeyPatch, executor: Serial) -> dict[str, bytes]:
-    monkeypatch.setattr(workers, "open_executor", lambda *_: executor)
-    build_scene(TWO_ROOMS / "two_rooms.obj", folder, BuildOptions(scheduler="somewhere"))
+    monkeypatch.setattr(background, "open_executor", lambda *_: executor)
+    build_scene(TWO_ROOMS / "two_rooms.obj", folder, scheduler="somewhere")
     return {
         file.relative_to(folder).as_posix(): file.read_bytes()
         for file in folder.rglob("*")
@@ -77,21 +77,21 @@ def transaction(tmp_path):
 
 def test_an_image_is_found_before_and_after_its_commit(tmp_path, transaction) -> None:
     image = (TWO_ROOMS / "floor.png").read_bytes()
-    picture = Picture("a.png", sha256(image), "0")
+    task = ImageTask("a.png", sha256(image), "0")
     database = tmp_path / "db"
-    with desk_of(transaction, database, TextureOptions(), Remote()) as desk:
-        assert desk is not None
+    with shared_disk(transaction, database, TextureOptions(), Remote()) as disk:
+        assert disk is not None
         with pytest.raises(WorkerError, match="PTM-W005"):
-            encoded_there(desk, picture)
+            encoded_there(disk, task)
         made = []
         for folder in (".ptm-new/scene/stages/images", "stages/images"):
             (database / folder).mkdir(parents=True)
-            (database / folder / picture.sha256).write_bytes(image)
-            made.append([digest for _, digest in encoded_there(desk, picture)])
-            (database / folder / picture.sha256).write_bytes(image[:-1])
+            (database / folder / task.sha256).write_bytes(image)
+            made.append([digest for _, digest in encoded_there(disk, task)])
+            (database / folder / task.sha256).write_bytes(image[:-1])
         assert made[0] == made[1]
         with pytest.raises(WorkerError, match="PTM-W005"):  # damaged, both of them
-            encoded_there(desk, picture)
+            encoded_there(disk, task)
 
 
 def test_a_forgotten_worker_writes_to_nowhere(tmp_path, transaction) -> None:
@@ -99,14 +99,14 @@ def test_a_forgotten_worker_writes_to_nowhere(tmp_path, transaction) -> None:
     folder = tmp_path / "db/stages/images"
     folder.mkdir(parents=True)
     (folder / sha256(image)).write_bytes(image)
-    with desk_of(transaction, tmp_path / "db", TextureOptions(), Remote()) as desk:
-        assert desk is not None
+    with shared_disk(transaction, tmp_path / "db", TextureOptions(), Remote()) as disk:
+        assert disk is not None
     before = sorted(tmp_path.rglob("*"))
     with pytest.raises(OutputError):
-        encoded_there(desk, Picture("a.png", sha256(image), "0"))
+        encoded_there(disk, ImageTask("a.png", sha256(image), "0"))
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_who_shares_memory_needs_no_desk(tmp_path, transaction) -> None:
-    with desk_of(transaction, tmp_path, TextureOptions(), Serial()) as desk:
-        assert desk is None
+def test_who_shares_memory_needs_no_shared_disk(tmp_path, transaction) -> None:
+    with shared_disk(transaction, tmp_path, TextureOptions(), Serial()) as disk:
+        assert disk is None
