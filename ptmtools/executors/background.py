@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ptmtools.executors.outcome import outcome
@@ -16,17 +15,6 @@ if TYPE_CHECKING:
 S = TypeVar("S")
 T = TypeVar("T")
 R = TypeVar("R")
-R_co = TypeVar("R_co", covariant=True)
-
-
-@dataclass(frozen=True)
-class Deferred(Generic[R_co]):
-    """See `Pending`: done by the caller's own thread, when it asks for the result."""
-
-    result: Callable[[], R_co]
-
-    def cancel(self) -> None:
-        """It was never begun."""
 
 
 class BackgroundTask(Generic[R]):

@@ -35,10 +35,9 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from types import TracebackType
-from typing import Protocol, Self, TypeVar
-
-from ptmtools.executors.background import Deferred
+from typing import Generic, Protocol, Self, TypeVar
 
 S = TypeVar("S")
 S_co = TypeVar("S_co", covariant=True)
@@ -58,6 +57,16 @@ class Pending(Protocol[R_co]):
 
     def cancel(self) -> object:
         """Its result is not wanted: if it has not begun, it never will."""
+
+
+@dataclass(frozen=True)
+class Deferred(Generic[R_co]):
+    """See `Pending`: done by the caller's own thread, when it asks for the result."""
+
+    result: Callable[[], R_co]
+
+    def cancel(self) -> None:
+        """It was never begun."""
 
 
 class Sharing(Protocol[S_co]):

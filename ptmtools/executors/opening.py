@@ -32,4 +32,3 @@ def open_executor(workers: int = 0, scheduler: str | None = None) -> Executor:
     from ptmtools.executors.local import Local
 
     return Local(workers)
-

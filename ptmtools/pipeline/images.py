@@ -12,6 +12,9 @@ from ptmtools.pipeline.stages import SCENE
 from ptmtools.store.layout import IMAGE_LIST, IMAGES
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from ptmtools.scene.model import Scene, SourceImage
 
 _IMAGE_NAME = re.compile(r"[A-Za-z0-9_-]+\.[A-Za-z0-9]+")
@@ -70,6 +73,13 @@ def images_of(artifacts: Artifacts) -> tuple[SourceImage, ...]:
         )
 
     return artifacts.held(IMAGES, images)
+
+
+def load_scene(artifacts: Artifacts, arrays: Mapping[str, NDArray[np.generic]]) -> Scene:
+    """See `Stage.load`."""
+    from ptmtools.scene.model import Scene
+
+    return Scene.from_arrays(arrays, images_of(artifacts))
 
 
 def keep_images(artifacts: Artifacts, images: Iterable[SourceImage]) -> bytes:

@@ -51,7 +51,7 @@ class Artifacts:
             arrays = self.db.read_arrays(stage.name, "this command")
             kind = stage.artifact.load()
             with self.reading(arrays_of(stage.name)):
-                made = stage.load(self, arrays) if stage.load else kind.from_arrays(arrays)
+                made = stage.load.load()(self, arrays) if stage.load else kind.from_arrays(arrays)
                 self._fit(stage, made)
             self._stages[stage] = made
         return cast(A, self._stages[stage])

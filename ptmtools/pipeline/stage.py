@@ -84,7 +84,7 @@ class Stage(Generic[A]):
     inputs: Lazy[Callable[[Artifacts], Mapping[str, str]]] | None = None
     foresee: Lazy[Callable[[Artifacts, StageRecord], bool]] | None = None
     tasks: Lazy[Callable[[StageRecord | None, StageRecord], list[str]]] | None = None
-    load: Callable[[Artifacts, Mapping[str, Any]], A] | None = None
+    load: Lazy[Callable[[Artifacts, Mapping[str, Any]], A]] | None = None
     check: Lazy[Callable[[Artifacts, A], Iterable[tuple[str, str, str]]]] | None = None
     from_model: bool = False
     hidden: bool = False

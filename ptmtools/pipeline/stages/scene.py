@@ -11,15 +11,7 @@ from ptmtools.quantities import count
 from ptmtools.scene.options import IngestOptions
 
 if TYPE_CHECKING:
-    from ptmtools.pipeline.run import Artifacts
     from ptmtools.scene.model import Scene
-
-
-def _load(artifacts: Artifacts, arrays: Mapping[str, Any]) -> Scene:
-    from ptmtools.pipeline.images import images_of
-    from ptmtools.scene.model import Scene
-
-    return Scene.from_arrays(arrays, images_of(artifacts))
 
 
 def _counts(scene: Scene) -> Mapping[str, Any]:
@@ -56,7 +48,7 @@ SCENE: Stage[Scene] = Stage(
     job=Lazy("ptmtools.pipeline.reading:ReadingJob"),
     inputs=Lazy("ptmtools.pipeline.reading:inputs_of"),
     foresee=Lazy("ptmtools.pipeline.reading:foresee"),
-    load=_load,
+    load=Lazy("ptmtools.pipeline.images:load_scene"),
     check=Lazy("ptmtools.pipeline.images:missing_images"),
     from_model=True,
     hidden=True,
