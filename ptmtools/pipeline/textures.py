@@ -143,7 +143,8 @@ class TexturesJob(Job):
         self._tasks = (len(self._names), len(self._names), 0)
         if not self._why:
             return
-        self._transaction = transaction = self.run.begin(self.stage)
+        # Not `Run.begin`: another stage may be under way.
+        self._transaction = transaction = self.run.writer.begin(self.stage.name)
         kept, resumed = 0, 0
         before = self.run.before(self.stage)
         stale = set(stale_textures(before, self._work))
