@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from ptmtools.compiled import plain_kernel
-from ptmtools.texture.coders.mixing.decisions.kernels import code_bit
+from ptmtools.texture.coders.mixing.decisions import code_bit
 
 
 @plain_kernel

@@ -44,7 +44,7 @@ def fit_weights(
     bh, bw, nc = below.shape
     if bh * bw < FEWEST_BLOCKS or min(bh, bw) < 4:
         return None
-    from ptmtools.texture.coders.haar.fitting import kernels
+    from ptmtools.texture.coders.haar import fitting
 
     step = max(1, bh // SAMPLED_ROWS)
     sampled = np.arange(step // 2, bh, step)
@@ -59,12 +59,12 @@ def fit_weights(
             features[6] = residual[1 if references > 1 else nc, k]
             used = np.array(features_used(k, references))
             sums = np.zeros((len(used), len(used) + 1), np.int64)
-            kernels.fit_sums(
+            fitting.fit_sums(
                 level, below, plane, ranks[plane], k, sampled, used, _SLOPE_WEIGHTS, features, sums
             )
             weights[c, k] = BUILT_IN_WEIGHTS[min(references, 2)][k]
             weights[c, k, used] = _solve(sums)
-            kernels.fit_residuals(features, weights[c, k], residual[c, k])
+            fitting.fit_residuals(features, weights[c, k], residual[c, k])
     return weights
 
 

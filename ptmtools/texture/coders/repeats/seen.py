@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ptmtools.compiled import plain_kernel as kernel
-from ptmtools.texture.coders.repeats.symbols.kernels import symbol
+from ptmtools.texture.coders.repeats.symbols import symbol
 
 #: Stands for a texel that is none of the guesses.
 OTHER = np.uint64(1 << 32)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ptmtools.compiled import plain_kernel as kernel
-from ptmtools.texture.coders.repeats.symbols.kernels import (
+from ptmtools.texture.coders.repeats.symbols import (
     CLASSES,
     EDGE,
     HAAR,
