@@ -74,7 +74,9 @@ def views(database: Path) -> Image.Image:
     for x, number in ((0, COARSE), (WIDTH + 10, -1)):
         ends = [levels[number] for levels in groups]
         side, size = ends[0]["width"], sum(level["offset"] + level["length"] for level in ends)
-        sheet.paste(Image.fromarray(render(scene, view, LOOKS["flat"], samples=2, side=side)), (x, 0))
+        sheet.paste(
+            Image.fromarray(render(scene, view, LOOKS["flat"], samples=2, side=side)), (x, 0)
+        )
         label = f"{len(used)} visible textures up to {side} x {side} texels: {size:,} bytes"
         draw.text((x, HEIGHT + 5), label, "black", font)
     return sheet
