@@ -8,6 +8,8 @@
 # make fuzz    100,000 damaged and hostile files for every reader (half an hour)
 # make sample  only the sample museum
 # make setup   only the virtual environment
+# make docs-tables     print the tables of the docs into their pages (ten minutes)
+# make docs-pictures   draw the pictures of the docs
 # make clean   remove what was built, except the virtual environment
 
 SHELL := bash
@@ -24,7 +26,7 @@ JOBS ?= 2
 PYTEST_ARGS ?=
 export PTM_SHARED ?= $(abspath ../shared)
 
-.PHONY: help setup demo test lint bench bench-codec bench-pvs bench-ach fuzz sample clean
+.PHONY: help setup demo test lint bench bench-codec bench-pvs bench-ach fuzz sample docs-tables docs-pictures clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -74,6 +76,7 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/python benchmarks/docs_tables.py --check
 
 bench-codec: $(VENV)/.installed-dev
 	@mkdir -p build/bench
@@ -106,6 +109,13 @@ bench: $(VENV)/.installed-dev
 
 fuzz: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks.fuzz --jobs $(JOBS)
+
+docs-tables: $(VENV)/.installed-dev
+	$(BIN)/python benchmarks/docs_tables.py
+
+docs-pictures: build/museum/.made
+	$(BIN)/ptm build-scene build/museum/museum.obj -o build/museum.db
+	$(BIN)/python benchmarks/docs_pictures.py build/museum.db
 
 clean:
 	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

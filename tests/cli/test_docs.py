@@ -1,11 +1,25 @@
-"""The documentation and the program have the same codes."""
+"""The documentation and the program have the same codes, options and tables; links resolve."""
 
 from __future__ import annotations
 
+import importlib
 import re
+import sys
 from pathlib import Path
 
+import click
+import pytest
+
+from ptmtools.cli.main import ptm
+
 ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted([*ROOT.glob("docs/*.md"), *ROOT.glob("*.md")])
+FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
+#: `[text](target)` and `![text](target)`, also over a line's end.
+LINK = re.compile(r"\]\(([^()\s]+)\)")
+#: Code in a line, and a line of code.
+CODE = re.compile(r"`([^`\n]+)`|^ {4,}(\S.*)$", re.MULTILINE)
+OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
 #: "PTM-L101", and what may follow: ", L102", " and I255", " to N213".
 FIRST = re.compile(r"PTM-([A-Z])(\d{3})\b")
 NEXT = re.compile(r"(,? and |, | to )(?:PTM-)?([A-Z]?)(\d{3})\b")
@@ -48,3 +62,70 @@ def test_every_documented_code_exists() -> None:
     named, _ = documented()
     strict = {code.replace("-N", "-I") for code in told()}
     assert sorted(named - told() - strict) == []
+
+
+def anchors(page: Path) -> set[str]:
+    """What a link may name in a page: its headings, as GitHub calls them, and explicit ids."""
+    text = FENCED.sub("", page.read_text("utf-8"))
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    named = re.findall(r'<a id="([^"]+)">', text)
+    return {re.sub(r"[^\w\- ]", "", h).strip().lower().replace(" ", "-") for h in headings} | {
+        *named
+    }
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_resolve(page: Path) -> None:
+    for target in LINK.findall(FENCED.sub("", page.read_text("utf-8"))):
+        if "://" in target:
+            continue
+        name, _, anchor = target.partition("#")
+        file = (page.parent / name).resolve() if name else page
+        assert file.is_file(), target
+        assert not anchor or anchor in anchors(file), target
+
+
+def options_of_scripts() -> set[str]:
+    """The options of everything that is no `ptm` command: benchmarks and sample data."""
+    scripts = [*ROOT.glob("benchmarks/**/*.py"), *ROOT.glob("sample_data/*.py")]
+    return {o for s in scripts for o in re.findall(r'"(--[a-z-]+)"', s.read_text("utf-8"))}
+
+
+def options_of_commands() -> dict[str, set[str]]:
+    """The options of each `ptm` command, and of `ptm` itself under "--help"."""
+    context = click.Context(ptm)
+    commands = {name: ptm.get_command(context, name) for name in ptm.list_commands(context)}
+    return {
+        name: {"--help"} | {o for p in command.params for o in (*p.opts, *p.secondary_opts)}
+        for name, command in [*commands.items(), ("--help", ptm)]
+        if command is not None
+    }
+
+
+#: Others speak of commands that were, or that somebody may add.
+@pytest.mark.parametrize(
+    "page", [p for p in PAGES if p.parent != ROOT or p.stem == "README"], ids=lambda p: p.name
+)
+def test_options_exist(page: Path) -> None:
+    commands, scripts = options_of_commands(), options_of_scripts()
+    every = scripts.union(*commands.values())
+    unknown = []
+    for inline, line in CODE.findall(FENCED.sub("", page.read_text("utf-8"))):
+        words = (inline or line).split()
+        if words[0] == "ptm" and words[1:] and re.match("[a-z]", words[1]):
+            known = commands[words[1]]  # KeyError: there is no such command
+        elif words[0] == "ptm" or (inline and words[0].startswith("-")):
+            known = every
+        else:  # of another program, or none
+            continue
+        unknown += [(o, " ".join(words)) for o in OPTION.findall(" ".join(words)) if o not in known]
+    assert unknown == []
+
+
+def test_tables_are_known_and_made_by_scripts_that_exist() -> None:
+    sys.path.insert(0, str(ROOT / "benchmarks"))
+    tables = importlib.import_module("docs_tables")
+    standing = [name for page in PAGES for name in tables.tables_of(page)]
+    assert sorted(standing) == sorted(tables.TABLES)
+    for table in tables.TABLES.values():
+        assert (ROOT / table.command.split()[0]).is_file()

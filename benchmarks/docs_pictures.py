@@ -1,0 +1,105 @@
+"""Draws the pictures of the docs. ``python benchmarks/docs_pictures.py build/museum.db``
+
+Takes the database of the sample museum and writes into ``docs/pictures``:
+
+plan.png     both floors, with what the middle room sees shaded by its coverage hints
+levels.jpg   a painting, as its levels show it while the `.ptm` arrives
+view.jpg     the view from a viewpoint with the first levels of all textures, and with all of them:
+             rays cast at the model, no browser
+door-*.png   two rooms with a door leaf in the doorway: one is lost, unless the leaf is detail
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+sys.path[:0] = [str(Path(__file__).parent)]
+from render import LOOKS, View, load, render  # noqa: E402
+
+from ptmtools import texture  # noqa: E402
+from ptmtools.cli.main import main as command  # noqa: E402
+
+ROOT = Path(__file__).resolve().parent.parent
+PICTURES = ROOT / "docs" / "pictures"
+TWO_ROOMS = ROOT / "sample_data/two_rooms"
+#: The room whose visible set is shaded, and the viewpoint that is shown.
+CELL, VIEWPOINT = 9, 5
+PAINTING, LEVELS, SIDE = "painting_09", (4, 6, 8, 10), 240
+#: The coarse picture has textures of 2⁵ texels a side.
+COARSE, WIDTH, HEIGHT = 5, 480, 340
+#: A door leaf that fills the doorway of the two rooms, as a line to add to the OBJ file.
+DOOR_LEAF = "o door_leaf\nusemtl doorway\nf 9/1 14/2 12/3 11/4\n"
+
+
+def ptm(*arguments: str) -> None:
+    """Runs the command, quietly."""
+    status = command([*arguments, "--quiet"])
+    if status:
+        sys.exit(status)
+
+
+def levels(file: Path) -> Image.Image:
+    """Some levels of a `.ptm` side by side at one size, with the bytes that they take to arrive."""
+    sheet = Image.new("RGB", (len(LEVELS) * (SIDE + 10) - 10, SIDE + 24), "white")
+    draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(13)
+    with texture.open(file) as reader:
+        for place, number in enumerate(LEVELS):
+            texels = Image.fromarray(np.asarray(reader.level(number)))
+            x = place * (SIDE + 10)
+            sheet.paste(texels.resize((SIDE, SIDE), Image.Resampling.BILINEAR), (x, 0))
+            level = reader.header.levels[number]
+            size = f"level {number}: {level.width} x {level.height}, {level.end:,} bytes"
+            draw.text((x, SIDE + 5), size, "black", font)
+    return sheet
+
+
+def views(database: Path) -> Image.Image:
+    """A viewpoint with coarse and with whole textures, with the bytes of the visible ones."""
+    hints = json.loads((database / "www/hints.json").read_text("utf-8"))
+    viewpoint = hints["viewpoints"][VIEWPOINT]
+    seen = hints["cells"][viewpoint["cell"]]["visible"]
+    used = {image for cell in seen for image in hints["cells"][cell]["textures"]}
+    groups = [hints["textures"][image]["levels"] for image in sorted(used)]
+    sheet = Image.new("RGB", (2 * WIDTH + 10, HEIGHT + 24), "white")
+    draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(13)
+    view, scene = View.of_hint(viewpoint, WIDTH, HEIGHT), load(database)
+    for x, number in ((0, COARSE), (WIDTH + 10, -1)):
+        ends = [levels[number] for levels in groups]
+        side, size = ends[0]["width"], sum(level["offset"] + level["length"] for level in ends)
+        sheet.paste(
+            Image.fromarray(render(scene, view, LOOKS["flat"], samples=2, side=side)), (x, 0)
+        )
+        label = f"{len(used)} visible textures up to {side} x {side} texels: {size:,} bytes"
+        draw.text((x, HEIGHT + 5), label, "black", font)
+    return sheet
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("database", type=Path, help="of the sample museum")
+    database: Path = parser.parse_args().database
+    PICTURES.mkdir(exist_ok=True)
+    plan = str(PICTURES / "plan.png")
+    ptm("plot", str(database), "--cell", str(CELL), "--dpi", "90", "-o", plan, "--force")
+    levels(database / f"www/textures/{PAINTING}.ptm").save(PICTURES / "levels.jpg", quality=85)
+    views(database).save(PICTURES / "view.jpg", quality=85)
+    with tempfile.TemporaryDirectory() as folder:
+        shutil.copytree(TWO_ROOMS, f"{folder}/model")
+        model = Path(folder, "model", "two_rooms.obj")
+        model.write_text(model.read_text("utf-8") + DOOR_LEAF, "utf-8")
+        for name, options in (("shut", []), ("open", ["--detail", "door_leaf*"])):
+            ptm("cells", str(model), "-o", f"{folder}/{name}", *options)
+            picture = str(PICTURES / f"door-{name}.png")
+            ptm("plot", f"{folder}/{name}", "-o", picture, "--force", "--width", "6", "--dpi", "60")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,115 @@
+"""Prints the tables of the docs into their pages. ``python benchmarks/docs_tables.py [NAME…]``
+
+A page holds a table between two lines, ``<!-- table: NAME -->`` and ``<!-- /table -->``. `TABLES`
+says which command prints it; what it prints as Markdown replaces what stood there.
+
+``--check`` writes nothing. It runs the quick form of each exact table, the rows that take a few
+seconds, and fails where a row that is printed does not stand in the page. `make lint` does this.
+A table whose data are not at hand is skipped with a message; with ``CI=true`` that is an error.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+SHARED = Path(os.environ.get("PTM_SHARED", ROOT.parent / "shared"))
+MARKED = re.compile(r"(<!-- table: (\S+) -->\n\n?)(.*?)(\n?<!-- /table -->)", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Table:
+    """How a table is made.
+
+    Attributes
+    ----------
+    command: a script of this project and its arguments; prints the whole table.
+    quick: the same for some rows of it; empty for timings, which are not compared.
+    needs: the folder below the shared data without which it cannot be made.
+    """
+
+    command: str
+    quick: str
+    needs: str
+
+
+BY_AREA = "benchmarks/cells.py {} --wall-area {}"
+TABLES = {
+    "scenes": Table("benchmarks/cells.py", "benchmarks/cells.py museum hospital gallery", "scenes"),
+    "wall-area": Table(
+        BY_AREA.format("museum hospital willowgarage gallery", "8 4 2 1"),
+        BY_AREA.format("gallery", "8 4 2"),
+        "scenes",
+    ),
+    "ptm-bytes": Table(
+        "benchmarks/codec/bytes.py", "benchmarks/codec/bytes.py raw fast", "textures"
+    ),
+}
+
+
+def printed(command: str) -> list[str]:
+    """The lines that a command prints."""
+    arguments = [sys.executable, *command.split()]
+    done = subprocess.run(arguments, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
+    return done.stdout.strip().splitlines()
+
+
+def tables_of(page: Path) -> dict[str, list[str]]:
+    """The tables that stand in a page, by name, as lines."""
+    return {name: body.splitlines() for _, name, body, _ in MARKED.findall(page.read_text("utf-8"))}
+
+
+def changed(name: str, page: Path) -> list[str]:
+    """Rows that the quick command prints and the page lacks."""
+    quick = TABLES[name].quick
+    standing = tables_of(page)[name]
+    return [line for line in printed(quick) if line not in standing] if quick else []
+
+
+def write(name: str, page: Path) -> None:
+    """Puts what the command prints into the page."""
+    lines = "\n".join(printed(TABLES[name].command))
+
+    def put(found: re.Match[str]) -> str:
+        if found[2] != name:
+            return found[0]
+        return f"<!-- table: {name} -->\n\n{lines}\n\n<!-- /table -->"
+
+    page.write_text(MARKED.sub(put, page.read_text("utf-8")), "utf-8")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("names", nargs="*", help=f"default: all of {', '.join(TABLES)}")
+    parser.add_argument("--check", action="store_true", help="write nothing; compare exact rows")
+    given = parser.parse_args()
+    failed = False
+    for page in sorted(ROOT.glob("docs/*.md")):
+        for name in tables_of(page):
+            if given.names and name not in given.names:
+                continue
+            where = f"docs/{page.name}: table {name}"
+            data = SHARED / TABLES[name].needs
+            if not data.is_dir():
+                print(f"{where}: skipped, there is no {data}")
+                failed |= os.environ.get("CI", "").lower() == "true"
+            elif given.check:
+                for line in changed(name, page):
+                    print(f"{where}: the command now prints: {line}")
+                    failed = True
+            else:
+                print(f"{where} …", flush=True)
+                write(name, page)
+    if failed:
+        print("The tables of the docs are not those of the program; run: make docs-tables")
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
