@@ -35,20 +35,20 @@ from numpy.typing import NDArray
 
 from ptmtools.cells import subdivide
 from ptmtools.cells.model import Cells
-from ptmtools.coverage import ach as stage
 from ptmtools.coverage.ach import compute_ach
-from ptmtools.coverage.backend import open_renderer, triangles_of_a_pvs
-from ptmtools.coverage.item_buffer import VIEWS, Surfaces
-from ptmtools.coverage.opengl import OpenGLRenderer, create_context, is_software
+from ptmtools.coverage.backends import BACKENDS
+from ptmtools.coverage.backends.choice import choose, triangles_of_a_pvs
+from ptmtools.coverage.backends.opengl import OpenGLRenderer, create_context, is_software
+from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.options import PRESETS, AchOptions
-from ptmtools.coverage.sampling import CellHints
+from ptmtools.coverage.sampling import CellHints, Sampler
 from ptmtools.errors import MissingComponentError
 from ptmtools.executors import open_executor
 from ptmtools.scene import ingest
 from ptmtools.scene.model import Scene
+from ptmtools.tradeoff.coverage import CoverageTrade
 from ptmtools.tradeoff.experiment import Trade, run
 from ptmtools.tradeoff.figure import picture
-from ptmtools.tradeoff.hints import CoverageTrade
 from ptmtools.tradeoff.report import as_csv
 from ptmtools.visibility.model import Pvs
 from ptmtools.visibility.pvs import compute_pvs
@@ -129,10 +129,7 @@ def accuracy(
                 tried = trade.tried[:FEW] if few else trade.tried
                 found, seconds[backend], _ = trade.hints(replace(options, backend=backend), tried)
                 errors = trade.errors(found)
-                surfaces = Surfaces.of(subjects[name][0], subjects[name][1])
-                chosen = open_renderer(surfaces, *subjects[name][1:], options)
-                auto = chosen.backend
-                chosen.close()
+                auto = choose(*subjects[name][1:], options).name
                 mean = float(errors.mean())
                 if preset == "paper" and backend == auto:
                     base = mean, seconds[backend]
@@ -161,8 +158,8 @@ def grid(report: Report, trials: dict[str, CoverageTrade]) -> list[Trade]:
     report.head("Rates: error ∝ rays^b", ("model", "family", "b"))
     found = []
     for name, trade in trials.items():
-        done = run(trade)
-        found.append(replace(done, stage=name))
+        done = run(name, trade)
+        found.append(done)
         for family, rate in done.rates.items():
             report.row((name, family, f"{rate:.2f}"))
     OUTPUT.mkdir(parents=True, exist_ok=True)
@@ -258,21 +255,19 @@ def speed(report: Report, subjects: dict[str, Subject]) -> None:
         "Speed, one process: wall seconds of the whole over those of the bare loop", columns
     )
     for name, (scene, cells, pvs) in subjects.items():
-        surfaces = Surfaces.of(scene, cells)
         volumes = np.bincount(cells.leaf_cell, cells.leaf_volumes())
         largest = np.argsort(-volumes, kind="stable")[:LARGEST].tolist()
         for face, count in ((4, 512), (8, 256), (64, 8), (256, 2)):
             for backend in ("embree", "gl") if has_gl() else ("embree",):
                 points = min(count, 32) if backend == "gl" else count
                 options = AchOptions(backend=backend, samples=points, face=face)
-                renderer = open_renderer(surfaces, cells, pvs, options)
-                sampler = stage.Sampler(scene, cells, pvs, options, surfaces, renderer)
+                sampler = Sampler(scene, cells, pvs, options, BACKENDS[backend])
                 sampler.of_cell(largest[0])
-                watch = watched(renderer)
+                watch = watched(sampler.renderer)
                 start = time.perf_counter()
                 used = sum(sampler.of_cell(cell).samples for cell in largest)
                 whole = time.perf_counter() - start
-                renderer.close()
+                sampler.renderer.close()
                 rays = used * len(VIEWS) * face**2
                 report.row((
                     name, backend, face, points, f"{used / whole:,.0f}",

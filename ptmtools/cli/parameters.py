@@ -119,6 +119,10 @@ def _option(field: Field[Any], hint: Any, told: str | None) -> Decorator:
     if hint is bool:
         # A switch that is on by default is named by what turns it off.
         flag = f"{flag}/--no-{flag[2:]}"
+    elif table := field.metadata.get("choices"):  # declarations by name
+        settings["type"] = click.Choice(list(table))
+        about = "; ".join(f"{name}: {declared.about}" for name, declared in table.items())
+        settings["help"] = f"{told} — {about}."
     elif get_origin(hint) is Literal:
         settings["type"] = click.Choice([str(choice) for choice in get_args(hint)])
     elif get_origin(hint) is tuple:

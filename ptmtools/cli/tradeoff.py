@@ -17,9 +17,9 @@ from ptmtools.errors import OutputError
 from ptmtools.files import refuse_existing, write_bytes, writing
 from ptmtools.pipeline import Artifacts, DatabaseFolder
 from ptmtools.tradeoff.experiment import Trade, run
+from ptmtools.tradeoff.experiments import EXPERIMENTS, Subject
 from ptmtools.tradeoff.figure import picture, require
 from ptmtools.tradeoff.report import as_csv, table
-from ptmtools.tradeoff.stages import STAGES, experiments
 
 #: Of the reference: so many that settings with fewer remain.
 LEAST_POINTS = 64
@@ -30,7 +30,7 @@ LEAST_POINTS = 64
 @click.option(
     "--stage",
     "stages",
-    type=click.Choice(STAGES),
+    type=click.Choice(list(EXPERIMENTS)),
     multiple=True,
     help="Of which stages; all if not given. May be given several times.",
 )
@@ -81,12 +81,13 @@ def tradeoff(
             _writable(file, force)
     if plot_file:
         require()
-    ready = experiments(Artifacts(DatabaseFolder.open(db)), cells_tried, reference)
+    artifacts = Artifacts(DatabaseFolder.open(db))
     trades = []
     with voice.progress() as progress:
-        for stage in stages or STAGES:
+        for stage in stages or EXPERIMENTS:
             progress(0, 1, f"preparing {stage}")
-            trades.append(run(ready[stage](), progress))
+            experiment = Subject(stage, artifacts, cells_tried, reference).prepared()
+            trades.append(run(stage, experiment, progress))
     if csv_file:
         write_bytes(csv_file, as_csv(trades).encode(), force=force)
     if plot_file:

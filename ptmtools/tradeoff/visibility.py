@@ -14,6 +14,7 @@ import numpy as np
 
 from ptmtools.cells.model import Cells
 from ptmtools.tradeoff.experiment import Measured, Setting, timed
+from ptmtools.tradeoff.experiments import Subject
 from ptmtools.visibility.options import PvsOptions
 from ptmtools.visibility.pvs import compute_pvs
 
@@ -25,10 +26,14 @@ BUDGETS = (200, 2_000, 20_000, 200_000)
 _BASE = PvsOptions(exact=True)
 
 
-class VisibilityTrade:
-    """The experiment of the stage ``pvs``."""
+def prepare(subject: Subject) -> VisibilityTrade:
+    """See `EXPERIMENTS`."""
+    return VisibilityTrade(subject.artifacts.cells, subject.options(PvsOptions))
 
-    stage = "pvs"
+
+class VisibilityTrade:
+    """The experiment of the visibility."""
+
     work = "operations"
     error = "pairs too many, or missing"
     reference_error = 0.0
