@@ -18,9 +18,9 @@ from ptmtools.files import refuse_existing, write_bytes, writing
 from ptmtools.pipeline import Artifacts
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.tradeoff.experiment import Trade, run
+from ptmtools.tradeoff.experiments import EXPERIMENTS
 from ptmtools.tradeoff.figure import picture, require
 from ptmtools.tradeoff.report import as_csv, table
-from ptmtools.tradeoff.stages import STAGES, experiments
 
 #: Of the reference: so many that settings with fewer remain.
 LEAST_POINTS = 64
@@ -31,7 +31,7 @@ LEAST_POINTS = 64
 @click.option(
     "--stage",
     "stages",
-    type=click.Choice(STAGES),
+    type=click.Choice(list(EXPERIMENTS)),
     multiple=True,
     help="Of which stages; all if not given. May be given several times.",
 )
@@ -82,12 +82,13 @@ def tradeoff(
             _writable(file, force)
     if plot_file:
         require()
-    ready = experiments(Artifacts(DatabaseFolder.open(db)), cells_tried, reference)
+    subject = Subject(Artifacts(DatabaseFolder.open(db)), cells_tried, reference)
     trades = []
     with voice.progress() as progress:
-        for stage in stages or STAGES:
+        for stage in stages or EXPERIMENTS:
             progress(0, 1, f"preparing {stage}")
-            trades.append(run(ready[stage](), progress))
+            experiment = EXPERIMENTS[stage].load()(subject)
+            trades.append(run(stage, experiment, progress))
     if csv_file:
         write_bytes(csv_file, as_csv(trades).encode(), force=force)
     if plot_file:

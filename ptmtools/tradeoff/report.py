@@ -32,8 +32,10 @@ def table(trade: Trade, wanted: float | None = None) -> list[str]:
         lines.append(f"  {family}: error ∝ work^{rate:.2f}")
     if wanted is not None:
         found = trade.cheapest(wanted)
-        told = found.setting.name if found else "none of these; the least error is the last star's"
-        lines.append(f"  cheapest for an error of at most {wanted:g}: {told}")
+        answer = (
+            found.setting.name if found else "none of these; the last one with a star is nearest"
+        )
+        lines.append(f"  cheapest for an error of at most {wanted:g}: {answer}")
     return lines
 
 
@@ -59,7 +61,7 @@ def as_csv(trades: Sequence[Trade]) -> str:
         for trial in trade.trials:
             m = trial.measured
             more = " ".join(f"{k}={v:.6g}" for k, v in m.more.items())
-            figures = [f"{m.seconds:.4f}", f"{m.work:.6g}", trade.work, f"{m.error:.6g}"]
-            told = [f"{m.worst:.6g}", trade.error, int(trial.best), more]
-            rows.writerow([trade.stage, trial.setting.name, *figures, *told])
+            cost = [f"{m.seconds:.4f}", f"{m.work:.6g}", trade.work]
+            error = [f"{m.error:.6g}", f"{m.worst:.6g}", trade.error]
+            rows.writerow([trade.stage, trial.setting.name, *cost, *error, int(trial.best), more])
     return text.getvalue()

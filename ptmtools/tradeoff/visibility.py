@@ -13,7 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from ptmtools.cells.model import Cells
+from ptmtools.pipeline.stages import CELLS, PVS
 from ptmtools.tradeoff.experiment import Measured, Setting, timed
+from ptmtools.tradeoff.experiments import Subject
 from ptmtools.visibility.options import PvsOptions
 from ptmtools.visibility.pvs import compute_pvs
 
@@ -25,10 +27,14 @@ BUDGETS = (200, 2_000, 20_000, 200_000)
 _BASE = PvsOptions(exact=True)
 
 
-class VisibilityTrade:
-    """The experiment of the stage ``pvs``."""
+def prepare(subject: Subject) -> VisibilityTrade:
+    """See `EXPERIMENTS`."""
+    return VisibilityTrade(subject.artifacts[CELLS], subject.options(PVS))
 
-    stage = "pvs"
+
+class VisibilityTrade:
+    """The experiment of the visibility."""
+
     work = "operations"
     error = "pairs too many, or missing"
     reference_error = 0.0

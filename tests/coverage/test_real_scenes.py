@@ -13,7 +13,7 @@ import pytest
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.subdivision import subdivide
 from ptmtools.coverage.ach import compute_ach
-from ptmtools.coverage.opengl import APT
+from ptmtools.coverage.backends.opengl import APT
 from ptmtools.coverage.options import AchOptions
 from ptmtools.scene.ingestion import ingest
 from ptmtools.visibility.pvs import compute_pvs

@@ -1,4 +1,4 @@
-"""Compiled rays through pixel centres, and the count of whom the pixels belong to."""
+"""Compiled rays through pixel centres, and the tally of whom the pixels belong to."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ Ints = NDArray[np.int64]
 
 @kernel
 def cast_rays(
-    eye: Floats, shift: Floats, face: int, views: Floats, origin: Singles, along: Singles
+    point: Floats, shift: Floats, face: int, views: Floats, origin: Singles, along: Singles
 ) -> None:
     """Writes origins and directions (6 K face², 3) of the rays of K sample points, in the order
     (point, view, row, column).
 
     Parameters
     ----------
-    eye: (K, 3) the points.
+    point: (K, 3) the points.
     shift: (K, 2) how far right and up of the pixel centres, in units of half a view.
     views: (6, 3, 3) right, up and forward of each view; a direction has 1 forward.
     """
     at = 0
-    for k in range(len(eye)):
-        x, y, z = np.float32(eye[k, 0]), np.float32(eye[k, 1]), np.float32(eye[k, 2])
+    for k in range(len(point)):
+        x, y, z = np.float32(point[k, 0]), np.float32(point[k, 1]), np.float32(point[k, 2])
         for v in range(len(views)):
             for row in range(face):
                 up = (2.0 * row + 1.0) / face - 1.0 + shift[k, 1]
@@ -52,9 +52,9 @@ def weigh(face: int, shift: Floats, unit: int, weight: Ints) -> None:
 
 
 @kernel
-def tally(
+def add_pixels(
     shows: NDArray[np.int32],
-    eye: Floats,
+    point: Floats,
     plane: Floats,
     owner: NDArray[np.int32],
     column: NDArray[np.int32],
@@ -63,12 +63,12 @@ def tally(
     in_views: Ints,
     doubt: Ints,
 ) -> int:
-    """Adds up whom the pixels belong to; returns how many it could not place.
+    """Adds up whom the pixels belong to; returns how many are in doubt.
 
     Parameters
     ----------
     shows: (K, 6, face²) the triangle in each pixel, -1 for none.
-    eye: (K, 3) the sample points.
+    point: (K, 3) the sample points.
     plane: (M, 4) of the triangles, in the coordinates of the points; it is seen from the front
         where the plane's value is above 0.
     owner: (M, 2) to whom a pixel counts that shows a triangle from its front or back, or -1.
@@ -81,7 +81,7 @@ def tally(
     doubted = 0
     views, size = shows.shape[1], shows.shape[2]
     for k in range(len(shows)):
-        x, y, z = eye[k, 0], eye[k, 1], eye[k, 2]
+        x, y, z = point[k, 0], point[k, 1], point[k, 2]
         of = min(k, len(weight) - 1)
         for v in range(views):
             for i in range(size):

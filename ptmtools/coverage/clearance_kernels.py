@@ -1,4 +1,4 @@
-"""Compiled distances of points from triangles, crossings of rays, and descent through the BSP."""
+"""Compiled distances of points from triangles, and crossings of rays with them (`solids`)."""
 
 from __future__ import annotations
 
@@ -8,21 +8,6 @@ from numpy.typing import NDArray
 from ptmtools.compiled import kernel
 
 Floats = NDArray[np.float64]
-
-
-@kernel
-def locate_leaves(
-    points: Floats, plane: Floats, child: NDArray[np.int32], leaf: NDArray[np.int32]
-) -> None:
-    """Writes into ``leaf`` (n,) the leaf that contains each of the (n, 3) points, or -1, for a tree
-    of (N, 4) planes and (N, 2) children with N > 0; as `Cells.locate_leaf`, box aside."""
-    for i in range(len(points)):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        node = 0
-        while node >= 0:
-            side = plane[node, 0] * x + plane[node, 1] * y + plane[node, 2] * z + plane[node, 3]
-            node = child[node, 0] if side > 0 else child[node, 1]
-        leaf[i] = -2 - node if node <= -2 else -1
 
 
 @kernel
