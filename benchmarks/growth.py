@@ -46,7 +46,6 @@ from ptmtools.coverage.options import AchOptions
 from ptmtools.database import TextureRecord, emit
 from ptmtools.pipeline.archive import pack_arrays, unpack_arrays
 from ptmtools.scene import Scene, SourceImage, ingest
-from ptmtools.tolerance import Tolerance
 from ptmtools.visibility import Pvs, compute_pvs
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -98,7 +97,7 @@ class Work:
             return lambda: subdivide(scene, replace(options, cells="leaf"))
         if stage == "rooms":
             leaves = Cells.from_arrays(self._arrays("leaves"))
-            return lambda: grouped(leaves, options, Tolerance.for_points(scene.points))
+            return lambda: grouped(leaves, options)
         cells = Cells.from_arrays(self._arrays("rooms"))
         if stage == "pvs":
             return lambda: compute_pvs(cells)

@@ -18,7 +18,6 @@ from ptmtools.cells.model import Cells
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.rooms import room_of_leaf
 from ptmtools.cells.sight import sampled_sight
-from ptmtools.tolerance import Tolerance
 
 #: Shares of a triangle that differ by less are equal, in digits.
 DIGITS = 6
@@ -26,18 +25,16 @@ DIGITS = 6
 ONE_HALL = "visibility culling gains nothing here: 1 hall"
 
 
-def grouped(cells: Cells, options: SubdivideOptions, tolerance: Tolerance) -> Cells:
+def grouped(cells: Cells, options: SubdivideOptions) -> Cells:
     """The cells that the options ask for, of cells that are single leaves.
 
     Cells are numbered in the order of their first leaves; geometry in a boundary between two
     leaves of one cell lies inside that cell.
     """
     if options.cells == "room":
-        cells = _joined(cells, numbered(_groups(cells, options.gain, tolerance)))
+        cells = _joined(cells, numbered(_groups(cells, options.gain)))
     if cells.cell_count == 1:
-        cells = replace(
-            cells, notes=(*cells.notes, "visibility culling gains nothing here: 1 hall")
-        )
+        cells = replace(cells, notes=(*cells.notes, ONE_HALL))
     return cells
 
 
@@ -80,9 +77,9 @@ def rank_in_file(cells: Cells) -> NDArray[np.int64]:
     return rank
 
 
-def _groups(cells: Cells, gain: float, tolerance: Tolerance) -> NDArray[np.integer]:
+def _groups(cells: Cells, gain: float) -> NDArray[np.integer]:
     rank = rank_in_file(cells)
-    room = room_of_leaf(cells, tolerance, rank)
+    room = room_of_leaf(cells, rank)
     if gain >= 1 or len(np.unique(room)) == len(room):
         return room
     inner = cells.portal_leaf[room[cells.portal_leaf[:, 0]] == room[cells.portal_leaf[:, 1]]]

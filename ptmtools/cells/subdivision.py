@@ -24,7 +24,6 @@ from ptmtools.cells.caps import Caps
 from ptmtools.cells.grouping import grouped
 from ptmtools.cells.model import OUTSIDE, Cells
 from ptmtools.cells.options import CellKind, SubdivideOptions
-from ptmtools.cells.orientation import main_axes
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import Portals, find_portals, portals_rejoined
@@ -36,6 +35,7 @@ from ptmtools.errors import InputError
 from ptmtools.executors.aside import Begin, asked
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
+from ptmtools.scene.orientation import main_axes
 from ptmtools.tolerance import Tolerance
 
 #: How far the first root box stands off the model, as a share of the model's extent.
@@ -107,7 +107,7 @@ def subdivide(
     options = options or SubdivideOptions()
     _check(scene, options)
     axes = main_axes(scene.corners)
-    tolerance = Tolerance.for_points(scene.points @ axes.T).for_walls(options.wall_thickness)
+    tolerance = scene.tolerance.for_walls(options.wall_thickness)
     corners = scene.corners[structural_triangles(scene, options)]
     model = _Model(corners, find_walls(scene, options, tolerance), options, tolerance)
     low, high = _bounds(scene.corners @ axes.T)
@@ -130,7 +130,7 @@ def subdivide(
             "hold walls that do not part them and so hide nothing; raise --max-cells"
         )
     pieces = cut_to_leaves(scene, space.tree, tolerance)
-    return grouped(_assemble(scene, space, pieces, notes), options, tolerance)
+    return grouped(_assemble(scene, space, pieces, notes), options)
 
 
 def _check(scene: Scene, options: SubdivideOptions) -> None:
@@ -299,6 +299,7 @@ def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> 
         triangle=triangle,
         triangle_source=pieces.source[owned].astype(np.int32),
         triangle_cell=owner[owned].astype(np.int32),
+        tolerance=scene.tolerance,
         closed=space.reach.closed,
         notes=tuple(notes),
     )

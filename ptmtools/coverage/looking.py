@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.eyes import Eyes
 from ptmtools.coverage.item_buffer import VIEWS, Renderer, Surfaces
-from ptmtools.tolerance import Tolerance
 
 #: Weight of a pixel in the middle of a view where pixels are weighted by solid angle.
 SOLID_ANGLE_UNIT = 2**16
@@ -120,7 +119,7 @@ class Looker:
         self._surfaces = surfaces
         self._cells = cells
         self._face = face
-        self._towards = TOWARDS * Tolerance.for_points(cells.vertex).plane
+        self._towards = TOWARDS * cells.tolerance.plane
 
     def look(self, eyes: Eyes, owners: Owners, wanted: NDArray[np.int64]) -> Seen:
         """What is seen of the (m,) ``wanted`` owners."""

@@ -17,7 +17,6 @@ from ptmtools.coverage.matter import Surroundings
 from ptmtools.coverage.options import AchOptions
 from ptmtools.coverage.placement import Tetrahedra, Volume
 from ptmtools.scene.model import Scene
-from ptmtools.tolerance import Tolerance
 from ptmtools.visibility.model import Pvs
 
 #: The default clearance as a share of the thinnest that a cell may be, so that even such a cell
@@ -68,8 +67,7 @@ class Sampler:
         self._cells, self._pvs, self._options = cells, pvs, options
         self._around = Surroundings.of(scene, cells)
         self._tetrahedra = Tetrahedra.of(cells)
-        thin = Tolerance.for_points(scene.points).thin
-        self._clearance = options.clearance or CLEARANCE * thin
+        self._clearance = options.clearance or CLEARANCE * scene.tolerance.thin
         self._owners = Owners.of(surfaces, options.per_texture)
         by_angle = options.weighting == "solid-angle"
         self._looker = Looker(renderer, surfaces, cells, options.side, by_angle=by_angle)

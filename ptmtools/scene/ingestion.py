@@ -33,6 +33,7 @@ from ptmtools.scene.faces import KeptFaces, keep_faces
 from ptmtools.scene.images import ImageStore
 from ptmtools.scene.model import Camera, Material, Scene, Space
 from ptmtools.scene.options import IngestOptions
+from ptmtools.scene.orientation import tolerance_of
 from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import MAX_VERTICES, Findings, Source
 from ptmtools.scene.texels import uses_holes
@@ -124,15 +125,17 @@ def ingest(
     progress(len(used_material), len(used_material), "materials")
     if options.strict:
         findings.enforce()
+    points, triangles = _to_world(kept.points, space), kept.triangles.astype(np.int32)
     return Scene(
-        points=_to_world(kept.points, space),
-        triangles=kept.triangles.astype(np.int32),
+        points=points,
+        triangles=triangles,
         uv=uv,
         triangle_object=triangle_object.astype(np.int32),
         triangle_material=triangle_material.astype(np.int32),
         two_sided=_two_sided(kept, source),
         objects=tuple(source.objects[i] for i in used_object.tolist()),
         materials=tuple(materials),
+        tolerance=tolerance_of(points, triangles),
         images=store.images,
         cameras=tuple(_camera(camera, space) for camera in source.cameras),
         space=space,

@@ -263,7 +263,7 @@ def test_same_input_same_arrays(room_row) -> None:
 @pytest.mark.parametrize("scale", [1e-6, 1e-3, 1e3, 1e6])
 def test_the_subdivision_scales_with_the_scene(room_row, scale: float) -> None:
     scene, _ = room_row(3)
-    large = replace(scene, points=scene.points * scale)
+    large = scene.with_points(scene.points * scale)
     cells = subdivide(large, SubdivideOptions(wall_area=2 * scale**2))
     assert cells.closed
     assert cells.cell_count == 3
