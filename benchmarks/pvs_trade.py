@@ -131,7 +131,7 @@ def warm_up(folder: Path) -> None:
 
     scene = ingest(WARM_UP)
     subdivide(scene)
-    cells = stored(folder, "small", subdivide(scene, SubdivideOptions(cells="leaf", max_cells=4)))
+    cells = stored(folder, "small", subdivide(scene, SubdivideOptions(cells="leaf", max_leaves=4)))
     for method in METHODS:
         compute_pvs(cells, PvsOptions(method=method))
 

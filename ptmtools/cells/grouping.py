@@ -54,13 +54,8 @@ def rank_in_file(cells: Cells) -> NDArray[np.int64]:
     Leaves themselves are numbered as planes split them, and which side of a plane is its front
     depends on how the model is turned.
     """
-    a, b, c = np.moveaxis(cells.vertex[cells.triangle], 1, 0)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    leaf, piece, area = _sides(cells)
     source = cells.triangle_source
-    front, back = cells.triangle_cell.T
-    behind = (back >= 0) & (back != front)
-    leaf = np.concatenate([front[front >= 0], back[behind]]).astype(np.int64)
-    piece = np.concatenate([np.flatnonzero(front >= 0), np.flatnonzero(behind)])
     count = int(source.max(initial=-1)) + 1
     pair, row = np.unique(leaf * count + source[piece], return_inverse=True)
     held = np.bincount(row, area[piece])
@@ -85,20 +80,23 @@ def _groups(cells: Cells, gain: float) -> NDArray[np.integer]:
     inner = cells.portal_leaf[room[cells.portal_leaf[:, 0]] == room[cells.portal_leaf[:, 1]]]
     order = np.argsort(rank)
     sees = sampled_sight(cells)[np.ix_(order, order)]
-    weights = cells.leaf_volumes()[order], _surface(cells)[order]
+    leaf, piece, area = _sides(cells)
+    surface: NDArray[np.float64] = np.bincount(leaf, area[piece], cells.leaf_count)
+    weights = cells.leaf_volumes()[order], surface[order]
     return join_by_gain(sees, *weights, rank[inner], gain)[rank]
 
 
-def _surface(cells: Cells) -> NDArray[np.float64]:
-    """(C,) m² of the surfaces of each cell; what lies in a boundary counts on both sides."""
+def _sides(
+    cells: Cells,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """(n,) leaves and (n,) pieces of geometry that belong to them, of cells that are single leaves;
+    what lies in a boundary counts on both sides. And (M,) the areas of the pieces, m²."""
     a, b, c = np.moveaxis(cells.vertex[cells.triangle], 1, 0)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
     front, back = cells.triangle_cell.T
-    total = np.zeros(cells.cell_count)
-    np.add.at(total, front[front >= 0], area[front >= 0])
     behind = (back >= 0) & (back != front)
-    np.add.at(total, back[behind], area[behind])
-    return total
+    leaf = np.concatenate([front[front >= 0], back[behind]]).astype(np.int64)
+    piece = np.concatenate([np.flatnonzero(front >= 0), np.flatnonzero(behind)])
+    return leaf, piece, np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
 
 
 def _joined(cells: Cells, group: NDArray[np.int32]) -> Cells:

@@ -58,11 +58,11 @@ def room_of_leaf(
     waiting = [(-regions.openness(a, b), a, b) for a, b in regions.pairs()]
     heapq.heapify(waiting)
     while waiting:
-        told, a, b = heapq.heappop(waiting)
+        known, a, b = heapq.heappop(waiting)
         if not regions.are_neighbours(a, b):
             continue
         share = regions.openness(a, b)
-        if -told > share:  # one of them has grown meanwhile
+        if -known > share:  # one of them has grown meanwhile
             heapq.heappush(waiting, (-share, a, b))
         elif share >= least:
             for c, d in regions.join(a, b):

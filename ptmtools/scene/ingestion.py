@@ -97,7 +97,7 @@ def ingest(
             f"({kept.degenerate} degenerate, {kept.not_finite} with coordinates not finite)",
             file=model,
         )
-    _tell_faces(kept, source, findings)
+    _note_faces(kept, source, findings)
     space = _settle_space(model, kept, source, metres, options.up, findings)
     uv = source.uv[kept.source]
     finite_uv = np.asarray(np.isfinite(uv).all(axis=(1, 2)))
@@ -186,7 +186,7 @@ def _read(
         ) from None
 
 
-def _tell_faces(kept: KeptFaces, source: Source, findings: Findings) -> None:
+def _note_faces(kept: KeptFaces, source: Source, findings: Findings) -> None:
     if kept.degenerate:
         findings.miss("PTM-N209", "degenerate faces dropped", "", kept.degenerate)
     if kept.not_finite:
@@ -298,7 +298,7 @@ def _material(
     store: ImageStore,
     findings: Findings,
 ) -> Material:
-    """The material as its kept ``faces``, by number, need it."""
+    """The material as its kept ``faces`` (indices of triangles) need it."""
     given = source.materials[index]
     texture = given.texture
     image = -1

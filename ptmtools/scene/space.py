@@ -2,7 +2,7 @@
 
 Up: floors and ceilings are large and level, and buildings are wider than high. Both are measured
 as shares and added. Unit: the one in which a building of this size is most plausible. Neither
-can be certain (a house drawn in feet may pass for a hall in metres), so both are told, and the
+can be certain (a house drawn in feet may pass for a hall in metres), so both are noted, and the
 user can give them.
 """
 

@@ -151,7 +151,7 @@ def test_a_limit_that_was_reached_is_said() -> None:
     scene = scene_of(shell(4))
     whole = subdivide(scene, SubdivideOptions(cells="leaf"))
     assert not any("limit" in note for note in whole.notes)
-    cut = subdivide(scene, SubdivideOptions(cells="leaf", max_cells=10))
+    cut = subdivide(scene, SubdivideOptions(cells="leaf", max_leaves=10))
     (said,) = [note for note in cut.notes if "limit" in note]
     assert said.startswith("the limit of 10 leaves was reached: ")
-    assert "--max-cells" in said
+    assert "--max-leaves" in said

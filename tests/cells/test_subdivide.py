@@ -173,11 +173,11 @@ def test_detail_and_structural_by_name(quads, room_faces) -> None:
     assert np.all(structural_triangles(scene, both))
 
 
-def test_max_cells_keeps_the_best_splits(room_row) -> None:
+def test_max_leaves_keeps_the_best_splits(room_row) -> None:
     scene, _ = room_row(6)
-    cells = subdivide(scene, SubdivideOptions(max_cells=3))
+    cells = subdivide(scene, SubdivideOptions(max_leaves=3))
     assert cells.cell_count <= 3
-    assert subdivide(scene, SubdivideOptions(max_cells=1)).cell_count == 1
+    assert subdivide(scene, SubdivideOptions(max_leaves=1)).cell_count == 1
 
 
 def test_the_flood_starts_at_the_viewpoints(quads, room_faces) -> None:
@@ -275,7 +275,7 @@ def test_the_subdivision_scales_with_the_scene(room_row, scale: float) -> None:
     [
         (SubdivideOptions(wall_area=0), "PTM-I300"),
         (SubdivideOptions(wall_area=float("nan")), "PTM-I300"),
-        (SubdivideOptions(max_cells=0), "PTM-I300"),
+        (SubdivideOptions(max_leaves=0), "PTM-I300"),
         (SubdivideOptions(viewpoints=((1e3, 0, 0),)), "PTM-I301"),
         (SubdivideOptions(detail=("no such thing",)), "PTM-I302"),
     ],
