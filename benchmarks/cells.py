@@ -32,7 +32,7 @@ def main() -> None:
     if not models:
         parser.exit(message="no model at hand\n")
     print("model         wall m²  cells  portals  average PVS  cut  CPU s: cells    pvs")
-    compute_pvs(subdivide(ingest(models[0]), SubdivideOptions(max_leaves=4)))  # compiles
+    compute_pvs(subdivide(ingest(models[0]), SubdivideOptions(max_cells=4)))  # compiles
     for model in models:
         scene = ingest(model)
         for area in given.wall_area:

@@ -81,7 +81,7 @@ def _groups(cells: Cells, gain: float) -> NDArray[np.integer]:
     order = np.argsort(rank)
     sees = sampled_sight(cells)[np.ix_(order, order)]
     leaf, piece, area = _sides(cells)
-    surface: NDArray[np.float64] = np.bincount(leaf, area[piece], cells.leaf_count)
+    surface = np.bincount(leaf, area[piece], cells.leaf_count).astype(np.float64)
     weights = cells.leaf_volumes()[order], surface[order]
     return join_by_gain(sees, *weights, rank[inner], gain)[rank]
 

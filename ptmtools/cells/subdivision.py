@@ -138,26 +138,16 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
             "a single triangle makes no room",
             remedy="give a model with floors and walls",
         )
-    if not options.wall_area > 0:
-        raise InputError(
-            "PTM-I300", f"wall area {options.wall_area:g} m² is not positive", remedy="try 2"
-        )
-    if not options.wall_thickness >= 0:
-        raise InputError("PTM-I300", f"wall thickness {options.wall_thickness:g} m is negative")
-    if not 0 <= options.gain <= 1:
-        raise InputError(
-            "PTM-I300",
-            f"a gain of {options.gain:g} is not between 0 and 1",
-            remedy="try 0.1",
-        )
-    if options.cells not in get_args(CellKind):
-        raise InputError(
-            "PTM-I300", f"unknown kind of cells {options.cells!r}", remedy="give leaf or room"
-        )
-    if options.max_leaves < 1:
-        raise InputError(
-            "PTM-I300", f"at most {options.max_leaves} leaves is too few", remedy="try 500"
-        )
+    area, thickness, gain = options.wall_area, options.wall_thickness, options.gain
+    for sound, fault, remedy in (
+        (area > 0, f"wall area {area:g} m² is not positive", "try 2"),
+        (thickness >= 0, f"wall thickness {thickness:g} m is negative", "try 0.5"),
+        (0 <= gain <= 1, f"a gain of {gain:g} is not between 0 and 1", "try 0.1"),
+        (options.cells in get_args(CellKind), f"unknown cells {options.cells!r}", "leaf or room"),
+        (options.max_leaves >= 1, f"at most {options.max_leaves} leaves is too few", "try 500"),
+    ):
+        if not sound:
+            raise InputError("PTM-I300", fault, remedy=remedy)
     names = (*scene.objects, *(material.name for material in scene.materials))
     for pattern in (*options.structural, *options.detail):
         if not any(matches(name, (pattern,)) for name in names):

@@ -11,6 +11,7 @@ format.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -84,13 +85,12 @@ def _read(
     )
     if unsupported:
         raise _unread(path, f"needs the glTF extension {unsupported[0]}")
-    order = _reachable(tree)
-    draws = _draws(path, tree, order, findings, max_triangles)
+    world_of = _world_matrices(tree)
+    draws = _draws(path, tree, world_of, findings, max_triangles)
     if not draws:
         raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with triangles")
     painter = MaterialReader(path, document, folder, findings)
     painted = [painter.read(draw.primitive.get("material")) for draw in draws]
-    world_of = _world_matrices(tree, order)
     points: list[NDArray[np.float64]] = []
     triangles: list[NDArray[np.int64]] = []
     uv: list[NDArray[np.float64]] = []
@@ -140,8 +140,9 @@ def _unread(path: Path, what: str, place: str | None = None) -> InputError:
     )
 
 
-def _reachable(tree: dict[str, Any]) -> list[int]:
-    """Nodes of the scene, parents first; of the first scene if none is the default."""
+def _world_matrices(tree: dict[str, Any]) -> dict[int, NDArray[np.float64]]:
+    """(4, 4) local to world of each node of the scene (section 3.5.3), parents first; of the first
+    scene if none is the default."""
     nodes = tree.get("nodes", [])
     scenes = tree.get("scenes", [])
     if scenes:
@@ -149,21 +150,20 @@ def _reachable(tree: dict[str, Any]) -> list[int]:
     else:
         children = {child for node in nodes for child in node.get("children", [])}
         roots = [i for i in range(len(nodes)) if i not in children]
-    order: list[int] = []
-    seen: set[int] = set()
-    stack = list(reversed(roots))
+    world: dict[int, NDArray[np.float64]] = {}
+    stack = [(root, np.eye(4)) for root in reversed(roots)]
     while stack:
-        node = natural(stack.pop())
-        if node in seen:
+        node, above = stack.pop()
+        if natural(node) in world:
             raise ValueError(f"node {node} has two parents")
-        seen.add(node)
-        order.append(node)
-        stack.extend(reversed(nodes[node].get("children", [])))
-    return order
+        with np.errstate(all="ignore"):
+            world[node] = above @ _local_matrix(nodes[node])
+        stack += [(child, world[node]) for child in reversed(nodes[node].get("children", []))]
+    return world
 
 
 def _draws(
-    path: Path, tree: dict[str, Any], order: list[int], findings: Findings, max_triangles: int
+    path: Path, tree: dict[str, Any], order: Iterable[int], findings: Findings, max_triangles: int
 ) -> list[_Draw]:
     draws = []
     vertices = triangles = 0
@@ -209,18 +209,6 @@ def _draws(
             remedy="raise the limit (--max-triangles), or split the model",
         )
     return draws
-
-
-def _world_matrices(tree: dict[str, Any], order: list[int]) -> dict[int, NDArray[np.float64]]:
-    """(4, 4) local to world of each node (section 3.5.3), in ``order``, parents first."""
-    world: dict[int, NDArray[np.float64]] = {}
-    above: dict[int, NDArray[np.float64]] = {}
-    with np.errstate(all="ignore"):
-        for node in order:
-            entry = tree["nodes"][node]
-            world[node] = above.get(node, np.eye(4)) @ _local_matrix(entry)
-            above.update(dict.fromkeys(entry.get("children", []), world[node]))
-    return world
 
 
 def _local_matrix(entry: dict[str, Any]) -> NDArray[np.float64]:

@@ -319,5 +319,7 @@ def test_axes_are_the_buildings_own(room_row) -> None:
     axes = main_axes(scene.corners @ turn.T)
     assert np.allclose(axes @ axes.T, np.eye(3))
     assert np.allclose(np.sort(np.abs(axes @ turn), axis=1), [0, 0, 1])
+    turned = scene.with_points(scene.points @ turn.T)
+    assert turned.tolerance.extent == pytest.approx(scene.tolerance.extent)
     assert np.array_equal(main_axes(scene.corners[:2]), np.eye(3))  # one floor: no second axis
     assert np.array_equal(main_axes(np.zeros((0, 3, 3))), np.eye(3))

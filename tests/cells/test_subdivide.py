@@ -14,15 +14,6 @@ from ptmtools.scene.model import Material, Scene
 LEAF = SubdivideOptions(cells="leaf")
 
 
-def volume(cells: Cells, leaf: int) -> float:
-    centre = cells.leaf_points(leaf).mean(axis=0)
-    total = 0.0
-    for loop in cells.leaf_faces(leaf):
-        p = cells.leaf_point[loop] - centre
-        total += sum(float(np.linalg.det(p[[0, i, i + 1]])) for i in range(1, len(p) - 1))
-    return total / 6
-
-
 def piece_areas(cells: Cells) -> np.ndarray:
     p = cells.vertex[cells.triangle]
     return np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / 2
@@ -36,8 +27,7 @@ def test_a_row_of_rooms(room_row, rooms: int) -> None:
     assert cells.cell_count == rooms
     assert cells.portal_count == rooms - 1
     assert np.allclose(cells.portal_area, 6.0)
-    for leaf in range(rooms):
-        assert volume(cells, leaf) == pytest.approx(64)
+    assert np.allclose(cells.leaf_volumes(), 64)
     middles = np.array([[4 * i + 2.0, 2, 0] for i in range(rooms)])
     where = cells.locate(middles)
     assert sorted(where) == list(range(rooms))
@@ -256,8 +246,12 @@ def test_same_input_same_arrays(room_row) -> None:
     scene, _ = room_row(3)
     first, second = subdivide(scene).to_arrays(), subdivide(scene).to_arrays()
     assert all(np.array_equal(first[k], second[k]) for k in first)
-    back = Cells.from_arrays(first).to_arrays()
-    assert all(np.array_equal(first[k], back[k]) for k in first)
+    back = Cells.from_arrays(first)
+    assert all(np.array_equal(first[k], array) for k, array in back.to_arrays().items())
+    assert back.tolerance == scene.tolerance
+    for extent in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match=r"extent"):
+            Cells.from_arrays({**first, "extent": np.array(extent)})
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1e-3, 1e3, 1e6])
