@@ -17,7 +17,9 @@ COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5
 ITEMS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 
 
-def elements(accessor: Mapping[str, Any], view: Mapping[str, Any], data: bytes) -> NDArray[Any]:
+def elements(
+    accessor: Mapping[str, Any], view: Mapping[str, Any], data: bytes | memoryview
+) -> NDArray[Any]:
     """(count, items) the elements of an accessor whose buffer view lies in ``data``, as stored.
 
     Raises ValueError if it has no elements or ends beyond its view or the data, and KeyError for a

@@ -1,13 +1,13 @@
 """Caps: small polygons that close the whole cross-section of a leaf.
 
-The planes of walls go on behind them and cut the solid matter of floors and walls into wedges. A
+The planes of walls go on behind them and cut the solids of floors and walls into wedges. A
 flight of stairs does so to the floor slab beside it: between the slope and the top of the slab
-lie matter and a piece of the stairwell, and what parts the two is the edge of the slab, smaller
+lie a solid and a piece of the stairwell, and what parts the two is the edge of the slab, smaller
 than a wall; nor is it a reveal, for the wedge lies between no two parallel faces. It is
 recognised by what it does: no opening is left beside it. Such a split costs one leaf and never a
 portal. A polygon that leaves an opening, however small, is none.
 
-No area is too small: a chain of matter is as open as its narrowest end, and in the museum of 50
+No area is too small: a chain of solids is as open as its narrowest end, and in the museum of 50
 rooms, with caps of 0.02 m² and more only, all of the 992 leaves stay that 365 are with all caps.
 """
 

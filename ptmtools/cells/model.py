@@ -2,7 +2,7 @@
 
 A *leaf* is a convex polyhedron, a leaf of the BSP tree that somebody can reach; a *cell* is a
 union of leaves, one each or as many as make up a room (`leaf_cell`). Index -1 means "no cell":
-solid matter, the outside of a closed model, or what nobody can reach.
+solids, the outside of a closed model, or what nobody can reach.
 
 Lists of varying length are CSR: row i of ``x`` is ``x[x_start[i]:x_start[i + 1]]``.
 """

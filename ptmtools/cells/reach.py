@@ -2,7 +2,7 @@
 
 The flood starts from the viewpoints, else from the largest leaf that has floor below it and does
 not touch the root box, and runs through the portals. The model is closed if it never meets the
-root box; what it does not reach is solid matter, a sealed void or the outside (design,
+root box; what it does not reach is a solid, a sealed void or the outside (design,
 "Reachable").
 """
 

@@ -1,9 +1,9 @@
 """Reveals: the jambs, lintels and sills that close a wall's thickness around an opening.
 
 Two parallel walls near to one another are the faces of one wall. Between them the BSP leaves a
-slab that holds both solid matter and the doorways through it; the polygons that part the two are
+slab that holds both solids and the doorways through it; the polygons that part the two are
 far smaller than any wall. They are found by what they do: they bridge the slab from face to face.
-Without them, matter that is not capped (a wall ending under a floor slab) would join rooms to the
+Without them, solids that are not capped (a wall ending under a floor slab) would join rooms to the
 outside, and every door in a wall to every other.
 """
 

@@ -69,14 +69,14 @@ class VerifiedBytes:
                 "PTM-I252",
                 f"cannot be read again ({error.strerror or error})",
                 file=self.label,
-                remedy="put it back, or ingest the model anew",
+                remedy="put it back, or build again",
             ) from None
         if hashlib.sha256(data).hexdigest() != self.sha256:
             raise InputError(
                 "PTM-I252",
-                "has changed since the model was ingested",
+                "has changed since the model was read",
                 file=self.label,
-                remedy="ingest the model anew",
+                remedy="build again",
             )
         return data
 

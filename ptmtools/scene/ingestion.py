@@ -317,11 +317,11 @@ def _material(
             if texture is None or mask.label != texture.label:
                 findings.say(
                     "PTM-N217",
-                    f"{mask.what}: marks the material transparent, and is not emitted",
+                    f"{mask.what}: makes the material transparent; the mask itself is not written",
                     mask.place,
                 )
     if given.opacity == 0:
-        findings.say("PTM-N231", f"material {given.name} cannot be seen (opacity 0)")
+        findings.say("PTM-N231", f"material {given.name} is invisible (opacity 0)")
     return Material(
         name=given.name,
         color=given.color or (PLAIN if image < 0 else WHITE),

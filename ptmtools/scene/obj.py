@@ -125,7 +125,7 @@ def read_obj(
     if cut.tangled:
         findings.say(
             "PTM-N221",
-            "polygons that cross themselves, or are too intricate, were cut as fans",
+            "polygons with crossing edges, or too many corners, were cut into fans of triangles",
             path.name,
             cut.tangled,
         )
@@ -144,7 +144,7 @@ def read_obj(
         if len(bare):
             findings.say(
                 "PTM-N229",
-                f"faces of the textured material {materials[index].name} have no vt",
+                f"faces of textured material {materials[index].name} have no texture coordinates",
                 f"{path.name}:{line[bare[0]]}",
                 len(bare),
             )

@@ -1,4 +1,4 @@
-"""Matter that only a polygon smaller than a wall closes, and what is not closed."""
+"""Solids that only a polygon smaller than a wall closes, and what is not closed."""
 
 from __future__ import annotations
 

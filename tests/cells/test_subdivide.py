@@ -54,7 +54,7 @@ def test_portals_lie_in_both_leaves_and_point_forward(room_row) -> None:
 
 
 @pytest.mark.parametrize("length", [4, 500])
-def test_walls_with_thickness_leave_solid_matter_out(quads, room_faces, length: float) -> None:
+def test_walls_with_thickness_leave_solids_out(quads, room_faces, length: float) -> None:
     # Two rooms 0.3 m apart, a door tunnel between them with jambs, floor and lintel. In a building
     # of 500 m 0.3 m is less than the cluster distance would be without a bound.
     left = room_faces((0, 0, -2), (4, 4, 2), "+x")
@@ -69,11 +69,11 @@ def test_walls_with_thickness_leave_solid_matter_out(quads, room_faces, length: 
     inside = cells.locate(np.array([[2.0, 1, 0], [4.15, 1, 0], [6, 1, 0]]))
     assert len(set(inside)) == 3
     assert np.all(inside >= 0)
-    # The doorway is a cell of its own; the matter around it and the outside are nobody's.
+    # The doorway is a cell of its own; the solid around it and the outside are nobody's.
     assert cells.cell_count == 3
-    matter = [[4.15, 3.5, 0], [4.15, 1, 1.5], [4.15, 1, -1.5]]
+    solid = [[4.15, 3.5, 0], [4.15, 1, 1.5], [4.15, 1, -1.5]]
     outside = [[-0.5, 1, 0], [2, 4.5, 0], [5 + length, 1, 0]]
-    assert np.all(cells.locate(np.array(matter + outside)) == -1)
+    assert np.all(cells.locate(np.array(solid + outside)) == -1)
 
 
 def test_no_ceiling_is_open_and_said(quads, room_faces, partition) -> None:
