@@ -42,7 +42,6 @@ from ptmtools.coverage.sampling import CLEARANCE
 from ptmtools.coverage.solids import Obstacles
 from ptmtools.coverage.tally import PixelCounter
 from ptmtools.scene import Scene, ingest
-from ptmtools.tolerance import Tolerance
 from ptmtools.visibility import Pvs, compute_pvs
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -62,7 +61,7 @@ def views(scene: Scene, leaves: Cells, seed: int) -> list[tuple[int, NDArray[np.
     """For random places, uniform over the volume and outside solids, the leaf and (L,) the pixels
     that each leaf covers, seen from there."""
     obstacles, surfaces = Obstacles.of(scene, leaves), Surfaces.of(scene, leaves)
-    clearance = CLEARANCE * Tolerance.for_points(scene.points).thin
+    clearance = CLEARANCE * scene.tolerance.thin
     random = np.random.default_rng(seed)
     low, high = leaves.root_box
     points = np.zeros((0, 3))
@@ -117,14 +116,13 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|---|---|---|")
     for model in [m for m in given.models or MODELS if m.is_file()]:
         scene = ingest(model)
-        tolerance = Tolerance.for_points(scene.points)
         leaves = subdivide(scene, LEAF)
-        rooms = grouped(leaves, WHOLE, tolerance)
+        rooms = grouped(leaves, WHOLE)
         way = passed(leaves, standard_walk(rooms).corner)
         seen = views(scene, leaves, seed=1)
         for name, options in kinds.items():
             start = time.process_time()
-            cells = grouped(leaves, options, tolerance)
+            cells = grouped(leaves, options)
             pvs = compute_pvs(cells)
             ach = compute_ach(scene, cells, pvs, AchOptions(backend="embree"))
             seconds = time.process_time() - start

@@ -199,6 +199,8 @@ def _option(field: Field[Any], hint: Any, text: str | None, former: str = "") ->
     default = None if former else _default(field)
     name = former or _option_name(field)
     settings: dict[str, Any] = {"default": default, "help": text, "hidden": bool(former)}
+    if former:
+        settings["help"] = f"Now --{_option_name(field)}."
     if get_origin(hint) in (Union, UnionType):  # X | None
         hint = next(part for part in get_args(hint) if part is not NoneType)
     if default not in (None, (), ""):

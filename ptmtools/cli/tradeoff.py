@@ -18,7 +18,7 @@ from ptmtools.files import refuse_existing, write_bytes, writing
 from ptmtools.pipeline import Artifacts
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.tradeoff.experiment import Trade, run
-from ptmtools.tradeoff.experiments import EXPERIMENTS
+from ptmtools.tradeoff.experiments import EXPERIMENTS, Subject
 from ptmtools.tradeoff.figure import picture, require
 from ptmtools.tradeoff.report import as_csv, table
 

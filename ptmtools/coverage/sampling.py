@@ -19,7 +19,6 @@ from ptmtools.coverage.sample_points import PointFinder, PointSequence, SamplePo
 from ptmtools.coverage.solids import Obstacles
 from ptmtools.coverage.tally import PixelCounter, Tally
 from ptmtools.scene.model import Scene
-from ptmtools.tolerance import Tolerance
 from ptmtools.visibility.model import Pvs
 
 #: The default clearance as a share of the thinnest that a cell may be, so that even such a cell
@@ -64,8 +63,7 @@ class Sampler:
         self.options, self.backend = options, backend
         self._obstacles = Obstacles.of(scene, cells)
         self._tetrahedra = Tetrahedra.of(cells)
-        thin = Tolerance.for_points(scene.points).thin
-        self._clearance = options.clearance or CLEARANCE * thin
+        self._clearance = options.clearance or CLEARANCE * scene.tolerance.thin
         surfaces = Surfaces.of(scene, cells)
         self.renderer = backend.open(surfaces, options.side, options.gpu)
         self._counter = PixelCounter(

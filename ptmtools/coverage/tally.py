@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.item_buffer import VIEWS, Renderer, Surfaces
 from ptmtools.coverage.sample_points import SamplePoints
-from ptmtools.tolerance import Tolerance
 
 #: Weight of a pixel in the middle of a view where pixels are weighted by solid angle.
 SOLID_ANGLE_UNIT = 2**16
@@ -140,7 +139,7 @@ class PixelCounter:
         self._surfaces = surfaces
         self._cells = cells
         self._face = face
-        self._towards = TOWARDS * Tolerance.for_points(cells.vertex).plane
+        self._towards = TOWARDS * cells.tolerance.plane
 
     def count(self, points: SamplePoints, wanted: NDArray[np.int64]) -> Tally:
         """How many pixels show each of the (m,) ``wanted`` owners."""

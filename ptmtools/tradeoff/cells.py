@@ -38,7 +38,7 @@ class CellsTrade:
 
     def __init__(self, scene: Scene, options: SubdivideOptions) -> None:
         self._scene, self._options = scene, options
-        few = subdivide(scene, replace(options, max_cells=WARM))
+        few = subdivide(scene, replace(options, max_leaves=WARM))
         compute_pvs(few, PvsOptions(method="fast"))  # now both are compiled
 
     def settings(self) -> Sequence[Setting]:

@@ -153,7 +153,7 @@ def moved_and_scaled(
         portal_point=cells.portal_point * factor + offset,
         vertex=cells.vertex * factor + offset,
     )
-    return replace(scene, points=scene.points * factor + offset), cut
+    return scene.with_points(scene.points * factor + offset), cut
 
 
 @pytest.fixture(scope="session")

@@ -20,7 +20,6 @@ from ptmtools.coverage.sampling import CLEARANCE, Sampler
 from ptmtools.coverage.solids import Obstacles
 from ptmtools.coverage.tally import PixelCounter
 from ptmtools.scene.model import Material, Scene
-from ptmtools.tolerance import Tolerance
 from ptmtools.visibility.model import Pvs
 
 SOME = AchOptions(samples=128, face=4)
@@ -65,7 +64,7 @@ def turned(scene: Scene, cells: Cells, turn: np.ndarray) -> tuple[Scene, Cells]:
         triangle=np.ascontiguousarray(cells.triangle[:, wound]),
     )
     triangles = np.ascontiguousarray(scene.triangles[:, wound])
-    return replace(scene, points=scene.points @ turn.T, triangles=triangles), cut
+    return replace(scene.with_points(scene.points @ turn.T), triangles=triangles), cut
 
 
 def about(axis, degrees: float) -> np.ndarray:
@@ -217,7 +216,7 @@ def test_a_cell_of_a_millimetre(room_row, backend, weighting, through_doors):
         portal_point=squeezed(cells.portal_point),
         vertex=vertex,
     )
-    scene = replace(scene, points=squeezed(scene.points))
+    scene = scene.with_points(squeezed(scene.points))
     assert np.ptp(cells.leaf_points(1)[:, 0]) == pytest.approx(1e-3)
     options = replace(SOME, samples=2048, backend=backend, weighting=weighting)
     ach = compute_ach(scene, cells, all_visible(3), options)
@@ -226,7 +225,7 @@ def test_a_cell_of_a_millimetre(room_row, backend, weighting, through_doors):
     share = through_doors(1, weighting, length=1e-3)
     assert share == pytest.approx(0.375 / 2, rel=0.01), "the door takes up 6 of 16 m²"
     # Too near to the walls beside the doors are 20 µm of the cell on either side.
-    near = 2 * CLEARANCE * Tolerance.for_points(scene.points).thin / 1e-3
+    near = 2 * CLEARANCE * scene.tolerance.thin / 1e-3
     assert near == pytest.approx(0.04, rel=0.01)
     share /= 1 - (1 - 0.375) * near
     row = slice(int(ach.start[1]), int(ach.start[2]))
@@ -498,7 +497,7 @@ def test_rays_start_at_the_sample_point(room_row, sample_points):
     scene, cells = room_row(1)
     far_off = 1e6 * np.array([4.0, -4, 4])
     moved = replace(cells, vertex=cells.vertex + far_off, root_box=cells.root_box + far_off)
-    there = Surfaces.of(replace(scene, points=scene.points + far_off), moved)
+    there = Surfaces.of(scene.with_points(scene.points + far_off), moved)
     at = sample_points(np.array([2.1, 1.7, 0.3]) + far_off)
     _, place = EmbreeRenderer(there, 8).trace(at, np.arange(6 * 64))
     away = np.abs(place[0] - far_off - [2, 2, 0]).max(axis=1)

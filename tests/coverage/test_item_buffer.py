@@ -349,7 +349,7 @@ def test_many_small_views_between_two_near_surfaces(
         require("OpenGL", "apt install libegl1 libgl1 libgl1-mesa-dri")
     scene, cells = room_row(3)
     flat = np.array([1.0, 5e-4, 1.0])
-    slab = replace(scene, points=scene.points * flat), replace(cells, vertex=cells.vertex * flat)
+    slab = scene.with_points(scene.points * flat), replace(cells, vertex=cells.vertex * flat)
     surfaces = Surfaces.of(*slab)
     points = np.random.default_rng(3).uniform([0.1, 0.2, -1.9], [11.9, 3.8, 1.9], (60, 3)) * flat
     at = sample_points(points, near=5e-5, shift=(0.2, 0.1))

@@ -17,7 +17,6 @@ from ptmtools.coverage.sampling import CLEARANCE
 from ptmtools.coverage.solids import Obstacles
 from ptmtools.coverage.tally import Owners
 from ptmtools.scene.model import Material
-from ptmtools.tolerance import Tolerance
 from ptmtools.visibility.model import Pvs
 
 BY_TEXTURE = AchOptions(samples=64, face=8, per_texture=True)
@@ -93,7 +92,7 @@ def test_textures_are_counted_where_they_are_seen(room_row, backend, drawing):
     options = replace(BY_TEXTURE, backend=backend)
     ach = compute_ach(scene, cells, all_visible(2), options)
     surfaces = Surfaces.of(scene, cells)
-    clearance = CLEARANCE * Tolerance.for_points(scene.points).thin
+    clearance = CLEARANCE * scene.tolerance.thin
     for cell in range(2):
         volume = Volume(cells, Tetrahedra.of(cells), cell)
         finder = PointFinder(volume, Obstacles.of(scene, cells), clearance)

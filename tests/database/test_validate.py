@@ -140,7 +140,7 @@ def test_tiny_and_huge_worlds(artifacts, tmp_path: Path, put_textures, seal, sca
         portal_area=c.portal_area * scale**2,
         vertex=c.vertex * scale,
     )
-    scene = replace(a.scene, points=a.scene.points * scale)
+    scene = a.scene.with_points(a.scene.points * scale)
     avatar = (0.25 * scale, 1.6 * scale, 0.75 * scale)
     records = put_textures(db / "www")
     options = EmitOptions(avatar_size=avatar)

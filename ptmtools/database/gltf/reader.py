@@ -13,13 +13,14 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.accessor import COMPONENTS, elements
 from ptmtools.database.gltf.container import GlbError, unpack
 from ptmtools.database.gltf.material import WHITE, WRAPS
 
 _NUMBER = (int, float)
 _VERTICES, _INDICES, _FLOAT = 34962, 34963, 5126
 _LARGEST = float(np.finfo(np.float32).max)
-_INDEX = {5123: "<u2", 5125: "<u4"}
+_INDEX = (5123, 5125)
 #: Of every object: members that must be there, and others that may, with their types.
 _Members = dict[str, Any]
 _DOCUMENT: tuple[_Members, _Members] = (
@@ -186,9 +187,7 @@ class _Reader:
         accessor = self._row("accessors", index, _ACCESSOR)
         if (accessor["type"], accessor["componentType"]) != (form, _FLOAT):
             _foreign(place, f"not {form} of floats")
-        begin = self._begin(accessor, place, 4 * width, 4, _VERTICES)
-        count = accessor["count"] * width
-        rows = np.frombuffer(self._binary, "<f4", count, begin).reshape(-1, width)
+        rows = self._elements(accessor, place, 4 * width, 4, _VERTICES)
         if not np.isfinite(rows).all():
             raise GlbError("PTM-D735", place, "a number is not finite")
         return rows.astype(np.float32)
@@ -198,27 +197,25 @@ class _Reader:
         accessor = self._row("accessors", index, _ACCESSOR)
         if accessor["type"] != "SCALAR" or accessor["componentType"] not in _INDEX:
             _foreign(place, "not scalars of 16 or 32 bits")
-        form = np.dtype(_INDEX[accessor["componentType"]])
-        begin = self._begin(accessor, place, form.itemsize, form.itemsize, _INDICES)
-        return np.frombuffer(self._binary, form, accessor["count"], begin).astype(np.int64)
+        size = np.dtype(COMPONENTS[accessor["componentType"]]).itemsize
+        return self._elements(accessor, place, size, size, _INDICES).ravel().astype(np.int64)
 
-    def _begin(
+    def _elements(
         self, accessor: dict[str, Any], place: str, size: int, align: int, target: int
-    ) -> int:
-        """Where an accessor begins in the bytes, once it is known to lie in its view."""
+    ) -> NDArray[Any]:
+        """The (count, items) elements of an accessor, once it is known to lie in its view."""
         view = self._row("bufferViews", accessor["bufferView"], _VIEW)
-        self._row("buffers", view["buffer"], _BUFFER)
+        buffer = self._row("buffers", view["buffer"], _BUFFER)
         if view["target"] != target or view.get("byteStride", size) != size:
             _foreign(place, "its buffer view is for other data")
-        first, offset = view.get("byteOffset", 0), accessor.get("byteOffset", 0)
-        length, count = view["byteLength"], accessor["count"]
-        if min(first, offset, length) < 0 or count < 1 or offset + count * size > length:
-            _outside(place, f"{count} elements from byte {offset} of a view of {length}")
-        if first + length > self._tree["buffers"][0]["byteLength"]:
-            _outside(place, f"a view of {length} bytes from byte {first}")
-        if (first + offset) % align:
-            _outside(place, f"begins at byte {first + offset}, no multiple of {align}")
-        return int(first + offset)
+        try:
+            found = elements(accessor, view, memoryview(self._binary)[: buffer["byteLength"]])
+        except ValueError as error:
+            _outside(place, str(error))
+        begin = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        if begin % align:
+            _outside(place, f"begins at byte {begin}, no multiple of {align}")
+        return found
 
     def _check_bounds(self, index: int, point: NDArray[np.float32]) -> None:
         accessor = self._tree["accessors"][index]
