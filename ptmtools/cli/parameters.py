@@ -2,7 +2,8 @@
 
 The dataclass stays the one home of names, defaults and their explanation: a field `wall_area:
 float = 2.0` with the line ``wall_area: the least area …`` under "Attributes" of the docstring
-becomes ``--wall-area FLOAT`` with that default and that help.
+becomes ``--wall-area FLOAT`` with that default and that help. A field whose metadata has
+``choices``, a table of declarations by name, becomes a choice among them.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import inspect
 import re
 import typing
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, fields
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
@@ -57,6 +58,28 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # generic only in new
             whole = "whole " if self.kind is int else ""
             self.fail(f"{value!r} is not {wanted} {whole}numbers separated by commas", param, ctx)
         return numbers
+
+
+class OneOf(click.ParamType):  # type: ignore[type-arg]  # generic only in newer Clicks
+    """A name in a table of declarations, each of which says in ``about`` what it is for."""
+
+    name = "name"
+
+    def __init__(self, table: Mapping[str, Any]) -> None:
+        self.table = table
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
+        return f"[{'|'.join(self.table)}]"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        if value not in self.table:
+            self.fail(f"{value!r} is not one of {', '.join(self.table)}", param, ctx)
+        return str(value)
+
+    def help(self, text: str | None) -> str:
+        """What is said of the option, and then of each name."""
+        names = "; ".join(f"{name}: {declared.about}" for name, declared in self.table.items())
+        return f"{text} — {names}."
 
 
 def descriptions(cls: type) -> dict[str, str]:
@@ -119,6 +142,9 @@ def _option(field: Field[Any], hint: Any, told: str | None) -> Decorator:
     if hint is bool:
         # A switch that is on by default is named by what turns it off.
         flag = f"{flag}/--no-{flag[2:]}"
+    elif "choices" in field.metadata:
+        settings["type"] = OneOf(field.metadata["choices"])
+        settings["help"] = settings["type"].help(told)
     elif get_origin(hint) is Literal:
         settings["type"] = click.Choice([str(choice) for choice in get_args(hint)])
     elif get_origin(hint) is tuple:
