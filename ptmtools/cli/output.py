@@ -15,6 +15,7 @@ import click
 from ptmtools.progress import Progress, silent
 
 if TYPE_CHECKING:
+    from rich.progress import Progress as Bars
     from rich.progress import TaskID
 
 
@@ -28,10 +29,16 @@ class Voice:
     quiet: bool = False
     verbose: bool = False
     aside: bool = False
+    #: Where a progress bar is being shown.
+    _bars: Bars | None = None
 
     def say(self, text: str) -> None:
-        """A line of the result, on stdout."""
-        if not self.quiet:
+        """A line of the result, on stdout; above the progress bar where both are on a terminal."""
+        if self.quiet:
+            return
+        if self._bars and (self.aside or sys.stdout.isatty()):
+            self._bars.console.print(printable(text), markup=False, highlight=False, soft_wrap=True)
+        else:
             click.echo(printable(text), err=self.aside)
 
     def warn(self, text: str) -> None:
@@ -56,9 +63,14 @@ class Voice:
         from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
         from rich.progress import Progress as Bars
 
+        # What is written to stderr meanwhile appears above the bar; stdout may be a file.
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
         with Bars(
-            *columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True
+            *columns,
+            TimeElapsedColumn(),
+            console=Console(stderr=True),
+            transient=True,
+            redirect_stdout=False,
         ) as bars:
             task: dict[str, TaskID] = {}
 
@@ -67,7 +79,11 @@ class Voice:
                     task[what] = bars.add_task(what, total=total)
                 bars.update(task[what], completed=done, total=total)
 
-            yield tell
+            self._bars = bars
+            try:
+                yield tell
+            finally:
+                self._bars = None
 
 
 def printable(text: str) -> str:

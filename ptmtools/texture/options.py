@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 
 from ptmtools.errors import InputError
-from ptmtools.texture.model import TILE_SIDES, EncodeOptions
+from ptmtools.texture.model import TILE_SIDES, EncodeOptions, PtmHeader
 from ptmtools.texture.profiles import PROFILES, Coder
 from ptmtools.texture.pyramid import level_sizes
 from ptmtools.texture.rows import ImageRows
@@ -74,3 +74,13 @@ def kept_levels(width: int, height: int, options: EncodeOptions) -> list[int]:
     kept = [n for n in range(first, last + 1) if min(sizes[n]) >= options.min_side] or [last]
     small = [n for n in kept if not options.max_side or max(sizes[n]) <= options.max_side]
     return small or kept[:1]
+
+
+def level_above(header: PtmHeader) -> tuple[int, int, int] | None:
+    """Of the coarsest level that was left out on purpose above those in the file: width, height,
+    and about how many bytes it would take, judged by the level below it. None if there is none."""
+    if not header.trimmed:
+        return None
+    width, height = level_sizes(header.width, header.height)[-header.trimmed]
+    finest = header.levels[-1]
+    return width, height, finest.length * width * height // (finest.width * finest.height)
