@@ -224,7 +224,8 @@ def for_each(
         for done, result in enumerate(ordered(guarded, jobs, at_once)):
             progress(done, len(jobs), what)
             if isinstance(result, Exception):
-                failed = report(result, voice.verbose)
+                with voice.above_progress():
+                    failed = report(result, voice.verbose)
                 status = status or failed
             else:
                 tell(result)

@@ -33,17 +33,26 @@ class Voice:
     _bars: Bars | None = None
 
     def say(self, text: str) -> None:
-        """A line of the result, on stdout; above the progress bar where both are on a terminal."""
-        if self.quiet:
-            return
-        if self._bars and (self.aside or sys.stdout.isatty()):
-            self._bars.console.print(printable(text), markup=False, highlight=False, soft_wrap=True)
-        else:
-            click.echo(printable(text), err=self.aside)
+        """A line of the result, on stdout."""
+        if not self.quiet:
+            with self.above_progress():
+                click.echo(printable(text), err=self.aside)
 
     def warn(self, text: str) -> None:
         """A line on stderr, of what is wrong and does not stop the command."""
-        click.echo(f"ptm: {printable(text)}", err=True)
+        with self.above_progress():
+            click.echo(f"ptm: {printable(text)}", err=True)
+
+    @contextmanager
+    def above_progress(self) -> Iterator[None]:
+        """What is printed meanwhile stays above the progress bar, if one is shown."""
+        if self._bars:
+            self._bars.stop()
+        try:
+            yield
+        finally:
+            if self._bars:
+                self._bars.start()
 
     def emit_json(self, document: Any) -> None:
         """The result as JSON on stdout; ``--quiet`` does not silence what was asked for. What is
@@ -63,8 +72,8 @@ class Voice:
         from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
         from rich.progress import Progress as Bars
 
-        # What is written to stderr meanwhile appears above the bar; stdout may be a file.
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+        # stdout may be a file.
         with Bars(
             *columns,
             TimeElapsedColumn(),
