@@ -12,7 +12,7 @@ from ptmtools.cli.common import as_json, limited, voiced
 from ptmtools.cli.output import Voice
 from ptmtools.errors import naming
 from ptmtools.quantities import count, size
-from ptmtools.texture.profiles import PROFILE_NUMBERS
+from ptmtools.texture.profiles import PROFILES
 
 if TYPE_CHECKING:
     from ptmtools.texture.comparison import Measured
@@ -29,8 +29,8 @@ class _Profiles(click.ParamType):  # type: ignore[type-arg]  # generic only in n
     ) -> tuple[str, ...]:
         names = tuple(str(value).split(","))
         for name in names:
-            if name not in PROFILE_NUMBERS:
-                self.fail(f"{name!r} is none of {', '.join(PROFILE_NUMBERS)}", param, ctx)
+            if name not in PROFILES:
+                self.fail(f"{name!r} is none of {', '.join(PROFILES)}", param, ctx)
         return names
 
 
@@ -39,7 +39,7 @@ class _Profiles(click.ParamType):  # type: ignore[type-arg]  # generic only in n
 @click.option(
     "--profiles",
     type=_Profiles(),
-    default=",".join(PROFILE_NUMBERS),
+    default=",".join(PROFILES),
     show_default=True,
     metavar="NAME,...",
     help="Which profiles.",

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from ptmtools.errors import PtmError
 from ptmtools.texture.model import EncodeOptions
-from ptmtools.texture.profiles import PROFILE_NUMBERS
+from ptmtools.texture.profiles import PROFILES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -76,7 +76,7 @@ class Measured:
     problem: str | None = None
 
 
-def codecs(profiles: Iterable[str] = PROFILE_NUMBERS) -> list[Codec]:
+def codecs(profiles: Iterable[str] = PROFILES) -> list[Codec]:
     """The profiles, then the other formats: PNG first, then WebP, JPEG XL, JPEG 2000, JPEG-LS."""
     return [*map(_profile, profiles), *_rivals()]
 
@@ -163,7 +163,7 @@ def _profile(name: str) -> Codec:
     from ptmtools.texture.codec import decode
     from ptmtools.texture.encoder import encode
 
-    options = EncodeOptions(name)  # type: ignore[arg-type]
+    options = EncodeOptions(name)
     return Codec(
         f"ptm {name}",
         lambda image: encode(image, options),

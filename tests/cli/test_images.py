@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -14,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from ptmtools.cli.main import main
 from ptmtools.texture import (
@@ -117,6 +120,154 @@ def test_each_file_once_and_none_over_another(
     assert main(["encode", *named, "--profile", "raw", "--force"]) == 0
     out = capsys.readouterr().out
     assert [line.partition(":")[0] for line in out.splitlines()] == ["sub/c.ptm", "d.ptm"]
+
+
+@pytest.mark.parametrize(
+    ("named", "output", "made"),
+    [
+        (["*.png"], "new", ["new/a.ptm"]),
+        (["sub/*.png", "a.png"], "new", ["new/a.ptm", "new/c.ptm"]),
+        (["."], "new/deep", ["new/deep/a.ptm", "new/deep/b.ptm"]),
+        (["a.png"], "new/", ["new/a.ptm"]),
+        (["a.png"], "sub", ["sub/a.ptm"]),
+        (["a.png"], "new", ["new"]),
+        (["?.png"], "x.ptm", ["x.ptm"]),
+        (["a.png", "b.PNG"], "x.ptm/", ["x.ptm/a.ptm", "x.ptm/b.ptm"]),
+    ],
+)
+def test_where_results_go(named: list[str], output: str, made: list[str], folder: Path) -> None:
+    before = set(folder.rglob("*"))
+    assert main(["-q", "encode", *named, "-o", output, "--profile", "raw"]) == 0
+    found = {path for path in folder.rglob("*") if path.is_file()} - before
+    assert sorted(path.relative_to(folder).as_posix() for path in found) == made
+    # And back.
+    output = output.replace(".ptm", ".png")
+    named = ["new/*" if name.startswith("new/") else name for name in made[:1]]
+    if made != ["new"]:
+        assert main(["-q", "decode", *made, "-o", f"back/{output}/"]) == 0
+        assert len(list((folder / "back" / output).iterdir())) == len(made)
+
+
+def test_a_folder_is_made_only_where_one_is_meant(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["encode", "a.png", "b.PNG", "-o", "x.ptm"]) == 2
+    assert "x.ptm is one file, and there are 2 to write" in capsys.readouterr().err
+    assert main(["encode", "a.png", "b.PNG", "-o", "notes.txt"]) == 2
+    assert main(["encode", "a.png", "-o", "notes.txt/"]) == 2
+    assert "is a file, not a folder" in capsys.readouterr().err
+    assert main(["encode", "a.png", "-o", "absent/x.ptm"]) == 4
+    assert main(["encode", "no*.png", "-o", "absent"]) == 3
+    assert not Path("absent").exists()
+
+
+def test_what_exists_is_skipped_if_asked_for(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    encoding = ["encode", ".", "-o", "new", "--profile", "raw"]
+    Path("new").mkdir()
+    Path("new/a.ptm").write_bytes(encode(RGB, RAW))
+    assert main([*encoding]) == 4
+    Path("new/b.ptm").unlink()
+    capsys.readouterr()
+    assert main([*encoding, "--skip-existing"]) == 0
+    first, second = capsys.readouterr().out.splitlines()
+    assert first == "new/a.ptm: exists and was skipped"
+    assert second.startswith("new/b.ptm: 5 levels")
+    assert main(["decode", "new", "--skip-existing", "--json"]) == 0
+    assert main(["decode", "new", "--skip-existing", "--json"]) == 0
+    made, skipped = json.JSONDecoder().raw_decode(text := capsys.readouterr().out)[0], text
+    assert [report["skipped"] for report in made] == [False, False]
+    assert skipped.count('"skipped": true') == 2
+    assert main([*encoding, "--skip-existing", "--force"]) == 2
+
+
+def test_sizes_are_told_beside_those_of_the_input(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    image = Image.fromarray(np.tile(RGB, (4, 4, 1)))
+    for name, options in {
+        "l.jpg": {"quality": 30},
+        "m.webp": {"quality": 30},
+        "n.webp": {"lossless": True},
+        "o.webp": {"quality": 30, "exif": b"Exif\0\0"},
+        "p.tif": {"compression": "jpeg"},
+    }.items():
+        image.save(name, **options)
+    assert main(["encode", "l.jpg", "a.png", "-o", "new"]) == 0
+    first, second, hint = capsys.readouterr().out.splitlines()
+    stored = os.path.getsize("new/l.ptm")
+    assert first.endswith(f"{stored / os.path.getsize('l.jpg'):.1f} times l.jpg (1.5 kB)") or (
+        f"times l.jpg ({os.path.getsize('l.jpg') / 1000:.1f} kB)" in first
+    )
+    assert f"% of a.png ({os.path.getsize('a.png') / 1000:.1f} kB)" in second
+    assert hint.startswith("hint: JPEG is small because")
+    assert "--max-error 4" in hint
+    assert main(["encode", "a.png", "n.webp", "-o", "new", "--force"]) == 0
+    assert main(["encode", "l.jpg", "-o", "new", "--force", "--max-error", "1"]) == 0
+    assert "hint" not in capsys.readouterr().out
+    assert main(["encode", ".", "-o", "new", "--json", "--profile", "raw", "--force"]) == 0
+    reports = json.loads(capsys.readouterr().out)
+    assert {os.path.basename(one["image"]): one["lossy"] for one in reports} == {
+        "a.png": None,
+        "b.PNG": None,
+        "l.jpg": "JPEG",
+        "m.webp": "WebP",
+        "n.webp": None,
+        "o.webp": "WebP",
+        "p.tif": "JPEG in TIFF",
+    }
+    assert [one["image_bytes"] for one in reports] == [
+        os.path.getsize(one["image"]) for one in reports
+    ]
+
+
+@pytest.mark.parametrize(
+    ("side", "told"),
+    [
+        (10, "finest within --max-side 10 is 8 x 5; the next, 17 x 10, would add about 4"),
+        (17, None),
+        (34, None),
+        (99, None),
+        (1, "no level is within --max-side 1; the coarsest, 2 x 1, is kept"),
+    ],
+)
+def test_the_side_that_was_chosen(
+    side: int, told: str | None, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["encode", "a.png", "--profile", "raw", "--max-side", str(side)]) == 0
+    _, *notes = capsys.readouterr().out.splitlines()
+    assert (told in notes[0]) if told else not notes
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs terminals")
+@pytest.mark.parametrize("both", [True, False])
+def test_results_stand_above_the_progress_bar(both: bool, folder: Path) -> None:
+    """On a terminal each has a line of its own; a file gets the results and nothing else."""
+    outer, inner = os.openpty()
+    with open("out.txt", "wb") as file:
+        run = subprocess.Popen(
+            [sys.executable, "-m", "ptmtools", "encode", ".", "--profile", "raw", "-j1"],
+            stdout=inner if both else file,
+            stderr=inner,
+            env=os.environ | {"COLUMNS": "300", "TERM": "xterm"},
+        )
+        os.close(inner)
+        shown = b""
+        with contextlib.suppress(OSError):  # the end of a terminal, on Linux
+            while part := os.read(outer, 1 << 16):
+                shown += part
+        assert run.wait() == 0
+    os.close(outer)
+    # What remains of each line once the terminal has done what it was told.
+    lines = [
+        re.split(rb"\r|\x1b\[[0-9?]*[KAhl]", line.strip(b"\r"))[-1] for line in shown.split(b"\n")
+    ]
+    results = [line.split(b":")[0] for line in lines if b" levels" in line]
+    assert b"images" in shown
+    assert results == ([b"a.ptm", b"b.ptm"] if both else [])
+    names = [line.split(b":")[0] for line in Path("out.txt").read_bytes().splitlines()]
+    assert names == ([] if both else [b"a.ptm", b"b.ptm"])
 
 
 def test_a_name_that_is_empty_does_not_stop_the_others(folder: Path) -> None:
@@ -250,6 +401,7 @@ def test_decode_reports_as_json(folder: Path, through: Callable[..., Any]) -> No
         {
             "file": "x.ptm",
             "image": "x.npy",
+            "skipped": False,
             "level": 3,
             "width": 17,
             "height": 10,

@@ -12,7 +12,7 @@ from __future__ import annotations
 from ptmtools.texture.images.picture import Picture
 from ptmtools.texture.images.png import png_bytes
 from ptmtools.texture.images.reading import SUFFIXES, check_image, load_image, read_image, read_ptm
-from ptmtools.texture.images.writing import WRITTEN, write_image, write_png, write_to
+from ptmtools.texture.images.writing import WRITTEN, write_image, write_to
 
 __all__ = [
     "SUFFIXES",
@@ -24,6 +24,5 @@ __all__ = [
     "read_image",
     "read_ptm",
     "write_image",
-    "write_png",
     "write_to",
 ]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 from ptmtools.errors import InputError, naming
@@ -19,7 +21,6 @@ from ptmtools.texture.sources import open_file
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-    from PIL.ImageFile import ImageFile
 
 #: Of the files that are taken for images where a folder is named.
 SUFFIXES = (
@@ -112,19 +113,17 @@ def read_ptm(path: str | os.PathLike[str]) -> bytes:
 
 
 def _load(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
-    from ptmtools.texture.images import eight_bit
     from ptmtools.texture.images.opening import pillow_faults
 
     found = _opened(file, path, limits)
     if isinstance(found, Picture):
         return found
     with pillow_faults():
-        return eight_bit.read(*found)
+        return found()
 
 
-def _opened(file: BinaryIO, path: str | None, limits: Limits) -> Picture | tuple[ImageFile, int]:
-    """An image; one of 8 bits as Pillow has opened it, not loaded but found good, and the depth of
-    its samples in the file, bits."""
+def _opened(file: BinaryIO, path: str | None, limits: Limits) -> Picture | Callable[[], Picture]:
+    """An image; of one of 8 bits, which Pillow has opened and found good, what unpacks it."""
     first = file.read(HEAD_MAX)
     if not first:
         raise InputError("PTM-I123", "is empty", remedy="fetch or export it again")
@@ -146,9 +145,14 @@ def _opened(file: BinaryIO, path: str | None, limits: Limits) -> Picture | tuple
 
 def _by_pillow(
     file: BinaryIO, path: str | None, first: bytes, limits: Limits
-) -> Picture | tuple[ImageFile, int]:
+) -> Picture | Callable[[], Picture]:
     from ptmtools.texture.images import deep, eight_bit
-    from ptmtools.texture.images.opening import high_colour, opened, pillow_faults
+    from ptmtools.texture.images.opening import (
+        high_colour,
+        lossy_format,
+        opened,
+        pillow_faults,
+    )
 
     with pillow_faults():
         if first.startswith(_PPM) and (picture := deep.read_ppm(file, path, limits)):
@@ -169,7 +173,7 @@ def _by_pillow(
         elif high_colour(image):
             raise unsupported("samples of 5 or 6 bits")
         eight_bit.check(image, limits)
-        return image, depth
+        return partial(eight_bit.read, image, depth, lossy_format(file, image))
 
 
 def _rescaled(tiles: list[Any]) -> bool:
