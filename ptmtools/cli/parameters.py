@@ -10,7 +10,7 @@ from __future__ import annotations
 import inspect
 import re
 import typing
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, fields
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
@@ -57,6 +57,23 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # generic only in new
             whole = "whole " if self.kind is int else ""
             self.fail(f"{value!r} is not {wanted} {whole}numbers separated by commas", param, ctx)
         return numbers
+
+
+class Names(click.ParamType):  # type: ignore[type-arg]  # generic only in newer Clicks
+    """``A,B``: names of a table, separated by commas."""
+
+    name = "names"
+
+    def __init__(self, table: Mapping[str, object]) -> None:
+        self.table = table
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
+        return "NAME[,NAME]"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        if unknown := [name for name in value.split(",") if name not in self.table]:
+            self.fail(f"{unknown[0]!r} is none of {', '.join(self.table)}", param, ctx)
+        return value
 
 
 def descriptions(cls: type) -> dict[str, str]:
@@ -119,6 +136,11 @@ def _option(field: Field[Any], hint: Any, told: str | None) -> Decorator:
     if hint is bool:
         # A switch that is on by default is named by what turns it off.
         flag = f"{flag}/--no-{flag[2:]}"
+    elif "names" in field.metadata:
+        table = field.metadata["names"]
+        settings["type"] = Names(table)
+        listed = "; ".join(f"{name}: {value.title}" for name, value in table.items())
+        settings["help"] = f"{told} ({listed})"
     elif get_origin(hint) is Literal:
         settings["type"] = click.Choice([str(choice) for choice in get_args(hint)])
     elif get_origin(hint) is tuple:

@@ -26,7 +26,7 @@ target = click.argument("target", metavar="FILE|DB", type=click.Path())
 
 def _tell_codes(context: click.Context, option: click.Option, asked: bool) -> None:
     if asked:
-        from ptmtools.database.validation import CODES
+        from ptmtools.database.validation.findings import CODES
 
         for code, (severity, meaning) in sorted(CODES.items()):
             click.echo(f"{code}  {severity:<7}  {meaning}")

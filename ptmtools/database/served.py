@@ -1,11 +1,11 @@
-"""Files below a folder, written a few at a time, with compressed twins if wanted.
+"""Files below a folder, written a few at a time, with gzip copies if wanted.
 
 A file is on the disk before it has its name (`ptmtools.files`), and most of the time goes into
 waiting for that; meanwhile the next ones are made.
 
-A twin is what servers hand out in place of a file (nginx: `gzip_static on`) and what VRML browsers
-open by themselves: gzip without a name and a time, so its bytes depend on nothing but the file and
-the version of zlib.
+A gzip copy is what servers hand out in place of a file (nginx: `gzip_static on`) and what VRML
+browsers open by themselves. It holds no name and no time, so its bytes depend on nothing but the
+file and the version of zlib.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
 
+from ptmtools.database.emitters import GZIP
 from ptmtools.files import write_bytes, writing
 
 #: Files that wait for the disk at a time, and files held in memory for it.
@@ -23,8 +24,7 @@ _WRITERS = 4
 _WAITING = 8
 #: Deflate, no name, no time, best compression, no system (RFC 1952).
 _GZIP = bytes([0x1F, 0x8B, 8, 0, 0, 0, 0, 0, 2, 255])
-TWIN = ".gz"
-#: What has twins.
+#: Suffixes of files that are copied.
 _TEXT = (".wrl", ".json")
 
 
@@ -42,8 +42,8 @@ class ServedFiles:
     Parameters
     ----------
     folder: an existing one.
-    force: overwrite files; a compressed twin that is not written again goes.
-    twins: write compressed twins of VRML and JSON files.
+    force: overwrite files; a gzip copy that is not written again goes.
+    gzip: write copies of VRML and JSON files.
 
     Attributes
     ----------
@@ -51,12 +51,12 @@ class ServedFiles:
     bytes: of those that are surely written.
     """
 
-    def __init__(self, folder: Path, *, force: bool, twins: bool) -> None:
+    def __init__(self, folder: Path, *, force: bool, gzip: bool) -> None:
         self.names: list[str] = []
         self.bytes = 0
         self._folder = folder
         self._force = force
-        self._twins = twins
+        self._gzip = gzip
         self._pool = ThreadPoolExecutor(_WRITERS, "files")
         self._pending: deque[Future[int]] = deque()
 
@@ -68,9 +68,9 @@ class ServedFiles:
         OutputError: PTM-O001 to PTM-O003, of this file or of an earlier one.
         """
         data = content.encode() if isinstance(content, str) else content
-        twin = self._twins and name.endswith(_TEXT)
-        self.names += [name, name + TWIN] if twin else [name]
-        self._pending.append(self._pool.submit(self._write, name, data, twin))
+        copied = self._gzip and name.endswith(_TEXT)
+        self.names += [name, name + GZIP] if copied else [name]
+        self._pending.append(self._pool.submit(self._write, name, data, copied))
         while len(self._pending) >= _WAITING:
             self.bytes += self._pending.popleft().result()
 
@@ -79,11 +79,11 @@ class ServedFiles:
         while self._pending:
             self.bytes += self._pending.popleft().result()
 
-    def _write(self, name: str, data: bytes, twin: bool) -> int:
+    def _write(self, name: str, data: bytes, copied: bool) -> int:
         path = self._folder / name
-        other = path.with_name(path.name + TWIN)
+        other = path.with_name(path.name + GZIP)
         write_bytes(path, data, force=self._force)
-        if twin:
+        if copied:
             packed = compressed(data)
             write_bytes(other, packed, force=self._force)
             return len(data) + len(packed)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection
 from typing import Any
 
 from ptmtools.database.model import Issue
-from ptmtools.database.validation import Findings
+from ptmtools.database.validation.findings import Findings
 from ptmtools.errors import DatabaseError
 from ptmtools.pipeline.folder import MANIFEST, DatabaseFolder
 from ptmtools.pipeline.run import Artifacts

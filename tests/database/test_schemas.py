@@ -15,7 +15,7 @@ import pytest
 
 from ptmtools import schemas
 from ptmtools.cli.main import main
-from ptmtools.database.validation import CODES, Findings
+from ptmtools.database.validation.findings import CODES, Findings
 from ptmtools.database.validation.hints import read_hints
 from ptmtools.pipeline.manifest import FORMAT, SCHEMA, Manifest, StageRecord
 from ptmtools.pipeline.stages import STAGES

@@ -18,7 +18,7 @@ import pytest
 from PIL import Image
 
 from ptmtools.database import EmitOptions, emit, validate_database, validate_ptm
-from ptmtools.database.validation import CODES
+from ptmtools.database.validation.findings import CODES
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.texture import EncodeOptions, Limits, decode, encode, read_header
 from ptmtools.visibility.model import Pvs
@@ -104,7 +104,7 @@ def test_faults_of_leaves(
 def test_gltf(artifacts, tmp_path: Path, put_textures, seal) -> None:
     db = tmp_path / "db"
     a, records = artifacts, put_textures(db / "www")
-    emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", EmitOptions(format="gltf"))
+    emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", EmitOptions(format="vrml,gltf"))
     seal(db)
     assert told(db) == []
 

@@ -223,12 +223,12 @@ class _Reader:
     def _check_bounds(self, index: int, point: NDArray[np.float32]) -> None:
         accessor = self._tree["accessors"][index]
         for name, held in (("min", point.min(axis=0)), ("max", point.max(axis=0))):
-            told = accessor.get(name)
-            if told is None or len(told) != 3 or not all(_is(v, _NUMBER) for v in told):
+            bound = accessor.get(name)
+            if bound is None or len(bound) != 3 or not all(_is(v, _NUMBER) for v in bound):
                 _foreign(f"accessors[{index}]", f"{name} is not three numbers")
             # In single precision, as they are written; an integer may have any length.
             if any(
-                abs(v) > _LARGEST or np.float32(v) != h for v, h in zip(told, held, strict=True)
+                abs(v) > _LARGEST or np.float32(v) != h for v, h in zip(bound, held, strict=True)
             ):
                 message = f"{name} is not that of the data, {held.tolist()}"
                 raise GlbError("PTM-D735", f"accessors[{index}]", message)

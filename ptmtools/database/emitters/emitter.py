@@ -1,0 +1,71 @@
+"""What an emitter is: one frozen value that says what it is called, what it writes, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ptmtools.database.content import Content
+    from ptmtools.database.validation.findings import Findings
+    from ptmtools.database.validation.served import ServedDatabase
+
+#: Suffix of a gzip copy.
+GZIP = ".gz"
+
+
+@dataclass(frozen=True)
+class Emitter:
+    """A form in which cells are served.
+
+    Attributes
+    ----------
+    name: as `--format` has it.
+    title: what it is, in a few words, for help.
+    owns: files and folders in the served folder that are its own; a folder ends in a slash. The
+        files must be there once it has been written.
+    entry: the one of its files that leads to the others; written when those are on the disk.
+    writer: function from a `Content` to the files, as (path in the served folder, str or bytes);
+        what it can refuse, it refuses before it gives the first.
+    reader: function from (name, bytes, `Findings`) of one of its files to what the check needs of
+        it, None if that cannot be had; called from several threads. "": nothing is read.
+    check: function from a `ServedDatabase` to the counts of the manifest that it can tell, by name.
+        "": there is nothing to check.
+    before: what the name alone meant in the release before, if that was something else.
+    """
+
+    name: str
+    title: str
+    owns: tuple[str, ...]
+    entry: str
+    writer: str
+    reader: str = ""
+    check: str = ""
+    before: str = ""
+
+    def is_owner(self, path: str) -> bool:
+        """Whether a path in the served folder is that of one of its files, or of a gzip copy."""
+        plain = path.removesuffix(GZIP)
+        return any(path.startswith(own) if own.endswith("/") else plain == own for own in self.owns)
+
+    def files(self, content: Content) -> Iterator[tuple[str, str | bytes]]:
+        """Path in the served folder and contents of each of its files, in the order of writing."""
+        files: Iterator[tuple[str, str | bytes]] = _function(self.writer)(content)
+        return files
+
+    def read(self, name: str, data: bytes, found: Findings) -> object | None:
+        """What the check needs of a file, named relative to the database."""
+        return _function(self.reader)(name, data, found) if self.reader else data
+
+    def validate(self, database: ServedDatabase) -> Mapping[str, int]:
+        """Holds its files against each other and against those of others; returns counts."""
+        counts: Mapping[str, int] = _function(self.check)(database) if self.check else {}
+        return counts
+
+
+def _function(reference: str) -> Callable[..., Any]:
+    module, _, name = reference.partition(":")
+    function: Callable[..., Any] = getattr(import_module(module), name)
+    return function
