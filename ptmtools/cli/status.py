@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
@@ -10,6 +12,8 @@ import click
 
 from ptmtools.cli.common import as_json, database, voiced
 from ptmtools.cli.output import Voice, count, size
+from ptmtools.errors import DatabaseError
+from ptmtools.pipeline.folder import DatabaseFolder
 
 if TYPE_CHECKING:
     from ptmtools.pipeline.plan import StagePlan
@@ -46,6 +50,14 @@ def status(voice: Voice, db: str, as_json: bool) -> None:
         voice.say(f"a run was interrupted{waiting if found.waiting else ''}")
     if not found.finished and not found.writer:
         voice.say("not finished: run `ptm build-scene MODEL -o DB`")
+
+
+def build_command(db: str, model: str | None = None) -> str:
+    """The command that brings a database up to date."""
+    if model is None:
+        with suppress(DatabaseError):
+            model = DatabaseFolder.open(db).manifest.model
+    return f"ptm build-scene {shlex.quote(model) if model else 'MODEL'} -o {shlex.quote(db)}"
 
 
 def tell_plan(voice: Voice, plans: Sequence[StagePlan], as_json: bool) -> None:

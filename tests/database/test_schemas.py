@@ -271,7 +271,7 @@ def run(capsys) -> Run:
 def test_the_report_of_the_command(database: Path, run: Run, damaged: bool) -> None:
     if damaged:
         (database / "www/root.wrl").write_text("#VRML V2.0 utf8\nShape { \x1b }\n")
-        (database / "www/notes.txt").write_text("mine")
+        (database / "www/cells/notes.txt").write_text("mine")
     status, stdout = run("validate", str(database), "--json")
     document = json.loads(stdout)
     validator(schemas.VALIDATION).validate(document)
@@ -285,7 +285,7 @@ def test_the_report_of_the_command(database: Path, run: Run, damaged: bool) -> N
 
 
 def test_ok_is_what_the_exit_status_says(database: Path, run: Run) -> None:
-    (database / "www/notes.txt").write_text("mine")
+    (database / "www/cells/notes.txt").write_text("mine")
     for options, expected in (((), 0), (("--strict",), 8)):
         status, stdout = run("validate", str(database), "--json", *options)
         assert (status, json.loads(stdout)["ok"]) == (expected, expected == 0)

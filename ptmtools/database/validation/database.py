@@ -123,8 +123,9 @@ class _Check:
         if "emit" not in self._stages and not any(e.entry in ours for e in EMITTERS.values()):
             database.add("PTM-D655", first.entry, "", "the stage `emit` has not run")
             return
-        present = [e for e in EMITTERS.values() if any(map(e.is_owner, ours))]
-        for emitter in {*present, *self._asked_for()}:
+        listed = {path for path in ours if f"{SERVED}/{path}" in self._outputs} or ours
+        present = [e for e in EMITTERS.values() if any(map(e.is_owner, listed))]
+        for emitter in {*present, *self._asked_for(present)}:
             for name in emitter.owns:
                 if not (name.endswith("/") or name in ours or f"{SERVED}/{name}" in self._outputs):
                     database.add("PTM-D651", name, "", "missing")
@@ -171,13 +172,14 @@ class _Check:
             what = "1 file is" if len(paths) == 1 else f"{len(paths):,} files are"
             self.notes = (f"{what} served beside those of ptmtools, and not checked: {named}",)
 
-    def _asked_for(self) -> tuple[Emitter, ...]:
-        """The emitters that the manifest says were asked for; the default if it says none."""
+    def _asked_for(self, present: Sequence[Emitter]) -> Sequence[Emitter]:
+        """The emitters that the manifest names; if it names none, those that there are, or the
+        default."""
         asked = self._stages.get("emit", {"parameters": {}})["parameters"].get("format")
         try:
             return chosen_emitters(str(asked))
         except ValueError:
-            return chosen_emitters(EmitOptions().format)
+            return present or chosen_emitters(EmitOptions().format)
 
     def _read_files(
         self, ours: Collection[str], database: ServedDatabase, progress: Progress, workers: int

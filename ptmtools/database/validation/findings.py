@@ -75,6 +75,11 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D739": ("error", "a material of a GLB is not that of its shape in the VRML file"),
 }
 
+#: Of files that are not as their stage wrote them: a build sees that by itself.
+SEEN_BY_BUILD = frozenset(f"PTM-D65{n}" for n in "12456")
+#: What no build can mend: files of others, too little memory, and what the model is like.
+NOT_BUILT = frozenset(f"PTM-D{n}" for n in (653, 657, 658, 675, 703, 708, 713))
+
 
 class Findings:
     """Gathers issues. The first few of one code in a file are kept one by one, the others counted.

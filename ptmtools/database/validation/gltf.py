@@ -40,7 +40,9 @@ _SLACK = 1e-5
 def read_file(name: str, data: bytes, found: Findings) -> Any:
     """A GLB as `ReadGlb`, or the hints beside them as JSON has them."""
     try:
-        return json.loads(data) if name.endswith(f"/{HINTS}") else read_glb(data)
+        if name.endswith(".glb"):
+            return read_glb(data)
+        return json.loads(data) if name == f"{SERVED}/{GLTF_HINTS}" else None
     except GlbError as fault:
         found.add(fault.code, name, fault.place, fault.message)
     except (ValueError, RecursionError) as fault:

@@ -70,7 +70,7 @@ def check_ptm(data: bytes, file: str, limits: Limits, found: Findings) -> Sample
         found.add("PTM-D713" if limit.code == "PTM-L103" else "PTM-D710", file, "", limit.message)
         return None
     for fault in faults:
-        found.add("PTM-D710", file, "", fault)
+        found.add("PTM-D710", file, "", fault.partition(" [PTM-")[0])
     return texels
 
 

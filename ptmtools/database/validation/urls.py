@@ -71,4 +71,4 @@ class Urls:
             return path, "", ""
         code = "PTM-D672" if path.startswith(f"{CELL_FOLDER}/") else "PTM-D671"
         other = self._folded.get(path.casefold())
-        return "", code, f"is not there, but {other} is" if other else "is not there"
+        return "", code, f"no such file, but there is {other}" if other else "no such file"

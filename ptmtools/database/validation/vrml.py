@@ -27,11 +27,11 @@ _WRL_FAULTS = {"encoding": "PTM-D660", "syntax": "PTM-D661", "finite": "PTM-D662
 
 
 def read_file(name: str, data: bytes, found: Findings) -> Document | ReadHints | None:
-    """A VRML file or the hints."""
+    """A VRML file or the hints; nothing of other files."""
     if name == f"{SERVED}/{HINTS}":
         return read_hints(data, name, found)
     try:
-        return parse(data)
+        return parse(data) if name.endswith(".wrl") else None
     except WrlError as fault:
         found.add(_WRL_FAULTS[fault.kind], name, fault.place, fault.message)
         return None
