@@ -13,7 +13,7 @@ from ptmtools.coverage.model import Ach
 from ptmtools.database.content import Content
 from ptmtools.database.emitters import chosen_emitters
 from ptmtools.database.model import EmitOptions, EmitReport, TextureRecord
-from ptmtools.database.served import ServedFiles
+from ptmtools.database.served import write_files
 from ptmtools.database.viewpoints.placement import place_viewpoints
 from ptmtools.errors import DatabaseError, OutputError
 from ptmtools.files import real_folder
@@ -69,19 +69,19 @@ def emit(
     for name in owned:
         if name.endswith("/"):
             real_folder(folder, name[:-1])
-    with ServedFiles(folder, force=force, gzip=options.gzip) as files:
-        for emitter, given in zip(emitters, written, strict=True):
-            for name, data in given:
-                if name == emitter.entry:
-                    files.settle()  # it leads to files that are there
-                files.put(name, data)
+    files = (  # what leads to others comes when those are there
+        (name, data, name == emitter.entry)
+        for emitter, given in zip(emitters, written, strict=True)
+        for name, data in given
+    )
+    names, size = write_files(folder, files, force=force, gzip=options.gzip)
     return EmitReport(
-        files=tuple(files.names),
+        files=names,
         viewpoints=viewpoints,
         shapes=len(content.geometry.object),
         triangles=len(content.geometry.triangle),
         collapsed=content.geometry.collapsed,
-        bytes=files.bytes,
+        bytes=size,
         notes=(*notes, *options.notes),
     )
 

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import zlib
 from collections import deque
+from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from types import TracebackType
 
 from ptmtools.database.emitters import GZIP
 from ptmtools.files import write_bytes, writing
@@ -36,73 +36,47 @@ def compressed(data: bytes) -> bytes:
     return _GZIP + body + check + (len(data) & 0xFFFFFFFF).to_bytes(4, "little")
 
 
-class ServedFiles:
-    """A context manager: when it is left, all files are written, or the first fault is raised.
+def write_files(
+    folder: Path, files: Iterable[tuple[str, str | bytes, bool]], *, force: bool, gzip: bool
+) -> tuple[tuple[str, ...], int]:
+    """The names of what was written, in the order of ``files``, and all their bytes.
 
     Parameters
     ----------
     folder: an existing one.
+    files: name relative to the folder, contents, and whether all before must be on the disk.
     force: overwrite files; a gzip copy that is not written again goes.
     gzip: write copies of VRML and JSON files.
 
-    Attributes
-    ----------
-    names: of the files, relative to the folder, in the order of `put`.
-    bytes: of those that are surely written.
+    Raises
+    ------
+    OutputError: PTM-O001 to PTM-O003, of the first file that cannot be written.
     """
+    names: list[str] = []
+    size = 0
+    pending: deque[Future[int]] = deque()
+    pool = ThreadPoolExecutor(_WRITERS, "files")
+    try:
+        for name, content, alone in files:
+            while pending and (alone or len(pending) >= _WAITING):
+                size += pending.popleft().result()
+            data = content.encode() if isinstance(content, str) else content
+            copied = gzip and name.endswith(_TEXT)
+            names += [name, name + GZIP] if copied else [name]
+            pending.append(pool.submit(_write, folder / name, data, copied, force))
+        return tuple(names), size + sum(each.result() for each in pending)
+    finally:
+        pool.shutdown(cancel_futures=True)
 
-    def __init__(self, folder: Path, *, force: bool, gzip: bool) -> None:
-        self.names: list[str] = []
-        self.bytes = 0
-        self._folder = folder
-        self._force = force
-        self._gzip = gzip
-        self._pool = ThreadPoolExecutor(_WRITERS, "files")
-        self._pending: deque[Future[int]] = deque()
 
-    def put(self, name: str, content: str | bytes) -> None:
-        """Begins to write a file.
-
-        Raises
-        ------
-        OutputError: PTM-O001 to PTM-O003, of this file or of an earlier one.
-        """
-        data = content.encode() if isinstance(content, str) else content
-        copied = self._gzip and name.endswith(_TEXT)
-        self.names += [name, name + GZIP] if copied else [name]
-        self._pending.append(self._pool.submit(self._write, name, data, copied))
-        while len(self._pending) >= _WAITING:
-            self.bytes += self._pending.popleft().result()
-
-    def settle(self) -> None:
-        """Waits until all of them are written."""
-        while self._pending:
-            self.bytes += self._pending.popleft().result()
-
-    def _write(self, name: str, data: bytes, copied: bool) -> int:
-        path = self._folder / name
-        other = path.with_name(path.name + GZIP)
-        write_bytes(path, data, force=self._force)
-        if copied:
-            packed = compressed(data)
-            write_bytes(other, packed, force=self._force)
-            return len(data) + len(packed)
-        if self._force:
-            with writing(other):
-                other.unlink(missing_ok=True)
-        return len(data)
-
-    def __enter__(self) -> ServedFiles:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        try:
-            if value is None:
-                self.settle()
-        finally:
-            self._pool.shutdown(cancel_futures=True)
+def _write(path: Path, data: bytes, copied: bool, force: bool) -> int:
+    other = path.with_name(path.name + GZIP)
+    write_bytes(path, data, force=force)
+    if copied:
+        packed = compressed(data)
+        write_bytes(other, packed, force=force)
+        return len(data) + len(packed)
+    if force:
+        with writing(other):
+            other.unlink(missing_ok=True)
+    return len(data)
