@@ -175,38 +175,42 @@ def _profile(name: str) -> Codec:
 def _rivals() -> list[Codec]:
     from PIL import features
 
+    webp = None if features.check("webp") else _PILLOW
+    jpeg_xl = [
+        _by_imagecodecs(f"JPEG XL effort {effort}", "jpegxl", lossless=True, effort=effort)
+        for effort in (1, 3, 7)
+    ]
+    jpeg_ls = _by_imagecodecs("JPEG-LS, less green", "jpegls")
+    return [
+        Codec("PNG", _png, _by_pillow),
+        Codec("WebP lossless", _webp, _by_pillow, remedy=webp),
+        *jpeg_xl,
+        _by_imagecodecs("JPEG 2000", "jpeg2k", level=0, reversible=True, codecformat="j2k"),
+        replace(jpeg_ls, encode=_jpeg_ls, decode=_from_jpeg_ls),
+    ]
+
+
+def _by_imagecodecs(name: str, function: str, **settings: Any) -> Codec:
+    """A codec of that library: ``function``_encode and ``function``_decode."""
     imagecodecs: Any
     try:
         import imagecodecs
     except ImportError:
         imagecodecs = None
-    webp = features.check("webp")
-    found = [
-        Codec("PNG", _png, _by_pillow),
-        Codec("WebP lossless", _webp, _by_pillow, remedy=None if webp else _PILLOW),
-    ]
-    jxl = imagecodecs is not None and imagecodecs.JPEGXL.available
-    found += [_jpeg_xl(effort, None if jxl else _CODECS) for effort in (1, 3, 7)]
-    j2k = features.check("jpg_2000")
-    found.append(Codec("JPEG 2000", _jpeg_2000, _from_jpeg_2000, remedy=None if j2k else _PILLOW))
-    jls = imagecodecs is not None and imagecodecs.JPEGLS.available
-    remedy = None if jls else _CODECS
-    found.append(Codec("JPEG-LS, less green", _jpeg_ls, _from_jpeg_ls, remedy=remedy))
-    return found
 
-
-def _jpeg_xl(effort: int, remedy: str | None) -> Codec:
     def encode(image: Samples) -> bytes:
-        import imagecodecs
-
-        return bytes(imagecodecs.jpegxl_encode(_plain(image), lossless=True, effort=effort))
+        if function == "jpeg2k":
+            if image.dtype.kind == "f":
+                raise ValueError("it has integers only")
+            settings["mct"] = image.shape[2] > 2
+        return bytes(getattr(imagecodecs, f"{function}_encode")(_plain(image), **settings))
 
     def decode(data: bytes, shape: tuple[int, ...]) -> Samples:
-        import imagecodecs
+        texels: Samples = getattr(imagecodecs, f"{function}_decode")(data)
+        return texels.reshape(shape)
 
-        return imagecodecs.jpegxl_decode(data).reshape(shape)
-
-    return Codec(f"JPEG XL effort {effort}", encode, decode, remedy=remedy)
+    there = imagecodecs is not None and getattr(imagecodecs, function.upper()).available
+    return Codec(name, encode, decode, remedy=None if there else _CODECS)
 
 
 def _plain(image: Samples) -> Samples:
@@ -232,40 +236,6 @@ def _webp(image: Samples) -> bytes:
     return buffer.getvalue()
 
 
-def _jpeg_2000(image: Samples) -> bytes:
-    from PIL import Image
-
-    if image.dtype.kind == "f":
-        raise ValueError("it has integers only")
-    if image.dtype.itemsize > 1:
-        import imagecodecs
-
-        return bytes(
-            imagecodecs.jpeg2k_encode(_plain(image), level=0, reversible=True, codecformat="j2k")
-        )
-    buffer = io.BytesIO()
-    # Six resolutions, the default, are too many for tiny images.
-    resolutions = min(6, min(image.shape[:2]).bit_length())
-    colour_transform = int(image.shape[2] > 2)
-    Image.fromarray(_plain(image)).save(
-        buffer,
-        "JPEG2000",
-        irreversible=False,
-        num_resolutions=resolutions,
-        mct=colour_transform,
-    )
-    return buffer.getvalue()
-
-
-def _from_jpeg_2000(data: bytes, shape: tuple[int, ...]) -> Samples:
-    """By what encoded it: Pillow for 8 bits, imagecodecs for 16."""
-    if data.startswith(b"\0\0\0\x0cjP  "):
-        return _by_pillow(data, shape)
-    import imagecodecs
-
-    return imagecodecs.jpeg2k_decode(data).reshape(shape)
-
-
 def _by_pillow(data: bytes, shape: tuple[int, ...]) -> Samples:
     """What Pillow decodes, or for PNGs of 16 bits `load_image`."""
     import numpy as np
@@ -275,7 +245,7 @@ def _by_pillow(data: bytes, shape: tuple[int, ...]) -> Samples:
         from ptmtools.texture.images import load_image
 
         return load_image(data).array()
-    with Image.open(io.BytesIO(data), formats=("PNG", "WEBP", "JPEG2000")) as image:
+    with Image.open(io.BytesIO(data), formats=("PNG", "WEBP")) as image:
         # WebP leaves out alpha where all is opaque.
         opaque = image.mode == "RGB" and shape[2] in (2, 4)
         texels = np.asarray(image.convert("RGBA") if opaque else image)

@@ -159,8 +159,8 @@ def _by_pillow(
             return picture
         if first.startswith(_PNG):
             check_chunks(file)
-        if first.startswith(_TIFF) and (layout := deep.tiff_layout(file)).deep:
-            return deep.read_tiff(file, layout, limits)
+        if first.startswith(_TIFF) and deep.is_deep(tags := deep.tiff_tags(file)):
+            return deep.read_tiff(file, tags, limits)
         image = opened(file, limits)
         eight_bit.one_frame(image)
         depth = 8
