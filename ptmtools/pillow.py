@@ -252,7 +252,7 @@ def _save(im: Image.Image, fp: IO[bytes], filename: str | bytes) -> None:
 
 
 def _description(im: Image.Image, given: Mapping[str, Any]) -> Description:
-    """What the image says of itself, unless `save` was told something else."""
+    """What the image says of itself, unless the arguments of ``save`` override it."""
     kept = described(im)
     if "icc_profile" in given:
         kept = replace(kept, icc=given["icc_profile"] or None)

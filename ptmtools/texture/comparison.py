@@ -1,10 +1,10 @@
-"""Size and speed of the profiles beside other lossless formats, on the same texels in one run.
+"""Size and speed of the profiles and of other lossless formats, on the same texels in one run.
 
-A `.ptm` holds all levels; the others hold one image, so for them the finest level alone is told as
-well as all levels in a file each, which is what a client that streams mipmaps would have to fetch.
-Speeds count the bytes of the finest level, raw: of the finest level alone for the others, of all
-levels for `.ptm`. What comes back is compared with what went in. Only ratios within one run mean
-something.
+A `.ptm` holds all levels. The other formats hold one image, so two sizes are given for them: the
+finest level alone, and one file for each level, which is what a client that streams mipmaps would
+fetch. Speeds are in raw bytes of the finest level per second, though a `.ptm` codes all levels in
+that time. Decoded texels are compared with the originals. Timings mean something only as ratios
+within one run.
 """
 
 from __future__ import annotations
@@ -27,23 +27,22 @@ if TYPE_CHECKING:
 
 _PILLOW = "pip install --force-reinstall pillow"
 _CODECS = "pip install 'ptmtools[codecs]'"
-#: Before it is timed a codec sees a corner of so many texels a side; ours also see grain and a
-#: plain image of that size, so that what is compiled or loaded when first used is not counted,
-#: whichever way they code the image.
+#: Before it is timed, a codec codes a corner of so many texels a side, and ours also noise and a
+#: plain image of that size, so that no compiling or loading is counted.
 _CORNER = 256
 _LENGTH = struct.Struct("<I")
 
 
 @dataclass(frozen=True)
 class Codec:
-    """A way to make an image a string of bytes, and back.
+    """A way to turn an image into bytes, and back.
 
     Attributes
     ----------
     name: what it is called in a table.
     encode, decode: of (h, w, c) texels. Either may raise anything for what it cannot hold.
     pyramid: whether one string holds all levels.
-    remedy: what to install where it is not there; None where it is.
+    remedy: how to install it; None if it is installed.
     """
 
     name: str
@@ -77,7 +76,7 @@ class Measured:
 
 
 def codecs(profiles: Iterable[str] = PROFILES) -> list[Codec]:
-    """The profiles, then the other formats: PNG first, then WebP, JPEG XL, JPEG 2000, JPEG-LS."""
+    """The profiles, then PNG, WebP, JPEG XL, JPEG 2000 and JPEG-LS."""
     return [*map(_profile, profiles), *_rivals()]
 
 
