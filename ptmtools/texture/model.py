@@ -61,7 +61,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Description:
-    """What a file says of its texels besides their numbers; none of it changes a texel.
+    """How the texels are to be shown, as the image file said; none of it changes a texel.
 
     Attributes
     ----------

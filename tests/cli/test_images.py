@@ -223,7 +223,7 @@ def test_sizes_are_told_beside_those_of_the_input(
 
 
 @pytest.mark.parametrize(
-    ("side", "told"),
+    ("side", "note"),
     [
         (10, "finest within --max-side 10 is 8 x 5; the next, 17 x 10, would add about 4"),
         (17, None),
@@ -233,11 +233,11 @@ def test_sizes_are_told_beside_those_of_the_input(
     ],
 )
 def test_the_side_that_was_chosen(
-    side: int, told: str | None, folder: Path, capsys: pytest.CaptureFixture[str]
+    side: int, note: str | None, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["encode", "a.png", "--profile", "raw", "--max-side", str(side)]) == 0
     _, *notes = capsys.readouterr().out.splitlines()
-    assert (told in notes[0]) if told else not notes
+    assert (note in notes[0]) if note else not notes
 
 
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs terminals")
@@ -292,8 +292,8 @@ def test_pipes_are_as_standard_input(folder: Path, through: Callable[..., Any]) 
     assert piped(data, "decode", "pipe", "-q") == (0, png_bytes(RGB), "")
     assert piped(data, "decode", "pipe", "-q", "-o", "x.png") == (0, b"", "")
     np.testing.assert_array_equal(load_image("x.png").array(), RGB)
-    status, told, _ = piped(data, "info", "pipe", "--json")
-    assert (status, json.loads(told)["whole_levels"]) == (0, 5)
+    status, report, _ = piped(data, "info", "pipe", "--json")
+    assert (status, json.loads(report)["whole_levels"]) == (0, 5)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is full")
@@ -322,8 +322,8 @@ def test_stdin_and_stdout(folder: Path, through: Callable[..., Any]) -> None:
     np.testing.assert_array_equal(load_image("x.png").array(), RGB)
     (folder / "a.ptm").write_bytes(data)
     assert through(b"", "decode", "a.ptm", "-o", "-", "-q") == (0, png_bytes(RGB), "")
-    status, told, _ = through(data, "info", "-", "--json")
-    assert json.loads(told)["whole_levels"] == 5
+    status, report, _ = through(data, "info", "-", "--json")
+    assert json.loads(report)["whole_levels"] == 5
     status, _, err = through(b"", "encode", "-")
     assert (status, err[:7], err.strip()[-10:]) == (3, "ptm: -:", "[PTM-I123]")
 
@@ -423,27 +423,27 @@ def test_info_counts(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     header = read_header(data)
     (folder / "x.ptm").write_bytes(data[: header.levels[-1].end - 1])
     assert main(["info", "x.ptm", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["width"], told["kind"], told["profile"], told["trimmed"]) == (
+    report = json.loads(capsys.readouterr().out)
+    assert (report["width"], report["kind"], report["profile"], report["trimmed"]) == (
         102,
         "uint16",
         "raw",
         1,
     )
-    assert told["description"] == {
+    assert report["description"] == {
         "icc_bytes": 9,
         "srgb_intent": 1,
         "gamma": 0.45455,
         "orientation": 6,
     }
-    assert told["whole_levels"] == len(header.levels) - 1
-    assert told["file_bytes"] == len(data) - 1
-    finest, one = told["levels"][-1], told["levels"][0]
+    assert report["whole_levels"] == len(header.levels) - 1
+    assert report["file_bytes"] == len(data) - 1
+    finest, one = report["levels"][-1], report["levels"][0]
     assert finest["tiles"] == [3, 1]
     assert finest["length"] == header.levels[-1].length
     assert finest["bits_per_texel"] == 8 * finest["length"] / (51 * 31)
     assert finest["end"] == header.levels[-1].end
-    assert sum(level["length"] for level in told["levels"]) <= header.file_size
+    assert sum(level["length"] for level in report["levels"]) <= header.file_size
     assert (one["gpu_bytes"], one["gpu_bytes_padded"]) == (3 * 1 * 6, 3 * 1 * 8)
     assert finest["gpu_bytes_padded"] * 3 == finest["gpu_bytes"] * 4
     assert main(["info", "x.ptm"]) == 0
@@ -463,9 +463,9 @@ def test_info_reads_the_head_only(folder: Path, capsys: pytest.CaptureFixture[st
 
 def test_compare(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["compare", "a.png", "b.PNG", "--profiles", "raw", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert [image["image"] for image in told["images"]] == ["a.png", "b.PNG"]
-    by_name = {one["codec"]: one for one in told["images"][0]["codecs"]}
+    report = json.loads(capsys.readouterr().out)
+    assert [image["image"] for image in report["images"]] == ["a.png", "b.PNG"]
+    by_name = {one["codec"]: one for one in report["images"][0]["codecs"]}
     assert by_name["ptm raw"]["all_bytes"] == len(encode(RGB, RAW))
     assert by_name["ptm raw"]["finest_bytes"] is None
     png = by_name["PNG"]
@@ -474,7 +474,7 @@ def test_compare(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert png["raw_bytes"] == RGB.size
     for one in by_name.values():
         assert one["problem"] is None or one["problem"].startswith("not installed: pip install")
-    totals = {one["codec"]: one for one in told["total"]}
+    totals = {one["codec"]: one for one in report["total"]}
     assert totals["PNG"]["all_bytes"] == 2 * png["all_bytes"]
     assert main(["compare", "a.png", "b.PNG", "--profiles", "raw"]) == 0
     out = capsys.readouterr().out

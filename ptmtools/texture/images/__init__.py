@@ -1,10 +1,10 @@
-"""Image files in and out, without ever changing a texel silently.
+"""Reading and writing image files without ever changing a texel silently.
 
-What a format can hold beyond what is asked for, or less, is an error that says so; nothing is
-scaled, rounded or converted on the way. Colour and orientation are *kept*, never applied: texels
-are taken as numbers, in the order of the file's rows, and what the file says of them goes into a
+Nothing is scaled, rounded or converted on the way: what a format cannot hold exactly, or what a
+`.ptm` cannot, is an error that says so. Colour and orientation are *kept*, not applied: texels are
+numbers, in the order of the file's rows, and what the file says of them goes into a
 `ptmtools.texture.Description`. The exception is TIFF, whose orientation says how its rows are
-stored: it is applied.
+stored; it is applied.
 """
 
 from __future__ import annotations

@@ -48,8 +48,8 @@ def load_image(source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS)
     Parameters
     ----------
     source: a path, or the bytes of a file.
-    limits: ``decoded_bytes`` is the most that the texels may take in memory, told by the head
-        of the file.
+    limits: ``decoded_bytes`` is the most memory that the texels may take, judged by the size that
+        the head of the file declares.
 
     Raises
     ------
@@ -70,9 +70,7 @@ def load_image(source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS)
 def read_image(
     source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS
 ) -> NDArray[np.uint8]:
-    """An image file of 8 bits a component as (h, w, c) uint8, rows from the top.
-
-    As `load_image`, for those who have a use for nothing else.
+    """The texels of an image file of 8 bits a component: (h, w, c) uint8, rows from the top.
 
     Raises what `load_image` raises; InputError PTM-I126 also for deeper samples.
     """
@@ -83,8 +81,8 @@ def read_image(
 
 
 def check_image(source: bytes, limits: Limits = _LIMITS) -> None:
-    """Raises what `read_image` would raise for an image that Pillow has been seen to decode: its
-    texels are not unpacked once more."""
+    """Raises what `read_image` would raise, without unpacking texels: for an image that Pillow has
+    decoded already."""
     file = cast("BinaryIO", io.BytesIO(source))
     found = _opened(file, None, limits)
     if isinstance(found, Picture):
@@ -159,8 +157,8 @@ def _by_pillow(
             return picture
         if first.startswith(_PNG):
             check_chunks(file)
-        if first.startswith(_TIFF) and (layout := deep.tiff_layout(file)).deep:
-            return deep.read_tiff(file, layout, limits)
+        if first.startswith(_TIFF) and deep.is_deep(tags := deep.tiff_tags(file)):
+            return deep.read_tiff(file, tags, limits)
         image = opened(file, limits)
         eight_bit.one_frame(image)
         depth = 8
