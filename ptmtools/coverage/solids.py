@@ -67,9 +67,9 @@ class Solid:
         from ptmtools.coverage.clearance_kernels import crossings
 
         turned = np.einsum("ij,kj->ik", points, FRAMES[ray])
-        order = np.argsort(turned[:, 0], kind="stable")
+        order, first, end = by_x(turned, self._turned[ray], 0.0)
         crossed = np.zeros(len(points), dtype=np.int64)
-        crossings(turned[order], self._turned[ray], crossed)
+        crossings(turned[order], self._turned[ray], first, end, crossed)
         odd = np.empty(len(points), dtype=np.bool_)
         odd[order] = crossed % 2 > 0
         return odd
@@ -213,8 +213,19 @@ class Obstacles:
         if len(points):
             low, high = points.min(axis=0) - enough, points.max(axis=0) + enough
             near = self.corners[self.nearby.meeting(low, high)]
-            order = np.argsort(points[:, 0], kind="stable")
+            order, first, end = by_x(points, near, enough)
             ascending = np.full(len(points), enough)
-            clearances(np.ascontiguousarray(points[order]), near, enough, ascending)
+            clearances(points[order], near, first, end, enough, ascending)
             found[order] = ascending
         return found
+
+
+def by_x(
+    points: NDArray[np.float64], corners: NDArray[np.float64], margin: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """The order of the (n, 3) points by x, and for each of the (m, 3, 3) triangles where those that
+    are within ``margin`` of its extent along x begin and end in that order."""
+    order = np.argsort(points[:, 0], kind="stable")
+    x, along = points[order, 0], corners[:, :, 0]
+    first = np.searchsorted(x, along.min(axis=1) - margin)
+    return order, first, np.searchsorted(x, along.max(axis=1) + margin, side="right")

@@ -218,10 +218,11 @@ class PixelCounter:
         return owner, hit
 
     def _weight(self, points: SamplePoints) -> NDArray[np.int64]:
-        from ptmtools.coverage.tally_kernels import weigh
-
+        """(1 or K, face²) weights of the pixels of a view: alike, or by solid angle,
+        (1 + x² + y²)^(-3/2) in `unit`-ths."""
         if self.unit == 1:
             return np.ones((1, self._face**2), dtype=np.int64)
-        weight = np.empty((len(points), self._face**2), dtype=np.int64)
-        weigh(self._face, points.shift / self._face, self.unit, weight)
-        return weight
+        centre = (2.0 * np.arange(self._face) + 1.0) / self._face - 1.0
+        x, y = (centre + shift[:, None] for shift in (points.shift / self._face).T)
+        weight = self.unit / (1.0 + x[:, None, :] ** 2 + y[:, :, None] ** 2) ** 1.5
+        return np.round(weight).astype(np.int64).reshape(len(points), -1)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.compiled import kernel
+from ptmtools.compiled import plain_kernel
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Ints = NDArray[np.int64]
 
 
-@kernel
+@plain_kernel
 def cast_rays(
     point: Floats, shift: Floats, face: int, views: Floats, origin: Singles, along: Singles
 ) -> None:
@@ -39,19 +39,7 @@ def cast_rays(
                     at += 1
 
 
-@kernel
-def weigh(face: int, shift: Floats, unit: int, weight: Ints) -> None:
-    """Writes into ``weight`` (K, face²) the solid angle of the pixels of a view over that of a
-    pixel in its middle, in ``unit``-ths: (1 + x² + y²)^(-3/2)."""
-    for k in range(len(shift)):
-        for row in range(face):
-            y = (2.0 * row + 1.0) / face - 1.0 + shift[k, 1]
-            for column in range(face):
-                x = (2.0 * column + 1.0) / face - 1.0 + shift[k, 0]
-                weight[k, row * face + column] = round(unit / (1.0 + x * x + y * y) ** 1.5)
-
-
-@kernel
+@plain_kernel
 def add_pixels(
     shows: NDArray[np.int32],
     point: Floats,

@@ -33,7 +33,7 @@ class CellsTrade:
     """The experiment of the subdivision."""
 
     work = "leaves"
-    error = "volume at hand"
+    error = "share of the building that a viewer may see"
     reference_error = 0.0
 
     def __init__(self, scene: Scene, options: SubdivideOptions) -> None:

@@ -50,8 +50,8 @@ def prepare(subject: Subject) -> CoverageTrade:
 class CoverageTrade:
     """The experiment of the coverage hints."""
 
-    work = "rays a cell"
-    error = "total variation"
+    work = "rays per cell"
+    error = "total variation of a cell's hints"
 
     def __init__(
         self,
@@ -117,8 +117,8 @@ class CoverageTrade:
             more={
                 "p95": float(np.percentile(errors, 95)) if len(errors) else 0.0,
                 "missed": float(missed.sum()) / many,
-                "gl": float(backend == "gl"),
             },
+            note=backend,
         )
 
     def errors(self, found: Mapping[int, CellHints]) -> NDArray[np.float64]:

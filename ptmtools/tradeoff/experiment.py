@@ -46,8 +46,9 @@ class Measured:
     seconds: of one process, for the whole database.
     work: in the units that the experiment names; does not depend on the machine.
     error: as the experiment names it; the mean over what was looked at.
-    worst: the greatest of them.
+    worst: the greatest error of them.
     more: other figures, by name.
+    note: how it was done, where that may differ.
     """
 
     seconds: float
@@ -55,6 +56,7 @@ class Measured:
     error: float
     worst: float
     more: Mapping[str, float] = field(default_factory=dict)
+    note: str = ""
 
 
 class Experiment(Protocol):

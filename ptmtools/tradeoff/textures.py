@@ -31,7 +31,7 @@ class TexturesTrade:
     """The experiment of the texture profiles."""
 
     work = "texels"
-    error = "bytes stored, of those of the finest level"
+    error = "bytes of all levels, as a share of the uncompressed finest"
     reference_error = 0.0
 
     def __init__(

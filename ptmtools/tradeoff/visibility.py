@@ -1,8 +1,8 @@
 """What the knobs of the visibility buy.
 
 The reference is the full search with a budget that hardly any portal exhausts. The error of a
-setting is the share of its pairs of cells that are too many, or for sampled lines of those that are
-missing, which is worse: a client that loads by such a set shows holes.
+setting is its number of wrong pairs of cells over that of the right ones: pairs too many, or with
+sampled lines also missing ones, which is worse: a client that loads by such a set shows holes.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class VisibilityTrade:
     """The experiment of the visibility."""
 
     work = "operations"
-    error = "pairs too many, or missing"
+    error = "wrong pairs of cells, as a share of the right ones"
     reference_error = 0.0
 
     def __init__(self, cells: Cells, options: PvsOptions) -> None:
