@@ -44,8 +44,8 @@ from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.database import TextureRecord, emit
-from ptmtools.pipeline.archive import pack_arrays, unpack_arrays
 from ptmtools.scene import Scene, SourceImage, ingest
+from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.tolerance import Tolerance
 from ptmtools.visibility import Pvs, compute_pvs
 

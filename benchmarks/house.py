@@ -56,7 +56,10 @@ def report(root: Path) -> None:
     naming = [module for module in package if module.stage_names]
     print(f"files over {LONG} lines: {len(long)}")
     print(f"folders of one module: {len(lonely(package))}")
-    print(f"circles between files: {circles(package)}")
+    found = circles(package)
+    print(f"circles between files: {len(found)}")
+    for circle in found:
+        print(f"    {', '.join(sorted(circle))}")
     print(f"stage names as strings: {sum(m.stage_names for m in naming)} in {len(naming)} files")
 
 
@@ -122,16 +125,15 @@ def lonely(modules: list[Module]) -> list[Path]:
     return [folder for folder, count in folders.items() if count == 1 and folder not in parents]
 
 
-def circles(modules: list[Module]) -> int:
-    """How many groups of files import each other, in however many steps (Tarjan)."""
+def circles(modules: list[Module]) -> list[list[str]]:
+    """Groups of files that import each other, in however many steps (Tarjan)."""
     named = {".".join(m.path.with_suffix("").parts).removesuffix(".__init__"): m for m in modules}
     order: dict[str, int] = {}
     low: dict[str, int] = {}
     stack: list[str] = []
-    found = 0
+    found: list[list[str]] = []
 
     def visit(name: str) -> None:
-        nonlocal found
         order[name] = low[name] = len(order)
         stack.append(name)
         for other in named[name].imports & named.keys() - {name}:
@@ -141,10 +143,11 @@ def circles(modules: list[Module]) -> int:
             elif other in stack:
                 low[name] = min(low[name], order[other])
         if low[name] == order[name]:
-            size = 1
-            while stack.pop() != name:
-                size += 1
-            found += size > 1
+            circle = [stack.pop()]
+            while circle[-1] != name:
+                circle.append(stack.pop())
+            if len(circle) > 1:
+                found.append(circle)
 
     sys.setrecursionlimit(10_000)
     for name in named:

@@ -176,10 +176,11 @@ class Tracer:
 def load(path: Path) -> Scene:
     """The scene of a model file, or of a database."""
     if path.is_dir():
-        from ptmtools.pipeline.folder import DatabaseFolder
         from ptmtools.pipeline.run import Artifacts
+        from ptmtools.pipeline.stages import SCENE
+        from ptmtools.store.folder import DatabaseFolder
 
-        return Artifacts(DatabaseFolder.open(path)).scene
+        return Artifacts(DatabaseFolder.open(path))[SCENE]
     from ptmtools.scene import ingest
 
     return ingest(path)

@@ -50,22 +50,14 @@ from prt import read_prt
 from ptmtools.cells import subdivide
 from ptmtools.coverage import ach as coverage
 from ptmtools.coverage.options import AchOptions
+from ptmtools.database.model import EmitOptions
 from ptmtools.executors import Executor, open_executor
 from ptmtools.executors.model import AHEAD
 from ptmtools.executors.serial import SerialSharing
 from ptmtools.files import write_bytes
-from ptmtools.pipeline import (
-    TextureOptions,
-    make_ach,
-    make_cells,
-    make_files,
-    make_pvs,
-    make_textures,
-)
-from ptmtools.pipeline import (
-    workers as workers_of,
-)
-from ptmtools.pipeline.textures import encoded_image
+from ptmtools.pipeline import TextureOptions, background, build_scene, run_stage
+from ptmtools.pipeline.encoding import encoded_image
+from ptmtools.pipeline.stages import CELLS
 from ptmtools.scene import ingest
 from ptmtools.texture import read_image
 from ptmtools.visibility import PvsOptions, compute_pvs
@@ -216,7 +208,9 @@ def collection(given: argparse.Namespace) -> dict[str, Any]:
     with tempfile.TemporaryDirectory(dir=given.folder) as folder, two_processes(8) as address:
         for count in counts:
             model, db = pictures(Path(folder, str(count)), count), Path(folder, f"{count}.db")
-            took = _stages(model, db) | _at_a_desk(model, Path(folder, f"{count}.desk"), address)
+            took = _stages(model, db) | _shared_disk(
+                model, Path(folder, f"{count}.disk"), address
+            )
             for stage, figures in took.items():
                 seconds.setdefault(stage, []).append(figures)
         manifest = (db / "manifest.json").stat().st_size / counts[2]
@@ -237,27 +231,27 @@ def collection(given: argparse.Namespace) -> dict[str, Any]:
     return found
 
 
-def _at_a_desk(model: Path, db: Path, address: str) -> dict[str, tuple[float, float]]:
+def _shared_disk(model: Path, db: Path, address: str) -> dict[str, tuple[float, float]]:
     """CPU and wall seconds of the textures, where workers see the disk; the scheduler's included,
     which runs in this process."""
-    workers_of.open_executor = open_executor
-    make_cells(model, db, workers=1)
+    background.open_executor = open_executor
+    build_scene(model, db, until=CELLS, workers=1)
     start = time.perf_counter()
-    _, took = cpu(lambda: make_textures(db, scheduler=address))
+    _, took = cpu(lambda: run_stage(db, TextureOptions(), scheduler=address))
     return {"textures, by name": (took, time.perf_counter() - start)}
 
 
 def _stages(model: Path, db: Path) -> dict[str, tuple[float, float]]:
     """CPU and wall seconds of each stage without its tasks."""
     recorder = Recorder()
-    workers_of.open_executor = lambda *_: recorder  # type: ignore[assignment]
+    background.open_executor = lambda *_: recorder  # type: ignore[assignment]
     hints = AchOptions(samples=1, backend="embree")
     found = {}
     for name, stage in {
-        "scene and cells": lambda: make_cells(model, db, workers=1),
-        "pvs and ach": lambda: (make_pvs(db), make_ach(db, hints)),
-        "textures": lambda: make_textures(db),
-        "emit": lambda: make_files(db),
+        "scene and cells": lambda: build_scene(model, db, until=CELLS, workers=1),
+        "pvs and ach": lambda: (run_stage(db, PvsOptions()), run_stage(db, hints)),
+        "textures": lambda: run_stage(db, TextureOptions()),
+        "emit": lambda: run_stage(db, EmitOptions()),
     }.items():
         recorder.rounds.clear()
         start = time.perf_counter()

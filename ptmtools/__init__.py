@@ -1,9 +1,9 @@
 """ptmtools: architectural scenes that stream.
 
 The functions here are the commands of `ptm`: `build_scene` builds a database from a model,
-`ingest`, `subdivide`, `compute_pvs`, `compute_ach` and `emit` are its stages, `encode` and
-`decode` turn one image into a `.ptm` and back, `open` reads one level by level, `validate` and
-`plot_plan` look at the result.
+`run_stage` runs one stage of it, `ingest`, `subdivide`, `compute_pvs`, `compute_ach` and `emit`
+are what the stages do, `encode` and `decode` turn one image into a `.ptm` and back, `open` reads
+one level by level, `validate` and `plot_plan` look at the result.
 Each has a frozen class of options, which holds the defaults. Whatever a user can cause raises a
 `PtmError`.
 
@@ -34,19 +34,14 @@ if TYPE_CHECKING:
     )
     from ptmtools.pipeline import (
         Artifacts,
-        BuildOptions,
         BuildReport,
-        DatabaseFolder,
         TextureOptions,
         build_scene,
-        make_ach,
-        make_cells,
-        make_files,
-        make_pvs,
-        make_textures,
+        run_stage,
         validate,
     )
     from ptmtools.scene import IngestOptions, Scene, ingest
+    from ptmtools.store.folder import DatabaseFolder
     from ptmtools.texture import (
         Description,
         EncodeOptions,
@@ -72,12 +67,11 @@ _HOME = {
     "Ach": "coverage.model",
     "AchOptions": "coverage.options",
     "Artifacts": "pipeline",
-    "BuildOptions": "pipeline",
     "BuildReport": "pipeline",
     "Cells": "cells",
     "CheckError": "errors",
     "DatabaseError": "errors",
-    "DatabaseFolder": "pipeline",
+    "DatabaseFolder": "store.folder",
     "Description": "texture",
     "EmitOptions": "database",
     "EncodeOptions": "texture",
@@ -107,15 +101,11 @@ _HOME = {
     "encode_to": "texture",
     "ingest": "scene",
     "load_image": "texture",
-    "make_ach": "pipeline",
-    "make_cells": "pipeline",
-    "make_files": "pipeline",
-    "make_pvs": "pipeline",
-    "make_textures": "pipeline",
     "open": "texture",
     "plot_plan": "database",
     "read_header": "texture",
     "read_image": "texture",
+    "run_stage": "pipeline",
     "subdivide": "cells",
     "validate": "pipeline",
     "write_image": "texture",
@@ -126,7 +116,6 @@ __all__ = [
     "Ach",
     "AchOptions",
     "Artifacts",
-    "BuildOptions",
     "BuildReport",
     "Cells",
     "CheckError",
@@ -162,14 +151,10 @@ __all__ = [
     "encode_to",
     "ingest",
     "load_image",
-    "make_ach",
-    "make_cells",
-    "make_files",
-    "make_pvs",
-    "make_textures",
     "plot_plan",
     "read_header",
     "read_image",
+    "run_stage",
     "subdivide",
     "validate",
     "write_image",

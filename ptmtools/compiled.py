@@ -1,16 +1,22 @@
 """Loops compiled by numba, and where their machine code is kept between runs.
 
-A cached kernel is stale when *any* kernel it calls has changed. Numba looks at a function's own
-file only, so the folder is named after the contents of all of them: kernels may be spread over
-files and share helpers without ever meeting the machine code of yesterday's helper.
+Machine code holds whatever its function could see as it was compiled: the functions that it calls
+and the constants of its module, imported ones among them. Numba looks at a function's own file
+only. So machine code is kept in a folder named after the contents of the function's module and of
+all modules of the package that this one imports, directly or not: a kernel may stand in any file
+and use what it likes, and a change elsewhere leaves its machine code in use. What an import brings
+is read off the source text (`_imports`), so a kernel's constants must not come from modules that
+are found at run time only.
 
 The folder lies in the package's ``__pycache__`` where that can be written, else in the user's
-cache folder; ``NUMBA_CACHE_DIR`` overrides both.
+cache folder, or in ``NUMBA_CACHE_DIR``. Imports of what a kernel's module does not need make it
+stale more often, so kernels stand in modules of their own or beside code that imports little.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Callable
@@ -43,8 +49,12 @@ finally:
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).parent
-#: Files of this name, and this one, make up the machine code.
-_KERNELS = "kernels.py"
+#: An import of the package's, wherever it stands: a module, and the names taken from it.
+_IMPORT = re.compile(
+    rf"^ *(?:from +({_PACKAGE.name}[\w.]*) +import +(\([^)]*\)|[^\n]*)"
+    rf"|import +({_PACKAGE.name}[\w.]*))",
+    re.MULTILINE,
+)
 
 
 def kernel(function: Function) -> Function:
@@ -101,7 +111,7 @@ def _compiled(function: Function, **options: bool) -> Function:
     settings: Any = numba.config
     with _setting:
         before = settings.CACHE_DIR
-        settings.CACHE_DIR = before or _folder()
+        settings.CACHE_DIR = _folder(before, function.__code__.co_filename)
         try:
             compile_: Any = numba.njit
             compiled: Any = compile_(
@@ -129,28 +139,58 @@ class _FirstCompilation(numba.core.event.Listener):
 numba.core.event.register("numba:compile", _FirstCompilation())  # type: ignore[no-untyped-call]
 
 
+def _folder(chosen: str, file: str) -> str:
+    """Where machine code of functions in that file is kept; "" if there is no place."""
+    place = chosen or _place()
+    return place and os.path.join(place, _digest(Path(file)))
+
+
 @cache
-def _folder() -> str:
-    digest = sha256()
-    for file in [Path(__file__), *_kernel_files()]:
-        digest.update(file.read_bytes())
-    name = f"kernels-{digest.hexdigest()[:12]}"
+def _place() -> str:
     # Not Path.expanduser, which raises for a user without a home.
     caches = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
-    for parent in (_PACKAGE / "__pycache__", caches / "ptmtools"):
+    for place in (_PACKAGE / "__pycache__" / "kernels", caches / "ptmtools" / "kernels"):
         try:
-            (parent / name).mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=parent / name):
-                return str(parent / name)
+            place.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=place):
+                return str(place)
         except OSError:
             continue
     return ""
 
 
-def _kernel_files() -> list[Path]:
-    """All of them, in order. Not by `Path.rglob`, which looks into the folders of machine code."""
-    found = []
-    for folder, folders, files in os.walk(_PACKAGE):
-        folders[:] = [name for name in folders if name != "__pycache__"]
-        found += [Path(folder) / name for name in files if name == _KERNELS]
-    return sorted(found)
+@cache
+def _digest(file: Path) -> str:
+    """Of a module and all that it imports from the package."""
+    files, waiting = {file}, [file]
+    while waiting:
+        found = _imports(waiting.pop()) - files
+        files |= found
+        waiting += found
+    digest = sha256()
+    for one in sorted(files):
+        digest.update(sha256(_source(one)).digest())
+    return digest.hexdigest()[:12]
+
+
+@cache
+def _source(file: Path) -> bytes:
+    return file.read_bytes()
+
+
+@cache
+def _imports(file: Path) -> frozenset[Path]:
+    """The modules of the package that are named in this one's imports."""
+    found = set()
+    for module, names, whole in _IMPORT.findall(_source(file).decode()):
+        # A name may be a module in a package, or something within the module.
+        for name in re.findall(r"\w+", re.sub(r"#.*| as \w+", "", names)) or [""]:
+            found.add(_module(f"{module}.{name}") or _module(module or whole))
+    return frozenset(found - {None})  # type: ignore[arg-type]
+
+
+@cache
+def _module(name: str) -> Path | None:
+    path = _PACKAGE.parent.joinpath(*name.split("."))
+    files = (path.with_suffix(".py"), path / "__init__.py")
+    return next((file for file in files if file.is_file()), None)

@@ -1,14 +1,29 @@
-"""Packages whose names are loaded when first used, so that importing them costs nothing.
+"""What is imported when it is first used, so that ``ptm --help`` is instant.
 
 A package says where each of its names lives, and takes what `names` returns for its
-``__getattr__`` (PEP 562).
+``__getattr__`` (PEP 562). A table says by `Lazy` where the function lives that does something.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import Any, Generic, TypeVar, cast
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Lazy(Generic[T]):
+    """A name of a module, such as ``Lazy("ptmtools.visibility.pvs:compute_pvs")``."""
+
+    place: str
+
+    def load(self) -> T:
+        """What it stands for; imports the module."""
+        module, _, name = self.place.partition(":")
+        return cast(T, getattr(import_module(module), name))
 
 
 def names(package: str, home: Mapping[str, str]) -> Callable[[str], Any]:

@@ -1,88 +1,135 @@
-"""Where machine code is kept: a folder for every state of all kernels together."""
+"""Where machine code is kept: a folder for every state of what compiled code can see."""
 
 from __future__ import annotations
 
+import ast
 import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import ptmtools
 from ptmtools import compiled
 
+ROOT = Path(ptmtools.__file__).parent
 PROGRAM = """
 from ptmtools.progress import listen
-from pkg.one.kernels import outer
+from ptmtools.one import outer
 listen(print)
 print(outer(1))
 """
-OUTER = """
+#: A package of two kernels and a table, of which the program calls the one that uses all.
+SOURCES = {
+    "__init__": "",
+    "one": """
 from ptmtools.compiled import kernel
-from pkg.two.kernels import inner
+from ptmtools.two import (  # what it calls
+    inner as called,
+)
 
 @kernel
 def outer(x):
-    return inner(x) + 1
-"""
-INNER = """
+    return called(x) + 1
+""",
+    "two": """
+from ptmtools import tables
 from ptmtools.compiled import kernel
+
+FACTOR = tables.FACTOR
 
 @kernel
 def inner(x):
-    return x * {}
-"""
+    return x * FACTOR + 1
+""",
+    "tables": "FACTOR = 10\n",
+    "apart": "NOTHING = 0\n",
+}
 
 
-def test_a_changed_kernel_changes_those_that_call_it(tmp_path: Path) -> None:
-    """Numba alone would run the machine code of yesterday's inner kernel."""
-    package = tmp_path / "pkg"
-    for name in ("one", "two"):
-        (package / name).mkdir(parents=True)
-        (package / name / "__init__.py").touch()
-    (package / "__init__.py").touch()
-    (package / "one" / "kernels.py").write_text(OUTER)
-    # A copy of the module that looks at the kernels of this package.
-    (tmp_path / "ptmtools").mkdir()
-    (tmp_path / "ptmtools" / "__init__.py").touch()
-    source = Path(compiled.__file__).read_text()
-    changed = source.replace(
-        "_PACKAGE = Path(__file__).parent", f"_PACKAGE = Path({str(package)!r})"
+def run(program: str, folder: Path, **environment: str) -> list[str]:
+    """What a program prints that imports the package in ``folder``, line by line."""
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(folder), **environment},
+        check=True,
+        capture_output=True,
     )
-    assert changed != source
-    (tmp_path / "ptmtools" / "compiled.py").write_text(changed)
-    shutil.copy(Path(ptmtools.__file__).parent / "progress.py", tmp_path / "ptmtools")
-    for factor in (10, 20):
-        (package / "two" / "kernels.py").write_text(INNER.format(factor))
-        for first in (True, False):
-            told = subprocess.run(
-                [sys.executable, "-c", PROGRAM], cwd=tmp_path, check=True, capture_output=True
-            )
-            *announced, result = told.stdout.decode().splitlines()
-            assert int(result) == factor + 1
-            assert [line.startswith("compiling") for line in announced] == [True] * first
-    folders = list((package / "__pycache__").glob("kernels-*"))
-    assert len(folders) == 2
-    shutil.rmtree(package)
+    return done.stdout.decode().splitlines()
+
+
+@pytest.mark.parametrize("chosen", ["", "chosen"])
+def test_what_a_kernel_sees_decides_about_its_machine_code(tmp_path: Path, chosen: str) -> None:
+    """Numba alone would run yesterday's inner kernel, with yesterday's table."""
+    package = tmp_path / "ptmtools"
+    package.mkdir()
+    for name, source in SOURCES.items():
+        (package / f"{name}.py").write_text(source)
+    for name in ("compiled.py", "progress.py"):
+        shutil.copy(ROOT / name, package)
+    for edited, old, new, result, fresh in (
+        ("one", "", "", 12, True),
+        ("tables", "10", "20", 22, True),
+        ("two", "+ 1", "+ 2", 23, True),
+        ("apart", "0", "1", 23, False),
+        ("tables", "20", "10", 13, True),
+        ("two", "+ 2", "+ 1", 12, False),
+    ):
+        file = package / f"{edited}.py"
+        file.write_text(file.read_text().replace(old, new))
+        *announced, found = run(PROGRAM, tmp_path, NUMBA_CACHE_DIR=chosen)
+        assert int(found) == result
+        assert len(announced) == fresh
+
+
+def test_a_constant_of_this_package(tmp_path: Path) -> None:
+    shutil.copytree(
+        ROOT, tmp_path / "ptmtools", ignore=shutil.ignore_patterns("__pycache__", "schemas")
+    )
+    program = (
+        "import numpy; from ptmtools.texture.coders.mixing.decisions import counted; "
+        "print(counted(numpy.uint32(1 << 31), 1, 9))"
+    )
+    before = run(program, tmp_path)
+    tables = tmp_path / "ptmtools" / "texture" / "coders" / "mixing" / "tables.py"
+    source = tables.read_text()
+    assert source.count("655360") == 1
+    tables.write_text(source.replace("655360", "327680"))
+    after = run(program, tmp_path)
+    assert before != after
+    tables.write_text(source)
+    assert run(program, tmp_path) == before
 
 
 def test_without_a_place_to_keep_it_code_still_runs(tmp_path: Path) -> None:
     """As a user without a home, of a package that is not theirs."""
-    environment = {k: v for k, v in os.environ.items() if k not in ("HOME", "NUMBA_CACHE_DIR")}
     (tmp_path / "file").touch()
-    environment["XDG_CACHE_HOME"] = str(tmp_path / "file")
     program = (
-        "from pathlib import Path; from ptmtools import compiled; "
-        f"compiled._PACKAGE = Path({str(tmp_path / 'file')!r}); "
-        "assert compiled._folder() == ''; "
+        "import os; os.environ.pop('HOME', None)\n"
+        "from pathlib import Path; from ptmtools import compiled\n"
+        f"compiled._PACKAGE = Path({str(tmp_path / 'file')!r})\n"
+        "assert compiled._place() == ''\n"
         "print(compiled.kernel(lambda x: x + 1)(41))"
     )
-    told = subprocess.run(
-        [sys.executable, "-c", program], env=environment, check=True, capture_output=True
-    )
-    assert int(told.stdout) == 42
+    place = str(tmp_path / "file")
+    assert run(program, ROOT.parent, XDG_CACHE_HOME=place, NUMBA_CACHE_DIR="") == ["42"]
 
 
-def test_all_kernels_are_found() -> None:
-    root = Path(ptmtools.__file__).parent
-    assert compiled._kernel_files() == sorted(root.rglob("kernels.py"))
+def test_no_import_is_overlooked() -> None:
+    for file in ROOT.rglob("*.py"):
+        found = set()
+        for node in ast.walk(ast.parse(file.read_text())):
+            names = []
+            if isinstance(node, ast.Import):
+                names = [name.name for name in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                assert not node.level
+                names = [f"{node.module}.{name.name}" for name in node.names]
+            for name in names:
+                if name.split(".")[0] == ROOT.name:
+                    own = compiled._module(name) or compiled._module(name.rpartition(".")[0])
+                    found.add(own)
+        assert found <= compiled._imports(file), file

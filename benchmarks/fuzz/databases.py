@@ -23,12 +23,13 @@ import numpy as np
 from benchmarks.fuzz.mutation import NAMES, NUMBERS, damaged, dumped, garbled, twisted
 from benchmarks.fuzz.target import Case
 from ptmtools.cli.main import main
-from ptmtools.pipeline.archive import pack_arrays, unpack_arrays
-from ptmtools.pipeline.folder import DatabaseFolder, sha256
-from ptmtools.pipeline.manifest import Manifest
 from ptmtools.pipeline.run import Artifacts
-from ptmtools.pipeline.stages import IMAGE_LIST, arrays_of
-from ptmtools.pipeline.writer import DatabaseWriter
+from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE
+from ptmtools.store.archive import pack_arrays, unpack_arrays
+from ptmtools.store.folder import DatabaseFolder
+from ptmtools.store.layout import IMAGE_LIST, arrays_of, sha256
+from ptmtools.store.manifest import Manifest
+from ptmtools.store.writer import DatabaseWriter
 
 MODEL = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"
 #: Names that outputs of a stage may try.
@@ -91,7 +92,7 @@ class Npz:
     def read(self, case: Case) -> str:
         """Reads it back as the stage that it is of, beside the others, and counts by it."""
         artifacts = Artifacts(_Held({**self._arrays, case.told: case.data}, self._images))
-        scene, cells, pvs, ach = artifacts.scene, artifacts.cells, artifacts.pvs, artifacts.ach
+        scene, cells, pvs, ach = (artifacts[stage] for stage in (SCENE, CELLS, PVS, ACH))
         assert len(scene.corners) == len(scene.opaque)
         with np.errstate(all="ignore"):
             cells.locate(scene.points[:9])

@@ -21,8 +21,8 @@ import numpy as np
 from benchmarks.fuzz.mutation import NAMES, NUMBERS, damaged, dumped, garbled, twisted
 from benchmarks.fuzz.target import Case
 from ptmtools.errors import InputError
-from ptmtools.pipeline.archive import pack_arrays, unpack_arrays
 from ptmtools.scene import IngestOptions, Scene, ingest
+from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.texture.images import png_bytes
 
 #: Small limits, so that going beyond them shows.

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
 CellKind = Literal["leaf", "room"]
+Position = tuple[float, float, float]
+
+
+def _positions(viewpoints: Sequence[tuple[float, ...]]) -> tuple[Position, ...]:
+    """The positions (x, y, z) of viewpoints (x, y, z[, yaw])."""
+    return tuple((x, y, z) for x, y, z, *_ in viewpoints)
 
 
 @dataclass(frozen=True)
@@ -26,7 +33,8 @@ class SubdivideOptions:
         at its doors, are one; but see `gain`.
     gain: leaves of one room stay cells of their own if that saves at least this share of what has
         to be fetched in them and for them; 0 joins nothing, 1 leaves every room whole.
-    viewpoints: eyes (x, y, z) in world metres from which the flood of the reachable starts.
+    viewpoints: a place to start from, and from which cells are to be reached, X,Y,Z[,YAW]: world
+        metres; the yaw in degrees, counter-clockwise from -Z.
     """
 
     wall_area: float = 2.0
@@ -36,4 +44,6 @@ class SubdivideOptions:
     detail: tuple[str, ...] = ()
     cells: CellKind = "room"
     gain: float = 0.1
-    viewpoints: tuple[tuple[float, float, float], ...] = ()
+    viewpoints: tuple[Position, ...] = field(
+        default=(), metadata={"option": "viewpoint", "numbers": (3, 4), "parse": _positions}
+    )

@@ -33,13 +33,16 @@ from ptmtools.cells.rejoin import rejoined
 from ptmtools.cells.reveals import Reveals
 from ptmtools.cells.structure import WallPlane, find_walls, structural_triangles
 from ptmtools.errors import InputError
-from ptmtools.executors.aside import Begin, asked
+from ptmtools.executors.model import Executor
+from ptmtools.executors.serial import Serial
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance
 
 #: How far the first root box stands off the model, as a share of the model's extent.
 BOX_MARGIN = 0.01
+#: So many triangles take as long to subdivide as two processes to start.
+LARGE = 4000
 #: A model is open above if less than this share of its floor has something over it.
 ROOFED = 0.5
 
@@ -92,12 +95,12 @@ def subdivide(
     scene: Scene,
     options: SubdivideOptions | None = None,
     progress: Progress = silent,
-    begin: Begin[_Model, _Box, _Space] = asked,
+    executor: Executor | None = None,
 ) -> Cells:
     """Subdivide a scene into convex leaves, and those into cells.
 
-    ``begin`` is how the second root box is subdivided: after the first, if the model proves to be
-    open; with `ptmtools.executors.Aside` beside the first, by another process.
+    An ``executor`` subdivides the second root box in the background while the first is subdivided
+    here; without one it is done after the first, if the model proves to be open.
 
     Raises
     ------
@@ -115,7 +118,8 @@ def subdivide(
     wide = _Box(np.array([low - margin, high + margin]), axes)
     tight = _Box(_thickened(*_bounds(corners if len(corners) else scene.corners), tolerance))
     notes: list[str] = []
-    clipped = begin(_divide, model, tight)
+    executor = executor or Serial()
+    clipped = executor.submit(_divide, model, tight, long=len(scene.triangles) >= LARGE)
     try:
         space = _divide(model, wide, progress)
         if not space.reach.closed:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable
 from functools import wraps
+from pathlib import Path
 from typing import Any
 
 import click
@@ -19,8 +21,8 @@ _ADDRESS = re.compile(r"\w+://.+:\d+")
 def voiced(function: Command) -> Command:
     """Adds ``-q`` and ``-v``, and hands the `Voice` in as the first argument."""
 
-    @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
-    @click.option("-v", "--verbose", is_flag=True, help="Say more; with errors, the traceback.")
+    @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+    @click.option("-v", "--verbose", is_flag=True, help="Print more; for errors, the traceback.")
     @click.pass_obj
     @wraps(function)
     def command(voice: Voice, /, quiet: bool, verbose: bool, **values: Any) -> Any:
@@ -40,8 +42,8 @@ def as_json(function: Command) -> Command:
 
 def forced(function: Command) -> Command:
     """Adds ``--force``."""
-    told = "Write over what is in the way though it is not ours."
-    return click.option("--force", is_flag=True, help=told)(function)
+    text = "Replace files or folders that ptm did not make, or that belong to another model."
+    return click.option("--force", is_flag=True, help=text)(function)
 
 
 def workers(function: Command) -> Command:
@@ -53,7 +55,8 @@ def workers(function: Command) -> Command:
         type=click.IntRange(0, 1024),
         default=0,
         metavar="N",
-        help="Workers; 0, the default, is one for each processor. The result is the same.",
+        help="Number of workers; 0, the default, is one for each processor. The result is the "
+        "same.",
     )(function)
 
 
@@ -63,14 +66,14 @@ def many_machines(function: Command) -> Command:
         "--scheduler",
         metavar="ADDRESS",
         callback=_address,
-        help="Have the tasks done by the cluster of this Dask scheduler, such as "
-        "tcp://10.0.0.1:8786; -j then says how many at a time, 0 as many as it has threads.",
+        help="Run the tasks on the cluster of this Dask scheduler, such as tcp://10.0.0.1:8786; "
+        "-j is then how many run at a time, and 0 as many as the cluster has threads.",
     )(workers(function))
 
 
 def _address(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
     if value is not None and not _ADDRESS.fullmatch(value):
-        raise click.BadParameter(f"{value!r} is no address such as tcp://10.0.0.1:8786")
+        raise click.BadParameter(f"{value!r} is not an address such as tcp://10.0.0.1:8786")
     return value
 
 
@@ -100,7 +103,19 @@ def database(function: Command) -> Command:
 
 
 def new_database(function: Command) -> Command:
-    """Adds ``-o DB``."""
-    return click.option(
-        "-o", "--output", "db", type=click.Path(), required=True, help="The database, a folder."
-    )(function)
+    """Adds ``-o DB`` to a command that is given a model; by default it lies beside the model."""
+
+    @click.option(
+        "-o",
+        "--output",
+        "db",
+        type=click.Path(),
+        metavar="DB",
+        help="The database, a folder; if not given, museum.db beside museum.obj.",
+    )
+    @wraps(function)
+    def command(*arguments: Any, model: str, db: str | None, **values: Any) -> Any:
+        place = os.fspath(Path(model).with_suffix(".db")) if db is None and model else db
+        return function(*arguments, model=model, db=place, **values)
+
+    return command

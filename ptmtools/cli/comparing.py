@@ -9,8 +9,9 @@ import click
 
 from ptmtools.cli.batch import expanded, no_name
 from ptmtools.cli.common import as_json, limited, voiced
-from ptmtools.cli.output import Voice, count, size
+from ptmtools.cli.output import Voice
 from ptmtools.errors import naming
+from ptmtools.quantities import count, size
 from ptmtools.texture.profiles import PROFILE_NUMBERS
 
 if TYPE_CHECKING:

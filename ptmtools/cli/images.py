@@ -11,10 +11,11 @@ import click
 from ptmtools.cli.batch import STANDARD, Job, expanded, for_each, jobs_for, standard_input
 from ptmtools.cli.batch import to_standard_output as to_stdout
 from ptmtools.cli.common import as_json, forced, limited, voiced, workers
-from ptmtools.cli.output import Voice, count, size
+from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import Numbers, options_of, take
 from ptmtools.errors import InputError, OutputError, naming
 from ptmtools.files import refuse_existing, write_with
+from ptmtools.quantities import count, size
 from ptmtools.texture.model import Description, EncodeOptions
 
 if TYPE_CHECKING:

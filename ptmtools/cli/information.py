@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import shlex
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,8 +13,9 @@ import click
 
 from ptmtools.cli.batch import STANDARD, no_name, standard_input
 from ptmtools.cli.common import as_json, voiced
-from ptmtools.cli.output import Voice, count, size
+from ptmtools.cli.output import Voice
 from ptmtools.errors import InputError, naming
+from ptmtools.quantities import count, size
 from ptmtools.texture.model import Description, PtmHeader
 
 #: Components that a texel has in the memory of most graphics processors: RGB is filled up.
@@ -37,8 +40,9 @@ def info(voice: Voice, target: str, as_json: bool) -> None:
 
 
 def _info_database(voice: Voice, target: str, as_json: bool) -> None:
-    from ptmtools.cli.scenes import figures
-    from ptmtools.pipeline import DatabaseFolder
+    from ptmtools.cli.parameters import words
+    from ptmtools.pipeline.stages import STAGES
+    from ptmtools.store.folder import DatabaseFolder
 
     db = DatabaseFolder.open(target)
     stages = db.manifest.stages
@@ -60,8 +64,14 @@ def _info_database(voice: Voice, target: str, as_json: bool) -> None:
         )
         return
     voice.say(f"{target}: database of {db.manifest.model}")
-    for name, record in stages.items():
-        voice.say(f"{name:<9} {figures(name, record.counts)}")
+    for name, stage in STAGES.items():
+        if name not in stages:
+            continue
+        record = stages[name]
+        voice.say(f"{name:<9} {stage.summarize(record.counts)}")
+        with suppress(ValueError):
+            if given := words([stage.recorded(record.parameters)]):
+                voice.say(f"{'':<9}   options: {shlex.join(given)}")
         if voice.verbose:
             for key, value in record.parameters.items():
                 voice.say(f"{'':<9}   {key} = {value}")

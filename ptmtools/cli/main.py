@@ -11,6 +11,7 @@ import importlib
 import sys
 import warnings
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -19,23 +20,17 @@ from ptmtools.cli.output import Voice, abandon_stdout
 from ptmtools.progress import listen
 from ptmtools.version import __version__
 
-#: command → (module, function, what `ptm --help` says).
+if TYPE_CHECKING:
+    from ptmtools.pipeline.stage import Stage
+
+#: Command → (module, function, what `ptm --help` says); besides, each stage has one.
 COMMANDS = {
-    "build-scene": (
-        "scenes",
-        "build_scene",
-        "Build or update a database from a model: all stages.",
-    ),
-    "cells": ("scenes", "cells", "Read a model and cut it into cells and portals."),
-    "pvs": ("scenes", "pvs", "Find which cells may see each other."),
-    "ach": ("scenes", "ach", "Measure how much of the view each visible cell covers."),
-    "textures": ("scenes", "textures", "Encode the model's images as progressive textures."),
-    "emit": ("scenes", "emit", "Write the VRML97 files and hints.json."),
+    "build-scene": ("stages", "build_scene", "Build or update a database from a model."),
     "status": ("status", "status", "Say which stages of a database are done."),
     "validate": ("reports", "validate", "Check a database or a .ptm file."),
     "info": ("information", "info", "Say what is in a database or a .ptm file."),
     "plot": ("reports", "plot", "Draw the floor plan of a database."),
-    "tradeoff": ("tradeoff", "tradeoff", "Measure what the knobs of the stages cost and bring."),
+    "tradeoff": ("tradeoff", "tradeoff", "Measure what the options of the stages cost and bring."),
     "encode": ("images", "encode", "Encode images as .ptm files."),
     "decode": ("images", "decode", "Decode .ptm files to images."),
     "compare": ("comparing", "compare", "Compare .ptm with other image formats: size and speed."),
@@ -54,19 +49,33 @@ class Commands(click.Group):
             raise click.Abort from fault
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(COMMANDS)
+        return [*COMMANDS, *_stages()]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in COMMANDS:
+        if cmd_name in COMMANDS:
+            module, function, _ = COMMANDS[cmd_name]
+            command = getattr(importlib.import_module(f"ptmtools.cli.{module}"), function)
+            assert isinstance(command, click.Command)
+            return command
+        stage = _stages().get(cmd_name)
+        if stage is None:
             return None
-        module, function, _ = COMMANDS[cmd_name]
-        command = getattr(importlib.import_module(f"ptmtools.cli.{module}"), function)
-        assert isinstance(command, click.Command)
-        return command
+        from ptmtools.cli.stages import stage_command
+
+        return stage_command(stage)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
             formatter.write_dl([(name, COMMANDS[name][2]) for name in COMMANDS])
+        with formatter.section("Single stages of build-scene"):
+            formatter.write_dl([(name, stage.about) for name, stage in _stages().items()])
+
+
+def _stages() -> dict[str, Stage[Any]]:
+    """The stages that have a command, by its name."""
+    from ptmtools.pipeline.stages import STAGES
+
+    return {name: stage for name, stage in STAGES.items() if not stage.hidden}
 
 
 @click.group(

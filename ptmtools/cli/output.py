@@ -97,16 +97,3 @@ def abandon_stdout() -> None:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
         os.close(nowhere)
-
-
-def size(count: int) -> str:
-    """A number of bytes for people: ``97.5 MB`` (MB = 10⁶ B)."""
-    for power, unit in ((9, "GB"), (6, "MB"), (3, "kB")):
-        if count >= 10**power:
-            return f"{count / 10**power:.1f} {unit}"
-    return f"{count} B"
-
-
-def count(number: int, one: str, many: str | None = None) -> str:
-    """``1 portal``, ``2 portals``."""
-    return f"{number:,} {one if number == 1 else many or one + 's'}"

@@ -1,8 +1,16 @@
-"""Command-line options made from the fields of an options dataclass.
+"""Command-line options made from the fields of an options dataclass, and back.
 
 The dataclass stays the one home of names, defaults and their explanation: a field `wall_area:
 float = 2.0` with the line ``wall_area: the least area …`` under "Attributes" of the docstring
-becomes ``--wall-area FLOAT`` with that default and that help.
+becomes ``--wall-area FLOAT`` with that default and that help. The metadata of a field may say more:
+
+* ``option``: its name on the command line, where that is not the field's own;
+* ``was``: former names, which work for one release, with a note;
+* ``choices``: a function that returns what may be given, for fields whose type does not say it;
+* ``numbers``: how many numbers one value consists of, where that varies, such as (3, 4);
+* ``parse``, ``print``: from what the command line gives to the field's value, and back.
+
+Fields of several classes that have the same option share it.
 """
 
 from __future__ import annotations
@@ -10,8 +18,9 @@ from __future__ import annotations
 import inspect
 import re
 import typing
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import MISSING, Field, fields
+from functools import wraps
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
@@ -19,16 +28,6 @@ import click
 
 T = TypeVar("T")
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
-
-#: Fields whose option has another name: of lists it names one element; of a stage, the stage.
-NAMES = {
-    "viewpoints": "viewpoint",
-    "image_folders": "image_folder",
-    "method": "pvs",
-    "budget": "pvs_budget",
-    "lines": "pvs_lines",
-    "exact": "pvs_exact",
-}
 
 
 class Numbers(click.ParamType):  # type: ignore[type-arg]  # generic only in newer Clicks
@@ -41,6 +40,8 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # generic only in new
         self.kind = kind
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
+        if self.counts == (3, 4):
+            return "X,Y,Z[,YAW]"
         return "X,Y,Z" if self.counts == (3,) else ",".join("N" * self.counts[0])
 
     def convert(
@@ -63,9 +64,9 @@ def descriptions(cls: type) -> dict[str, str]:
     """What the docstring of a dataclass, and of its bases, says of its fields: name → text."""
     if cls is object:
         return {}
-    found = {name: told for base in cls.__bases__ for name, told in descriptions(base).items()}
-    text = inspect.cleandoc(cls.__doc__ or "")
-    _, _, body = text.partition("Attributes\n----------\n")
+    found = {name: text for base in cls.__bases__ for name, text in descriptions(base).items()}
+    doc = inspect.cleandoc(cls.__doc__ or "")
+    _, _, body = doc.partition("Attributes\n----------\n")
     names: list[str] = []
     for line in re.split(r"\n\w+\n-+\n", body)[0].splitlines():
         if head := re.match(r"(\w+(?:, \w+)*): (.*)", line):
@@ -76,56 +77,122 @@ def descriptions(cls: type) -> dict[str, str]:
                 found[name] += " " + line.strip()
         else:
             names = []
-    return {name: re.sub(r"``?([^`]*)``?", r"\1", told) for name, told in found.items()}
+    return {name: re.sub(r"``?([^`]*)``?", r"\1", text) for name, text in found.items()}
 
 
-def options_of(cls: type, *, omit: Sequence[str] = ()) -> Decorator:
-    """A decorator that adds one option for every field of ``cls`` that is not in ``omit``."""
-    hints = typing.get_type_hints(cls)
-    told = descriptions(cls)
+def options_of(*classes: type, omit: Sequence[str] = ()) -> Decorator:
+    """A decorator that adds the options of all fields of ``classes`` that are not in ``omit``."""
+    found: dict[str, Decorator] = {}
+    former: dict[str, str] = {}
+    for cls in classes:
+        hints, texts = typing.get_type_hints(cls), descriptions(cls)
+        for field in fields(cls):
+            name = _option_name(field)
+            if field.name not in omit and name not in found:
+                found[name] = _option(field, hints[field.name], texts.get(field.name))
+                for old in field.metadata.get("was", ()):
+                    found[old] = _option(field, hints[field.name], None, former=old)
+                    former[old] = name
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
-        for field in reversed(fields(cls)):
-            if field.name not in omit:
-                function = _option(field, hints[field.name], told.get(field.name))(function)
-        return function
+        @wraps(function)
+        def renamed(*arguments: Any, **values: Any) -> Any:
+            for old, new in former.items():
+                given = values.pop(_variable(old))
+                if given is not None:
+                    click.echo(f"ptm: note: --{old} is now called --{new}", err=True)
+                    values[_variable(new)] = given
+            return function(*arguments, **values)
+
+        command: Callable[..., Any] = renamed
+        for option in reversed(found.values()):
+            command = option(command)
+        return command
 
     return decorate
 
 
-def take(
-    cls: type[T],
-    values: dict[str, Any],
-    *,
-    omit: Sequence[str] = (),
-    share: Sequence[str] = (),
-    **given: Any,
-) -> T:
-    """An instance of ``cls`` from the parsed values, which are removed from ``values`` but for
-    those that others ``share``; fields in ``omit`` keep their defaults."""
-    names = {field.name for field in fields(cls)} & set(values) - set(omit)  # type: ignore[arg-type]
-    found = {name: values[name] if name in share else values.pop(name) for name in sorted(names)}
-    return cls(**found, **given)
+def take(cls: type[T], values: dict[str, Any]) -> T:
+    """An instance of ``cls`` from the parsed values; a field whose option the command does not have
+    keeps its default."""
+    found = {}
+    for field in fields(cls):  # type: ignore[arg-type]
+        name = _variable(_option_name(field))
+        if name in values:
+            parse = field.metadata.get("parse", lambda value: value)
+            found[field.name] = parse(values[name])
+    return cls(**found)
 
 
-def _option(field: Field[Any], hint: Any, told: str | None) -> Decorator:
-    default = field.default if field.default_factory is MISSING else field.default_factory()
-    flag = "--" + NAMES.get(field.name, field.name).replace("_", "-")
-    settings: dict[str, Any] = {"default": default, "help": told}
+def words(options: Iterable[Any]) -> list[str]:
+    """The command-line words that give these instances of options classes; defaults are left out.
+    Where several share an option the last one counts."""
+    found: dict[str, list[str]] = {}
+    for each in options:
+        for field in fields(each):
+            value, name = getattr(each, field.name), _option_name(field)
+            if value == _default(field):
+                continue
+            value = field.metadata.get("print", lambda value: value)(value)
+            if isinstance(value, bool):
+                found[name] = [f"--{name}" if value else f"--no-{name}"]
+            else:
+                many = isinstance(value, (list, tuple)) and _repeated(type(each), field)
+                each_value = value if many else [value]
+                found[name] = [w for one in each_value for w in (f"--{name}", _text(one))]
+    return [word for given in found.values() for word in given]
+
+
+def _repeated(cls: type, field: Field[Any]) -> bool:
+    """Whether the option of a field may be given several times."""
+    hint = typing.get_type_hints(cls)[field.name]
+    return get_origin(hint) is tuple and get_args(hint)[-1] is Ellipsis
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, (list, tuple)):
+        return ",".join(map(_text, value))
+    return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
+
+
+def _option_name(field: Field[Any]) -> str:
+    name: str = field.metadata.get("option", field.name.replace("_", "-"))
+    return name
+
+
+def _variable(option: str) -> str:
+    """The name under which a command is handed an option."""
+    return option.replace("-", "_")
+
+
+def _default(field: Field[Any]) -> Any:
+    return field.default if field.default_factory is MISSING else field.default_factory()
+
+
+def _option(field: Field[Any], hint: Any, text: str | None, former: str = "") -> Decorator:
+    """The option of a field; with ``former`` the hidden one of that name, without a default."""
+    default = None if former else _default(field)
+    name = former or _option_name(field)
+    settings: dict[str, Any] = {"default": default, "help": text, "hidden": bool(former)}
     if get_origin(hint) in (Union, UnionType):  # X | None
         hint = next(part for part in get_args(hint) if part is not NoneType)
     if default not in (None, (), ""):
         settings["show_default"] = True
+    flag = f"--{name}"
     if hint is bool:
         # A switch that is on by default is named by what turns it off.
-        flag = f"{flag}/--no-{flag[2:]}"
+        flag = f"{flag}/--no-{name}"
+    elif choices := field.metadata.get("choices"):
+        settings["type"] = click.Choice(list(choices()))
     elif get_origin(hint) is Literal:
         settings["type"] = click.Choice([str(choice) for choice in get_args(hint)])
+    elif counts := field.metadata.get("numbers"):
+        settings["type"], settings["multiple"] = Numbers(counts), True
     elif get_origin(hint) is tuple:
         settings["type"], settings["multiple"] = _element(hint)
     else:
         settings["type"] = hint
-    return click.option(flag, field.name, **settings)
+    return click.option(flag, _variable(name), **settings)
 
 
 def _element(hint: Any) -> tuple[Any, bool]:

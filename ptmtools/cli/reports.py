@@ -9,12 +9,15 @@ import click
 
 from ptmtools.cli.batch import no_name
 from ptmtools.cli.common import as_json, database, forced, limited, voiced, workers
-from ptmtools.cli.output import Voice, count, size
+from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
 from ptmtools.database import PlotOptions, ValidationReport
 from ptmtools.errors import CheckError
-from ptmtools.pipeline import Artifacts, DatabaseFolder, shoot_segments
+from ptmtools.pipeline import Artifacts, shoot_segments
 from ptmtools.pipeline import validate as check
+from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE
+from ptmtools.quantities import count, size
+from ptmtools.store.folder import DatabaseFolder
 from ptmtools.texture.model import Limits
 from ptmtools.visibility import SegmentReport
 
@@ -95,12 +98,11 @@ def plot(voice: Voice, db: str, output: str, force: bool, **values: Any) -> None
 
     options = take(PlotOptions, values)
     artifacts = Artifacts(DatabaseFolder.open(db))
-    done = artifacts.db.manifest.stages
     report = plot_plan(
-        artifacts.scene,
-        artifacts.cells,
-        artifacts.pvs if "pvs" in done else None,
-        artifacts.ach if "ach" in done else None,
+        artifacts[SCENE],
+        artifacts[CELLS],
+        artifacts[PVS] if artifacts.before(PVS) else None,
+        artifacts[ACH] if artifacts.before(ACH) else None,
         output,
         options,
         force=force,

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from ptmtools.cli.common import as_json, database, voiced
-from ptmtools.cli.output import Voice, count, size
+from ptmtools.cli.output import Voice
+from ptmtools.cli.parameters import words
+from ptmtools.pipeline.stages import STAGES
+from ptmtools.quantities import count, size
+from ptmtools.store.folder import read_manifest
+from ptmtools.store.manifest import Manifest
 
 if TYPE_CHECKING:
     from ptmtools.pipeline.plan import StagePlan
@@ -26,7 +34,6 @@ _PLANNED = {"current": "unchanged", "run": "would run", "maybe": "may run"}
 @voiced
 def status(voice: Voice, db: str, as_json: bool) -> None:
     """Say which stages of DB are done, stale or damaged, and who is writing it."""
-    from ptmtools.cli.scenes import figures
     from ptmtools.pipeline.status import database_status
 
     found = database_status(db)
@@ -36,30 +43,44 @@ def status(voice: Voice, db: str, as_json: bool) -> None:
     model = f"database of {found.model}" if found.model else "nothing has been committed yet"
     voice.say(f"{db}: {model}")
     for stage in found.stages:
-        told = stage.why or (figures(stage.stage, stage.counts) if stage.counts else "")
+        summary = STAGES[stage.stage].summarize(stage.counts) if stage.counts else ""
         files = f"{count(stage.files, 'file')}, {size(stage.bytes)}" if stage.files else ""
-        voice.say(f"{stage.stage:<9}{stage.state:>8}   {files:<22} {told}".rstrip())
+        voice.say(f"{stage.stage:<9}{stage.state:>8}   {files:<22} {stage.why or summary}".rstrip())
     if found.writer:
         voice.say(f"being written by {found.writer}")
     if found.interrupted:
         waiting = f"; {count(found.waiting, 'finished texture')} will be taken over"
         voice.say(f"a run was interrupted{waiting if found.waiting else ''}")
     if not found.finished and not found.writer:
-        voice.say("not finished: run `ptm build-scene MODEL -o DB`")
+        voice.say(f"not finished: run `{build_command(db, found.model)}`")
 
 
-def tell_plan(voice: Voice, plans: Sequence[StagePlan], as_json: bool) -> None:
+def build_command(db: str, model: str | None) -> str:
+    """The command that brings a database up to date, with the options that it was built with."""
+    manifest = read_manifest(Path(db)) or Manifest("")
+    recorded = []
+    for name, record in manifest.stages.items():
+        with suppress(KeyError, ValueError):
+            recorded.append(STAGES[name].recorded(record.parameters))
+    model = shlex.quote(model) if model else "MODEL"
+    return " ".join(
+        ["ptm build-scene", model, "-o", shlex.quote(db), *map(shlex.quote, words(recorded))]
+    )
+
+
+def print_plan(voice: Voice, plans: Sequence[StagePlan], as_json: bool) -> None:
     """Says what a build would do."""
     if as_json:
         voice.emit_json({"schema": 1, "stages": [asdict(plan) for plan in plans]})
         return
     for plan in plans:
-        told = list(plan.reasons)
+        reasons = list(plan.reasons)
         if plan.textures and plan.plan == "run":
             shown = plan.textures if voice.verbose else plan.textures[:SHOWN_TEXTURES]
             more = len(plan.textures) - len(shown)
             names = ", ".join(shown) + (f" and {more:,} more" if more else "")
-            told.append(f"encode {count(len(plan.textures), 'texture')}: {names}")
-        voice.say(f"{plan.stage:<9}{_PLANNED[plan.plan]:>10}   {told[0] if told else ''}".rstrip())
-        for line in told[1:]:
+            reasons.append(f"encode {count(len(plan.textures), 'texture')}: {names}")
+        first = reasons[0] if reasons else ""
+        voice.say(f"{plan.stage:<9}{_PLANNED[plan.plan]:>10}   {first}".rstrip())
+        for line in reasons[1:]:
             voice.say(f"{'':<22}{line}")

@@ -15,7 +15,8 @@ from ptmtools.cli.output import Voice
 from ptmtools.coverage.options import MAX_SAMPLES
 from ptmtools.errors import OutputError
 from ptmtools.files import refuse_existing, write_bytes, writing
-from ptmtools.pipeline import Artifacts, DatabaseFolder
+from ptmtools.pipeline import Artifacts
+from ptmtools.store.folder import DatabaseFolder
 from ptmtools.tradeoff.experiment import Trade, run
 from ptmtools.tradeoff.figure import picture, require
 from ptmtools.tradeoff.report import as_csv, table

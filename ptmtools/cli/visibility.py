@@ -2,51 +2,61 @@
 
 from __future__ import annotations
 
-from ptmtools.cli.output import Voice, count
-from ptmtools.visibility.report import PortalFacts, PvsReport
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
+
+from ptmtools.pipeline.run import Artifacts
+from ptmtools.pipeline.stages import CELLS, PVS
+from ptmtools.quantities import count
+from ptmtools.visibility.report import PortalFacts, PvsReport, report
 
 #: Leaks that are shown without ``-v``.
 SHOWN_LEAKS = 5
 
 
-def tell_pvs(voice: Voice, told: PvsReport) -> None:
-    """The report as lines on stdout."""
-    voice.say(
-        f"{count(told.cells, 'cell')}; {count(told.portals, 'portal')}, {told.doors:,} of them "
-        f"between cells; a cell sees {told.average:.1f} cells on average, itself included"
+def visibility_report(artifacts: Artifacts, verbose: bool) -> tuple[dict[str, Any], list[str]]:
+    """What the sets of a database look like, as a document and as lines."""
+    found = report(artifacts[CELLS], artifacts[PVS])
+    return asdict(found), list(_lines(found, verbose))
+
+
+def _lines(found: PvsReport, verbose: bool) -> Iterator[str]:
+    yield (
+        f"{count(found.cells, 'cell')}; {count(found.portals, 'portal')}, {found.doors:,} of them "
+        f"between cells; a cell sees {found.average:.1f} cells on average, itself included"
     )
-    if not told.conservative:
-        voice.say("sampled: what no random line showed is missing")
-    if told.cells > 1:
-        voice.say("cells seen: " + ", ".join(_share(*size) for size in told.sizes))
-    if told.costliest:
-        cut = f"; {count(told.fallbacks, 'portal')} cut short" if told.fallbacks else ""
-        voice.say(f"{told.operations:,} operations{cut}")
-        if told.ties:
+    if not found.conservative:
+        yield "sampled: what no random line showed is missing"
+    if found.cells > 1:
+        yield "cells seen: " + ", ".join(_share(*size) for size in found.sizes)
+    if found.costliest:
+        cut = f"; {count(found.fallbacks, 'portal')} cut short" if found.fallbacks else ""
+        yield f"{found.operations:,} operations{cut}"
+        if found.ties:
             exactly = (
-                f"{told.decided:,} that may matter decided in exact arithmetic: "
-                f"{told.decided - told.opened:,} closed, {told.opened:,} open"
+                f"{found.decided:,} that may matter decided in exact arithmetic: "
+                f"{found.decided - found.opened:,} closed, {found.opened:,} open"
             )
-            voice.say(
-                f"{count(told.ties, 'near-tie')}, " + (exactly if told.decided else "none matters")
+            yield (
+                f"{count(found.ties, 'near-tie')}, "
+                + (exactly if found.decided else "none matters")
             )
-        voice.say("the costliest portals:")
-        for dear in told.costliest:
+        yield "the costliest portals:"
+        for dear in found.costliest:
             cut = ", cut short" if dear.cut else ""
-            voice.say(f"  {dear.operations:10,}  {_place(dear)}{cut}")
-    if not told.leaks:
-        if told.cells > 1:
-            voice.say("no leaks: no one opening shows a cell suspiciously much")
+            yield f"  {dear.operations:10,}  {_place(dear)}{cut}"
+    if not found.leaks:
+        if found.cells > 1:
+            yield "no leaks: no one opening shows a cell suspiciously much"
         return
-    voice.say("cells that see more than three times the median, and the smallest opening that")
-    voice.say("shows them half of it (a gap that nobody meant?):")
-    shown = len(told.leaks) if voice.verbose else SHOWN_LEAKS
-    for leak in told.leaks[:shown]:
-        voice.say(
-            f"  cell {leak.cell} sees {leak.sees:,}; {leak.through:,} of them by {_place(leak)}"
-        )
-    if len(told.leaks) > shown:
-        voice.say(f"  … and {len(told.leaks) - shown} more; -v shows them")
+    yield "cells that see more than three times the median, and the smallest opening that"
+    yield "shows them half of it (a gap that nobody meant?):"
+    shown = len(found.leaks) if verbose else SHOWN_LEAKS
+    for leak in found.leaks[:shown]:
+        yield (f"  cell {leak.cell} sees {leak.sees:,}; {leak.through:,} of them by {_place(leak)}")
+    if len(found.leaks) > shown:
+        yield f"  … and {len(found.leaks) - shown} more; -v shows them"
 
 
 def _share(share: float, sees: int) -> str:

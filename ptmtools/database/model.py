@@ -7,7 +7,8 @@ up (design, "Space"); angles are radians unless a name says otherwise.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
 from ptmtools.errors import InputError
@@ -99,6 +100,18 @@ class Viewpoint:
     cell: int
 
 
+def _given(viewpoints: Sequence[tuple[float, ...]]) -> tuple[GivenViewpoint, ...]:
+    """Viewpoints of (x, y, z[, yaw])."""
+    return tuple(
+        GivenViewpoint((x, y, z), rest[0] if rest else None) for x, y, z, *rest in viewpoints
+    )
+
+
+def _numbers(viewpoints: Sequence[GivenViewpoint]) -> list[tuple[float, ...]]:
+    """Inverse of `_given`."""
+    return [(*v.position, *(() if v.yaw is None else (v.yaw,))) for v in viewpoints]
+
+
 @dataclass(frozen=True)
 class EmitOptions:
     """
@@ -120,7 +133,10 @@ class EmitOptions:
 
     title: str = "ptmtools database"
     fallback: bool = True
-    viewpoints: tuple[GivenViewpoint, ...] = ()
+    viewpoints: tuple[GivenViewpoint, ...] = field(
+        default=(),
+        metadata={"option": "viewpoint", "numbers": (3, 4), "parse": _given, "print": _numbers},
+    )
     viewpoint_count: int = 32
     avatar_size: Vector = (0.25, 1.6, 0.75)
     field_of_view: float = 1.1

@@ -17,18 +17,18 @@ from typing import TYPE_CHECKING
 from ptmtools.lazy import names
 
 if TYPE_CHECKING:
-    from ptmtools.executors.aside import Aside
+    from ptmtools.executors.background import BackgroundTask
     from ptmtools.executors.local import Local
     from ptmtools.executors.model import Executor, Sharing
     from ptmtools.executors.opening import open_executor
     from ptmtools.executors.serial import Serial
 
-__all__ = ["Aside", "Executor", "Local", "Serial", "Sharing", "open_executor"]
+__all__ = ["BackgroundTask", "Executor", "Local", "Serial", "Sharing", "open_executor"]
 
 __getattr__ = names(
     __name__,
     {
-        "Aside": "aside",
+        "BackgroundTask": "background",
         "Executor": "model",
         "Local": "local",
         "Serial": "serial",

@@ -12,8 +12,8 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ptmtools.executors.model import AHEAD, Executor, Sharing
-from ptmtools.executors.opening import processors
+from ptmtools.executors.background import BackgroundTask
+from ptmtools.executors.model import AHEAD, Executor, Pending, Sharing, processors
 from ptmtools.executors.order import in_order
 from ptmtools.executors.serial import SerialSharing
 
@@ -65,6 +65,14 @@ class Local(Executor):
         if self._processes is None:
             self._processes = Processes(self._workers)
         return self._processes.sharing(shared)
+
+    def submit(
+        self, function: Callable[[S, T], R], shared: S, task: T, *, long: bool = True
+    ) -> Pending[R]:
+        """See `Executor.submit`: in a process of its own."""
+        if self._workers == 1 or not long:
+            return super().submit(function, shared, task)
+        return BackgroundTask(function, shared, task)
 
     def close(self) -> None:
         """See `Executor.close`."""

@@ -31,11 +31,13 @@ once, and between the rounds only its `change` is, to be made on all copies alik
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from types import TracebackType
-from typing import Protocol, Self, TypeVar
+from typing import Generic, Protocol, Self, TypeVar
 
 S = TypeVar("S")
 S_co = TypeVar("S_co", covariant=True)
@@ -55,6 +57,16 @@ class Pending(Protocol[R_co]):
 
     def cancel(self) -> object:
         """Its result is not wanted: if it has not begun, it never will."""
+
+
+@dataclass(frozen=True)
+class Deferred(Generic[R_co]):
+    """See `Pending`: done by the caller's own thread, when it asks for the result."""
+
+    result: Callable[[], R_co]
+
+    def cancel(self) -> None:
+        """It was never begun."""
 
 
 class Sharing(Protocol[S_co]):
@@ -108,6 +120,13 @@ class Executor(ABC):
     ) -> AbstractContextManager[Sharing[S]]:
         """Sends ``shared`` to the workers, for several rounds of tasks, until the context ends."""
 
+    def submit(
+        self, function: Callable[[S, T], R], shared: S, task: T, *, long: bool = True
+    ) -> Pending[R]:
+        """Begins ``function(shared, task)`` in the background, where that can be done; elsewhere it
+        is done once its result is asked for. ``long``: it takes longer than a process to start."""
+        return Deferred(lambda: function(shared, task))
+
     @abstractmethod
     def close(self) -> None:
         """Ends what was started, tasks included."""
@@ -122,3 +141,11 @@ class Executor(ABC):
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def processors() -> int:
+    """How many processors this process may use: a batch system may have given it a few only."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not Linux
+        return os.cpu_count() or 1

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
-
-from ptmtools.executors.model import Executor
+from ptmtools.executors.model import Executor, processors
 
 
 def open_executor(workers: int = 0, scheduler: str | None = None) -> Executor:
@@ -34,11 +32,3 @@ def open_executor(workers: int = 0, scheduler: str | None = None) -> Executor:
     from ptmtools.executors.local import Local
 
     return Local(workers)
-
-
-def processors() -> int:
-    """How many processors this process may use: a batch system may have given it a few only."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not Linux
-        return os.cpu_count() or 1

@@ -10,16 +10,8 @@ from typing import TYPE_CHECKING
 from ptmtools.lazy import names
 
 if TYPE_CHECKING:
-    from ptmtools.pipeline.build import (
-        build_scene,
-        make_ach,
-        make_cells,
-        make_files,
-        make_pvs,
-        make_textures,
-    )
-    from ptmtools.pipeline.folder import DatabaseFolder
-    from ptmtools.pipeline.options import BuildOptions, TextureOptions
+    from ptmtools.pipeline.build import build_scene, run_stage
+    from ptmtools.pipeline.options import TextureOptions
     from ptmtools.pipeline.plan import StagePlan, plan_build
     from ptmtools.pipeline.report import BuildReport, StageReport
     from ptmtools.pipeline.run import Artifacts
@@ -28,9 +20,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "Artifacts": "run",
-    "BuildOptions": "options",
     "BuildReport": "report",
-    "DatabaseFolder": "folder",
     "DatabaseStatus": "status",
     "StagePlan": "plan",
     "StageReport": "report",
@@ -38,21 +28,15 @@ _HOME = {
     "TextureOptions": "options",
     "build_scene": "build",
     "database_status": "status",
-    "make_ach": "build",
-    "make_cells": "build",
-    "make_files": "build",
-    "make_pvs": "build",
-    "make_textures": "build",
     "plan_build": "plan",
+    "run_stage": "build",
     "shoot_segments": "validation",
     "validate": "validation",
 }
 
 __all__ = [
     "Artifacts",
-    "BuildOptions",
     "BuildReport",
-    "DatabaseFolder",
     "DatabaseStatus",
     "StagePlan",
     "StageReport",
@@ -60,12 +44,8 @@ __all__ = [
     "TextureOptions",
     "build_scene",
     "database_status",
-    "make_ach",
-    "make_cells",
-    "make_files",
-    "make_pvs",
-    "make_textures",
     "plan_build",
+    "run_stage",
     "shoot_segments",
     "validate",
 ]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ptmtools.pipeline.folder import DatabaseFolder
-from ptmtools.pipeline.manifest import StageRecord
+from ptmtools.store.folder import DatabaseFolder
+from ptmtools.store.manifest import StageRecord
 
 #: Files that are named one by one.
 _NAMED = 3

@@ -2,53 +2,88 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from itertools import accumulate
+from typing import TYPE_CHECKING
 
-from ptmtools.errors import DatabaseError
-from ptmtools.pipeline.run import Run
-from ptmtools.pipeline.stages import SERVED
-from ptmtools.pipeline.textures import texture_inputs, texture_records
-from ptmtools.pipeline.transaction import Transaction
+from ptmtools.pipeline.encoding import fallback_level
+from ptmtools.pipeline.images import image_digests
+from ptmtools.pipeline.run import Artifacts, Job, Made
+from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE, TEXTURES
+from ptmtools.pipeline.textures import header_of, texture_files
+from ptmtools.store.layout import SERVED
+from ptmtools.store.transaction import Transaction
 
 if TYPE_CHECKING:
-    from ptmtools.database.model import EmitOptions
+    from ptmtools.database.model import TextureRecord
 
 
-def put_files(run: Run, options: EmitOptions) -> None:
-    """Runs the stage `emit`; raises what `ptmtools.database.emit` and `Run.inputs` raise."""
-    textures = run.db.record("textures")
-    if textures.inputs != texture_inputs(run.image_digests):
-        raise DatabaseError(
-            "PTM-D008",
-            "the textures stage was computed from another scene",
-            file=run.db.path,
-            remedy="run `ptm textures DB` or `ptm build-scene MODEL -o DB` first",
-        )
+class EmissionJob(Job):
+    """Writes the served files; raises what `ptmtools.database.emit` raises."""
 
-    def compute(transaction: Transaction) -> tuple[Mapping[str, Any], tuple[str, ...]]:
+    def make(self, transaction: Transaction) -> Made:
+        """See `Job.make`."""
         from ptmtools.database import emit
 
+        run = self.run
         report = emit(
-            run.scene,
-            run.cells,
-            run.pvs,
-            run.ach,
+            run[SCENE],
+            run[CELLS],
+            run[PVS],
+            run[ACH],
             texture_records(run),
             transaction.made(SERVED),
-            options,
+            self.options,
             run.progress,
             force=True,
         )
         for name in report.files:
             transaction.adopt(f"{SERVED}/{name}")
-        return {
+        counts = {
             "files": len(report.files),
             "bytes": report.bytes,
             "shapes": report.shapes,
             "triangles": report.triangles,
             "collapsed": report.collapsed,
             "viewpoints": len(report.viewpoints),
-        }, report.notes
+        }
+        return Made(transaction.pending(), counts, report.notes)
 
-    run.stage("emit", options, compute, also=textures.outputs)
+
+def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
+    """What the emitted files say of the textures of a database."""
+    from ptmtools.database import TextureLevel, TextureRecord
+
+    record = run.record(TEXTURES)
+    options = run.recorded(TEXTURES)
+    records = []
+    for i, name in enumerate(texture_files(image_digests(run))):
+        fallback = f"{name.removesuffix('ptm')}png"
+        has_fallback = f"{SERVED}/{fallback}" in record.outputs
+        header = header_of(run.db.path / SERVED / name)
+        texels = accumulate(level.width * level.height for level in header.levels)
+        levels = tuple(
+            TextureLevel(
+                width=level.width,
+                height=level.height,
+                offset=level.offset,
+                length=level.length,
+                gpu_bytes=count * header.texel_bytes,
+            )
+            for level, count in zip(header.levels, texels, strict=True)
+        )
+        records.append(
+            TextureRecord(
+                image=i,
+                file=name,
+                fallback=fallback if has_fallback else None,
+                width=levels[-1].width,
+                height=levels[-1].height,
+                components=header.components,
+                levels=levels,
+                sha256=run.db.output(TEXTURES.name, f"{SERVED}/{name}"),
+                fallback_level=(
+                    fallback_level(header, options.fallback_size) if has_fallback else None
+                ),
+            )
+        )
+    return tuple(records)

@@ -8,17 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from ptmtools.errors import DatabaseError
+from ptmtools.pipeline.build import chosen_options
 from ptmtools.pipeline.changes import reasons
-from ptmtools.pipeline.folder import DatabaseFolder
-from ptmtools.pipeline.manifest import StageRecord
-from ptmtools.pipeline.options import BuildOptions
-from ptmtools.pipeline.run import work_of
-from ptmtools.pipeline.scenes import repainted, scene_work
-from ptmtools.pipeline.stages import IMAGE_LIST, READS, STAGES, arrays_of, image_rows
-from ptmtools.pipeline.textures import stale_textures, texture_inputs
-from ptmtools.pipeline.writer import admitted
-from ptmtools.texture.options import check_options
+from ptmtools.pipeline.run import Artifacts, work_of
+from ptmtools.pipeline.stage import Options, Stage
+from ptmtools.pipeline.stages import STAGES
+from ptmtools.store.folder import DatabaseFolder
+from ptmtools.store.layout import arrays_of
+from ptmtools.store.manifest import StageRecord
+from ptmtools.store.writer import admitted
 
 Plan = Literal["current", "run", "maybe"]
 
@@ -43,7 +41,10 @@ class StagePlan:
 
 
 def plan_build(
-    model: str | os.PathLike[str], db: str | os.PathLike[str], options: BuildOptions | None = None
+    model: str | os.PathLike[str],
+    db: str | os.PathLike[str],
+    *options: Options,
+    force: bool = False,
 ) -> tuple[StagePlan, ...]:
     """The stages in their order, and what `build_scene` would do with each. Nothing is written.
 
@@ -52,87 +53,54 @@ def plan_build(
     """
     from ptmtools.scene.ingestion import check_file
 
-    options = options or BuildOptions()
-    check_options(options.textures)
+    chosen = chosen_options(options)
     check_file(Path(model))
     folder = Path(db)
-    return _Planning(
-        DatabaseFolder(folder, admitted(folder, Path(model).name, force=options.force)),
-        Path(model),
-        options,
-    ).stages()
+    artifacts = Artifacts(
+        DatabaseFolder(folder, admitted(folder, Path(model).name, force=force)), Path(model)
+    )
+    planning = _Planning(artifacts, chosen)
+    plans = tuple(planning.plan(stage) for stage in STAGES.values())
+    artifacts.db.digests.save()
+    return plans
 
 
 class _Planning:
-    def __init__(self, db: DatabaseFolder, model: Path, options: BuildOptions) -> None:
-        self._db = db
-        self._model = model
-        self._options = options
-        self._plans: dict[str, StagePlan] = {}
+    def __init__(self, artifacts: Artifacts, options: Mapping[Stage[Any], Options]) -> None:
+        self._artifacts, self._options = artifacts, options
+        #: Stages of which others may read something else than there is.
+        self._changing: set[Stage[Any]] = set()
 
-    def stages(self) -> tuple[StagePlan, ...]:
-        scene = scene_work(
-            self._model, self._options.ingest, self._before("scene"), self._db.digests
-        )
-        why = reasons(self._before("scene"), scene, self._db)
-        images, known = self._images(scene)
-        self._note("scene", why, ())
-        # Where only plain images have been painted over, the arrays of the scene stay.
-        source = () if known else ("scene",)
-        self._plan("cells", self._options.subdivide, source)
-        self._plan("pvs", self._options.pvs, ("cells",))
-        self._plan("ach", self._options.ach, (*source, "cells", "pvs"))
-        self._plan_textures(images, source)
-        self._plan("emit", self._options.emit, (*source, "cells", "pvs", "ach", "textures"))
-        self._db.digests.save()
-        return tuple(self._plans[stage] for stage in STAGES)
+    def plan(self, stage: Stage[Any]) -> StagePlan:
+        """Of a stage, after those that it reads."""
+        before, work = self._artifacts.before(stage), self._work(stage)
+        why = reasons(before, work, self._artifacts.db)
+        tasks = stage.tasks.load()(before, work) if stage.tasks else []
+        textures = tuple(Path(name).stem for name in tasks)
+        reads = stage.read_with(self._options[stage])
+        anew = [read.name for read in reads if read in self._changing]
+        plan: Plan = "run" if why else "maybe" if anew else "current"
+        if plan == "maybe":
+            why = (f"if {' or '.join(anew)} makes other files than there are",)
+        known = plan == "run" and stage.foresee and stage.foresee.load()(self._artifacts, work)
+        if plan != "current" and not known:
+            self._changing.add(stage)
+        return StagePlan(stage.name, plan, why, textures)
 
-    def _before(self, stage: str) -> StageRecord | None:
-        return self._db.manifest.stages.get(stage)
-
-    def _images(self, work: StageRecord) -> tuple[dict[str, str], bool]:
-        """Name → SHA-256 of the images as they would be, and whether that is known before the
-        scene is read."""
-        before = self._before("scene")
-        try:
-            rows = image_rows(self._db.read_output("scene", IMAGE_LIST))
-        except (DatabaseError, ValueError, KeyError, TypeError):
-            return {}, False
-        changed = None if before is None else repainted(before, work, rows)
-        if changed is None:
-            return {}, False
-        files = {i: work.inputs[name] for i, name in changed.items()}
-        return {r["name"]: files.get(i, r["sha256"]) for i, r in enumerate(rows)}, True
-
-    def _plan(self, stage: str, options: Any, after: tuple[str, ...]) -> None:
-        there = self._db.manifest.outputs()
-        inputs = {arrays_of(name): there.get(arrays_of(name), "") for name in READS[stage]}
-        if stage == "emit" and (textures := self._before("textures")):
-            inputs |= textures.outputs
-        work = work_of(stage, options, inputs)
-        self._note(stage, reasons(self._before(stage), work, self._db), after)
-
-    def _plan_textures(self, images: dict[str, str], source: tuple[str, ...]) -> None:
-        before = self._before("textures")
-        if source:
-            inputs: Mapping[str, str] = before.inputs if before else {}
+    def _work(self, stage: Stage[Any]) -> StageRecord:
+        """What the stage would do, of the files as they are."""
+        artifacts, options = self._artifacts, self._options[stage]
+        before = artifacts.before(stage)
+        reads = stage.read_with(options)
+        if stage.inputs and not self._changing.intersection(reads):
+            inputs = stage.inputs.load()(artifacts)
+        elif stage.inputs:
+            inputs = before.inputs if before else {}
         else:
-            inputs = texture_inputs(images)
-        work = work_of("textures", self._options.textures, inputs)
-        names = tuple(Path(name).stem for name in stale_textures(before, work))
-        self._note("textures", reasons(before, work, self._db), source, names)
-
-    def _note(
-        self,
-        stage: str,
-        why: tuple[str, ...],
-        after: tuple[str, ...],
-        textures: tuple[str, ...] = (),
-    ) -> None:
-        """``after`` are the stages whose files it reads."""
-        anew = [name for name in after if self._plans[name].plan != "current"]
-        if not why and anew:
-            told = f"if {' or '.join(anew)} makes other files than there are"
-            self._plans[stage] = StagePlan(stage, "maybe", (told,), textures)
-        else:
-            self._plans[stage] = StagePlan(stage, "run" if why else "current", why, textures)
+            inputs = {}
+            for read in reads:
+                record = artifacts.before(read)
+                outputs = record.outputs if record else {}
+                name = arrays_of(read.name)
+                inputs |= {name: outputs.get(name, "")} if read.artifact else outputs
+        return work_of(stage, options, inputs)

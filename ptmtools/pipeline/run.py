@@ -3,38 +3,29 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from ptmtools.errors import DatabaseError
 from ptmtools.pipeline.changes import reasons
-from ptmtools.pipeline.folder import DatabaseFolder
-from ptmtools.pipeline.manifest import StageRecord
 from ptmtools.pipeline.report import StageReport
-from ptmtools.pipeline.stages import (
-    IMAGE_LIST,
-    IMAGES,
-    READS,
-    RECIPES,
-    STAGES,
-    arrays_of,
-    image_rows,
-    parameters,
-)
-from ptmtools.pipeline.transaction import Transaction
-from ptmtools.pipeline.writer import DatabaseWriter
+from ptmtools.pipeline.stage import Options, Stage, parameters
 from ptmtools.progress import Progress, silent
+from ptmtools.store.folder import DatabaseFolder
+from ptmtools.store.layout import arrays_of
+from ptmtools.store.manifest import StageRecord
+from ptmtools.store.transaction import Transaction
+from ptmtools.store.writer import DatabaseWriter
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+    from collections.abc import Iterator
+    from pathlib import Path
 
-    from ptmtools.cells.model import Cells
-    from ptmtools.coverage.model import Ach
-    from ptmtools.scene.model import Scene, SourceImage
-    from ptmtools.visibility.model import Pvs
+    from ptmtools.pipeline.background import Workers
 
+A = TypeVar("A")
 T = TypeVar("T")
 
 #: What damaged contents make their readers raise.
@@ -42,208 +33,268 @@ _FAULTS = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeErr
 
 
 class Artifacts:
-    """The results of the stages of a database, read when they are first asked for."""
+    """What the stages of a database have made: ``artifacts[CELLS]``, read when first asked for.
 
-    def __init__(self, db: DatabaseFolder) -> None:
+    ``model`` is the file that it is made of, where that is at hand.
+    """
+
+    def __init__(self, db: DatabaseFolder, model: Path | None = None) -> None:
         self.db = db
+        self.model = model
         self._held: dict[str, Any] = {}
+        self._stages: dict[Stage[Any], Any] = {}
 
-    @property
-    def images(self) -> tuple[SourceImage, ...]:
-        """The scene's, each read when it is loaded; raises PTM-D004 to PTM-D006."""
-        from ptmtools.scene.model import SourceImage
+    def __getitem__(self, stage: Stage[A]) -> A:
+        """Raises PTM-D004 to PTM-D006; also where artifacts do not fit together."""
+        if stage not in self._stages:
+            assert stage.artifact is not None
+            arrays = self.db.read_arrays(stage.name, "this command")
+            kind = stage.artifact.load()
+            with self.reading(arrays_of(stage.name)):
+                made = stage.load.load()(self, arrays) if stage.load else kind.from_arrays(arrays)
+                self._fit(stage, made)
+            self._stages[stage] = made
+        return cast(A, self._stages[stage])
 
-        if "images" not in self._held:
-            data = self.db.read_output("scene", IMAGE_LIST)
+    def keep(self, stage: Stage[A], artifact: A) -> None:
+        """Keeps an artifact that was just computed."""
+        self._stages[stage] = artifact
 
-            def loader(digest: str) -> Callable[[], bytes]:
-                return lambda: self.db.read(f"{IMAGES}/{digest}", digest)
+    def held(self, name: str, read: Callable[[], T]) -> T:
+        """What ``read`` makes of another file of the database, read once; damage is PTM-D006."""
+        if name not in self._held:
+            with self.reading(name):
+                self._held[name] = read()
+        return cast(T, self._held[name])
 
-            with self._reading(IMAGE_LIST):
-                self._held["images"] = tuple(
-                    SourceImage(
-                        row["name"],
-                        row["sha256"],
-                        loader(row["sha256"]),
-                        tuple(row["files"]),
-                        row["plain"],
-                    )
-                    for row in image_rows(data)
-                )
-        images: tuple[SourceImage, ...] = self._held["images"]
-        return images
+    def hold(self, name: str, value: Any) -> None:
+        """Keeps what `held` would read."""
+        self._held[name] = value
 
-    @property
-    def image_digests(self) -> dict[str, str]:
-        """Name → SHA-256 of the scene's images, in their order; raises as `images`."""
-        if "images" in self._held:
-            return {image.name: image.sha256 for image in self.images}
-        data = self.db.read_output("scene", IMAGE_LIST)
-        with self._reading(IMAGE_LIST):
-            return {row["name"]: row["sha256"] for row in image_rows(data)}
+    def record(self, stage: Stage[Any]) -> StageRecord:
+        """The record of a stage's last run; raises PTM-D004 if there was none."""
+        return self.db.record(stage.name)
 
-    @property
-    def scene(self) -> Scene:
-        """Raises PTM-D004 to PTM-D006, as do the others: also where they do not fit together."""
-        from ptmtools.scene.model import Scene
+    def before(self, stage: Stage[Any]) -> StageRecord | None:
+        """The record of a stage as the database has it, or None."""
+        return self.db.manifest.stages.get(stage.name)
 
-        return self._artifact("scene", lambda arrays: Scene.from_arrays(arrays, self.images))
+    def recorded(self, stage: Stage[Any]) -> Options:
+        """The options of a stage's last run; raises PTM-D002 if the record has others."""
+        with _damaged_record(self.db):
+            return stage.recorded(self.record(stage).parameters)
 
-    @property
-    def cells(self) -> Cells:
-        from ptmtools.cells.model import Cells
+    def inputs(self, stage: Stage[Any], options: Options) -> dict[str, str]:
+        """Name → SHA-256 of what the stage would read now; raises PTM-D004 and PTM-D002."""
+        if stage.inputs:
+            return dict(stage.inputs.load()(self))
+        found: dict[str, str] = {}
+        for read in stage.read_with(options):
+            outputs = self.record(read).outputs
+            name = arrays_of(read.name)
+            if read.artifact and name not in outputs:
+                self.db.output(read.name, name)  # says what is wrong
+            found |= {name: outputs[name]} if read.artifact else outputs
+        return found
 
-        return self._artifact("cells", Cells.from_arrays)
+    def outdated(self, stage: Stage[Any]) -> str:
+        """What a stage that has run was made from and is another by now; "" if there is none."""
+        record = self.record(stage)
+        try:
+            options = self.recorded(stage)
+            if not stage.read_with(options):  # but the model, which need not be at hand
+                return ""
+            there = self.inputs(stage, options)
+        except DatabaseError:
+            return ""  # which is the fault of the stage that it reads
+        names = there.keys() | record.inputs.keys()
+        changed = [name for name in names if record.inputs.get(name) != there.get(name)]
+        if not changed:
+            return ""
+        return stage.read_with(options)[0].name if stage.inputs else min(changed)
 
-    @property
-    def pvs(self) -> Pvs:
-        from ptmtools.visibility.model import Pvs
+    def _fit(self, stage: Stage[A], made: A) -> None:
+        """Raises ValueError if an artifact and one that was read before do not fit together."""
+        together = {**self._stages, stage: made}
+        for one, artifact in together.items():
+            for other, check in one.fits.items():
+                concerned = stage in (one, other) and other in together
+                if concerned and (fault := check(artifact, together[other])):
+                    raise ValueError(fault)
 
-        return self._artifact("pvs", Pvs.from_arrays)
-
-    @property
-    def ach(self) -> Ach:
-        from ptmtools.coverage.model import Ach
-
-        return self._artifact("ach", Ach.from_arrays)
-
-    def hold(self, stage: str, result: Scene | Cells | Pvs | Ach) -> None:
-        """Keeps a result that was just computed."""
-        self._held[stage] = result
-
-    def hold_images(self, images: Sequence[SourceImage]) -> None:
-        """Keeps the images of a scene that was just read."""
-        self._held["images"] = tuple(images)
-
-    def _artifact(self, stage: str, build: Callable[[Mapping[str, NDArray[np.generic]]], T]) -> T:
-        if stage not in self._held:
-            arrays = self.db.read_arrays(stage, "this command")
-            with self._reading(arrays_of(stage)):
-                made = build(arrays)
-                self._fit({**self._held, stage: made})
-            self._held[stage] = made
-        result: T = self._held[stage]
-        return result
-
-    @staticmethod
-    def _fit(held: Mapping[str, Any]) -> None:
-        """Raises ValueError if one artifact counts what another has not."""
-        scene, cells, pvs, ach = (held.get(name) for name in ("scene", "cells", "pvs", "ach"))
-        if scene and cells and (cells.triangle_source >= len(scene.triangles)).any():
-            raise ValueError("a piece is of no triangle of the scene")
-        if cells and pvs and cells.cell_count != pvs.cell_count:
-            raise ValueError("the sets are of other cells")
-        if (
-            pvs
-            and ach
-            and not (len(pvs.start) == len(ach.start) and (pvs.start == ach.start).all())
-        ):
-            raise ValueError("the hints are of other sets")
-        if scene and ach and (ach.texture >= len(scene.images)).any():
-            raise ValueError("a share is of no image")
-
-    def _reading(self, name: str) -> _Reading:
-        return _Reading(self.db, name)
-
-
-@dataclass(frozen=True)
-class _Reading:
-    """What is wrong with the contents of a file of a database becomes PTM-D006."""
-
-    db: DatabaseFolder
-    name: str
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: object, fault: BaseException | None, trace: object) -> None:
-        if isinstance(fault, _FAULTS):
+    @contextmanager
+    def reading(self, name: str) -> Iterator[None]:
+        """What is wrong with the contents of a file of the database becomes PTM-D006."""
+        try:
+            yield
+        except _FAULTS as fault:
             raise DatabaseError(
                 "PTM-D006",
                 f"damaged: {type(fault).__name__} {fault}",
-                file=self.db.path / self.name,
+                file=self.db.path / name,
                 remedy="run `ptm build-scene` again to rebuild it",
             ) from fault
+
+
+@contextmanager
+def _damaged_record(db: DatabaseFolder) -> Iterator[None]:
+    from ptmtools.store.layout import MANIFEST
+
+    try:
+        yield
+    except ValueError as fault:
+        raise DatabaseError(
+            "PTM-D002",
+            f"damaged manifest: {fault}",
+            file=db.path / MANIFEST,
+            remedy="restore it, or build the database again with --force",
+        ) from fault
 
 
 class Run(Artifacts):
     """A database being written: skips the stages that are current, records those that are not."""
 
-    def __init__(self, db: DatabaseWriter, progress: Progress = silent) -> None:
-        super().__init__(db)
+    def __init__(
+        self,
+        db: DatabaseWriter,
+        workers: Workers,
+        progress: Progress = silent,
+        model: Path | None = None,
+    ) -> None:
+        super().__init__(db, model)
         self.writer = db
+        self.workers = workers
         self.progress = progress
-        self._reports: dict[str, StageReport] = {}
+        self.reports: dict[Stage[Any], StageReport] = {}
+        self._joint: Transaction | None = None
+        self._uncommitted: dict[str, StageRecord] = {}
 
-    @property
-    def reports(self) -> tuple[StageReport, ...]:
-        """Of the stages that were dealt with, in their order."""
-        return tuple(self._reports[stage] for stage in STAGES if stage in self._reports)
+    def record(self, stage: Stage[Any]) -> StageRecord:
+        """As `Artifacts.record`, of this run if it is not committed yet."""
+        return self._uncommitted.get(stage.name) or super().record(stage)
 
-    def inputs(self, *stages: str) -> dict[str, str]:
-        """Name → SHA-256 of the arrays of these stages, for the record of one that reads them.
+    def work(self, stage: Stage[Any], options: Options) -> StageRecord:
+        """What a stage is to do.
 
         Raises
         ------
-        DatabaseError: PTM-D002 if one has no arrays; PTM-D004 if one has not been run; PTM-D008 if
-            one was computed from what has been replaced since.
+        DatabaseError: PTM-D002, PTM-D004; PTM-D008 if a stage that it reads was itself made from
+            what has been replaced since.
         """
-        current = self.db.manifest.outputs()
-        found = {}
-        for stage in stages:
-            record = self.db.record(stage)
-            for name, digest in record.inputs.items():
-                if stage != "scene" and name.startswith("stages/") and current.get(name) != digest:
-                    raise DatabaseError(
-                        "PTM-D008",
-                        f"the {stage} stage was computed from another {name}",
-                        file=self.db.path,
-                        remedy=f"run `ptm {stage} DB` or `ptm build-scene MODEL -o DB` first",
-                    )
-            found[arrays_of(stage)] = self.db.output(stage, arrays_of(stage))
-        return found
+        inputs = self.inputs(stage, options)
+        for read in stage.read_with(options):
+            if earlier := self.outdated(read):
+                raise DatabaseError(
+                    "PTM-D008",
+                    f"the {read.name} stage was made from an earlier {earlier}",
+                    file=self.db.path,
+                    remedy=f"run `ptm {read.name} DB` or `ptm build-scene MODEL -o DB` first",
+                )
+        return work_of(stage, options, inputs)
 
-    def stage(
-        self,
-        name: str,
-        options: Any,
-        compute: Callable[[Transaction], tuple[Mapping[str, Any], Sequence[str]]],
-        also: Mapping[str, str] | None = None,
-    ) -> None:
-        """Runs a stage unless it is current.
+    def begin(self, stage: Stage[Any]) -> Transaction:
+        """The transaction for what a stage makes."""
+        return self._joint or self.writer.begin(stage.name)
 
-        Parameters
-        ----------
-        compute: puts the outputs into the transaction that it is given, and returns counts and
-            notes.
-        also: inputs besides the arrays that the stage reads.
-        """
-        start = time.perf_counter()
-        work = work_of(name, options, {**self.inputs(*READS[name]), **(also or {})})
-        why = reasons(self.db.manifest.stages.get(name), work, self.db)
-        if why:
-            transaction = self.writer.begin(name)
-            counts, notes = compute(transaction)
-            outputs = transaction.pending()
-            transaction.commit({name: replace(work, outputs=outputs, counts=counts, notes=notes)})
-        self.report(name, why, start)
+    def settle(self, stage: Stage[Any], transaction: Transaction, record: StageRecord) -> None:
+        """Records a stage, and commits unless it is `Stage.joined` to the next."""
+        self._uncommitted[stage.name] = record
+        self._joint = transaction if stage.joined else None
+        if not stage.joined:
+            self._commit(transaction)
+
+    def end_of_turn(self, stage: Stage[Any]) -> None:
+        """Commits what was left for this stage to commit, if it had nothing to do."""
+        if self._joint and not stage.joined:
+            self._commit(self._joint)
+
+    def _commit(self, transaction: Transaction) -> None:
+        transaction.commit(self._uncommitted)
+        self._joint, self._uncommitted = None, {}
 
     def report(
         self,
-        name: str,
+        stage: Stage[Any],
         why: tuple[str, ...],
-        start: float,
-        end: float | None = None,
+        seconds: float,
         tasks: tuple[int, int, int] | None = None,
     ) -> None:
-        """Notes that a stage has been dealt with, from ``start`` to ``end`` (now)."""
-        record = self.db.manifest.stages[name]
-        seconds = (time.perf_counter() if end is None else end) - start
-        self._reports[name] = StageReport(
-            name, bool(why), seconds, record.counts, tuple(record.notes), why, tasks
+        """Notes that a stage has been dealt with."""
+        record = self.record(stage)
+        self.reports[stage] = StageReport(
+            stage.name, bool(why), seconds, record.counts, tuple(record.notes), why, tasks
         )
 
 
-def work_of(stage: str, options: Any, inputs: Mapping[str, str]) -> StageRecord:
+def work_of(stage: Stage[Any], options: Options, inputs: Mapping[str, str]) -> StageRecord:
     """What a stage is to do, as its record will say; without outputs."""
-    return StageRecord(RECIPES[stage], parameters(options), dict(inputs), {})
+    return StageRecord(stage.recipe, parameters(options), dict(inputs), {})
+
+
+@dataclass(frozen=True)
+class Made:
+    """What a stage has made, as its record will have it; ``inputs`` where what it reads was not
+    known before."""
+
+    outputs: Mapping[str, str]
+    counts: Mapping[str, Any]
+    notes: tuple[str, ...] = ()
+    inputs: Mapping[str, str] | None = None
+
+
+class Job:
+    """One stage in one run."""
+
+    def __init__(self, run: Run, stage: Stage[Any], options: Options) -> None:
+        self.run, self.stage, self.options = run, stage, options
+
+    def begin(self) -> None:
+        """Begins in the background what can be done there, once all that it reads is known; the
+        turn is then another stage's, of one thread."""
+
+    def do(self) -> None:
+        """Makes the stage current, when it is its turn, and reports on it."""
+        run, stage = self.run, self.stage
+        start = time.perf_counter()
+        work, why = self.planned()
+        if why:
+            transaction = run.begin(stage)
+            made = self.make(transaction)
+            known = {name: value for name, value in vars(made).items() if value is not None}
+            record = replace(work, **known)
+            run.settle(stage, transaction, record)
+        run.report(stage, why, time.perf_counter() - start)
+
+    def planned(self) -> tuple[StageRecord, tuple[str, ...]]:
+        """What is to be done, and why; no reasons if the stage is current. Raises as `Run.work`."""
+        work = self.run.work(self.stage, self.options)
+        return work, reasons(self.run.before(self.stage), work, self.run.db)
+
+    def make(self, transaction: Transaction) -> Made:
+        """Puts what the stage makes into the transaction."""
+        raise NotImplementedError
+
+    def check(self) -> None:
+        """Raises what has gone wrong in the background so far."""
+
+    def abandon(self) -> None:
+        """Ends what `begin` began: the run has failed."""
+
+
+class ArraysJob(Job):
+    """A stage that computes an artifact, which is stored as arrays."""
+
+    def make(self, transaction: Transaction) -> Made:
+        """Computes the artifact."""
+        run, stage, options = self.run, self.stage, self.options
+        assert stage.compute is not None
+        assert stage.counts is not None
+        reads = [run[read] for read in stage.read_with(options)]
+        executor = run.workers.alone if stage.one_thread else run.workers.executor
+        artifact = stage.compute.load()(*reads, options, run.progress, executor)
+        run.keep(stage, artifact)
+        return Made(
+            transaction.put_arrays(stage.name, artifact.to_arrays()),
+            stage.counts(artifact),
+            tuple(stage.notes(artifact, options)),
+        )

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from ptmtools.errors import DatabaseError
-from ptmtools.pipeline.folder import DatabaseFolder, read_manifest
-from ptmtools.pipeline.lock import LOCK, holder, is_held
-from ptmtools.pipeline.manifest import Manifest
 from ptmtools.pipeline.run import Artifacts
+from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import STAGES
-from ptmtools.pipeline.textures import texture_inputs
-from ptmtools.pipeline.transaction import STAGING, finished_tasks
+from ptmtools.store.folder import DatabaseFolder, read_manifest
+from ptmtools.store.layout import LOCK, STAGING
+from ptmtools.store.lock import holder, is_held
+from ptmtools.store.manifest import Manifest
+from ptmtools.store.transaction import finished_tasks
 
 State = Literal["done", "not run", "stale", "damaged"]
 
@@ -81,7 +81,8 @@ def database_status(path: str | os.PathLike[str]) -> DatabaseStatus:
     if manifest is None and not begun and not (folder / LOCK).exists():
         DatabaseFolder.open(folder)  # says what is wrong
     db = DatabaseFolder(folder, manifest or Manifest(""))
-    stages = tuple(_stage(db, stage) for stage in STAGES)
+    artifacts = Artifacts(db)
+    stages = tuple(_stage(artifacts, stage) for stage in STAGES.values())
     db.digests.save()
     held = is_held(folder)
     return DatabaseStatus(
@@ -95,10 +96,11 @@ def database_status(path: str | os.PathLike[str]) -> DatabaseStatus:
     )
 
 
-def _stage(db: DatabaseFolder, stage: str) -> StageStatus:
-    record = db.manifest.stages.get(stage)
+def _stage(artifacts: Artifacts, stage: Stage[Any]) -> StageStatus:
+    db = artifacts.db
+    record = db.manifest.stages.get(stage.name)
     if record is None:
-        return StageStatus(stage, "not run", "", {}, 0, 0)
+        return StageStatus(stage.name, "not run", "", {}, 0, 0)
     sizes = []
     for name in record.outputs:
         file = db.path / name
@@ -108,20 +110,6 @@ def _stage(db: DatabaseFolder, stage: str) -> StageStatus:
     why = ""
     if lost := db.damaged(record.outputs):
         state, why = "damaged", f"{lost} is missing or damaged"
-    elif earlier := _earlier(db, stage):
+    elif earlier := artifacts.outdated(stage):
         state, why = "stale", f"made from an earlier {earlier}"
-    return StageStatus(stage, state, why, record.counts, len(sizes), sum(sizes))
-
-
-def _earlier(db: DatabaseFolder, stage: str) -> str:
-    """An input of a stage that has been made anew since, "" if there is none."""
-    record, there = db.manifest.stages[stage], db.manifest.outputs()
-    if stage == "textures":
-        try:
-            images = texture_inputs(Artifacts(db).image_digests)
-        except DatabaseError:
-            return ""  # which is the scene's fault
-        return "" if images == record.inputs else "scene"
-    if stage == "scene":
-        return ""
-    return next((n for n, digest in record.inputs.items() if there.get(n) != digest), "")
+    return StageStatus(stage.name, state, why, record.counts, len(sizes), sum(sizes))

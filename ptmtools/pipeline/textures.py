@@ -14,30 +14,31 @@ import time
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from itertools import accumulate, takewhile
+from itertools import takewhile
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
 
-from ptmtools.errors import DatabaseError, naming
+from ptmtools.errors import naming
 from ptmtools.executors.model import Executor
 from ptmtools.files import open_regular
-from ptmtools.pipeline.changes import reasons
-from ptmtools.pipeline.folder import sha256
-from ptmtools.pipeline.manifest import StageRecord
+from ptmtools.pipeline.background import BackgroundLoop
+from ptmtools.pipeline.encoding import encoded_image
+from ptmtools.pipeline.images import image_digests, images_of
 from ptmtools.pipeline.options import TextureOptions
-from ptmtools.pipeline.run import Run, work_of
-from ptmtools.pipeline.stages import SERVED
-from ptmtools.pipeline.transaction import Transaction
+from ptmtools.pipeline.run import Artifacts, Job, Run
+from ptmtools.pipeline.shared_disk import ImageTask, encoded_there, shared_disk
+from ptmtools.pipeline.stage import Stage
+from ptmtools.store.layout import SERVED, sha256
+from ptmtools.store.manifest import StageRecord
+from ptmtools.store.transaction import Transaction
 
 if TYPE_CHECKING:
-    from ptmtools.database.model import TextureRecord
     from ptmtools.texture.model import PtmHeader
 
 FOLDER = "textures"
 #: Images that are named together at most: a message costs a few ms.
-AT_A_DESK = 4
-PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
+AT_ONCE = 4
 
 
 def texture_names(images: Iterable[str]) -> list[str]:
@@ -67,6 +68,11 @@ def texture_files(images: Iterable[str]) -> list[str]:
     return [f"{FOLDER}/{name}.ptm" for name in texture_names(images)]
 
 
+def inputs_of(artifacts: Artifacts) -> dict[str, str]:
+    """See `Stage.inputs`."""
+    return texture_inputs(image_digests(artifacts))
+
+
 def texture_inputs(images: Mapping[str, str]) -> dict[str, str]:
     """The inputs of the stage, for name → SHA-256 of the images: under the name of each `.ptm` the
     digest of its image."""
@@ -81,26 +87,16 @@ def stale_textures(before: StageRecord | None, work: StageRecord) -> list[str]:
     return [name for name in work.inputs if before.inputs.get(name) != work.inputs[name]]
 
 
-class TextureStage:
-    """One run of the stage, in steps, so that the long one may be done beside other stages."""
+class TexturesJob(Job):
+    """Encodes the images of the scene, in the background as far as that is worth it."""
 
-    def __init__(self, run: Run, options: TextureOptions) -> None:
-        self._run = run
-        self._options = options
+    def __init__(self, run: Run, stage: Stage[None], options: TextureOptions) -> None:
+        super().__init__(run, stage, options)
         self._seconds = 0.0
-        self._digests = run.image_digests
-        self._names = texture_files(self._digests)
-        self._before = run.db.manifest.stages.get("textures")
-        self._work = work_of("textures", options, texture_inputs(self._digests))
-        self._why = reasons(self._before, self._work, run.db)
         self._transaction: Transaction | None = None
         self._left: deque[int] = deque()
-        self._tasks = (len(self._names), len(self._names), 0)
-
-    @property
-    def current(self) -> bool:
-        """Whether there is nothing to do."""
-        return not self._why
+        self._names: list[str] = []
+        self._background: BackgroundLoop | None = None
 
     @property
     def left(self) -> int:
@@ -108,14 +104,54 @@ class TextureStage:
         return len(self._left)
 
     def begin(self) -> None:
-        """Keeps what the last run made, and takes over what an interrupted one left."""
-        if self.current:
+        """See `Job.begin`."""
+        self._prepare()
+        executor = self.run.workers.background(self.left)
+        if executor:
+            free = self.run.workers.alone.free
+            self._background = BackgroundLoop(self.encode, executor, free)
+
+    def check(self) -> None:
+        """See `Job.check`."""
+        if self._background:
+            self._background.check()
+
+    def abandon(self) -> None:
+        """See `Job.abandon`."""
+        if self._background:
+            self._background.abandon()
+
+    def do(self) -> None:
+        """Encodes what is left, with all workers, and commits."""
+        self._prepare()
+        if self._background:
+            self._background.finish()
+        if self.left:
+            self.encode(self.run.workers.executor)
+        if transaction := self._transaction:
+            outputs = transaction.pending()
+            record = replace(self._work, outputs=outputs, counts=self._counted(transaction))
+            self.run.settle(self.stage, transaction, record)
+        self.run.report(self.stage, self._why, self._seconds, self._tasks)
+
+    def _prepare(self) -> None:
+        """Once: keeps what the last run made, and takes over what an interrupted one left."""
+        if self._names:
             return
-        self._transaction = transaction = self._run.writer.begin("textures")
+        self._work, self._why = self.planned()
+        self._names = list(self._work.inputs)
+        self._tasks = (len(self._names), len(self._names), 0)
+        if not self._why:
+            return
+        # Not `Run.begin`: another stage may be under way.
+        self._transaction = transaction = self.run.writer.begin(self.stage.name)
         kept, resumed = 0, 0
-        stale = set(stale_textures(self._before, self._work))
+        before = self.run.before(self.stage)
+        stale = set(stale_textures(before, self._work))
+        outputs = before.outputs if before else {}
         for i, name in enumerate(self._names):
-            if name not in stale and self._keep(transaction, self._files(name)):
+            files = {file: outputs.get(file, "") for file in self._files(name)}
+            if name not in stale and transaction.keep(files):
                 kept += 1
             elif transaction.resume(self._task(i)):
                 resumed += 1
@@ -124,71 +160,50 @@ class TextureStage:
         self._tasks = (len(self._names), kept, resumed)
 
     def encode(self, executor: Executor, stop: Event | None = None) -> None:
-        """Encodes what is left, once begun; nothing is committed. With ``stop``, from another
-        thread, no more images are taken.
+        """Encodes what is left; nothing is committed. No more images are taken once another thread
+        sets ``stop``.
 
         Raises what `encode` raises.
         """
-        if self._transaction is None:
-            return
+        assert self._transaction
         start = time.perf_counter()
         total = len(self._names)
         wanted = takewhile(lambda _: stop is None or not stop.is_set(), tuple(self._left))
         for files in self._staged(self._transaction, executor, wanted):
-            self._run.progress(total - len(self._left), total, "textures")
+            self.run.progress(total - len(self._left), total, "textures")
             self._transaction.finish(self._task(self._left.popleft()), files)
-        self._run.progress(total - len(self._left), total, "textures")
+        self.run.progress(total - len(self._left), total, "textures")
         self._seconds += time.perf_counter() - start
-
-    def commit(self) -> None:
-        """Makes what was encoded, all of it, part of the database."""
-        if self._transaction is not None:
-            outputs = self._transaction.pending()
-            record = replace(self._work, outputs=outputs, counts=self._counted(self._transaction))
-            self._transaction.commit({"textures": record})
-        self._run.report("textures", self._why, 0.0, self._seconds, self._tasks)
 
     def _files(self, name: str) -> list[str]:
         """The outputs of a texture, its `.ptm` first."""
-        suffixes = ("ptm", "png")[: 1 + self._options.fallback]
+        suffixes = ("ptm", "png")[: 1 + self.options.fallback]
         return [f"{SERVED}/{name.removesuffix('ptm')}{suffix}" for suffix in suffixes]
-
-    def _keep(self, transaction: Transaction, files: list[str]) -> bool:
-        outputs = self._before.outputs if self._before else {}
-        return all(name in outputs for name in files) and transaction.keep(
-            {name: outputs[name] for name in files}
-        )
 
     def _task(self, i: int) -> str:
         """A digest of all that the files of a texture depend on, their names included."""
         name = self._names[i]
-        told = [self._work.recipe, self._work.parameters, name, self._work.inputs[name]]
-        return sha256(json.dumps(told, sort_keys=True).encode())
+        depends = [self._work.recipe, self._work.parameters, name, self._work.inputs[name]]
+        return sha256(json.dumps(depends, sort_keys=True).encode())
 
     def _staged(
         self, transaction: Transaction, executor: Executor, wanted: Iterator[int]
     ) -> Iterator[list[str]]:
         """The names of the files of each image, once they are staged; in order, so it is always the
         first of what is left."""
-        from ptmtools.pipeline.desk import Picture, desk_of, encoded_there
-
-        images = self._run.images
-        with desk_of(transaction, self._run.db.path, self._options, executor) as desk:
-            if desk is None:
+        images = images_of(self.run)
+        with shared_disk(transaction, self.run.db.path, self.options, executor) as disk:
+            if disk is None:
                 sources = ((images[i].name, images[i].load()) for i in wanted)
-                for made in executor.each(
-                    encoded_image, self._options, sources, releases_lock=True
-                ):
+                for made in executor.each(encoded_image, self.options, sources, releases_lock=True):
                     files = self._files(self._names[self._left[0]])
                     for name, data in zip(files, made, strict=True):
                         transaction.put(name, data)
                     yield files
                 return
-            chunk = max(1, min(AT_A_DESK, len(self._left) // (8 * executor.workers)))
-            pictures = (Picture(images[i].name, images[i].sha256, str(i)) for i in wanted)
-            for left in executor.each(
-                encoded_there, desk, pictures, releases_lock=True, chunk=chunk
-            ):
+            chunk = max(1, min(AT_ONCE, len(self._left) // (8 * executor.workers)))
+            tasks = (ImageTask(images[i].name, images[i].sha256, str(i)) for i in wanted)
+            for left in executor.each(encoded_there, disk, tasks, releases_lock=True, chunk=chunk):
                 files = self._files(self._names[self._left[0]])
                 for name, (file, digest) in zip(files, left, strict=True):
                     transaction.take(name, Path(file), digest)
@@ -198,111 +213,15 @@ class TextureStage:
         raw = stored = 0
         for ptm, *_ in map(self._files, self._names):
             place = transaction.folder / ptm
-            header = _header(place if place.is_file() else self._run.db.path / ptm)
+            header = header_of(place if place.is_file() else self.run.db.path / ptm)
             finest = header.levels[-1]
             raw += finest.width * finest.height * header.texel_bytes
             stored += header.file_size
         return {"textures": len(self._names), "raw_bytes": raw, "ptm_bytes": stored}
 
 
-def encoded_image(options: TextureOptions, image: tuple[str, bytes]) -> list[bytes]:
-    """An image, (name, bytes of its file), as the bytes of a `.ptm` and, if there is to be one, of
-    its PNG twin.
-
-    Raises what `encode` and `read_image` raise.
-    """
-    from ptmtools.texture import Limits, decode, encode, read_header, read_image
-    from ptmtools.texture.images import png_bytes
-
-    name, source = image
-    with naming(name):
-        texels = read_image(source, Limits(options.limit << 20))
-        data = encode(texels, options)
-    if not options.fallback:
-        return [data]
-    header = read_header(data)
-    level = fallback_level(header, options.fallback_size)
-    if level < len(header.levels) - 1 or options.max_error or header.trimmed:
-        # Decoding takes more than the image, which is within the limit.
-        twin = png_bytes(decode(data, level=level, limits=Limits(64 * texels.nbytes + (1 << 20))))
-    elif source.startswith(PNG_MAGIC):
-        twin = bare_png(source)
-    else:
-        twin = png_bytes(texels)
-    return [data, twin]
-
-
-def fallback_level(header: PtmHeader, size: int) -> int:
-    """The level that a PNG twin of this size holds, see `TextureOptions`."""
-    sides = [max(level.width, level.height) for level in header.levels]
-    fitting = [n for n, side in enumerate(sides) if side <= size or not size]
-    return fitting[-1] if fitting else 0
-
-
-def bare_png(data: bytes) -> bytes:
-    """An intact PNG reduced to what makes its texels: no gamma, colour profile, text or date.
-
-    Deflating a megatexel again takes half a second, three times as long as encoding it, and gives
-    other bytes with another zlib.
-    """
-    kept, at = [data[: len(PNG_MAGIC)]], len(PNG_MAGIC)
-    while at < len(data):
-        end = at + 12 + int.from_bytes(data[at : at + 4], "big")
-        kind = data[at + 4 : at + 8]
-        if kind in (b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"):
-            kept.append(data[at:end])
-        if kind == b"IEND":
-            break
-        at = end
-    return b"".join(kept)
-
-
-def texture_records(run: Run) -> tuple[TextureRecord, ...]:
-    """What the emitted files say of the textures of a database."""
-    from ptmtools.database import TextureLevel, TextureRecord
-
-    record = run.db.record("textures")
-    size = record.parameters.get("fallback_size")
-    if type(size) is not int:
-        raise DatabaseError(
-            "PTM-D002",
-            "damaged manifest: stage textures has no fallback_size",
-            file=run.db.path,
-            remedy="run `ptm textures DB` again",
-        )
-    records = []
-    for i, name in enumerate(texture_files(image.name for image in run.images)):
-        twin = f"{name.removesuffix('ptm')}png"
-        has_twin = f"{SERVED}/{twin}" in record.outputs
-        header = _header(run.db.path / SERVED / name)
-        texels = accumulate(level.width * level.height for level in header.levels)
-        levels = tuple(
-            TextureLevel(
-                width=level.width,
-                height=level.height,
-                offset=level.offset,
-                length=level.length,
-                gpu_bytes=count * header.texel_bytes,
-            )
-            for level, count in zip(header.levels, texels, strict=True)
-        )
-        records.append(
-            TextureRecord(
-                image=i,
-                file=name,
-                fallback=twin if has_twin else None,
-                width=levels[-1].width,
-                height=levels[-1].height,
-                components=header.components,
-                levels=levels,
-                sha256=run.db.output("textures", f"{SERVED}/{name}"),
-                fallback_level=fallback_level(header, size) if has_twin else None,
-            )
-        )
-    return tuple(records)
-
-
-def _header(file: Path) -> PtmHeader:
+def header_of(file: Path) -> PtmHeader:
+    """The header of a `.ptm` of ours; raises what `read_header` raises."""
     from ptmtools.texture.container import HEAD_MAX, read_header
 
     with open_regular(file) as stream, naming(file):

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.cells import Cells, SubdivideOptions, structural_triangles
+from ptmtools.cells import Cells, structural_triangles
 from ptmtools.database import ValidationReport, validate_database, validate_ptm
 from ptmtools.errors import DatabaseError
-from ptmtools.pipeline.folder import MANIFEST, DatabaseFolder
 from ptmtools.pipeline.run import Artifacts
 from ptmtools.pipeline.stagecheck import check_stages
+from ptmtools.pipeline.stages import CELLS, PVS, SCENE
 from ptmtools.progress import Progress, silent
-from ptmtools.stored import texts
+from ptmtools.store.folder import DatabaseFolder
 from ptmtools.texture.model import Limits
 from ptmtools.visibility import Pvs, SegmentReport, check_conservative
 
@@ -74,19 +74,7 @@ def structure_of(db: str | os.PathLike[str]) -> tuple[NDArray[np.float64], Cells
 
     Raises as `shoot_segments`.
     """
-    held = Artifacts(DatabaseFolder.open(db))
-    told = held.db.record("cells").parameters
-    try:
-        options = SubdivideOptions(
-            structural=texts(told.get("structural", []), "structural"),
-            detail=texts(told.get("detail", []), "detail"),
-        )
-    except ValueError as fault:
-        raise DatabaseError(
-            "PTM-D002",
-            f"damaged manifest: stage cells: {fault}",
-            file=held.db.path / MANIFEST,
-            remedy="restore it, or build the database again with --force",
-        ) from fault
-    corners = held.scene.corners[structural_triangles(held.scene, options)]
-    return corners, held.cells, held.pvs
+    artifacts = Artifacts(DatabaseFolder.open(db))
+    options, scene = artifacts.recorded(CELLS), artifacts[SCENE]
+    corners = scene.corners[structural_triangles(scene, options)]
+    return corners, artifacts[CELLS], artifacts[PVS]

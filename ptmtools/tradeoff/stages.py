@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from ptmtools.cells import SubdivideOptions
 from ptmtools.coverage.options import AchOptions
 from ptmtools.pipeline import Artifacts
+from ptmtools.pipeline.stages import CELLS, PVS, SCENE
 from ptmtools.texture import EncodeOptions
 from ptmtools.tradeoff.cells import CellsTrade
 from ptmtools.tradeoff.experiment import Experiment
@@ -37,17 +38,17 @@ def experiments(
         return cls(**{name: _plain(given[name]) for name in names})
 
     return {
-        "cells": lambda: CellsTrade(artifacts.scene, told("cells", SubdivideOptions)),
-        "pvs": lambda: VisibilityTrade(artifacts.cells, told("pvs", PvsOptions)),
+        "cells": lambda: CellsTrade(artifacts[SCENE], told("cells", SubdivideOptions)),
+        "pvs": lambda: VisibilityTrade(artifacts[CELLS], told("pvs", PvsOptions)),
         "ach": lambda: CoverageTrade(
-            artifacts.scene,
-            artifacts.cells,
-            artifacts.pvs,
+            artifacts[SCENE],
+            artifacts[CELLS],
+            artifacts[PVS],
             _open(told("ach", AchOptions)),
             cells_tried,
             reference_points,
         ),
-        "textures": lambda: TexturesTrade(artifacts.scene.images, told("textures", EncodeOptions)),
+        "textures": lambda: TexturesTrade(artifacts[SCENE].images, told("textures", EncodeOptions)),
     }
 
 

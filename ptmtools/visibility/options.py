@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from ptmtools.errors import InputError
@@ -24,10 +24,10 @@ class PvsOptions:
         otherwise lines of sight thinner than a rounding are not seen.
     """
 
-    method: Literal["full", "fast", "sampled"] = "full"
-    budget: int = 200_000
-    lines: int = 1000
-    exact: bool = True
+    method: Literal["full", "fast", "sampled"] = field(default="full", metadata={"option": "pvs"})
+    budget: int = field(default=200_000, metadata={"option": "pvs-budget"})
+    lines: int = field(default=1000, metadata={"option": "pvs-lines"})
+    exact: bool = field(default=True, metadata={"option": "pvs-exact"})
 
     def __post_init__(self) -> None:
         if self.budget < 0:

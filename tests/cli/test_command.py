@@ -14,9 +14,10 @@ import pytest
 from click.testing import CliRunner
 
 import ptmtools
-from ptmtools.cli.main import COMMANDS, main, ptm
-from ptmtools.cli.output import Voice, count, size
+from ptmtools.cli.main import main, ptm
+from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import descriptions, options_of, take
+from ptmtools.quantities import count, size
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def test_options_come_from_the_class(arguments: list[str], wanted: Options | Non
     assert (result.exit_code, found) == ((0, [wanted]) if wanted else (2, []))
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize("name", ptm.list_commands(click.Context(ptm)))
 def test_every_option_of_every_command_is_explained(name: str) -> None:
     command = ptm.get_command(click.Context(ptm), name)
     assert command is not None

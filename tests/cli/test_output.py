@@ -10,7 +10,7 @@ import pytest
 
 from ptmtools.cli.main import main
 from ptmtools.cli.output import Voice, printable
-from ptmtools.cli.scenes import figures
+from ptmtools.pipeline.stages import STAGES
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_errors_about_odd_files(
     err.decode()
 
 
-@pytest.mark.parametrize("stage", ["scene", "cells", "pvs", "ach", "textures", "emit"])
+@pytest.mark.parametrize("stage", STAGES)
 @pytest.mark.parametrize("value", [None, "x", {}, [], "9", float("inf")])
 def test_figures_of_a_damaged_manifest(stage: str, value: object) -> None:
     """Whatever the manifest says, a line comes out."""
@@ -65,6 +65,6 @@ def test_figures_of_a_damaged_manifest(stage: str, value: object) -> None:
         *("cells", "leaves", "portals", "average_share", "samples", "backend", "renderer"),
         *("textures", "raw_bytes", "ptm_bytes", "files", "bytes", "viewpoints"),
     )
-    assert isinstance(figures(stage, dict.fromkeys(names, value)), str)
-    assert figures(stage, {}) == "figures that make no sense"
-    assert isinstance(figures(stage, dict.fromkeys(names, 10**400)), str)
+    assert isinstance(STAGES[stage].summarize(dict.fromkeys(names, value)), str)
+    assert STAGES[stage].summarize({}) == "figures that make no sense"
+    assert isinstance(STAGES[stage].summarize(dict.fromkeys(names, 10**400)), str)

@@ -12,7 +12,7 @@ from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.errors import InputError
 from ptmtools.executors import Local
-from ptmtools.pipeline.build import _coverage_notes
+from ptmtools.pipeline.stages import ACH
 from ptmtools.visibility.model import Pvs
 
 RAYS = AchOptions(face=4, backend="embree")
@@ -109,7 +109,7 @@ def test_samples_caps_the_points(room_row, most):
     assert (ach.samples <= most).all()
     assert (ach.samples > most - 8).all()
     assert (ach.uncertain > 0.001).all()
-    notes = _coverage_notes(ach, options)
+    notes = tuple(ACH.notes(ach, options))
     assert len(notes) == 1
     assert notes[0].startswith("3 cells did not reach the tolerance of 0.001 with")
 
@@ -118,10 +118,10 @@ def test_the_note_counts_the_cells_that_fell_short(room_row):
     scene, cells = room_row(3)
     options = replace(RAYS, tolerance=0.01)
     ach = compute_ach(scene, cells, all_visible(3), options)
-    assert _coverage_notes(ach, options) == ()
+    assert tuple(ACH.notes(ach, options)) == ()
     short = replace(ach, uncertain=np.array([0.5, 0.009, np.nan]))
-    assert _coverage_notes(short, options)[0].startswith("2 cells did not reach")
-    assert _coverage_notes(short, replace(options, tolerance=None)) == ()
+    assert next(iter(ACH.notes(short, options))).startswith("2 cells did not reach")
+    assert not list(ACH.notes(short, replace(options, tolerance=None)))
 
 
 def test_a_tolerance_needs_eight_points():

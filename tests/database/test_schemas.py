@@ -17,8 +17,8 @@ from ptmtools import schemas
 from ptmtools.cli.main import main
 from ptmtools.database.validation import CODES, Findings
 from ptmtools.database.validation.hints import read_hints
-from ptmtools.pipeline.manifest import FORMAT, SCHEMA, Manifest, StageRecord
 from ptmtools.pipeline.stages import STAGES
+from ptmtools.store.manifest import FORMAT, SCHEMA, Manifest, StageRecord
 
 Step = str | int
 

@@ -17,8 +17,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ptmtools.pipeline.lock import LOCK
-from ptmtools.pipeline.transaction import STAGING
+from ptmtools.store.layout import LOCK, STAGING
 from tests.e2e.conftest import Ptm, listing
 
 ROOT = Path(__file__).resolve().parents[2]

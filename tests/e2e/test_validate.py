@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from ptmtools import schemas
-from ptmtools.pipeline.folder import sha256
+from ptmtools.store.layout import sha256
 from tests.e2e.conftest import TWO_ROOMS, Ptm
 
 ROOT = Path(__file__).parents[2]

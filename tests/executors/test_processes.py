@@ -15,8 +15,7 @@ import executor_tasks as tasks
 import pytest
 
 from ptmtools.errors import InputError, OutputError, WorkerError
-from ptmtools.executors import Aside, Local, Serial, open_executor
-from ptmtools.executors.aside import asked
+from ptmtools.executors import BackgroundTask, Local, Serial, open_executor
 
 HERE = Path(__file__).parent / "tasks"
 
@@ -134,32 +133,35 @@ def test_without_threads_even_one_worker_is_another_process():
     assert os.getpid() not in found
 
 
-def test_one_task_aside():
+def test_one_task_in_the_background():
     ended = threading.Event()
-    assert Aside(tasks.slower_at_first, 0.02, 4, ended.set).result() == 16
+    task = BackgroundTask(tasks.slower_at_first, 0.02, 4)
+    task.add_done_callback(lambda _: ended.set())
+    assert task.result() == 16
     until(ended.is_set)
     with pytest.raises(InputError, match="PTM-I999"):
-        Aside(tasks.refuse, 5, 5).result()
+        BackgroundTask(tasks.refuse, 5, 5).result()
     with pytest.raises(WorkerError, match="PTM-W004"):
-        Aside(tasks.die, 7, 7).result()
+        BackgroundTask(tasks.die, 7, 7).result()
 
 
 @pytest.mark.parametrize("begun", [False, True])
-def test_an_unwanted_task_aside_is_ended(tmp_path, begun):
+def test_an_unwanted_task_is_ended(tmp_path, begun):
     """In the middle, or before its process was even started."""
     ended = threading.Event()
-    aside = Aside(tasks.note_and_sleep, tmp_path, 1e6, ended.set)
+    task = BackgroundTask(tasks.note_and_sleep, tmp_path, 1e6)
+    task.add_done_callback(lambda _: ended.set())
     if begun:
         until(lambda: any(tmp_path.iterdir()))
-    aside.cancel()
+    task.cancel()
     until(ended.is_set)
     until(lambda: all(gone(int(file.name)) for file in tmp_path.iterdir()))
     with pytest.raises((WorkerError, RuntimeError)):
-        aside.result()
+        task.result()
 
 
 def test_what_is_only_asked_for_is_not_done_before(tmp_path):
-    pending = asked(tasks.note_and_sleep, tmp_path, 0.0)
+    pending = Serial().submit(tasks.note_and_sleep, tmp_path, 0.0)
     assert not list(tmp_path.iterdir())
     pending.result()
     assert list(tmp_path.iterdir())

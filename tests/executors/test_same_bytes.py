@@ -12,8 +12,8 @@ import pytest
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.executors import Executor
-from ptmtools.pipeline import BuildOptions, build_scene
-from ptmtools.pipeline.archive import pack_arrays
+from ptmtools.pipeline import build_scene
+from ptmtools.store.archive import pack_arrays
 from ptmtools.visibility import Pvs, PvsOptions, compute_pvs
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -76,9 +76,7 @@ def test_whole_databases(tmp_path, scheduler: str, monkeypatch):
     model = ROOT / "sample_data/two_rooms/two_rooms.obj"
     ach = AchOptions(backend="embree")
     for folder, workers, address in (("one", 1, None), ("two", 2, None), ("many", 0, scheduler)):
-        build_scene(
-            model, tmp_path / folder, BuildOptions(ach=ach, workers=workers, scheduler=address)
-        )
+        build_scene(model, tmp_path / folder, ach, workers=workers, scheduler=address)
     one, two, many = (
         {file.relative_to(root): file.read_bytes() for file in root.rglob("*") if file.is_file()}
         for root in (tmp_path / name for name in ("one", "two", "many"))

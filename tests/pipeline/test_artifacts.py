@@ -17,10 +17,12 @@ import pytest
 
 from ptmtools.cli.main import main
 from ptmtools.errors import DatabaseError
-from ptmtools.pipeline.archive import pack_arrays, unpack_arrays
-from ptmtools.pipeline.folder import DatabaseFolder, sha256
+from ptmtools.pipeline.images import images_of
 from ptmtools.pipeline.run import Artifacts
-from ptmtools.pipeline.stages import IMAGE_LIST, arrays_of
+from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE
+from ptmtools.store.archive import pack_arrays, unpack_arrays
+from ptmtools.store.folder import DatabaseFolder
+from ptmtools.store.layout import IMAGE_LIST, arrays_of, sha256
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"
 Arrays = dict[str, Any]
@@ -52,7 +54,7 @@ def replaced(db: Path, name: str, data: bytes) -> None:
 
 def opened(db: Path) -> list[object]:
     artifacts = Artifacts(DatabaseFolder.open(db))
-    return [artifacts.scene, artifacts.cells, artifacts.pvs, artifacts.ach]
+    return [artifacts[stage] for stage in (SCENE, CELLS, PVS, ACH)]
 
 
 def first(name: str, value: object) -> Change:
@@ -290,9 +292,9 @@ def test_names_and_digests_of_images(database: Path, row: dict[str, Any]) -> Non
         artifacts = Artifacts(DatabaseFolder.open(database))
         if refused:
             with pytest.raises(DatabaseError, match="PTM-D006"):
-                _ = artifacts.images
+                images_of(artifacts)
         else:
-            assert len(artifacts.images) == 1
+            assert len(images_of(artifacts)) == 1
 
 
 @pytest.mark.parametrize("place", ["manifest.json", "stages/scene.npz", "stages/images.json"])

@@ -13,10 +13,11 @@ import pytest
 
 from ptmtools.coverage.model import Ach
 from ptmtools.pipeline import validate
-from ptmtools.pipeline.archive import pack_arrays
-from ptmtools.pipeline.folder import DatabaseFolder, sha256
-from ptmtools.pipeline.manifest import Manifest, StageRecord
 from ptmtools.pipeline.stagecheck import check_stages
+from ptmtools.store.archive import pack_arrays
+from ptmtools.store.folder import DatabaseFolder
+from ptmtools.store.layout import sha256
+from ptmtools.store.manifest import Manifest, StageRecord
 from ptmtools.visibility.model import Pvs
 
 Arrays = dict[str, dict[str, np.ndarray]]
@@ -238,7 +239,7 @@ def test_counts(stages: Arrays, tmp_path: Path, stage: str, name: str, value: ob
 
 
 def test_a_stage_that_lists_no_arrays(stages: Arrays, tmp_path: Path) -> None:
-    manifest = written(tmp_path, stages).with_stage("pvs", StageRecord(1, {}, {}, {}))
+    manifest = written(tmp_path, stages).with_stages({"pvs": StageRecord(1, {}, {}, {})})
     assert ("PTM-D720", "manifest.json", "") in found(tmp_path, manifest)
 
 

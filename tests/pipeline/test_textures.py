@@ -1,4 +1,4 @@
-"""Names of textures, and the PNG twins."""
+"""Names of textures, and fallback images."""
 
 from __future__ import annotations
 
@@ -11,10 +11,13 @@ import pytest
 from PIL import Image, PngImagePlugin
 
 from ptmtools.executors import Serial
-from ptmtools.pipeline import BuildOptions, TextureOptions, build_scene, make_cells, workers
+from ptmtools.pipeline import TextureOptions, background, build_scene
+from ptmtools.pipeline.background import Workers
+from ptmtools.pipeline.encoding import bare_png
 from ptmtools.pipeline.run import Run
-from ptmtools.pipeline.textures import TextureStage, bare_png, texture_names
-from ptmtools.pipeline.writer import DatabaseWriter
+from ptmtools.pipeline.stages import CELLS, TEXTURES
+from ptmtools.pipeline.textures import TexturesJob, texture_names
+from ptmtools.store.writer import DatabaseWriter
 from ptmtools.texture import read_image
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data/two_rooms/two_rooms.obj"
@@ -47,29 +50,28 @@ def test_a_bare_png_has_the_same_texels_and_nothing_else(mode: str, transparent:
 
 
 def test_what_is_left_when_it_is_stopped_is_done_later(tmp_path: Path) -> None:
-    make_cells(TWO_ROOMS, tmp_path / "db")
-    with DatabaseWriter.open_for_stage(tmp_path / "db") as writer:
-        run = Run(writer, lambda done, *_: stop.set() if done == 1 else None)
+    build_scene(TWO_ROOMS, tmp_path / "db", until=CELLS)
+    with DatabaseWriter.open_for_stage(tmp_path / "db") as writer, Workers(1, None) as workers:
+        run = Run(writer, workers, lambda done, *_: stop.set() if done == 1 else None)
         stop = Event()
-        stage = TextureStage(run, TextureOptions())
-        stage.begin()
-        images = stage.left
-        stage.encode(Serial(), stop)
-        assert 0 < stage.left < images
-        stage.encode(Serial())
-        assert stage.left == 0
-        stage.commit()
-        assert run.reports[-1].tasks == (images, 0, 0)
-        assert run.db.record("textures").counts["textures"] == images
+        job = TexturesJob(run, TEXTURES, TextureOptions())
+        job.begin()
+        images = job.left
+        job.encode(Serial(), stop)
+        assert 0 < job.left < images
+        job.do()
+        assert job.left == 0
+        assert run.reports[TEXTURES].tasks == (images, 0, 0)
+        assert run.record(TEXTURES).counts["textures"] == images
 
 
 def test_many_textures_are_encoded_beside_the_cells(tmp_path, monkeypatch) -> None:
     """The same bytes from one worker, from workers beside, and where some are left for later."""
     found = {}
     for count, least in ((1, 8), (2, 1), (2, 10**9)):
-        monkeypatch.setattr(workers, "WORTH_A_PROCESS", least)
+        monkeypatch.setattr(background, "WORTH_A_PROCESS", least)
         db = tmp_path / f"{count} {least}"
-        build_scene(TWO_ROOMS, db, BuildOptions(workers=count))
+        build_scene(TWO_ROOMS, db, workers=count)
         found[db] = {f.relative_to(db): f.read_bytes() for f in db.rglob("*") if f.is_file()}
     one, *others = found.values()
     assert all(other == one for other in others)

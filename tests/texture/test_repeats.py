@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError
 from ptmtools.texture import build_pyramid
 from ptmtools.texture.coders.repeats import coder as repeats
+from ptmtools.texture.coders.repeats import symbols
 from ptmtools.texture.coders.repeats.reference import decode_repeats
-from ptmtools.texture.coders.repeats.symbols import kernels
 
 
 def zoo() -> dict[str, NDArray[np.uint8]]:
@@ -62,15 +62,15 @@ def test_compiled_pass_agrees_with_the_reference(name: str, height: int, width: 
 
 
 def test_between_them_the_images_use_every_sort_of_symbol() -> None:
-    counts = np.zeros((kernels.TABLES, 256), np.int64)
+    counts = np.zeros((symbols.TABLES, 256), np.int64)
     for image in zoo().values():
         level = image[:39, :43]
         counts += repeats.find(np.ascontiguousarray(level), below_of(level)).counts
-    assert (counts[kernels.GUESS : kernels.TEXEL].sum(axis=0)[:5] > 0).all()
-    assert (counts[kernels.TEXEL : kernels.EDGE].sum(axis=0)[:6] > 0).all()
-    firsts = [kernels.FIRST, kernels.EDGE, kernels.HAAR, kernels.SAMPLE, kernels.REMAINDER]
+    assert (counts[symbols.GUESS : symbols.TEXEL].sum(axis=0)[:5] > 0).all()
+    assert (counts[symbols.TEXEL : symbols.EDGE].sum(axis=0)[:6] > 0).all()
+    firsts = [symbols.FIRST, symbols.EDGE, symbols.HAAR, symbols.SAMPLE, symbols.REMAINDER]
     assert all(counts[first : first + 10].sum() > 0 for first in firsts)
-    runs = counts[kernels.RUN :]
+    runs = counts[symbols.RUN :]
     assert runs[:, 0].sum() > 0
     assert runs[:, 1:].sum() > 0
 

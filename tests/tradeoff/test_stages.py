@@ -15,7 +15,7 @@ from PIL import Image
 from ptmtools.cli.main import main
 from ptmtools.cli.output import Voice
 from ptmtools.coverage.options import AchOptions
-from ptmtools.pipeline import BuildOptions, build_scene
+from ptmtools.pipeline import build_scene
 from ptmtools.scene.model import SourceImage
 from ptmtools.texture import EncodeOptions
 from ptmtools.tradeoff.experiment import Setting
@@ -32,7 +32,7 @@ LITTLE = ("--cells-tried", "2", "--reference", "64")
 @pytest.fixture(scope="module")
 def db(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("trade") / "rooms.db"
-    build_scene(TWO_ROOMS, path, BuildOptions(ach=AchOptions(preset="fast", backend="embree")))
+    build_scene(TWO_ROOMS, path, AchOptions(preset="fast", backend="embree"))
     return path
 
 
@@ -83,7 +83,7 @@ def no_constant(name: str) -> None:
 def test_cells_without_usable_points_give_json_and_rates(tmp_path, capsys) -> None:
     """Nothing in the rooms keeps a megametre from all surfaces: one point stands for each."""
     path = tmp_path / "tight.db"
-    build_scene(TWO_ROOMS, path, BuildOptions(ach=AchOptions(backend="embree", clearance=1e6)))
+    build_scene(TWO_ROOMS, path, AchOptions(backend="embree", clearance=1e6))
     assert main(["tradeoff", str(path), "--stage", "ach", *LITTLE, "--json"]) == 0
     (trade,) = json.loads(capsys.readouterr().out, parse_constant=no_constant)
     assert trade["reference_error"] == 0

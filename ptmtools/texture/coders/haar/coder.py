@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ptmtools.texture.coders.damage import damaged
 from ptmtools.texture.coders.haar import layout
-from ptmtools.texture.coders.haar.fitting.weights import fit_weights
+from ptmtools.texture.coders.haar.weights import fit_weights
 from ptmtools.texture.coders.rans import tables
 from ptmtools.texture.coders.rans.stream import encode_symbols, read_stream
 

@@ -17,13 +17,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ptmtools.compiled import plain_kernel as kernel
-from ptmtools.texture.coders.haar.blocks.kernels import (
+from ptmtools.texture.coders.haar.blocks import (
     read_differences,
     rebuild,
     rebuild_ranked,
     write_row,
 )
-from ptmtools.texture.coders.haar.contexts.kernels import (
+from ptmtools.texture.coders.haar.contexts import (
     context_g,
     context_h,
     context_v,

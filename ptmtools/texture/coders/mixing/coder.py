@@ -80,7 +80,7 @@ def _even(
     coder: NDArray[np.int64],
     buffer: NDArray[np.uint8],
 ) -> Level:
-    from ptmtools.texture.coders.mixing.even.kernels import code_even
+    from ptmtools.texture.coders.mixing.even import code_even
 
     height, width, components = shape
     order = list(range(components))
@@ -95,7 +95,7 @@ def _even(
 
 @cache
 def _ways() -> NDArray[np.int64]:
-    """See `even.kernels.code_even`."""
+    """See `even.code_even`."""
     ways = np.zeros((4, 772), np.int64)
     sums = np.ones(1, np.int64)
     for left in range(4):

@@ -6,7 +6,7 @@ turned into binary decisions. One pass serves both directions, so that encoder a
 disagree about a prediction. See `coder` for the planes and the order of strips, and
 ``docs/profile-small.md`` for the format.
 
-Everything here is in integers; see `squares.kernels` for the one part that is not.
+Everything here is in integers; see `squares` for the one part that is not.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from ptmtools.compiled import inlined_kernel, plain_kernel, prefetch
 from ptmtools.texture.coders.mixing import tables
-from ptmtools.texture.coders.mixing.decisions.kernels import (
+from ptmtools.texture.coders.mixing.decisions import (
     CONFIRMED,
     COUNTERS,
     EXPECTED,
@@ -40,7 +40,7 @@ from ptmtools.texture.coders.mixing.decisions.kernels import (
     look_up,
     open_slots,
 )
-from ptmtools.texture.coders.mixing.squares.kernels import (
+from ptmtools.texture.coders.mixing.squares import (
     FEATURES,
     TARGET,
     WEIGHT_BITS,
@@ -125,13 +125,13 @@ class Place(NamedTuple):
 class State(NamedTuple):
     """What a plane has learned, level after level; arrays are changed in place."""
 
-    normal: Any  # (5, 24, 24) float64: see squares.kernels
+    normal: Any  # (5, 24, 24) float64: see squares
     pending: Any  # (5, 16, 25) int32
     weights: Any  # (5, 24) int32
     seen: Any  # (5, 2) int64
     bias: Any  # (5 * 729,) int32: mean residual by context, 16 fractional bits
     scale: Any  # (5 * 24 * 12, 2) int32: mean magnitude by context, 16 fractional bits; count
-    mix: Any  # (rows, 16) int32: weights of the mixer, see decisions.kernels
+    mix: Any  # (rows, 16) int32: weights of the mixer, see decisions
     chances: Any  # (n,) int32
     flat: Any  # (432,) uint32: counters of flat blocks
 

@@ -33,9 +33,9 @@ def fresh_memory(planes: int) -> Memory:
 
 
 def _fresh_state() -> State:
-    from ptmtools.texture.coders.mixing.decisions import kernels as decisions
+    from ptmtools.texture.coders.mixing import decisions
     from ptmtools.texture.coders.mixing.kernels import POSITIONS, SECOND, State
-    from ptmtools.texture.coders.mixing.squares.kernels import BATCH, FEATURES, SAMPLE
+    from ptmtools.texture.coders.mixing.squares import BATCH, FEATURES, SAMPLE
 
     # A context's level of magnitude is that of a sum of nine residuals: its lowest, and a bit more.
     lowest = np.searchsorted(tables.magnitude(), np.arange(tables.MAGNITUDES))
@@ -61,9 +61,9 @@ def _fresh_state() -> State:
 
 def level_tables(texels: int) -> Tables:
     """What is learned of one plane of a level of so many ``texels``, and forgotten behind it."""
-    from ptmtools.texture.coders.mixing.decisions import kernels as decisions
+    from ptmtools.texture.coders.mixing import decisions
     from ptmtools.texture.coders.mixing.kernels import Tables
-    from ptmtools.texture.coders.mixing.squares.kernels import FEATURES
+    from ptmtools.texture.coders.mixing.squares import FEATURES
 
     slots, values = table_bits(texels)
     return Tables(

@@ -30,7 +30,7 @@ UNUSED = 0
 SENT = 255
 #: The first kind is told as the change from this one.
 _FIRST_KIND = 4
-#: What `kernels.read_tables` finds wrong.
+#: What `frequencies.read_tables` finds wrong.
 _ERRORS = {
     1: "its tables are cut short or hold a number above 4095",
     2: "a table is of an unknown kind",
@@ -42,11 +42,11 @@ Frequencies = NDArray[np.int64]
 
 
 def normalise(counts: NDArray[np.int64]) -> Frequencies:
-    """Frequencies (t, 256) of the rows of ``counts`` (t, 256): see `kernels.normalise`."""
-    from ptmtools.texture.coders.rans.frequencies import kernels
+    """Frequencies (t, 256) of the rows of ``counts`` (t, 256): see `frequencies.normalise`."""
+    from ptmtools.texture.coders.rans import frequencies
 
     frequency = np.zeros_like(counts)
-    kernels.normalise(counts, frequency, np.empty(256, np.int64))
+    frequencies.normalise(counts, frequency, np.empty(256, np.int64))
     return frequency
 
 
@@ -114,20 +114,20 @@ def choose(
     Tables from number ``plain`` on have no escape: one that is built in is used only where it holds
     every symbol that occurs. ``family``: other tables in place of `built_in`, an empty one first.
     """
-    from ptmtools.texture.coders.rans.frequencies import kernels
+    from ptmtools.texture.coders.rans import frequencies
 
     lengths = _built_in_lengths() if family is None else _lengths(family)
     family = built_in() if family is None else family
     exact = normalise(counts)
     kinds = np.zeros(len(counts), np.int64)
-    kernels.choose_kinds(
+    frequencies.choose_kinds(
         counts, exact, family, lengths, _log_table(), plain, SENT, kinds, np.empty(256, np.int64)
     )
     frequency = exact.copy()
     named = (kinds != UNUSED) & (kinds != SENT)
     frequency[named] = family[kinds[named]]
     packed = np.zeros(_most_bytes(len(kinds), int(np.count_nonzero(kinds == SENT))), np.uint8)
-    size = kernels.write_tables(kinds, _FIRST_KIND, SENT, exact, packed)
+    size = frequencies.write_tables(kinds, _FIRST_KIND, SENT, exact, packed)
     return frequency, size.to_bytes(2, "little") + packed[:size].tobytes()
 
 
@@ -162,12 +162,14 @@ def parse_version_1(data: bytes | memoryview, tables: int) -> tuple[Frequencies,
 def _read(
     packed: bytes | memoryview, named: bool, kinds: NDArray[np.int64], family: Frequencies
 ) -> Frequencies:
-    from ptmtools.texture.coders.rans.frequencies import kernels
+    from ptmtools.texture.coders.rans import frequencies
 
     frequency = np.zeros((len(kinds), 256), np.int64)
     numbers = np.frombuffer(packed, np.uint8).copy()
     state = np.zeros(2, np.int64)
-    error = kernels.read_tables(numbers, named, kinds, _FIRST_KIND, SENT, family, frequency, state)
+    error = frequencies.read_tables(
+        numbers, named, kinds, _FIRST_KIND, SENT, family, frequency, state
+    )
     if error:
         raise damaged(_ERRORS[error])
     return frequency
@@ -178,22 +180,22 @@ def row_tables(frequency: Frequencies) -> tuple[NDArray[np.uint32], NDArray[np.i
     use, one after the other, and where each table (t,) begins. Those not in use share one of zeros,
     which only a damaged stream asks for.
     """
-    from ptmtools.texture.coders.rans.frequencies import kernels
+    from ptmtools.texture.coders.rans import frequencies
 
     used = frequency.any(axis=1)
     begins = np.where(used, np.cumsum(used) * TABLE_SIZE, 0)
     table = np.empty((1 + int(used.sum())) * TABLE_SIZE, np.uint32)
     table[:TABLE_SIZE] = 0
-    kernels.fill_row_tables(frequency, begins, table)
+    frequencies.fill_row_tables(frequency, begins, table)
     return table, begins
 
 
 def single_tables(frequency: Frequencies) -> NDArray[np.uint32]:
     """For `kernels.decode_single`: a third of the size; zeros where not in use."""
-    from ptmtools.texture.coders.rans.frequencies import kernels
+    from ptmtools.texture.coders.rans import frequencies
     from ptmtools.texture.coders.rans.kernels import SINGLE_SIZE
 
     table = np.zeros((len(frequency), SINGLE_SIZE), np.uint32)
     slots = table[:, : TABLE_SIZE // 4].view(np.uint8)
-    kernels.fill_single_tables(frequency, slots, table[:, TABLE_SIZE // 4 :])
+    frequencies.fill_single_tables(frequency, slots, table[:, TABLE_SIZE // 4 :])
     return table.reshape(-1)

@@ -44,7 +44,7 @@ class Symbols:
     @property
     def hits(self) -> int:
         """Blocks that were the first guess."""
-        from ptmtools.texture.coders.repeats.symbols.kernels import FIRST, GUESS
+        from ptmtools.texture.coders.repeats.symbols import FIRST, GUESS
 
         return int(self.counts[FIRST:GUESS, 0].sum())
 
@@ -52,7 +52,7 @@ class Symbols:
     def new(self) -> int:
         """Texels that were not among the guesses, of the first three of each block."""
         from ptmtools.texture.coders.repeats.kernels import DIFFERENCES
-        from ptmtools.texture.coders.repeats.symbols.kernels import GUESS, TEXEL
+        from ptmtools.texture.coders.repeats.symbols import GUESS, TEXEL
 
         blocks = self.counts[GUESS:TEXEL, DIFFERENCES].sum()
         texels = self.counts[TEXEL : TEXEL + 36, 5].sum()
@@ -63,7 +63,7 @@ def find(level: Bytes, below: Bytes) -> Symbols:
     """The symbols that refine ``below`` (h >> 1, w >> 1, c) to ``level`` (h, w, c)."""
     from ptmtools.texture.coders.rans.kernels import split_numbers
     from ptmtools.texture.coders.repeats import kernels
-    from ptmtools.texture.coders.repeats.symbols.kernels import TABLES
+    from ptmtools.texture.coders.repeats.symbols import TABLES
 
     blocks = below.shape[0] * below.shape[1]
     edge = level.shape[0] * level.shape[1] - 4 * blocks
@@ -89,7 +89,7 @@ def write(found: Symbols) -> bytes:
 def decode(data: bytes, below: Bytes, shape: tuple[int, int, int]) -> Bytes:
     """The inverse of `find` and `write`. Raises InputError PTM-I112 for what no encoder writes."""
     from ptmtools.texture.coders.repeats import kernels
-    from ptmtools.texture.coders.repeats.symbols.kernels import TABLES
+    from ptmtools.texture.coders.repeats.symbols import TABLES
 
     frequency, used = tables.parse(data, TABLES)
     stream = read_stream(memoryview(data)[used:], kernels.MOST_SYMBOLS)

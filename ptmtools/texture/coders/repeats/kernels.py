@@ -23,7 +23,7 @@ import numpy as np
 
 from ptmtools.compiled import plain_kernel as kernel
 from ptmtools.texture.coders.rans.kernels import STATE_LOW
-from ptmtools.texture.coders.repeats.seen.kernels import (
+from ptmtools.texture.coders.repeats.seen import (
     K0,
     K1,
     K2,
@@ -40,7 +40,7 @@ from ptmtools.texture.coders.repeats.seen.kernels import (
     slot,
     spread,
 )
-from ptmtools.texture.coders.repeats.symbols.kernels import (
+from ptmtools.texture.coders.repeats.symbols import (
     ESCAPES_END,
     FIRST,
     GUESS,
@@ -51,7 +51,7 @@ from ptmtools.texture.coders.repeats.symbols.kernels import (
     WORD,
     symbol,
 )
-from ptmtools.texture.coders.repeats.unseen.kernels import (
+from ptmtools.texture.coders.repeats.unseen import (
     differences,
     edge_samples,
     remainders,

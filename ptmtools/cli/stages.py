@@ -1,0 +1,228 @@
+"""The commands that build a database: `build-scene` runs all stages, and each has its own."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import sys
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ptmtools.cli.common import (
+    as_json,
+    database,
+    forced,
+    many_machines,
+    new_database,
+    voiced,
+    workers,
+)
+from ptmtools.cli.output import Voice
+from ptmtools.cli.parameters import options_of, take
+from ptmtools.lazy import Lazy
+from ptmtools.pipeline.build import build_scene as build
+from ptmtools.pipeline.build import run_stage
+from ptmtools.pipeline.changes import NEVER_RUN
+from ptmtools.pipeline.report import BuildReport, StageReport
+from ptmtools.pipeline.run import Artifacts
+from ptmtools.pipeline.stage import Stage
+from ptmtools.pipeline.stages import EMIT, PVS, STAGES
+from ptmtools.quantities import size
+from ptmtools.store.folder import DatabaseFolder
+
+#: Notes that are shown without ``-v``.
+SHOWN_NOTES = 12
+
+#: What ``ptm STAGE DB --report`` prints besides: what that is, and a function of the artifacts that
+#: returns it as a document and as lines.
+REPORTS: dict[Stage[Any], tuple[str, Lazy[Callable[..., tuple[Any, list[str]]]]]] = {
+    PVS: (
+        "Describe the sets: how large they are, the most expensive portals, and openings that show "
+        "suspiciously much.",
+        Lazy("ptmtools.cli.visibility:visibility_report"),
+    )
+}
+
+model_argument = click.argument("model", type=click.Path())
+
+
+@click.command("build-scene")
+@model_argument
+@new_database
+@options_of(*(stage.options for stage in STAGES.values()))
+@many_machines
+@forced
+@click.option("--dry-run", is_flag=True, help="Say what would be done, and why; write nothing.")
+@as_json
+@voiced
+def build_scene(
+    voice: Voice,
+    model: str,
+    db: str,
+    as_json: bool,
+    dry_run: bool,
+    workers: int,
+    scheduler: str | None,
+    force: bool,
+    **values: Any,
+) -> None:
+    """Build a database from MODEL, or bring it up to date.
+
+    MODEL is an OBJ, glTF or GLB file, or one of the formats that pymeshlab reads. The database is
+    a folder: museum.db beside museum.obj, or what -o names. Only what changed since the last build
+    is computed again.
+    """
+    options: list[Any] = [take(stage.options, values) for stage in STAGES.values()]
+    if dry_run:
+        from ptmtools.cli.status import print_plan
+        from ptmtools.pipeline.plan import plan_build
+
+        print_plan(voice, plan_build(model, db, *options, force=force), as_json)
+        return
+    with voice.progress() as progress:
+        report = build(
+            model,
+            db,
+            *options,
+            workers=workers,
+            scheduler=scheduler,
+            force=force,
+            progress=progress,
+        )
+    print_report(voice, report, as_json)
+
+
+def stage_command(stage: Stage[Any]) -> click.Command:
+    """The command of a stage."""
+    command = _from_model(stage) if stage.from_model else _of_database(stage)
+    return click.command(stage.name, help=stage.about)(command)
+
+
+def _from_model(last: Stage[Any]) -> Callable[..., None]:
+    """The first stages of a database, up to one that is cut out of the model."""
+    stages = list(STAGES.values())
+    stages = stages[: stages.index(last) + 1]
+
+    @model_argument
+    @new_database
+    @options_of(*(stage.options for stage in stages))
+    @workers
+    @forced
+    @as_json
+    @voiced
+    def command(
+        voice: Voice,
+        model: str,
+        db: str,
+        as_json: bool,
+        force: bool,
+        workers: int,
+        **values: Any,
+    ) -> None:
+        options: list[Any] = [take(stage.options, values) for stage in stages]
+        with voice.progress() as progress:
+            report = build(
+                model, db, *options, until=last, workers=workers, force=force, progress=progress
+            )
+        print_report(voice, report, as_json)
+
+    return command
+
+
+def _of_database(stage: Stage[Any]) -> Callable[..., None]:
+    @database
+    @options_of(stage.options)
+    @many_machines
+    @as_json
+    @voiced
+    def command(
+        voice: Voice,
+        db: str,
+        as_json: bool,
+        workers: int,
+        scheduler: str | None,
+        wanted: bool = False,
+        **values: Any,
+    ) -> None:
+        with voice.progress() as progress:
+            report = run_stage(
+                db,
+                take(stage.options, values),
+                workers=workers,
+                scheduler=scheduler,
+                progress=progress,
+            )
+        if not wanted:
+            print_report(voice, report, as_json)
+            return
+        document, lines = REPORTS[stage][1].load()(
+            Artifacts(DatabaseFolder.open(db)), voice.verbose
+        )
+        if as_json:
+            voice.emit_json(document)
+            return
+        print_report(voice, report, as_json)
+        for line in lines:
+            voice.say(line)
+
+    if stage in REPORTS:
+        return click.option("--report", "wanted", is_flag=True, help=REPORTS[stage][0])(command)
+    return command
+
+
+def print_report(voice: Voice, report: BuildReport, as_json: bool) -> None:
+    """Says what a run has done."""
+    if as_json:
+        voice.emit_json(asdict(report))
+        return
+    for stage in report.stages:
+        done = f"{stage.seconds:7.1f} s" if stage.ran else "unchanged"
+        summary = STAGES[stage.stage].summarize(stage.counts)
+        voice.say(f"{stage.stage:<9}{done:>10}   {summary}{_tasks(stage)}")
+        if voice.verbose or stage.reasons != NEVER_RUN:
+            for reason in stage.reasons:
+                voice.say(f"{'':<22}because {reason}")
+    memory = f", at most {size(report.peak_memory)} of memory" if report.peak_memory else ""
+    voice.say(f"{'all':<9}{report.seconds:>8.1f} s{memory}")
+    shown = report.notes if voice.verbose else report.notes[:SHOWN_NOTES]
+    for note in shown:
+        voice.say(f"note: {note}")
+    if len(shown) < len(report.notes):
+        voice.say(f"note: {len(report.notes) - len(shown):,} more; -v shows them all")
+    if any(stage.stage == EMIT.name for stage in report.stages):
+        ptm, db = _invoked(), shlex.quote(report.database)
+        voice.say("")
+        voice.say(f"The database is {db}. Next:")
+        for command, purpose in (
+            (f"{ptm} plot {db} -o plan.png", "its floor plan"),
+            (f"{ptm} validate {db}", "check every file"),
+            (f"python3 -m http.server -d {db}/www", "serve it; start at root.wrl"),
+        ):
+            voice.say(f"  {command:<50} {purpose}")
+
+
+def _tasks(stage: StageReport) -> str:
+    """How many tasks of a stage had been done before, if it ran for the rest."""
+    if not stage.ran or stage.tasks is None:
+        return ""
+    total, kept, resumed = stage.tasks
+    if not kept and not resumed:
+        return ""
+    taken = f", {resumed:,} by the run that was interrupted" if resumed else ""
+    return f"; {total - kept - resumed:,} encoded, {kept:,} as they were{taken}"
+
+
+def _invoked() -> str:
+    """How the user calls this command: by its name, or by a path where it is not on PATH."""
+    called = sys.argv[0]
+    found = shutil.which("ptm")
+    if Path(called).name != "ptm" or (
+        found and os.path.realpath(found) == os.path.realpath(called)
+    ):
+        return "ptm"
+    return shlex.quote(called)

@@ -1,0 +1,65 @@
+"""One image as a task: the bytes of a `.ptm`, and of its fallback image."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ptmtools.errors import naming
+from ptmtools.pipeline.options import TextureOptions
+
+if TYPE_CHECKING:
+    from ptmtools.texture.model import PtmHeader
+
+PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
+
+
+def encoded_image(options: TextureOptions, image: tuple[str, bytes]) -> list[bytes]:
+    """An image, (name, bytes of its file), as the bytes of a `.ptm` and, if there is to be one, of
+    its fallback image.
+
+    Raises what `encode` and `read_image` raise.
+    """
+    from ptmtools.texture import Limits, decode, encode, read_header, read_image
+    from ptmtools.texture.images import png_bytes
+
+    name, source = image
+    with naming(name):
+        texels = read_image(source, Limits(options.limit << 20))
+        data = encode(texels, options)
+    if not options.fallback:
+        return [data]
+    header = read_header(data)
+    level = fallback_level(header, options.fallback_size)
+    if level < len(header.levels) - 1 or options.max_error or header.trimmed:
+        # Decoding takes more than the image, which is within the limit.
+        png = png_bytes(decode(data, level=level, limits=Limits(64 * texels.nbytes + (1 << 20))))
+    elif source.startswith(PNG_MAGIC):
+        png = bare_png(source)
+    else:
+        png = png_bytes(texels)
+    return [data, png]
+
+
+def fallback_level(header: PtmHeader, size: int) -> int:
+    """The level that a fallback image of this size holds, see `TextureOptions`."""
+    sides = [max(level.width, level.height) for level in header.levels]
+    fitting = [n for n, side in enumerate(sides) if side <= size or not size]
+    return fitting[-1] if fitting else 0
+
+
+def bare_png(data: bytes) -> bytes:
+    """An intact PNG reduced to what makes its texels: no gamma, colour profile, text or date.
+
+    Deflating a megatexel again takes half a second, three times as long as encoding it, and gives
+    other bytes with another zlib.
+    """
+    kept, at = [data[: len(PNG_MAGIC)]], len(PNG_MAGIC)
+    while at < len(data):
+        end = at + 12 + int.from_bytes(data[at : at + 4], "big")
+        kind = data[at + 4 : at + 8]
+        if kind in (b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"):
+            kept.append(data[at:end])
+        if kind == b"IEND":
+            break
+        at = end
+    return b"".join(kept)

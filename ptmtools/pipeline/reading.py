@@ -1,0 +1,171 @@
+"""The stage `scene`: a model becomes arrays, a list of its images, and a copy of each.
+
+The list is an artifact of its own beside the arrays, so that a texture that is painted over touches
+neither the cells nor what follows from them. If nothing but the contents of plain images (see
+`SourceImage`) has changed, the model itself is not read again: nothing else could come of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ptmtools.errors import DatabaseError, naming
+from ptmtools.pipeline.images import image_rows_of, images_of, keep_images
+from ptmtools.pipeline.run import Artifacts, Job, Made
+from ptmtools.pipeline.stages.scene import SCENE
+from ptmtools.store.digests import Digests
+from ptmtools.store.layout import IMAGE_LIST, IMAGES, sha256
+from ptmtools.store.manifest import StageRecord
+from ptmtools.store.transaction import Transaction
+
+if TYPE_CHECKING:
+    from ptmtools.scene.model import Note, SourceImage
+
+
+def inputs_of(artifacts: Artifacts) -> dict[str, str]:
+    """See `Stage.inputs`; as far as can be known without reading the model: the files that it was
+    made of before."""
+    assert artifacts.model
+    before = artifacts.before(SCENE)
+    names = before.inputs if before else ()
+    return files_of(artifacts.model, names, artifacts.db.digests)
+
+
+def files_of(model: Path, names: Iterable[str], digests: Digests) -> dict[str, str]:
+    """Name → SHA-256 of the files that a model consists of, "" where there is none."""
+    found = {}
+    for name in dict.fromkeys((model.name, *names)):
+        file = model.parent / name
+        try:
+            found[name] = digests.of(file) if file.is_file() else ""
+        except OSError:
+            found[name] = ""
+    return found
+
+
+def repainted(
+    before: StageRecord, work: StageRecord, rows: Sequence[Mapping[str, Any]]
+) -> dict[int, str] | None:
+    """Which rows of the list of images have other contents, and the names of their files, if the
+    contents of plain images are all that has changed; else None."""
+    same = (before.recipe, before.parameters, set(before.inputs)) == (
+        work.recipe,
+        work.parameters,
+        set(work.inputs),
+    )
+    if not same:
+        return None
+    row_of = {row["files"][0]: i for i, row in enumerate(rows) if len(row["files"]) == 1}
+    changed = [name for name, digest in work.inputs.items() if before.inputs[name] != digest]
+    for name in changed:
+        row = rows[row_of[name]] if name in row_of else None
+        if row is None or not row["plain"] or row["sha256"] != before.inputs[name]:
+            return None
+    found = {row_of[name]: name for name in changed}
+    digests = {work.inputs[found[i]] if i in found else row["sha256"] for i, row in enumerate(rows)}
+    return found if len(digests) == len(rows) else None
+
+
+def foresee(artifacts: Artifacts, work: StageRecord) -> bool:
+    """See `Stage.foresee`: known if plain images alone have been painted over. ``artifacts`` then
+    hold the list of images as it will be."""
+    before = artifacts.before(SCENE)
+    try:
+        rows = image_rows_of(artifacts)
+    except DatabaseError:
+        return False
+    changed = repainted(before, work, rows) if before else None
+    if changed is None:
+        return False
+    new = {i: work.inputs[name] for i, name in changed.items()}
+    rows = [{**row, "sha256": new.get(i, row["sha256"])} for i, row in enumerate(rows)]
+    artifacts.hold(IMAGE_LIST, rows)
+    return True
+
+
+class ReadingJob(Job):
+    """Reads the model of the run."""
+
+    @property
+    def _model(self) -> Path:
+        assert self.run.model
+        return self.run.model
+
+    def make(self, transaction: Transaction) -> Made:
+        """Raises what `ingest` and `check_image` raise."""
+        before = self.run.before(SCENE)
+        return (before and self._repainted(transaction, before)) or self._read(transaction)
+
+    def _read(self, transaction: Transaction) -> Made:
+        from ptmtools.scene import ingest
+
+        run = self.run
+        scene = ingest(self._model, self.options, run.progress, workers=run.workers.here)
+        run.keep(SCENE, scene)
+        transaction.put_arrays(SCENE.name, scene.to_arrays())
+        self._put_images(transaction, scene.images, scene.images)
+        assert SCENE.counts
+        return Made(
+            transaction.pending(),
+            SCENE.counts(scene),
+            tuple(_line(note) for note in scene.notes),
+            files_of(self._model, scene.files, run.db.digests),
+        )
+
+    def _repainted(self, transaction: Transaction, before: StageRecord) -> Made | None:
+        """The scene, if nothing but plain images has changed; None if more has."""
+        from ptmtools.scene.images import is_plain
+        from ptmtools.scene.model import SourceImage
+        from ptmtools.scene.source import FileRange, HeldBytes
+
+        work, _ = self.planned()
+        try:
+            rows = image_rows_of(self.run)
+        except DatabaseError:
+            return None
+        changed = repainted(before, work, rows)
+        if changed is None:
+            return None
+        fresh: dict[int, SourceImage] = {}
+        for i, name in changed.items():
+            try:
+                data = FileRange(self._model.parent / name)()
+            except OSError:
+                return None
+            limit = self.options.limit << 20
+            if sha256(data) != work.inputs[name] or not is_plain(data, rows[i]["name"], limit):
+                return None
+            held = HeldBytes(data)
+            fresh[i] = SourceImage(rows[i]["name"], work.inputs[name], held, (name,), True)
+        old = {f"{IMAGES}/{before.inputs[name]}" for name in changed.values()} | {IMAGE_LIST}
+        kept = {name: digest for name, digest in before.outputs.items() if name not in old}
+        if not transaction.keep(kept):
+            return None
+        images = [fresh.get(i, image) for i, image in enumerate(images_of(self.run))]
+        self._put_images(transaction, images, fresh.values())
+        return Made(transaction.pending(), before.counts, tuple(before.notes))
+
+    def _put_images(
+        self,
+        transaction: Transaction,
+        images: Iterable[SourceImage],
+        fresh: Iterable[SourceImage],
+    ) -> None:
+        """Stages the list of images, and a copy of each that is new and can be decoded."""
+        from ptmtools.texture.images import check_image
+        from ptmtools.texture.model import Limits
+
+        transaction.put(IMAGE_LIST, keep_images(self.run, images))
+        for image in fresh:
+            data = image.load()
+            with naming(image.name):
+                check_image(data, Limits(self.options.limit << 20))
+            transaction.put(f"{IMAGES}/{image.sha256}", data)
+
+
+def _line(note: Note) -> str:
+    where = f"{note.place}: " if note.place else ""
+    times = f" ({note.count:,} times)" if note.count > 1 else ""
+    return f"{where}{note.message}{times} [{note.code}]"

@@ -1,0 +1,27 @@
+"""The table of stages, in the order in which they run. A new stage is a file and a line here."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ptmtools.pipeline.stage import Stage
+from ptmtools.pipeline.stages.ach import ACH
+from ptmtools.pipeline.stages.cells import CELLS
+from ptmtools.pipeline.stages.emit import EMIT
+from ptmtools.pipeline.stages.pvs import PVS
+from ptmtools.pipeline.stages.scene import SCENE
+from ptmtools.pipeline.stages.textures import TEXTURES
+
+__all__ = ["ACH", "CELLS", "EMIT", "PVS", "SCENE", "STAGES", "TEXTURES"]
+
+STAGES: dict[str, Stage[Any]] = {
+    stage.name: stage
+    for stage in (
+        SCENE,
+        CELLS,
+        PVS,
+        ACH,
+        TEXTURES,
+        EMIT,
+    )
+}

@@ -1,0 +1,58 @@
+"""The scene is cut into convex leaves, portals, and the cells that leaves make up (paper §3)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from ptmtools.cells.options import SubdivideOptions
+from ptmtools.lazy import Lazy
+from ptmtools.pipeline.stage import Stage
+from ptmtools.pipeline.stages.scene import SCENE
+from ptmtools.quantities import count
+
+if TYPE_CHECKING:
+    from ptmtools.cells.model import Cells
+    from ptmtools.scene.model import Scene
+
+
+def _counts(cells: Cells) -> Mapping[str, Any]:
+    return {
+        "cells": cells.cell_count,
+        "leaves": cells.leaf_count,
+        "portals": cells.portal_count,
+        "pieces": len(cells.triangle),
+        "closed": cells.closed,
+    }
+
+
+def _notes(cells: Cells, _: SubdivideOptions) -> Iterable[str]:
+    return cells.notes
+
+
+def _summary(n: Mapping[str, Any]) -> str:
+    leaves = f" of {count(n['leaves'], 'leaf', 'leaves')}" if n["leaves"] != n["cells"] else ""
+    state = "closed" if n["closed"] else "open"
+    return f"{count(n['cells'], 'cell')}{leaves}, {count(n['portals'], 'portal')}; {state}"
+
+
+def _fits_scene(cells: Cells, scene: Scene) -> str:
+    strange = (cells.triangle_source >= len(scene.triangles)).any()
+    return "a piece is of no triangle of the scene" if strange else ""
+
+
+CELLS: Stage[Cells] = Stage(
+    name="cells",
+    about="Read a model and cut it into cells and portals.",
+    recipe=1,
+    options=SubdivideOptions,
+    reads=(SCENE,),
+    artifact=Lazy("ptmtools.cells.model:Cells"),
+    compute=Lazy("ptmtools.cells:subdivide"),
+    counts=_counts,
+    notes=_notes,
+    summary=_summary,
+    fits={SCENE: _fits_scene},
+    from_model=True,
+    one_thread=True,
+)

@@ -1,0 +1,34 @@
+"""All that was computed becomes the served files (paper §6)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ptmtools.database.model import EmitOptions
+from ptmtools.lazy import Lazy
+from ptmtools.pipeline.stage import Stage
+from ptmtools.pipeline.stages.ach import ACH
+from ptmtools.pipeline.stages.cells import CELLS
+from ptmtools.pipeline.stages.pvs import PVS
+from ptmtools.pipeline.stages.scene import SCENE
+from ptmtools.pipeline.stages.textures import TEXTURES
+from ptmtools.quantities import count, size
+
+
+def _summary(n: Mapping[str, Any]) -> str:
+    return (
+        f"{count(n['files'], 'file')}, {size(n['bytes'])}; "
+        f"{count(n['triangles'], 'triangle')}, {count(n['viewpoints'], 'viewpoint')}"
+    )
+
+
+EMIT: Stage[None] = Stage(
+    name="emit",
+    about="Write the served files: cells and hints.json.",
+    recipe=4,
+    options=EmitOptions,
+    reads=(SCENE, CELLS, PVS, ACH, TEXTURES),
+    job=Lazy("ptmtools.pipeline.emission:EmissionJob"),
+    summary=_summary,
+)

@@ -1,0 +1,69 @@
+"""Which cells may see each other: potentially visible sets (paper §3)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from ptmtools.lazy import Lazy
+from ptmtools.pipeline.stage import Stage
+from ptmtools.pipeline.stages.cells import CELLS
+from ptmtools.visibility.options import PvsOptions
+
+if TYPE_CHECKING:
+    from ptmtools.cells.model import Cells
+    from ptmtools.visibility.model import Pvs
+
+#: Above this share of cells visible on average, culling by cells does not pay.
+CULLING_GAINS_LITTLE = 0.7
+
+
+def _counts(pvs: Pvs) -> Mapping[str, Any]:
+    return {
+        "average_share": pvs.average_share,
+        "fallbacks": pvs.fallbacks,
+        "ties": int(pvs.ties.sum()),
+        "decided_exactly": int(pvs.decided.sum()),
+        "opened": int(pvs.opened.sum()),
+        "leaks": len(pvs.leak),
+        "conservative": pvs.conservative,
+    }
+
+
+def _notes(pvs: Pvs, _: PvsOptions) -> Iterator[str]:
+    share = pvs.average_share
+    # Of a single cell, the cells stage has said it.
+    if share > CULLING_GAINS_LITTLE and pvs.cell_count > 1:
+        yield (
+            f"culling by visibility gains little here: on average a cell sees {share:.0%} of all "
+            "cells, as in a single hall"
+        )
+    if not pvs.conservative:
+        yield (
+            "these visible sets hold only what random lines happened to show: a client that loads "
+            "by them will show holes (build with `--pvs full` or `--pvs fast` before you publish)"
+        )
+    if pvs.fallbacks:
+        yield (
+            f"the search was cut short at {pvs.fallbacks:,} portals; "
+            "their sets are larger than need be, never smaller"
+        )
+
+
+def _fits_cells(pvs: Pvs, cells: Cells) -> str:
+    return "" if pvs.cell_count == cells.cell_count else "the sets are of other cells"
+
+
+PVS: Stage[Pvs] = Stage(
+    name="pvs",
+    about="Find which cells may see each other.",
+    recipe=1,
+    options=PvsOptions,
+    reads=(CELLS,),
+    artifact=Lazy("ptmtools.visibility.model:Pvs"),
+    compute=Lazy("ptmtools.visibility:compute_pvs"),
+    counts=_counts,
+    notes=_notes,
+    summary=lambda n: f"a cell sees {n['average_share']:.1%} of all cells on average",
+    fits={CELLS: _fits_cells},
+)

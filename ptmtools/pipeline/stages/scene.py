@@ -1,0 +1,56 @@
+"""The model becomes arrays in metres, a list of its images, and a copy of each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from ptmtools.lazy import Lazy
+from ptmtools.pipeline.stage import Stage
+from ptmtools.quantities import count
+from ptmtools.scene.options import IngestOptions
+
+if TYPE_CHECKING:
+    from ptmtools.scene.model import Scene
+
+
+def _counts(scene: Scene) -> Mapping[str, Any]:
+    return {
+        "triangles": len(scene.triangles),
+        "objects": len(scene.objects),
+        "materials": len(scene.materials),
+        "images": len(scene.images),
+        "origin": list(scene.space.origin),
+        "metres": scene.space.metres,
+        "up": scene.space.up,
+        "unit_guessed": scene.space.unit_guessed,
+        "up_guessed": scene.space.up_guessed,
+    }
+
+
+def _summary(n: Mapping[str, Any]) -> str:
+    guessed = [what for what, key in (("unit", "unit"), ("up axis", "up")) if n[f"{key}_guessed"]]
+    how = f" ({' and '.join(guessed)} guessed)" if guessed else ""
+    return (
+        f"{count(n['triangles'], 'triangle')} in {count(n['objects'], 'object')}, "
+        f"{count(n['images'], 'image')}; 1 unit = {n['metres']:g} m, {n['up']} up{how}"
+    )
+
+
+SCENE: Stage[Scene] = Stage(
+    name="scene",
+    about="Read a model.",
+    recipe=2,
+    options=IngestOptions,
+    artifact=Lazy("ptmtools.scene.model:Scene"),
+    counts=_counts,
+    summary=_summary,
+    job=Lazy("ptmtools.pipeline.reading:ReadingJob"),
+    inputs=Lazy("ptmtools.pipeline.reading:inputs_of"),
+    foresee=Lazy("ptmtools.pipeline.reading:foresee"),
+    load=Lazy("ptmtools.pipeline.images:load_scene"),
+    check=Lazy("ptmtools.pipeline.images:missing_images"),
+    from_model=True,
+    hidden=True,
+    joined=True,
+)

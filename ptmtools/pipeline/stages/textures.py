@@ -1,0 +1,31 @@
+"""The images of the scene become progressive textures (paper §4)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ptmtools.lazy import Lazy
+from ptmtools.pipeline.options import TextureOptions
+from ptmtools.pipeline.stage import Stage
+from ptmtools.pipeline.stages.scene import SCENE
+from ptmtools.quantities import count, size
+
+
+def _summary(n: Mapping[str, Any]) -> str:
+    raw, stored = n["raw_bytes"], n["ptm_bytes"]
+    share = f" ({stored / raw:.1%})" if raw else ""
+    return f"{count(n['textures'], 'texture')}, {size(raw)} → {size(stored)}{share}"
+
+
+TEXTURES: Stage[None] = Stage(
+    name="textures",
+    about="Encode the model's images as progressive textures.",
+    recipe=2,
+    options=TextureOptions,
+    reads=(SCENE,),
+    inputs=Lazy("ptmtools.pipeline.textures:inputs_of"),
+    job=Lazy("ptmtools.pipeline.textures:TexturesJob"),
+    tasks=Lazy("ptmtools.pipeline.textures:stale_textures"),
+    summary=_summary,
+)

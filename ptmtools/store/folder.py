@@ -1,0 +1,152 @@
+"""A database on disk, to read: every file is held against its recorded hash."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ptmtools.errors import DatabaseError
+from ptmtools.files import open_regular
+from ptmtools.store.digests import Digests
+from ptmtools.store.layout import MANIFEST, arrays_of, sha256
+from ptmtools.store.manifest import Manifest, StageRecord
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+class DatabaseFolder:
+    """A database on disk.
+
+    Attributes
+    ----------
+    path: the folder.
+    manifest: what it says of itself.
+    digests: of its files, and of those that it is made from.
+    """
+
+    def __init__(self, path: Path, manifest: Manifest) -> None:
+        self.path = path
+        self.manifest = manifest
+        self.digests = Digests(path)
+
+    @staticmethod
+    def open(path: str | os.PathLike[str]) -> DatabaseFolder:
+        """An existing database, to read.
+
+        Raises
+        ------
+        DatabaseError: PTM-D001 no database there; PTM-D002 damaged manifest; PTM-D003 schema of
+            another version.
+        """
+        folder = Path(path)
+        manifest = read_manifest(folder)
+        if manifest is None:
+            raise DatabaseError(
+                "PTM-D001",
+                "not a ptmtools database" if folder.exists() else "there is no such database",
+                file=folder,
+                remedy="make one with `ptm build-scene MODEL -o DB`",
+            )
+        return DatabaseFolder(folder, manifest)
+
+    def record(self, stage: str, needed_for: str = "this") -> StageRecord:
+        """The record of a stage.
+
+        Raises
+        ------
+        DatabaseError: PTM-D004 if the stage has not been run.
+        """
+        record = self.manifest.stages.get(stage)
+        if record is None:
+            raise DatabaseError(
+                "PTM-D004",
+                f"the {stage} stage has not been run, {needed_for} needs it",
+                file=self.path,
+                remedy="run `ptm build-scene MODEL -o DB` first",
+            )
+        return record
+
+    def read(self, name: str, digest: str) -> bytes:
+        """The bytes of a file of the database.
+
+        Raises
+        ------
+        DatabaseError: PTM-D005 if it is missing, PTM-D006 if it is not what was recorded.
+        """
+        file = self.path / name
+        try:
+            with open_regular(file) as stream:
+                data = stream.read()
+        except OSError as fault:
+            raise DatabaseError(
+                "PTM-D005",
+                f"cannot be read ({fault.strerror or fault})",
+                file=file,
+                remedy="run `ptm build-scene` again to rebuild it",
+            ) from fault
+        if sha256(data) != digest:
+            raise DatabaseError(
+                "PTM-D006",
+                "damaged: its SHA-256 is not the recorded one",
+                file=file,
+                remedy="run `ptm build-scene` again to rebuild it",
+            )
+        return data
+
+    def read_output(self, stage: str, name: str, needed_for: str = "this") -> bytes:
+        """The bytes of an output that a stage must have; raises as `output` and `read` do."""
+        return self.read(name, self.output(stage, name, needed_for))
+
+    def output(self, stage: str, name: str, needed_for: str = "this") -> str:
+        """The recorded hash of an output that a stage must have; raises as `record` does, and
+        PTM-D002 if it has no such output."""
+        digest = self.record(stage, needed_for).outputs.get(name)
+        if digest is None:
+            raise DatabaseError(
+                "PTM-D002",
+                f"damaged manifest: the {stage} stage lists no {name}",
+                file=self.path / MANIFEST,
+                remedy="restore it, or build the database again with --force",
+            )
+        return digest
+
+    def read_arrays(self, stage: str, needed_for: str) -> dict[str, NDArray[np.generic]]:
+        """The arrays of a stage; raises as `read_output` does."""
+        from ptmtools.store.archive import unpack_arrays
+
+        name = arrays_of(stage)
+        return unpack_arrays(self.read_output(stage, name, needed_for), file=self.path / name)
+
+    def damaged(self, outputs: Mapping[str, str]) -> str | None:
+        """The first file that is not there with its recorded hash, or None."""
+        for name, digest in outputs.items():
+            try:
+                if self.digests.of(self.path / name) != digest:
+                    return name
+            except OSError:
+                return name
+        return None
+
+
+def read_manifest(folder: Path) -> Manifest | None:
+    """The manifest of a folder, None if there is none.
+
+    Raises
+    ------
+    DatabaseError: as `DatabaseFolder.open`.
+    """
+    file = folder / MANIFEST
+    try:
+        with open_regular(file) as stream:
+            data = stream.read()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as fault:
+        raise DatabaseError(
+            "PTM-D001", f"cannot be read ({fault.strerror or fault})", file=file
+        ) from fault
+    return Manifest.from_bytes(data, file=file)

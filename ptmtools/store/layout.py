@@ -1,0 +1,35 @@
+"""The names of what lies in a database folder.
+
+::
+
+    manifest.json       what the database says of itself, see `manifest`
+    stages/NAME.npz     the arrays of a stage
+    stages/images.json  the list of the model's images
+    stages/images/      a copy of each, under its SHA-256
+    www/                what is served, and nothing else
+    .ptm-new/           outputs on their way in, see `transaction`
+    .ptm-lock           who is writing, see `lock`
+"""
+
+from __future__ import annotations
+
+import hashlib
+
+MANIFEST = "manifest.json"
+SERVED = "www"
+STAGES_FOLDER = "stages"
+#: The folders that stages write in.
+WRITTEN = (STAGES_FOLDER, SERVED)
+IMAGES, IMAGE_LIST = f"{STAGES_FOLDER}/images", f"{STAGES_FOLDER}/images.json"
+STAGING = ".ptm-new"
+LOCK = ".ptm-lock"
+
+
+def arrays_of(stage: str) -> str:
+    """The file of a stage's arrays."""
+    return f"{STAGES_FOLDER}/{stage}.npz"
+
+
+def sha256(data: bytes) -> str:
+    """The hex digest under which a file is recorded."""
+    return hashlib.sha256(data).hexdigest()

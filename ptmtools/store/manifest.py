@@ -1,0 +1,167 @@
+"""What a database says of itself: `manifest.json`, the one file that is written last.
+
+::
+
+    {"format": "ptmtools database", "schema": 2,
+     "model": "museum.obj",                          the file's name, never its folder
+     "stages": {"cells": {
+         "recipe": 1,                                the version of what the stage does
+         "parameters": {"wall_area": 1.0, …},        the options that can change the outputs
+         "inputs":  {"stages/scene.npz": "9f86…"},   name → SHA-256 of what was read
+         "outputs": {"stages/cells.npz": "60b7…"},   path in the database → SHA-256
+         "counts":  {"cells": 52, "portals": 61, …}, figures and choices, for reports
+         "notes":   ["open above: …"]                what it had to say, one line each
+     }, …}}
+
+Stages stand in the order of their names. There is no time and no folder of the machine in it:
+the same model and options give the same manifest anywhere. A stage is current if it would be run
+by the same recipe with the same parameters on the same inputs, and its outputs are all there.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from os import PathLike
+from typing import Any
+
+from ptmtools import schemas
+from ptmtools.errors import DatabaseError
+from ptmtools.store.layout import WRITTEN
+
+FORMAT = "ptmtools database"
+SCHEMA = 2
+
+#: Lists and objects may be nested this deep at most.
+_DEEPEST = 16
+
+
+@dataclass(frozen=True)
+class StageRecord:
+    """What one run of a stage was, see the module's description.
+
+    `inputs` may map to the empty string: a file that was looked for and not found.
+    """
+
+    recipe: int
+    parameters: Mapping[str, Any]
+    inputs: Mapping[str, str]
+    outputs: Mapping[str, str]
+    counts: Mapping[str, Any] = field(default_factory=dict)
+    notes: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """The contents of `manifest.json`."""
+
+    model: str
+    stages: Mapping[str, StageRecord] = field(default_factory=dict)
+
+    def with_stages(self, records: Mapping[str, StageRecord]) -> Manifest:
+        """This manifest with some stages recorded anew."""
+        return Manifest(self.model, {**self.stages, **records})
+
+    def outputs(self) -> dict[str, str]:
+        """Every file of the database with its SHA-256, except the manifest itself."""
+        return {p: h for record in self.stages.values() for p, h in record.outputs.items()}
+
+    def to_bytes(self) -> bytes:
+        """The text of `manifest.json`."""
+        stages = {name: asdict(self.stages[name]) for name in sorted(self.stages)}
+        for record in stages.values():
+            for part in ("inputs", "outputs"):
+                record[part] = dict(sorted(record[part].items()))
+        document = {"format": FORMAT, "schema": SCHEMA, "model": self.model, "stages": stages}
+        return (json.dumps(document, indent=1, ensure_ascii=False) + "\n").encode()
+
+    @staticmethod
+    def from_bytes(data: bytes, *, file: str | PathLike[str]) -> Manifest:
+        """Inverse of `to_bytes`; ``file`` is named in the errors.
+
+        Raises
+        ------
+        DatabaseError: PTM-D001 if it is not a manifest of ours, PTM-D002 if it is damaged,
+            PTM-D003 if another version of ptmtools wrote it.
+        """
+        try:
+            document = json.loads(data)
+        except (ValueError, RecursionError) as fault:
+            raise _damaged(file, f"not JSON ({fault})") from fault
+        if _nested(document):
+            raise _damaged(file, f"nested more than {_DEEPEST} deep")
+        if not isinstance(document, dict) or document.get("format") != FORMAT:
+            raise DatabaseError(
+                "PTM-D001", "not a ptmtools database", file=file, remedy="give a database folder"
+            )
+        if document.get("schema") != SCHEMA:
+            raise DatabaseError(
+                "PTM-D003",
+                f"schema version {document.get('schema')!r}, this ptmtools reads {SCHEMA}",
+                file=file,
+                remedy="build the database again, or use the ptmtools that wrote it",
+            )
+        try:
+            schemas.check(document, schemas.MANIFEST)
+        except schemas.ShapeError as fault:
+            raise _damaged(file, str(fault)) from fault
+        names = StageRecord.__dataclass_fields__
+        return Manifest(
+            document["model"],
+            {
+                stage: StageRecord(**{name: entry[name] for name in names})
+                for stage, entry in document["stages"].items()
+            },
+        )
+
+
+def listed_before(data: bytes) -> tuple[str, set[str]] | None:
+    """The model, and the files that are listed, of a manifest of an earlier schema; None if it is
+    no such manifest.
+
+    Of such a database nothing can be used but the knowledge of what is ours in its folder.
+    """
+    try:
+        document = json.loads(data)
+        schema, model = document["schema"], document["model"]
+        earlier = type(schema) is int and 0 < schema < SCHEMA
+        if document["format"] != FORMAT or not earlier or not isinstance(model, str):
+            return None
+        listed = [path for stage in document["stages"].values() for path in stage["outputs"]]
+        return model, {path for path in listed if isinstance(path, str) and _is_output(path)}
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def _nested(document: object) -> bool:
+    """Whether something lies deeper in it than any option or figure does. It would be written a
+    line for each, indented."""
+    level = [document] if isinstance(document, dict | list) else []
+    for _ in range(_DEEPEST):
+        level = [
+            inner
+            for value in level
+            for inner in (value.values() if isinstance(value, dict) else value)
+            if isinstance(inner, dict | list)
+        ]
+        if not level:
+            return False
+    return True
+
+
+def _is_output(path: str) -> bool:
+    """Whether a path is one that stages write to: inside of the database on every system, and
+    nothing that somebody else has put beside it."""
+    parts = path.split("/")
+    inside = "\\" not in path and ":" not in path and "\0" not in path
+    return inside and len(parts) > 1 and parts[0] in WRITTEN and not {"", ".", ".."} & set(parts)
+
+
+def _damaged(file: str | PathLike[str], what: str) -> DatabaseError:
+    return DatabaseError(
+        "PTM-D002",
+        f"damaged manifest: {what}",
+        file=file,
+        remedy="restore it, or build the database again with --force",
+    )

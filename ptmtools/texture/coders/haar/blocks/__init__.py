@@ -1,1 +1,0 @@
-"""Compiled loops between texels and differences."""

@@ -1,1 +1,0 @@
-"""The weights of the Haar coder's predictors: only the encoder needs this."""

@@ -1,1 +1,0 @@
-"""Binary decisions: adaptive probabilities, the mixer, the arithmetic coder."""

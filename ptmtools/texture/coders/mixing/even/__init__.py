@@ -1,1 +1,0 @@
-"""Blocks that could be anything with the right mean."""

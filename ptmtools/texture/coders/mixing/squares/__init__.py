@@ -1,1 +1,0 @@
-"""The predictor: recursive least squares."""

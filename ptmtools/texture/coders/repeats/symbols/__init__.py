@@ -1,1 +1,0 @@
-"""Compiled coding of one symbol."""

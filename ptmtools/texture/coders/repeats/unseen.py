@@ -1,0 +1,182 @@
+"""Blocks and texels that were not seen before: Haar differences, samples, remainders of a sum."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ptmtools.compiled import plain_kernel as kernel
+from ptmtools.texture.coders.repeats.symbols import (
+    CLASSES,
+    EDGE,
+    HAAR,
+    REMAINDER,
+    SAMPLE,
+    STRAY,
+    symbol,
+)
+
+LARGEST_ACTIVITY = 1023
+
+
+@kernel
+def _index(activity: Any) -> Any:
+    return np.uint64(activity if activity < LARGEST_ACTIVITY else LARGEST_ACTIVITY)
+
+
+@kernel
+def samples(
+    encoding: bool, texel: Any, mean: Any, w: Any, n: Any, nw: Any, ne: Any, position: int,
+    order: Any, weights: Any, classes: Any, numbers: Any, words: Any, state: Any,
+) -> Any:  # fmt: skip
+    """p, q or r of a block, sample by sample, each predicted from its surroundings."""
+    out = np.uint64(0)
+    reference = np.int64(0)
+    byte = np.uint64(255)
+    for c in range(order.size):
+        at = np.uint64(8 * order[c])
+        i = np.int64((mean >> at) & byte)
+        fw, fn = np.int64((w >> at) & byte) - i, np.int64((n >> at) & byte) - i
+        fnw, fne = np.int64((nw >> at) & byte) - i, np.int64((ne >> at) & byte) - i
+        guess = i + (
+            (weights[position, 0] * fw + weights[position, 1] * fn + weights[position, 2] * fnw
+             + weights[position, 3] * fne + 32) >> 6
+        )  # fmt: skip
+        activity = abs(fw - fn) + abs(fn - fne) + abs(fw) + abs(fn)
+        context = SAMPLE
+        if position > 0:
+            context += CLASSES
+        if c > 0 and c < 3 and order.size > 2:
+            guess += reference
+            activity = (activity >> 2) + 4 * abs(reference)
+            context += 2 * CLASSES
+        guess = min(max(guess, 0), 255)
+        level = np.int64(classes[_index(activity)])
+        e = ((np.int64((texel >> at) & byte) - guess + 128) & 255) - 128
+        z = symbol(encoding, (e << 1) ^ (e >> 63), context + level, numbers, words, state)
+        value = (guess + ((z >> 1) ^ -(z & 1))) & 255
+        if c == 0:
+            reference = value - guess
+        elif c == 1:
+            reference += (value - guess) >> 1
+        out |= np.uint64(value) << at
+    return out
+
+
+@kernel
+def remainders(
+    encoding: bool, s: Any, mean: Any, p: Any, q: Any, r: Any, order: Any, numbers: Any,
+    words: Any, state: Any,
+) -> Any:  # fmt: skip
+    """s of a block by the remainder of the sum in each component."""
+    out = np.uint64(0)
+    byte = np.uint64(255)
+    for c in range(order.size):
+        at = np.uint64(8 * order[c])
+        a, b = np.int64((q >> at) & byte), np.int64((r >> at) & byte)
+        corner = np.int64((p >> at) & byte)
+        base = 4 * np.int64((mean >> at) & byte) - a - b - corner
+        guess: Any = max(min(a, b), min(max(a, b), a + b - corner)) - base
+        kind = 0 if guess < 0 else 1 if guess < 4 else 2
+        guess = min(max(guess, 0), 3)
+        value = np.int64((s >> at) & byte) - base
+        z = symbol(encoding, (value - guess) & 3, REMAINDER + kind, numbers, words, state)
+        value = base + ((z + guess) & 3)
+        if value < 0 or value > 255:
+            state[STRAY] = 1
+        out |= np.uint64(value & 255) << at
+    return out
+
+
+@kernel
+def differences(
+    encoding: bool, block: Any, mean: Any, around: Any, errors: Any, order: Any, classes: Any,
+    numbers: Any, words: Any, state: Any,
+) -> None:  # fmt: skip
+    """The four texels of ``block`` by their Haar differences, component by component.
+
+    around: w0, w1, n0, n1 and the means to the east, south, south-west and south-east.
+    """
+    byte = np.uint64(255)
+    out0, out1, out2, out3 = np.uint64(0), np.uint64(0), np.uint64(0), np.uint64(0)
+    for c in range(order.size):
+        at = np.uint64(8 * order[c])
+        i = np.int64((mean >> at) & byte)
+        w0, w1 = np.int64((around[0] >> at) & byte), np.int64((around[1] >> at) & byte)
+        n0, n1 = np.int64((around[2] >> at) & byte), np.int64((around[3] >> at) & byte)
+        east, south = np.int64((around[4] >> at) & byte), np.int64((around[5] >> at) & byte)
+        tilt = np.int64((around[7] >> at) & byte) - np.int64((around[6] >> at) & byte)
+        p, q = np.int64((block[0] >> at) & byte), np.int64((block[1] >> at) & byte)
+        r, s = np.int64((block[2] >> at) & byte), np.int64((block[3] >> at) & byte)
+        referring = c > 0 and c < 3 and order.size > 2
+        if not referring:
+            errors[0] = errors[1] = errors[2] = 0
+        north, west = n0 + n1 - 2 * i, w0 + w1 - 2 * i
+        across, down = n0 - n1, w0 - w1
+        east -= i
+        south -= i
+        calm = abs(north) + abs(west) + abs(across) + abs(down)
+
+        v, h, g = np.int64(0), np.int64(0), np.int64(0)
+        for kind in range(3):
+            if kind == 0:
+                value, reference, activity = p + q - r - s, errors[0], calm + abs(south)
+                guess = 88 * north - 50 * south + 176 * down + 220 * reference
+            elif kind == 1:
+                value, reference, activity = p - q, errors[1], calm + abs(east)
+                guess = 46 * west - 22 * east + 93 * across + 240 * reference
+            else:
+                value, reference, activity = (r - s) >> 1, errors[2], calm + abs(tilt)
+                guess = 20 * west - 8 * east - 2 * tilt + 47 * h + 235 * reference
+            guess = np.int64((guess + 128) >> 8)
+            context: Any = HAAR + kind * CLASSES
+            if referring:
+                context += 3 * CLASSES
+                activity = (activity >> 2) + 3 * abs(reference)
+            e = value - guess
+            context += np.int64(classes[_index(activity)])
+            z = symbol(encoding, (e << 1) ^ (e >> 63), context, numbers, words, state)
+            e = (z >> 1) ^ -(z & 1)
+            if kind == 0:
+                v = guess + e
+            elif kind == 1:
+                h = guess + e
+            else:
+                g = guess + e
+            if c == 0:
+                errors[kind] = e
+
+        half = (v + (v & 1)) >> 1
+        top = 2 * i + ((h ^ half) & 1) + half
+        bottom = top - v
+        p = (top + h) >> 1
+        q = p - h
+        d = 2 * g + (bottom & 1)
+        r = (bottom + d) >> 1
+        s = r - d
+        if (p | q | r | s) & ~255:
+            state[STRAY] = 1
+        out0 |= np.uint64(p & 255) << at
+        out1 |= np.uint64(q & 255) << at
+        out2 |= np.uint64(r & 255) << at
+        out3 |= np.uint64(s & 255) << at
+    block[0], block[1], block[2], block[3] = out0, out1, out2, out3
+
+
+@kernel
+def edge_samples(
+    encoding: bool, texel: Any, w: Any, n: Any, nw: Any, components: int, numbers: Any, words: Any,
+    state: Any,
+) -> Any:  # fmt: skip
+    """A texel that belongs to no block, sample by sample, less the median of W, N, W + N - NW."""
+    out = np.uint64(0)
+    byte = np.uint64(255)
+    for c in range(components):
+        at = np.uint64(8 * c)
+        a, b = np.int64((w >> at) & byte), np.int64((n >> at) & byte)
+        guess = max(min(a, b), min(max(a, b), a + b - np.int64((nw >> at) & byte)))
+        e = ((np.int64((texel >> at) & byte) - guess + 128) & 255) - 128
+        z = symbol(encoding, (e << 1) ^ (e >> 63), EDGE, numbers, words, state)
+        out |= np.uint64((guess + ((z >> 1) ^ -(z & 1))) & 255) << at
+    return out

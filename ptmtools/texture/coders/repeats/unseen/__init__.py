@@ -1,1 +1,0 @@
-"""Compiled loops for what was not seen before."""

@@ -1,0 +1,132 @@
+"""The database folder: who may write in it, and that it never is in between two states."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ptmtools.errors import DatabaseError, OutputError
+from ptmtools.store.folder import DatabaseFolder
+from ptmtools.store.layout import MANIFEST
+from ptmtools.store.manifest import SCHEMA, StageRecord
+from ptmtools.store.writer import DatabaseWriter
+
+
+def state(folder: Path) -> dict[str, bytes]:
+    """Every file below a folder with its bytes."""
+    files = (f for f in sorted(folder.rglob("*")) if f.is_file())
+    return {str(f.relative_to(folder)): f.read_bytes() for f in files}
+
+
+def write(db: Path, files: dict[str, bytes], stage: str = "cells", model: str = "m.obj") -> None:
+    with DatabaseWriter.open_for_model(db, model, force=True) as writer:
+        staged = writer.begin("some")
+        for name, data in files.items():
+            staged.put(name, data)
+        staged.commit({stage: StageRecord(1, {}, {}, staged.pending())})
+
+
+def test_commits_and_reads_back(tmp_path: Path) -> None:
+    write(tmp_path / "a" / "db", {"stages/x": b"1", "www/y": b"2"})
+    db = DatabaseFolder.open(tmp_path / "a" / "db")
+    outputs = db.record("cells").outputs
+    assert db.read("stages/x", outputs["stages/x"]) == b"1"
+    assert db.damaged(outputs) is None
+    assert set(state(db.path)) == {MANIFEST, "stages/x", "www/y"}
+
+
+def test_what_a_stage_no_longer_makes_goes_and_what_is_foreign_stays(tmp_path: Path) -> None:
+    write(tmp_path, {"www/old/a": b"1", "www/keep": b"2"})
+    (tmp_path / "www" / "mine.txt").write_text("mine")
+    write(tmp_path, {"www/keep": b"3"})
+    assert set(state(tmp_path)) == {MANIFEST, "www/keep", "www/mine.txt"}
+    assert not (tmp_path / "www" / "old").exists()
+
+
+def test_without_a_commit_it_stays_what_it_was(tmp_path: Path) -> None:
+    write(tmp_path, {"www/a": b"1"})
+    before = state(tmp_path)
+
+    def update() -> None:
+        with DatabaseWriter.open_for_model(tmp_path, "m.obj") as writer:
+            writer.begin("some").put("www/a", b"2")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        update()
+    assert state(tmp_path) == before
+
+
+def test_a_new_folder_goes_again_if_nothing_was_committed(tmp_path: Path) -> None:
+    with DatabaseWriter.open_for_model(tmp_path / "a" / "db", "m.obj") as writer:
+        writer.begin("some").put("www/a", b"2")
+    assert not list(tmp_path.iterdir())
+
+
+def test_two_writers_do_not_meet(tmp_path: Path) -> None:
+    with (
+        DatabaseWriter.open_for_model(tmp_path, "m.obj"),
+        pytest.raises(DatabaseError, match="PTM-D007"),
+    ):
+        DatabaseWriter.open_for_model(tmp_path, "m.obj")
+
+
+def test_force_guards_what_is_not_ours(tmp_path: Path) -> None:
+    foreign = tmp_path / "foreign"
+    foreign.mkdir()
+    (foreign / "mine.txt").write_text("mine")
+    with pytest.raises(OutputError, match="PTM-O010"):
+        DatabaseWriter.open_for_model(foreign, "m.obj")
+    write(foreign, {"www/a": b"1"})
+    assert (foreign / "mine.txt").read_text() == "mine"
+
+    with pytest.raises(OutputError, match="PTM-O011"):
+        DatabaseWriter.open_for_model(foreign, "other.obj")
+    write(foreign, {"www/b": b"1"}, "pvs", model="other.obj")
+    assert set(state(foreign)) == {MANIFEST, "www/b", "mine.txt"}
+
+    file = tmp_path / "file"
+    file.write_text("mine")
+    with pytest.raises(OutputError, match="PTM-O001"):
+        DatabaseWriter.open_for_model(file, "m.obj", force=True)
+
+
+def test_a_database_of_an_earlier_schema_is_built_again(tmp_path: Path) -> None:
+    write(tmp_path, {"www/old/a": b"1", "www/keep": b"2"})
+    (tmp_path / "www" / "mine.txt").write_text("mine")
+    manifest = tmp_path / MANIFEST
+    now = f'"schema": {SCHEMA}'
+    earlier = manifest.read_text().replace(now, '"schema": 1')
+    manifest.write_text(earlier)
+    with pytest.raises(DatabaseError, match="PTM-D003"):
+        DatabaseFolder.open(tmp_path)
+    with pytest.raises(DatabaseError, match="PTM-D003"):
+        DatabaseWriter.open_for_model(tmp_path, "other.obj")
+    with DatabaseWriter.open_for_model(tmp_path, "m.obj") as writer:
+        assert writer.manifest.stages == {}
+        staged = writer.begin("some")
+        staged.put("www/keep", b"3")
+        staged.commit({"cells": StageRecord(1, {}, {}, staged.pending())})
+    assert set(state(tmp_path)) == {MANIFEST, "www/keep", "www/mine.txt"}
+    manifest.write_text(earlier.replace('"schema": 1', f'"schema": {SCHEMA + 1}'))
+    with pytest.raises(DatabaseError, match="PTM-D003"):
+        DatabaseWriter.open_for_model(tmp_path, "m.obj")
+
+
+def test_says_what_is_missing_or_damaged(tmp_path: Path) -> None:
+    with pytest.raises(DatabaseError, match="PTM-D001"):
+        DatabaseFolder.open(tmp_path)
+    write(tmp_path, {"stages/cells.npz": b"no archive", "www/a": b"1"})
+    db = DatabaseFolder.open(tmp_path)
+    with pytest.raises(DatabaseError, match="PTM-D004"):
+        db.record("pvs")
+    with pytest.raises(DatabaseError, match="PTM-D006"):
+        db.read_arrays("cells", "this")
+    (tmp_path / "www/a").write_bytes(b"2")
+    with pytest.raises(DatabaseError, match="PTM-D006"):
+        db.read("www/a", db.record("cells").outputs["www/a"])
+    (tmp_path / "www/a").unlink()
+    with pytest.raises(DatabaseError, match="PTM-D005"):
+        db.read("www/a", db.record("cells").outputs["www/a"])
+    assert db.damaged(db.record("cells").outputs) == "www/a"

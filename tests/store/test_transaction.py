@@ -1,0 +1,161 @@
+"""A commit that is killed at any change of a name on the disk leaves the old state or the new."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from ptmtools.errors import OutputError
+from ptmtools.store.layout import MANIFEST, STAGING
+from ptmtools.store.manifest import StageRecord
+from ptmtools.store.transaction import finished_tasks
+from ptmtools.store.writer import DatabaseWriter
+
+ROOT = Path(__file__).resolve().parents[2]
+#: Replaces the outputs of one stage: one stays as it is, one changes, one goes, one is new.
+UPDATE = """
+import sys
+from pathlib import Path
+sys.path.insert(0, {benchmarks!r})
+from kills import dying
+from ptmtools.store.manifest import StageRecord
+from ptmtools.store.writer import DatabaseWriter
+
+dying({n}, Path({db!r}))
+with DatabaseWriter.open_for_model({db!r}, "m.obj") as writer:
+    staged = writer.begin("some")
+    for name, data in {files!r}.items():
+        staged.put(name, data)
+    staged.commit({{"cells": StageRecord(2, {{}}, {{}}, staged.pending())}})
+"""
+BEFORE = {"www/same": b"0", "www/a": b"1", "www/gone/x": b"1"}
+AFTER = {"www/same": b"0", "www/a": b"2", "www/deep/new": b"2"}
+
+
+def state(folder: Path) -> dict[str, bytes]:
+    files = (f for f in sorted(folder.rglob("*")) if f.is_file())
+    return {str(f.relative_to(folder)): f.read_bytes() for f in files}
+
+
+def write(db: Path, files: dict[str, bytes], recipe: int) -> None:
+    with DatabaseWriter.open_for_model(db, "m.obj") as writer:
+        staged = writer.begin("some")
+        for name, data in files.items():
+            staged.put(name, data)
+        staged.commit({"cells": StageRecord(recipe, {}, {}, staged.pending())})
+
+
+def without(found: dict[str, bytes]) -> dict[str, bytes]:
+    return {name: data for name, data in found.items() if name != MANIFEST}
+
+
+def test_killed_at_any_change_of_a_name(tmp_path: Path) -> None:
+    first, second = tmp_path / "first", tmp_path / "second"
+    write(first, BEFORE, 1)
+    write(second, BEFORE, 1)
+    write(second, AFTER, 2)
+    before, after = state(first), state(second)
+    assert without(after) == AFTER
+    outcomes = []
+    for n in range(1, 100):
+        db = tmp_path / f"{n}"
+        write(db, BEFORE, 1)
+        (db / "www/mine.txt").write_text("mine")
+        script = UPDATE.format(benchmarks=str(ROOT / "benchmarks"), n=n, db=str(db), files=AFTER)
+        status = subprocess.run([sys.executable, "-c", script], cwd=ROOT).returncode
+        if status == 0:
+            break
+        assert status == -signal.SIGKILL
+        with DatabaseWriter.open_for_model(db, "m.obj"):
+            pass
+        found = state(db)
+        assert found.pop("www/mine.txt") == b"mine"
+        assert found in (before, after), n
+        outcomes.append(found == after)
+        write(db, AFTER, 2)
+        assert state(db) == {**after, "www/mine.txt": b"mine"}, n
+    else:
+        pytest.fail("it never came to its end")
+    # First the old state, from the commit on the new one.
+    assert outcomes == sorted(outcomes)
+    assert False in outcomes
+    assert True in outcomes
+
+
+def test_finished_tasks_are_taken_over(tmp_path: Path) -> None:
+    write(tmp_path, BEFORE, 1)
+
+    def stopped() -> None:
+        with DatabaseWriter.open_for_model(tmp_path, "m.obj") as writer:
+            staged = writer.begin("textures")
+            for name in ("www/x", "www/y"):
+                staged.put(name, name.encode())
+            staged.finish("x", ["www/x"])
+            staged.finish("y", ["www/y"])
+            staged.put("www/z", b"z")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped()
+    with (tmp_path / STAGING / "textures/journal").open("a") as journal:
+        journal.write('{"task": "z", "outp')
+    (tmp_path / STAGING / "textures/www/y").write_bytes(b"changed")
+    assert finished_tasks(tmp_path) == 2
+
+    with DatabaseWriter.open_for_model(tmp_path, "m.obj") as writer:
+        staged = writer.begin("textures")
+        assert staged.resume("x")
+        assert not staged.resume("y")
+        assert not staged.resume("z")
+        staged.commit({"textures": StageRecord(1, {}, {}, staged.pending())})
+    assert not (tmp_path / STAGING).exists()
+    assert (tmp_path / "www/x").read_bytes() == b"www/x"
+    assert not (tmp_path / "www/z").exists()
+
+
+def test_what_stands_is_not_written_again(tmp_path: Path) -> None:
+    write(tmp_path, BEFORE, 1)
+    stamp = (tmp_path / "www/same").stat()
+    write(tmp_path, {**AFTER, "www/adopted": b"3"}, 2)
+    assert (tmp_path / "www/same").stat() == stamp
+    with DatabaseWriter.open_for_model(tmp_path, "m.obj") as writer:
+        stamp = (tmp_path / "www/adopted").stat()
+        staged = writer.begin("some")
+        (staged.folder / "www").mkdir(parents=True)
+        (staged.folder / "www/adopted").write_bytes(b"3")
+        staged.adopt("www/adopted")
+        staged.commit({"cells": StageRecord(3, {}, {}, staged.pending())})
+    assert (tmp_path / "www/adopted").stat() == stamp
+
+
+def test_a_commit_leaves_the_folder_of_those_that_are_beginning(tmp_path: Path) -> None:
+    with DatabaseWriter.open_for_model(tmp_path, "m.obj") as writer:
+        staged = writer.begin("one")
+        staged.put("www/a", b"1")
+        staged.commit({"cells": StageRecord(1, {}, {}, staged.pending())})
+        assert (tmp_path / STAGING).is_dir()
+    assert not (tmp_path / STAGING).exists()
+
+
+@pytest.mark.parametrize("link", ["www", "stages", STAGING])
+def test_links_are_not_followed(tmp_path: Path, link: str) -> None:
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    db = tmp_path / "db"
+    db.mkdir()
+    (db / link).symlink_to(elsewhere)
+    with pytest.raises(OutputError, match="PTM-O005"):
+        write_anyhow(db)
+    assert list(elsewhere.iterdir()) == []
+
+
+def write_anyhow(db: Path) -> None:
+    with DatabaseWriter.open_for_model(db, "m.obj", force=True) as writer:
+        staged = writer.begin("some")
+        staged.put("www/a", b"1")
+        staged.put("stages/b", b"1")
+        staged.commit({"cells": StageRecord(1, {}, {}, staged.pending())})
