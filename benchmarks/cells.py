@@ -1,4 +1,4 @@
-"""The test models in cells: ``benchmarks/cells.py [museum hospital …] [--wall-area 8 4 2 1]``
+"""The test models in cells: ``python benchmarks/cells.py [MODEL…] [--wall-area 8 4 2 1]``
 
 Prints a Markdown table with a row for each model at the default options: triangles, cells, leaves,
 portals, and the average share of all cells that a cell may see. With ``--wall-area`` a row for
