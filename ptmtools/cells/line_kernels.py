@@ -90,6 +90,7 @@ def passes(point: Floats, start: Ints, q: int, origin: Floats, along: Floats, tu
     ax = point[end - 1, 0] - origin[0]
     ay = point[end - 1, 1] - origin[1]
     az = point[end - 1, 2] - origin[2]
+    across = False  # a line in the portal's plane makes no volume
     for i in range(begin, end):
         bx = point[i, 0] - origin[0]
         by = point[i, 1] - origin[1]
@@ -97,5 +98,6 @@ def passes(point: Floats, start: Ints, q: int, origin: Floats, along: Floats, tu
         volume = (ay * bz - az * by) * dx + (az * bx - ax * bz) * dy + (ax * by - ay * bx) * dz
         if volume * sense < 0:
             return False
+        across |= volume != 0
         ax, ay, az = bx, by, bz
-    return True
+    return across

@@ -1,4 +1,4 @@
-"""`ptm pvs --report`: what a PVS looks like, line by line."""
+"""`ptm pvs --report`: a summary of the potentially visible sets, line by line."""
 
 from __future__ import annotations
 
@@ -9,44 +9,51 @@ from ptmtools.visibility.report import PortalFacts, PvsReport
 SHOWN_LEAKS = 5
 
 
-def tell_pvs(voice: Voice, told: PvsReport) -> None:
+def tell_pvs(voice: Voice, report: PvsReport) -> None:
     """The report as lines on stdout."""
     voice.say(
-        f"{count(told.cells, 'cell')}; {count(told.portals, 'portal')}, {told.doors:,} of them "
-        f"between cells; a cell sees {told.average:.1f} cells on average, itself included"
+        f"{count(report.cells, 'cell')}, {count(report.portals, 'portal')} (openings), "
+        f"{report.doors:,} of them between cells; a cell sees {report.average:.1f} cells on "
+        "average, itself included"
     )
-    if not told.conservative:
-        voice.say("sampled: what no random line showed is missing")
-    if told.cells > 1:
-        voice.say("cells seen: " + ", ".join(_share(*size) for size in told.sizes))
-    if told.costliest:
-        cut = f"; {count(told.fallbacks, 'portal')} cut short" if told.fallbacks else ""
-        voice.say(f"{told.operations:,} operations{cut}")
-        if told.ties:
-            exactly = (
-                f"{told.decided:,} that may matter decided in exact arithmetic: "
-                f"{told.decided - told.opened:,} closed, {told.opened:,} open"
-            )
-            voice.say(
-                f"{count(told.ties, 'near-tie')}, " + (exactly if told.decided else "none matters")
-            )
-        voice.say("the costliest portals:")
-        for dear in told.costliest:
-            cut = ", cut short" if dear.cut else ""
-            voice.say(f"  {dear.operations:10,}  {_place(dear)}{cut}")
-    if not told.leaks:
-        if told.cells > 1:
-            voice.say("no leaks: no one opening shows a cell suspiciously much")
+    if not report.conservative:
+        voice.say("sampled: cells that no random line reached are missing")
+    if report.cells > 1:
+        voice.say("cells visible from a cell: " + ", ".join(_share(*size) for size in report.sizes))
+    if report.costliest:
+        cut = f"; budget spent at {count(report.fallbacks, 'portal')}" if report.fallbacks else ""
+        voice.say(f"{report.operations:,} operations{cut}")
+        if report.ties:
+            voice.say(_near_ties(report))
+        voice.say("portals that took most operations:")
+        for portal in report.costliest:
+            cut = ", budget spent" if portal.cut else ""
+            voice.say(f"  {portal.operations:10,}  {_place(portal)}{cut}")
+    if not report.leaks:
+        if report.cells > 1:
+            voice.say("no leaks: no cell sees suspiciously much through a single opening")
         return
-    voice.say("cells that see more than three times the median, and the smallest opening that")
-    voice.say("shows them half of it (a gap that nobody meant?):")
-    shown = len(told.leaks) if voice.verbose else SHOWN_LEAKS
-    for leak in told.leaks[:shown]:
+    voice.say("cells that see more than three times the median, each with the smallest opening")
+    voice.say("through which it sees at least half of that (an unintended gap?):")
+    shown = len(report.leaks) if voice.verbose else SHOWN_LEAKS
+    for leak in report.leaks[:shown]:
         voice.say(
-            f"  cell {leak.cell} sees {leak.sees:,}; {leak.through:,} of them by {_place(leak)}"
+            f"  cell {leak.cell} sees {leak.sees:,} cells, {leak.through:,} of them through "
+            f"{_place(leak)}"
         )
-    if len(told.leaks) > shown:
-        voice.say(f"  … and {len(told.leaks) - shown} more; -v shows them")
+    if len(report.leaks) > shown:
+        voice.say(f"  … and {len(report.leaks) - shown} more; -v shows them")
+
+
+def _near_ties(report: PvsReport) -> str:
+    """What became of the lines of sight that doubles cannot decide."""
+    ties = count(report.ties, "near tie") + " (lines of sight that graze an edge)"
+    if not report.decided:
+        return f"{ties}; the result does not depend on any"
+    return (
+        f"{ties}; {report.decided:,} could change the result and were checked in higher precision: "
+        f"{report.decided - report.opened:,} blocked, {report.opened:,} visible"
+    )
 
 
 def _share(share: float, sees: int) -> str:
@@ -58,7 +65,7 @@ def _share(share: float, sees: int) -> str:
             return f"median {sees:,}"
         case 1.0:
             return f"most {sees:,}"
-    return f"{share:.0%} ≤ {sees:,}"
+    return f"{share:.0%} of cells ≤ {sees:,}"
 
 
 def _place(one: PortalFacts) -> str:
