@@ -21,6 +21,8 @@ from ptmtools.cells.vectors import cross
 #: Lines over all portals, and the least and the most through one of them.
 LINES = 2**20
 LEAST_LINES, MOST_LINES = 64, 8192
+#: A line is followed through so many leaves to either side of its portal.
+LONGEST = 512
 #: A portal whose normal has a level part smaller than this is a hatch.
 LEVEL = 1e-3
 #: Fractional parts of 1/g, 1/g², 1/g³, 1/g⁴ in units of 2⁻⁶⁴, where g⁵ = g + 1 (Roberts'
@@ -39,25 +41,25 @@ def sampled_sight(cells: Cells) -> NDArray[np.bool_]:
     seen[ends, ends[:, ::-1]] = True
     if len(ends) == 0:
         return seen
-    from ptmtools.cells.kernels import sight_lines
+    from ptmtools.cells.line_kernels import Openings, sight_lines
 
     count = min(max(LINES // len(ends), LEAST_LINES), MOST_LINES) // 8 * 8
     share = _even(count)
     origin, along = np.empty((2, len(ends), count, 3))
     for k in range(len(ends)):
         origin[k], along[k] = _lines(cells.portal(k), cells.portal_plane[k, :3], share)
-    order = np.argsort(ends.reshape(-1), kind="stable")
-    sight_lines(
+    leaves = ends.reshape(-1)
+    order = np.argsort(leaves, kind="stable")
+    openings = Openings(
         np.ascontiguousarray(cells.portal_point, dtype=np.float64),
         cells.portal_start.astype(np.int64),
-        ends,
-        np.searchsorted(ends.reshape(-1)[order], np.arange(cells.leaf_count + 1)),
-        order // 2,
-        origin.reshape(-1, 3),
-        along.reshape(-1, 3),
-        np.repeat(np.arange(len(ends)), count),
-        seen,
+        ends[:, ::-1].reshape(-1),
+        np.searchsorted(leaves[order], np.arange(cells.leaf_count + 1)),
+        order,
     )
+    path = np.empty(2 * LONGEST, np.int64)
+    portal = np.repeat(np.arange(len(ends)), count)
+    sight_lines(openings, origin.reshape(-1, 3), along.reshape(-1, 3), portal, path, seen)
     return seen
 
 

@@ -40,8 +40,8 @@ def describe(fault: BaseException) -> tuple[int, str]:
             return USAGE, fault.format_message()
         case click.UsageError():
             path = fault.ctx.command_path if fault.ctx else "ptm"
-            told = " ".join(fault.format_message().split()).rstrip(".")
-            return USAGE, f"{told}; see `{path} --help` [PTM-U001]"
+            message = " ".join(fault.format_message().split()).rstrip(".")
+            return USAGE, f"{message}; see `{path} --help` [PTM-U001]"
         case click.exceptions.Exit():
             return fault.exit_code, ""
         case KeyboardInterrupt() | click.Abort():
@@ -58,9 +58,9 @@ def describe(fault: BaseException) -> tuple[int, str]:
             return 3, f"{_file_of(fault)}{fault.strerror}; check the path and its rights [PTM-I099]"
         case SystemExit():
             return fault.code if isinstance(fault.code, int) else INTERNAL, ""
-    told = " ".join(str(fault).split())
+    message = " ".join(str(fault).split())
     return INTERNAL, (
-        f"internal error, {type(fault).__name__}: {told}; please report it, "
+        f"internal error, {type(fault).__name__}: {message}; please report it, "
         "run with -v for the traceback [PTM-X001]"
     )
 

@@ -95,11 +95,11 @@ def _info_ptm(voice: Voice, target: str, as_json: bool) -> None:
     whole = whole_levels(header, bytes_there)
     levels = _levels(header)
     if as_json:
-        told = None if description is None else _told(description)
+        found = None if description is None else _described(description)
         voice.emit_json(
             {
                 **asdict(header),
-                "description": told,
+                "description": found,
                 "levels": levels,
                 "file_bytes": bytes_there,
                 "whole_levels": whole,
@@ -114,8 +114,8 @@ def _info_ptm(voice: Voice, target: str, as_json: bool) -> None:
     )
     if description is None:
         voice.say("its description is damaged or cut off")
-    elif told := _told(description):
-        voice.say("; ".join(f"{name} {value}" for name, value in told.items()))
+    elif found := _described(description):
+        voice.say("; ".join(f"{name} {value}" for name, value in found.items()))
     voice.say(
         "level       size       tiles         bytes   share  bits/texel      up to here"
         "   in GPU memory  RGB as RGBA"
@@ -135,11 +135,11 @@ def _info_ptm(voice: Voice, target: str, as_json: bool) -> None:
 def _levels(header: PtmHeader) -> list[dict[str, Any]]:
     """What is said of each level; bytes up to and including it are those of `end` and `gpu_…`."""
     per_texel = _PADDED[header.components] * header.texel_bytes // header.components
-    told, texels = [], 0
+    found, texels = [], 0
     for level in header.levels:
         here = level.width * level.height
         texels += here
-        told.append(
+        found.append(
             {
                 **asdict(level),
                 "end": level.end,
@@ -149,7 +149,7 @@ def _levels(header: PtmHeader) -> list[dict[str, Any]]:
                 "gpu_bytes_padded": per_texel * texels,
             }
         )
-    return told
+    return found
 
 
 def _description(data: bytes, crc32: int) -> Description | None:
@@ -163,7 +163,7 @@ def _description(data: bytes, crc32: int) -> Description | None:
         return None
 
 
-def _told(description: Description) -> dict[str, Any]:
+def _described(description: Description) -> dict[str, Any]:
     """What a description says, without what it does not."""
     found: dict[str, Any] = {}
     if description.icc is not None:

@@ -6,6 +6,7 @@ becomes ``--wall-area FLOAT`` with that default and that help. The metadata of a
 
 * ``option``: its name on the command line, where that is not the field's own;
 * ``was``: former names, which work for one release, with a note;
+* ``deprecated``: why it does nothing any more; it is hidden, and giving it draws a note;
 * ``choices``: a table of what may be given, by name, each with an ``about``; with ``several``,
   names may be joined by commas;
 * ``numbers``: how many numbers one value consists of, where that varies, such as (3, 4);
@@ -109,12 +110,15 @@ def options_of(*classes: type, omit: Sequence[str] = ()) -> Decorator:
     """A decorator that adds the options of all fields of ``classes`` that are not in ``omit``."""
     found: dict[str, Decorator] = {}
     former: dict[str, str] = {}
+    deprecated: dict[str, tuple[Any, str]] = {}
     for cls in classes:
         hints, texts = typing.get_type_hints(cls), descriptions(cls)
         for field in fields(cls):
             name = _option_name(field)
             if field.name not in omit and name not in found:
                 found[name] = _option(field, hints[field.name], texts.get(field.name))
+                if reason := field.metadata.get("deprecated"):
+                    deprecated[name] = _default(field), reason
                 for old in field.metadata.get("was", ()):
                     found[old] = _option(field, hints[field.name], None, former=old)
                     former[old] = name
@@ -127,6 +131,9 @@ def options_of(*classes: type, omit: Sequence[str] = ()) -> Decorator:
                 if given is not None:
                     click.echo(f"ptm: note: --{old} is now called --{new}", err=True)
                     values[_variable(new)] = given
+            for name, (default, reason) in deprecated.items():
+                if values[_variable(name)] != default:
+                    click.echo(f"ptm: note: --{name} does nothing any more: {reason}", err=True)
             return function(*arguments, **values)
 
         command: Callable[..., Any] = renamed
@@ -198,7 +205,11 @@ def _option(field: Field[Any], hint: Any, text: str | None, former: str = "") ->
     """The option of a field; with ``former`` the hidden one of that name, without a default."""
     default = None if former else _default(field)
     name = former or _option_name(field)
-    settings: dict[str, Any] = {"default": default, "help": text, "hidden": bool(former)}
+    settings: dict[str, Any] = {
+        "default": default,
+        "help": text,
+        "hidden": bool(former or field.metadata.get("deprecated")),
+    }
     if former:
         settings["help"] = f"Now --{_option_name(field)}."
     if get_origin(hint) in (Union, UnionType):  # X | None

@@ -1,4 +1,4 @@
-"""`ptm pvs --report`: what a PVS looks like, line by line."""
+"""`ptm pvs --report`: a summary of the potentially visible sets, line by line."""
 
 from __future__ import annotations
 
@@ -16,47 +16,55 @@ SHOWN_LEAKS = 5
 
 
 def visibility_report(artifacts: Artifacts, verbose: bool) -> tuple[dict[str, Any], list[str]]:
-    """What the sets of a database look like, as a document and as lines."""
+    """A summary of the sets of a database, as a document and as lines."""
     found = report(artifacts[CELLS], artifacts[PVS])
     return asdict(found), list(_lines(found, verbose))
 
 
-def _lines(found: PvsReport, verbose: bool) -> Iterator[str]:
+def _lines(report: PvsReport, verbose: bool) -> Iterator[str]:
     yield (
-        f"{count(found.cells, 'cell')}; {count(found.portals, 'portal')}, {found.doors:,} of them "
-        f"between cells; a cell sees {found.average:.1f} cells on average, itself included"
+        f"{count(report.cells, 'cell')}, {count(report.portals, 'portal')} (openings), "
+        f"{report.doors:,} of them between cells; a cell sees {report.average:.1f} cells on "
+        "average, itself included"
     )
-    if not found.conservative:
-        yield "sampled: what no random line showed is missing"
-    if found.cells > 1:
-        yield "cells seen: " + ", ".join(_share(*size) for size in found.sizes)
-    if found.costliest:
-        cut = f"; {count(found.fallbacks, 'portal')} cut short" if found.fallbacks else ""
-        yield f"{found.operations:,} operations{cut}"
-        if found.ties:
-            exactly = (
-                f"{found.decided:,} that may matter decided in exact arithmetic: "
-                f"{found.decided - found.opened:,} closed, {found.opened:,} open"
-            )
-            yield (
-                f"{count(found.ties, 'near-tie')}, "
-                + (exactly if found.decided else "none matters")
-            )
-        yield "the costliest portals:"
-        for dear in found.costliest:
-            cut = ", cut short" if dear.cut else ""
-            yield f"  {dear.operations:10,}  {_place(dear)}{cut}"
-    if not found.leaks:
-        if found.cells > 1:
-            yield "no leaks: no one opening shows a cell suspiciously much"
+    if not report.conservative:
+        yield "sampled: cells that no random line reached are missing"
+    if report.cells > 1:
+        yield "cells visible from a cell: " + ", ".join(_share(*size) for size in report.sizes)
+    if report.costliest:
+        cut = f"; budget spent at {count(report.fallbacks, 'portal')}" if report.fallbacks else ""
+        yield f"{report.operations:,} operations{cut}"
+        if report.ties:
+            yield _near_ties(report)
+        yield "portals that took most operations:"
+        for portal in report.costliest:
+            cut = ", budget spent" if portal.cut else ""
+            yield f"  {portal.operations:10,}  {_place(portal)}{cut}"
+    if not report.leaks:
+        if report.cells > 1:
+            yield "no leaks: no cell sees suspiciously much through a single opening"
         return
-    yield "cells that see more than three times the median, and the smallest opening that"
-    yield "shows them half of it (a gap that nobody meant?):"
-    shown = len(found.leaks) if verbose else SHOWN_LEAKS
-    for leak in found.leaks[:shown]:
-        yield (f"  cell {leak.cell} sees {leak.sees:,}; {leak.through:,} of them by {_place(leak)}")
-    if len(found.leaks) > shown:
-        yield f"  … and {len(found.leaks) - shown} more; -v shows them"
+    yield "cells that see more than three times the median, each with the smallest opening"
+    yield "through which it sees at least half of that (an unintended gap?):"
+    shown = len(report.leaks) if verbose else SHOWN_LEAKS
+    for leak in report.leaks[:shown]:
+        yield (
+            f"  cell {leak.cell} sees {leak.sees:,} cells, {leak.through:,} of them through "
+            f"{_place(leak)}"
+        )
+    if len(report.leaks) > shown:
+        yield f"  … and {len(report.leaks) - shown} more; -v shows them"
+
+
+def _near_ties(report: PvsReport) -> str:
+    """What became of the lines of sight that doubles cannot decide."""
+    ties = count(report.ties, "near tie") + " (lines of sight that graze an edge)"
+    if not report.decided:
+        return f"{ties}; the result does not depend on any"
+    return (
+        f"{ties}; {report.decided:,} could change the result and were checked in higher precision: "
+        f"{report.decided - report.opened:,} blocked, {report.opened:,} visible"
+    )
 
 
 def _share(share: float, sees: int) -> str:
@@ -68,7 +76,7 @@ def _share(share: float, sees: int) -> str:
             return f"median {sees:,}"
         case 1.0:
             return f"most {sees:,}"
-    return f"{share:.0%} ≤ {sees:,}"
+    return f"{share:.0%} of cells ≤ {sees:,}"
 
 
 def _place(one: PortalFacts) -> str:

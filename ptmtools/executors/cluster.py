@@ -152,8 +152,8 @@ class Cluster(Executor):
             ) from fault
 
     def _check_software(self) -> None:
-        told = self._client.run(check_in, software(), on_error="return")
-        for worker, fault in sorted(told.items()):
+        answers = self._client.run(check_in, software(), on_error="return")
+        for worker, fault in sorted(answers.items()):
             if isinstance(fault, WorkerError):
                 raise fault
             if fault is not None:
@@ -327,7 +327,7 @@ def _connected(address: str) -> Client:
 def _wait_for_answer(host: str, port: int) -> None:
     """Waits until somebody listens: the scheduler may be starting beside us. (Dask's client, asked
     in vain, complains once more much later, when it is collected.) Raises OSError."""
-    began, told = time.monotonic(), False
+    began, announced = time.monotonic(), False
     while True:
         try:
             socket.create_connection((host, port), timeout=PATIENCE).close()
@@ -335,7 +335,7 @@ def _wait_for_answer(host: str, port: int) -> None:
         except OSError:
             if time.monotonic() - began > PATIENCE:
                 raise
-        if not told:
+        if not announced:
             announce(f"waiting for the scheduler at {host}:{port}")
-            told = True
+            announced = True
         time.sleep(0.5)

@@ -1,4 +1,4 @@
-"""Why a stage has to be run: what it was told, or read, has changed, or what it wrote is gone."""
+"""Why a stage has to be run: its options or inputs have changed, or an output is gone."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def reasons(before: StageRecord | None, work: StageRecord, db: DatabaseFolder) -
     for name in names:
         old, new = before.parameters.get(name), work.parameters.get(name)
         if old != new:
-            found.append(f"{name.replace('_', ' ')}: {_told(old)} → {_told(new)}")
+            found.append(f"{name.replace('_', ' ')}: {_text(old)} → {_text(new)}")
     for what, files in _changed(before.inputs, work.inputs).items():
         if files:
             found.append(f"{_listed(files)} {what}")
@@ -48,7 +48,7 @@ def _listed(files: list[str]) -> str:
     return ", ".join(files[:_NAMED]) + more
 
 
-def _told(value: Any) -> str:
+def _text(value: Any) -> str:
     if value is None or value in ("", []):
         return "none"
     if isinstance(value, bool):

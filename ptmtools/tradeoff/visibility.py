@@ -23,8 +23,8 @@ from ptmtools.visibility.pvs import compute_pvs
 AMPLE = 2_000_000
 #: Those that are tried, beside the one that the database was built with.
 BUDGETS = (200, 2_000, 20_000, 200_000)
-#: What settings do not say: near-ties decided exactly.
-_BASE = PvsOptions(exact=True)
+#: What settings do not say.
+_BASE = PvsOptions()
 
 
 def prepare(subject: Subject) -> VisibilityTrade:
@@ -48,7 +48,6 @@ class VisibilityTrade:
 
     def settings(self) -> Sequence[Setting]:
         """See `Experiment.settings`."""
-        usual = BUDGETS[-1]
         return [
             *(
                 Setting(
@@ -63,10 +62,6 @@ class VisibilityTrade:
             *(
                 Setting(f"--pvs full --pvs-budget {n}", {"method": "full", "budget": n}, "budget")
                 for n in sorted({*BUDGETS, self._own})
-            ),
-            Setting(
-                f"--pvs full --pvs-budget {usual} --no-pvs-exact",
-                {"method": "full", "budget": usual, "exact": False},
             ),
         ]
 

@@ -17,7 +17,8 @@ Over the textbook:
   seen; if none is left, the whole subtree is.
 * A search that grows long shoots one line at each portal that is still possible. What a line
   crosses is seen without a search; what is left to refute is little, even in an open hall.
-* What is rejected by less than the rounding of the arithmetic is decided exactly (`hairs`).
+* What is rejected by less than the rounding of the arithmetic is decided again in double-double
+  (`near_ties`).
 * Each source portal has a budget of operations, not of seconds. When it is spent, open branches
   are not followed; what their separators leave of the possible set counts as seen.
 
@@ -91,9 +92,9 @@ class PortalFlow:
         its normal, 2k + 1 against it) may be followed by directed portal q on one straight line.
     cut: (K,) whether the budget or the depth cut the search from a portal short.
     work: (K,) chain tests and clips that the search from each portal took, both ways together.
-    ties: (K,) how many sequences of portals the search from each portal rejected by a hair, less
+    ties: (K,) near ties, sequences of portals that the search from each portal rejected by less
         than 16 roundings, both ways together: mostly portals that touch a plane and no more.
-    decided: (K,) how many of them mattered and were decided in exact arithmetic.
+    decided: (K,) how many of them mattered and were decided in double-double arithmetic.
     opened: (K,) how many of those let a line pass.
     """
 
@@ -115,18 +116,14 @@ def portal_flow(
     budget: int,
     progress: Progress = silent,
     executor: Executor = Serial(),  # noqa: B008 - has no state
-    *,
-    exact: bool = True,
 ) -> PortalFlow:
     """Conservative visibility from portal to portal (Teller & Séquin; paper §3).
 
     Parameters
     ----------
-    budget: operations for each search from a directed portal; see the module's head. With ``exact``
-        a search may be repeated until three budgets are spent.
+    budget: operations for each search from a directed portal; see the module's head. Near ties may
+        make a search be repeated until three budgets are spent.
     executor: does the searches; see `searching`. The result is the same for any.
-    exact: whether sequences rejected by a hair are decided again in exact arithmetic (`hairs`);
-        otherwise lines of sight thinner than a rounding are not seen.
 
     Raises InputError PTM-I400 (arrays that do not fit together), PTM-I401 (a coordinate
     that is not finite); LimitError PTM-L400 (more portals than fit into memory).
@@ -149,7 +146,7 @@ def portal_flow(
 
     g = geometry(portals)
     together = BATCH // 8
-    searching = Searching(g, _prepass(g, executor), budget, exact)
+    searching = Searching(g, _prepass(g, executor), budget)
     sizes = BITS_OF_BYTE[searching.known.view(np.uint8)].sum(axis=1)
     order = np.argsort(sizes, kind="stable")
     with executor.sharing(searching, releases_lock=True) as shared:
@@ -170,14 +167,14 @@ def _prepass(g: Geometry, executor: Executor) -> NDArray[np.uint64]:
 
     The rounds of bits take a hundredth of the time of the floods: they are not shared out.
     """
-    from ptmtools.visibility.bits.kernels import return_sight
-    from ptmtools.visibility.prepass.kernels import tighten
+    from ptmtools.visibility.bit_kernels import return_sight
+    from ptmtools.visibility.prepass_kernels import tighten
     from ptmtools.visibility.searching import Searching, flood_from
 
     count = len(g.leaf)
     words = (count + 63) // 64
     known, tighter = np.zeros((2, count, words), dtype=np.uint64)
-    floods = Searching(g, known[:0], budget=0, exact=False)
+    floods = Searching(g, known[:0], budget=0)
     spans = [(first, min(first + SPAN, count)) for first in range(0, count, SPAN)]
     reached = executor.each(flood_from, floods, spans, releases_lock=True)
     for (first, last), rows in zip(spans, reached, strict=True):
@@ -211,8 +208,7 @@ def check(portals: Portals) -> None:
 
 
 def geometry(portals: Portals) -> Geometry:
-    """The portals as the kernels want them: centred, wound about their normals, with bounds."""
-
+    """The portals as the kernels want them: centred, counter-clockwise, with bounds."""
     start = portals.start.astype(np.int64)
     sizes = np.diff(start)
     middle = (portals.point.min(axis=0) + portals.point.max(axis=0)) / 2
@@ -220,7 +216,7 @@ def geometry(portals: Portals) -> Geometry:
     owner = np.repeat(np.arange(len(sizes)), sizes)
     normal = portals.normal / np.linalg.norm(portals.normal, axis=1, keepdims=True)
 
-    # Newell's area vector about the first vertex tells how a polygon is wound.
+    # Newell's area vector about the first vertex tells a polygon's orientation.
     within = np.arange(len(point)) - start[owner]
     following = np.where(within + 1 < sizes[owner], np.arange(len(point)) + 1, start[owner])
     arm = point - point[start[owner]]

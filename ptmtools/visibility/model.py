@@ -11,10 +11,14 @@ from numpy.typing import NDArray
 
 from ptmtools.stored import Stored
 
+#: What is counted for each portal.
+COUNTED = ("work", "ties", "decided", "opened")
+
 
 @dataclass(frozen=True)
 class Pvs:
-    """Who may see whom. Symmetric; a row is the cell itself, then the others, ascending.
+    """The potentially visible set of each cell. Symmetric; a row is the cell itself, then the
+    others, ascending.
 
     Attributes
     ----------
@@ -22,9 +26,9 @@ class Pvs:
     cell: (n,) int32 the potentially visible cells; ``cell[start[i]] == i``.
     work: (K,) int64 operations that the search from each portal took; empty without a search.
     cut: (K,) bool portals whose search was given up for a looser, still conservative set.
-    ties: (K,) int64 sequences of portals that the search from each portal rejected by a hair, less
+    ties: (K,) int64 near ties of the search from each portal: sequences of portals rejected by less
         than 16 roundings of the arithmetic.
-    decided: (K,) int64 those of them that mattered and were decided in exact arithmetic.
+    decided: (K,) int64 those of them that mattered and were decided in double-double arithmetic.
     opened: (K,) int64 those that let a line pass; see `PortalFlow`.
     leak: (n, 4) int32 cells that see suspiciously much: the cell, how many cells it sees, the
         smallest portal that shows it half of them, and how many that one shows.
@@ -68,28 +72,18 @@ class Pvs:
         return matrix
 
     @staticmethod
-    def from_matrix(matrix: NDArray[np.bool_], **told: Any) -> Pvs:
+    def from_matrix(matrix: NDArray[np.bool_], **attributes: Any) -> Pvs:
         """From a (C, C) symmetric matrix, the diagonal taken as set; further attributes."""
         n = len(matrix)
         rest = matrix & ~np.eye(n, dtype=np.bool_)
         rows = [np.concatenate([[i], np.flatnonzero(rest[i])]) for i in range(n)]
         start = np.concatenate([[0], np.cumsum([len(r) for r in rows])]).astype(np.int64)
         cell = np.concatenate(rows).astype(np.int32) if rows else np.zeros(0, np.int32)
-        return Pvs(start, cell, **told)
+        return Pvs(start, cell, **attributes)
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
         """The sets as plain arrays."""
-        return {
-            "start": self.start,
-            "cell": self.cell,
-            "work": self.work,
-            "cut": self.cut,
-            "ties": self.ties,
-            "decided": self.decided,
-            "opened": self.opened,
-            "leak": self.leak,
-            "conservative": np.array([self.conservative]),
-        }
+        return vars(self) | {"conservative": np.array([self.conservative])}
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> Pvs:
@@ -110,11 +104,8 @@ class Pvs:
         return Pvs(
             start,
             entries,
-            stored.array("work", np.int64, None),
-            stored.array("cut", np.bool_, None),
-            stored.array("ties", np.int64, None),
-            stored.array("decided", np.int64, None),
-            stored.array("opened", np.int64, None),
-            leak,
-            bool(stored.array("conservative", np.bool_, 1)[0]),
+            **{name: stored.array(name, np.int64, None) for name in COUNTED},
+            cut=stored.array("cut", np.bool_, None),
+            leak=leak,
+            conservative=bool(stored.array("conservative", np.bool_, 1)[0]),
         )

@@ -1,4 +1,4 @@
-"""The knobs of the visibility stage."""
+"""The options of the visibility stage."""
 
 from __future__ import annotations
 
@@ -14,20 +14,30 @@ class PvsOptions:
 
     Attributes
     ----------
-    method: full: portal flow, exact up to the budget; fast: planes and the separators of the first
-        two portals, looser and conservative too; sampled: what random lines show, not conservative,
-        to compare with.
-    budget: operations (chain tests, clips) that the search from one side of a portal may take
-        before what it has not refuted counts as visible; the result is conservative at any value.
-    lines: random lines through each portal, where sampled.
-    exact: whether what floating point rejects by a hair is decided again in exact arithmetic;
-        otherwise lines of sight thinner than a rounding are not seen.
+    method: how the potentially visible set (PVS) of each cell is found. full: search every sequence
+        of portals (openings between cells), within the budget; fast: look at the first two portals
+        only, which gives larger sets; sampled: try random lines, which misses visible cells and is
+        for comparison only.
+    budget: operations (tests and clips of portals) that the search from one side of a portal may
+        take. When it is spent, what is still undecided counts as visible, so a lower budget makes
+        sets larger, never wrong.
+    lines: random lines through each portal, for the sampled method.
+    exact: deprecated, does nothing: lines of sight too thin for floating point are always decided
+        in higher precision.
     """
 
     method: Literal["full", "fast", "sampled"] = field(default="full", metadata={"option": "pvs"})
     budget: int = field(default=200_000, metadata={"option": "pvs-budget"})
     lines: int = field(default=1000, metadata={"option": "pvs-lines"})
-    exact: bool = field(default=True, metadata={"option": "pvs-exact"})
+    exact: bool = field(
+        default=True,
+        compare=False,
+        metadata={
+            "option": "pvs-exact",
+            "deprecated": "lines of sight too thin for floating point are always decided in higher "
+            "precision",
+        },
+    )
 
     def __post_init__(self) -> None:
         if self.budget < 0:
@@ -39,6 +49,6 @@ class PvsOptions:
         if self.method not in ("full", "fast", "sampled") or self.lines < 1:
             raise InputError(
                 "PTM-I402",
-                f"method {self.method!r} with {self.lines} lines is no way to compute visibility",
-                remedy="give full, fast or sampled, and at least one line",
+                f"visibility cannot be computed by method {self.method!r} with {self.lines} lines",
+                remedy="choose full, fast or sampled, and at least one line",
             )

@@ -43,7 +43,7 @@ def compute_pvs(
         leaves = sampled_leaves(portals, options.lines, executor)
         return Pvs.from_matrix(_lifted(cells, leaves), conservative=False)
     budget = options.budget if options.method == "full" else 0
-    flow = portal_flow(portals, budget, progress, executor, exact=options.exact)
+    flow = portal_flow(portals, budget, progress, executor)
     matrix = _lifted(cells, leaf_matrix(cells.leaf_count, portals.leaf, flow))
     leaks = [astuple(leak) for leak in find_leaks(cells, flow, matrix)]
     return Pvs.from_matrix(

@@ -1,4 +1,4 @@
-"""What a PVS looks like: how much cells see, what was dear to find out, where it leaks."""
+"""A summary of a PVS: how much cells see, which portals took most work, where it leaks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ptmtools.visibility.model import Pvs
 
 #: Portals listed by the work that they took.
 COSTLIEST = 10
-#: Shares of the cells at which the sizes of their sets are told.
+#: Shares of the cells for which the sizes of their sets are reported.
 QUANTILES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
 
 
@@ -63,7 +63,7 @@ class LeakingPortal(PortalFacts):
 
 @dataclass(frozen=True)
 class PvsReport:
-    """What `report` tells.
+    """What `report` finds.
 
     Attributes
     ----------
@@ -71,9 +71,10 @@ class PvsReport:
     sizes: share of the cells → cells that this share of them sees at most, for `QUANTILES`.
     average: cells that a cell sees, itself included.
     operations: chain tests and clips in all. fallbacks: portals whose search was cut short.
-    ties: sequences of portals rejected by a hair, less than 16 roundings. decided: those of them
-        that mattered and were decided in exact arithmetic. opened: those that let a line pass.
-    costliest: the portals that took most, dearest first. leaks: those that see most first.
+    ties: near ties, sequences of portals rejected by less than 16 roundings. decided: those of them
+        that mattered and were decided in double-double arithmetic. opened: those that let a line
+        pass.
+    costliest: the portals that took most work, most first. leaks: those that see most first.
     conservative: False where the sets are of what random lines showed.
     """
 
@@ -93,7 +94,7 @@ class PvsReport:
 
 
 def report(cells: Cells, pvs: Pvs) -> PvsReport:
-    """What there is to say of the PVS of a subdivision."""
+    """The summary of the PVS of a subdivision."""
     sees = np.sort(np.diff(pvs.start))
     count = len(sees)
     at = [min(count - 1, int(np.ceil(q * count)) - 1) if q else 0 for q in QUANTILES]

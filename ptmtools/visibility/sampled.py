@@ -2,18 +2,18 @@
 
 What a straight line crosses on its way through the portals sees each other; what no line happened
 to show counts as hidden. So the sets are a lower bound, not conservative: a client that loads by
-them shows holes. They serve to compare with, and to see how much of a conservative set may be too
-much (`confirmed`).
+them shows holes. They serve to compare with. Lines are walked as in `cells.sight`, which spreads
+them evenly; random ones, as many as wanted, show more.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.cells.sight import LONGEST
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
 from ptmtools.visibility.flow import Portals, check, geometry
@@ -30,14 +30,6 @@ class Shooting(NamedTuple):
     leaf_count: int
     lines: int
     seed: int
-
-
-class Aiming(NamedTuple):
-    """What the tasks share: (n, 2) pairs of leaves and tries for each."""
-
-    geometry: Geometry
-    pairs: NDArray[np.int32]
-    tries: int
 
 
 def sampled_leaves(
@@ -59,54 +51,45 @@ def sampled_leaves(
     if count == 0:
         return matrix
     shooting = Shooting(geometry(portals), leaves, lines, seed)
-    bits = np.zeros((leaves, (leaves + 63) // 64), np.uint64)
-    for sees in executor.each(_shoot, shooting, _spans(count), releases_lock=True):
-        bits |= sees
-    seen = np.unpackbits(bits.view(np.uint8), axis=1, count=leaves, bitorder="little")
-    matrix |= seen.astype(np.bool_)
+    step = -(-count // SPANS)
+    spans = [(first, min(first + step, count)) for first in range(0, count, step)]
+    for bits in executor.each(_shoot, shooting, spans, releases_lock=True):
+        matrix |= np.unpackbits(bits, axis=1, count=leaves).astype(np.bool_)
     one, other = portals.leaf.T
     matrix[one, other] = matrix[other, one] = True
     return matrix
 
 
-def confirmed(
-    portals: Portals,
-    pairs: NDArray[np.int32],
-    tries: int,
-    executor: Executor = Serial(),  # noqa: B008 - has no state
-) -> NDArray[np.bool_]:
-    """(n,) which pairs (n, 2) of leaves a line shows to see each other, of ``tries`` aimed ones.
+def _shoot(shared: Shooting, span: tuple[int, int]) -> NDArray[np.uint8]:
+    """As a task: (L, ⌈L / 8⌉) bits, who sees whom by lines of the portals ``span``."""
+    from ptmtools.cells.line_kernels import Openings, sight_lines
 
-    A line leads from a random point of a portal of the one to a random point of a portal of the
-    other.
-
-    Raises what `flow.check` raises.
-    """
-    check(portals)
-    if len(pairs) == 0 or len(portals.leaf) == 0:
-        return np.zeros(len(pairs), dtype=np.bool_)
-    aiming = Aiming(geometry(portals), pairs, tries)
-    hits = executor.each(_aim, aiming, _spans(len(pairs)), releases_lock=True)
-    return np.concatenate(list(hits)) > 0
-
-
-def _spans(count: int) -> Iterator[tuple[int, int]]:
-    """0 … count in a few parts."""
-    step = -(-count // SPANS)
-    return ((first, min(first + step, count)) for first in range(0, count, step))
+    g = shared.geometry
+    openings = Openings(g.point, g.start, g.leaf, g.out_start, g.out)
+    path = np.empty(2 * LONGEST, np.int64)
+    seen = np.zeros((shared.leaf_count, shared.leaf_count), np.bool_)
+    for k in range(*span):
+        rng = np.random.default_rng([shared.seed, k])
+        portal = np.full(shared.lines, k)
+        origin = _points(rng, g, portal)
+        aimed = _points(rng, g, rng.integers(len(g.normal), size=shared.lines)) - origin
+        anywhere = rng.normal(size=origin.shape)
+        along = np.where(rng.random((shared.lines, 1)) < 0.5, aimed, anywhere)
+        speed = along @ g.normal[k]
+        across = np.abs(speed) > g.slack
+        along *= np.sign(speed)[:, None]
+        sight_lines(openings, origin[across], along[across], portal[across], path, seen)
+    return np.packbits(seen, axis=1)
 
 
-def _shoot(shared: Shooting, span: tuple[int, int]) -> NDArray[np.uint64]:
-    from ptmtools.visibility.lines import kernels
-
-    sees = np.zeros((shared.leaf_count, (shared.leaf_count + 63) // 64), np.uint64)
-    kernels.shoot(shared.geometry, *span, shared.lines, shared.seed, sees)
-    return sees
-
-
-def _aim(shared: Aiming, span: tuple[int, int]) -> NDArray[np.int64]:
-    from ptmtools.visibility.lines import kernels
-
-    hit = np.zeros(len(shared.pairs), np.int64)
-    kernels.confirm(shared.geometry, shared.pairs, *span, shared.tries, hit)
-    return hit[slice(*span)]
+def _points(
+    rng: np.random.Generator, g: Geometry, portal: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """(n, 3) a random point of each of (n,) portals, in a random triangle of its fan."""
+    first, size = g.start[portal], np.diff(g.start)[portal]
+    corner = 1 + rng.integers(np.maximum(size - 2, 1))
+    fan = [np.zeros_like(corner), corner, corner + 1]
+    a, b, c = (g.point[first + np.minimum(i, size - 1)] for i in fan)
+    u, v = np.sqrt(rng.random((len(portal), 1))), rng.random((len(portal), 1))
+    points: NDArray[np.float64] = a + u * (b - a + v * (c - b))
+    return points

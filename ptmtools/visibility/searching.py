@@ -12,18 +12,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.visibility.decide import Decisions
-from ptmtools.visibility.hairs import Searched, searched
+from ptmtools.visibility.double_double import SequenceTest
+from ptmtools.visibility.near_ties import Searched, searched
 from ptmtools.visibility.storage import Geometry, Scratch
 
 #: A sequence longer than this is not followed further (its possible set counts as seen).
 DEPTH = 1024
 #: Vertices that clipping may add to a portal before it is left unclipped.
 GROWTH = 24
-#: Words that remember which sequences a search rejected by a hair.
-HAIR = 1 << 16
+#: Words that remember which sequences a search rejected by near ties.
+NEAR_TIE_WORDS = 1 << 16
 
-Tools = tuple[Scratch, Decisions | None]
+Tools = tuple[Scratch, SequenceTest]
 
 
 class Searching:
@@ -31,14 +31,12 @@ class Searching:
 
     Attributes
     ----------
-    geometry: the portals. budget, exact: see `portal_flow`.
+    geometry: the portals. budget: see `portal_flow`.
     known: (2K, W) uint64 rows of bits.
     """
 
-    def __init__(
-        self, geometry: Geometry, known: NDArray[np.uint64], budget: int, exact: bool
-    ) -> None:
-        self.geometry, self.known, self.budget, self.exact = geometry, known, budget, exact
+    def __init__(self, geometry: Geometry, known: NDArray[np.uint64], budget: int) -> None:
+        self.geometry, self.known, self.budget = geometry, known, budget
         self._idle: list[Tools] = []
 
     @property
@@ -52,8 +50,7 @@ class Searching:
         try:
             lent = self._idle.pop()
         except IndexError:
-            exactly = Decisions(self.geometry) if self.exact else None
-            lent = scratch(self.geometry, self.words), exactly
+            lent = scratch(self.geometry, self.words), SequenceTest(self.geometry)
         try:
             yield lent
         finally:
@@ -73,7 +70,7 @@ class Found(NamedTuple):
 def flood_from(shared: Searching, span: tuple[int, int]) -> NDArray[np.uint64]:
     """As a task: (last - first, W) what floods reach from the directed portals ``span`` (first,
     last)."""
-    from ptmtools.visibility.prepass.kernels import flood
+    from ptmtools.visibility.prepass_kernels import flood
 
     first, last = span
     rows = np.zeros((last - first, shared.words), np.uint64)
@@ -85,16 +82,15 @@ def flood_from(shared: Searching, span: tuple[int, int]) -> NDArray[np.uint64]:
 def search_from(shared: Searching, source: int) -> Found:
     """As a task: what the directed portal ``source`` sees."""
     seen = np.zeros(shared.words, np.uint64)
-    with shared.tools() as (storage, exactly):
-        figures = searched(
-            shared.geometry, storage, exactly, shared.known, source, shared.budget, seen
-        )
+    with shared.tools() as (storage, test):
+        given = shared.geometry, storage, test, shared.known, source, shared.budget
+        figures = searched(*given, seen)
     return Found(seen, figures)
 
 
 def settle(shared: Searching, done: tuple[NDArray[np.int64], NDArray[np.uint64]]) -> None:
     """As a change: the (B, W) rows that a batch of (B,) directed portals has found."""
-    from ptmtools.visibility.bits.kernels import drop_unreturned
+    from ptmtools.visibility.bit_kernels import drop_unreturned
 
     batch, seen = done
     dropped = shared.known[batch] & ~seen
@@ -118,5 +114,5 @@ def scratch(g: Geometry, words: int) -> Scratch:
         at=np.zeros(depth, np.int64),
         distance=np.zeros(vertices),
         line=np.zeros((2, 3)),
-        hair=np.zeros(HAIR, np.int64),
+        near_tie=np.zeros(NEAR_TIE_WORDS, np.int64),
     )

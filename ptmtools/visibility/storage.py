@@ -32,31 +32,31 @@ class Scratch(NamedTuple):
 
     polygon: Floats  # (2D + 3, V, 3)
     size: Ints  # (2D + 3,)
-    plane: Floats  # (D + 1, 2V, 4) normal and offset: kept is where n·x >= offset
+    plane: Floats  # (D + 1, 2V, 4) unit normal n and offset d: kept is where n·x + d >= 0
     planes: Ints  # (D + 1,) how many
     might: Bits  # (D, W) bits
     via: Ints  # (D + 1,) the directed portal that led into the frame
     at: Ints  # (D,) next candidate, index into out
     distance: Floats  # (V,)
     line: Floats  # (2, 3) a point and a direction
-    hair: Ints  # (H,) sequences rejected by a hair, each after its length
+    near_tie: Ints  # (H,) sequences of portals rejected by a near tie, each after its length
 
 
-class DoubledPortals(NamedTuple):
-    """Portals in numbers of twice the length of a double, (high, low) along the last axis;
-    `decide` fills it."""
+class DoubleDoublePortals(NamedTuple):
+    """Portals in double-double numbers, (high, low) along the last axis; `double_double` fills
+    it."""
 
     point: Floats  # (Q, 3, 2) at most 1
     start: Ints  # (K + 1,)
     normal: Floats  # (K, 3)
 
 
-class DoubledScratch(NamedTuple):
+class DoubleDoubleScratch(NamedTuple):
     """Working storage of one worker for these."""
 
     polygon: Floats  # (4, V, 3, 2)
     size: Ints  # (4,)
     cuts: Ints  # (4,) how often each polygon was cut
-    plane: Floats  # (2, 2V + 1, 4, 2) normal and offset: kept is where n·x >= offset
+    plane: Floats  # (2, 2V + 1, 4, 2) unit normal n and offset d: kept is where n·x + d >= 0
     side: Floats  # (V, 2)
     vector: Floats  # (2, 3, 2)

@@ -188,7 +188,7 @@ def test_the_reference_has_a_scramble_of_its_own(room_row, seed) -> None:
     assert same.error > 0
 
 
-@pytest.mark.parametrize("built", [PvsOptions(budget=7, exact=False), PvsOptions(method="fast")])
+@pytest.mark.parametrize("built", [PvsOptions(budget=7), PvsOptions(method="fast")])
 def test_visibility_is_tried_alike_whatever_the_database_was_built_with(room_row, built) -> None:
     _, cells = room_row(4)
     asked: list[PvsOptions] = []
@@ -200,12 +200,11 @@ def test_visibility_is_tried_alike_whatever_the_database_was_built_with(room_row
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("ptmtools.tradeoff.visibility.compute_pvs", watched)
         trade = VisibilityTrade(cells, built)
-        assert (asked[0].method, asked[0].budget, asked[0].exact) == ("full", 2_000_000, True)
+        assert (asked[0].method, asked[0].budget) == ("full", 2_000_000)
         asked.clear()
         settings = trade.settings()
         for setting in settings:
             trade.measure(setting)
-    assert [o.exact for o in asked] == ["--no-pvs-exact" not in s.name for s in settings]
     budgets = [s.knobs["budget"] for s in settings if s.family == "budget"]
     assert budgets == sorted({200, 2_000, 20_000, 200_000, built.budget})
     for setting, options in zip(settings, asked, strict=True):

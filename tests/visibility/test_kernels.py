@@ -8,12 +8,12 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ptmtools.visibility import kernels
-from ptmtools.visibility.bits import kernels as bits
+from ptmtools.visibility import bit_kernels as bits
+from ptmtools.visibility import clipping_kernels as clipping
+from ptmtools.visibility import flow_kernels
+from ptmtools.visibility import prepass_kernels as prepass
 from ptmtools.visibility.flow import Portals, geometry
-from ptmtools.visibility.prepass import kernels as prepass
 from ptmtools.visibility.searching import GROWTH, scratch
-from ptmtools.visibility.winding import kernels as winding
 
 SLACK = 1e-12
 Z = np.array([[0.0, 0, 1]])
@@ -41,30 +41,30 @@ def test_clip_is_the_half_plane_intersection(rng, n, c):
     angle = rng.uniform(0, 2 * np.pi)
     normal = np.array([np.cos(angle), np.sin(angle)])
     polygon, size = slots(points)
-    status = winding.clip(polygon, size, 0, np.zeros(polygon.shape[1]), *normal, 0.0, c, SLACK)
+    status = clipping.clip(polygon, size, 0, np.zeros(polygon.shape[1]), *normal, 0.0, -c, SLACK)
     along = np.array([-normal[1], normal[0]])
     half = np.array([-1, 1, 1, -1])[:, None] * 50 * along + np.array([0, 0, 1, 1])[:, None] * (
         50 * normal
     )
     expected = shapely.Polygon(points).intersection(shapely.Polygon(half + c * normal)).area
-    kept = 0.0 if status <= winding.EMPTY else shapely.Polygon(polygon[0, : size[0], :2]).area
+    kept = 0.0 if status <= clipping.EMPTY else shapely.Polygon(polygon[0, : size[0], :2]).area
     assert kept == pytest.approx(expected, abs=1e-9)
-    assert (status == winding.WHOLE) == bool((points @ normal >= c - SLACK).all())
+    assert (status == clipping.WHOLE) == bool((points @ normal >= c - SLACK).all())
 
 
 def test_clip_drops_what_only_touches_and_keeps_a_sliver():
     square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
-    # At 1 + 15 slacks and more it is empty; up to there by a hair.
+    # At 1 + 15 slacks and more it is empty; up to there a near tie.
     for at, status in (
-        (1 + 16 * SLACK, winding.EMPTY),
-        (1 + 14 * SLACK, winding.GRAZED),
-        (1.0, winding.GRAZED),
-        (1 - 1e-9, winding.CUT),
-        (0.0, winding.WHOLE),
+        (1 + 16 * SLACK, clipping.EMPTY),
+        (1 + 14 * SLACK, clipping.NEAR_TIE),
+        (1.0, clipping.NEAR_TIE),
+        (1 - 1e-9, clipping.CUT),
+        (0.0, clipping.WHOLE),
     ):
         polygon, size = slots(square)
         distance = np.zeros(polygon.shape[1])
-        assert winding.clip(polygon, size, 0, distance, 1.0, 0.0, 0.0, at, SLACK) == status
+        assert clipping.clip(polygon, size, 0, distance, 1.0, 0.0, 0.0, -at, SLACK) == status
 
 
 def test_clip_never_overruns_a_slot():
@@ -73,8 +73,8 @@ def test_clip_never_overruns_a_slot():
     polygon, size = slots(teeth)
     polygon = np.ascontiguousarray(polygon[:, : len(teeth) + 1])
     before = polygon[0].copy()
-    status = winding.clip(polygon, size, 0, np.zeros(50), 0.0, 1.0, 0.0, 0.5, SLACK)
-    assert status == winding.WHOLE
+    status = clipping.clip(polygon, size, 0, np.zeros(50), 0.0, 1.0, 0.0, -0.5, SLACK)
+    assert status == clipping.WHOLE
     assert np.array_equal(polygon[0], before)
 
 
@@ -91,7 +91,7 @@ def brute_force_separators(a, b):
                 n /= np.linalg.norm(n)
                 for m in (n, -n):
                     if (a @ m).max() <= (b @ m).min() + 1e-9:
-                        found.append(np.append(m, (b @ m).min() if sign > 0 else (a @ m).max()))
+                        found.append(np.append(m, -(b @ m).min() if sign > 0 else -(a @ m).max()))
     return np.array(found).reshape(-1, 4)
 
 
@@ -105,7 +105,7 @@ def test_separators_are_those_of_brute_force(rng, na, nb):
     polygon, size = slots(a, b)
     plane = np.zeros((1, 2 * polygon.shape[1], 4))
     normal = np.array([Z[0], Z[0] @ turn])
-    count = winding.separate(polygon, size, 0, 0, 1.0, 1, 1, -1.0, normal, plane, 0, SLACK)
+    count = clipping.separate(polygon, size, 0, 0, 1.0, 1, 1, -1.0, normal, plane, 0, SLACK)
     ours, theirs = plane[0, :count], brute_force_separators(a, b)
     assert count > 0
     for one, other in ((ours, theirs), (theirs, ours)):
@@ -121,11 +121,11 @@ def test_no_line_through_both_polygons_leaves_the_separators(rng):
     polygon, size = slots(a, b)
     plane = np.zeros((1, 2 * polygon.shape[1], 4))
     normal = np.concatenate([Z, Z])
-    count = winding.separate(polygon, size, 0, 0, 1.0, 1, 1, -1.0, normal, plane, 0, SLACK)
+    count = clipping.separate(polygon, size, 0, 0, 1.0, 1, 1, -1.0, normal, plane, 0, SLACK)
     p = rng.dirichlet(np.ones(5), 200) @ a
     q = rng.dirichlet(np.ones(4), 200) @ b
     beyond = p + rng.uniform(1, 20, (200, 1)) * (q - p)
-    assert (beyond @ plane[0, :count, :3].T >= plane[0, :count, 3] - 1e-9).all()
+    assert (beyond @ plane[0, :count, :3].T + plane[0, :count, 3] >= -1e-9).all()
 
 
 def test_lowest_set_bit_of_every_word():
@@ -164,7 +164,7 @@ def test_ahead_in_one_plane_and_touching():
     assert not prepass.ahead(g, 1, 2)
 
 
-def test_geometry_winds_polygons_about_their_normals():
+def test_geometry_turns_polygons_counter_clockwise_about_their_normals():
     for points in (SQUARE, SQUARE[::-1]):
         for n in (1.0, -1.0):
             g = two_portals(
@@ -192,7 +192,7 @@ def test_a_chain_longer_than_the_scratch_is_accepted_whole(room_row):
     short = whole._replace(might=whole.might[:3], polygon=whole.polygon[-9:], plane=whole.plane[:4])
     for storage, expected_cut in ((whole, False), (short, True)):
         seen = np.zeros(1, np.uint64)
-        _, cut, *_ = kernels.flow(g, storage, known, 0, 10**6, NONE, False, seen)
+        _, cut, *_ = flow_kernels.flow(g, storage, known, 0, 10**6, NONE, False, seen)
         assert cut == expected_cut
         assert seen[0] == known[0, 0]
 
@@ -219,7 +219,7 @@ def test_a_glance_sees_a_straight_corridor_and_nothing_behind_a_corner(room_row,
         known = np.full((n, 1), (1 << n) - 1, np.uint64)
         known[0, 0] ^= np.uint64(1)
         seen = np.zeros(1, np.uint64)
-        assert kernels.glance(g, known, 0, seen, np.zeros((2, 3))) > 0
+        assert flow_kernels.glance(g, known, 0, seen, np.zeros((2, 3))) > 0
         assert seen[0] == sum(1 << q for q in range(2, last + 1, 2))
 
 

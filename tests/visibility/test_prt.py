@@ -27,7 +27,7 @@ def prt():
 @pytest.fixture(scope="module")
 def dm1(prt, shared):
     portals, cluster = prt.read_prt(shared / "prt" / "dm1.prt")
-    flow = portal_flow(portals, PvsOptions().budget, exact=False)
+    flow = portal_flow(portals, PvsOptions().budget)
     with np.load(shared / "prt" / "dm1.visible.npz") as stored:
         theirs = np.unpackbits(stored["visible"], axis=1, count=stored["shape"][1]).astype(bool)
     return portals, cluster, flow, theirs & theirs.T
@@ -57,8 +57,8 @@ def test_dm1_is_the_same_for_any_number_of_workers(dm1):
     portals, _, flow, _ = dm1
     for budget, expected in ((PvsOptions().budget, flow), (500, None)):
         with Local(3) as local:
-            three = portal_flow(portals, budget, executor=local, exact=False)
-        one = portal_flow(portals, budget, exact=False)
+            three = portal_flow(portals, budget, executor=local)
+        one = portal_flow(portals, budget)
         for other in (three, expected or one):
             assert np.array_equal(one.sees, other.sees)
             assert np.array_equal(one.cut, other.cut)

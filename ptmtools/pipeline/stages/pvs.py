@@ -23,7 +23,7 @@ def _counts(pvs: Pvs) -> Mapping[str, Any]:
         "average_share": pvs.average_share,
         "fallbacks": pvs.fallbacks,
         "ties": int(pvs.ties.sum()),
-        "decided_exactly": int(pvs.decided.sum()),
+        "decided": int(pvs.decided.sum()),
         "opened": int(pvs.opened.sum()),
         "leaks": len(pvs.leak),
         "conservative": pvs.conservative,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ptmtools.compiled import kernel, plain_kernel
-from ptmtools.visibility.bits.kernels import ONE, ZERO, has
+from ptmtools.visibility.bit_kernels import ONE, ZERO, has
+from ptmtools.visibility.clipping_kernels import EMPTY, beyond, load, separate
 from ptmtools.visibility.storage import Bits, Floats, Geometry, Scratch
-from ptmtools.visibility.winding.kernels import EMPTY, beyond, load, separate
 
 
 @plain_kernel

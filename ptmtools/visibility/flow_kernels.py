@@ -3,8 +3,8 @@
 Conventions. Every undirected portal k has a unit normal and is listed counter-clockwise around
 it; the directed portal 2k crosses it along the normal, 2k + 1 against it, so ``q ^ 1`` is the
 way back. Rows of bits are little-endian words over directed portals. Of the slots of polygons
-(see `winding`) frame f of the depth-first search owns 2f (what is left of the source) and 2f + 1
-(what is left of the portal passed last).
+(see `clipping_kernels`) frame f of the depth-first search owns 2f (what is left of the source) and
+2f + 1 (what is left of the portal passed last).
 """
 
 from __future__ import annotations
@@ -12,13 +12,11 @@ from __future__ import annotations
 import numpy as np
 
 from ptmtools.compiled import plain_kernel
-from ptmtools.visibility.bits.kernels import ONE, ZERO, has, lowest
-from ptmtools.visibility.lines.kernels import glance
-from ptmtools.visibility.storage import Bits, Geometry, Ints, Scratch
-from ptmtools.visibility.winding.kernels import (
+from ptmtools.visibility.bit_kernels import ONE, ZERO, has, lowest
+from ptmtools.visibility.clipping_kernels import (
     CUT,
     EMPTY,
-    GRAZED,
+    NEAR_TIE,
     WHOLE,
     beyond,
     clip,
@@ -27,6 +25,8 @@ from ptmtools.visibility.winding.kernels import (
     load,
     separate,
 )
+from ptmtools.visibility.line_kernels import glance
+from ptmtools.visibility.storage import Bits, Geometry, Ints, Scratch
 
 #: Operations after which a search glances, which costs about as much again.
 GLANCE_AFTER = 12_500
@@ -35,13 +35,13 @@ GLANCE_AFTER = 12_500
 @plain_kernel
 def record(s: Scratch, used: int, frame: int, q: int) -> int:
     """Appends the sequence of portals that led into a frame, and q, to the ``used`` words of
-    `Scratch.hair`, if there is room; returns the words now used."""
-    if used + frame + 2 > len(s.hair):
+    `Scratch.near_tie`, if there is room; returns the words now used."""
+    if used + frame + 2 > len(s.near_tie):
         return used
-    s.hair[used] = frame + 1
+    s.near_tie[used] = frame + 1
     for f in range(1, frame + 1):
-        s.hair[used + f] = s.via[f]
-    s.hair[used + frame + 1] = q
+        s.near_tie[used + f] = s.via[f]
+    s.near_tie[used + frame + 1] = q
     return used + frame + 2
 
 
@@ -56,10 +56,10 @@ def mark(sequence: Ints, first: int, count: int) -> np.uint64:
 
 @plain_kernel
 def settled(s: Scratch, opened: Bits, lenient: bool, frame: int, q: int, status: int) -> int:
-    """The status of a clip; GRAZED becomes WHOLE if ``lenient``, or if the sequence of portals that
-    led into the frame, and q, is among the ``opened`` ones, ascending `mark`s."""
-    if status != GRAZED or lenient:
-        return WHOLE if status == GRAZED else status
+    """The status of a clip; NEAR_TIE becomes WHOLE if ``lenient``, or if the sequence of portals
+    that led into the frame, and q, is among the ``opened`` ones, ascending `mark`s."""
+    if status != NEAR_TIE or lenient:
+        return WHOLE if status == NEAR_TIE else status
     if len(opened) == 0:
         return status
     before = s.via[frame + 1]
@@ -82,8 +82,8 @@ def thin_out(
 ) -> tuple[bool, int, int, int]:
     """Drops from a frame's possible portals the unseen ones that its separators hide.
 
-    Returns (whether an unseen one is left, portals tested, how many were dropped by a hair, words
-    of `Scratch.hair` used).
+    Returns (whether an unseen one is left, portals tested, how many of them by a near tie, words
+    of `Scratch.near_tie` used).
     """
     might, plane, count = s.might, s.plane, s.planes[frame]
     left = False
@@ -99,7 +99,7 @@ def thin_out(
                 left = True
             else:
                 might[frame, w] &= ~(ONE << np.uint64(q & 63))
-                if now == GRAZED:
+                if now == NEAR_TIE:
                     ties += 1
                     used = record(s, used, frame, q)
             rest &= rest - ONE
@@ -119,7 +119,7 @@ def flow(
 ) -> tuple[int, bool, int, int]:
     """All directed portals that a line through ``source`` may cross after it.
 
-    Rejections by a hair stand, except of the sequences with `mark`s in ``opened``, ascending, or
+    Rejections by near ties stand, except of the sequences with `mark`s in ``opened``, ascending, or
     of all if ``lenient``.
 
     ``known`` (2K, W) is what each portal may see at most; ``seen`` (W,) the result row,
@@ -127,8 +127,8 @@ def flow(
     search that grows long `glance`s, once: in an open hall nearly all is seen at once, and what is
     left to look out for is little. (Glancing first costs more than it saves where walls are many:
     e1m1 +30 %. Without it, a hall of 1,344 open portals spends its whole budget.)
-    Returns (operations, whether the budget or the depth cut the search short, ties: how many
-    rejections were by a hair, see `winding`, words of `Scratch.hair` that tell which).
+    Returns (operations, whether the budget or the depth cut the search short, how many rejections
+    were near ties, see `clipping_kernels`, words of `Scratch.near_tie` that tell which).
     """
     words = known.shape[1]
     depth = len(s.might)
@@ -137,7 +137,7 @@ def flow(
     normal, ball, slack = g.normal, g.ball, g.slack
     k0 = source >> 1
     s0 = 1.0 if source & 1 == 0 else -1.0
-    floor = g.low[k0] if source & 1 == 0 else -g.high[k0]
+    behind = -g.low[k0] if source & 1 == 0 else g.high[k0]
     load(g.point, g.start, k0, polygon, size, 0)
     for w in range(words):
         might[0, w] = known[source, w]
@@ -178,24 +178,24 @@ def flow(
         a, b = 2 * child, 2 * child + 1
         load(g.point, g.start, k, polygon, size, b)
         n0, n1, n2 = s0 * normal[k0, 0], s0 * normal[k0, 1], s0 * normal[k0, 2]
-        now = clip(polygon, size, b, distance, n0, n1, n2, floor, slack)
+        now = clip(polygon, size, b, distance, n0, n1, n2, behind, slack)
         now = settled(s, opened, lenient, f, q, now)
         for i in range(planes[f]):
             if now <= EMPTY:
                 break
-            n0, n1, n2, c = plane[f, i, 0], plane[f, i, 1], plane[f, i, 2], plane[f, i, 3]
-            if n0 * ball[k, 0] + n1 * ball[k, 1] + n2 * ball[k, 2] - c >= ball[k, 3]:
+            n0, n1, n2, d = plane[f, i, 0], plane[f, i, 1], plane[f, i, 2], plane[f, i, 3]
+            if n0 * ball[k, 0] + n1 * ball[k, 1] + n2 * ball[k, 2] + d >= ball[k, 3]:
                 continue
             ops += 1
-            now = clip(polygon, size, b, distance, n0, n1, n2, c, slack)
+            now = clip(polygon, size, b, distance, n0, n1, n2, d, slack)
             now = settled(s, opened, lenient, f, q, now)
         status = now
         if now > EMPTY:
             copy(polygon, size, 2 * f, a, size[2 * f])
             ops += 1
             n0, n1, n2 = -sq * normal[k, 0], -sq * normal[k, 1], -sq * normal[k, 2]
-            ceiling = g.high[k] if q & 1 == 0 else -g.low[k]
-            now = clip(polygon, size, a, distance, n0, n1, n2, -ceiling, slack)
+            before = g.high[k] if q & 1 == 0 else -g.low[k]
+            now = clip(polygon, size, a, distance, n0, n1, n2, before, slack)
             now = status = settled(s, opened, lenient, f, q, now)
         if now > EMPTY and f > 0:
             passed, last = 2 * f + 1, via[f]
@@ -216,7 +216,7 @@ def flow(
                 now = clip_all(polygon, size, a, distance, plane, depth, n, slack)
                 now = settled(s, opened, lenient, f, q, now)
         if now <= EMPTY:
-            if now == GRAZED:
+            if now == NEAR_TIE:
                 ties += 1
                 used = record(s, used, f, q)
             continue
@@ -231,9 +231,9 @@ def flow(
                 polygon, size, a, k0, s0, b, k, -sq, normal, plane, child, slack
             )
             via[child] = q
-            left, tested, grazed, used = thin_out(g, s, opened, lenient, child, seen, used)
+            left, tested, near, used = thin_out(g, s, opened, lenient, child, seen, used)
             ops += 1 + (tested >> 3)
-            ties += grazed
+            ties += near
             if not left:
                 continue
         if not room or ops >= budget:

@@ -1,8 +1,8 @@
 """Clipping and separating convex polygons in space, compiled.
 
 Polygons live in numbered slots of one scratch array: ``polygon`` (S, V, 3) and ``size`` (S,); the
-last slot is spare. Planes live in rows, ``plane`` (R, P, 4): a unit normal n and an offset c; kept
-is the side n·x >= c.
+last slot is spare. Planes live in rows, ``plane`` (R, P, 4): a unit normal n and an offset d; kept
+is the side in front, n·x + d >= 0.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from ptmtools.compiled import plain_kernel as kernel
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: What clipping left. GRAZED is EMPTY by a hair: the polygon ends within `NEAR` slacks of where it
+#: What clipping left. NEAR_TIE is EMPTY, but the polygon ends within `NEAR` slacks of where it
 #: would have been kept.
-GRAZED, EMPTY, WHOLE, CUT = -1, 0, 1, 2
-#: How many slacks are a hair.
+NEAR_TIE, EMPTY, WHOLE, CUT = -1, 0, 1, 2
+#: How many slacks make a near tie.
 NEAR = 16.0
 #: Edges shorter than this many slacks are left over from clipping; their direction is noise.
 SHORTEST_EDGE = 16.0
@@ -33,23 +33,23 @@ def clip(
     n0: float,
     n1: float,
     n2: float,
-    c: float,
+    offset: float,
     slack: float,
 ) -> int:
-    """Keeps what of a polygon lies at n·x >= c, and ``slack`` more; in place.
+    """Keeps what of a polygon lies at n·x + offset >= 0, and ``slack`` more; in place.
 
-    EMPTY or GRAZED if nothing reaches beyond c + slack. A polygon that would outgrow its slot
-    stays WHOLE.
+    EMPTY or NEAR_TIE if nothing reaches further in front than ``slack``. A polygon that would
+    outgrow its slot stays WHOLE.
     """
     count = size[slot]
     low, high = np.inf, -np.inf
     for i in range(count):
-        d = n0 * polygon[slot, i, 0] + n1 * polygon[slot, i, 1] + n2 * polygon[slot, i, 2] - c
+        d = n0 * polygon[slot, i, 0] + n1 * polygon[slot, i, 1] + n2 * polygon[slot, i, 2] + offset
         distance[i] = d
         low = min(low, d)
         high = max(high, d)
     if high <= slack:
-        return EMPTY if high <= slack - NEAR * slack else GRAZED
+        return EMPTY if high <= slack - NEAR * slack else NEAR_TIE
     if low >= -slack:
         return WHOLE
     spare = len(polygon) - 1
@@ -84,7 +84,7 @@ def copy(polygon: Floats, size: Ints, source: int, target: int, count: int) -> N
 
 @kernel
 def load(point: Floats, start: Ints, k: int, polygon: Floats, size: Ints, slot: int) -> None:
-    """Puts the winding of portal k into a slot."""
+    """Puts the polygon of portal k into a slot."""
     first = start[k]
     count = start[k + 1] - first
     for i in range(count):
@@ -155,12 +155,13 @@ def separators_through(
             far = min(far, m0 * polygon[b, k, 0] + m1 * polygon[b, k, 1] + m2 * polygon[b, k, 2])
         if near > far + slack:
             continue
+        offset = -far
         if flip:
-            m0, m1, m2, far = -m0, -m1, -m2, -near
+            m0, m1, m2, offset = -m0, -m1, -m2, near
         plane[row, count, 0] = m0
         plane[row, count, 1] = m1
         plane[row, count, 2] = m2
-        plane[row, count, 3] = far
+        plane[row, count, 3] = offset
         count += 1
     return count
 
@@ -227,21 +228,21 @@ def beyond(
     count: int,
     slack: float,
 ) -> int:
-    """WHOLE if portal k reaches beyond every plane of a row, else EMPTY or GRAZED."""
+    """WHOLE if portal k reaches beyond every plane of a row, else EMPTY or NEAR_TIE."""
     c0, c1, c2, radius = ball[k, 0], ball[k, 1], ball[k, 2], ball[k, 3]
     for i in range(count):
         n0, n1, n2 = plane[row, i, 0], plane[row, i, 1], plane[row, i, 2]
-        d = n0 * c0 + n1 * c1 + n2 * c2 - plane[row, i, 3]
+        d = n0 * c0 + n1 * c1 + n2 * c2 + plane[row, i, 3]
         if d > slack:
             continue
         if d + radius <= slack - NEAR * slack:
             return EMPTY
         high = -np.inf
         for j in range(start[k], start[k + 1]):
-            d = n0 * point[j, 0] + n1 * point[j, 1] + n2 * point[j, 2] - plane[row, i, 3]
+            d = n0 * point[j, 0] + n1 * point[j, 1] + n2 * point[j, 2] + plane[row, i, 3]
             high = max(high, d)
             if high > slack:
                 break
         if high <= slack:
-            return EMPTY if high <= slack - NEAR * slack else GRAZED
+            return EMPTY if high <= slack - NEAR * slack else NEAR_TIE
     return WHOLE

@@ -1,10 +1,11 @@
-"""Searches whose rejections by a hair are decided again in exact arithmetic.
+"""Searches whose near ties are decided in double-double arithmetic.
 
-A search tells which sequences of portals it rejected by less than the rounding of its arithmetic
-allows to be sure of (`winding`). Another one that lets them all through tells what depends on
-them, mostly nothing. Those on which something depends are put to `Decisions`. Where a line can
-pass one, the search is done again with that let through, as often as this brings up new ones. Where
-there are too many, or a budget ends, all are let through: looser, and conservative as ever.
+A near tie is a sequence of portals that a search rejected by less than the rounding of its
+arithmetic allows to be sure of (`clipping_kernels`). Another search that lets all near ties pass
+tells what depends on them, mostly nothing. Those on which something depends are put to
+`SequenceTest`. Where a line can pass one, the search is done again with that let through, as often
+as this brings up new ones. Where there are too many, or a budget ends, all are let through: looser,
+and conservative as ever.
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.visibility.decide import Decisions
+from ptmtools.visibility.double_double import SequenceTest
 from ptmtools.visibility.storage import Geometry, Scratch
 
-#: Sequences decided exactly for one directed portal, at most.
+#: Sequences tested in double-double for one directed portal, at most.
 DECIDED = 64
 #: No search is done again when this many budgets are spent.
 COSTLIEST = 3
@@ -29,8 +30,8 @@ class Searched(NamedTuple):
     Attributes
     ----------
     cut: whether it was given up for a looser result. work: operations. ties: sequences rejected by
-        a hair. decided: how many of them were decided exactly. opened: how many of those let a
-        line pass.
+        a near tie. decided: how many of them were tested again in double-double. opened: how many
+        of those let a line pass.
     """
 
     cut: bool
@@ -43,23 +44,21 @@ class Searched(NamedTuple):
 def searched(
     g: Geometry,
     s: Scratch,
-    arithmetic: Decisions | None,
+    test: SequenceTest,
     known: NDArray[np.uint64],
     source: int,
     budget: int,
     seen: NDArray[np.uint64],
 ) -> Searched:
     """Fills the zeroed row ``seen`` (W,) with what a directed portal sees; the arguments are those
-    of `kernels.flow`. Without ``arithmetic`` rejections by a hair stand."""
-    from ptmtools.visibility import kernels
+    of `flow_kernels.flow`."""
+    from ptmtools.visibility import flow_kernels as kernels
 
     none = np.zeros(0, np.uint64)
     work, cut, ties, used = kernels.flow(g, s, known, source, budget, none, False, seen)
-    rejected = set(noted := _sequences(s.hair[:used]))
+    rejected = set(noted := _sequences(s.near_tie[:used]))
     overflown = len(noted) < ties
-    if arithmetic is None or not (
-        overflown or _that_matter(known, known[source] & ~seen, rejected)
-    ):
+    if not (overflown or _that_matter(known, known[source] & ~seen, rejected)):
         return Searched(cut, work, ties, 0, 0)
     # With all of them let through, what more is seen? What is seen already need not be found again.
     most = seen.copy()
@@ -71,26 +70,26 @@ def searched(
         if len(passes) + len(new) > DECIDED:
             break
         for sequence in new:
-            passes[sequence] = arithmetic.passes((source, *sequence))
+            passes[sequence] = test.passes((source, *sequence))
         if not any(passes[sequence] for sequence in new):
             return Searched(False, work, ties, len(passes), sum(passes.values()))
         opened = np.sort(np.array([_mark(way) for way, open_ in passes.items() if open_]))
         more, cut, found, used = kernels.flow(g, s, known, source, budget, opened, False, seen)
         work, ties = work + more, max(ties, found)
-        rejected = set(noted := _sequences(s.hair[:used]))
+        rejected = set(noted := _sequences(s.near_tie[:used]))
         overflown = len(noted) < found
     seen |= most
     return Searched(True, work, ties, len(passes), sum(passes.values()))
 
 
 def _mark(sequence: tuple[int, ...]) -> np.uint64:
-    from ptmtools.visibility import kernels
+    from ptmtools.visibility import flow_kernels as kernels
 
     return np.uint64(kernels.mark(np.array(sequence, np.int64), 0, len(sequence)))
 
 
 def _sequences(words: NDArray[np.int64]) -> list[tuple[int, ...]]:
-    """The sequences in `Scratch.hair`, each after its length."""
+    """The sequences in `Scratch.near_tie`, each after its length."""
     row = words.tolist()
     found = []
     at = 0

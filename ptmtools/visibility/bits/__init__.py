@@ -1,1 +1,0 @@
-"""Square matrices of bits: who sees whom, over directed portals."""

@@ -1,0 +1,330 @@
+"""Sequences of portals in double-double arithmetic, compiled.
+
+A number is the unevaluated sum of two doubles, (high, low), the last axis of arrays; ``high`` is
+the sum, rounded: 106 bits. Sums and products are built from error-free transformations (Dekker,
+Numer. Math. 18, 1971; Knuth, TAOCP 2, 4.2.2). Coordinates are at most 1, so that what is computed
+of them is right to `ERROR`.
+
+The clipping is that of the flow, with polygons and half-spaces too large by more than all errors
+together, so that what is found empty is so. Planes are a unit normal n and an offset d; kept is
+n·x + d >= 0.
+
+Why that is certain. A vertex newly cut is computed somewhere on an edge, wrong by less than
+`ERROR`; the same share of the true edge is off by what the ends are. So after k cuts a vertex is
+off by less than (k + 1) · `ERROR` <= `WRONG` from that of a polygon Q, convex and in the portal's
+plane. Sides are computed to far less than `WRONG`. Q contains what is truly left: a plane accepted
+has a gap of at least SLACK / 2 between computed polygons, so of SLACK / 2 - 4 WRONG >= 0 between
+the true ones, and does separate them. It is moved by SLACK, so what is cut off of Q is off the true
+half-space by SLACK - 4 WRONG > 0. What would take too much room is left uncut.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ptmtools.compiled import plain_kernel as kernel
+from ptmtools.visibility.storage import DoubleDoublePortals, DoubleDoubleScratch, Ints
+
+Double = tuple[float, float]
+
+#: More than a product of vectors and a vertex newly cut may be wrong by.
+ERROR = 2.0**-99
+#: How often a polygon is cut, at most.
+CUTS = 255
+#: More than a vertex of a polygon is wrong by, after so many cuts of points rounded once.
+WRONG = (CUTS + 1) * ERROR
+#: By how much polygons and half-spaces are too large. A plane is accepted if it leaves half of this
+#: between two polygons, each wrong by `WRONG`, measured as well as that.
+SLACK = 8 * WRONG
+#: What is less than the greatest by this share in doubles is less.
+ROUGHLY = 2.0**-24
+#: What of the source, of the portal passed last and of the next is left; spare.
+SOURCE, PASSED, NEXT, SPARE = 0, 1, 2, 3
+#: Rows of planes: those that bound all lines so far, and others.
+BOUNDS, OTHERS = 0, 1
+
+_SPLITTER = 2.0**27 + 1.0
+
+
+@kernel
+def two_sum(a: float, b: float) -> Double:
+    """a + b, exactly."""
+    s = a + b
+    t = s - a
+    return s, (a - (s - t)) + (b - t)
+
+
+@kernel
+def two_product(a: float, b: float) -> Double:
+    """a · b, exactly."""
+    p = a * b
+    t = _SPLITTER * a
+    a1 = t - (t - a)
+    a2 = a - a1
+    t = _SPLITTER * b
+    b1 = t - (t - b)
+    b2 = b - b1
+    return p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2
+
+
+@kernel
+def added(a: Double, b: Double) -> Double:
+    """a + b, to 2⁻¹⁰⁴ of |a| + |b|."""
+    s, e = two_sum(a[0], b[0])
+    t, f = two_sum(a[1], b[1])
+    s, e = two_sum(s, e + t)
+    return two_sum(s, e + f)
+
+
+@kernel
+def less(a: Double, b: Double) -> Double:
+    """a - b."""
+    return added(a, (-b[0], -b[1]))
+
+
+@kernel
+def times(a: Double, b: Double) -> Double:
+    """a · b, to 2⁻¹⁰² of it."""
+    p, e = two_product(a[0], b[0])
+    return two_sum(p, e + (a[0] * b[1] + a[1] * b[0]))
+
+
+@kernel
+def over(a: Double, b: Double) -> Double:
+    """a / b, to 2⁻¹⁰⁰ of it."""
+    first = a[0] / b[0]
+    rest = less(a, times(b, (first, 0.0)))
+    second = rest[0] / b[0]
+    rest = less(rest, times(b, (second, 0.0)))
+    s, e = two_sum(first, second)
+    return two_sum(s, e + rest[0] / b[0])
+
+
+@kernel
+def greater(a: Double, b: Double) -> bool:
+    """a > b."""
+    return a[0] > b[0] or (a[0] == b[0] and a[1] > b[1])
+
+
+@kernel
+def side(s: DoubleDoubleScratch, row: int, i: int, slot: int, k: int) -> Double:
+    """n·x + d of plane i of a row and vertex k of a polygon."""
+    n, x = s.plane, s.polygon
+    total = (n[row, i, 3, 0], n[row, i, 3, 1])
+    for a in range(3):
+        product = times((n[row, i, a, 0], n[row, i, a, 1]), (x[slot, k, a, 0], x[slot, k, a, 1]))
+        total = added(total, product)
+    return total
+
+
+@kernel
+def clip(s: DoubleDoubleScratch, row: int, count: int, slot: int) -> bool:
+    """Keeps what of a polygon lies in all half-spaces of a row, in place; whether that is
+    something."""
+    polygon = s.polygon
+    for i in range(count):
+        size = s.size[slot]
+        low, high = np.inf, -np.inf
+        for k in range(size):
+            d = side(s, row, i, slot, k)
+            s.side[k, 0], s.side[k, 1] = d
+            low, high = min(low, d[0]), max(high, d[0])
+        if high <= 0:
+            return False
+        if low >= 0 or size + 2 > polygon.shape[1] or s.cuts[slot] == CUTS:
+            continue
+        s.cuts[slot] += 1
+        m = 0
+        for k in range(size):
+            j = k + 1 if k + 1 < size else 0
+            d, e = (s.side[k, 0], s.side[k, 1]), (s.side[j, 0], s.side[j, 1])
+            if d[0] >= 0:
+                for a in range(3):
+                    polygon[SPARE, m, a, 0] = polygon[slot, k, a, 0]
+                    polygon[SPARE, m, a, 1] = polygon[slot, k, a, 1]
+                m += 1
+            if (d[0] > 0 and e[0] < 0) or (d[0] < 0 and e[0] > 0):
+                share = over(d, less(d, e))
+                for a in range(3):
+                    x = (polygon[slot, k, a, 0], polygon[slot, k, a, 1])
+                    along = less((polygon[slot, j, a, 0], polygon[slot, j, a, 1]), x)
+                    x = added(x, times(share, along))
+                    polygon[SPARE, m, a, 0], polygon[SPARE, m, a, 1] = x
+                m += 1
+        move(s, SPARE, slot, m)
+    return True
+
+
+@kernel
+def move(s: DoubleDoubleScratch, source: int, target: int, count: int) -> None:
+    """Puts the first vertices of one polygon into the place of another."""
+    for i in range(count):
+        for a in range(3):
+            s.polygon[target, i, a, 0] = s.polygon[source, i, a, 0]
+            s.polygon[target, i, a, 1] = s.polygon[source, i, a, 1]
+    s.size[target] = count
+
+
+@kernel
+def load(g: DoubleDoublePortals, s: DoubleDoubleScratch, k: int, slot: int) -> None:
+    """Puts the polygon of portal k into a slot."""
+    first = g.start[k]
+    s.size[slot], s.cuts[slot] = g.start[k + 1] - first, 0
+    for i in range(s.size[slot]):
+        for a in range(3):
+            s.polygon[slot, i, a, 0] = g.point[first + i, a, 0]
+            s.polygon[slot, i, a, 1] = g.point[first + i, a, 1]
+
+
+@kernel
+def separators_through(
+    g: DoubleDoublePortals,
+    s: DoubleDoubleScratch,
+    a: int,
+    q: int,
+    b: int,
+    flip: bool,
+    row: int,
+    count: int,
+) -> int:
+    """Appends to a row the planes that separate polygons ``a`` and ``b`` through the edges of a.
+
+    Polygon a is what is left of directed portal q, which leads towards b. The plane through an edge
+    turns about it, outwards in a's plane + t · normal: the least t that has all of b beyond, and a
+    little more. It is accepted by measuring both polygons. With ``flip`` the kept side is a's, else
+    b's. Returns the planes in the row.
+    """
+    polygon, plane, edge, outward = s.polygon, s.plane, s.vector[0], s.vector[1]
+    k, sign = q >> 1, 1.0 if q & 1 == 0 else -1.0
+    for i in range(s.size[a]):
+        if count == plane.shape[1]:
+            break
+        j = i + 1 if i + 1 < s.size[a] else 0
+        length = 0.0
+        for c in range(3):
+            along = less(
+                (polygon[a, j, c, 0], polygon[a, j, c, 1]),
+                (polygon[a, i, c, 0], polygon[a, i, c, 1]),
+            )
+            edge[c, 0], edge[c, 1] = along
+            length += along[0] * along[0]
+        length = np.sqrt(length)
+        if length <= ERROR:
+            continue
+        for c in range(3):
+            c1, c2 = (c + 1) % 3, (c + 2) % 3
+            x = times((edge[c1, 0], edge[c1, 1]), (g.normal[k, c2] / length, 0.0))
+            y = times((edge[c2, 0], edge[c2, 1]), (g.normal[k, c1] / length, 0.0))
+            outward[c, 0], outward[c, 1] = less(x, y)
+        turn: Double = (-np.inf, 0.0)
+        for m in range(s.size[b]):
+            u: Double = (0.0, 0.0)
+            v: Double = (0.0, 0.0)
+            for c in range(3):
+                r = less(
+                    (polygon[b, m, c, 0], polygon[b, m, c, 1]),
+                    (polygon[a, i, c, 0], polygon[a, i, c, 1]),
+                )
+                u = added(u, times((outward[c, 0], outward[c, 1]), r))
+                v = added(v, times((sign * g.normal[k, c], 0.0), r))
+            if v[0] > ERROR:
+                rough = -u[0] / v[0]
+                if rough + ROUGHLY * (1.0 + abs(rough)) < turn[0]:
+                    continue
+                # By so much more as has the vertex SLACK beyond the plane.
+                more = SLACK * np.sqrt(1.0 + rough * rough) / v[0]
+                t = added(over((-u[0], -u[1]), v), (more, 0.0))
+                if greater(t, turn):
+                    turn = t
+        if turn[0] == -np.inf:
+            continue
+        scale = 1.0 / np.sqrt(1.0 + turn[0] * turn[0])
+        for c in range(3):
+            x = times(turn, (sign * g.normal[k, c], 0.0))
+            x = times(added((outward[c, 0], outward[c, 1]), x), (scale, 0.0))
+            plane[row, count, c, 0], plane[row, count, c, 1] = x
+        plane[row, count, 3, 0] = plane[row, count, 3, 1] = 0.0
+        before: Double = (-np.inf, 0.0)
+        beyond: Double = (np.inf, 0.0)
+        for m in range(s.size[a]):
+            d = side(s, row, count, a, m)
+            if greater(d, before):
+                before = d
+        for m in range(s.size[b]):
+            d = side(s, row, count, b, m)
+            if greater(beyond, d):
+                beyond = d
+        if less(beyond, before)[0] < SLACK / 2:
+            continue
+        offset = (-beyond[0], -beyond[1])
+        if flip:
+            for c in range(3):
+                plane[row, count, c, 0] *= -1.0
+                plane[row, count, c, 1] *= -1.0
+            offset = before
+        plane[row, count, 3, 0], plane[row, count, 3, 1] = added(offset, (SLACK, 0.0))
+        count += 1
+    return count
+
+
+@kernel
+def own_plane(g: DoubleDoublePortals, s: DoubleDoubleScratch, q: int, row: int) -> None:
+    """The first plane of a row := that of directed portal q; kept is what lies beyond it, and
+    SLACK more."""
+    k, sign = q >> 1, 1.0 if q & 1 == 0 else -1.0
+    offset: Double = (SLACK, 0.0)
+    for a in range(3):
+        n = (sign * g.normal[k, a], 0.0)
+        x = (g.point[g.start[k], a, 0], g.point[g.start[k], a, 1])
+        s.plane[row, 0, a, 0], s.plane[row, 0, a, 1] = n
+        offset = less(offset, times(n, x))
+    s.plane[row, 0, 3, 0], s.plane[row, 0, 3, 1] = offset
+
+
+@kernel
+def something_left(g: DoubleDoublePortals, s: DoubleDoubleScratch, sequence: Ints) -> bool:
+    """Whether something is left when a sequence of directed portals is clipped; False is certain.
+
+    The next portal is clipped by all planes so far, the source by the next, the next by those that
+    separate source and passed, the source by those of next and passed; and what separates source
+    and next bounds all lines further on.
+    """
+    first = sequence[0]
+    load(g, s, first >> 1, SOURCE)
+    own_plane(g, s, first, BOUNDS)
+    bounds = 1
+    for i in range(1, len(sequence)):
+        q, last = sequence[i], sequence[i - 1]
+        load(g, s, q >> 1, NEXT)
+        own_plane(g, s, q ^ 1, OTHERS)
+        if not clip(s, BOUNDS, bounds, NEXT) or not clip(s, OTHERS, 1, SOURCE):
+            return False
+        if i > 1:
+            count = separate(g, s, SOURCE, first, PASSED, last ^ 1, OTHERS, 0)
+            if not clip(s, OTHERS, count, NEXT):
+                return False
+            count = separate(g, s, NEXT, q ^ 1, PASSED, last, OTHERS, 0)
+            if not clip(s, OTHERS, count, SOURCE):
+                return False
+        bounds = separate(g, s, SOURCE, first, NEXT, q ^ 1, BOUNDS, 1)
+        move(s, NEXT, PASSED, s.size[NEXT])
+        s.cuts[PASSED] = s.cuts[NEXT]
+    return True
+
+
+@kernel
+def separate(
+    g: DoubleDoublePortals,
+    s: DoubleDoubleScratch,
+    near: int,
+    near_q: int,
+    beyond: int,
+    beyond_q: int,
+    row: int,
+    count: int,
+) -> int:
+    """Row ``row`` from plane ``count`` on := all planes that separate two polygons, left of the
+    directed portals that lead towards each other; kept is the side beyond. Returns the planes in
+    the row."""
+    count = separators_through(g, s, near, near_q, beyond, False, row, count)
+    return separators_through(g, s, beyond, beyond_q, near, True, row, count)

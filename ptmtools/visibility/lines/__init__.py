@@ -1,1 +1,0 @@
-"""Compiled loops that walk straight lines through the portals."""

@@ -1,1 +1,0 @@
-"""A first, quick bound of what each portal sees."""

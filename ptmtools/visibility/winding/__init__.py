@@ -1,1 +1,0 @@
-"""Convex polygons in space: what is left of one behind planes, and the planes between two."""
