@@ -107,7 +107,7 @@ def jobs_for(
     if output == "":
         raise click.BadParameter("the name is empty", None, None, "-o")
     if STANDARD in sources and len(sources) > 1:
-        raise click.UsageError("standard input (-) is to be the only file")
+        raise click.UsageError("standard input (-) must be the only file")
     found = _once(sources)
     named = [name for name in found if name]
     nameless = [Job(name, fault=no_name()) for name in found if not name]
@@ -143,7 +143,7 @@ def _several(name: str) -> bool:
 def no_name() -> InputError:
     """The error for an empty name."""
     return InputError(
-        "PTM-I120", "there is no file without a name", remedy="is a variable of the shell empty?"
+        "PTM-I120", "the name of a file is empty", remedy="check the shell variable that it comes from"
     )
 
 
