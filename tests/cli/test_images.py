@@ -259,12 +259,12 @@ def test_results_stand_above_the_progress_bar(both: bool, folder: Path) -> None:
                 shown += part
         assert run.wait() == 0
     os.close(outer)
-    # What remains of each line once the terminal has done what it was told.
+    # What remains of each line once the terminal has obeyed.
     lines = [
         re.split(rb"\r|\x1b\[[0-9?]*[KAhl]", line.strip(b"\r"))[-1] for line in shown.split(b"\n")
     ]
     results = [line.split(b":")[0] for line in lines if b" levels" in line]
-    assert b"images" in shown
+    assert b"files" in shown
     assert results == ([b"a.ptm", b"b.ptm"] if both else [])
     names = [line.split(b":")[0] for line in Path("out.txt").read_bytes().splitlines()]
     assert names == ([] if both else [b"a.ptm", b"b.ptm"])
