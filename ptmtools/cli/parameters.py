@@ -78,8 +78,8 @@ class OneOf(click.ParamType):  # type: ignore[type-arg]  # generic only in newer
 
     def help(self, text: str | None) -> str:
         """What is said of the option, and then of each name."""
-        names = "; ".join(f"{name}: {declared.about}" for name, declared in self.table.items())
-        return f"{text} — {names}."
+        names = ", ".join(f"{name} ({declared.about})" for name, declared in self.table.items())
+        return f"{text}: {names}."
 
 
 def descriptions(cls: type) -> dict[str, str]:
