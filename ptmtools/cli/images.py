@@ -191,10 +191,10 @@ def _hint_on_lossy(reports: list[Report], options: EncodeOptions) -> str | None:
         return None
     kinds = " and ".join(sorted({report["lossy"] for report in grown}))
     return (
-        f"hint: {kinds} is small because it discards detail; a lossless .ptm of it keeps every "
-        f"texel, noise included. For pictures, --max-error {_HINTED_ERROR} about halves the .ptm: "
-        f"no sample is off by more than {_HINTED_ERROR} (of 255), which is hard to see. Stay at 0 "
-        "where texels are data, such as normals, masks or heights."
+        f"hint: {kinds} files are small because they discard detail; a lossless .ptm keeps every "
+        f"texel of them, noise included. For pictures, --max-error {_HINTED_ERROR} about halves the "
+        f".ptm: no sample is off by more than {_HINTED_ERROR} (of 255), which is hard to see. Stay "
+        "at 0 where texels are data, such as normals, masks or heights."
     )
 
 

@@ -197,7 +197,7 @@ def test_sizes_are_told_beside_those_of_the_input(
     stored, given = os.path.getsize("new/l.ptm"), os.path.getsize("l.jpg")
     assert first.endswith(f", {stored / given:.1f} times l.jpg ({given / 1000:.1f} kB)")
     assert f"% of a.png ({os.path.getsize('a.png') / 1000:.1f} kB)" in second
-    assert hint.startswith("hint: JPEG is small because")
+    assert hint.startswith("hint: JPEG files are small because")
     assert "--max-error 4" in hint
     assert main(["encode", "a.png", "n.webp", "-o", "new", "--force"]) == 0
     assert main(["encode", "l.jpg", "-o", "new", "--force", "--max-error", "1"]) == 0
