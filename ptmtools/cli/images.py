@@ -188,9 +188,9 @@ def _hint_on_lossy(reports: list[Report], options: EncodeOptions) -> str | None:
     kinds = " and ".join(sorted({report["lossy"] for report in grown}))
     return (
         f"hint: {kinds} files are small because they discard detail; a lossless .ptm keeps every "
-        "texel of them, noise included. For pictures, --max-error 4 about halves the .ptm: no sample "
-        "is off by more than 4 (of 255), which is hard to see. Stay at 0 where texels are data, such "
-        "as normals, masks or heights."
+        "texel of them, noise included. For pictures, --max-error 4 about halves the .ptm: no "
+        "sample is off by more than 4 (of 255), which is hard to see. Stay at 0 where texels are "
+        "data, such as normals, masks or heights."
     )
 
 
