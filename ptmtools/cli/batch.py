@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TypeVar
+from typing import IO, Any
 
 import click
 
@@ -19,7 +19,8 @@ from ptmtools.cli.output import Voice, abandon_stdout
 from ptmtools.errors import InputError, OutputError, PtmError, naming
 from ptmtools.files import write_with, writing
 
-Result = TypeVar("Result")
+#: What is said of a file, as in JSON.
+Report = dict[str, Any]
 
 #: As a file name: standard input or output.
 STANDARD = "-"
@@ -107,7 +108,7 @@ def jobs_for(
     if output == "":
         raise click.BadParameter("the name is empty", None, None, "-o")
     if STANDARD in sources and len(sources) > 1:
-        raise click.UsageError("standard input (-) is to be the only file")
+        raise click.UsageError("standard input (-) must be the only file")
     found = _once(sources)
     named = [name for name in found if name]
     nameless = [Job(name, fault=no_name()) for name in found if not name]
@@ -143,7 +144,9 @@ def _several(name: str) -> bool:
 def no_name() -> InputError:
     """The error for an empty name."""
     return InputError(
-        "PTM-I120", "there is no file without a name", remedy="is a variable of the shell empty?"
+        "PTM-I120",
+        "the name of a file is empty",
+        remedy="check the shell variable that it comes from",
     )
 
 
@@ -196,22 +199,24 @@ def _apart(targets: dict[str, Path], folder: Path | None) -> list[Job]:
 def for_each(
     voice: Voice,
     jobs: Sequence[Job],
-    work: Callable[[Job, int], Result],
-    tell: Callable[[Result], object],
+    work: Callable[[Job, int], Report],
+    lines: Callable[[Report], Iterable[str]],
     workers: int,
-    what: str,
-) -> int:
-    """``work(job, threads)`` for every job, several at a time, and ``tell`` of each in their
-    order. A job that fails is reported and the others go on. The first failure's exit status.
+    as_json: bool,
+) -> tuple[int, list[Report]]:
+    """``work(job, threads)`` for every job, several at a time; the first failure's exit status, and
+    the reports of those done, in the order of the jobs.
 
-    One job has all the threads to itself; of several, each has one.
+    What ``lines`` makes of a report is printed, or with ``as_json`` all of them at the end; in both
+    cases a warning in it goes to stderr. A job that fails is reported and the others go on. One job
+    has all the threads to itself; of several, each has one.
     """
     from ptmtools.texture.parallel import ordered
 
     workers = workers or os.cpu_count() or 1
     at_once = min(workers, len(jobs))
 
-    def guarded(job: Job) -> Result | Exception:
+    def guarded(job: Job) -> Report | Exception:
         if job.fault:
             return job.fault
         try:
@@ -220,16 +225,23 @@ def for_each(
             return fault
 
     status = 0
+    reports: list[Report] = []
     with voice.progress() as progress:
         for done, result in enumerate(ordered(guarded, jobs, at_once)):
-            progress(done, len(jobs), what)
+            progress(done, len(jobs), "files")
             if isinstance(result, Exception):
                 with voice.above_progress():
                     failed = report(result, voice.verbose)
                 status = status or failed
-            else:
-                tell(result)
-    return status
+                continue
+            reports.append(result)
+            if result.get("warning"):
+                voice.warn(f"{result['file']}: {result['warning']}")
+            for line in lines(result) if not as_json else ():
+                voice.say(line)
+    if as_json:
+        voice.emit_json(reports)
+    return status, reports
 
 
 def standard_input() -> bytes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import wraps
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import click
 
-from ptmtools.cli.batch import STANDARD, Job, expanded, for_each, jobs_for, standard_input
+from ptmtools.cli.batch import STANDARD, Job, Report, expanded, for_each, jobs_for, standard_input
 from ptmtools.cli.common import as_json, forced, limited, voiced, workers
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import Numbers, options_of, take
@@ -23,10 +23,6 @@ from ptmtools.texture.profiles import PROFILES
 
 if TYPE_CHECKING:
     from ptmtools.texture.model import Limits
-
-
-#: Of the allowed errors that the hint on lossy images proposes, and what it does to their size.
-_HINTED_ERROR = 4
 
 
 def _skipping(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -104,11 +100,10 @@ def encode(
     voice.aside = any(job.to_stdout for job in jobs)
     if output and any(job.target and not job.folder for job in jobs):
         _refuse_image_suffix(output)
-    reports: list[dict[str, Any]] = []
 
-    def work(job: Job, threads: int) -> dict[str, Any]:
+    def work(job: Job, threads: int) -> Report:
         source, target = job.source, job.target
-        report: dict[str, Any] = {
+        report: Report = {
             "image": source,
             "file": os.fspath(target) if target else STANDARD,
             "skipped": _skipped(target, force, skip_existing),
@@ -142,32 +137,27 @@ def encode(
             job.put(write, force)
         return report
 
-    def tell(report: dict[str, Any]) -> None:
-        reports.append(report)
-        if as_json:
-            return
+    def lines(report: Report) -> Iterator[str]:
         if report["skipped"]:
-            voice.say(f"{report['file']}: exists and was skipped")
+            yield f"{report['file']}: exists and was skipped"
             return
         raw, stored, image = (report[f"{what}_bytes"] for what in ("raw", "ptm", "image"))
         name = "the input" if report["image"] == STANDARD else os.path.basename(report["image"])
         beside = f", {_share(stored, image)} {name} ({size(image)})" if image else ""
-        voice.say(
+        yield (
             f"{report['file']}: {count(report['levels'], 'level')}, {size(stored)}: "
             f"{_share(stored, raw)} the raw texels ({size(raw)}){beside}"
         )
         if note := _note_on_sides(report, options.max_side):
-            voice.say(f"  {note}")
+            yield f"  {note}"
 
-    status = for_each(voice, jobs, work, tell, workers, "images")
-    if as_json:
-        voice.emit_json(reports)
-    elif hint := _hint_on_lossy(reports, options):
+    status, reports = for_each(voice, jobs, work, lines, workers, as_json)
+    if not as_json and (hint := _hint_on_lossy(reports, options)):
         voice.say(hint)
     return status
 
 
-def _note_on_sides(report: dict[str, Any], max_side: int) -> str | None:
+def _note_on_sides(report: Report, max_side: int) -> str | None:
     """What ``--max-side`` made of an image whose sides do not halve to it."""
     width, height = report["finest"]
     if not max_side or max(width, height) == max_side:
@@ -185,7 +175,7 @@ def _note_on_sides(report: dict[str, Any], max_side: int) -> str | None:
     )
 
 
-def _hint_on_lossy(reports: list[dict[str, Any]], options: EncodeOptions) -> str | None:
+def _hint_on_lossy(reports: list[Report], options: EncodeOptions) -> str | None:
     """What helps where lossless files have become larger than the lossy images they come from."""
     grown = [
         report
@@ -198,10 +188,10 @@ def _hint_on_lossy(reports: list[dict[str, Any]], options: EncodeOptions) -> str
         return None
     kinds = " and ".join(sorted({report["lossy"] for report in grown}))
     return (
-        f"hint: {kinds} is small because it discards detail; a lossless .ptm of it keeps every "
-        f"texel, noise included. For pictures, --max-error {_HINTED_ERROR} about halves the .ptm: "
-        f"no sample is off by more than {_HINTED_ERROR} (of 255), which is hard to see. Stay at 0 "
-        "where texels are data, such as normals, masks or heights."
+        f"hint: {kinds} files are small because they discard detail; a lossless .ptm keeps every "
+        "texel of them, noise included. For pictures, --max-error 4 about halves the .ptm: no "
+        "sample is off by more than 4 (of 255), which is hard to see. Stay at 0 where texels are "
+        "data, such as normals, masks or heights."
     )
 
 
@@ -268,9 +258,8 @@ def decode(
     if named:
         with naming(output):
             writer(Path(str(output)).suffix)
-    reports: list[dict[str, Any]] = []
 
-    def work(job: Job, threads: int) -> dict[str, Any]:
+    def work(job: Job, threads: int) -> Report:
         source, target = job.source, job.target
         where = standard_input() if source == STANDARD else source
         with naming(source), open(where, limits=limits, threads=threads) as ptm:
@@ -279,7 +268,7 @@ def decode(
                 suffix = target.suffix
             elif target:
                 target = target.with_name(target.name + suffix)
-            report: dict[str, Any] = {
+            report: Report = {
                 "file": source,
                 "image": os.fspath(target) if target else STANDARD,
                 "skipped": _skipped(target, force, skip_existing),
@@ -304,30 +293,21 @@ def decode(
             "height": height,
             "components": components,
             "kind": texels.dtype.name,
-            "warning": warning and f"{warning.message} [{warning.code}]",
+            "warning": warning
+            and f"written without colour and orientation: {warning.message} [{warning.code}]",
         }
 
-    def tell(report: dict[str, Any]) -> None:
-        reports.append(report)
-        if report.get("warning"):
-            voice.warn(
-                f"{report['file']}: written without colour and orientation: {report['warning']}"
-            )
-        if as_json:
-            return
+    def lines(report: Report) -> Iterator[str]:
         if report["skipped"]:
-            voice.say(f"{report['image']}: exists and was skipped")
+            yield f"{report['image']}: exists and was skipped"
             return
         kind = "" if report["kind"] == "uint8" else f" of {report['kind']}"
-        voice.say(
+        yield (
             f"{report['image']}: {report['width']} x {report['height']}, "
             f"{count(report['components'], 'component')}{kind}, level {report['level']}"
         )
 
-    status = for_each(voice, jobs, work, tell, workers, "files")
-    if as_json:
-        voice.emit_json(reports)
-    return status
+    return for_each(voice, jobs, work, lines, workers, as_json)[0]
 
 
 def _refuse_image_suffix(output: str) -> None:

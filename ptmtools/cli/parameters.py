@@ -83,7 +83,7 @@ class Named(click.ParamType):  # type: ignore[type-arg]  # generic only in newer
     @property
     def explained(self) -> str:
         """What each name stands for."""
-        return "; ".join(f"{name}: {declared.about}" for name, declared in self.table.items())
+        return ", ".join(f"{name} ({declared.about})" for name, declared in self.table.items())
 
 
 def descriptions(cls: type) -> dict[str, str]:
@@ -222,7 +222,7 @@ def _option(field: Field[Any], hint: Any, text: str | None, former: str = "") ->
         flag = f"{flag}/--no-{name}"
     elif (table := field.metadata.get("choices")) is not None:
         settings["type"] = named = Named(table, several=field.metadata.get("several", False))
-        settings["help"] = text and f"{text} — {named.explained}."
+        settings["help"] = text and f"{text}: {named.explained}."
     elif get_origin(hint) is Literal:
         settings["type"] = click.Choice([str(choice) for choice in get_args(hint)])
     elif counts := field.metadata.get("numbers"):

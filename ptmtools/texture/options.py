@@ -24,12 +24,12 @@ def check_options(options: EncodeOptions) -> None:
         )
     if options.min_side < 1 or options.max_side < 0:
         raise _impossible(
-            "the least or largest side of a level is impossible",
-            "min_side must be at least 1; max_side at least 1, or 0 for no limit",
+            "min_side or max_side is impossible",
+            "min_side must be at least 1, max_side at least 1 or 0 for no limit",
         )
     first, last = options.min_level, options.max_level
     if (first < 0) == (last < 0) and first > last:
-        raise _impossible(f"levels {first} to {last} are none", "min_level is the coarser one")
+        raise _impossible(f"there are no levels {first} to {last}", "min_level is the coarser one")
     low, high = TILE_SIDES
     if options.tile and not (low <= options.tile <= high and options.tile % 2 == 0):
         raise _impossible(
@@ -37,11 +37,11 @@ def check_options(options: EncodeOptions) -> None:
             f"use an even number from {low} to {high}, or 0 for none",
         )
     if options.max_error < 0:
-        raise _impossible("an error below 0 is impossible", "use 0 for none")
+        raise _impossible("max_error is below 0", "use 0 for none")
     if options.max_error and not PROFILES[options.profile].lossy:
         others = " or ".join(name for name, profile in PROFILES.items() if profile.lossy)
         raise _impossible(
-            f"profile {options.profile!r} is always exact", f"use {others} with an error"
+            f"profile {options.profile!r} is always exact", f"for an allowed error use {others}"
         )
 
 

@@ -316,16 +316,19 @@ class PtmReader:
         """Offset, length and CRC-32 of every tile of a level."""
         import numpy as np
 
-        count = level.tiles[0] * level.tiles[1]
-        size = count * TILE_ENTRY.size
-        if size > level.length:
-            raise _contradiction(place)
-        data = self._checked(level.offset, size, level.crc32, place)
-        entries = np.frombuffer(data, "<u4").reshape(-1, 2)
-        ends = level.offset + size + np.cumsum(entries[:, 0], dtype=np.int64)
-        if ends[-1] != level.end:
-            raise _contradiction(place)
-        return _Index(entries, ends)
+        size = level.tiles[0] * level.tiles[1] * TILE_ENTRY.size
+        if size <= level.length:
+            data = self._checked(level.offset, size, level.crc32, place)
+            entries = np.frombuffer(data, "<u4").reshape(-1, 2)
+            ends = level.offset + size + np.cumsum(entries[:, 0], dtype=np.int64)
+            if ends[-1] == level.end:
+                return _Index(entries, ends)
+        raise InputError(
+            "PTM-I112",
+            "the index of its tiles contradicts its length",
+            place=place,
+            remedy="the file is damaged or its encoder does not conform; encode it again",
+        )
 
     def _checked(self, offset: int, length: int, crc32: int, place: str) -> bytes:
         data = self._ranges.read(offset, length)
@@ -333,7 +336,13 @@ class PtmReader:
             self._end = offset + len(data)
             raise self._cut(place)
         if zlib.crc32(data) != crc32:
-            raise _wrong_checksum(place)
+            raise InputError(
+                "PTM-I108",
+                "the checksum is wrong",
+                place=place,
+                remedy="the file is damaged, but coarser levels may be intact; fetch or encode it "
+                "again",
+            )
         return data
 
     def _cut(self, place: str, whole: int | None = None) -> InputError:
@@ -367,21 +376,3 @@ class _State:
     texels: Samples
     box: Box
     memory: Any
-
-
-def _wrong_checksum(place: str) -> InputError:
-    return InputError(
-        "PTM-I108",
-        "the checksum is wrong",
-        place=place,
-        remedy="the file is damaged: fetch or encode it again; coarser levels may be intact",
-    )
-
-
-def _contradiction(place: str) -> InputError:
-    return InputError(
-        "PTM-I112",
-        "the index of its tiles contradicts its length",
-        place=place,
-        remedy="the file is damaged or was not written by a conforming encoder; encode it again",
-    )

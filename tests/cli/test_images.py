@@ -140,12 +140,11 @@ def test_where_results_go(named: list[str], output: str, made: list[str], folder
     assert main(["-q", "encode", *named, "-o", output, "--profile", "raw"]) == 0
     found = {path for path in folder.rglob("*") if path.is_file()} - before
     assert sorted(path.relative_to(folder).as_posix() for path in found) == made
-    # And back.
-    output = output.replace(".ptm", ".png")
-    named = ["new/*" if name.startswith("new/") else name for name in made[:1]]
+    # And back, the same way.
     if made != ["new"]:
-        assert main(["-q", "decode", *made, "-o", f"back/{output}/"]) == 0
-        assert len(list((folder / "back" / output).iterdir())) == len(made)
+        assert main(["-q", "decode", *made, "-o", "back/"]) == 0
+        names = sorted(path.stem for path in Path("back").iterdir())
+        assert names == [Path(name).stem for name in made]
 
 
 def test_a_folder_is_made_only_where_one_is_meant(
@@ -167,18 +166,17 @@ def test_what_exists_is_skipped_if_asked_for(
     encoding = ["encode", ".", "-o", "new", "--profile", "raw"]
     Path("new").mkdir()
     Path("new/a.ptm").write_bytes(encode(RGB, RAW))
-    assert main([*encoding]) == 4
+    assert main(encoding) == 4
     Path("new/b.ptm").unlink()
     capsys.readouterr()
     assert main([*encoding, "--skip-existing"]) == 0
     first, second = capsys.readouterr().out.splitlines()
     assert first == "new/a.ptm: exists and was skipped"
     assert second.startswith("new/b.ptm: 5 levels")
-    assert main(["decode", "new", "--skip-existing", "--json"]) == 0
-    assert main(["decode", "new", "--skip-existing", "--json"]) == 0
-    made, skipped = json.JSONDecoder().raw_decode(text := capsys.readouterr().out)[0], text
-    assert [report["skipped"] for report in made] == [False, False]
-    assert skipped.count('"skipped": true') == 2
+    for skipped in (False, True):
+        assert main(["decode", "new", "--skip-existing", "--json"]) == 0
+        reports = json.loads(capsys.readouterr().out)
+        assert [report["skipped"] for report in reports] == [skipped, skipped]
     assert main([*encoding, "--skip-existing", "--force"]) == 2
 
 
@@ -196,12 +194,10 @@ def test_sizes_are_told_beside_those_of_the_input(
         image.save(name, **options)
     assert main(["encode", "l.jpg", "a.png", "-o", "new"]) == 0
     first, second, hint = capsys.readouterr().out.splitlines()
-    stored = os.path.getsize("new/l.ptm")
-    assert first.endswith(f"{stored / os.path.getsize('l.jpg'):.1f} times l.jpg (1.5 kB)") or (
-        f"times l.jpg ({os.path.getsize('l.jpg') / 1000:.1f} kB)" in first
-    )
+    stored, given = os.path.getsize("new/l.ptm"), os.path.getsize("l.jpg")
+    assert first.endswith(f", {stored / given:.1f} times l.jpg ({given / 1000:.1f} kB)")
     assert f"% of a.png ({os.path.getsize('a.png') / 1000:.1f} kB)" in second
-    assert hint.startswith("hint: JPEG is small because")
+    assert hint.startswith("hint: JPEG files are small because")
     assert "--max-error 4" in hint
     assert main(["encode", "a.png", "n.webp", "-o", "new", "--force"]) == 0
     assert main(["encode", "l.jpg", "-o", "new", "--force", "--max-error", "1"]) == 0
@@ -259,12 +255,12 @@ def test_results_stand_above_the_progress_bar(both: bool, folder: Path) -> None:
                 shown += part
         assert run.wait() == 0
     os.close(outer)
-    # What remains of each line once the terminal has done what it was told.
+    # What remains of each line once the terminal has obeyed.
     lines = [
         re.split(rb"\r|\x1b\[[0-9?]*[KAhl]", line.strip(b"\r"))[-1] for line in shown.split(b"\n")
     ]
     results = [line.split(b":")[0] for line in lines if b" levels" in line]
-    assert b"images" in shown
+    assert b"files" in shown
     assert results == ([b"a.ptm", b"b.ptm"] if both else [])
     names = [line.split(b":")[0] for line in Path("out.txt").read_bytes().splitlines()]
     assert names == ([] if both else [b"a.ptm", b"b.ptm"])

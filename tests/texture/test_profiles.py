@@ -65,7 +65,9 @@ def test_a_toy_profile_works_everywhere(
     np.testing.assert_array_equal(decode(bytes(data), 2), decode(encode(TEXELS), 2))
     data[-1] ^= 1
     assert "PTM-I108" in check(bytes(data))[0]
-    with pytest.raises(InputError, match="'toy' is always exact; use fast or small"):
+    with pytest.raises(
+        InputError, match="'toy' is always exact; for an allowed error use fast or small"
+    ):
         encode(TEXELS, EncodeOptions("toy", max_error=1))
 
 
@@ -91,4 +93,4 @@ def test_the_table_is_what_the_pages_say(capsys: pytest.CaptureFixture[str]) -> 
     assert main(["encode", "--help"]) == 0
     text = " ".join(capsys.readouterr().out.split())
     for name, profile in PROFILES.items():
-        assert f"{name}: {profile.about}" in text
+        assert f"{name} ({profile.about})" in text

@@ -63,7 +63,8 @@ def writer(suffix: str) -> Writer:
     """What writes files of that suffix. Raises OutputError PTM-O101."""
     found = WRITTEN.get(suffix.lower())
     if found is None:
-        why = "would change the texels" if suffix.lower() in LOSSY else "is not written"
+        lossy = suffix.lower() in LOSSY
+        why = "is lossy and would change the texels" if lossy else "is not written"
         raise OutputError(
             "PTM-O101",
             f"the suffix {suffix!r} {why}",

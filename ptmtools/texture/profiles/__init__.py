@@ -56,7 +56,7 @@ PROFILES = {
         Profile(
             "small",
             2,
-            "for archives: smaller, but 30 to 60 times slower",
+            "for archives; smaller, but 30 to 60 times slower",
             f"{__name__}.small",
             lossy=True,
         ),
