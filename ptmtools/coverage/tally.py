@@ -226,4 +226,5 @@ class PixelCounter:
         centre = (2.0 * np.arange(self._face) + 1.0) / self._face - 1.0
         x, y = (centre + shift[:, None] for shift in (points.shift / self._face).T)
         weight = self.unit / (1.0 + x[:, None, :] ** 2 + y[:, :, None] ** 2) ** 1.5
-        return np.asarray(np.round(weight).astype(np.int64).reshape(len(points), -1))
+        rounded: NDArray[np.int64] = np.round(weight).astype(np.int64)
+        return rounded.reshape(len(points), -1)

@@ -206,7 +206,7 @@ def test_points_inside_a_column_are_replaced(room_row, furnish):
     assert abs(ach.row(0)[1] - open_space.row(0)[1]) < 0.05
 
 
-def test_a_part_full_of_matter_gives_no_sample(room_row, furnish):
+def test_a_part_inside_a_solid_gives_no_sample(room_row, furnish):
     scene, cells = room_row(2)
     filled = furnish(scene, cells, column((1e-4, -0.3), (2.3, 2 - 1e-4)), [(0, 0)] * 6)
     ach = compute_ach(*filled, all_visible(2), replace(EIGHT, backend="embree", face=16))
@@ -214,7 +214,7 @@ def test_a_part_full_of_matter_gives_no_sample(room_row, furnish):
     assert ach.rejected[0] >= 2 * TRIES
 
 
-def test_a_cell_without_any_usable_point_is_still_looked_at(room_row, furnish, backend):
+def test_a_cell_without_any_usable_point_has_hints_all_the_same(room_row, furnish, backend):
     scene, cells = room_row(2)
     filled = furnish(scene, cells, column((1e-4, 1e-4 - 2), (4 - 1e-4, 2 - 1e-4)), [(0, 0)] * 6)
     ach = compute_ach(*filled, all_visible(2), replace(EIGHT, backend=backend, face=16))

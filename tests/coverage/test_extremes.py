@@ -1,4 +1,4 @@
-"""Tiny, huge, far away, turned, mirrored; a hair before a wall; a cell of a millimetre; hardly
+"""Tiny, huge, far away, turned, mirrored; just before a wall; a cell of a millimetre; hardly
 anything or very much to see."""
 
 from __future__ import annotations

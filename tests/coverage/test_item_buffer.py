@@ -270,7 +270,9 @@ def test_an_unexpected_cell_is_believed_only_if_a_ray_confirms_it(room_row, samp
     assert counted(wrong, [0, 1]) == [*truth[:2], truth[2]], "what room 2 really covers is missed"
 
 
-def test_what_reaches_in_a_hair_is_seen_where_it_is(room_row, furnish, sample_points):
+def test_what_reaches_in_by_less_than_a_tolerance_is_seen_where_it_is(
+    room_row, furnish, sample_points
+):
     """The end of a wall that belongs to room 2, a tenth of a millimetre deep in room 1: from room
     1, which cannot see room 2, it is part of room 1."""
     scene, cells = room_row(3)
