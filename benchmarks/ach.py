@@ -245,8 +245,8 @@ def watched(renderer: Any) -> Stopwatch:
     if isinstance(renderer, OpenGLRenderer):
         renderer._draw = watch.timed(renderer._draw)  # type: ignore[method-assign]
     else:
-        for tree in (renderer._opaque, renderer._transparent):
-            if not tree.empty:
+        for tree in renderer._trees:
+            if tree._tree is not None:
                 tree._tree = TimedTree(tree._tree, watch)
     return watch
 

@@ -23,7 +23,7 @@ GROUPS = 8
 #: Student's t for GROUPS - 1 degrees of freedom, two-sided 95 %. One-sided would be 1.895, but
 #: distances lean to one side: where two cells share the view, that bound held in 91 % of the cases.
 STUDENT_T = 2.365
-#: Rule of three: what was not met in K trials happens in less than 3/K of all, at 95 %.
+#: Rule of three: what did not happen in K trials happens in less than 3/K of all, at 95 %.
 RULE_OF_THREE = 3.0
 
 
@@ -35,7 +35,7 @@ class Row:
     ----------
     value: (n,) float64 share of what is seen; sums to 1.
     pixels: (n,) float64 pixels, weighted.
-    error: (n,) float64 standard error of `value`; NaN where no pixel was met, or with one point.
+    error: (n,) float64 standard error of `value`; NaN where no pixel showed it, or with one point.
     p95: (n,) float64 the share that is exceeded from 5 % of the points.
     seen: (n,) float64 share of the points from which it is seen.
     views: (n, 6) float64 the same share for each of the six views alone; each column sums to 1.

@@ -25,7 +25,7 @@ class Ach:
         was covered has 1 for itself.
     pixels: (n,) float64 the pixels counted, N_j of the paper; weighted by their solid angle over
         that of a pixel in the middle of a view, if that was asked for.
-    error: (n,) float64 standard error of `value`; NaN for an entry that was never met (see
+    error: (n,) float64 standard error of `value`; NaN for an entry that no point saw (see
         `unseen_below`) and where there was one sample point only.
     p95: (n,) float64 the share that is exceeded from at most 5 % of the sample points.
     seen: (n,) float64 share of the sample points from which the entry was seen.
@@ -37,9 +37,10 @@ class Ach:
     rejected: (C,) int32 sample points rejected: inside a solid, or too near to a surface.
     uncertain: (C,) float64 bound of the total variation between the row and the truth, at about
         95 %; NaN with fewer than eight sample points.
-    unseen_below: (C,) float64 an entry never met is seen from less than this share of the cell, at
-        95 % (rule of three).
-    floor: (C,) float64 what a client may take for an entry never met: half a pixel's share.
+    unseen_below: (C,) float64 an entry that no point saw is seen from less than this share of the
+        cell, at 95 % (rule of three).
+    floor: (C,) float64 what a client may take for an entry that no point saw: half a pixel's
+        share.
     texture_start, texture, texture_value: (n + 1,) int64 CSR over entries, (m,) int32 images of the
         scene, -1 for what has none, ascending within an entry, and (m,) float64 their shares, which
         sum to the entry's `value`. Empty unless asked for.

@@ -45,7 +45,7 @@ class Measured:
     ----------
     seconds: of one process, for the whole database.
     work: in the units that the experiment names; does not depend on the machine.
-    error: as the experiment names it; the mean over what was looked at.
+    error: as the experiment names it; the mean over what was tried.
     worst: the greatest error of them.
     more: other figures, by name.
     note: how it was done, where that may differ.

@@ -29,11 +29,18 @@ def has_gl() -> bool:
     return True
 
 
-@pytest.fixture(params=["gl", "embree"])
-def backend(request, has_gl, require) -> str:
-    """Each backend in turn; a missing OpenGL is reported."""
-    if request.param == "gl" and not has_gl:
+@pytest.fixture
+def gl(has_gl, require) -> None:
+    """For tests that need OpenGL; a missing one is reported."""
+    if not has_gl:
         require("OpenGL", APT)
+
+
+@pytest.fixture(params=["gl", "embree"])
+def backend(request) -> str:
+    """Each backend in turn."""
+    if request.param == "gl":
+        request.getfixturevalue("gl")
     return request.param
 
 
@@ -75,12 +82,6 @@ def counted(
     counter = PixelCounter(renderer, surfaces, cells, face)
     tally = counter.count(at, np.arange(surfaces.cell_count))
     return np.append(tally.in_views.sum(axis=0), tally.missed.sum())
-
-
-@pytest.fixture(scope="session")
-def count() -> Callable[..., np.ndarray]:
-    """``count(renderer, surfaces, cells, points, face)``: pixels of each cell, then of none."""
-    return counted
 
 
 @pytest.fixture(scope="session")

@@ -107,26 +107,22 @@ def test_points_that_see_nothing_count_as_points():
     assert row.p95.tolist() == [1.0, 0.5]
 
 
-def test_nothing_seen_at_all():
-    row = estimated(np.zeros((9, 6, 3), dtype=np.int64), grouped(9), 1)
-    assert row.value.tolist() == [1, 0, 0]
-    assert row.seen.tolist() == row.p95.tolist() == row.pixels.tolist() == [0, 0, 0]
+@pytest.mark.parametrize(
+    ("at_points", "value", "seen"),
+    [
+        (np.zeros((9, 3), int), [1, 0, 0], [0, 0, 0]),
+        (np.zeros((0, 2), int), [1, 0], [0, 0]),
+        (np.array([[7, 1]]), [0.875, 0.125], [1, 1]),
+    ],
+)
+def test_nothing_seen_no_points_and_one_say_nothing_of_errors(at_points, value, seen):
+    row = estimated(in_all_views(at_points), grouped(len(at_points)), 1)
+    assert row.value.tolist() == value
+    assert row.seen.tolist() == seen
+    assert row.p95.tolist() == [v * s for v, s in zip(value, seen, strict=True)]
+    assert row.pixels.tolist() == at_points.sum(axis=0).tolist()
     assert np.isnan(row.error).all()
-
-
-def test_no_points_at_all():
-    row = estimated(np.zeros((0, 6, 2), dtype=np.int64), grouped(0), 1)
-    assert row.value.tolist() == [1, 0]
-    assert row.p95.tolist() == row.seen.tolist() == [0, 0]
-    assert np.isnan(row.error).all()
-    assert math.isnan(row.uncertain)
-
-
-def test_one_point_says_nothing_of_its_error():
-    row = estimated(in_all_views(np.array([[7, 1]])), grouped(1), 1)
-    assert row.value.tolist() == [0.875, 0.125]
-    assert np.isnan(row.error).all()
-    assert math.isnan(row.uncertain)
+    assert math.isnan(row.uncertain) == (len(at_points) < GROUPS)
 
 
 def test_what_was_never_met_has_no_error_of_0():

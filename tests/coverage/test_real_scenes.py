@@ -13,7 +13,6 @@ import pytest
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.subdivision import subdivide
 from ptmtools.coverage.ach import compute_ach
-from ptmtools.coverage.backends.opengl import APT
 from ptmtools.coverage.options import AchOptions
 from ptmtools.scene.ingestion import ingest
 from ptmtools.visibility.pvs import compute_pvs
@@ -46,14 +45,10 @@ def assert_backends_agree(model: Path, transparent: bool) -> None:
     assert np.abs(one.pixels - other.pixels).sum() / 2 / covered <= 1e-4
 
 
-def test_the_hospital(shared, has_gl, require):
-    if not has_gl:
-        require("OpenGL", APT)
+def test_the_hospital(shared, gl):
     assert_backends_agree(shared / "scenes/hospital/hospital.obj", transparent=False)
 
 
-def test_the_museum(museum, has_gl, require):
+def test_the_museum(museum, gl):
     """Its windows are of transparent glass."""
-    if not has_gl:
-        require("OpenGL", APT)
     assert_backends_agree(museum, transparent=True)

@@ -1,4 +1,4 @@
-"""Which points are usable: clearance exactly, matter for closed surfaces only."""
+"""Which points are usable: clearance exactly, inside closed surfaces only."""
 
 from __future__ import annotations
 

@@ -11,7 +11,6 @@ import pytest
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.errors import InputError
-from ptmtools.executors import Local
 from ptmtools.pipeline.stages import ACH
 from ptmtools.visibility.model import Pvs
 
@@ -155,17 +154,6 @@ def test_uniform_points_reach_a_tolerance_too(room_row, exact_row):
     sobol = compute_ach(*room_row(2), all_visible(2), replace(options, placement="sobol"))
     assert (variation(matrix(ach, all_visible(2)), exact_row(2)) <= 0.015).all()
     assert ach.samples.sum() > sobol.samples.sum()
-
-
-def test_a_tolerance_is_the_same_from_one_process_or_two(room_row, monkeypatch):
-    monkeypatch.setattr("ptmtools.coverage.ach.WORTH_A_PROCESS", 1.0)
-    options = replace(RAYS, tolerance=0.02, per_texture=True)
-    given = *room_row(ROOMS), all_visible(ROOMS), options
-    one = compute_ach(*given).to_arrays()
-    with Local(2) as local:
-        two = compute_ach(*given, executor=local).to_arrays()
-    for name, array in one.items():
-        assert np.array_equal(array, two[name], equal_nan=array.dtype.kind == "f"), name
 
 
 def rate(placement, room_row, truth, seeds):

@@ -39,8 +39,8 @@ class EmbreeRenderer:
         self._surfaces = surfaces
         self._face = face
         self.most = max(1, RAYS // (len(VIEWS) * face * face))
-        opaque, transparent = np.flatnonzero(surfaces.opaque), np.flatnonzero(~surfaces.opaque)
-        self._opaque, self._transparent = _Tree(surfaces, opaque), _Tree(surfaces, transparent)
+        layers = [surfaces.opaque] if surfaces.opaque.all() else [surfaces.opaque, ~surfaces.opaque]
+        self._trees = [_Tree(surfaces, np.flatnonzero(which)) for which in layers]
 
     @property
     def name(self) -> str:
@@ -53,23 +53,18 @@ class EmbreeRenderer:
         self, points: SamplePoints, needed: NDArray[np.bool_] | None = None
     ) -> NDArray[np.int32]:
         """See `Renderer.show`."""
-        origin, along = self._rays(points)
-        if self._transparent.empty:
-            layers = self._opaque.nearest(origin, along)[None]
-        else:
-            layers = self._two_layers(origin, along)[0]
-        return layers.reshape(-1, len(points), len(VIEWS), self._face**2)
+        found, _ = self._layers(*self._rays(points))
+        return found.reshape(-1, len(points), len(VIEWS), self._face**2)
 
     def trace(
         self, points: SamplePoints, pixels: NDArray[np.int64]
     ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
         """See `Renderer.trace`."""
         origin, along = (rays[pixels] for rays in self._rays(points))
-        layers = slice(1 if self._transparent.empty else 2)
-        found, depth = self._two_layers(origin, along)
+        found, depth = self._layers(origin, along)
         point = pixels // (len(VIEWS) * self._face**2)
         exact = self._surfaces.normalised(points.position)[point]
-        return found[layers], self._surfaces.world(exact + depth[layers, :, None] * along)
+        return found, self._surfaces.world(exact + depth[..., None] * along)
 
     def _rays(self, points: SamplePoints) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         from ptmtools.coverage.tally_kernels import cast_rays
@@ -80,16 +75,19 @@ class EmbreeRenderer:
         cast_rays(position, points.shift / self._face, self._face, VIEWS, origin, along)
         return origin, along
 
-    def _two_layers(
+    def _layers(
         self, origin: NDArray[np.float32], along: NDArray[np.float32]
     ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-        """(2, n) opaque and transparent triangles that the (n, 3) rays hit, or -1; (2, n) depths,
+        """(L, n) opaque and transparent triangles that the (n, 3) rays hit, or -1; (L, n) depths,
         0 where there is none."""
-        opaque, depth = self._opaque.hits(origin, along)
-        limit = np.where(opaque >= 0, depth / np.float32(BEFORE), np.float32(np.inf))
-        pane, pane_depth = self._transparent.hits(origin, along, limit.astype(np.float32))
-        found, depths = np.stack([opaque, pane]), np.stack([depth, pane_depth]).astype(np.float64)
-        return found, np.where(found >= 0, depths, 0.0)
+        found, depths = [], []
+        limit = None
+        for tree in self._trees:
+            triangle, depth = tree.hits(origin, along, limit)
+            found.append(triangle)
+            depths.append(np.where(triangle >= 0, depth.astype(np.float64), 0.0))
+            limit = np.where(triangle >= 0, depth / np.float32(BEFORE), np.float32(np.inf))
+        return np.stack(found), np.stack(depths)
 
     def close(self) -> None:
         """Drops the trees."""
@@ -103,35 +101,24 @@ class _Tree:
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
 
-        self.empty = len(which) == 0
-        self._all = len(which) == len(surfaces.triangle)
         self._which = np.append(which, -1).astype(np.int32)
         self._tree: Any = None
-        if not self.empty:
+        if len(which):
             self._tree = EmbreeScene(robust=True)
             mesh = surfaces.vertex.astype(np.float32), surfaces.triangle[which]
             TriangleMesh(self._tree, *mesh)
             ray = np.ones((1, 3), dtype=np.float32)
             self._tree.run(ray, ray)  # builds the tree now
 
-    def nearest(self, origin: NDArray[np.float32], along: NDArray[np.float32]) -> NDArray[np.int32]:
-        """(n,) the triangle that each of the (n, 3) rays hits first, or -1."""
-        if self.empty:
-            return np.full(len(origin), -1, dtype=np.int32)
-        return self._named(self._tree.run(origin, along))
-
     def hits(
         self,
         origin: NDArray[np.float32],
         along: NDArray[np.float32],
-        limit: NDArray[np.float32] | None = None,
+        limit: NDArray[np.float32] | None,
     ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-        """`nearest` within (n,) ``limit`` depths, and their (n,) depths."""
-        if self.empty:
-            return self.nearest(origin, along), np.zeros(len(origin), dtype=np.float32)
+        """(n,) the triangle that each of the (n, 3) rays hits first, up to (n,) ``limit`` depths,
+        or -1; and their (n,) depths."""
+        if self._tree is None:
+            return np.full(len(origin), -1, np.int32), np.zeros(len(origin), np.float32)
         found = self._tree.run(origin, along, dists=limit, output=True)
-        return self._named(found["primID"]), found["tfar"]
-
-    def _named(self, found: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Numbers within the tree, -1 for a miss, as numbers of the surfaces in it."""
-        return found if self._all else self._which[found]
+        return self._which[found["primID"]], found["tfar"]
