@@ -27,7 +27,7 @@ class Content:
     ----------
     textures: in the order of the hints; one for every image that a material in use names.
     viewpoints: the places to start from.
-    progress: to be told of every cell.
+    progress: is called for every cell.
     """
 
     scene: Scene
