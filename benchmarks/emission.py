@@ -2,8 +2,8 @@
 
     python benchmarks/emission.py [MODEL…]
 
-First the formatting of numbers alone, in megabytes of text a second: the compiled loops, the same
-in NumPy, and Python's own conversion. Then for every model the VRML and GLB files of a database
+First the formatting of numbers alone, in megabytes of text a second: ours, and Python's own
+conversion. Then for every model the VRML and GLB files of a database
 beside what pymeshlab (VRML97) and trimesh (GLB) write of the model itself, images left out; the
 last three columns are their ratios to ours: of bytes, of bytes a triangle, and of seconds. A
 database has more triangles than the model, since cells cut them, and what hangs in a boundary is
@@ -21,6 +21,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -32,10 +33,12 @@ from ptmtools import AchOptions, compute_ach
 from ptmtools.cells import Cells, subdivide
 from ptmtools.coverage.model import Ach
 from ptmtools.database import TextureRecord, emit
+from ptmtools.database.content import Content
+from ptmtools.database.floats import row_texts
 from ptmtools.database.geometry import Geometry
-from ptmtools.database.gltf import gltf_files
-from ptmtools.database.numerals import Rows, loops
+from ptmtools.database.gltf.cell import gltf_files
 from ptmtools.database.served import compressed
+from ptmtools.database.vrml.text import field
 from ptmtools.scene import Scene, ingest
 from ptmtools.visibility import Pvs, compute_pvs
 
@@ -61,7 +64,7 @@ def best(work: Callable[[], object]) -> float:
     return min(taken)
 
 
-def numerals() -> None:
+def numbers() -> None:
     random = np.random.default_rng(1)
     n = 150_000
     bits = random.integers(0, 2**32, n, dtype=np.uint32).view(np.float32)
@@ -71,25 +74,18 @@ def numerals() -> None:
         "metres, whole millimetres": np.round(random.normal(0, 20, n), 3),
         "whole metres": random.integers(-99, 99, n),
         "texture coordinates": random.random(n),
+        "indices": random.integers(0, 20_000, n),
     }
-    print("numbers as text, MB/s       compiled  NumPy  Python")
-    index, start = np.arange(n // 3), np.array([0, n // 3])
+    print("numbers as text, MB/s           ours  Python")
     for name, values in kinds.items():
-        points = (values.astype(np.float32) + np.float32(0)).reshape(-1, 3)
-        text = Rows(points, True).list(index)
-        fast = best(lambda points=points: Rows(points, True).list(index))
-        slow = best(lambda points=points: Rows(points).list(index))
-        some = points[: n // 30].ravel()
+        whole = name == "indices"
+        rows = (values if whole else values.astype(np.float32) + np.float32(0)).reshape(-1, 3)
+        text = field(row_texts(rows))
+        ours = best(lambda rows=rows: field(row_texts(rows)))
+        some = rows[: n // 30].ravel()
         own = best(lambda some=some: ",".join([str(v) for v in some])) * 10
-        rates = (f"{len(text) / t / 1e6:8.1f}" for t in (fast, slow, own))
-        print(f"{name:27}{'  '.join(rates)}")
-    triangles = random.integers(0, 20_000, (n // 3, 3))
-    text = loops(triangles, start, compiled=True)[0]
-    fast = best(lambda: loops(triangles, start, compiled=True))
-    slow = best(lambda: loops(triangles, start))
-    own = best(lambda: ",".join([f"{a} {b} {c} -1" for a, b, c in triangles.tolist()]))
-    rates = (f"{len(text) / t / 1e6:8.1f}" for t in (fast, slow, own))
-    print(f"{'indices':27}{'  '.join(rates)}\n", flush=True)
+        print(f"{name:27}{len(text) / ours / 1e6:9.1f}{len(text) / own / 1e6:8.1f}")
+    print(flush=True)
 
 
 def records(scene: Scene) -> tuple[TextureRecord, ...]:
@@ -163,12 +159,12 @@ def emitted(scene: Scene, cells: Cells, pvs: Pvs, ach: Ach, folder: Path) -> Wri
     return Written(report.triangles, [(out / name).read_bytes() for name in report.files], seconds)
 
 
-def emitted_gltf(scene: Scene, cells: Cells) -> Written:
+def emitted_gltf(scene: Scene, cells: Cells, pvs: Pvs, ach: Ach) -> Written:
     def work() -> list[bytes]:
-        geometry = Geometry(scene, cells)
-        return [glb for _, glb in gltf_files(scene, geometry, cells.cell_count, some, True)]
+        content = Content(scene, cells, pvs, ach, records(scene))
+        files = islice(gltf_files(content), cells.cell_count)
+        return [data for _, data in files if isinstance(data, bytes)]
 
-    some = records(scene)
     return Written(len(Geometry(scene, cells).triangle), work(), best(work))
 
 
@@ -211,7 +207,7 @@ def compare(model: Path, folder: Path) -> None:
         by_pymeshlab(model, folder).row("pymeshlab VRML", vrml)
     except ImportError as fault:
         print(f"  pymeshlab cannot be loaded: {fault}")
-    glb = emitted_gltf(scene, cells)
+    glb = emitted_gltf(scene, cells, pvs, ach)
     glb.row("GLBs")
     by_trimesh(model).row("trimesh GLB", glb)
     if len(cells.triangle) < MANY and model.stem == MODELS[0].stem:
@@ -226,7 +222,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("models", nargs="*", type=Path, help="default: museum, hospital, gallery")
     models = [model for model in parser.parse_args().models or MODELS if model.is_file()]
-    numerals()
+    numbers()
     with tempfile.TemporaryDirectory(prefix="emission-") as folder:
         for model in models:
             compare(model, Path(folder) / model.stem)

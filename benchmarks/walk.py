@@ -11,13 +11,16 @@ import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells import Cells
 from ptmtools.database import TextureRecord
-from ptmtools.database.vrml import CellText, CellWriter
+from ptmtools.database.content import Content
+from ptmtools.database.vrml.cell import CellWriter
 from ptmtools.scene import Scene
 from ptmtools.visibility import Pvs
 
@@ -168,16 +171,26 @@ def _stretches(
     return found
 
 
+class CellText(NamedTuple):
+    """A cell's file, and the images that its shapes use."""
+
+    text: str
+    images: list[int]
+
+
 def cell_texts(
     scene: Scene, cells: Cells, pvs: Pvs, hints: Sequence[NDArray[np.float64]]
 ) -> list[CellText]:
     """The files of all cells; ``hints`` are aligned with the rows of ``pvs``."""
-    records = {
-        i: TextureRecord(i, f"textures/{image.name}.ptm", f"{image.name}.png", 1, 1, 3, (), "")
+    records = tuple(
+        TextureRecord(i, f"textures/{image.name}.ptm", f"{image.name}.png", 1, 1, 3, (), "")
         for i, image in enumerate(scene.images)
-    }
-    writer = CellWriter(scene, cells, pvs, np.concatenate(hints), records, True)
-    return [writer.cell(c) for c in range(cells.cell_count)]
+    )
+    ach: Any = SimpleNamespace(value=np.concatenate(hints))  # all that a cell's file has of it
+    content = Content(scene, cells, pvs, ach, records)
+    writer = CellWriter(content)
+    images = [used.tolist() for used in content.painted]
+    return [CellText(writer.cell(c).text, images[c]) for c in range(cells.cell_count)]
 
 
 def load(cells: Cells, pvs: Pvs, way: Way, size: NDArray[np.int64]) -> Load:
@@ -200,7 +213,7 @@ def texels_at_hand(scene: Scene, cells: Cells, pvs: Pvs, way: Way, texts: list[C
     texels = _texels(scene)
     used = np.zeros((len(texts), len(texels)), dtype=bool)
     for c, text in enumerate(texts):
-        used[c, list(text.images)] = True
+        used[c, text.images] = True
     whole = float(texels[used.any(axis=0)].sum())
     if not whole:
         return 0.0

@@ -27,8 +27,8 @@ from ptmtools.store.folder import DatabaseFolder
 from ptmtools.texture.model import Limits
 from ptmtools.visibility import SegmentReport
 
-#: Files whose findings are shown without ``-v``.
-SHOWN_FILES = 20
+#: So many findings are shown without ``-v``; if there are more, of each file the worst.
+SHOWN = 20
 
 target = click.argument("target", metavar="FILE|DB", type=click.Path())
 
@@ -76,8 +76,8 @@ def validate(
 ) -> None:
     """Check a database or a .ptm file.
 
-    Says of each file what is worst, and at the end which command repairs it. Exits with 8 if it
-    finds an error.
+    Says of each file first what is worst, and at the end which command repairs it. Exits with 8 if
+    it finds an error.
     """
     if not target:
         raise no_name()
@@ -149,20 +149,20 @@ def _document(
 def _print_findings(
     voice: Voice, target: str, report: ValidationReport, shot: SegmentReport | None
 ) -> None:
-    """Of each file the worst finding, and how many more it has; with ``-v`` all of them."""
+    """All findings, of each file the worst first; of many findings that of each file alone, and how
+    many more it has."""
     lines = [str(issue) for issue in report.issues]
-    if not voice.verbose:
+    if len(lines) > SHOWN and not voice.verbose:
         files = [list(found) for _, found in groupby(report.issues, lambda issue: issue.file)]
         files.sort(key=lambda found: found[0].severity != "error")
         more = [sum(issue.count for issue in found) - 1 for found in files]
         lines = [
             f"{found[0]}{f' and {n:,} more' if n else ''}"
-            for found, n in zip(files[:SHOWN_FILES], more, strict=False)
+            for found, n in zip(files[:SHOWN], more, strict=False)
         ]
         if rest := len(files) - len(lines):
             lines.append(f"findings in {count(rest, 'more file')}")
-        if rest or any(more):
-            lines.append("-v shows all findings")
+        lines.append("-v shows all findings")
     for pair in shot.missed if shot else ():
         a, b = pair.cells
         lines.append(

@@ -7,6 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
 from ptmtools.database.geometry import Geometry
@@ -24,7 +27,7 @@ class Content:
     ----------
     textures: in the order of the hints; one for every image that a material in use names.
     viewpoints: the places to start from.
-    progress: to be told of every cell.
+    progress: is called for every cell.
     """
 
     scene: Scene
@@ -45,6 +48,14 @@ class Content:
     def records(self) -> Mapping[int, tuple[int, TextureRecord]]:
         """Image of the scene → its place in `textures`, and its record there."""
         return {record.image: (place, record) for place, record in enumerate(self.textures)}
+
+    @cached_property
+    def painted(self) -> list[NDArray[np.int64]]:
+        """Of each cell the places in `textures` that its shapes use, ascending."""
+        place = [self.records[m.image][0] if m.image >= 0 else -1 for m in self.scene.materials]
+        of_shape = np.array(place, dtype=np.int64)[self.geometry.material]
+        cells = np.split(of_shape, self.geometry.cell_start[1:-1])
+        return [np.unique(used[used >= 0]) for used in cells]
 
     def hints(self, cell_url: Callable[[int], str], up: str = "") -> str:
         """The text of a `hints.json`; ``cell_url`` gives a cell's URL from where it lies, ``up`` is

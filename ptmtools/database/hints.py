@@ -21,7 +21,6 @@ from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
 from ptmtools.database.model import TextureRecord, Viewpoint
 from ptmtools.database.names import cell_name
-from ptmtools.database.rounding import significant
 from ptmtools.errors import DatabaseError
 
 if TYPE_CHECKING:
@@ -46,14 +45,12 @@ def hints_text(content: Content, cell_url: Callable[[int], str], up: str) -> str
     """
     space, cells, pvs, ach = content.scene.space, content.cells, content.pvs, content.ach
     place = {image: i for image, (i, _) in content.records.items()}
-    adjacent, geometry = cells.adjacent(), content.geometry
-    image = np.array([place.get(m.image, -1) for m in content.scene.materials], dtype=np.int64)
-    painted = np.split(image[geometry.material], geometry.cell_start[1:-1])
+    adjacent, painted = cells.adjacent(), content.painted
     leaves = np.split(
         np.argsort(cells.leaf_cell, kind="stable"),
         np.cumsum(np.bincount(cells.leaf_cell, minlength=cells.cell_count))[:-1],
     )
-    statistics: Any = {name: significant(getattr(ach, name), DIGITS) for name in STATISTICS}
+    statistics: Any = {name: _rounded(getattr(ach, name)) for name in STATISTICS}
     rounded = replace(ach, **statistics)
     portals = _portals(cells)
     head = {
@@ -71,7 +68,7 @@ def hints_text(content: Content, cell_url: Callable[[int], str], up: str) -> str
             "name": cell_name(c),
             "url": cell_url(c),
             "leaves": [_leaf(cells, leaf) for leaf in leaves[c].tolist()],
-            "textures": np.unique(painted[c][painted[c] >= 0]).tolist(),
+            "textures": painted[c].tolist(),
             "adjacent": adjacent[c].tolist(),
             "visible": pvs.row(c).tolist(),
             "ach": ach.row(c).tolist(),
@@ -91,6 +88,13 @@ def hints_text(content: Content, cell_url: Callable[[int], str], up: str) -> str
     lines = [f" {_json(k)}: {_json(v)}" for k, v in head.items()]
     lines += [f" {_json(k)}: {_rows(v)}" for k, v in lists.items()]
     return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _rounded(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Numbers with `DIGITS` significant digits. (Tried: decimal scaling in NumPy, for 30 lines; of
+    willowgarage's 104,000 numbers it rounds in 7 ms, text in 35.)"""
+    text = [float(f"{value:.{DIGITS}g}") for value in values.ravel().tolist()]
+    return np.array(text, dtype=np.float64).reshape(values.shape)
 
 
 def _json(value: object) -> str:

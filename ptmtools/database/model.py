@@ -271,8 +271,9 @@ class PlotOptions:
     """
     Attributes
     ----------
-    cell: shade its potentially visible set by ACH.
-    height: of the section above a storey's floor, metres.
+    cell: the number of a cell: shade every cell that can be seen from it by its average share of
+        the view.
+    height: how far above a storey's floor the building is cut, metres.
     storey_gap: floors farther apart than this belong to different storeys, metres.
     width: of the picture, inches.
     dpi: dots per inch.

@@ -24,7 +24,6 @@ from ptmtools.database import (
     validate_database,
 )
 from ptmtools.database.names import DefNames
-from ptmtools.database.rounding import significant
 from ptmtools.database.served import compressed
 from ptmtools.database.vrml.reader import Node, parse
 from ptmtools.errors import DatabaseError, InputError, OutputError
@@ -44,6 +43,12 @@ def records() -> tuple[TextureRecord, ...]:
 def write(artifacts, out: Path, options: EmitOptions = EmitOptions(), **changes):  # noqa: B008
     a = replace(artifacts, **changes)
     return emit(a.scene, a.cells, a.pvs, a.ach, records(), out, options)
+
+
+def shapes(db: Path) -> list[Node]:
+    """Of all cells."""
+    files = sorted((db / "www/cells").glob("*.wrl"))
+    return [shape for file in files for shape in parse(file.read_bytes()).of_type("Shape")]
 
 
 def triangles(shape: Node) -> np.ndarray:
@@ -81,35 +86,33 @@ def test_texture_coordinates_go_with_their_corners(artifacts, finished: Path) ->
         for i in range(len(cells.vertex))
     }
     met = 0
-    for c in range(3):
-        for shape in parse((finished / f"www/cells/c000{c}.wrl").read_bytes()).of_type("Shape"):
-            fields = shape.fields["geometry"].fields
-            if "texCoord" not in fields:
-                continue
-            index = fields["texCoordIndex"].reshape(-1, 4)[:, :3]
-            uv = fields["texCoord"].fields["point"][index]
-            for p, t in zip(triangles(shape).reshape(-1, 3), uv.reshape(-1, 2), strict=True):
-                assert (tuple(p.tolist()), tuple(t.tolist())) in known
-                met += 1
+    for shape in shapes(finished):
+        fields = shape.at("geometry")
+        if "texCoord" not in fields:
+            continue
+        index = fields["texCoordIndex"].reshape(-1, 4)[:, :3]
+        uv = fields["texCoord"].fields["point"][index]
+        for p, t in zip(triangles(shape).reshape(-1, 3), uv.reshape(-1, 2), strict=True):
+            assert (tuple(p.tolist()), tuple(t.tolist())) in known
+            met += 1
     assert met > 30
 
 
 def test_each_kind_of_material(finished: Path) -> None:
     """Textured: no Material. Tinted: one Color. See-through: a Material."""
     kinds = set()
-    for c in range(3):
-        for shape in parse((finished / f"www/cells/c000{c}.wrl").read_bytes()).of_type("Shape"):
-            look, geometry = shape.fields["appearance"].fields, shape.fields["geometry"].fields
-            material = look["material"].fields if "material" in look else {}
-            kinds.add(
-                (
-                    look["texture"].fields["url"][0] if "texture" in look else "",
-                    look["texture"].fields.get("repeatS", True) if "texture" in look else True,
-                    tuple(material["diffuseColor"].tolist()) if material else None,
-                    float(material["transparency"][0]) if "transparency" in material else 0.0,
-                    tuple(geometry["color"].fields["color"].ravel()) if "color" in geometry else (),
-                )
+    for shape in shapes(finished):
+        texture, material = shape.at("appearance", "texture"), shape.at("appearance", "material")
+        color = shape.at("geometry", "color")
+        kinds.add(
+            (
+                texture.get("url", ("",))[0],
+                texture.get("repeatS", True),
+                tuple(material["diffuseColor"].tolist()) if material else None,
+                float(material["transparency"][0]) if "transparency" in material else 0.0,
+                tuple(color["color"].ravel()) if color else (),
             )
+        )
     assert kinds == {
         ("", True, (0.8, 0.8, 0.8), 0.0, ()),
         ("../textures/a.png", True, None, 0.0, ()),
@@ -119,11 +122,8 @@ def test_each_kind_of_material(finished: Path) -> None:
     }
 
 
-def test_solid_follows_the_sides(artifacts, finished: Path) -> None:
-    sides = set()
-    for c in range(3):
-        for shape in parse((finished / f"www/cells/c000{c}.wrl").read_bytes()).of_type("Shape"):
-            sides.add(shape.fields["geometry"].fields.get("solid", True))
+def test_solid_follows_the_sides(finished: Path) -> None:
+    sides = {shape.at("geometry").get("solid", True) for shape in shapes(finished)}
     assert sides == {True, False}
 
 
@@ -199,32 +199,6 @@ def test_the_level_of_the_fallback_image(artifacts, tmp_path: Path) -> None:
         emit(a.scene, a.cells, a.pvs, a.ach, some, out, EmitOptions(fallback=fallback))
         hints = json.loads((out / "hints.json").read_text())
         assert [t["fallbackLevel"] for t in hints["textures"]] == levels
-
-
-def test_significant_digits() -> None:
-    """As text rounds, ties and all."""
-    random = np.random.default_rng(1)
-    whole = random.integers(0, 10**6, 4000)
-    patterns = random.integers(0, 2**64, 4000, dtype=np.uint64).view(np.float64)
-    values = np.concatenate(
-        [
-            random.random(4000),
-            10.0 ** random.uniform(-320, 308, 4000),
-            whole + 0.5,
-            whole * 10 + 5,
-            (whole * 10 + 5) / 10.0 ** random.integers(0, 20, 4000),
-            patterns[np.isfinite(patterns)],
-            [0.0, -0.0, 5e-324, 99999.5, 99999.4999, 1e22, 1e23, 1.7e308],
-        ]
-    )
-    values = np.concatenate([values, -values, np.nextafter(values, 0), np.nextafter(values, 1e300)])
-    for digits in (1, 5, 8):
-        wanted = np.array([float(f"{v:.{digits}g}") for v in values])
-        np.testing.assert_array_equal(
-            significant(values, digits).view(np.int64), wanted.view(np.int64)
-        )
-    odd = np.array([[np.nan, np.inf], [-np.inf, 1.23456]])
-    np.testing.assert_array_equal(significant(odd, 2), [[np.nan, np.inf], [-np.inf, 1.2]])
 
 
 def test_an_empty_cell_has_a_file(artifacts, tmp_path: Path) -> None:

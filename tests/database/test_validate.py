@@ -22,8 +22,19 @@ from ptmtools.database.validation.findings import CODES
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.texture import EncodeOptions, Limits, decode, encode, read_header
 from ptmtools.visibility.model import Pvs
-
-Damage = Callable[[Path], object]
+from tests.database.damage import (
+    Damage,
+    all_of,
+    appended,
+    copied,
+    hinted,
+    linked,
+    put,
+    removed,
+    replaced,
+    rewritten,
+    zipped,
+)
 
 TESTS = Path(__file__).parents[1]
 
@@ -51,7 +62,7 @@ def test_a_good_database_has_no_issue(finished: Path) -> None:
 
 @pytest.fixture(scope="session")
 def roomy(artifacts, tmp_path_factory, put_textures, made_up_hints, seal) -> Path:
-    """The first two rooms as one cell of two leaves; no PNG twins; shares of textures."""
+    """The first two rooms as one cell of two leaves; no fallback images; shares of textures."""
     db = tmp_path_factory.mktemp("roomy") / "db"
     cell = np.maximum(artifacts.cells.triangle_cell - 1, -1)
     cells = replace(
@@ -68,8 +79,8 @@ def roomy(artifacts, tmp_path_factory, put_textures, made_up_hints, seal) -> Pat
         texture_value=np.array([0.5, 0.25, 0.25, 0.5, 0.5]),
     )
     records = put_textures(db / "www")
-    for twin in (db / "www/textures").glob("*.png"):
-        twin.unlink()
+    for image in (db / "www/textures").glob("*.png"):
+        image.unlink()
     emit(artifacts.scene, cells, pvs, ach, records, db / "www", EmitOptions(fallback=False))
     seal(db)
     return db
@@ -109,7 +120,7 @@ def test_gltf(artifacts, tmp_path: Path, put_textures, seal) -> None:
     assert told(db) == []
 
 
-def test_gzip_twins(database: Path, seal: Damage) -> None:
+def test_gzip_copies(database: Path, seal: Damage) -> None:
     for name in ("root.wrl", "hints.json", "cells/c0001.wrl"):
         zipped(name)(database)
     seal(database)
@@ -117,7 +128,7 @@ def test_gzip_twins(database: Path, seal: Damage) -> None:
 
 
 @pytest.mark.parametrize("level", [0, 2, -1])
-def test_a_twin_of_a_coarser_level(database: Path, seal: Damage, level: int) -> None:
+def test_a_fallback_image_of_a_coarser_level(database: Path, seal: Damage, level: int) -> None:
     coarser(level)(database)
     count = len(read_header((database / "www/textures/a.ptm").read_bytes()).levels)
     hinted(lambda d: d["textures"][0].update(fallbackLevel=range(count)[level]))(database)
@@ -152,100 +163,8 @@ def test_tiny_and_huge_worlds(artifacts, tmp_path: Path, put_textures, seal, sca
 # Faults, and what plants them
 
 
-def replaced(name: str, pattern: str, new: str) -> Damage:
-    """Replaces the first match in a served file; it must be there."""
-
-    def damage(db: Path) -> None:
-        path = db / "www" / name
-        text, count = re.subn(pattern, new, path.read_text(), count=1, flags=re.DOTALL)
-        assert count == 1, f"{pattern} is not in {name}"
-        path.write_text(text)
-
-    return damage
-
-
-def appended(name: str, data: bytes) -> Damage:
-    def damage(db: Path) -> None:
-        path = db / "www" / name
-        path.write_bytes(path.read_bytes() + data)
-
-    return damage
-
-
-def rewritten(name: str, change: Callable[[bytes], bytes]) -> Damage:
-    def damage(db: Path) -> None:
-        path = db / "www" / name
-        path.write_bytes(change(path.read_bytes()))
-
-    return damage
-
-
-def all_of(*damages: Damage) -> Damage:
-    def damage(db: Path) -> None:
-        for each in damages:
-            each(db)
-
-    return damage
-
-
-def removed(name: str) -> Damage:
-    return lambda db: (db / "www" / name).unlink()
-
-
-def put(name: str, data: bytes = b"something") -> Damage:
-    def damage(db: Path) -> None:
-        path = db / "www" / name
-        path.parent.mkdir(exist_ok=True)
-        path.write_bytes(data)
-
-    return damage
-
-
-def hinted(change: Callable[[dict], object]) -> Damage:
-    """Changes hints.json."""
-
-    def damage(db: Path) -> None:
-        path = db / "www/hints.json"
-        document = json.loads(path.read_text())
-        change(document)
-        path.write_text(json.dumps(document))
-
-    return damage
-
-
-def both(*damages: Damage) -> Damage:
-    def damage(db: Path) -> None:
-        for each in damages:
-            each(db)
-
-    return damage
-
-
-def zipped(name: str, change: Callable[[bytes], bytes] = bytes) -> Damage:
-    """Puts a gzip twin beside a file."""
-
-    def damage(db: Path) -> None:
-        path = db / "www" / name
-        twin = path.with_name(f"{path.name}.gz")
-        twin.write_bytes(change(gzip.compress(path.read_bytes(), mtime=0)))
-
-    return damage
-
-
-def linked(name: str, target: str) -> Damage:
-    def damage(db: Path) -> None:
-        (db / "www" / name).unlink(missing_ok=True)
-        (db / "www" / name).symlink_to(target)
-
-    return damage
-
-
-def copied(name: str, other: str) -> Damage:
-    return lambda db: shutil.copy(db / "www" / name, db / "www" / other)
-
-
 def coarser(level: int) -> Damage:
-    """The PNG twin of the first texture holds another level."""
+    """The fallback image of the first texture holds another level."""
 
     def damage(db: Path) -> None:
         data = (db / "www/textures/a.ptm").read_bytes()
@@ -292,11 +211,6 @@ def shifted(row: dict, by: float) -> None:
         point[2] += by
 
 
-def turned(db: Path) -> None:
-    """Turns the portals between the first rooms round, on both sides."""
-    portal(lambda row: row["polygon"].reverse())(db)
-
-
 def painted(texture: object) -> Damage:
     """Says that this texture alone is what a cell sees."""
     return cell(
@@ -314,11 +228,7 @@ def repainted(db: Path) -> None:
     Image.fromarray(np.zeros((16, 24, 3), np.uint8)).save(db / "www/textures/a.png")
 
 
-def flipped(db: Path) -> None:
-    path = db / "www/textures/a.ptm"
-    data = bytearray(path.read_bytes())
-    data[-3] ^= 1
-    path.write_bytes(data)
+flipped = rewritten("textures/a.ptm", lambda data: data[:-3] + bytes([data[-3] ^ 1]) + data[-2:])
 
 
 def unused(db: Path) -> None:
@@ -408,7 +318,7 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D674 D708", hinted(lambda d: d["textures"].append(d["textures"][0]))),
     ("D674 D701 D706", hinted(lambda d: d["cells"][2].update(url="cells/c0001.wrl"))),
     ("D674 D701", replaced(C0, r"\.\./textures/a\.png", "../textures/a.ptm")),
-    ("D675 D677", both(copied(A, "textures/A.ptm"), copied("textures/a.png", "textures/A.png"))),
+    ("D675 D677", all_of(copied(A, "textures/A.ptm"), copied("textures/a.png", "textures/A.png"))),
     ("D675", put("Cells/c0000.txt")),
     ("D676", zipped(C0, lambda data: data[:-9])),
     ("D676", zipped(C0, lambda data: data[:40])),
@@ -417,7 +327,7 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D676", zipped(C0, lambda data: LONG)),
     ("D676", zipped(C0, lambda data: b"")),
     ("D676", put("nothing.wrl.gz", LONG)),
-    ("D676", both(zipped(C0), appended(C0, b"\n"))),
+    ("D676", all_of(zipped(C0), appended(C0, b"\n"))),
     ("D677", copied("textures/a.png", "textures/z.png")),
     ("D680", replaced(C0, r"coordIndex \[ \d+", "coordIndex [ 99")),
     ("D680", replaced(C0, r"coordIndex \[ \d+", "coordIndex [ -2")),
@@ -498,7 +408,7 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D705", portal(lambda row: moved(row, 0, 0, 0.1))),
     ("D705", portal(lambda row: shifted(row, 5.0))),
     ("D705", portal(lambda row: row["polygon"].append(row["polygon"][0]))),
-    ("D705", turned),
+    ("D705", portal(lambda row: row["polygon"].reverse())),
     ("D705", cell(0, lambda c: c["portals"][0]["polygon"].reverse())),
     ("D705", cell(0, lambda c: c["portals"][0].update(area=1.0))),
     ("D706", hinted(lambda d: d["viewpoints"][0].update(cell=2))),

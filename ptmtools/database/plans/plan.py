@@ -1,4 +1,4 @@
-"""A floor plan per storey: cells, walls, portals, leaks, one cell's visible set shaded by ACH.
+"""A floor plan per storey: cells, walls, portals, leaks, and how much of the view others cover.
 
 Everything drawn is a true section at one height, so a plan shows what the stages computed and
 nothing that an artist would add. Without matplotlib the plan cannot be drawn (extra `plot`).
@@ -183,33 +183,17 @@ class _Plan:
             PolyCollection(polygons, facecolors=fills, edgecolors=fills, linewidths=0.5)
         )
         edges = _outlines(sections)
-        panes = triangle_section(self._corners[~self._opaque], height)
-        walls = triangle_section(self._corners[self._opaque], height)
-        chosen = [self._shown(e) for e in edges.get(self._options.cell, ())]
-        axis.add_collection(
-            LineCollection(
-                [self._shown(e) for outline in edges.values() for e in outline],
-                colors=_CELL_EDGE,
-                linewidths=0.5,
-                zorder=2,
-            )
-        )
-        axis.add_collection(LineCollection(chosen, colors=_CHOSEN, linewidths=5, zorder=2))
-        for layer, (segments, colour, width) in enumerate(
-            (
-                (np.array(self._portals(height)), _PORTAL, 2.2),
-                (panes, _SEE_THROUGH, 1.4),
-                (walls, _WALL, 1.2),
-            )
+        for zorder, colour, width, segments in (
+            (2, _CELL_EDGE, 0.5, [e for outline in edges.values() for e in outline]),
+            (2, _CHOSEN, 5, edges.get(self._options.cell, [])),
+            (3, _PORTAL, 2.2, self._portals(height)),
+            (4, _SEE_THROUGH, 1.4, triangle_section(self._corners[~self._opaque], height)),
+            (5, _WALL, 1.2, triangle_section(self._corners[self._opaque], height)),
         ):
+            lines = [self._shown(segment) for segment in segments]
+            settings = {"capstyle": "butt"} if zorder > 2 else {}
             axis.add_collection(
-                LineCollection(
-                    [self._shown(s) for s in segments],
-                    colors=colour,
-                    linewidths=width,
-                    zorder=3 + layer,
-                    capstyle="butt",
-                )
+                LineCollection(lines, colors=colour, linewidths=width, zorder=zorder, **settings)
             )
         self._numbers(axis, sections, 72 * panel / float(self._high[0] - self._low[0]))
         self._scale_bar(axis)
@@ -248,6 +232,7 @@ class _Plan:
     ) -> None:
         """Each cell's number once, in its largest section, if there is room; ``points`` of paper
         make a metre."""
+        import shapely
         from matplotlib.patheffects import withStroke
 
         largest: dict[int, NDArray[np.float64]] = {}
@@ -260,7 +245,8 @@ class _Plan:
             size = min(depth * 0.6, width / (0.65 * len(text)), 8.0)
             if min(width, depth) < _NARROWEST or size < 4.5:
                 continue
-            x, y = self._shown(_middle(polygon))
+            (middle,) = shapely.get_coordinates(shapely.centroid(shapely.Polygon(polygon)))
+            x, y = self._shown(middle)
             dark = self._shade is not None and self._shade.get(cell, 0.0) > _DARK
             ink, paper = (_PAPER, _INK) if dark else (_INK, _PAPER)
             halo = [withStroke(linewidth=1.6, foreground=paper, alpha=0.6)]
@@ -294,7 +280,7 @@ class _Plan:
         drawn.set_ticks([1, 0.1, 0.01, 0.001, _FAINTEST])
         drawn.set_ticklabels(["100 %", "10 %", "1 %", "0.1 %", "≤ 0.01 %"])
         drawn.outline.set_visible(False)
-        bar.set_title("ACH", fontsize=9, color=_INK, pad=6)
+        bar.set_title("share of view", fontsize=9, color=_INK, pad=6)
         bar.tick_params(labelsize=7, colors=_INK, length=2)
         bar.minorticks_off()
 
@@ -305,7 +291,7 @@ class _Plan:
         doors = _count(len(self._doors()), "portal")
         parts = [_count(cells.cell_count, "cell"), f"{doors} between them"]
         if self._pvs is not None:
-            parts.append(f"average PVS {100 * self._pvs.average_share:.1f} %")
+            parts.append(f"on average a cell sees {100 * self._pvs.average_share:.1f} %")
         if len(self._floors) > 1:
             parts.append(f"{len(self._floors)} storeys")
         place = {"ha": "left", "va": "center", "color": _INK}
@@ -352,16 +338,6 @@ def _outlines(
         rim = shapely.boundary(shapely.union_all(leaves) if len(leaves) > 1 else leaves[0])
         found[cell] = [shapely.get_coordinates(line) for line in shapely.get_parts(rim)]
     return found
-
-
-def _middle(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The centroid of a polygon's area."""
-    a, b = polygon - polygon[0], np.roll(polygon, -1, axis=0) - polygon[0]
-    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    total = cross.sum()
-    if total <= 0:
-        return np.asarray(polygon.mean(axis=0))
-    return np.asarray(polygon[0] + ((a + b) * cross[:, None]).sum(axis=0) / (3 * total))
 
 
 def _count(number: int, what: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,77 +11,47 @@ import pytest
 
 from ptmtools.database import validate_database
 from ptmtools.database.gltf.container import pack, unpack
+from tests.database.damage import Damage, copied, hinted, put, removed, rewritten
 
-Damage = Callable[[Path], None]
-GLB = "gltf/c0001.glb"
+GLB, HINTS = "gltf/c0001.glb", "gltf/hints.json"
 
 
-def treed(change: Callable[[dict[str, Any]], object], name: str = GLB) -> Damage:
+def treed(change: Callable[[dict[str, Any]], object]) -> Damage:
     """Changes the JSON of a GLB."""
 
-    def damage(db: Path) -> None:
-        path = db / "www" / name
-        tree, binary = unpack(path.read_bytes())
+    def changed(data: bytes) -> bytes:
+        tree, binary = unpack(data)
         change(tree)
-        path.write_bytes(pack(tree, binary))
+        return pack(tree, binary)
 
-    return damage
+    return rewritten(GLB, changed)
 
 
 def poked(kind: str, element: int, value: float) -> Damage:
     """Writes a number into the first accessor of a kind: POSITION, TEXCOORD_0 or indices."""
 
-    def damage(db: Path) -> None:
-        path = db / "www" / GLB
-        tree, binary = unpack(path.read_bytes())
+    def changed(data: bytes) -> bytes:
+        tree, binary = unpack(data)
         primitives = [p for mesh in tree["meshes"] for p in mesh["primitives"]]
         places = [p["attributes"].get(kind, p.get(kind)) for p in primitives]
         accessor = tree["accessors"][next(place for place in places if place is not None)]
         view = tree["bufferViews"][accessor["bufferView"]]
-        begin = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-        form = "<u2" if kind == "indices" else "<f4"
-        data = bytearray(binary)
-        one = np.array([value], form).tobytes()
-        begin += element * len(one)
-        data[begin : begin + len(one)] = one
-        path.write_bytes(pack(tree, bytes(data)))
+        one = np.array([value], "<u2" if kind == "indices" else "<f4").tobytes()
+        begin = view.get("byteOffset", 0) + accessor.get("byteOffset", 0) + element * len(one)
+        return pack(tree, binary[:begin] + one + binary[begin + len(one) :])
 
-    return damage
+    return rewritten(GLB, changed)
 
 
 def edited(change: Callable[[bytearray], object]) -> Damage:
     """Changes the bytes of a GLB."""
 
-    def damage(db: Path) -> None:
-        data = bytearray((db / "www" / GLB).read_bytes())
-        change(data)
-        (db / "www" / GLB).write_bytes(data)
+    def changed(data: bytes) -> bytes:
+        held = bytearray(data)
+        change(held)
+        return bytes(held)
 
-    return damage
-
-
-def hinted(change: Callable[[dict[str, Any]], object]) -> Damage:
-    """Changes gltf/hints.json."""
-
-    def damage(db: Path) -> None:
-        path = db / "www/gltf/hints.json"
-        tree = json.loads(path.read_text())
-        change(tree)
-        path.write_text(json.dumps(tree))
-
-    return damage
-
-
-def written(name: str, data: bytes) -> Damage:
-    return lambda db: (db / "www" / name).write_bytes(data) and None
-
-
-def removed(name: str) -> Damage:
-    return lambda db: (db / "www" / name).unlink()
-
-
-def copied(source: str, target: str) -> Damage:
-    return lambda db: (db / "www" / target).write_bytes((db / "www" / source).read_bytes()) and None
+    return rewritten(GLB, changed)
 
 
 def textured(tree: dict[str, Any]) -> dict[str, Any]:
@@ -145,9 +114,9 @@ def of_accessor(member: str, value: object) -> Damage:
 #: Each with a manifest written afterwards, so that no hash gives the fault away.
 FAULTS: list[tuple[str, str, Damage]] = [
     ("PTM-D730", "no GLB", removed(GLB)),
-    ("PTM-D730", "no hints", removed("gltf/hints.json")),
+    ("PTM-D730", "no hints", removed(HINTS)),
     ("PTM-D730", "a GLB too many", copied(GLB, "gltf/c0003.glb")),
-    ("PTM-D731", "empty", written(GLB, b"")),
+    ("PTM-D731", "empty", put(GLB, b"")),
     ("PTM-D731", "magic", edited(lambda d: d.__setitem__(0, 0))),
     ("PTM-D731", "version", edited(lambda d: d.__setitem__(4, 1))),
     ("PTM-D731", "length", edited(lambda d: d.__setitem__(8, d[8] ^ 4))),
@@ -199,14 +168,14 @@ FAULTS: list[tuple[str, str, Damage]] = [
         "another texture",
         treed(lambda t: textured(t)["extras"].update(texture=1 - textured(t)["extras"]["texture"])),
     ),
-    ("PTM-D737", "coverage", hinted(lambda d: d["cells"][1]["ach"].reverse())),
-    ("PTM-D737", "a URL", hinted(lambda d: d["cells"][1].update(url="c0002.glb"))),
-    ("PTM-D737", "a texture's URL", hinted(lambda d: d["textures"][0].update(file="a.ptm"))),
-    ("PTM-D737", "a member", hinted(lambda d: d.pop("unit"))),
-    ("PTM-D737", "true for 1", hinted(lambda d: d.update(schema=True))),
-    ("PTM-D737", "one more", hinted(lambda d: d["viewpoints"].append({}))),
-    ("PTM-D737", "no JSON", written("gltf/hints.json", b"{")),
-    ("PTM-D737", "no object", written("gltf/hints.json", b"[]")),
+    ("PTM-D737", "coverage", hinted(lambda d: d["cells"][1]["ach"].reverse(), HINTS)),
+    ("PTM-D737", "a URL", hinted(lambda d: d["cells"][1].update(url="c0002.glb"), HINTS)),
+    ("PTM-D737", "a texture's URL", hinted(lambda d: d["textures"][0].update(file="a.ptm"), HINTS)),
+    ("PTM-D737", "a member", hinted(lambda d: d.pop("unit"), HINTS)),
+    ("PTM-D737", "true for 1", hinted(lambda d: d.update(schema=True), HINTS)),
+    ("PTM-D737", "one more", hinted(lambda d: d["viewpoints"].append({}), HINTS)),
+    ("PTM-D737", "no JSON", put(HINTS, b"{")),
+    ("PTM-D737", "no object", put(HINTS, b"[]")),
     ("PTM-D738", "swapped", treed(swap_first_corners)),
     ("PTM-D738", "fewer shapes", treed(drop_mesh)),
     ("PTM-D738", "no texture coordinates", treed(drop_coordinates)),

@@ -18,9 +18,8 @@ from hypothesis import strategies as st
 
 from ptmtools.database import EmitOptions, validate_database
 from ptmtools.database.gltf.buffer import BufferWriter
-from ptmtools.database.gltf.container import GlbError, pack, unpack
+from ptmtools.database.gltf.container import pack, unpack
 from ptmtools.database.gltf.material import linear
-from ptmtools.database.gltf.reader import read_glb
 from ptmtools.database.vrml.reader import Node, parse
 from ptmtools.errors import InputError, LimitError, OutputError
 from ptmtools.scene.model import Material
@@ -321,31 +320,3 @@ def test_a_cell_beyond_the_format_is_refused(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr("ptmtools.database.gltf.container._LARGEST", 100)
     with pytest.raises(LimitError, match="PTM-L600"):
         pack({"asset": {}}, bytes(100))
-
-
-def test_no_damage_is_more_than_an_error(gltf_finished: Path) -> None:
-    """Bytes changed, cut out or doubled: read, or refused with a code."""
-    good = (gltf_finished / "gltf/c0001.glb").read_bytes()
-    assert len(read_glb(good).primitives) > 3
-    random = np.random.default_rng(5)
-    refused = []
-    for _ in range(1500):
-        data = bytearray(good)
-        for _ in range(int(random.integers(1, 4))):
-            at = int(random.integers(0, len(data)))
-            match int(random.integers(0, 4)):
-                case 0:
-                    data[at] = int(random.integers(0, 256))
-                case 1:
-                    del data[at : at + int(random.integers(1, 9))]
-                case 2:
-                    data[at] ^= 1 << int(random.integers(0, 8))
-                case _:
-                    digit = b'0123456789-e[]{}"'[int(random.integers(0, 17))]
-                    data[at] = digit
-        try:
-            read_glb(bytes(data))
-        except GlbError as fault:
-            refused.append(fault.code)
-    assert len(refused) > 700
-    assert set(refused) <= {f"PTM-D73{n}" for n in range(1, 6)}
