@@ -134,16 +134,9 @@ class Cells:
         its back."""
         points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
         inside = np.all((points >= self.root_box[0]) & (points <= self.root_box[1]), axis=1)
-        if len(self.node_plane) == 0:
-            return np.where(inside & (self.leaf_count > 0), 0, -1).astype(np.int32)
-        at = np.where(inside, 0, OUTSIDE).astype(np.int64)
-        active = np.flatnonzero(inside)
-        while len(active):
-            node = at[active]
-            plane = self.node_plane[node]
-            front = np.einsum("ij,ij->i", plane[:, :3], points[active]) + plane[:, 3] > 0
-            at[active] = self.node_child[node, np.where(front, 0, 1)]
-            active = active[at[active] >= 0]
+        at = np.full(len(points), OUTSIDE, dtype=np.int64)
+        if self.leaf_count:
+            at[inside] = sunk(self.node_plane, self.node_child, points[inside])
         return np.where(at <= -2, -2 - at, -1).astype(np.int32)
 
     def locate(self, points: NDArray[np.float64]) -> NDArray[np.int32]:
@@ -239,3 +232,18 @@ class Cells:
             closed=bool(about["closed"]),
             notes=texts(about["notes"], "notes"),
         )
+
+
+def sunk(
+    planes: NDArray[np.float64], children: NDArray[np.int32], points: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """(n,) where points end in a BSP tree, as `Cells.node_child` has it: `OUTSIDE`, or leaf i as
+    -2 - i; a point in a plane counts to its back."""
+    at = np.full(len(points), 0 if len(planes) else -2, dtype=np.int64)
+    active = np.flatnonzero(at >= 0)
+    while len(active):
+        plane = planes[at[active]]
+        front = np.einsum("ij,ij->i", plane[:, :3], points[active]) + plane[:, 3] > 0
+        at[active] = children[at[active], np.where(front, 0, 1)]
+        active = active[at[active] >= 0]
+    return at

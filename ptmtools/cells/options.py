@@ -27,9 +27,10 @@ class SubdivideOptions:
         one wall; jambs, lintels and sills between them divide it whatever their area. What stands
         off a wall by less than 0.12 of this, or 1/1000 of the building's extent, is part of it.
     max_leaves: stop at this many leaves; the best splits come first.
-    structural: names of objects or materials, with * and ?, that divide whatever their area.
+    structural: names of objects or materials, with * and ?, of what divides the building whatever
+        its area.
     detail: names, with * and ?, of what never divides the building nor hides anything, such as
-        furniture. structural wins.
+        furniture; structural wins.
     cells: a cell, the unit that is loaded and drawn, is a single "leaf" or a "room", all leaves
         between its doors; but see gain.
     gain: keep the leaves of a room as separate cells if that saves viewers at least this share of

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ptmtools.cells.bsp import Tree, build_tree
 from ptmtools.cells.caps import Caps
 from ptmtools.cells.grouping import grouped
-from ptmtools.cells.model import OUTSIDE, Cells
+from ptmtools.cells.model import OUTSIDE, Cells, sunk
 from ptmtools.cells.options import CellKind, SubdivideOptions
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.polyhedron import Polyhedron
@@ -194,25 +194,17 @@ def _viewpoint_leaves(
 ) -> tuple[int, ...]:
     if not options.viewpoints:
         return ()
-    eyes = np.array(options.viewpoints, dtype=np.float64)
-    outside = np.flatnonzero(np.any((eyes < box[0]) | (eyes > box[1]), axis=1))
+    places = np.array(options.viewpoints, dtype=np.float64)
+    outside = np.flatnonzero(np.any((places < box[0]) | (places > box[1]), axis=1))
     if len(outside):
-        x, y, z = eyes[outside[0]]
+        x, y, z = places[outside[0]]
         raise InputError(
             "PTM-I301",
             f"viewpoint {x:g},{y:g},{z:g} lies outside the model, which spans "
             + " to ".join(",".join(f"{c:.2f}" for c in corner) for corner in box),
             remedy="viewpoints are in metres, Y up, with the middle of the floor at 0,0,0",
         )
-    found: list[int] = []
-    for eye in eyes:
-        node = 0 if len(tree.planes) else -2
-        while node >= 0:
-            plane = tree.planes[node]
-            node = int(tree.children[node, 0 if plane[:3] @ eye + plane[3] > 0 else 1])
-        if -2 - node not in found:
-            found.append(-2 - node)
-    return tuple(found)
+    return tuple(dict.fromkeys((-2 - sunk(tree.planes, tree.children, places)).tolist()))
 
 
 def _bounds(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -5,13 +5,13 @@ fan would fold over takes its other diagonal. All others are cut by clipping ear
 their Newell normal (Meisters 1975), which also serves concave, slightly bent and keyhole outlines.
 Shapely's constrained Delaunay triangulation was rejected: it refuses outlines that touch
 themselves, and needs a GEOS newer than the one we ask for. So was mapbox_earcut (2.1), which would
-save 60 statements: its time has no bound. A spiral of 10,000 corners takes it 6.6 s, a star of
+save 40 statements: its time has no bound. A spiral of 10,000 corners takes it 6.6 s, a star of
 100,000 takes 6 s, and one of a million had not ended after a minute; here none of them takes 4 s.
 
-Clipping takes a time that grows with the square of an outline, and for outlines made to be
-difficult faster. The steps that all of them together may take grow with the number of corners
-only; an outline for which they do not suffice becomes a fan, and is counted as tangled. That
-happens to single concave polygons from 15,000 corners on.
+Clipping (`polygon_kernels`) takes a time that grows with the square of an outline, and for outlines
+made to be difficult faster. The steps that all of them together may take grow with the number of
+corners only; an outline for which they do not suffice becomes a fan, and is counted as tangled.
+That happens to single concave polygons from 50,000 corners on.
 """
 
 from __future__ import annotations
@@ -23,13 +23,9 @@ from numpy.typing import NDArray
 
 from ptmtools.tolerance import ROUNDING_SHARE
 
-#: Steps of clipping, of about 10 ns: for all outlines together and for each corner besides; of a
-#: look at a corner; of a search for what occupies an ear, which takes one more for each corner; of
-#: a corner where there are few, which are searched one by one.
-_BASE_STEPS, _CORNER_STEPS = 200_000_000, 10_000
-_LOOK, _SEARCH, _CORNER = 150, 2_000, 40
-#: So many corners are few.
-_FEW = 40
+#: Steps of clipping, of about 3 ns, one for each corner that is looked at: for all outlines
+#: together, and for each of their corners besides.
+_BASE_STEPS, _CORNER_STEPS = 1_000_000_000, 30_000
 
 
 @dataclass(frozen=True)
@@ -130,98 +126,10 @@ def _clip_ears(shape: NDArray[np.float64], steps: int) -> tuple[NDArray[np.int64
         return fan[:1], True, 0  # a line or a point: one degenerate triangle stands for it
     normal = cross.sum(axis=0)
     axis = int(np.abs(normal).argmax())
-    if abs(normal[axis]) <= ROUNDING_SHARE or 3 * n * (_SEARCH + n) // 2 > steps:
+    if abs(normal[axis]) <= ROUNDING_SHARE or n * n > steps:
         return fan, False, 0
     flat = shape[:, [(axis + 1) % 3, (axis + 2) % 3]] * [1.0, np.sign(normal[axis])]
 
-    ring = _Ring(flat)
-    ears: list[list[int]] = []
-    at = tried = 0
-    while len(ring.index) > 2:
-        m = len(ring.index)
-        a, b, c = ring.index[(at - 1) % m], ring.index[at % m], ring.index[(at + 1) % m]
-        area = _turn(*(ring.points[i] for i in (a, b, c)))
-        ring.steps += _LOOK
-        if area > ROUNDING_SHARE and not ring.occupied(a, b, c):
-            ears.append([a, b, c])
-            ring.pop(at % m)
-            at, tried = at % m, 0
-        elif tried > m and abs(area) <= ROUNDING_SHARE:
-            ring.pop(at % m)  # no ear is left but this point lies on a straight edge
-            tried = 0
-        else:
-            at, tried = (at + 1) % m, tried + 1
-            if tried > 2 * m + 2 or ring.steps > steps:
-                ears += [[ring.index[0], ring.index[i], ring.index[i + 1]] for i in range(1, m - 1)]
-                return np.array(ears, dtype=np.int64), False, ring.steps
-    return np.array(ears, dtype=np.int64), True, ring.steps
+    from ptmtools.scene.polygon_kernels import clip_ears
 
-
-class _Ring:
-    """What is left of an outline.
-
-    Attributes
-    ----------
-    index: of the vertices left, in order.
-    points: of all vertices.
-    steps: taken so far.
-    """
-
-    def __init__(self, flat: NDArray[np.float64]) -> None:
-        self.index = list(range(len(flat)))
-        self.steps = 0
-        self.points: list[list[float]] = flat.tolist()
-        self._left = flat.copy()
-        self._there = [True] * len(flat)
-        self._occupant: dict[tuple[int, int, int], int] = {}
-
-    def pop(self, at: int) -> None:
-        """Takes a vertex away, by its place in the ring."""
-        self._there[self.index.pop(at)] = False
-        left = len(self.index)
-        self._left[at:left] = self._left[at + 1 : left + 1]
-
-    def occupied(self, a: int, b: int, c: int) -> bool:
-        """Whether a vertex of the ring lies in the closed triangle, other than in its corners."""
-        known = self._occupant.get((a, b, c))
-        if known is not None and self._there[known]:
-            return True
-        found = (self._one_by_one if len(self.index) <= _FEW else self._at_once)(a, b, c)
-        if found < 0:
-            return False
-        self._occupant[a, b, c] = found
-        return True
-
-    def _at_once(self, a: int, b: int, c: int) -> int:
-        """The first vertex of the ring that occupies a triangle, -1 if none does."""
-        left = len(self.index)
-        self.steps += _SEARCH + left
-        x, y = self._left[:left].T
-        inside = np.ones(left, dtype=bool)
-        for s, t in ((a, b), (b, c), (c, a)):
-            (ux, uy), (vx, vy) = self.points[s], self.points[t]
-            inside &= (vx - ux) * (y - uy) - (vy - uy) * (x - ux) >= 0
-            inside &= (x != ux) | (y != uy)
-        found = int(inside.argmax())
-        return self.index[found] if inside[found] else -1
-
-    def _one_by_one(self, a: int, b: int, c: int) -> int:
-        """The same by the same arithmetic."""
-        corners = self.points[a], self.points[b], self.points[c]
-        (ax, ay), (bx, by), (cx, cy) = corners
-        px, py, qx, qy, rx, ry = bx - ax, by - ay, cx - bx, cy - by, ax - cx, ay - cy
-        for i in self.index:
-            self.steps += _CORNER
-            x, y = point = self.points[i]
-            if (
-                px * (y - ay) - py * (x - ax) >= 0
-                and qx * (y - by) - qy * (x - bx) >= 0
-                and rx * (y - cy) - ry * (x - cx) >= 0
-                and point not in corners
-            ):
-                return i
-        return -1
-
-
-def _turn(a: list[float], b: list[float], c: list[float]) -> float:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    return clip_ears(np.ascontiguousarray(flat), ROUNDING_SHARE, steps)

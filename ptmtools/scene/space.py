@@ -62,8 +62,8 @@ def guess_up(corners: NDArray[np.float64]) -> tuple[Literal["y", "z"], str]:
     other = "z" if up == "y" else "y"
     high, wide = (side[1], side[2]) if up == "y" else (side[2], side[1])
     return up, (
-        f"with {up} up, {share:.0%} of the area square to y or z is level, "
-        f"and the model is {high:.4g} high and {wide:.4g} along {other}"
+        f"{share:.0%} of the area perpendicular to y or z would be level, "
+        f"and the model would be {high:.4g} high and {wide:.4g} along {other}"
     )
 
 

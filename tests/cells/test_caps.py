@@ -27,11 +27,7 @@ def hall(room_faces, edge: list) -> list:
 
 def leaf_at(cells: Cells, point: list[float]) -> int:
     """The leaf that holds a point, or -1."""
-    child = 0
-    while child >= 0:
-        plane = cells.node_plane[child]
-        child = int(cells.node_child[child, 0 if plane[:3] @ point + plane[3] > 0 else 1])
-    return -2 - child if child <= -2 else -1
+    return int(cells.locate_leaf(np.array([point]))[0])
 
 
 IN_THE_SLAB = [[4.1, 3.25, 0], [4.5, 3.1, 1], [9, 3.15, -1]]

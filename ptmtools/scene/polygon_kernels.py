@@ -1,0 +1,60 @@
+"""Clips the ears of one outline (see `polygon`)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.compiled import kernel
+
+
+@kernel
+def clip_ears(
+    flat: NDArray[np.float64], rounding: float, most: int
+) -> tuple[NDArray[np.int64], bool, int]:
+    """Triangles (k, 3) of an outline (n, 2), counter-clockwise, in indices of its corners; whether
+    they are all ears; and the steps taken. After ``most`` steps, and where no ear is left, the rest
+    becomes a fan. Corners whose triangle has less than the area ``rounding`` lie on an edge.
+    """
+    x, y = flat[:, 0].copy(), flat[:, 1].copy()
+    ring = np.arange(len(flat))
+    ears = np.empty((len(flat) - 2, 3), np.int64)
+    left, found, at, tried, steps = len(flat), 0, 0, 0, 0
+    while left > 2:
+        a, b, c = ring[(at - 1) % left], ring[at], ring[(at + 1) % left]
+        px, py, qx, qy = x[b] - x[a], y[b] - y[a], x[c] - x[b], y[c] - y[b]
+        rx, ry = x[a] - x[c], y[a] - y[c]
+        area = px * (y[c] - y[a]) - py * (x[c] - x[a])
+        ear = area > rounding
+        steps += 1
+        if ear:
+            for k in range(left):
+                i = ring[k]
+                if (
+                    px * (y[i] - y[a]) - py * (x[i] - x[a]) >= 0
+                    and qx * (y[i] - y[b]) - qy * (x[i] - x[b]) >= 0
+                    and rx * (y[i] - y[c]) - ry * (x[i] - x[c]) >= 0
+                    and not (x[i] == x[a] and y[i] == y[a])
+                    and not (x[i] == x[b] and y[i] == y[b])
+                    and not (x[i] == x[c] and y[i] == y[c])
+                ):
+                    ear = False
+                    break
+            steps += k + 1
+        if ear or (tried > left and abs(area) <= rounding):
+            if ear:
+                ears[found] = a, b, c
+                found += 1
+            left -= 1
+            for k in range(at, left):
+                ring[k] = ring[k + 1]
+            steps += (left - at) // 8
+            at, tried = at % left, 0
+        else:
+            at, tried = (at + 1) % left, tried + 1
+            if tried > 2 * left + 2 or steps > most:
+                for k in range(1, left - 1):
+                    ears[found] = ring[0], ring[k], ring[k + 1]
+                    found += 1
+                return ears[:found], False, steps
+    return ears[:found], True, steps
