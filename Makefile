@@ -103,7 +103,7 @@ bench: $(VENV)/.installed-dev
 	  $(BIN)/python benchmarks/prt.py "$$map" -o "build/bench/$$(basename "$$map" .prt).npz" \
 	    --reference "$${map%.prt}.visible.npz"; { set +x; } 2>/dev/null; done
 	@[ ! -d build/museum.db ] || { set -x; $(BIN)/python benchmarks/false_negatives.py build/museum.db; }
-	$(BIN)/python benchmarks/ach.py sample_data/two_rooms/two_rooms.obj --only accuracy speed
+	$(BIN)/python benchmarks/ach.py sample_data/two_rooms/two_rooms.obj --only presets speed
 	$(BIN)/python benchmarks/emission.py
 	$(BIN)/python -m benchmarks.fuzz --count 5000 --jobs $(JOBS)
 

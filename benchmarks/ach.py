@@ -1,22 +1,26 @@
 """Coverage hints: what accuracy costs. ``make bench-ach``, or
 
-    python benchmarks/ach.py [MODEL…] [--cells N] [--only accuracy grid tolerance agreement speed]
+    python benchmarks/ach.py [MODEL…] [--cells N] [--only presets rates tolerance agreement …]
 
 For every model, cut with the default options, up to ``--cells`` cells stand for all. CPU seconds
 are those of all threads of this process, for the whole model; errors are total variations (half
 the sum of absolute differences) between a cell's hints and those of 16,384 other points.
 
-accuracy    the presets with both backends and with ``auto``: error, missed mass, rays, CPU seconds,
+presets     the presets with both backends and with ``auto``: error, missed mass, rays, CPU seconds,
             and both as a share of the paper's preset with ``auto``. Is ``auto`` the faster one?
             OpenGL in software is tried on three cells beyond the paper's preset, and not on `high`
-grid        `CoverageTrade`'s grid of settings, into `ach.csv` and `ach.png`
+rates       how the error falls with the rays, by least squares over `CoverageTrade`'s grid of
+            settings, which goes into `ach.csv` and `ach.png`
 tolerance   achieved errors under ``--tolerance``, and how often the truth lies within
             the error bars
 agreement   pixels that differ between the backends
 speed       rays and sample points a second of each backend, and what the whole takes over what
-            Embree or the draws take in it, which is a bare loop; two processes against one
+            Embree or the draws take in it, which is a bare loop
+processes   two processes against one
 
-Tables go to the standard output and into `build/bench/ach.md`, in Markdown.
+Each part is a table in Markdown on the standard output, so that one ``--only`` prints what
+docs/tradeoffs.md shows. What else there is to say goes to the standard error, and all of it, under
+headings, into `build/bench/ach.md`.
 """
 
 from __future__ import annotations
@@ -28,27 +32,27 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells import subdivide
 from ptmtools.cells.model import Cells
-from ptmtools.coverage import ach as stage
 from ptmtools.coverage.ach import compute_ach
-from ptmtools.coverage.backend import open_renderer, triangles_of_a_pvs
-from ptmtools.coverage.item_buffer import VIEWS, Surfaces
-from ptmtools.coverage.opengl import OpenGLRenderer, create_context, is_software
+from ptmtools.coverage.backends import BACKENDS
+from ptmtools.coverage.backends.choice import choose, triangles_of_a_pvs
+from ptmtools.coverage.backends.opengl import OpenGLRenderer, create_context, is_software
+from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.options import PRESETS, AchOptions
-from ptmtools.coverage.sampling import CellHints
+from ptmtools.coverage.sampling import CellHints, Sampler
 from ptmtools.errors import MissingComponentError
 from ptmtools.executors import open_executor
 from ptmtools.scene import ingest
 from ptmtools.scene.model import Scene
-from ptmtools.tradeoff.experiment import Trade, run
+from ptmtools.tradeoff.coverage import CoverageTrade
+from ptmtools.tradeoff.experiment import run
 from ptmtools.tradeoff.figure import picture
-from ptmtools.tradeoff.hints import CoverageTrade
 from ptmtools.tradeoff.report import as_csv
 from ptmtools.visibility.model import Pvs
 from ptmtools.visibility.pvs import compute_pvs
@@ -60,7 +64,7 @@ MODELS = (
     ROOT / "build/museum/museum.obj",
     *(SHARED / f"scenes/{n}/{n}.obj" for n in ("hospital", "willowgarage", "gallery", "office")),
 )
-PARTS = ("accuracy", "grid", "tolerance", "agreement", "speed")
+PARTS = ("presets", "rates", "tolerance", "agreement", "speed", "processes")
 REFERENCE = 16384
 #: Student's t for seven degrees of freedom, two-sided 95 %.
 T = 2.365
@@ -72,22 +76,23 @@ Subject = tuple[Scene, Cells, Pvs]
 
 
 class Report:
-    """Markdown, printed as it comes."""
+    """Markdown: tables to the standard output, the rest to the standard error, as it comes."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
 
-    def say(self, line: str) -> None:
-        print(line, flush=True)
+    def say(self, line: str, file: TextIO = sys.stderr) -> None:
+        print(line, file=file, flush=True)
         self.lines.append(line)
 
     def head(self, title: str, columns: Sequence[str]) -> None:
-        self.say(f"\n### {title}\n")
-        self.say("| " + " | ".join(columns) + " |")
-        self.say("|---" * len(columns) + "|")
+        self.say(f"\n### {title}")
+        self.say("", sys.stdout)
+        self.row(columns)
+        self.say("|---" * len(columns) + "|", sys.stdout)
 
     def row(self, values: Iterable[Any]) -> None:
-        self.say("| " + " | ".join(map(str, values)) + " |")
+        self.say("| " + " | ".join(map(str, values)) + " |", sys.stdout)
 
 
 def cpu(work: Callable[[], Any]) -> tuple[Any, float]:
@@ -109,9 +114,7 @@ def has_gl() -> str:
     return name
 
 
-def accuracy(
-    report: Report, trials: dict[str, CoverageTrade], subjects: dict[str, Subject]
-) -> None:
+def presets(report: Report, trials: dict[str, CoverageTrade], subjects: dict[str, Subject]) -> None:
     columns = ("model", "preset", "backend", "mean", "p95", "max", "missed", "rays a cell", "CPU s",
                "error / paper", "time / paper")  # fmt: skip
     report.head("Presets", columns)
@@ -129,10 +132,7 @@ def accuracy(
                 tried = trade.tried[:FEW] if few else trade.tried
                 found, seconds[backend], _ = trade.hints(replace(options, backend=backend), tried)
                 errors = trade.errors(found)
-                surfaces = Surfaces.of(subjects[name][0], subjects[name][1])
-                chosen = open_renderer(surfaces, *subjects[name][1:], options)
-                auto = chosen.backend
-                chosen.close()
+                auto = choose(*subjects[name][1:], options).name
                 mean = float(errors.mean())
                 if preset == "paper" and backend == auto:
                     base = mean, seconds[backend]
@@ -157,18 +157,17 @@ def accuracy(
         report.say(f"The reference of {name} has a standard error of {trade.reference_error:.5f}.")
 
 
-def grid(report: Report, trials: dict[str, CoverageTrade]) -> list[Trade]:
-    report.head("Rates: error ∝ rays^b", ("model", "family", "b"))
-    found = []
-    for name, trade in trials.items():
-        done = run(trade)
-        found.append(replace(done, stage=name))
-        for family, rate in done.rates.items():
-            report.row((name, family, f"{rate:.2f}"))
+def rates(report: Report, trials: dict[str, CoverageTrade]) -> None:
+    found = [run(name, trade) for name, trade in trials.items()]
+    report.head(
+        "Rates: error ∝ rays^b", ("family", *(trade.stage for trade in found if trade.rates))
+    )
+    for family in dict.fromkeys(family for trade in found for family in trade.rates):
+        rate = [trade.rates.get(family) for trade in found if trade.rates]
+        report.row((family, *("–" if b is None else f"{b:.2f}" for b in rate)))
     OUTPUT.mkdir(parents=True, exist_ok=True)
     (OUTPUT / "ach.csv").write_text(as_csv(found))
     (OUTPUT / "ach.png").write_bytes(picture(found))
-    return found
 
 
 def tolerance(report: Report, trials: dict[str, CoverageTrade]) -> None:
@@ -258,39 +257,36 @@ def speed(report: Report, subjects: dict[str, Subject]) -> None:
         "Speed, one process: wall seconds of the whole over those of the bare loop", columns
     )
     for name, (scene, cells, pvs) in subjects.items():
-        surfaces = Surfaces.of(scene, cells)
         volumes = np.bincount(cells.leaf_cell, cells.leaf_volumes())
         largest = np.argsort(-volumes, kind="stable")[:LARGEST].tolist()
         for face, count in ((4, 512), (8, 256), (64, 8), (256, 2)):
             for backend in ("embree", "gl") if has_gl() else ("embree",):
                 points = min(count, 32) if backend == "gl" else count
                 options = AchOptions(backend=backend, samples=points, face=face)
-                renderer = open_renderer(surfaces, cells, pvs, options)
-                sampler = stage.Sampler(scene, cells, pvs, options, surfaces, renderer)
+                sampler = Sampler(scene, cells, pvs, options, BACKENDS[backend])
                 sampler.of_cell(largest[0])
-                watch = watched(renderer)
+                watch = watched(sampler.renderer)
                 start = time.perf_counter()
                 used = sum(sampler.of_cell(cell).samples for cell in largest)
                 whole = time.perf_counter() - start
-                renderer.close()
+                sampler.renderer.close()
                 rays = used * len(VIEWS) * face**2
                 report.row((
                     name, backend, face, points, f"{used / whole:,.0f}",
                     f"{rays / whole / 1e6:.2f}", f"{whole / watch.seconds:.2f}",
                 ))  # fmt: skip
-    two_processes(report, {n: s for n, s in subjects.items() if n in ("museum", "hospital")})
 
 
-def two_processes(report: Report, subjects: dict[str, Subject]) -> None:
+def processes(report: Report, subjects: dict[str, Subject]) -> None:
     title = "Two processes against one (--samples 16384 --backend embree, wall seconds)"
     report.head(title, ("model", "one", "two", "times"))
-    for name, subject in subjects.items():
+    for name in (n for n in subjects if n in ("museum", "hospital")):
         took = []
         for workers in (1, 2):
             options = AchOptions(samples=16384, backend="embree")
             start = time.perf_counter()
             with open_executor(workers) as executor:
-                compute_ach(*subject, options, executor=executor)
+                compute_ach(*subjects[name], options, executor=executor)
             took.append(time.perf_counter() - start)
         report.row((name, *(f"{t:.1f}" for t in took), f"{took[0] / took[1]:.2f}"))
 
@@ -307,24 +303,26 @@ def main() -> None:
     report.say(f"OpenGL: {has_gl() or 'none'}")
     subjects: dict[str, Subject] = {}
     trials: dict[str, CoverageTrade] = {}
-    report.head("Models", ("model", "cells", "tried", "triangles", "of a PVS"))
     for model in given.models:
         scene = ingest(model)
         cells = subdivide(scene)
         pvs = compute_pvs(cells)
         subjects[model.stem] = scene, cells, pvs
-        few = set(given.only) <= {"agreement", "speed"}
+        few = set(given.only) <= {"agreement", "speed", "processes"}
         trade = CoverageTrade(scene, cells, pvs, AchOptions(), given.cells, 8 if few else REFERENCE)
         trials[model.stem] = trade
         mean = triangles_of_a_pvs(cells, pvs)
-        sizes = cells.cell_count, len(trade.tried), f"{len(cells.triangle):,}", f"{mean:,.0f}"
-        report.row((model.stem, *sizes))
+        report.say(
+            f"{model.stem}: {cells.cell_count} cells, {len(trade.tried)} of them tried, "
+            f"{len(cells.triangle):,} triangles, {mean:,.0f} in a PVS"
+        )
     parts: dict[str, Callable[[], Any]] = {
-        "accuracy": lambda: accuracy(report, trials, subjects),
-        "grid": lambda: grid(report, trials),
+        "presets": lambda: presets(report, trials, subjects),
+        "rates": lambda: rates(report, trials),
         "tolerance": lambda: tolerance(report, trials),
         "agreement": lambda: agreement(report, subjects, given.cells),
         "speed": lambda: speed(report, subjects),
+        "processes": lambda: processes(report, subjects),
     }
     for part in PARTS:
         if part in given.only:

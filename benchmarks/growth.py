@@ -17,7 +17,7 @@ during the stage over what was resident before it, inputs read; where the system
 is that of the process.
 
 The last rows are the exponents b of seconds or megabytes = a · leavesᵇ, by least squares in the
-logarithms, with the standard error of b. A museum that hit `--max-cells` is marked.
+logarithms, with the standard error of b. A museum that hit `--max-leaves` is marked.
 """
 
 from __future__ import annotations
@@ -46,7 +46,6 @@ from ptmtools.coverage.options import AchOptions
 from ptmtools.database import TextureRecord, emit
 from ptmtools.scene import Scene, SourceImage, ingest
 from ptmtools.store.archive import pack_arrays, unpack_arrays
-from ptmtools.tolerance import Tolerance
 from ptmtools.visibility import Pvs, compute_pvs
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -63,7 +62,7 @@ class Work:
     folder: Path
     model: Path
     wall_area: float
-    max_cells: int
+    max_leaves: int
 
     def run(self, stage: str) -> dict[str, float]:
         """Runs a stage, leaves its result and returns its figures."""
@@ -84,7 +83,7 @@ class Work:
                 "leaves": result.leaf_count,
                 "cells": result.cell_count,
                 "portals": result.portal_count,
-                "limited": any("max-cells" in note for note in result.notes),
+                "limited": any("max-leaves" in note for note in result.notes),
             }
         return figures
 
@@ -93,12 +92,12 @@ class Work:
         if stage == "scene":
             return lambda: ingest(self.model)
         scene = Scene.from_arrays(self._arrays("scene"), self._images())
-        options = SubdivideOptions(wall_area=self.wall_area, max_cells=self.max_cells)
+        options = SubdivideOptions(wall_area=self.wall_area, max_leaves=self.max_leaves)
         if stage == "leaves":
             return lambda: subdivide(scene, replace(options, cells="leaf"))
         if stage == "rooms":
             leaves = Cells.from_arrays(self._arrays("leaves"))
-            return lambda: grouped(leaves, options, Tolerance.for_points(scene.points))
+            return lambda: grouped(leaves, options)
         cells = Cells.from_arrays(self._arrays("rooms"))
         if stage == "pvs":
             return lambda: compute_pvs(cells)
@@ -179,17 +178,17 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("--rooms", default=",".join(map(str, ROOMS)), metavar="N,N,…")
     parser.add_argument("--wall-area", type=float, default=SubdivideOptions().wall_area)
-    parser.add_argument("--max-cells", type=int, default=SubdivideOptions().max_cells)
+    parser.add_argument("--max-leaves", type=int, default=SubdivideOptions().max_leaves)
     parser.add_argument("--csv", type=Path, metavar="FILE", help="the figures as a table")
     parser.add_argument("--folder", type=Path, help="where museums are made, left and found again")
     parser.add_argument("--stage", choices=STAGES, help=argparse.SUPPRESS)
     given = parser.parse_args(arguments)
     if given.stage:
         model = given.folder / "model/museum.obj"
-        work = Work(given.folder, model, given.wall_area, given.max_cells)
+        work = Work(given.folder, model, given.wall_area, given.max_leaves)
         one_stage(given.stage, work)
         return 0
-    options = [f"--wall-area={given.wall_area}", f"--max-cells={given.max_cells}"]
+    options = [f"--wall-area={given.wall_area}", f"--max-leaves={given.max_leaves}"]
     with tempfile.TemporaryDirectory() as scratch:
         folder = given.folder or Path(scratch)
         print(f"| rooms | triangles | leaves | cells | portals | | {' | '.join(STAGES)} |")

@@ -131,7 +131,7 @@ def warm_up(folder: Path) -> None:
 
     scene = ingest(WARM_UP)
     subdivide(scene)
-    cells = stored(folder, "small", subdivide(scene, SubdivideOptions(cells="leaf", max_cells=4)))
+    cells = stored(folder, "small", subdivide(scene, SubdivideOptions(cells="leaf", max_leaves=4)))
     for method in METHODS:
         compute_pvs(cells, PvsOptions(method=method))
 
@@ -152,14 +152,12 @@ def cut(folder: Path, model: Path, area: float) -> dict[str, tuple[float, float]
     from ptmtools.cells import SubdivideOptions, subdivide
     from ptmtools.cells.grouping import grouped
     from ptmtools.scene import ingest
-    from ptmtools.tolerance import Tolerance
 
     subdivide(ingest(WARM_UP))
     scene = ingest(model)
-    tolerance = Tolerance.for_points(scene.points)
     options = SubdivideOptions(cells="leaf", wall_area=area)
     leaves, cpu, wall = timed(subdivide, scene, options)
-    rooms, more_cpu, more_wall = timed(grouped, leaves, SubdivideOptions(wall_area=area), tolerance)
+    rooms, more_cpu, more_wall = timed(grouped, leaves, SubdivideOptions(wall_area=area))
     stored(folder, "leaf", leaves)
     stored(folder, "room", rooms)
     return {"leaf": (cpu, wall), "room": (cpu + more_cpu, wall + more_wall)}

@@ -33,16 +33,15 @@ from walk import cell_texts, load, passed, standard_walk, texels_at_hand
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.cells.grouping import grouped
 from ptmtools.coverage.ach import compute_ach
-from ptmtools.coverage.embree import EmbreeRenderer
-from ptmtools.coverage.eyes import Eyes
+from ptmtools.coverage.backends.embree import EmbreeRenderer
 from ptmtools.coverage.item_buffer import Surfaces
-from ptmtools.coverage.looking import Looker, Owners
-from ptmtools.coverage.matter import Surroundings
 from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
+from ptmtools.coverage.sample_points import SamplePoints
 from ptmtools.coverage.sampling import CLEARANCE
+from ptmtools.coverage.solids import Obstacles
+from ptmtools.coverage.tally import PixelCounter
 from ptmtools.scene import Scene, ingest
-from ptmtools.tolerance import Tolerance
 from ptmtools.visibility import Pvs, compute_pvs
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -59,26 +58,25 @@ PLACES, FACE = 300, 64
 
 
 def views(scene: Scene, leaves: Cells, seed: int) -> list[tuple[int, NDArray[np.int64]]]:
-    """For random places, uniform over the volume and clear of matter, the leaf and (L,) the pixels
+    """For random places, uniform over the volume and outside solids, the leaf and (L,) the pixels
     that each leaf covers, seen from there."""
-    around, surfaces = Surroundings.of(scene, leaves), Surfaces.of(scene, leaves)
-    clearance = CLEARANCE * Tolerance.for_points(scene.points).thin
+    obstacles, surfaces = Obstacles.of(scene, leaves), Surfaces.of(scene, leaves)
+    clearance = CLEARANCE * scene.tolerance.thin
     random = np.random.default_rng(seed)
     low, high = leaves.root_box
     points = np.zeros((0, 3))
     while len(points) < PLACES:
         tried = random.uniform(low, high, (PLACES, 3))
         tried = tried[leaves.locate_leaf(tried) >= 0]
-        clear = around.clearance(tried, clearance) >= clearance
-        points = np.concatenate([points, tried[clear & ~around.in_matter(tried)]])
+        clear = obstacles.clearance(tried, clearance) >= clearance
+        points = np.concatenate([points, tried[clear & ~obstacles.in_solid(tried)]])
     points = points[:PLACES]
-    eyes = Eyes(points, np.full(PLACES, clearance), np.zeros((PLACES, 2)))
-    looker = Looker(EmbreeRenderer(surfaces, FACE), surfaces, leaves, FACE, by_angle=False)
-    owners = Owners.of(surfaces, by_image=False)
+    viewers = SamplePoints(points, np.full(PLACES, clearance), np.zeros((PLACES, 2)))
+    counter = PixelCounter(EmbreeRenderer(surfaces, FACE), surfaces, leaves, FACE)
     every = np.arange(leaves.cell_count)
     of_leaf = leaves.locate_leaf(points).tolist()
     return [
-        (leaf, looker.look(eyes.part(slice(i, i + 1)), owners, every).counts.sum(axis=(0, 1)))
+        (leaf, counter.count(viewers.part(slice(i, i + 1)), every).in_views.sum(axis=0))
         for i, leaf in enumerate(of_leaf)
     ]
 
@@ -118,14 +116,13 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|---|---|---|")
     for model in [m for m in given.models or MODELS if m.is_file()]:
         scene = ingest(model)
-        tolerance = Tolerance.for_points(scene.points)
         leaves = subdivide(scene, LEAF)
-        rooms = grouped(leaves, WHOLE, tolerance)
+        rooms = grouped(leaves, WHOLE)
         way = passed(leaves, standard_walk(rooms).corner)
         seen = views(scene, leaves, seed=1)
         for name, options in kinds.items():
             start = time.process_time()
-            cells = grouped(leaves, options, tolerance)
+            cells = grouped(leaves, options)
             pvs = compute_pvs(cells)
             ach = compute_ach(scene, cells, pvs, AchOptions(backend="embree"))
             seconds = time.process_time() - start

@@ -208,9 +208,7 @@ def collection(given: argparse.Namespace) -> dict[str, Any]:
     with tempfile.TemporaryDirectory(dir=given.folder) as folder, two_processes(8) as address:
         for count in counts:
             model, db = pictures(Path(folder, str(count)), count), Path(folder, f"{count}.db")
-            took = _stages(model, db) | _shared_disk(
-                model, Path(folder, f"{count}.disk"), address
-            )
+            took = _stages(model, db) | _shared_disk(model, Path(folder, f"{count}.disk"), address)
             for stage, figures in took.items():
                 seconds.setdefault(stage, []).append(figures)
         manifest = (db / "manifest.json").stat().st_size / counts[2]

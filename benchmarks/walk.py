@@ -19,7 +19,6 @@ from ptmtools.cells import Cells
 from ptmtools.database import TextureRecord
 from ptmtools.database.vrml import CellText, CellWriter
 from ptmtools.scene import Scene
-from ptmtools.tolerance import Tolerance
 from ptmtools.visibility import Pvs
 
 #: Rooms that the walk leads through, and the least portal that it passes (m²).
@@ -125,7 +124,7 @@ def passed(cells: Cells, walk: NDArray[np.float64]) -> Way:
     if len(walk) == 1:
         leaf = cells.locate_leaf(walk)
         return Way(leaf[leaf >= 0].astype(np.int64), np.ones(int((leaf >= 0).sum())))
-    least = Tolerance.for_points(cells.root_box).hairline
+    least = cells.tolerance.hairline
     found = [
         (leaf, metres)
         for a, b in pairwise(walk)

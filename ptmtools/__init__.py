@@ -56,7 +56,6 @@ if TYPE_CHECKING:
         read_header,
         read_image,
         write_image,
-        write_png,
     )
     from ptmtools.texture.reader import open as open
     from ptmtools.visibility.model import Pvs
@@ -109,7 +108,6 @@ _HOME = {
     "subdivide": "cells",
     "validate": "pipeline",
     "write_image": "texture",
-    "write_png": "texture",
 }
 
 __all__ = [
@@ -158,7 +156,6 @@ __all__ = [
     "subdivide",
     "validate",
     "write_image",
-    "write_png",
 ]
 
 __getattr__ = names(__name__, _HOME)

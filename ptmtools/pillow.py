@@ -46,7 +46,7 @@ from ptmtools.texture.images.opening import ORIENTATION, described, orientation_
 from ptmtools.texture.images.picture import Strips
 from ptmtools.texture.model import Description, EncodeOptions, Limits, PtmHeader
 from ptmtools.texture.reader import PtmReader
-from ptmtools.texture.sources import File
+from ptmtools.texture.sources import ranges_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -82,7 +82,7 @@ class PtmImageFile(ImageFile.ImageFile):
         # Pillow's own check of the number of texels comes right after this.
         everything = Limits(decoded_bytes=1 << 62)
         with _pillow_errors():
-            self._ptm = PtmReader(File(cast("Any", self.fp)), everything, 1)
+            self._ptm = PtmReader(ranges_of(cast("Any", self.fp)), everything, 1)
             header = self._ptm.header
             description = self._description()
         mode = _MODES.get((header.kind, header.components))
@@ -252,7 +252,7 @@ def _save(im: Image.Image, fp: IO[bytes], filename: str | bytes) -> None:
 
 
 def _description(im: Image.Image, given: Mapping[str, Any]) -> Description:
-    """What the image says of itself, unless `save` was told something else."""
+    """What the image says of itself, unless the arguments of ``save`` override it."""
     kept = described(im)
     if "icc_profile" in given:
         kept = replace(kept, icc=given["icc_profile"] or None)

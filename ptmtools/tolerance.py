@@ -2,7 +2,8 @@
 
 All geometry behind ingest is float64 in metres with its origin at the centre of the model's
 floor, so the extent of the scene bounds every coordinate. A tolerance is a fixed share of that
-extent: the same building in other units, or moved, is treated alike.
+extent: the same building in other units, or moved, is treated alike. Ingest derives them once
+(`scene.orientation`); `Scene.tolerance` and `Cells.tolerance` hand them on to every stage.
 """
 
 from __future__ import annotations
@@ -93,7 +94,10 @@ class Tolerance:
 
     @staticmethod
     def for_extent(extent: float) -> Tolerance:
-        """Tolerances for a scene whose bounding box has the largest side ``extent`` (metres)."""
+        """Tolerances for a scene whose bounding box has the largest side ``extent`` (metres);
+        ValueError unless that is positive."""
+        if not extent > 0:
+            raise ValueError(f"{extent} is no extent")
         return Tolerance(
             extent=extent,
             plane=PLANE_SHARE * extent,

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import settings
+from numpy.typing import ArrayLike
 
 from ptmtools.cells.model import Cells
 from ptmtools.scene.model import Material, Scene
+from ptmtools.scene.orientation import tolerance_of
 
 # How long an example takes says how busy the machine is.
 settings.register_profile("untimed", deadline=None)
@@ -42,6 +44,9 @@ def shared() -> Path:
     return SHARED
 
 
+#: Texture coordinates of the corners of a face.
+CORNER_UV = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float64)
+
 RoomRow = Callable[[int], tuple[Scene, Cells]]
 
 
@@ -53,6 +58,35 @@ def room_row() -> RoomRow:
     [-1, 1]. Walls have no thickness; cells, portals and pieces are written down by hand.
     """
     return make_room_row
+
+
+def scene_of(
+    faces: ArrayLike,
+    objects: Sequence[str] | None = None,
+    materials: Sequence[Material] = (Material("plain"),),
+    material: Sequence[int] | None = None,
+) -> Scene:
+    """A scene of (n, 4, 3) quadrilaterals or (n, 3, 3) triangles, which share no points.
+
+    ``objects`` is a name and ``material`` an index for each face.
+    """
+    corners = np.array(faces, dtype=np.float64)
+    n, sides = corners.shape[:2]
+    loop = np.array([[0, 1, 2], [0, 2, 3]])[: sides - 2]
+    triangles = (sides * np.arange(n)[:, None, None] + loop).reshape(-1, 3).astype(np.int32)
+    of_face = np.zeros(n, np.int32) if material is None else np.array(material, np.int32)
+    points = corners.reshape(-1, 3)
+    return Scene(
+        points=points,
+        triangles=triangles,
+        uv=np.tile(CORNER_UV[loop], (n, 1, 1)),
+        triangle_object=np.repeat(np.arange(n, dtype=np.int32), len(loop)),
+        triangle_material=np.repeat(of_face, len(loop)),
+        two_sided=np.ones(len(triangles), dtype=bool),
+        objects=tuple(objects or [f"quad{i}" for i in range(n)]),
+        materials=tuple(materials),
+        tolerance=tolerance_of(points, triangles),
+    )
 
 
 def make_room_row(n: int) -> tuple[Scene, Cells]:
@@ -80,23 +114,7 @@ def make_room_row(n: int) -> tuple[Scene, Cells]:
         quad([x, 0, 1], [x, 4, 1], [x, 4, 2], [x, 0, 2], i + 1, i)
         quad([x, 3, -1], [x, 4, -1], [x, 4, 1], [x, 3, 1], i + 1, i)
 
-    q = len(quads)
-    points = np.concatenate(quads)
-    base = 4 * np.arange(q)[:, None, None]
-    triangles = (base + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3).astype(np.int32)
-    corner_uv = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float64)
-    uv = np.tile(corner_uv[np.array([[0, 1, 2], [0, 2, 3]])], (q, 1, 1))
-    t = 2 * q
-    scene = Scene(
-        points=points,
-        triangles=triangles,
-        uv=uv,
-        triangle_object=np.repeat(np.arange(q), 2).astype(np.int32),
-        triangle_material=np.zeros(t, np.int32),
-        two_sided=np.ones(t, np.bool_),
-        objects=tuple(f"quad{i}" for i in range(q)),
-        materials=(Material("plain"),),
-    )
+    scene = scene_of(np.array(quads))
 
     box = np.array([[x, y, z] for x in (0, 4) for y in (0, 4) for z in (-2, 2)], dtype=np.float64)
     loops = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
@@ -124,10 +142,11 @@ def make_room_row(n: int) -> tuple[Scene, Cells]:
         portal_point=np.concatenate(doors) if doors else np.zeros((0, 3)),
         portal_start=4 * np.arange(n),
         portal_area=np.full(n - 1, 6.0),
-        vertex=points,
-        vertex_uv=np.tile(corner_uv, (q, 1)),
-        triangle=triangles,
-        triangle_source=np.arange(t, dtype=np.int32),
+        vertex=scene.points,
+        vertex_uv=np.tile(CORNER_UV, (len(quads), 1)),
+        triangle=scene.triangles,
+        triangle_source=np.arange(2 * len(quads), dtype=np.int32),
         triangle_cell=np.repeat(np.array(sides, dtype=np.int32), 2, axis=0),
+        tolerance=scene.tolerance,
     )
     return scene, cells

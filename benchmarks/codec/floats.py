@@ -57,7 +57,7 @@ def made() -> dict[str, Samples]:
 
 def exact(image: Samples, profile: str) -> tuple[int, float, float]:
     """Bytes, seconds to encode and to decode; checks every bit of every level."""
-    encoding, data = best(lambda: encode(image, EncodeOptions(profile)), 2)  # type: ignore[arg-type]
+    encoding, data = best(lambda: encode(image, EncodeOptions(profile)), 2)
     decoding, levels = best(lambda: list(decode_levels(data)), 2)
     for found, wanted in zip(levels, build_pyramid(image), strict=True):
         assert found.tobytes() == wanted.tobytes(), "not exact"

@@ -74,7 +74,7 @@ def peak() -> int:
 
 def one(task: str, folder: Path, side: int, profile: str, threads: int) -> None:
     """Does one task and prints what it took, as JSON."""
-    options = EncodeOptions(profile)  # type: ignore[arg-type]
+    options = EncodeOptions(profile)
     ptm = folder / "a.ptm"
     warm = np.ascontiguousarray(sample()[:64, :64])
     texture.decode(texture.encode(warm, options))

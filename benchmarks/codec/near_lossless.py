@@ -58,7 +58,7 @@ def ptm(images: list[Samples], profile: str, allowed: int) -> tuple[Sums, int]:
     """Ours, and the largest error of any level."""
     sums, worst = Sums(), 0
     for image in images:
-        data = encode(image, EncodeOptions(profile, max_error=allowed))  # type: ignore[arg-type]
+        data = encode(image, EncodeOptions(profile, max_error=allowed))
         levels = list(decode_levels(data))
         sums.add(len(data), image, levels[-1])
         for level, exact in zip(levels, build_pyramid(image), strict=True):

@@ -41,7 +41,7 @@ def by_ptm(profile: str) -> Callable[[NDArray[Any]], list[int]]:
     """Bytes until each level, finest first."""
 
     def sizes(image: NDArray[Any]) -> list[int]:
-        header = read_header(encode(image, EncodeOptions(profile)))  # type: ignore[arg-type]
+        header = read_header(encode(image, EncodeOptions(profile)))
         return [level.end for level in header.levels[::-1]]
 
     return sizes

@@ -89,7 +89,7 @@ def noise(profiles: list[str]) -> None:
     for dtype in (np.uint8, np.uint16):
         image: NDArray[np.integer] = rng.integers(0, np.iinfo(dtype).max + 1, (512, 512, 3), dtype)
         for profile in profiles:
-            data = encode(image, EncodeOptions(profile))  # type: ignore[arg-type]
+            data = encode(image, EncodeOptions(profile))
             print(f"  noise, {np.dtype(dtype)}, {profile}: {len(data) / image.nbytes:.4f} × raw")
 
 
@@ -98,7 +98,7 @@ def threads(profiles: list[str]) -> None:
     photo = sample()
     wide = np.tile(photo, (3, 3, 1))[:1536, :2048]
     for profile in profiles:
-        options = EncodeOptions(profile)  # type: ignore[arg-type]
+        options = EncodeOptions(profile)
         for label, image in (("768 x 512, no tiles", photo), ("2048 x 1536, tiles", wide)):
             seconds = []
             for n in (1, 2):

@@ -419,7 +419,7 @@ class Vrml:
 
     def read(self, case: Case) -> str:
         """Parses it."""
-        from ptmtools.database.vrml import WrlError, parse
+        from ptmtools.database.vrml.reader import WrlError, parse
 
         try:
             return f"{len(parse(case.data).nodes)} nodes"

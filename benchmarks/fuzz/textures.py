@@ -58,7 +58,7 @@ def encoded() -> list[bytes]:
                 for tile in (0, 16):
                     if profile == "paper" and image.dtype.kind == "f":
                         continue
-                    options = EncodeOptions(profile, max_error, tile)  # type: ignore[arg-type]
+                    options = EncodeOptions(profile, max_error, tile)
                     found.append(encode(image, options))
     return found
 

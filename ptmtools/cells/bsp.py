@@ -102,8 +102,8 @@ def build_tree(
     tolerance: Tolerance,
     progress: Progress,
 ) -> Tree:
-    """Split ``box`` by the planes of ``walls``, then of ``reveals``, then of ``caps``; the
-    module tells the order."""
+    """Split ``box`` by the planes of ``walls``, then of ``reveals``, then of ``caps``; in
+    the order that the module describes."""
     least = (FRAGMENT_SHARE * options.wall_area, 0.0, 0.0)
     planes: list[NDArray[np.float64]] = []
     taken: list[WallPlane] = []
@@ -140,7 +140,7 @@ def build_tree(
     push(box, _sections(box, walls, tolerance), (-1, 0), _WALLS)
     while queue:
         task = heapq.heappop(queue)
-        if len(leaves) + len(queue) + 2 > options.max_cells:
+        if len(leaves) + len(queue) + 2 > options.max_leaves:
             finish(task.body, task.parent)
             unsplit += task.source != _CAPS
             continue

@@ -1,13 +1,13 @@
 """Caps: small polygons that close the whole cross-section of a leaf.
 
-The planes of walls go on behind them and cut the solid matter of floors and walls into wedges. A
+The planes of walls go on behind them and cut the solids of floors and walls into wedges. A
 flight of stairs does so to the floor slab beside it: between the slope and the top of the slab
-lie matter and a piece of the stairwell, and what parts the two is the edge of the slab, smaller
+lie a solid and a piece of the stairwell, and what parts the two is the edge of the slab, smaller
 than a wall; nor is it a reveal, for the wedge lies between no two parallel faces. It is
 recognised by what it does: no opening is left beside it. Such a split costs one leaf and never a
 portal. A polygon that leaves an opening, however small, is none.
 
-No area is too small: a chain of matter is as open as its narrowest end, and in the museum of 50
+No area is too small: a chain of solids is as open as its narrowest end, and in the museum of 50
 rooms, with caps of 0.02 m² and more only, all of the 992 leaves stay that 365 are with all caps.
 """
 
@@ -16,12 +16,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.cells.nearby import Nearby
-from ptmtools.cells.planar import difference, unite, without_cracks
+from ptmtools.cells.planar import difference, without_cracks
 from ptmtools.cells.polyhedron import Polyhedron, section
-from ptmtools.cells.structure import Frame, WallPlane, lying_in, planes_of
+from ptmtools.cells.structure import Frame, Structure, WallPlane
 from ptmtools.cells.vectors import cross
-from ptmtools.tolerance import Tolerance, ranked
+from ptmtools.tolerance import ranked
 
 #: Areas are compared with this share to spare before polygons are.
 _SPARE = 1e-3
@@ -32,38 +31,35 @@ _CHUNK, _ROWS = 4096, 256
 class Caps:
     """The structural triangles of a scene, to ask which of them close a leaf."""
 
-    def __init__(self, corners: NDArray[np.float64], tolerance: Tolerance) -> None:
-        """``corners``: (T, 3, 3) structural triangles."""
-        self._corners = corners
-        self._planes, self._areas = planes_of(corners)
-        self._nearby = Nearby(corners, tolerance.rounding)
-        self._low, self._high = corners.min(axis=1), corners.max(axis=1)
-        self._tolerance = tolerance
+    def __init__(self, structure: Structure) -> None:
+        self._structure = structure
+        self._corners = structure.corners
+        self._areas = structure.areas
+        self._tolerance = structure.tolerance
 
     def within(self, body: Polyhedron) -> list[WallPlane]:
         """The planes in which what lies there leaves no opening between two parts of a body, in the
         order of the model's triangles: many are equally good, and areas of strips some centimetres
         wide keep few digits far from the origin."""
         low, high = body.points.min(axis=0), body.points.max(axis=0)
-        near = self._nearby.meeting(low, high)
-        slack = self._tolerance.plane
-        apart = (self._low[near] > high + slack) | (self._high[near] < low - slack)
+        near = self._structure.nearby.meeting(low, high)
+        slack, corners = self._tolerance.plane, self._corners[near]
+        apart = (corners.min(axis=1) > high + slack) | (corners.max(axis=1) < low - slack)
         near = near[~apart.any(axis=1)]
         inside = self._reaching_into(body, near)
-        areas = self._areas[inside]
-        needed = _section_areas(body, self._planes[inside]) * (1 - _SPARE)
+        areas, planes = self._areas[inside], self._structure.planes[inside]
+        needed = _section_areas(body, planes) * (1 - _SPARE)
         free = needed <= areas.sum()
         free[free] = needed[free] <= self._in_plane(inside[free], inside)
         found: list[tuple[int, WallPlane]] = []
         for seed in ranked(areas):
             if not free[seed]:
                 continue
-            plane = self._planes[inside[seed]]
-            members = np.flatnonzero(lying_in(plane, self._corners[inside], self._tolerance))
+            members = np.flatnonzero(self._structure.lie_in(planes[seed], inside))
             free[members] = False
             free[seed] = False
             if areas[members].sum() >= needed[seed]:
-                cap = self._closing(body, plane, near)
+                cap = self._closing(body, planes[seed], near)
                 found += [(int(inside[members[0]]), cap)] if cap else []
         return [cap for _, cap in sorted(found, key=lambda one: one[0])]
 
@@ -81,7 +77,7 @@ class Caps:
     ) -> NDArray[np.float64]:
         """For each seed at least the area of those triangles that lie in its plane."""
         middle, areas = self._corners[triangles].mean(axis=1), self._areas[triangles]
-        planes = self._planes[seeds]
+        planes = self._structure.planes[seeds]
         found = [np.zeros(0)]
         for first in range(0, len(planes), _ROWS):
             plane = planes[first : first + _ROWS]
@@ -100,8 +96,7 @@ class Caps:
         if len(outline) < 3:
             return None
         frame = Frame.of(plane)
-        flat = near[lying_in(plane, self._corners[near], tolerance)]
-        blocking = unite(frame.to_plane(self._corners[flat]), tolerance.grid)
+        blocking = self._structure.united(frame, near[self._structure.lie_in(plane, near)])
         region = shapely.polygons(frame.to_plane(outline))
         opening = without_cracks(
             difference(region, blocking, tolerance.grid), tolerance.hairline, tolerance.grid

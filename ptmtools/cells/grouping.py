@@ -18,7 +18,6 @@ from ptmtools.cells.model import Cells
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.rooms import room_of_leaf
 from ptmtools.cells.sight import sampled_sight
-from ptmtools.tolerance import Tolerance
 
 #: Shares of a triangle that differ by less are equal, in digits.
 DIGITS = 6
@@ -26,18 +25,16 @@ DIGITS = 6
 ONE_HALL = "visibility culling gains nothing here: 1 hall"
 
 
-def grouped(cells: Cells, options: SubdivideOptions, tolerance: Tolerance) -> Cells:
+def grouped(cells: Cells, options: SubdivideOptions) -> Cells:
     """The cells that the options ask for, of cells that are single leaves.
 
     Cells are numbered in the order of their first leaves; geometry in a boundary between two
     leaves of one cell lies inside that cell.
     """
     if options.cells == "room":
-        cells = _joined(cells, numbered(_groups(cells, options.gain, tolerance)))
+        cells = _joined(cells, numbered(_groups(cells, options.gain)))
     if cells.cell_count == 1:
-        cells = replace(
-            cells, notes=(*cells.notes, "visibility culling gains nothing here: 1 hall")
-        )
+        cells = replace(cells, notes=(*cells.notes, ONE_HALL))
     return cells
 
 
@@ -57,13 +54,8 @@ def rank_in_file(cells: Cells) -> NDArray[np.int64]:
     Leaves themselves are numbered as planes split them, and which side of a plane is its front
     depends on how the model is turned.
     """
-    a, b, c = np.moveaxis(cells.vertex[cells.triangle], 1, 0)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    leaf, piece, area = _sides(cells)
     source = cells.triangle_source
-    front, back = cells.triangle_cell.T
-    behind = (back >= 0) & (back != front)
-    leaf = np.concatenate([front[front >= 0], back[behind]]).astype(np.int64)
-    piece = np.concatenate([np.flatnonzero(front >= 0), np.flatnonzero(behind)])
     count = int(source.max(initial=-1)) + 1
     pair, row = np.unique(leaf * count + source[piece], return_inverse=True)
     held = np.bincount(row, area[piece])
@@ -80,28 +72,31 @@ def rank_in_file(cells: Cells) -> NDArray[np.int64]:
     return rank
 
 
-def _groups(cells: Cells, gain: float, tolerance: Tolerance) -> NDArray[np.integer]:
+def _groups(cells: Cells, gain: float) -> NDArray[np.integer]:
     rank = rank_in_file(cells)
-    room = room_of_leaf(cells, tolerance, rank)
+    room = room_of_leaf(cells, rank)
     if gain >= 1 or len(np.unique(room)) == len(room):
         return room
     inner = cells.portal_leaf[room[cells.portal_leaf[:, 0]] == room[cells.portal_leaf[:, 1]]]
     order = np.argsort(rank)
     sees = sampled_sight(cells)[np.ix_(order, order)]
-    weights = cells.leaf_volumes()[order], _surface(cells)[order]
+    leaf, piece, area = _sides(cells)
+    surface = np.bincount(leaf, area[piece], cells.leaf_count).astype(np.float64)
+    weights = cells.leaf_volumes()[order], surface[order]
     return join_by_gain(sees, *weights, rank[inner], gain)[rank]
 
 
-def _surface(cells: Cells) -> NDArray[np.float64]:
-    """(C,) m² of the surfaces of each cell; what lies in a boundary counts on both sides."""
+def _sides(
+    cells: Cells,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """(n,) leaves and (n,) pieces of geometry that belong to them, of cells that are single leaves;
+    what lies in a boundary counts on both sides. And (M,) the areas of the pieces, m²."""
     a, b, c = np.moveaxis(cells.vertex[cells.triangle], 1, 0)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
     front, back = cells.triangle_cell.T
-    total = np.zeros(cells.cell_count)
-    np.add.at(total, front[front >= 0], area[front >= 0])
     behind = (back >= 0) & (back != front)
-    np.add.at(total, back[behind], area[behind])
-    return total
+    leaf = np.concatenate([front[front >= 0], back[behind]]).astype(np.int64)
+    piece = np.concatenate([np.flatnonzero(front >= 0), np.flatnonzero(behind)])
+    return leaf, piece, np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
 
 
 def _joined(cells: Cells, group: NDArray[np.int32]) -> Cells:

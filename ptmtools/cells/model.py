@@ -2,7 +2,7 @@
 
 A *leaf* is a convex polyhedron, a leaf of the BSP tree that somebody can reach; a *cell* is a
 union of leaves, one each or as many as make up a room (`leaf_cell`). Index -1 means "no cell":
-solid matter, the outside of a closed model, or what nobody can reach.
+solids, the outside of a closed model, or what nobody can reach.
 
 Lists of varying length are CSR: row i of ``x`` is ``x[x_start[i]:x_start[i + 1]]``.
 """
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ptmtools.cells.vectors import cross
 from ptmtools.stored import Stored, texts
+from ptmtools.tolerance import Tolerance
 
 #: A child of a BSP node that is no node: ``OUTSIDE``, or leaf i as ``-2 - i``.
 OUTSIDE = -1
@@ -51,6 +52,7 @@ class Cells:
     triangle_cell: (M, 2) int32 the cell on its front and on its back. Equal where the piece lies
         inside a cell; different only where it lies in a boundary; -1 where that side is no cell.
         A pixel of the item buffer counts for the viewer's side.
+    tolerance: that of the scene.
     closed: whether the flood of the reachable never met the root box.
     notes: what the subdivision has to say, one line each ("open above: …").
     """
@@ -74,6 +76,7 @@ class Cells:
     triangle: NDArray[np.int32]
     triangle_source: NDArray[np.int32]
     triangle_cell: NDArray[np.int32]
+    tolerance: Tolerance
     closed: bool = True
     notes: tuple[str, ...] = ()
 
@@ -171,7 +174,8 @@ class Cells:
         arrays = {f.name: getattr(self, f.name) for f in fields(self)}
         about = {"closed": arrays.pop("closed"), "notes": arrays.pop("notes")}
         text = json.dumps(about, sort_keys=True, ensure_ascii=False)
-        return {**arrays, "about": np.frombuffer(text.encode(), dtype=np.uint8)}
+        extent = np.array(arrays.pop("tolerance").extent)
+        return {**arrays, "extent": extent, "about": np.frombuffer(text.encode(), dtype=np.uint8)}
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> Cells:
@@ -231,6 +235,7 @@ class Cells:
             triangle=triangle,
             triangle_source=stored.indices("triangle_source", np.int32, n, high=1 << 31),
             triangle_cell=stored.indices("triangle_cell", np.int32, n, 2, low=-1, high=cells),
+            tolerance=Tolerance.for_extent(stored.array("extent", np.float64, finite=True).item()),
             closed=bool(about["closed"]),
             notes=texts(about["notes"], "notes"),
         )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 #: Triangles in a block.
 _BLOCK = 64
 #: Bits of each coordinate by which triangles are ordered.
-_BITS = 16
+_BITS = 15
 
 
 class Nearby:
@@ -22,7 +22,7 @@ class Nearby:
 
     def __init__(self, corners: NDArray[np.float64], margin: float) -> None:
         self._margin = margin
-        self._order = _along_a_curve(corners.mean(axis=1)) if len(corners) else np.zeros(0, int)
+        self._order = along_a_curve(corners.mean(axis=1)) if len(corners) else np.zeros(0, int)
         first = np.arange(0, len(corners), _BLOCK)
         points = corners[self._order]
         if len(first):
@@ -49,12 +49,12 @@ class Nearby:
         return np.sort(self._order[row[row < len(self._order)]])
 
 
-def _along_a_curve(points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """An order of (n, 3) points in which neighbours mostly follow one another (Morton's)."""
-    low, size = points.min(axis=0), max(float(np.ptp(points, axis=0).max()), np.finfo(float).tiny)
-    at = ((points - low) / size * (2**_BITS - 1)).astype(np.int64)
-    code = np.zeros(len(points), dtype=np.int64)
-    for bit in range(_BITS):
-        for axis in range(3):
-            code |= (at[:, axis] >> bit & 1) << (3 * bit + axis)
+def along_a_curve(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """An order of (n, k) points in which neighbours mostly follow one another (Morton's)."""
+    low, size = points.min(axis=0), np.ptp(points, axis=0)
+    share = np.divide(points - low, size, out=np.zeros(points.shape), where=size > 0)
+    at = np.minimum(share * 2**_BITS, 2**_BITS - 1).astype(np.int64)
+    axes = range(points.shape[1])
+    places = ((bit, axis, bit * len(axes) + axis) for bit in range(_BITS) for axis in axes)
+    code = sum((at[:, axis] >> bit & 1) << place for bit, axis, place in places)
     return np.argsort(code, kind="stable")

@@ -17,29 +17,31 @@ def _positions(viewpoints: Sequence[tuple[float, ...]]) -> tuple[Position, ...]:
 
 @dataclass(frozen=True)
 class SubdivideOptions:
-    """What may split, and how far.
+    """What may split, and how far. The metadata of a field name its option and older spellings.
 
     Attributes
     ----------
-    wall_area: the least area in m² of a polygon that may split a cell. Smaller: more and tighter
-        cells, and a slower portal flow.
-    wall_thickness: parallel walls nearer than this (metres) are the two faces of one wall; there,
-        polygons that bridge its thickness (jambs, lintels, sills) split whatever their area. What
-        stands off a wall by less than 0.12 of it, or 1/1000 of the extent, hangs on it.
-    max_cells: stop at this many leaves, best splits first.
-    structural: globs over object and material names; what matches may split whatever its area.
-    detail: globs; what matches never splits a cell nor blocks a portal. `structural` wins.
-    cells: every convex "leaf" of the subdivision is a cell, or the leaves of a "room", which ends
-        at its doors, are one; but see `gain`.
-    gain: leaves of one room stay cells of their own if that saves at least this share of what has
-        to be fetched in them and for them; 0 joins nothing, 1 leaves every room whole.
-    viewpoints: a place to start from, and from which cells are to be reached, X,Y,Z[,YAW]: world
-        metres; the yaw in degrees, counter-clockwise from -Z.
+    wall_area: walls of at least this area, in m², divide the building into leaves, its convex
+        pieces. Smaller: more and tighter cells, and slower visibility.
+    wall_thickness: parallel walls nearer to each other than this, in metres, are the two faces of
+        one wall; jambs, lintels and sills between them divide it whatever their area. What stands
+        off a wall by less than 0.12 of this, or 1/1000 of the building's extent, is part of it.
+    max_leaves: stop at this many leaves; the best splits come first.
+    structural: names of objects or materials, with * and ?, that divide whatever their area.
+    detail: names, with * and ?, of what never divides the building nor hides anything, such as
+        furniture. structural wins.
+    cells: a cell, the unit that is loaded and drawn, is a single "leaf" or a "room", all leaves
+        between its doors; but see gain.
+    gain: keep the leaves of a room as separate cells if that saves viewers at least this share of
+        what they download; 0 keeps all of them apart, 1 makes every room one cell.
+    viewpoints: a place X,Y,Z[,YAW] to start from, inside the building: metres, Y up; the yaw in
+        degrees, counter-clockwise from -Z. What cannot be reached from the places given is
+        dropped. If none is given, one is chosen.
     """
 
     wall_area: float = 2.0
     wall_thickness: float = 0.5
-    max_cells: int = 10_000
+    max_leaves: int = field(default=10_000, metadata={"was": ("max-cells",)})
     structural: tuple[str, ...] = ()
     detail: tuple[str, ...] = ()
     cells: CellKind = "room"

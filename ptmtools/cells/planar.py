@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.cells.nearby import along_a_curve
+
 #: A shapely geometry, or an array of them.
 Geometry = Any
 
@@ -47,21 +49,11 @@ def union(shapes: Geometry, grid: float) -> Geometry:
         before = len(polygons)
         # Halves of a quadrilateral have one box, but centroids a third of its length apart.
         boxes = shapely.bounds(polygons)
-        polygons = polygons[_along_a_curve((boxes[:, :2] + boxes[:, 2:]) / 2)]
+        polygons = polygons[along_a_curve((boxes[:, :2] + boxes[:, 2:]) / 2)]
         chunks = np.array_split(polygons, -(-before // _CHUNK))
         united = [shapely.union_all(chunk) for chunk in chunks]
         polygons = _polygons_in(shapely.simplify(united, grid))
     return shapely.simplify(shapely.union_all(polygons), grid)
-
-
-def _along_a_curve(points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """An order of (n, 2) points in which neighbours mostly follow one another (Morton's)."""
-    low, size = points.min(axis=0), np.ptp(points, axis=0)
-    at = np.zeros(points.shape, dtype=np.int64)
-    np.divide(points - low, size, out=(share := np.zeros(points.shape)), where=size > 0)
-    at[:] = np.minimum(share * 2**15, 2**15 - 1)
-    code = sum((at[:, axis] >> bit & 1) << 2 * bit + axis for bit in range(15) for axis in (0, 1))
-    return np.argsort(code, kind="stable")
 
 
 def intersection(one: Geometry, other: Geometry, grid: float) -> Geometry:

@@ -155,7 +155,8 @@ def _open_pieces(
         for part in shapely.get_parts(piece):
             if not _wider_than(part, tolerance.plane):
                 continue
-            hull = shapely.get_coordinates(_counter_clockwise(shapely.convex_hull(part)))[:-1]
+            hull = shapely.orient_polygons(shapely.convex_hull(part))
+            hull = shapely.get_coordinates(hull)[:-1]
             found.append((faces[1][b][0], faces[0][a][0], hull, float(shapely.area(part))))
     return found
 
@@ -165,9 +166,3 @@ def _wider_than(part: Geometry, width: float) -> bool:
     import shapely
 
     return not shapely.is_empty(shapely.buffer(part, -width / 2, join_style="mitre"))
-
-
-def _counter_clockwise(polygon: Geometry) -> Geometry:
-    import shapely
-
-    return shapely.orient_polygons(polygon)

@@ -2,7 +2,7 @@
 
 The flood starts from the viewpoints, else from the largest leaf that has floor below it and does
 not touch the root box, and runs through the portals. The model is closed if it never meets the
-root box; what it does not reach is solid matter, a sealed void or the outside (design,
+root box; what it does not reach is a solid, a sealed void or the outside (design,
 "Reachable").
 """
 
@@ -65,18 +65,10 @@ def flood(
         start = largest_with_floor(tree, ~outer, corners)
     if not start and not outer.all():
         start = (_by_volume(tree, ~outer)[0],)
-    reached = np.zeros(len(tree.leaves), dtype=bool)
-    neighbours: list[list[int]] = [[] for _ in tree.leaves]
-    for a, b in portals.leaves.tolist():
-        neighbours[a].append(b)
-        neighbours[b].append(a)
-    stack = list(start)
-    reached[stack] = True
-    while stack:
-        for other in neighbours[stack.pop()]:
-            if not reached[other]:
-                reached[other] = True
-                stack.append(other)
+    reached, count = np.zeros(len(tree.leaves), dtype=bool), 0
+    reached[list(start)] = True
+    while count < (count := int(reached.sum())):
+        reached[portals.leaves[reached[portals.leaves].any(axis=1)]] = True
     closed = bool(start) and not bool(np.any(reached & outer))
     return Reach(reached, closed, start)
 
@@ -86,7 +78,7 @@ def largest_with_floor(
 ) -> tuple[int, ...]:
     """The largest allowed leaf with floor below its middle, as a tuple of one, or ()."""
     for leaf in _by_volume(tree, allowed):
-        if _floor_below(tree.leaves[leaf].points.mean(axis=0), corners):
+        if np.any(_plumb(tree.leaves[leaf].points.mean(axis=0), corners) < 0):
             return (leaf,)
     return ()
 
@@ -121,11 +113,6 @@ def roofed_share(corners: NDArray[np.float64], floor_area: float) -> float:
             total += area[triangle]
             covered += area[triangle] * bool(np.any(heights > apart))
     return float(covered / total) if total else 1.0
-
-
-def _floor_below(eye: NDArray[np.float64], corners: NDArray[np.float64]) -> bool:
-    """Whether a plumb line from ``eye`` meets a triangle that can be stood on."""
-    return bool(np.any(_plumb(eye, corners) < 0))
 
 
 def _plumb(eye: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,9 +1,9 @@
 """Reveals: the jambs, lintels and sills that close a wall's thickness around an opening.
 
 Two parallel walls near to one another are the faces of one wall. Between them the BSP leaves a
-slab that holds both solid matter and the doorways through it; the polygons that part the two are
+slab that holds both solids and the doorways through it; the polygons that part the two are
 far smaller than any wall. They are found by what they do: they bridge the slab from face to face.
-Without them, matter that is not capped (a wall ending under a floor slab) would join rooms to the
+Without them, solids that are not capped (a wall ending under a floor slab) would join rooms to the
 outside, and every door in a wall to every other.
 """
 
@@ -12,32 +12,22 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.cells.nearby import Nearby
-from ptmtools.cells.planar import unite
 from ptmtools.cells.polyhedron import BOX_FACE, Polyhedron
-from ptmtools.cells.structure import (
-    Frame,
-    WallPlane,
-    lying_in,
-    parallel_gap,
-    planes_of,
-)
-from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
+from ptmtools.cells.structure import Frame, Structure, WallPlane, parallel_gap
+from ptmtools.tolerance import TIE_SHARE, ranked
 
 
 class Reveals:
     """The reveals in the thickness of walls, found once for every pair of wall faces."""
 
-    def __init__(
-        self, corners: NDArray[np.float64], wall_thickness: float, tolerance: Tolerance
-    ) -> None:
-        """``corners``: (T, 3, 3) structural triangles."""
-        self._corners = corners
-        self._planes, self._areas = planes_of(corners)
-        self._nearby = Nearby(corners, tolerance.rounding)
+    def __init__(self, structure: Structure, wall_thickness: float) -> None:
+        self._structure = structure
         self._limit = wall_thickness
-        self._tolerance = tolerance
+        self._tolerance = structure.tolerance
         self._known: dict[bytes, list[WallPlane]] = {}
+
+    def __getstate__(self) -> dict[str, object]:
+        return {**vars(self), "_known": {}}  # which another thread may be adding to
 
     def within(self, body: Polyhedron, planes: list[NDArray[np.float64]]) -> list[WallPlane]:
         """The reveals of the slab that a body lies in; none if it lies in no wall.
@@ -69,28 +59,24 @@ class Reveals:
         turn = float(np.sign(first[:3] @ second[:3]))
         width = abs(float(first[3]) - turn * float(second[3]))
         inward = float(np.sign(float(first[3]) - turn * float(second[3]))) or 1.0
-        near = self._nearby.between(first, *sorted((inward * slack, inward * (width - slack))))
-        depth = inward * (self._corners[near] @ first[:3] + first[3])
+        structure, areas = self._structure, self._structure.areas
+        near = structure.nearby.between(first, *sorted((inward * slack, inward * (width - slack))))
+        depth = inward * (structure.corners[near] @ first[:3] + first[3])
         low, high = depth.min(axis=1), depth.max(axis=1)
-        within = (high > slack) & (low < width - slack) & (self._areas[near] > 0)
+        within = (high > slack) & (low < width - slack) & (areas[near] > 0)
         inside, low, high = near[within], low[within], high[within]
         spans = (np.abs(low) <= slack) & (np.abs(high - width) <= slack)
         bridging = inside[spans]
         found: list[WallPlane] = []
-        for seed in bridging[ranked(self._areas[bridging])]:
-            plane = self._planes[seed]
+        for seed in bridging[ranked(areas[bridging])]:
+            plane = structure.planes[seed]
             apart = (parallel_gap(plane, w.frame.plane, self._tolerance) for w in found)
             if min(apart, default=self._limit) < self._tolerance.thin:
                 continue
-            frame = Frame.of(plane)
-            flat = inside[lying_in(plane, self._corners[inside], self._tolerance)]
-            walls = np.intersect1d(flat, bridging)
+            frame, lies = Frame.of(plane), structure.lie_in(plane, inside)
+            walls, blocking = inside[lies & spans], inside[lies]
             found.append(
-                WallPlane(
-                    frame,
-                    unite(frame.to_plane(self._corners[walls]), self._tolerance.grid),
-                    unite(frame.to_plane(self._corners[flat]), self._tolerance.grid),
-                )
+                WallPlane(frame, structure.united(frame, walls), structure.united(frame, blocking))
             )
         return found
 

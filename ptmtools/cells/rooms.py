@@ -30,7 +30,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
-from ptmtools.tolerance import Tolerance
 
 if TYPE_CHECKING:
     Plan = Any
@@ -46,7 +45,6 @@ AT_ONCE = 2048
 
 def room_of_leaf(
     cells: Cells,
-    tolerance: Tolerance,
     rank: NDArray[np.int64] | None = None,
     least: float = OPEN,
 ) -> NDArray[np.int64]:
@@ -56,15 +54,15 @@ def room_of_leaf(
     by number: a doorway between two equal rooms.
     """
     rank = np.arange(cells.leaf_count) if rank is None else rank
-    regions = _Regions(cells, rank, tolerance)
+    regions = _Regions(cells, rank)
     waiting = [(-regions.openness(a, b), a, b) for a, b in regions.pairs()]
     heapq.heapify(waiting)
     while waiting:
-        told, a, b = heapq.heappop(waiting)
+        known, a, b = heapq.heappop(waiting)
         if not regions.are_neighbours(a, b):
             continue
         share = regions.openness(a, b)
-        if -told > share:  # one of them has grown meanwhile
+        if -known > share:  # one of them has grown meanwhile
             heapq.heappush(waiting, (-share, a, b))
         elif share >= least:
             for c, d in regions.join(a, b):
@@ -76,7 +74,7 @@ class _Regions:
     """Connected groups of leaves, each called by the rank of one of them, and the openings between
     them."""
 
-    def __init__(self, cells: Cells, rank: NDArray[np.int64], tolerance: Tolerance) -> None:
+    def __init__(self, cells: Cells, rank: NDArray[np.int64]) -> None:
         import shapely
 
         order = np.argsort(rank)
@@ -88,7 +86,7 @@ class _Regions:
         self._section = [_section(v, p) for v, p in zip(self._volume, self._plan, strict=True)]
         self._parent = list(range(cells.leaf_count))
         self._area = cells.portal_area.tolist()
-        self._touching = _touching(cells, tolerance.plane)
+        self._touching = _touching(cells, cells.tolerance.plane)
         self._between: list[dict[int, list[int]]] = [{} for _ in range(cells.leaf_count)]
         for k, (a, b) in enumerate(rank[cells.portal_leaf].tolist()):
             doors = self._between[a].setdefault(b, [])

@@ -16,7 +16,7 @@ triangle there, whatever its size.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
@@ -92,62 +92,85 @@ class WallPlane:
     blocking: Geometry
 
 
+@dataclass(frozen=True)
+class Structure:
+    """The triangles that may bound a leaf, and what is asked of them again and again.
+
+    Attributes
+    ----------
+    corners: (T, 3, 3) their corners, metres.
+    forced: (T,) whether `SubdivideOptions.structural` names them.
+    planes, areas: see `planes_of`.
+    nearby: finds them.
+    """
+
+    corners: NDArray[np.float64]
+    forced: NDArray[np.bool_]
+    planes: NDArray[np.float64]
+    areas: NDArray[np.float64]
+    nearby: Nearby
+    tolerance: Tolerance
+
+    @staticmethod
+    def of(scene: Scene, options: SubdivideOptions, tolerance: Tolerance) -> Structure:
+        """The structural triangles of a scene."""
+        mask = structural_triangles(scene, options)
+        corners, forced = scene.corners[mask], _named(scene, options.structural)[mask]
+        nearby = Nearby(corners, tolerance.rounding)
+        return Structure(corners, forced, *planes_of(corners), nearby, tolerance)
+
+    def lie_in(self, plane: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """(n,) which of these triangles, by number, lie in a plane."""
+        distance = np.abs(self.corners[triangles] @ plane[:3] + plane[3])
+        lies: NDArray[np.bool_] = np.all(distance <= self.tolerance.plane, axis=1)
+        return lies
+
+    def united(self, frame: Frame, triangles: NDArray[np.int64]) -> Geometry:
+        """The union of these triangles in a plane."""
+        return unite(frame.to_plane(self.corners[triangles]), self.tolerance.grid)
+
+
 def structural_triangles(scene: Scene, options: SubdivideOptions) -> NDArray[np.bool_]:
     """(T,) which triangles occlude: opaque, and not called detail by name."""
     detail = _named(scene, options.detail) & ~_named(scene, options.structural)
     return scene.opaque & ~detail
 
 
-def _named(scene: Scene, patterns: Iterable[str]) -> NDArray[np.bool_]:
-    patterns = tuple(patterns)
-
-    def match(name: str) -> bool:
-        return any(fnmatchcase(name, pattern) for pattern in patterns)
-
-    objects = np.array([match(name) for name in scene.objects], dtype=bool)
-    materials = np.array([match(m.name) for m in scene.materials], dtype=bool)
+def _named(scene: Scene, patterns: Sequence[str]) -> NDArray[np.bool_]:
+    """(T,) which triangles have an object or a material of such a name."""
+    objects = np.array([matches(name, patterns) for name in scene.objects], dtype=bool)
+    materials = np.array([matches(m.name, patterns) for m in scene.materials], dtype=bool)
     named: NDArray[np.bool_] = objects[scene.triangle_object] | materials[scene.triangle_material]
     return named
 
 
-def find_walls(scene: Scene, options: SubdivideOptions, tolerance: Tolerance) -> list[WallPlane]:
-    """The planes that may split cells, heaviest first."""
+def matches(name: str, patterns: Sequence[str]) -> bool:
+    """Whether one of the patterns, with * and ?, is a name's."""
+    return any(fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
+    """The planes that may split leaves, heaviest first."""
     import shapely
 
-    mask = structural_triangles(scene, options)
-    corners = scene.corners[mask]
-    forced = _named(scene, options.structural)[mask]
-    planes, areas = planes_of(corners)
-    least = (1 - TIE_SHARE) * options.wall_area
-    layers = _layers(corners, planes, areas, forced, least, tolerance)
-    nearby = Nearby(corners, tolerance.rounding)
+    tolerance, forced = structure.tolerance, structure.forced
+    least = (1 - TIE_SHARE) * wall_area
     found: list[tuple[float, WallPlane]] = []
-    for plane in layers:
+    for plane in _layers(structure, least):
         frame = Frame.of(plane)
-        near = nearby.between(plane, -tolerance.plane, tolerance.plane)
-        flat = near[lying_in(plane, corners[near], tolerance)]
-        blocking = unite(frame.to_plane(corners[flat]), tolerance.grid)
+        near = structure.nearby.between(plane, -tolerance.plane, tolerance.plane)
+        flat = near[structure.lie_in(plane, near)]
+        blocking = structure.united(frame, flat)
         shapely.prepare(blocking)
         parts = shapely.get_parts(blocking)
         group = neighbours(parts, tolerance.hairline)
         large = np.bincount(group, weights=shapely.area(parts))[group] >= least
         if np.any(forced[flat]):
-            named = unite(frame.to_plane(corners[flat[forced[flat]]]), tolerance.grid)
-            large |= shapely.intersects(parts, named)
-        if not np.any(large):
-            continue
-        walls = shapely.multipolygons(parts[large])
-        found.append((float(shapely.area(walls)), WallPlane(frame, walls, blocking)))
+            large |= shapely.intersects(parts, structure.united(frame, flat[forced[flat]]))
+        if np.any(large):
+            walls = shapely.multipolygons(parts[large])
+            found.append((float(shapely.area(walls)), WallPlane(frame, walls, blocking)))
     return [found[i][1] for i in ranked(np.array([area for area, _ in found]))]
-
-
-def lying_in(
-    plane: NDArray[np.float64], corners: NDArray[np.float64], tolerance: Tolerance
-) -> NDArray[np.bool_]:
-    """(n,) which of the (n, 3, 3) triangles lie in a plane."""
-    distance = np.abs(corners @ plane[:3] + plane[3])
-    lies: NDArray[np.bool_] = np.all(distance <= tolerance.plane, axis=1)
-    return lies
 
 
 def planes_of(
@@ -163,39 +186,32 @@ def planes_of(
     return np.concatenate([normal, offset[:, None]], axis=1), double / 2.0
 
 
-def _layers(
-    corners: NDArray[np.float64],
-    planes: NDArray[np.float64],
-    areas: NDArray[np.float64],
-    forced: NDArray[np.bool_],
-    wall_area: float,
-    tolerance: Tolerance,
-) -> list[NDArray[np.float64]]:
+def _layers(structure: Structure, wall_area: float) -> list[NDArray[np.float64]]:
     """Planes that hold enough coplanar area to carry a wall, heaviest first.
 
     Triangles are compared only within bins of similar normal and offset, and a bin is left as soon
     as what is free in it cannot reach ``wall_area``: curved detail and slivers fall away before
     anything quadratic happens.
     """
-    bins = _Bins(planes, np.where(forced, np.inf, areas), tolerance)
+    planes, areas, forced = structure.planes, structure.areas, structure.forced
+    bins = _Bins(planes, np.where(forced, np.inf, areas), structure.tolerance)
     free = areas > 0
     layers: list[tuple[float, NDArray[np.float64]]] = []
     for seed in ranked(areas):
         if not free[seed]:
             continue
         free[seed] = False
-        plane = planes[seed]
         if bins.weight(seed) < wall_area:
             bins.drop_one(seed)
             continue
         near = bins.near(seed)
         near = near[free[near]]
-        members = np.append(near[lying_in(plane, corners[near], tolerance)], seed)
+        members = np.append(near[structure.lie_in(planes[seed], near)], seed)
         free[members] = False
         bins.drop(members)
         weight = float(areas[members].sum())
         if weight >= wall_area or np.any(forced[members]):
-            layers.append((weight, plane))
+            layers.append((weight, planes[seed]))
     return [layers[i][1] for i in ranked(np.array([weight for weight, _ in layers]))]
 
 

@@ -12,8 +12,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import get_args
 
 import numpy as np
@@ -24,19 +24,19 @@ from ptmtools.cells.caps import Caps
 from ptmtools.cells.grouping import grouped
 from ptmtools.cells.model import OUTSIDE, Cells
 from ptmtools.cells.options import CellKind, SubdivideOptions
-from ptmtools.cells.orientation import main_axes
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import Portals, find_portals, portals_rejoined
 from ptmtools.cells.reach import Reach, flood, largest_with_floor, roofed_share
 from ptmtools.cells.rejoin import rejoined
 from ptmtools.cells.reveals import Reveals
-from ptmtools.cells.structure import WallPlane, find_walls, structural_triangles
+from ptmtools.cells.structure import Structure, WallPlane, find_walls, matches
 from ptmtools.errors import InputError
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
+from ptmtools.scene.orientation import main_axes
 from ptmtools.tolerance import Tolerance
 
 #: How far the first root box stands off the model, as a share of the model's extent.
@@ -49,23 +49,21 @@ ROOFED = 0.5
 
 @dataclass(frozen=True)
 class _Model:
-    """What is subdivided; ``corners`` are those of the structural triangles, (T, 3, 3)."""
+    """What is subdivided, and what may split it."""
 
-    corners: NDArray[np.float64]
+    structure: Structure
     walls: list[WallPlane]
+    reveals: Reveals
+    caps: Caps
     options: SubdivideOptions
-    tolerance: Tolerance
 
-    @cached_property
-    def reveals(self) -> Reveals:
-        return Reveals(self.corners, self.options.wall_thickness, self.tolerance)
-
-    @cached_property
-    def caps(self) -> Caps:
-        return Caps(self.corners, self.tolerance)
-
-    def __getstate__(self) -> dict[str, object]:
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+    @staticmethod
+    def of(scene: Scene, options: SubdivideOptions) -> _Model:
+        tolerance = scene.tolerance.for_walls(options.wall_thickness)
+        structure = Structure.of(scene, options, tolerance)
+        walls = find_walls(structure, options.wall_area)
+        reveals = Reveals(structure, options.wall_thickness)
+        return _Model(structure, walls, reveals, Caps(structure), options)
 
 
 @dataclass(frozen=True)
@@ -110,9 +108,8 @@ def subdivide(
     options = options or SubdivideOptions()
     _check(scene, options)
     axes = main_axes(scene.corners)
-    tolerance = Tolerance.for_points(scene.points @ axes.T).for_walls(options.wall_thickness)
-    corners = scene.corners[structural_triangles(scene, options)]
-    model = _Model(corners, find_walls(scene, options, tolerance), options, tolerance)
+    model = _Model.of(scene, options)
+    corners, tolerance = model.structure.corners, model.structure.tolerance
     low, high = _bounds(scene.corners @ axes.T)
     margin = BOX_MARGIN * tolerance.extent
     wide = _Box(np.array([low - margin, high + margin]), axes)
@@ -130,11 +127,12 @@ def subdivide(
         clipped.cancel()
     if space.tree.unsplit:
         notes.append(
-            f"the limit of {options.max_cells:,} leaves was reached: {space.tree.unsplit:,} leaves "
-            "hold walls that do not part them and so hide nothing; raise --max-cells"
+            f"the limit of {options.max_leaves:,} leaves was reached: {space.tree.unsplit:,} of "
+            "them contain walls that do not divide them, so what is behind these walls counts as "
+            "visible; raise --max-leaves"
         )
     pieces = cut_to_leaves(scene, space.tree, tolerance)
-    return grouped(_assemble(scene, space, pieces, notes), options, tolerance)
+    return grouped(_assemble(scene, space, pieces, notes), options)
 
 
 def _check(scene: Scene, options: SubdivideOptions) -> None:
@@ -144,27 +142,19 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
             "a single triangle makes no room",
             remedy="give a model with floors and walls",
         )
-    if not options.wall_area > 0:
-        raise InputError(
-            "PTM-I300", f"wall area {options.wall_area:g} m² is not positive", remedy="try 2"
-        )
-    if not options.wall_thickness >= 0:
-        raise InputError("PTM-I300", f"wall thickness {options.wall_thickness:g} m is negative")
-    if not 0 <= options.gain <= 1:
-        raise InputError(
-            "PTM-I300",
-            f"a gain of {options.gain:g} is no share",
-            remedy="give a number from 0 to 1, such as 0.1",
-        )
-    if options.cells not in get_args(CellKind):
-        raise InputError("PTM-I300", f"cells are no {options.cells!r}", remedy="leaf or room")
-    if options.max_cells < 1:
-        raise InputError("PTM-I300", f"at most {options.max_cells} cells is none", remedy="try 500")
+    area, thickness, gain = options.wall_area, options.wall_thickness, options.gain
+    for sound, fault, remedy in (
+        (area > 0, f"wall area {area:g} m² is not positive", "try 2"),
+        (thickness >= 0, f"wall thickness {thickness:g} m is negative", "try 0.5"),
+        (0 <= gain <= 1, f"a gain of {gain:g} is not between 0 and 1", "try 0.1"),
+        (options.cells in get_args(CellKind), f"unknown cells {options.cells!r}", "leaf or room"),
+        (options.max_leaves >= 1, f"at most {options.max_leaves} leaves is too few", "try 500"),
+    ):
+        if not sound:
+            raise InputError("PTM-I300", fault, remedy=remedy)
+    names = (*scene.objects, *(material.name for material in scene.materials))
     for pattern in (*options.structural, *options.detail):
-        one = SubdivideOptions(detail=(pattern,))
-        if np.array_equal(structural_triangles(scene, one), scene.opaque) and not _matches(
-            scene, pattern
-        ):
+        if not any(matches(name, (pattern,)) for name in names):
             raise InputError(
                 "PTM-I302",
                 f"no object or material is called {pattern!r}",
@@ -172,16 +162,10 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
             )
 
 
-def _matches(scene: Scene, pattern: str) -> bool:
-    from fnmatch import fnmatchcase
-
-    names = (*scene.objects, *(m.name for m in scene.materials))
-    return any(fnmatchcase(name, pattern) for name in names)
-
-
 def _divide(model: _Model, root: _Box, progress: Progress = silent) -> _Space:
     """Subdivide a root box and flood it."""
-    corners, options, tolerance = model.corners, model.options, model.tolerance
+    corners, tolerance = model.structure.corners, model.structure.tolerance
+    options = model.options
     box = root.bounds
     body = Polyhedron.box(box[0], box[1])
     if root.axes is not None:
@@ -252,7 +236,7 @@ def _open_note(space: _Space, roofed: float, box: NDArray[np.float64]) -> str:
     else:
         what = "open: the outside can be reached from the rooms (windows, doors or gaps)"
     size = " × ".join(f"{s:.2f}" for s in box[1] - box[0])
-    return f"the model is {what}; root box clipped to the structure, {size} m"
+    return f"the model is {what}; cells end at the bounding box of its walls, {size} m"
 
 
 def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> Cells:
@@ -270,14 +254,14 @@ def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> 
     owned = np.any(owner >= 0, axis=1)
     lost = len(np.unique(pieces.source)) - len(np.unique(pieces.source[owned]))
     if lost:
-        notes = [*notes, f"{lost} triangles lie where nobody can see them"]
+        notes = [*notes, f"{lost} triangles lie outside all cells, where nobody can see them"]
     dropped = int(np.count_nonzero(~keep))
     if dropped:
-        notes = [*notes, f"{dropped} of {len(keep)} leaves cannot be reached and were dropped"]
+        unreached = f"{dropped} of {len(keep)} leaves (convex pieces of space)"
+        notes = [*notes, f"{unreached} cannot be reached from inside and were dropped"]
     vertex, vertex_uv, triangle = _weld(scene, pieces, owned)
 
-    counts = np.array([len(b.points) for b in bodies])
-    point_start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    point_start = _starts(len(b.points) for b in bodies)
     loops = [loop + point_start[i] for i, b in enumerate(bodies) for loop in b.faces]
     return Cells(
         node_plane=tree.planes,
@@ -287,25 +271,27 @@ def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> 
         leaf_point=np.concatenate([b.points for b in bodies]),
         leaf_point_start=point_start,
         face_index=np.concatenate(loops).astype(np.int32),
-        face_start=np.concatenate([[0], np.cumsum([len(x) for x in loops])]).astype(np.int64),
-        leaf_face_start=np.concatenate([[0], np.cumsum([len(b.faces) for b in bodies])]).astype(
-            np.int64
-        ),
+        face_start=_starts(map(len, loops)),
+        leaf_face_start=_starts(len(b.faces) for b in bodies),
         portal_leaf=portals.leaves,
         portal_plane=portals.planes,
         portal_point=np.concatenate([np.zeros((0, 3)), *portals.polygons]),
-        portal_start=np.concatenate([[0], np.cumsum([len(p) for p in portals.polygons])]).astype(
-            np.int64
-        ),
+        portal_start=_starts(map(len, portals.polygons)),
         portal_area=portals.areas,
         vertex=vertex,
         vertex_uv=vertex_uv,
         triangle=triangle,
         triangle_source=pieces.source[owned].astype(np.int32),
         triangle_cell=owner[owned].astype(np.int32),
+        tolerance=scene.tolerance,
         closed=space.reach.closed,
         notes=tuple(notes),
     )
+
+
+def _starts(lengths: Iterable[int]) -> NDArray[np.int64]:
+    """(n + 1,) where the rows of a CSR begin."""
+    return np.cumsum([0, *lengths], dtype=np.int64)
 
 
 def _weld(

@@ -16,8 +16,8 @@ import click
 
 from ptmtools.cli.failures import report
 from ptmtools.cli.output import Voice, abandon_stdout
-from ptmtools.errors import InputError, OutputError, PtmError
-from ptmtools.files import writing
+from ptmtools.errors import InputError, OutputError, PtmError, naming
+from ptmtools.files import write_with, writing
 
 Result = TypeVar("Result")
 
@@ -42,12 +42,12 @@ def expanded(names: Iterable[str], suffixes: Sequence[str]) -> list[str]:
             if not inside:
                 raise InputError(
                     "PTM-I128",
-                    "is a folder without such files",
+                    "is a folder without any file of the kind that is wanted",
                     file=name,
                     remedy=f"their names end with {', '.join(suffixes)}",
                 )
             found += inside
-        elif name != STANDARD and glob.has_magic(name) and not os.path.lexists(name):
+        elif _several(name):
             found += sorted(glob.glob(name, recursive=True)) or [name]
         else:
             found.append(name)
@@ -62,11 +62,13 @@ class Job:
     ----------
     source: its name; - is standard input.
     target: where the result goes; None is standard output.
+    folder: one to make first, if it is not there.
     fault: why nothing can be done with it.
     """
 
     source: str
     target: Path | None = None
+    folder: Path | None = None
     fault: PtmError | None = None
 
     @property
@@ -74,13 +76,31 @@ class Job:
         """Whether standard output carries the result."""
         return self.target is None and self.fault is None
 
+    def put(self, write: Callable[[IO[bytes]], object], force: bool) -> None:
+        """What ``write`` puts into the file it is given, which can seek, goes where it belongs."""
+        if self.target is None:
+            to_standard_output(write)
+            return
+        with naming(self.target):
+            if self.folder:
+                with writing(self.folder):
+                    self.folder.mkdir(parents=True, exist_ok=True)
+            write_with(self.target, write, force=force)
+
 
 def jobs_for(
-    sources: Sequence[str], output: str | None, given: Sequence[str], suffix: str
+    sources: Sequence[str],
+    output: str | None,
+    given: Sequence[str],
+    suffix: str,
+    suffixes: Sequence[str],
 ) -> list[Job]:
-    """What is to be done, each file once. ``given`` is what the user named the sources.
+    """What is to be done, each file once.
 
-    Different sources of which the results would lie in one place are one job, a fault.
+    ``output`` is a folder if it is one already or ends with a slash, or if ``given``, what the user
+    named the sources, are several, a folder or a pattern; of the last two, a single file may still
+    go to a name with one of ``suffixes``. Different sources whose results would lie in one place
+    are one job, a fault.
 
     Raises click.UsageError.
     """
@@ -90,21 +110,34 @@ def jobs_for(
         raise click.UsageError("standard input (-) is to be the only file")
     found = _once(sources)
     named = [name for name in found if name]
+    nameless = [Job(name, fault=no_name()) for name in found if not name]
     if output == STANDARD or (output is None and any(map(_streams, named))):
         if len(named) > 1:
             raise click.UsageError("only one file can go to standard output")
-        return [Job(name, fault=None if name else no_name()) for name in found]
-    if output is None or os.path.isdir(output):
-        folder = None if output is None else Path(output)
-        beside = [_beside(name, folder, suffix) for name in named]
-    elif len(named) == 1 and not os.path.isdir(given[0]):
-        beside = [Path(output)]
-    else:
+        return nameless + [Job(name) for name in named]
+    if output is None:
+        return nameless + _apart({name: _beside(name, None, suffix) for name in named}, None)
+    several = len(named) > 1 or any(name != STANDARD and _several(name) for name in given)
+    is_file = Path(output).suffix.lower() in suffixes
+    if os.path.isdir(output) or output.endswith(("/", os.sep)) or (several and not is_file):
+        folder = Path(output)
+        if os.path.lexists(folder) and not folder.is_dir():
+            raise click.BadParameter(f"{folder} is a file, not a folder", None, None, "-o")
+        return nameless + _apart({n: _beside(n, folder, suffix) for n in named}, folder)
+    if len(named) > 1:
         raise click.BadParameter(
-            "for several files it must be a folder that exists", None, None, "-o"
+            f"{output} is one file, and there are {len(named)} to write: name a folder, or end the "
+            "name with a slash",
+            None,
+            None,
+            "-o",
         )
-    nameless = [Job(name, fault=no_name()) for name in found if not name]
-    return nameless + _apart(dict(zip(named, beside, strict=True)))
+    return nameless + [Job(name, Path(output)) for name in named]
+
+
+def _several(name: str) -> bool:
+    """Whether a name that the user gave stands for any number of files."""
+    return os.path.isdir(name) or (glob.has_magic(name) and not os.path.lexists(name))
 
 
 def no_name() -> InputError:
@@ -139,7 +172,7 @@ def _beside(name: str, folder: Path | None, suffix: str) -> Path:
     return folder / path.name if folder else path
 
 
-def _apart(targets: dict[str, Path]) -> list[Job]:
+def _apart(targets: dict[str, Path], folder: Path | None) -> list[Job]:
     """A job for each target that one source has."""
     places: dict[str, list[str]] = {}
     for name, target in targets.items():
@@ -156,7 +189,7 @@ def _apart(targets: dict[str, Path]) -> list[Job]:
                 file=target,
                 remedy="name one of them alone, or write them into different folders",
             )
-        jobs.append(Job(names[0], target, fault))
+        jobs.append(Job(names[0], target, folder, fault))
     return jobs
 
 
@@ -191,7 +224,8 @@ def for_each(
         for done, result in enumerate(ordered(guarded, jobs, at_once)):
             progress(done, len(jobs), what)
             if isinstance(result, Exception):
-                failed = report(result, voice.verbose)
+                with voice.above_progress():
+                    failed = report(result, voice.verbose)
                 status = status or failed
             else:
                 tell(result)

@@ -3,46 +3,38 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from ptmtools.cli.batch import expanded, no_name
 from ptmtools.cli.common import as_json, limited, voiced
 from ptmtools.cli.output import Voice
+from ptmtools.cli.parameters import Named
 from ptmtools.errors import naming
 from ptmtools.quantities import count, size
-from ptmtools.texture.profiles import PROFILE_NUMBERS
+from ptmtools.texture.profiles import PROFILES
 
 if TYPE_CHECKING:
     from ptmtools.texture.comparison import Measured
     from ptmtools.texture.model import Limits
 
 
-class _Profiles(click.ParamType):  # type: ignore[type-arg]  # generic only in newer Clicks
+def _profiles(context: click.Context, parameter: click.Parameter, value: str) -> tuple[str, ...]:
     """Names of profiles, separated by commas."""
-
-    name = "profiles"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, ...]:
-        names = tuple(str(value).split(","))
-        for name in names:
-            if name not in PROFILE_NUMBERS:
-                self.fail(f"{name!r} is none of {', '.join(PROFILE_NUMBERS)}", param, ctx)
-        return names
+    one = Named(PROFILES)
+    return tuple(one.convert(name, parameter, context) for name in value.split(","))
 
 
 @click.command("compare")
 @click.argument("images", metavar="IMAGE...", nargs=-1, required=True, type=click.Path())
 @click.option(
     "--profiles",
-    type=_Profiles(),
-    default=",".join(PROFILE_NUMBERS),
+    callback=_profiles,
+    default=",".join(PROFILES),
     show_default=True,
     metavar="NAME,...",
-    help="Which profiles.",
+    help="The profiles to compare with the other formats.",
 )
 @click.option(
     "--repeat",
@@ -50,7 +42,7 @@ class _Profiles(click.ParamType):  # type: ignore[type-arg]  # generic only in n
     default=2,
     show_default=True,
     metavar="N",
-    help="Code each image so many times; the shortest time counts.",
+    help="Time each image this many times; the shortest time counts.",
 )
 @limited
 @as_json
@@ -63,10 +55,11 @@ def compare(
     limits: Limits,
     as_json: bool,
 ) -> None:
-    """Say how large images get, and how fast, as .ptm and in other lossless formats.
+    """Compare the size and speed of .ptm with other lossless image formats.
 
-    An IMAGE may be a pattern or a folder (all images in it). Speeds are of one thread, in megabytes
-    of the finest level, decoded, a second.
+    An IMAGE may be a file, a pattern such as 'scans/*.tif' or a folder (all images in it). A .ptm
+    holds all levels; the other formats take one file for the finest level, or one for each level.
+    Speeds are those of one thread, in MB of raw texels of the finest level per second.
     """
     from ptmtools.texture.comparison import codecs, measure, total
     from ptmtools.texture.images import SUFFIXES, load_image

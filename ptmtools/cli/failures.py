@@ -14,7 +14,7 @@ from ptmtools.errors import PtmError
 INTERNAL, USAGE, INTERRUPTED, BROKEN_PIPE = 1, 2, 130, 141
 
 _MEMORY = (
-    "not enough memory; use smaller images, fewer cells (--max-cells) or fewer workers (-j 1) "
+    "not enough memory; use smaller images, fewer cells (--max-leaves) or fewer workers (-j 1) "
     "[PTM-L099]"
 )
 

@@ -3,23 +3,56 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from dataclasses import replace
+from functools import wraps
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 import click
 
 from ptmtools.cli.batch import STANDARD, Job, expanded, for_each, jobs_for, standard_input
-from ptmtools.cli.batch import to_standard_output as to_stdout
 from ptmtools.cli.common import as_json, forced, limited, voiced, workers
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import Numbers, options_of, take
 from ptmtools.errors import InputError, OutputError, naming
-from ptmtools.files import refuse_existing, write_with
+from ptmtools.files import refuse_existing
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Description, EncodeOptions
+from ptmtools.texture.profiles import PROFILES
 
 if TYPE_CHECKING:
     from ptmtools.texture.model import Limits
+
+
+#: Of the allowed errors that the hint on lossy images proposes, and what it does to their size.
+_HINTED_ERROR = 4
+
+
+def _skipping(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Adds ``--skip-existing``."""
+
+    @click.option(
+        "--skip-existing",
+        is_flag=True,
+        help="Leave out what has its result already, as after a run that was interrupted.",
+    )
+    @wraps(function)
+    def command(*arguments: Any, force: bool, skip_existing: bool, **values: Any) -> Any:
+        if force and skip_existing:
+            raise click.UsageError("--force and --skip-existing exclude each other")
+        return function(*arguments, force=force, skip_existing=skip_existing, **values)
+
+    return command
+
+
+def _skipped(target: Path | None, force: bool, skip_existing: bool) -> bool:
+    """Whether the result is there and may stay. Raises OutputError PTM-O001 if it may not."""
+    if target is None or force:
+        return False
+    if not skip_existing:
+        refuse_existing(target)
+    return target.exists()
 
 
 @click.command("encode")
@@ -28,13 +61,15 @@ if TYPE_CHECKING:
     "-o",
     "--output",
     type=click.Path(),
-    help="The .ptm, a folder for several, or - for stdout. By default beside each image.",
+    help="The .ptm file to write, - for stdout, or for several images a folder, which is made if "
+    "need be. A name that ends with / is a folder. By default each .ptm lies beside its image.",
 )
 @options_of(EncodeOptions)
 @click.option(
     "--orient / --no-orient",
-    help="Turn the texels as the image's EXIF orientation says, instead of recording it.",
+    help="Turn the texels upright as the image's EXIF orientation says, instead of recording it.",
 )
+@_skipping
 @limited
 @workers
 @forced
@@ -45,39 +80,41 @@ def encode(
     images: tuple[str, ...],
     output: str | None,
     orient: bool,
+    skip_existing: bool,
     limits: Limits,
     workers: int,
     force: bool,
     as_json: bool,
     **values: Any,
 ) -> int:
-    """Encode images as progressive textures.
+    """Encode images as progressive textures (.ptm).
 
-    An IMAGE may be a pattern, a folder (all images in it), or - for stdin. A bad one is reported
-    and the others are encoded.
+    An IMAGE may be a file, a pattern such as 'scans/*.tif', a folder (all images in it), or - for
+    stdin. An image that cannot be read is reported, and the others are encoded.
     """
     from ptmtools.texture.container import HEAD_MAX, read_header
     from ptmtools.texture.encoder import encode_to
     from ptmtools.texture.images import SUFFIXES, load_image
-    from ptmtools.texture.options import check_options
+    from ptmtools.texture.options import check_options, level_above
 
     options = take(EncodeOptions, values)
     check_options(options)
     sources = expanded(images, SUFFIXES)
-    jobs = jobs_for(sources, output, images, ".ptm")
+    jobs = jobs_for(sources, output, images, ".ptm", (".ptm", *SUFFIXES))
     voice.aside = any(job.to_stdout for job in jobs)
-    if output and not os.path.isdir(output):
+    if output and any(job.target and not job.folder for job in jobs):
         _refuse_image_suffix(output)
-    told: list[dict[str, object]] = []
+    reports: list[dict[str, Any]] = []
 
-    def work(job: Job, threads: int) -> dict[str, object]:
+    def work(job: Job, threads: int) -> dict[str, Any]:
         source, target = job.source, job.target
-        if target and not force:
-            refuse_existing(target)
-        report: dict[str, object] = {
+        report: dict[str, Any] = {
             "image": source,
             "file": os.fspath(target) if target else STANDARD,
+            "skipped": _skipped(target, force, skip_existing),
         }
+        if report["skipped"]:
+            return report
 
         def write(file: IO[bytes]) -> None:
             encode_to(
@@ -86,53 +123,116 @@ def encode(
             report["ptm_bytes"] = file.tell()
             file.seek(0)
             header = read_header(file.read(HEAD_MAX))
+            file.seek(0, os.SEEK_END)
             report["raw_bytes"] = header.width * header.height * header.texel_bytes
             report["levels"] = len(header.levels)
-            file.seek(0, os.SEEK_END)
+            finest, above = header.levels[-1], level_above(header)
+            report["finest"] = finest.width, finest.height
+            report["left_out"] = above and dict(
+                zip(("width", "height", "bytes"), above, strict=True)
+            )
 
         with naming(source):
-            picture = load_image(standard_input() if source == STANDARD else source, limits)
+            data = standard_input() if source == STANDARD else source
+            picture = load_image(data, limits)
+            report["image_bytes"] = len(data) if isinstance(data, bytes) else os.path.getsize(data)
+            report["lossy"] = picture.lossy
             if orient:
                 picture = picture.upright()
-            if target:
-                write_with(target, write, force=force)
-            else:
-                to_stdout(write)
+            job.put(write, force)
         return report
 
     def tell(report: dict[str, Any]) -> None:
-        told.append(report)
-        if not as_json:
-            raw, stored = report["raw_bytes"], report["ptm_bytes"]
-            voice.say(
-                f"{report['file']}: {count(report['levels'], 'level')}, {size(raw)} → "
-                f"{size(stored)} ({stored / raw:.1%})"
-            )
+        reports.append(report)
+        if as_json:
+            return
+        if report["skipped"]:
+            voice.say(f"{report['file']}: exists and was skipped")
+            return
+        raw, stored, image = (report[f"{what}_bytes"] for what in ("raw", "ptm", "image"))
+        name = "the input" if report["image"] == STANDARD else os.path.basename(report["image"])
+        beside = f", {_share(stored, image)} {name} ({size(image)})" if image else ""
+        voice.say(
+            f"{report['file']}: {count(report['levels'], 'level')}, {size(stored)}: "
+            f"{_share(stored, raw)} the raw texels ({size(raw)}){beside}"
+        )
+        if note := _note_on_sides(report, options.max_side):
+            voice.say(f"  {note}")
 
     status = for_each(voice, jobs, work, tell, workers, "images")
     if as_json:
-        voice.emit_json(told)
+        voice.emit_json(reports)
+    elif hint := _hint_on_lossy(reports, options):
+        voice.say(hint)
     return status
+
+
+def _note_on_sides(report: dict[str, Any], max_side: int) -> str | None:
+    """What ``--max-side`` made of an image whose sides do not halve to it."""
+    width, height = report["finest"]
+    if not max_side or max(width, height) == max_side:
+        return None
+    if max(width, height) > max_side:
+        return (
+            f"no level is within --max-side {max_side}; the coarsest, {width} x {height}, is kept"
+        )
+    if not (above := report["left_out"]):
+        return None
+    return (
+        f"sides halve from level to level: the finest within --max-side {max_side} is {width} x "
+        f"{height}; the next, {above['width']} x {above['height']}, would add about "
+        f"{size(above['bytes'])}"
+    )
+
+
+def _hint_on_lossy(reports: list[dict[str, Any]], options: EncodeOptions) -> str | None:
+    """What helps where lossless files have become larger than the lossy images they come from."""
+    grown = [
+        report
+        for report in reports
+        if not report["skipped"]
+        and report["lossy"]
+        and report["ptm_bytes"] > report["image_bytes"] > 0
+    ]
+    if not grown or options.max_error or not PROFILES[options.profile].lossy:
+        return None
+    kinds = " and ".join(sorted({report["lossy"] for report in grown}))
+    return (
+        f"hint: {kinds} is small because it discards detail; a lossless .ptm of it keeps every "
+        f"texel, noise included. For pictures, --max-error {_HINTED_ERROR} about halves the .ptm: "
+        f"no sample is off by more than {_HINTED_ERROR} (of 255), which is hard to see. Stay at 0 "
+        "where texels are data, such as normals, masks or heights."
+    )
+
+
+def _share(part: int, whole: int) -> str:
+    """``85.3% of``, ``4.2 times``."""
+    return f"{part / whole:.1%} of" if part < 2 * whole else f"{part / whole:.1f} times"
 
 
 @click.command("decode")
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path())
 @click.option(
-    "--level", type=int, help="The level, 0 is the coarsest. By default the finest that is whole."
+    "--level",
+    type=int,
+    help="Which level to decode; 0 is the coarsest. By default the finest that the file holds "
+    "whole.",
 )
 @click.option(
     "--window",
     type=Numbers([4], int),
     metavar="X,Y,W,H",
-    help="Only these texels of the level: from column X and row Y on, W wide and H high.",
+    help="Decode only this part of the level: W x H texels from column X and row Y on.",
 )
 @click.option(
     "-o",
     "--output",
     type=click.Path(),
-    help="The image (.png, .npy, .tif, .hdr or .exr), a folder, or - for stdout. By default "
-    "beside each file: a .png, or for floats an .npy.",
+    help="The image to write (.png, .npy, .tif, .hdr or .exr), - for stdout, or for several files "
+    "a folder, which is made if need be. A name that ends with / is a folder. By default each "
+    "image lies beside its file: a .png, or an .npy for floats.",
 )
+@_skipping
 @limited
 @workers
 @forced
@@ -144,29 +244,31 @@ def decode(
     level: int | None,
     window: tuple[int, int, int, int] | None,
     output: str | None,
+    skip_existing: bool,
     limits: Limits,
     workers: int,
     force: bool,
     as_json: bool,
 ) -> int:
-    """Decode .ptm files, or their beginnings, to images.
+    """Decode .ptm files to images.
 
-    A FILE may be a pattern, a folder (all .ptm files in it), or - for stdin. A bad one is reported
-    and the others are decoded.
+    A FILE may be a .ptm, or the beginning of one that is still being loaded; a pattern such as
+    'textures/*.ptm'; a folder (all .ptm files in it); or - for stdin. A file that cannot be decoded
+    is reported, and the others are decoded.
     """
-    from ptmtools.texture.images import write_to
+    from ptmtools.texture.images import WRITTEN, write_to
     from ptmtools.texture.images.writing import writer
     from ptmtools.texture.reader import open
 
     sources = expanded(files, (".ptm",))
-    jobs = jobs_for(sources, output, files, "")
+    jobs = jobs_for(sources, output, files, "", tuple(WRITTEN))
     voice.aside = any(job.to_stdout for job in jobs)
     # One name is an image's; what goes into a folder, or beside its file, gets a suffix.
-    named = output is not None and output != STANDARD and not Path(output).is_dir()
+    named = output is not None and any(job.target and not job.folder for job in jobs)
     if named:
         with naming(output):
             writer(Path(str(output)).suffix)
-    told: list[dict[str, object]] = []
+    reports: list[dict[str, Any]] = []
 
     def work(job: Job, threads: int) -> dict[str, Any]:
         source, target = job.source, job.target
@@ -177,8 +279,13 @@ def decode(
                 suffix = target.suffix
             elif target:
                 target = target.with_name(target.name + suffix)
-            if target and not force:
-                refuse_existing(target)
+            report: dict[str, Any] = {
+                "file": source,
+                "image": os.fspath(target) if target else STANDARD,
+                "skipped": _skipped(target, force, skip_existing),
+            }
+            if report["skipped"]:
+                return report
             # The sizes of files and of stdin are known, and so is what is whole.
             number = max(0, ptm.whole - 1) if level is None else level
             texels = ptm.window(number, *window) if window else ptm.level(number)
@@ -187,19 +294,11 @@ def decode(
                 description = ptm.description()
             except InputError as error:  # the texels are intact
                 warning = error
-
-        def write(file: IO[bytes]) -> None:
-            write_to(file, suffix, texels, description)
-
-        if target:
-            with naming(target):
-                write_with(target, write, force=force)
-        else:
-            to_stdout(write)
+        replace(job, target=target).put(
+            lambda file: write_to(file, suffix, texels, description), force
+        )
         height, width, components = texels.shape
-        return {
-            "file": source,
-            "image": os.fspath(target) if target else STANDARD,
+        return report | {
             "level": number,
             "width": width,
             "height": height,
@@ -209,21 +308,25 @@ def decode(
         }
 
     def tell(report: dict[str, Any]) -> None:
-        told.append(report)
-        if report["warning"]:
+        reports.append(report)
+        if report.get("warning"):
             voice.warn(
                 f"{report['file']}: written without colour and orientation: {report['warning']}"
             )
-        if not as_json:
-            kind = "" if report["kind"] == "uint8" else f" of {report['kind']}"
-            voice.say(
-                f"{report['image']}: {report['width']} x {report['height']}, "
-                f"{count(report['components'], 'component')}{kind}"
-            )
+        if as_json:
+            return
+        if report["skipped"]:
+            voice.say(f"{report['image']}: exists and was skipped")
+            return
+        kind = "" if report["kind"] == "uint8" else f" of {report['kind']}"
+        voice.say(
+            f"{report['image']}: {report['width']} x {report['height']}, "
+            f"{count(report['components'], 'component')}{kind}, level {report['level']}"
+        )
 
     status = for_each(voice, jobs, work, tell, workers, "files")
     if as_json:
-        voice.emit_json(told)
+        voice.emit_json(reports)
     return status
 
 

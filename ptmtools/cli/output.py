@@ -15,6 +15,7 @@ import click
 from ptmtools.progress import Progress, silent
 
 if TYPE_CHECKING:
+    from rich.progress import Progress as Bars
     from rich.progress import TaskID
 
 
@@ -28,15 +29,30 @@ class Voice:
     quiet: bool = False
     verbose: bool = False
     aside: bool = False
+    #: Where a progress bar is being shown.
+    _bars: Bars | None = None
 
     def say(self, text: str) -> None:
         """A line of the result, on stdout."""
         if not self.quiet:
-            click.echo(printable(text), err=self.aside)
+            with self.above_progress():
+                click.echo(printable(text), err=self.aside)
 
     def warn(self, text: str) -> None:
         """A line on stderr, of what is wrong and does not stop the command."""
-        click.echo(f"ptm: {printable(text)}", err=True)
+        with self.above_progress():
+            click.echo(f"ptm: {printable(text)}", err=True)
+
+    @contextmanager
+    def above_progress(self) -> Iterator[None]:
+        """What is printed meanwhile stays above the progress bar, if one is shown."""
+        if self._bars:
+            self._bars.stop()
+        try:
+            yield
+        finally:
+            if self._bars:
+                self._bars.start()
 
     def emit_json(self, document: Any) -> None:
         """The result as JSON on stdout; ``--quiet`` does not silence what was asked for. What is
@@ -57,8 +73,13 @@ class Voice:
         from rich.progress import Progress as Bars
 
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+        # stdout may be a file.
         with Bars(
-            *columns, TimeElapsedColumn(), console=Console(stderr=True), transient=True
+            *columns,
+            TimeElapsedColumn(),
+            console=Console(stderr=True),
+            transient=True,
+            redirect_stdout=False,
         ) as bars:
             task: dict[str, TaskID] = {}
 
@@ -67,7 +88,11 @@ class Voice:
                     task[what] = bars.add_task(what, total=total)
                 bars.update(task[what], completed=done, total=total)
 
-            yield tell
+            self._bars = bars
+            try:
+                yield tell
+            finally:
+                self._bars = None
 
 
 def printable(text: str) -> str:

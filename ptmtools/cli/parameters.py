@@ -6,7 +6,8 @@ becomes ``--wall-area FLOAT`` with that default and that help. The metadata of a
 
 * ``option``: its name on the command line, where that is not the field's own;
 * ``was``: former names, which work for one release, with a note;
-* ``choices``: a function that returns what may be given, for fields whose type does not say it;
+* ``choices``: a table of what may be given, by name, each with an ``about``; with ``several``,
+  names may be joined by commas;
 * ``numbers``: how many numbers one value consists of, where that varies, such as (3, 4);
 * ``parse``, ``print``: from what the command line gives to the field's value, and back.
 
@@ -18,7 +19,7 @@ from __future__ import annotations
 import inspect
 import re
 import typing
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, Field, fields
 from functools import wraps
 from types import NoneType, UnionType
@@ -58,6 +59,30 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]  # generic only in new
             whole = "whole " if self.kind is int else ""
             self.fail(f"{value!r} is not {wanted} {whole}numbers separated by commas", param, ctx)
         return numbers
+
+
+class Named(click.ParamType):  # type: ignore[type-arg]  # generic only in newer Clicks
+    """A name in a table of declarations, or ``several`` with commas in between."""
+
+    name = "name"
+
+    def __init__(self, table: Mapping[str, Any], *, several: bool = False) -> None:
+        self.table = table
+        self.several = several
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
+        return "NAME[,NAME]" if self.several else f"[{'|'.join(self.table)}]"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        for name in str(value).split(",") if self.several else [value]:
+            if name not in self.table:
+                self.fail(f"{name!r} is not one of {', '.join(self.table)}", param, ctx)
+        return str(value)
+
+    @property
+    def explained(self) -> str:
+        """What each name stands for."""
+        return "; ".join(f"{name}: {declared.about}" for name, declared in self.table.items())
 
 
 def descriptions(cls: type) -> dict[str, str]:
@@ -174,6 +199,8 @@ def _option(field: Field[Any], hint: Any, text: str | None, former: str = "") ->
     default = None if former else _default(field)
     name = former or _option_name(field)
     settings: dict[str, Any] = {"default": default, "help": text, "hidden": bool(former)}
+    if former:
+        settings["help"] = f"Now --{_option_name(field)}."
     if get_origin(hint) in (Union, UnionType):  # X | None
         hint = next(part for part in get_args(hint) if part is not NoneType)
     if default not in (None, (), ""):
@@ -182,8 +209,9 @@ def _option(field: Field[Any], hint: Any, text: str | None, former: str = "") ->
     if hint is bool:
         # A switch that is on by default is named by what turns it off.
         flag = f"{flag}/--no-{name}"
-    elif choices := field.metadata.get("choices"):
-        settings["type"] = click.Choice(list(choices()))
+    elif (table := field.metadata.get("choices")) is not None:
+        settings["type"] = named = Named(table, several=field.metadata.get("several", False))
+        settings["help"] = text and f"{text} — {named.explained}."
     elif get_origin(hint) is Literal:
         settings["type"] = click.Choice([str(choice) for choice in get_args(hint)])
     elif counts := field.metadata.get("numbers"):

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 from dataclasses import asdict
+from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import click
@@ -12,6 +16,8 @@ from ptmtools.cli.common import as_json, database, forced, limited, voiced, work
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
 from ptmtools.database import PlotOptions, ValidationReport
+from ptmtools.database.names import MANIFEST
+from ptmtools.database.validation.findings import NOT_BUILT, SEEN_BY_BUILD
 from ptmtools.errors import CheckError
 from ptmtools.pipeline import Artifacts, shoot_segments
 from ptmtools.pipeline import validate as check
@@ -21,15 +27,15 @@ from ptmtools.store.folder import DatabaseFolder
 from ptmtools.texture.model import Limits
 from ptmtools.visibility import SegmentReport
 
-#: Findings that are shown without ``-v``.
-SHOWN_ISSUES = 20
+#: Files whose findings are shown without ``-v``.
+SHOWN_FILES = 20
 
 target = click.argument("target", metavar="FILE|DB", type=click.Path())
 
 
-def _tell_codes(context: click.Context, option: click.Option, asked: bool) -> None:
+def _print_codes(context: click.Context, option: click.Option, asked: bool) -> None:
     if asked:
-        from ptmtools.database.validation import CODES
+        from ptmtools.database.validation.findings import CODES
 
         for code, (severity, meaning) in sorted(CODES.items()):
             click.echo(f"{code}  {severity:<7}  {meaning}")
@@ -43,16 +49,17 @@ def _tell_codes(context: click.Context, option: click.Option, asked: bool) -> No
     type=click.IntRange(0),
     default=0,
     metavar="N",
-    help="Also shoot N random segments: what sees each other must be potentially visible.",
+    help="Also try N random lines between points in cells: where nothing is in the way, the cells "
+    "must be listed as seeing each other.",
 )
-@click.option("--strict / --no-strict", help="Warnings are errors.")
+@click.option("--strict / --no-strict", help="Fail on warnings too.")
 @click.option(
     "--codes",
     is_flag=True,
     is_eager=True,
     expose_value=False,
-    callback=_tell_codes,
-    help="List what can be found, and end.",
+    callback=_print_codes,
+    help="List the codes of all findings with their meaning, and exit.",
 )
 @limited
 @workers
@@ -69,7 +76,8 @@ def validate(
 ) -> None:
     """Check a database or a .ptm file.
 
-    Exits with 8 if it finds an error.
+    Says of each file what is worst, and at the end which command repairs it. Exits with 8 if it
+    finds an error.
     """
     if not target:
         raise no_name()
@@ -81,9 +89,15 @@ def validate(
     if as_json:
         voice.emit_json(_document(target, report, shot, failed == 0))
     else:
-        _tell_findings(voice, target, report, shot)
+        _print_findings(voice, target, report, shot)
     if failed:
-        raise CheckError("PTM-C001", f"{count(failed, 'finding')} to be mended", file=target)
+        repair = _repair(target, report)
+        raise CheckError(
+            "PTM-C001",
+            f"not in order: {count(failed, 'finding')}",
+            file=target,
+            remedy=f"repair it with `{repair}`" if repair else None,
+        )
 
 
 @click.command("plot")
@@ -126,27 +140,61 @@ def _document(
             "warnings": report.warning_count,
         },
         "issues": [asdict(issue) for issue in report.issues],
+        "notes": list(report.notes),
+        "repair": _repair(target, report),
         **({"segments": asdict(shot)} if shot else {}),
     }
 
 
-def _tell_findings(
+def _print_findings(
     voice: Voice, target: str, report: ValidationReport, shot: SegmentReport | None
 ) -> None:
-    shown = report.issues if voice.verbose else report.issues[:SHOWN_ISSUES]
-    for issue in shown:
-        voice.say(str(issue))
-    if len(shown) < len(report.issues):
-        voice.say(f"{len(report.issues) - len(shown):,} more findings; -v shows them all")
-    if shot:
-        for pair in shot.missed:
-            a, b = pair.cells
-            voice.say(f"{target}: error: cells {a} and {b} see each other outside the PVS")
-        voice.say(
-            f"{target}: {count(shot.tried, 'random segment')}, {shot.unoccluded:,} unoccluded; "
-            f"{shot.missed_segments:,} outside the PVS, {count(shot.hairlines, 'hairline')}"
+    """Of each file the worst finding, and how many more it has; with ``-v`` all of them."""
+    lines = [str(issue) for issue in report.issues]
+    if not voice.verbose:
+        files = [list(found) for _, found in groupby(report.issues, lambda issue: issue.file)]
+        files.sort(key=lambda found: found[0].severity != "error")
+        more = [sum(issue.count for issue in found) - 1 for found in files]
+        lines = [
+            f"{found[0]}{f' and {n:,} more' if n else ''}"
+            for found, n in zip(files[:SHOWN_FILES], more, strict=False)
+        ]
+        if rest := len(files) - len(lines):
+            lines.append(f"findings in {count(rest, 'more file')}")
+        if rest or any(more):
+            lines.append("-v shows all findings")
+    for pair in shot.missed if shot else ():
+        a, b = pair.cells
+        lines.append(
+            f"{target}: error: cells {a} and {b} see each other, but not in their visible sets"
         )
+    if shot:
+        lines.append(
+            f"{target}: {count(shot.tried, 'random segment')}, {shot.unoccluded:,} of them free; "
+            f"{shot.missed_segments:,} between cells that are not said to see each other, "
+            f"{shot.hairlines:,} too near to an edge to tell"
+        )
+    lines += [f"note: {note}" for note in report.notes]
+    for line in lines:
+        voice.say(line)
     voice.say(
         f"{target}: {count(report.files, 'file')}, {size(report.bytes)}; "
         f"{count(report.error_count, 'error')}, {count(report.warning_count, 'warning')}"
     )
+
+
+def _repair(target: str, report: ValidationReport) -> str | None:
+    """The command that makes good what was found, if one does."""
+    from ptmtools.cli.status import build_command
+
+    codes = {issue.code for issue in report.issues}
+    if not codes - NOT_BUILT:
+        return None
+    if not Path(target).is_dir():
+        again = f"ptm encode IMAGE -o {shlex.quote(target)} --force"
+        return again if target.endswith(".ptm") else None
+    if "PTM-D650" not in codes and codes & SEEN_BY_BUILD:
+        return build_command(target)
+    # Files are as they were written, so nothing but a new build changes them.
+    manifest = shlex.quote(os.path.join(target, MANIFEST))
+    return f"rm -f {manifest} && {build_command(target)} --force"

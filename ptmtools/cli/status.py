@@ -14,6 +14,7 @@ import click
 from ptmtools.cli.common import as_json, database, voiced
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import words
+from ptmtools.errors import DatabaseError
 from ptmtools.pipeline.stages import STAGES
 from ptmtools.quantities import count, size
 from ptmtools.store.folder import read_manifest
@@ -52,17 +53,19 @@ def status(voice: Voice, db: str, as_json: bool) -> None:
         waiting = f"; {count(found.waiting, 'finished texture')} will be taken over"
         voice.say(f"a run was interrupted{waiting if found.waiting else ''}")
     if not found.finished and not found.writer:
-        voice.say(f"not finished: run `{build_command(db, found.model)}`")
+        voice.say(f"not finished: run `{build_command(db)}`")
 
 
-def build_command(db: str, model: str | None) -> str:
+def build_command(db: str) -> str:
     """The command that brings a database up to date, with the options that it was built with."""
-    manifest = read_manifest(Path(db)) or Manifest("")
+    manifest = Manifest("")
+    with suppress(DatabaseError):
+        manifest = read_manifest(Path(db)) or manifest
     recorded = []
     for name, record in manifest.stages.items():
         with suppress(KeyError, ValueError):
             recorded.append(STAGES[name].recorded(record.parameters))
-    model = shlex.quote(model) if model else "MODEL"
+    model = shlex.quote(manifest.model) if manifest.model else "MODEL"
     return " ".join(
         ["ptm build-scene", model, "-o", shlex.quote(db), *map(shlex.quote, words(recorded))]
     )

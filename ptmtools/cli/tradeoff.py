@@ -1,4 +1,4 @@
-"""The command that measures what the knobs of the stages buy."""
+"""The command that measures what the settings of the stages cost, and how accurate they are."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from ptmtools.files import refuse_existing, write_bytes, writing
 from ptmtools.pipeline import Artifacts
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.tradeoff.experiment import Trade, run
+from ptmtools.tradeoff.experiments import EXPERIMENTS, Subject
 from ptmtools.tradeoff.figure import picture, require
 from ptmtools.tradeoff.report import as_csv, table
-from ptmtools.tradeoff.stages import STAGES, experiments
 
-#: Of the reference: so many that settings with fewer remain.
+#: Sample points of the reference: at least so many that settings with fewer remain.
 LEAST_POINTS = 64
 
 
@@ -31,22 +31,22 @@ LEAST_POINTS = 64
 @click.option(
     "--stage",
     "stages",
-    type=click.Choice(STAGES),
+    type=click.Choice(list(EXPERIMENTS)),
     multiple=True,
-    help="Of which stages; all if not given. May be given several times.",
+    help="Try only this stage; may be given several times. By default all are tried.",
 )
 @click.option(
     "--error",
     "wanted",
     type=click.FloatRange(0, min_open=True),
-    help="Also name the cheapest setting whose error is at most this.",
+    help="Also name the cheapest setting of each stage whose error is at most this.",
 )
 @click.option(
     "--cells-tried",
     type=click.IntRange(1),
     default=16,
     show_default=True,
-    help="Cells that stand for all, where hints are tried.",
+    help="Try coverage hints in so many cells, which stand for all.",
 )
 @click.option(
     "--reference",
@@ -54,7 +54,8 @@ LEAST_POINTS = 64
     default=MAX_SAMPLES,
     show_default=True,
     metavar="POINTS",
-    help="Sample points a cell that hints are compared with; settings of fewer are tried.",
+    help="Compare coverage hints with those of so many other sample points in a cell; settings "
+    "with fewer are tried.",
 )
 @click.option("--csv", "csv_file", type=click.Path(), help="Also write every trial as CSV.")
 @click.option("--plot", "plot_file", type=click.Path(), help="Also draw error against cost, a PNG.")
@@ -73,21 +74,22 @@ def tradeoff(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Measure what the knobs of each stage cost and bring, on the scene of DB.
+    """Measure what settings of each stage cost, and how accurate they are, on the scene of DB.
 
-    A star marks the settings that no cheaper one beats. Nothing in DB is changed.
+    A star marks the settings that no cheaper one beats in accuracy. DB is not changed.
     """
     for file in (csv_file, plot_file):
         if file:
             _writable(file, force)
     if plot_file:
         require()
-    ready = experiments(Artifacts(DatabaseFolder.open(db)), cells_tried, reference)
+    subject = Subject(Artifacts(DatabaseFolder.open(db)), cells_tried, reference)
     trades = []
     with voice.progress() as progress:
-        for stage in stages or STAGES:
+        for stage in stages or EXPERIMENTS:
             progress(0, 1, f"preparing {stage}")
-            trades.append(run(ready[stage](), progress))
+            experiment = EXPERIMENTS[stage].load()(subject)
+            trades.append(run(stage, experiment, progress))
     if csv_file:
         write_bytes(csv_file, as_csv(trades).encode(), force=force)
     if plot_file:

@@ -9,23 +9,21 @@ are hundreds of them, with views of a few pixels.
 
 The paper draws "all the objects of its PVS". Here what else shows is found too, since only so can a
 pixel fall on a cell outside the PVS, which would be an error of the PVS or a crack in the model.
-Such pixels are asked again, left out of the hints and reported as missed mass (`looking`).
+Such pixels are looked up again, left out of the hints and reported as missed mass (`tally`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
-from ptmtools.coverage.backend import open_renderer
-from ptmtools.coverage.embree import EmbreeRenderer
+from ptmtools.coverage.backends.choice import choose
 from ptmtools.coverage.estimate import RULE_OF_THREE
-from ptmtools.coverage.item_buffer import VIEWS, Renderer, Surfaces
-from ptmtools.coverage.looking import Owners
+from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.coverage.sampling import CellHints, Sampler
@@ -55,83 +53,51 @@ def compute_ach(
     """The coverage hints of every cell, aligned with ``pvs`` (paper §5).
 
     Equal input and options give equal results whatever the ``executor``; two backends differ in a
-    few edge pixels. Cells are tasks of their own with Embree, whose binding keeps the interpreter's
-    lock, so that here they mean processes; OpenGL draws them in this one.
+    few edge pixels. Where a backend draws `in_processes`, cells are tasks of their own; otherwise
+    this process draws them all.
 
     Raises `InputError` PTM-I501 if the three inputs do not belong together, and
     `MissingComponentError` PTM-M500 if the gl backend is asked for and there is no OpenGL.
     """
     _check(scene, cells, pvs)
-    surfaces = Surfaces.of(scene, cells)
-    renderer = open_renderer(surfaces, cells, pvs, options)
+    backend = choose(cells, pvs, options)
     points = options.points if options.tolerance is None else EXPECTED
     rays = points * len(VIEWS) * options.side**2
     count = cells.cell_count
-    apart = executor.workers > 1 and rays * count >= 2 * WORTH_A_PROCESS
+    worth = rays * count >= 2 * WORTH_A_PROCESS
+    doer = executor if backend.in_processes and executor.workers > 1 and worth else Serial()
+    chunk = int(max(1, min(TASK // rays, count // (4 * doer.workers))))
+    found: list[CellHints] = []
+    sampler = Sampler(scene, cells, pvs, options, backend)
     try:
-        if apart and renderer.backend == "embree":
-            renderer.close()
-            sampling = Sampling(replace(scene, images=()), cells, pvs, options)
-            chunk = int(max(1, min(TASK // rays, count // (4 * executor.workers))))
-            each = executor.each(_sampled, sampling, range(count), chunk=chunk)
-        else:
-            sampler = Sampler(scene, cells, pvs, options, surfaces, renderer)
-            each = map(sampler.of_cell, range(count))
-        found: list[CellHints] = []
-        for hints in each:
+        if doer is executor:
+            sampler.renderer.close()  # each process opens one of its own
+        for hints in doer.each(Sampler.of_cell, sampler, range(count), chunk=chunk):
             found.append(hints)
             progress(len(found), count, "coverage")
     finally:
-        renderer.close()
-    return _gathered(pvs, found, Owners.of(surfaces, options.per_texture), renderer, options)
+        sampler.renderer.close()
+    return _gathered(found, sampler)
 
 
-@dataclass(frozen=True)
-class Sampling:
-    """What the tasks share. A scene without images, whose bytes are not needed."""
-
-    scene: Scene
-    cells: Cells
-    pvs: Pvs
-    options: AchOptions
-
-    @cached_property
-    def sampler(self) -> Sampler:
-        """Built once in each process, with trees of its own."""
-        surfaces = Surfaces.of(self.scene, self.cells)
-        renderer = EmbreeRenderer(surfaces, self.options.side)
-        return Sampler(self.scene, self.cells, self.pvs, self.options, surfaces, renderer)
-
-    def __getstate__(self) -> dict[str, object]:
-        return {name: value for name, value in vars(self).items() if name != "sampler"}
-
-
-def _sampled(sampling: Sampling, cell: int) -> CellHints:
-    return sampling.sampler.of_cell(cell)
-
-
-def _gathered(
-    pvs: Pvs, found: list[CellHints], owners: Owners, renderer: Renderer, options: AchOptions
-) -> Ach:
+def _gathered(found: list[CellHints], sampler: Sampler) -> Ach:
     rows = [hints.row for hints in found]
+    textures = [hints.textures for hints in found] if sampler.options.per_texture else []
 
-    def joined(name: str, width: tuple[int, ...] = ()) -> NDArray[np.float64]:
-        return np.concatenate([np.zeros((0, *width)), *(getattr(row, name) for row in rows)])
+    def joined(parts: Iterable[NDArray[Any]], *shape: int, kind: Any = np.float64) -> NDArray[Any]:
+        return np.concatenate([np.zeros((0, *shape), kind), *parts])
 
     samples = np.array([hints.samples for hints in found], dtype=np.int32)
     total = np.array([float(row.pixels.sum()) for row in rows])
-    textures = [hints.textures for hints in found] if options.per_texture else []
-    every = np.concatenate([np.zeros(0), *(t.share for t in textures)])
-    owner = np.concatenate([np.zeros(0, np.int64), *(t.owner for t in textures)])
-    size = np.concatenate([np.zeros(0, np.int64), *(t.count for t in textures)])
+    size = joined((t.count for t in textures), kind=np.int64)
     return Ach(
-        start=pvs.start.copy(),
-        value=joined("value"),
-        pixels=joined("pixels"),
-        error=joined("error"),
-        p95=joined("p95"),
-        seen=joined("seen"),
-        views=joined("views", (6,)),
+        start=sampler.pvs.start.copy(),
+        value=joined(row.value for row in rows),
+        pixels=joined(row.pixels for row in rows),
+        error=joined(row.error for row in rows),
+        p95=joined(row.p95 for row in rows),
+        seen=joined(row.seen for row in rows),
+        views=joined((row.views for row in rows), 6),
         missed=np.array([hints.missed for hints in found], dtype=np.float64),
         samples=samples,
         rejected=np.array([hints.rejected for hints in found], dtype=np.int32),
@@ -139,10 +105,10 @@ def _gathered(
         unseen_below=np.minimum(1.0, RULE_OF_THREE / np.maximum(samples, 1)),
         floor=np.divide(0.5, total, out=np.zeros_like(total), where=total > 0),
         texture_start=np.cumsum(np.append(0, size)) if textures else np.zeros(0, np.int64),
-        texture=owners.image[owner],
-        texture_value=every,
-        backend=renderer.backend,
-        renderer=renderer.name,
+        texture=joined((t.image for t in textures), kind=np.int32),
+        texture_value=joined(t.share for t in textures),
+        backend=sampler.backend.name,
+        renderer=sampler.renderer.name,
     )
 
 

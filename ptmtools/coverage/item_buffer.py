@@ -1,7 +1,7 @@
 """The item buffer: which surface shows in each pixel of six square views around a point (§5).
 
-Both backends answer the same question, *which triangle does pixel (view, row, column) show*, for
-the same directions; whose triangle that is is decided elsewhere (`looking`), in float64. A triangle
+Every backend answers the same question, *which triangle does pixel (view, row, column) show*, for
+the same directions; whose triangle that is is decided elsewhere (`tally`), in float64. A triangle
 in a boundary belongs to a cell on either side, and the pixel counts for the viewer's side (design,
 "Ownership"), so of coincident faces it does not matter which one wins.
 
@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
-from ptmtools.coverage.eyes import Eyes
+from ptmtools.coverage.sample_points import SamplePoints
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import DEPTH_SHARE
 
@@ -57,8 +57,8 @@ class Surfaces:
     ----------
     centre, scale: ``(world - centre) * scale`` lies within about 1 of the origin; scale is a
         power of two.
-    place: (W, 3) float64 normalised vertices.
-    triangle: (M, 3) int32 into `place`.
+    vertex: (W, 3) float64 normalised vertices.
+    triangle: (M, 3) int32 into `vertex`.
     plane: (M, 4) float64 of the scene's triangle that each is a piece of, which is better known
         than that of a sliver: unit normal and offset in normalised coordinates.
     cell: (M, 2) int32 the cell on the front and on the back, -1 for none.
@@ -69,7 +69,7 @@ class Surfaces:
 
     centre: NDArray[np.float64]
     scale: float
-    place: NDArray[np.float64]
+    vertex: NDArray[np.float64]
     triangle: NDArray[np.int32]
     plane: NDArray[np.float64]
     cell: NDArray[np.int32]
@@ -87,17 +87,17 @@ class Surfaces:
         centre = low + (high - low) / 2
         extent = float((high - low).max())
         scale = 2.0 ** -np.frexp(extent)[1] if extent > 0 else 1.0
-        place = (cells.vertex - centre) * scale
+        vertex = (cells.vertex - centre) * scale
         source = scene.corners[cells.triangle_source]
         normal = np.cross(source[:, 1] - source[:, 0], source[:, 2] - source[:, 0])
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
-        offset = -np.einsum("ij,ij->i", normal, place[cells.triangle[:, 0]])
+        offset = -np.einsum("ij,ij->i", normal, vertex[cells.triangle[:, 0]])
         image = np.array([m.image for m in scene.materials], dtype=np.int32)
         return Surfaces(
             centre=centre,
             scale=float(scale),
-            place=place,
+            vertex=vertex,
             triangle=cells.triangle,
             plane=np.column_stack([normal, offset]),
             cell=cells.triangle_cell,
@@ -107,7 +107,7 @@ class Surfaces:
         )
 
     def normalised(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(…, 3) points in world metres, in the coordinates of `place`."""
+        """(…, 3) points in world metres, in the coordinates of `vertex`."""
         return np.asarray((points - self.centre) * self.scale)
 
     def world(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -120,13 +120,9 @@ class Renderer(Protocol):
 
     Attributes
     ----------
-    backend: "gl" or "embree".
-    name: the renderer's own name.
+    name: its own name, with its version or device, for the record.
     most: how many sample points it takes at a time.
     """
-
-    @property
-    def backend(self) -> str: ...
 
     @property
     def name(self) -> str: ...
@@ -134,14 +130,16 @@ class Renderer(Protocol):
     @property
     def most(self) -> int: ...
 
-    def show(self, eyes: Eyes, needed: NDArray[np.bool_] | None = None) -> NDArray[np.int32]:
+    def show(
+        self, points: SamplePoints, needed: NDArray[np.bool_] | None = None
+    ) -> NDArray[np.int32]:
         """(L, K, 6, face²) the triangle that each pixel shows, -1 for none, in the order (point,
         view, row, column); opaque surfaces first, then the transparent ones before them, if the
         scene has any. ``needed`` (C,) are the cells whose surfaces may show, if that is known:
         others need not be drawn."""
 
     def trace(
-        self, eyes: Eyes, pixels: NDArray[np.int64]
+        self, points: SamplePoints, pixels: NDArray[np.int64]
     ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
         """(L, n) what a ray through each of the (n,) pixels, numbered from 0 in the order of
         `show`, says of its layers, and (L, n, 3) where it hits, in world metres."""

@@ -34,7 +34,7 @@ class Ach:
     missed: (C,) float64 share of the covered pixels that fell on cells outside the PVS, or on
         what belongs to no cell.
     samples: (C,) int32 sample points used.
-    rejected: (C,) int32 sample points rejected: inside matter, or too near to a surface.
+    rejected: (C,) int32 sample points rejected: inside a solid, or too near to a surface.
     uncertain: (C,) float64 bound of the total variation between the row and the truth, at about
         95 %; NaN with fewer than eight sample points.
     unseen_below: (C,) float64 an entry never met is seen from less than this share of the cell, at
@@ -43,7 +43,7 @@ class Ach:
     texture_start, texture, texture_value: (n + 1,) int64 CSR over entries, (m,) int32 images of the
         scene, -1 for what has none, ascending within an entry, and (m,) float64 their shares, which
         sum to the entry's `value`. Empty unless asked for.
-    backend: "gl" or "embree".
+    backend: the one that drew, a name in `BACKENDS`.
     renderer: the renderer's own name, for the record.
     """
 

@@ -1,4 +1,4 @@
-"""Where a cell is looked from: points spread over its volume.
+"""Where the sample points of a cell lie: spread over its volume.
 
 The paper takes "samples per cell whose COPs are uniformly distributed inside the cell" (§5).
 Position matters far more than resolution (docs/coverage.md), so there is a choice of how:
@@ -10,8 +10,8 @@ Position matters far more than resolution (docs/coverage.md), so there is a choi
     tetrahedra of its leaves instead, with a fourth dimension for the choice among them.
 ``kd``
     The volume is halved again and again along its longest axis into as many parts of equal volume
-    as there are points, and each part is looked at from the point nearest to its centroid: best
-    below some sixteen points.
+    as there are points, and of each part the point nearest to its centroid is taken: best below
+    some sixteen points.
 ``uniform``
     Independent random points, as in the paper: K^-0.5.
 
@@ -142,24 +142,14 @@ class Volume:
         if not self.boxed:
             return np.hstack([filling(self._tetra, self._volume, unit), unit[:, 4:]])
         points = self._low + unit[:, :3] * self._size
-        return np.hstack([points, unit[:, 4:]])[self._holds(points)]
+        inside = self._cells.locate(points) == self._cell
+        return np.hstack([points[inside], unit[inside, 4:]])
 
     def parts(self, count: int, seed: int) -> list[NDArray[np.float64]]:
         """For each of ``count`` equal parts of the cell (TRIES, 3) points, from its centroid
         outwards."""
         points = filling(self._tetra, self._volume, sobol(0, CLOUD * count, seed))
         return [points[group[:: CLOUD // TRIES]] for group in strata(points, count)]
-
-    def _holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        from ptmtools.coverage.clearance.kernels import locate_leaves
-
-        cells = self._cells
-        leaf = np.zeros(len(points), dtype=np.int32)
-        if len(cells.node_plane):
-            locate_leaves(points, cells.node_plane, cells.node_child, leaf)
-        low, high = cells.root_box
-        boxed = np.all((points >= low) & (points <= high), axis=1)
-        return np.asarray(boxed & (leaf >= 0) & (cells.leaf_cell[leaf] == self._cell))
 
 
 def strata(points: NDArray[np.float64], parts: int) -> list[NDArray[np.int64]]:

@@ -1,30 +1,29 @@
-"""The hints of one cell: where to look from, how often, and what comes of it."""
+"""The hints of one cell: at which points, at how many, and what comes of it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
+from ptmtools.coverage.backends import Backend
 from ptmtools.coverage.estimate import GROUPS, Row, estimate, grouped, shares, spread
-from ptmtools.coverage.eyes import Eyes, Places, Sequence
-from ptmtools.coverage.item_buffer import Renderer, Surfaces
-from ptmtools.coverage.looking import Looker, Owners, Seen
-from ptmtools.coverage.matter import Surroundings
+from ptmtools.coverage.item_buffer import Surfaces
 from ptmtools.coverage.options import AchOptions
 from ptmtools.coverage.placement import Tetrahedra, Volume
+from ptmtools.coverage.sample_points import PointFinder, PointSequence, SamplePoints
+from ptmtools.coverage.solids import Obstacles
+from ptmtools.coverage.tally import PixelCounter, Tally
 from ptmtools.scene.model import Scene
-from ptmtools.tolerance import Tolerance
 from ptmtools.visibility.model import Pvs
 
 #: The default clearance as a share of the thinnest that a cell may be, so that even such a cell
 #: has usable points.
 CLEARANCE = 0.25
-#: Sees from sample points what a row of the PVS asks for.
-Look = Callable[[Eyes], Seen]
 #: Points of each of the groups that a tolerance is first tried with.
 FIRST = 8
 #: What a bound falls by, about, as the points are doubled (K^-0.6): one that falls faster has luck,
@@ -34,11 +33,11 @@ FALL = 2**-0.6
 
 @dataclass(frozen=True)
 class TextureShares:
-    """Shares of the owners within the entries of a row: (n,) int64 how many each entry has, and
-    for all of them (m,) int64 `owner` and (m,) float64 `share` of the row."""
+    """Shares of images within the entries of a row: (n,) int64 how many each entry has, and for all
+    of them (m,) int32 `image`, -1 for none, and (m,) float64 `share` of the row."""
 
     count: NDArray[np.int64]
-    owner: NDArray[np.int64]
+    image: NDArray[np.int32]
     share: NDArray[np.float64]
 
 
@@ -54,82 +53,93 @@ class CellHints:
 
 
 class Sampler:
-    """Ready to sample any cell of a scene."""
+    """Ready to sample any cell of a scene, with an open `renderer`. It travels to other processes
+    as what it is made of, without the images, whose bytes are not needed."""
 
     def __init__(
-        self,
-        scene: Scene,
-        cells: Cells,
-        pvs: Pvs,
-        options: AchOptions,
-        surfaces: Surfaces,
-        renderer: Renderer,
+        self, scene: Scene, cells: Cells, pvs: Pvs, options: AchOptions, backend: Backend
     ) -> None:
-        self._cells, self._pvs, self._options = cells, pvs, options
-        self._around = Surroundings.of(scene, cells)
+        self.scene, self.cells, self.pvs = scene, cells, pvs
+        self.options, self.backend = options, backend
+        self._obstacles = Obstacles.of(scene, cells)
         self._tetrahedra = Tetrahedra.of(cells)
-        thin = Tolerance.for_points(scene.points).thin
-        self._clearance = options.clearance or CLEARANCE * thin
-        self._owners = Owners.of(surfaces, options.per_texture)
-        by_angle = options.weighting == "solid-angle"
-        self._looker = Looker(renderer, surfaces, cells, options.side, by_angle=by_angle)
+        self._clearance = options.clearance or CLEARANCE * scene.tolerance.thin
+        surfaces = Surfaces.of(scene, cells)
+        self.renderer = backend.open(surfaces, options.side, options.gpu)
+        self._counter = PixelCounter(
+            self.renderer,
+            surfaces,
+            cells,
+            options.side,
+            by_angle=options.weighting == "solid-angle",
+            by_image=options.per_texture,
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        scene = replace(self.scene, images=())
+        return Sampler, (scene, self.cells, self.pvs, self.options, self.backend)
 
     def of_cell(self, cell: int) -> CellHints:
         """The hints of one cell."""
-        places = Places(Volume(self._cells, self._tetrahedra, cell), self._around, self._clearance)
-        wanted, begin = self._owners.in_cells(self._pvs.row(cell))
+        volume = Volume(self.cells, self._tetrahedra, cell)
+        finder = PointFinder(volume, self._obstacles, self._clearance)
+        owners = self._counter.owners
+        wanted, begin = owners.in_cells(self.pvs.row(cell))
 
-        def look(eyes: Eyes) -> Seen:
-            return self._looker.look(eyes, self._owners, wanted)
+        def count(points: SamplePoints) -> Tally:
+            return self._counter.count(points, wanted)
 
-        if self._options.tolerance is None:
-            eyes = self._eyes(places)
-            eyes = eyes if len(eyes) else places.least_bad()
-            spread_out = self._options.placed != "kd"
-            seen, group = look(eyes), grouped(len(eyes), spread_out)
+        if self.options.tolerance is None:
+            points = self._points(finder)
+            points = points if len(points) else finder.least_bad()
+            tally, group = count(points), grouped(len(points), self.options.placed != "kd")
         else:
-            seen, group = self._until_certain(places, look, begin, self._options.tolerance)
-        owned = shares(seen.in_views.sum(axis=0))
+            tally, group = self._until_certain(finder, count, begin, self.options.tolerance)
+        owned = shares(tally.in_views.sum(axis=0))
         met = np.flatnonzero(owned)
         entry = np.searchsorted(begin, met, "right") - 1
-        total = int(seen.in_views.sum()) + int(seen.missed.sum())
-        by_cell = seen.grouped(begin)
+        total = int(tally.in_views.sum()) + int(tally.missed.sum())
+        by_cell = tally.grouped(begin)
         return CellHints(
-            row=estimate(by_cell.at_points, by_cell.in_views, group, self._looker.unit),
-            missed=int(seen.missed.sum()) / max(total, 1),
+            row=estimate(by_cell.at_points, by_cell.in_views, group, self._counter.unit),
+            missed=int(tally.missed.sum()) / max(total, 1),
             samples=len(group),
-            rejected=places.rejected,
+            rejected=finder.rejected,
             textures=TextureShares(
-                np.bincount(entry, minlength=len(begin)), wanted[met], owned[met]
+                np.bincount(entry, minlength=len(begin)), owners.image[wanted[met]], owned[met]
             ),
         )
 
-    def _eyes(self, places: Places) -> Eyes:
-        options = self._options
+    def _points(self, finder: PointFinder) -> SamplePoints:
+        options = self.options
         if options.placed == "kd":
-            return places.of_parts(options.points, options.seed)
-        return Sequence(places, options.placed, options.seed).take(options.points)
+            return finder.of_parts(options.points, options.seed)
+        return PointSequence(finder, options.placed, options.seed).take(options.points)
 
     def _until_certain(
-        self, places: Places, look: Look, begin: NDArray[np.int64], tolerance: float
-    ) -> tuple[Seen, NDArray[np.int64]]:
+        self,
+        finder: PointFinder,
+        count: Callable[[SamplePoints], Tally],
+        begin: NDArray[np.int64],
+        tolerance: float,
+    ) -> tuple[Tally, NDArray[np.int64]]:
         """What is seen, and the (K,) group of each point: of eight independent sequences as many
         points as make the hints certain, doubled until they are."""
-        options = self._options
+        options = self.options
         seeds = ((options.seed << 3) + g + (1 << 35) for g in range(GROUPS))
-        sequences = [Sequence(places, options.placed, seed) for seed in seeds]
-        found: list[Seen] = []
+        sequences = [PointSequence(finder, options.placed, seed) for seed in seeds]
+        found: list[Tally] = []
         group = np.zeros(0, dtype=np.int64)
         before = np.inf
         more = max(1, min(FIRST, options.points // GROUPS))
         while True:
-            eyes = [sequence.take(more) for sequence in sequences]
-            added = np.repeat(np.arange(GROUPS), [len(e) for e in eyes])
-            every = Eyes.join(eyes)
+            parts = [sequence.take(more) for sequence in sequences]
+            added = np.repeat(np.arange(GROUPS), [len(part) for part in parts])
+            points = SamplePoints.join(parts)
             if not len(added) and not found:
-                every, added = places.least_bad(), np.zeros(1, dtype=np.int64)
-                return look(every), added[: len(every)]
-            found = [Seen.join([*found, look(every)])]
+                points = finder.least_bad()
+                return count(points), np.zeros(len(points), dtype=np.int64)
+            found = [Tally.join([*found, count(points)])]
             group = np.concatenate([group, added])
             by_cell = found[0].grouped(begin).at_points
             now = spread(by_cell, group)[1]

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ptmtools.database.model import (
+    EmitOptions,
+    EmitReport,
+    GivenViewpoint,
+    Issue,
+    PlotOptions,
+    PlotReport,
+    TextureLevel,
+    TextureRecord,
+    ValidationReport,
+    Viewpoint,
+)
 from ptmtools.lazy import names
 
 if TYPE_CHECKING:
     from ptmtools.database.emission import emit
-    from ptmtools.database.model import (
-        EmitOptions,
-        EmitReport,
-        GivenViewpoint,
-        Issue,
-        PlotOptions,
-        PlotReport,
-        TextureLevel,
-        TextureRecord,
-        ValidationReport,
-        Viewpoint,
-    )
-    from ptmtools.database.plans import plot_plan
-    from ptmtools.database.validation import validate_database, validate_ptm
+    from ptmtools.database.plans.plan import plot_plan
+    from ptmtools.database.validation.database import validate_database, validate_ptm
 
 __all__ = [
     "EmitOptions",
@@ -41,20 +41,10 @@ __all__ = [
 ]
 
 _HOME = {
-    "EmitOptions": "model",
-    "EmitReport": "model",
-    "GivenViewpoint": "model",
-    "Issue": "model",
-    "PlotOptions": "model",
-    "PlotReport": "model",
-    "TextureLevel": "model",
-    "TextureRecord": "model",
-    "ValidationReport": "model",
-    "Viewpoint": "model",
     "emit": "emission",
-    "plot_plan": "plans",
-    "validate_database": "validation",
-    "validate_ptm": "validation",
+    "plot_plan": "plans.plan",
+    "validate_database": "validation.database",
+    "validate_ptm": "validation.database",
 }
 
 __getattr__ = names(__name__, _HOME)

@@ -1,23 +1,20 @@
-"""Artifacts → the files that are served (paper §6): a root, a file per cell, and the hints."""
+"""Artifacts → the files that are served (paper §6), by the emitters that are asked for."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
-from ptmtools.database.gltf import GLTF_FOLDER, GLTF_HINTS, UP, glb_file
-from ptmtools.database.hints import hints_text
+from ptmtools.database.content import Content
+from ptmtools.database.emitters import chosen_emitters
 from ptmtools.database.model import EmitOptions, EmitReport, TextureRecord
-from ptmtools.database.names import CELL_FOLDER, HINTS, ROOT, cell_path
-from ptmtools.database.served import ServedFiles
-from ptmtools.database.viewpoints import place_viewpoints
-from ptmtools.database.vrml import CellWriter, root_text
+from ptmtools.database.served import write_files
+from ptmtools.database.viewpoints.placement import place_viewpoints
 from ptmtools.errors import DatabaseError, OutputError
 from ptmtools.files import real_folder
 from ptmtools.progress import Progress, silent
@@ -37,14 +34,13 @@ def emit(
     *,
     force: bool = False,
 ) -> EmitReport:
-    """Writes `cells/c0000.wrl` …, `hints.json` and, when all else is there, `root.wrl` into the
-    folder ``out``; with ``options.format`` "gltf" the GLBs and `gltf/hints.json` before
-    `hints.json`. The textures themselves are written by the stage before.
+    """Writes the files of every emitter that ``options.format`` names into the folder ``out``. The
+    textures themselves are written by the stage before.
 
     Parameters
     ----------
     textures: one record for every image that a material in use names.
-    force: overwrite files of these names, compressed twins included.
+    force: overwrite files of these names, gzip copies included.
 
     Raises
     ------
@@ -57,59 +53,36 @@ def emit(
     """
     folder = Path(out)
     _check(scene, cells, pvs, ach, {t.image: t for t in textures})
-    gltf = options.format == "gltf"
-    if not force:
-        for name in (ROOT, HINTS, CELL_FOLDER, *([GLTF_FOLDER] if gltf else [])):
-            if os.path.lexists(folder / name):
-                raise OutputError(
-                    "PTM-O001",
-                    "exists already",
-                    file=folder / name,
-                    remedy="name another folder, or give --force to overwrite it",
-                )
+    emitters = chosen_emitters(options.format)
+    owned = [name for emitter in emitters for name in emitter.owns]
+    for name in owned:
+        if not force and os.path.lexists(folder / name):
+            raise OutputError(
+                "PTM-O001",
+                "exists already",
+                file=folder / name,
+                remedy="name another folder, or give --force to overwrite it",
+            )
     viewpoints, notes = place_viewpoints(scene, cells, options)
-    records = {t.image: t for t in textures}
-    writer = CellWriter(scene, cells, pvs, ach.value, records, options.fallback)
-    for inner in (CELL_FOLDER, *([GLTF_FOLDER] if gltf else [])):
-        real_folder(folder, inner)
-
-    count = cells.cell_count
-    boxes, images = [], []
-    shapes = triangles = 0
-    with ServedFiles(folder, force=force, twins=options.gzip) as files:
-        for c in range(count):
-            progress(c, count, "cells")
-            cell = writer.cell(c)
-            files.put(cell_path(c), cell.text)
-            boxes.append(cell.box)
-            images.append(cell.images)
-            shapes += cell.shapes
-            triangles += cell.triangles
-        progress(count, count, "cells")
-        hints = partial(
-            hints_text, scene.space, cells, pvs, ach, textures, images, viewpoints, options
-        )
-        if gltf:
-            from ptmtools.database.gltf import gltf_files
-
-            fallback = options.fallback
-            for name, glb in gltf_files(
-                scene, writer.geometry, count, textures, fallback, progress
-            ):
-                files.put(name, glb)
-            files.put(GLTF_HINTS, hints(cell_url=glb_file, up=UP))
-        files.put(HINTS, hints())
-        root = root_text(viewpoints, boxes, options)
-        files.settle()  # a root leads to files that are there
-        files.put(ROOT, root)
+    content = Content(scene, cells, pvs, ach, textures, viewpoints, options, progress)
+    written = [emitter.files(content) for emitter in emitters]
+    for name in owned:
+        if name.endswith("/"):
+            real_folder(folder, name[:-1])
+    files = (  # what leads to others comes when those are there
+        (name, data, name == emitter.entry)
+        for emitter, given in zip(emitters, written, strict=True)
+        for name, data in given
+    )
+    names, size = write_files(folder, files, force=force, gzip=options.gzip)
     return EmitReport(
-        files=tuple(files.names),
+        files=names,
         viewpoints=viewpoints,
-        shapes=shapes,
-        triangles=triangles,
-        collapsed=writer.geometry.collapsed,
-        bytes=files.bytes,
-        notes=notes,
+        shapes=len(content.geometry.object),
+        triangles=len(content.geometry.triangle),
+        collapsed=content.geometry.collapsed,
+        bytes=size,
+        notes=(*notes, *options.notes),
     )
 
 

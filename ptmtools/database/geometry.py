@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
-from ptmtools.database.numerals import single
+from ptmtools.database.floats import single
 from ptmtools.scene.model import Scene
 
 
@@ -90,19 +90,25 @@ class Geometry:
             uv_corner, shape, len(first), len(self.uv)
         )
 
+    def shape(self, s: int) -> Shape:
+        """One of them."""
+        points, uvs, rows = (
+            slice(*start[s : s + 2].tolist())
+            for start in (self.point_start, self.uv_start, self.triangle_start)
+        )
+        return Shape(
+            int(self.object[s]),
+            int(self.material[s]),
+            bool(self.two_sided[s]),
+            self.shape_point[points],
+            self.shape_uv[uvs],
+            self.triangle[rows],
+            self.uv_triangle[rows],
+        )
+
     def shapes(self, cell: int) -> Iterator[Shape]:
         """The shapes of a cell."""
-        for s in range(int(self.cell_start[cell]), int(self.cell_start[cell + 1])):
-            rows = slice(int(self.triangle_start[s]), int(self.triangle_start[s + 1]))
-            yield Shape(
-                int(self.object[s]),
-                int(self.material[s]),
-                bool(self.two_sided[s]),
-                self.shape_point[self.point_start[s] : self.point_start[s + 1]],
-                self.shape_uv[self.uv_start[s] : self.uv_start[s + 1]],
-                self.triangle[rows],
-                self.uv_triangle[rows],
-            )
+        return map(self.shape, range(*self.cell_start[cell : cell + 2].tolist()))
 
 
 def _indexed(

@@ -11,7 +11,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 import numpy as np
@@ -19,56 +19,42 @@ from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
-from ptmtools.database.model import EmitOptions, TextureRecord, Viewpoint
-from ptmtools.database.names import cell_name, cell_path
+from ptmtools.database.model import TextureRecord, Viewpoint
+from ptmtools.database.names import cell_name
 from ptmtools.database.rounding import significant
 from ptmtools.errors import DatabaseError
-from ptmtools.scene.model import Space
-from ptmtools.visibility.model import Pvs
+
+if TYPE_CHECKING:
+    from ptmtools.database.content import Content
 
 FORMAT = "ptmtools hints"
 SCHEMA = 1
-#: Significant digits of statistics.
+#: The statistics of the coverage, rounded to so many significant digits.
+STATISTICS = ("error", "p95", "seen", "views", "uncertain", "unseen_below", "floor") + (
+    "texture_value",
+)
 DIGITS = 5
 
 
-def hints_text(
-    space: Space,
-    cells: Cells,
-    pvs: Pvs,
-    ach: Ach,
-    textures: Sequence[TextureRecord],
-    images: Sequence[Sequence[int]],
-    viewpoints: Sequence[Viewpoint],
-    options: EmitOptions,
-    *,
-    cell_url: Callable[[int], str] = cell_path,
-    up: str = "",
-) -> str:
-    """The contents of `hints.json`; ``images`` are the images that each cell uses. ``cell_url`` and
-    ``up``, the way to the served folder, are those of another place than that folder.
+def hints_text(content: Content, cell_url: Callable[[int], str], up: str) -> str:
+    """The contents of `hints.json`: ``cell_url`` and ``up``, the way to the served folder, as seen
+    from where it lies.
 
     Raises
     ------
     DatabaseError: PTM-D601 a number is not finite.
     """
-    place = {record.image: i for i, record in enumerate(textures)}
-    adjacent = cells.adjacent()
+    space, cells, pvs, ach = content.scene.space, content.cells, content.pvs, content.ach
+    place = {image: i for image, (i, _) in content.records.items()}
+    adjacent, geometry = cells.adjacent(), content.geometry
+    image = np.array([place.get(m.image, -1) for m in content.scene.materials], dtype=np.int64)
+    painted = np.split(image[geometry.material], geometry.cell_start[1:-1])
     leaves = np.split(
         np.argsort(cells.leaf_cell, kind="stable"),
         np.cumsum(np.bincount(cells.leaf_cell, minlength=cells.cell_count))[:-1],
     )
-    told = replace(
-        ach,
-        error=significant(ach.error, DIGITS),
-        p95=significant(ach.p95, DIGITS),
-        seen=significant(ach.seen, DIGITS),
-        views=significant(ach.views, DIGITS),
-        uncertain=significant(ach.uncertain, DIGITS),
-        unseen_below=significant(ach.unseen_below, DIGITS),
-        floor=significant(ach.floor, DIGITS),
-        texture_value=significant(ach.texture_value, DIGITS),
-    )
+    statistics: Any = {name: significant(getattr(ach, name), DIGITS) for name in STATISTICS}
+    rounded = replace(ach, **statistics)
     portals = _portals(cells)
     head = {
         "format": FORMAT,
@@ -77,7 +63,7 @@ def hints_text(
         "unit": space.metres,
         "up": space.up,
         "closed": cells.closed,
-        "avatarSize": list(options.avatar_size),
+        "avatarSize": list(content.options.avatar_size),
         "coverage": {"backend": ach.backend, "renderer": ach.renderer},
     }
     rows = [
@@ -85,21 +71,21 @@ def hints_text(
             "name": cell_name(c),
             "url": cell_url(c),
             "leaves": [_leaf(cells, leaf) for leaf in leaves[c].tolist()],
-            "textures": sorted(place[image] for image in images[c]),
+            "textures": np.unique(painted[c][painted[c] >= 0]).tolist(),
             "adjacent": adjacent[c].tolist(),
             "visible": pvs.row(c).tolist(),
             "ach": ach.row(c).tolist(),
             "samples": int(ach.samples[c]),
             "rejected": int(ach.rejected[c]),
             "missed": float(ach.missed[c]),
-            "coverage": _coverage(told, c, place),
+            "coverage": _coverage(rounded, c, place),
             "portals": portals[c],
         }
         for c in range(cells.cell_count)
     ]
     lists: dict[str, Sequence[object]] = {
-        "viewpoints": [_viewpoint(v) for v in viewpoints],
-        "textures": [_texture(record, options.fallback, up) for record in textures],
+        "viewpoints": [_viewpoint(v) for v in content.viewpoints],
+        "textures": [_texture(r, content.options.fallback, up) for r in content.textures],
         "cells": rows,
     }
     lines = [f" {_json(k)}: {_json(v)}" for k, v in head.items()]
@@ -133,9 +119,9 @@ def _leaf(cells: Cells, leaf: int) -> dict[str, Any]:
 
 def _coverage(ach: Ach, c: int, place: Mapping[int, int]) -> dict[str, Any]:
     """How far the hints of a cell can be trusted, and how they differ by point, view and texture;
-    aligned with its visible cells. The numbers of ``ach`` are those to be told."""
+    aligned with its visible cells; ``ach`` is rounded."""
     rows = ach.entries(c)
-    told: dict[str, Any] = {
+    found: dict[str, Any] = {
         "error": _plain(ach.error[rows]),
         "p95": _plain(ach.p95[rows]),
         "seen": _plain(ach.seen[rows]),
@@ -145,13 +131,13 @@ def _coverage(ach: Ach, c: int, place: Mapping[int, int]) -> dict[str, Any]:
         "floor": _plain(ach.floor[c : c + 1])[0],
     }
     if ach.by_texture:
-        told["textures"] = []
+        found["textures"] = []
         for entry in range(rows.start, rows.stop):
             of_entry = slice(int(ach.texture_start[entry]), int(ach.texture_start[entry + 1]))
             images, value = ach.texture[of_entry].tolist(), _plain(ach.texture_value[of_entry])
             shares = [[place.get(i), share] for i, share in zip(images, value, strict=True)]
-            told["textures"].append(shares)
-    return told
+            found["textures"].append(shares)
+    return found
 
 
 def _plain(values: NDArray[np.float64]) -> list[float | None]:

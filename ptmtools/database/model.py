@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
+from ptmtools.database.emitters import EMITTERS, chosen_emitters
 from ptmtools.errors import InputError
 
 Vector = tuple[float, float, float]
@@ -42,12 +43,12 @@ class TextureRecord:
     ----------
     image: index into `Scene.images`.
     file: the `.ptm`, relative to the served folder, "textures/NAME.ptm".
-    fallback: the PNG twin, relative to the served folder, or None.
+    fallback: the fallback image, a PNG, relative to the served folder, or None.
     width, height, components: of the finest level stored.
     levels: coarsest first.
     sha256: hex digest of the `.ptm`'s bytes.
-    fallback_level: index into `levels` of the one that the PNG twin holds; None if there is no
-        twin, or if it is the finest.
+    fallback_level: index into `levels` of the one that the fallback image holds; None if there is
+        no image, or if it is the finest.
     """
 
     image: int
@@ -117,18 +118,19 @@ class EmitOptions:
     """
     Attributes
     ----------
-    title: WorldInfo's title in the root file.
-    fallback: name the PNG twin of a texture first in its URLs, the `.ptm` second; without it
-        only the `.ptm`.
-    viewpoints: where to begin; empty takes the scene's cameras, or a place in the largest room if
+    title: of the world, which browsers show in their title bar.
+    fallback: refer to the fallback image of each texture too, a PNG for clients that cannot read
+        `.ptm`; without it only to the `.ptm`.
+    viewpoints: where to begin; empty takes the model's cameras, or a place in the largest room if
         there are none.
-    viewpoint_count: how many more rooms get a viewpoint, at most, the largest first; in the order
-        of a walk.
-    avatar_size: NavigationInfo's: least distance to a wall, height of the eye above the floor,
-        highest step, metres.
-    field_of_view: of viewpoints that are no cameras, radians.
-    gzip: write a twin of each VRML file and of the hints, compressed, under its name with ".gz".
-    format: "gltf" writes a GLB for each cell, and hints for them, beside the VRML files.
+    viewpoint_count: give at most so many more rooms a viewpoint, the largest first; they are listed
+        in the order in which one would walk through them.
+    avatar_size: the visitor: distance that he keeps from walls, height of his eyes above the floor,
+        highest step that he climbs, metres.
+    field_of_view: of viewpoints that are no cameras of the model, radians.
+    gzip: also write a gzip copy of each VRML and JSON file, such as root.wrl.gz, for servers that
+        send those instead.
+    format: what to write, names with commas in between
     """
 
     title: str = "ptmtools database"
@@ -141,20 +143,35 @@ class EmitOptions:
     avatar_size: Vector = (0.25, 1.6, 0.75)
     field_of_view: float = 1.1
     gzip: bool = False
-    format: Literal["vrml", "gltf"] = "vrml"
+    format: str = field(default="vrml", metadata={"choices": EMITTERS, "several": True})
 
     def __post_init__(self) -> None:
         wrong = None
+        try:
+            names = ",".join(emitter.name for emitter in chosen_emitters(self.format))
+            if self.format not in EMITTERS:
+                object.__setattr__(self, "format", names)
+        except ValueError as fault:
+            wrong = f"--format: {fault}"
         if not 0 < self.field_of_view < math.pi:
             wrong = f"a field of view of {self.field_of_view:g} is not between 0 and pi radians"
         elif not all(0 <= size < math.inf for size in self.avatar_size):
             wrong = "an avatar's sizes are metres of at least 0"
         elif self.viewpoint_count < 0:
             wrong = f"at most {self.viewpoint_count} viewpoints is less than none"
-        elif self.format not in ("vrml", "gltf"):
-            wrong = f"{self.format!r} is neither vrml nor gltf"
         if wrong:
             raise InputError("PTM-I603", wrong, remedy="leave the option out for its default")
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What there is to say of the options as they were given."""
+        emitter = EMITTERS.get(self.format)
+        if emitter is None or not emitter.before:
+            return ()
+        return (
+            f"--format {self.format} wrote {emitter.before} and still does, but from the next "
+            f"release on it means {self.format} alone; write --format {emitter.before}",
+        )
 
 
 @dataclass(frozen=True)
@@ -214,14 +231,16 @@ class ValidationReport:
     """
     Attributes
     ----------
-    issues: errors and warnings, by file, in the order in which they were met.
+    issues: errors and warnings, by file, the worst of each first.
     files: how many files were read.
     bytes: how many bytes they hold.
+    notes: what else there is to say, one line each.
     """
 
     issues: tuple[Issue, ...]
     files: int
     bytes: int
+    notes: tuple[str, ...] = ()
 
     @property
     def errors(self) -> tuple[Issue, ...]:

@@ -9,9 +9,18 @@ from __future__ import annotations
 import re
 import unicodedata
 
+#: Of a database: what it says of itself, and the folder that is served.
+MANIFEST = "manifest.json"
+SERVED = "www"
+#: In the served folder.
 ROOT = "root.wrl"
 HINTS = "hints.json"
 CELL_FOLDER = "cells"
+TEXTURE_FOLDER = "textures"
+GLTF_FOLDER = "gltf"
+#: The hints whose URLs start from the glTF folder, and the way back from there.
+GLTF_HINTS = f"{GLTF_FOLDER}/{HINTS}"
+UP = "../"
 
 _ILLEGAL = re.compile(r"[^A-Za-z0-9_]+")
 #: Longer object names are cut: they come from generators and say nothing more.
@@ -31,6 +40,16 @@ def cell_file(cell: int) -> str:
 def cell_path(cell: int) -> str:
     """A cell's file relative to the served folder."""
     return f"{CELL_FOLDER}/{cell_file(cell)}"
+
+
+def glb_file(cell: int) -> str:
+    """The name of a cell's GLB, as the hints beside it refer to it."""
+    return f"{cell_name(cell)}.glb"
+
+
+def glb_path(cell: int) -> str:
+    """A cell's GLB relative to the served folder."""
+    return f"{GLTF_FOLDER}/{glb_file(cell)}"
 
 
 class DefNames:

@@ -1,21 +1,22 @@
-"""Files below a folder, written a few at a time, with compressed twins if wanted.
+"""Files below a folder, written a few at a time, with gzip copies if wanted.
 
 A file is on the disk before it has its name (`ptmtools.files`), and most of the time goes into
 waiting for that; meanwhile the next ones are made.
 
-A twin is what servers hand out in place of a file (nginx: `gzip_static on`) and what VRML browsers
-open by themselves: gzip without a name and a time, so its bytes depend on nothing but the file and
-the version of zlib.
+A gzip copy is what servers hand out in place of a file (nginx: `gzip_static on`) and what VRML
+browsers open by themselves. It holds no name and no time, so its bytes depend on nothing but the
+file and the version of zlib.
 """
 
 from __future__ import annotations
 
 import zlib
 from collections import deque
+from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from types import TracebackType
 
+from ptmtools.database.emitters import GZIP
 from ptmtools.files import write_bytes, writing
 
 #: Files that wait for the disk at a time, and files held in memory for it.
@@ -23,8 +24,7 @@ _WRITERS = 4
 _WAITING = 8
 #: Deflate, no name, no time, best compression, no system (RFC 1952).
 _GZIP = bytes([0x1F, 0x8B, 8, 0, 0, 0, 0, 0, 2, 255])
-TWIN = ".gz"
-#: What has twins.
+#: Suffixes of files that are copied.
 _TEXT = (".wrl", ".json")
 
 
@@ -36,73 +36,47 @@ def compressed(data: bytes) -> bytes:
     return _GZIP + body + check + (len(data) & 0xFFFFFFFF).to_bytes(4, "little")
 
 
-class ServedFiles:
-    """A context manager: when it is left, all files are written, or the first fault is raised.
+def write_files(
+    folder: Path, files: Iterable[tuple[str, str | bytes, bool]], *, force: bool, gzip: bool
+) -> tuple[tuple[str, ...], int]:
+    """The names of what was written, in the order of ``files``, and all their bytes.
 
     Parameters
     ----------
     folder: an existing one.
-    force: overwrite files; a compressed twin that is not written again goes.
-    twins: write compressed twins of VRML and JSON files.
+    files: name relative to the folder, contents, and whether all before must be on the disk.
+    force: overwrite files; a gzip copy that is not written again goes.
+    gzip: write copies of VRML and JSON files.
 
-    Attributes
-    ----------
-    names: of the files, relative to the folder, in the order of `put`.
-    bytes: of those that are surely written.
+    Raises
+    ------
+    OutputError: PTM-O001 to PTM-O003, of the first file that cannot be written.
     """
+    names: list[str] = []
+    size = 0
+    pending: deque[Future[int]] = deque()
+    pool = ThreadPoolExecutor(_WRITERS, "files")
+    try:
+        for name, content, alone in files:
+            while pending and (alone or len(pending) >= _WAITING):
+                size += pending.popleft().result()
+            data = content.encode() if isinstance(content, str) else content
+            copied = gzip and name.endswith(_TEXT)
+            names += [name, name + GZIP] if copied else [name]
+            pending.append(pool.submit(_write, folder / name, data, copied, force))
+        return tuple(names), size + sum(each.result() for each in pending)
+    finally:
+        pool.shutdown(cancel_futures=True)
 
-    def __init__(self, folder: Path, *, force: bool, twins: bool) -> None:
-        self.names: list[str] = []
-        self.bytes = 0
-        self._folder = folder
-        self._force = force
-        self._twins = twins
-        self._pool = ThreadPoolExecutor(_WRITERS, "files")
-        self._pending: deque[Future[int]] = deque()
 
-    def put(self, name: str, content: str | bytes) -> None:
-        """Begins to write a file.
-
-        Raises
-        ------
-        OutputError: PTM-O001 to PTM-O003, of this file or of an earlier one.
-        """
-        data = content.encode() if isinstance(content, str) else content
-        twin = self._twins and name.endswith(_TEXT)
-        self.names += [name, name + TWIN] if twin else [name]
-        self._pending.append(self._pool.submit(self._write, name, data, twin))
-        while len(self._pending) >= _WAITING:
-            self.bytes += self._pending.popleft().result()
-
-    def settle(self) -> None:
-        """Waits until all of them are written."""
-        while self._pending:
-            self.bytes += self._pending.popleft().result()
-
-    def _write(self, name: str, data: bytes, twin: bool) -> int:
-        path = self._folder / name
-        other = path.with_name(path.name + TWIN)
-        write_bytes(path, data, force=self._force)
-        if twin:
-            packed = compressed(data)
-            write_bytes(other, packed, force=self._force)
-            return len(data) + len(packed)
-        if self._force:
-            with writing(other):
-                other.unlink(missing_ok=True)
-        return len(data)
-
-    def __enter__(self) -> ServedFiles:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        try:
-            if value is None:
-                self.settle()
-        finally:
-            self._pool.shutdown(cancel_futures=True)
+def _write(path: Path, data: bytes, copied: bool, force: bool) -> int:
+    other = path.with_name(path.name + GZIP)
+    write_bytes(path, data, force=force)
+    if copied:
+        packed = compressed(data)
+        write_bytes(other, packed, force=force)
+        return len(data) + len(packed)
+    if force:
+        with writing(other):
+            other.unlink(missing_ok=True)
+    return len(data)

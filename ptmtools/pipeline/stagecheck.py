@@ -13,7 +13,7 @@ from collections.abc import Collection
 from typing import Any
 
 from ptmtools.database.model import Issue
-from ptmtools.database.validation import Findings
+from ptmtools.database.validation.findings import Findings
 from ptmtools.errors import DatabaseError
 from ptmtools.pipeline.run import Artifacts
 from ptmtools.pipeline.stage import Stage

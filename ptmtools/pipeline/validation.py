@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ptmtools.cells import Cells, structural_triangles
 from ptmtools.database import ValidationReport, validate_database, validate_ptm
+from ptmtools.database.validation.findings import worst_first
 from ptmtools.errors import DatabaseError
 from ptmtools.pipeline.run import Artifacts
 from ptmtools.pipeline.stagecheck import check_stages
@@ -52,8 +53,7 @@ def validate(
     if db is None:
         return report
     issues = (*report.issues, *check_stages(db, {issue.file for issue in report.issues}))
-    by_file = sorted(issues, key=lambda issue: (issue.file, issue.code))
-    return replace(report, issues=tuple(by_file))
+    return replace(report, issues=worst_first(issues))
 
 
 def shoot_segments(

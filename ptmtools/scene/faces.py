@@ -119,7 +119,7 @@ def _degenerate(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> ND
     with np.errstate(over="ignore"):
         extent = float((points.max(axis=0) - low).max())
     if not (np.isfinite(extent) and extent > 0):
-        # No size, or one beyond float64: the caller tells.
+        # No size, or one beyond float64: for the caller to report.
         return np.full(len(triangles), not extent > 0)
     # In shares of the extent, so that neither tiny nor huge coordinates leave float64's range.
     local = ((points - low) / extent)[triangles]

@@ -78,9 +78,7 @@ def _read_trimesh(path: Path, findings: Findings) -> Source:
 
     with open(path, "rb") as stream:
         scene = trimesh.load_scene(stream, file_type=path.suffix.lower()[1:], process=False)
-    points, triangles, owner = [], [], []
-    names: list[str] = []
-    total = 0
+    parts = []
     for name in scene.graph.nodes_geometry:
         matrix, geometry = scene.graph.get(name)
         mesh = scene.geometry[geometry]
@@ -90,23 +88,20 @@ def _read_trimesh(path: Path, findings: Findings) -> Source:
             raise InputError("PTM-I246", "a face names a vertex that does not exist", file=path)
         if getattr(mesh.visual, "kind", None) in ("vertex", "face"):
             findings.say("PTM-N223", "colours of vertices and faces are not carried over")
-        points.append(local @ matrix[:3, :3].T + matrix[:3, 3])
-        triangles.append(faces + total)
-        owner.append(np.full(len(faces), len(names), dtype=np.int64))
-        names.append(path.stem if len(scene.geometry) == 1 else str(geometry))
-        total += len(local)
-    if not sum(len(faces) for faces in triangles):
-        raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with faces")
-    count = sum(len(faces) for faces in triangles)
-    return Source(
-        points=np.concatenate(points),
-        triangles=np.concatenate(triangles),
-        uv=np.zeros((count, 3, 2)),
-        triangle_object=np.concatenate(owner),
-        triangle_material=np.zeros(count, dtype=np.int64),
-        objects=tuple(names),
-        materials=(SourceMaterial("default"),),
-    )
+        parts.append(
+            Source(
+                points=local @ matrix[:3, :3].T + matrix[:3, 3],
+                triangles=faces,
+                uv=np.zeros((len(faces), 3, 2)),
+                triangle_object=np.zeros(len(faces), dtype=np.int64),
+                triangle_material=np.zeros(len(faces), dtype=np.int64),
+                objects=(path.stem if len(scene.geometry) == 1 else str(geometry),),
+                materials=(SourceMaterial("default"),),
+            )
+        )
+    joined = _joined(path, parts)
+    material = np.zeros_like(joined.triangle_material)
+    return replace(joined, materials=joined.materials[:1], triangle_material=material)
 
 
 def _read_meshlab(path: Path, folder: Folder, findings: Findings, max_triangles: int) -> Source:
@@ -119,13 +114,13 @@ def _read_meshlab(path: Path, folder: Folder, findings: Findings, max_triangles:
         for converted, label in convert(path, Path(scratch)):
             part = read_obj(converted, near, findings, max_triangles=max_triangles)
             parts.append(replace(part, objects=(label or path.stem,)))
-    if not parts:
+    return _joined(path, parts)
+
+
+def _joined(path: Path, parts: list[Source]) -> Source:
+    """One source of several, in order. Raises InputError PTM-I247 if they have no face."""
+    if not any(len(part.triangles) for part in parts):
         raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with faces")
-    return _joined(parts)
-
-
-def _joined(parts: list[Source]) -> Source:
-    """One source of several, in order."""
     points = np.cumsum([0] + [len(part.points) for part in parts])
     objects = np.cumsum([0] + [len(part.objects) for part in parts])
     materials = np.cumsum([0] + [len(part.materials) for part in parts])

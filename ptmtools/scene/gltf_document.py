@@ -19,6 +19,10 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.accessor import elements, meaning, natural
 from ptmtools.errors import InputError
 from ptmtools.files import open_regular
 from ptmtools.scene.reference import Folder
@@ -60,12 +64,18 @@ class Document:
             raise ValueError(f"buffer view {index} ends beyond its buffer")
         return buffer, start, length
 
-
-def natural(value: object) -> int:
-    """The value, if it is an index or a size; ValueError otherwise."""
-    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise ValueError(f"{value!r} is not an index or a size")
-    return value
+    def values(self, index: int) -> NDArray[np.float64]:
+        """(count, items) the numbers of an accessor. Raises ValueError, LookupError or TypeError
+        if it is damaged, NotImplementedError if it is sparse or has no buffer view."""
+        accessor = self.tree["accessors"][natural(index)]
+        if "sparse" in accessor or "bufferView" not in accessor:
+            raise NotImplementedError(f"accessor {index} is sparse or has no buffer view")
+        view = self.tree["bufferViews"][natural(accessor["bufferView"])]
+        try:
+            stored = elements(accessor, view, self.buffers[natural(view["buffer"])].data)
+        except ValueError as error:
+            raise ValueError(f"accessor {index}: {error}") from None
+        return meaning(stored, bool(accessor.get("normalized")))
 
 
 def damaged(path: Path, what: str, place: str | None = None) -> InputError:

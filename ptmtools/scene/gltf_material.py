@@ -124,20 +124,10 @@ class MaterialReader:
             read = HeldBytes(data_uri(self._path, uri, f"image {source}"))
         else:
             what = unquote(str(uri))
-            found = self._folder.find(what)
-            if found.path is None:
-                if found.outcome == "outside":
-                    self._findings.miss(
-                        "PTM-N205", f"{what}: lies outside the model's folder", place
-                    )
-                else:
-                    self._findings.miss("PTM-N204", f"{what}: not found", place)
+            file = self._findings.locate(self._folder, what, what, place)
+            if file is None:
                 return None
-            if found.outcome == "elsewhere":
-                self._findings.say(
-                    "PTM-N208", f"{what}: found as {self._folder.label(found.path)}", place
-                )
-            read, label = FileRange(found.path), found.path.name
+            read, label = FileRange(file), file.name
         return Texture(
             read=read,
             label=label,

@@ -69,14 +69,14 @@ class VerifiedBytes:
                 "PTM-I252",
                 f"cannot be read again ({error.strerror or error})",
                 file=self.label,
-                remedy="put it back, or ingest the model anew",
+                remedy="put it back, or build again",
             ) from None
         if hashlib.sha256(data).hexdigest() != self.sha256:
             raise InputError(
                 "PTM-I252",
-                "has changed since the model was ingested",
+                "has changed since the model was read",
                 file=self.label,
-                remedy="ingest the model anew",
+                remedy="build again",
             )
         return data
 
@@ -127,13 +127,12 @@ class ImageStore:
         self._findings = findings
         self._folder = folder
         self._limit = limit
-        self._examined: dict[Callable[[], bytes], _Examined] = {}
+        self._examined: dict[tuple[Callable[[], bytes], str | None], _Examined] = {}
         self._index: dict[str, int] = {}
         self._images: list[SourceImage] = []
         self._files: list[set[str]] = []
         self._opaque: list[bool] = []
         self._masks: set[str] = set()
-        self._masked: dict[tuple[Callable[[], bytes], str], _Examined] = {}
         self._stems: set[str] = set()
 
     @property
@@ -154,17 +153,13 @@ class ImageStore:
             examined = pool.map(lambda texture: _examine(texture, self._limit), wanted.values())
             for done, (read, found) in enumerate(zip(wanted, examined, strict=True)):
                 progress(done, len(wanted), "images")
-                self._examined[read] = found
+                self._examined[read, None] = found
         progress(len(wanted), len(wanted), "images")
 
     def add(self, texture: Texture) -> Decoded | None:
         """The image of a texture, or None (and a miss is recorded) if it cannot be decoded."""
-        if texture.read not in self._examined:
-            with _unwarned():
-                self._examined[texture.read] = _examine(texture, self._limit)
-        found = self._examined[texture.read]
-        if found.fault:
-            self._findings.miss("PTM-N206", f"{texture.what}: {found.fault}", texture.place)
+        found = self._sound(texture)
+        if found is None:
             return None
         if found.sha256 not in self._index:
             self._index[found.sha256] = len(self._images)
@@ -190,14 +185,21 @@ class ImageStore:
         """(H, W) which texels of a mask (``map_d``) are not opaque; all, if it is unreadable."""
         if file := self._whole_file(mask):
             self._masks.add(file)
-        if (mask.read, mask.channel) not in self._masked:
-            with _unwarned():
-                self._masked[mask.read, mask.channel] = _examine(mask, self._limit, mask.channel)
-        found = self._masked[mask.read, mask.channel]
-        if found.fault:
-            self._findings.miss("PTM-N206", f"{mask.what}: {found.fault}", mask.place)
+        found = self._sound(mask, mask.channel)
+        if found is None:
             return np.ones((1, 1), dtype=bool)
         return None if found.holes is None else found.holes.unfolded
+
+    def _sound(self, texture: Texture, channel: str | None = None) -> _Examined | None:
+        """What `_examine` finds, once; None (and a miss is recorded) if that is a fault."""
+        key = texture.read, channel
+        if key not in self._examined:
+            with _unwarned():
+                self._examined[key] = _examine(texture, self._limit, channel)
+        if fault := self._examined[key].fault:
+            self._findings.miss("PTM-N206", f"{texture.what}: {fault}", texture.place)
+            return None
+        return self._examined[key]
 
     def _name(self, label: str, kind: str) -> str:
         """A safe name whose stem alone is unique without regard to case."""

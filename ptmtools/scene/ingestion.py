@@ -33,6 +33,7 @@ from ptmtools.scene.faces import KeptFaces, keep_faces
 from ptmtools.scene.images import ImageStore
 from ptmtools.scene.model import Camera, Material, Scene, Space
 from ptmtools.scene.options import IngestOptions
+from ptmtools.scene.orientation import tolerance_of
 from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import MAX_VERTICES, Findings, Source
 from ptmtools.scene.texels import uses_holes
@@ -96,7 +97,7 @@ def ingest(
             f"({kept.degenerate} degenerate, {kept.not_finite} with coordinates not finite)",
             file=model,
         )
-    _tell_faces(kept, source, findings)
+    _note_faces(kept, source, findings)
     space = _settle_space(model, kept, source, metres, options.up, findings)
     uv = source.uv[kept.source]
     finite_uv = np.asarray(np.isfinite(uv).all(axis=(1, 2)))
@@ -124,15 +125,17 @@ def ingest(
     progress(len(used_material), len(used_material), "materials")
     if options.strict:
         findings.enforce()
+    points, triangles = _to_world(kept.points, space), kept.triangles.astype(np.int32)
     return Scene(
-        points=_to_world(kept.points, space),
-        triangles=kept.triangles.astype(np.int32),
+        points=points,
+        triangles=triangles,
         uv=uv,
         triangle_object=triangle_object.astype(np.int32),
         triangle_material=triangle_material.astype(np.int32),
         two_sided=_two_sided(kept, source),
         objects=tuple(source.objects[i] for i in used_object.tolist()),
         materials=tuple(materials),
+        tolerance=tolerance_of(points, triangles),
         images=store.images,
         cameras=tuple(_camera(camera, space) for camera in source.cameras),
         space=space,
@@ -183,7 +186,7 @@ def _read(
         ) from None
 
 
-def _tell_faces(kept: KeptFaces, source: Source, findings: Findings) -> None:
+def _note_faces(kept: KeptFaces, source: Source, findings: Findings) -> None:
     if kept.degenerate:
         findings.miss("PTM-N209", "degenerate faces dropped", "", kept.degenerate)
     if kept.not_finite:
@@ -295,7 +298,7 @@ def _material(
     store: ImageStore,
     findings: Findings,
 ) -> Material:
-    """The material as its kept ``faces``, by number, need it."""
+    """The material as its kept ``faces`` (indices of triangles) need it."""
     given = source.materials[index]
     texture = given.texture
     image = -1
@@ -314,11 +317,11 @@ def _material(
             if texture is None or mask.label != texture.label:
                 findings.say(
                     "PTM-N217",
-                    f"{mask.what}: marks the material transparent, and is not emitted",
+                    f"{mask.what}: makes the material transparent; the mask itself is not written",
                     mask.place,
                 )
     if given.opacity == 0:
-        findings.say("PTM-N231", f"material {given.name} cannot be seen (opacity 0)")
+        findings.say("PTM-N231", f"material {given.name} is invisible (opacity 0)")
     return Material(
         name=given.name,
         color=given.color or (PLAIN if image < 0 else WHITE),

@@ -1,6 +1,6 @@
 """Converts a model to OBJ files through pymeshlab, in a process of its own.
 
-pymeshlab (GPL-3, needs libGL) does not tell which face has which texture, but writes it into an
+pymeshlab (GPL-3, needs libGL) does not say which face has which texture, but writes it into an
 OBJ file. Its readers are many, in C++, and trust what a file declares: a header of 2 GB in an STL
 file of 134 bytes keeps one busy for minutes, others end the process. So it runs where that does no
 harm: a crash is an error of the file, and memory and time are bounded by the file's size.
@@ -50,14 +50,14 @@ def convert(path: Path, scratch: Path) -> list[tuple[Path, str]]:
     except subprocess.TimeoutExpired as error:
         raise _unreadable(path, f"it did not end in {error.timeout:.0f} s") from None
     try:
-        told = json.loads(run.stdout.splitlines()[-1])
+        answer = json.loads(run.stdout.splitlines()[-1])
     except (IndexError, ValueError):
         raise _unreadable(path, f"it ended with status {run.returncode}") from None
-    if "missing" in told:
-        raise _missing(told["missing"])
-    if "fault" in told:
-        raise _unreadable(path, told["fault"])
-    return [(scratch / f"{i}.obj", label) for i, label in enumerate(told["labels"])]
+    if "missing" in answer:
+        raise _missing(answer["missing"])
+    if "fault" in answer:
+        raise _unreadable(path, answer["fault"])
+    return [(scratch / f"{i}.obj", label) for i, label in enumerate(answer["labels"])]
 
 
 def _absence() -> str:
@@ -86,7 +86,7 @@ def _unreadable(path: Path, why: str) -> InputError:
 
 
 def _convert_here(path: str, scratch: Path) -> dict[str, object]:
-    """What `convert` tells of itself."""
+    """The answer that `convert` reads."""
     try:
         import pymeshlab
     except ImportError as error:
@@ -118,8 +118,7 @@ def _main(path: str, scratch: str, memory: str) -> None:
 
         resource.setrlimit(resource.RLIMIT_AS, (int(memory), int(memory)))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    told = _convert_here(path, Path(scratch))
-    print(f"\n{json.dumps(told)}", flush=True)
+    print(f"\n{json.dumps(_convert_here(path, Path(scratch)))}", flush=True)
     os._exit(0)  # its libraries may fail once more as they are unloaded
 
 

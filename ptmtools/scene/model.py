@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.scene.orientation import tolerance_of
 from ptmtools.stored import Stored, numbers, texts, whole
+from ptmtools.tolerance import Tolerance
 
 Wrap = Literal["repeat", "clamp"]
 
@@ -119,6 +121,7 @@ class Scene:
     two_sided: (T,) bool; False for glTF faces whose material is not doubleSided, and for both of
         two coincident faces of opposite winding (each belongs to the side that it faces).
     objects: names, unique not required.
+    tolerance: what counts as equal, as flat and as open; derived here, once, for all stages.
     materials, images, cameras: see their classes.
     space: how the model was brought to world coordinates.
     notes: what was dropped, missed or guessed, in the order of the model file.
@@ -134,6 +137,7 @@ class Scene:
     two_sided: NDArray[np.bool_]
     objects: tuple[str, ...]
     materials: tuple[Material, ...]
+    tolerance: Tolerance
     images: tuple[SourceImage, ...] = ()
     cameras: tuple[Camera, ...] = ()
     space: Space = Space((0.0, 0.0, 0.0), 1.0, "y")
@@ -150,6 +154,10 @@ class Scene:
         """(T,) whether each triangle occludes."""
         opaque = np.array([not m.transparent for m in self.materials], dtype=bool)
         return opaque[self.triangle_material]
+
+    def with_points(self, points: NDArray[np.float64]) -> Scene:
+        """The same triangles over (V, 3) other points, with the tolerances of those."""
+        return replace(self, points=points, tolerance=tolerance_of(points, self.triangles))
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
         """The scene as plain arrays, without its images: what is made of the arrays alone does
@@ -169,6 +177,7 @@ class Scene:
             "triangle_object": self.triangle_object,
             "triangle_material": self.triangle_material,
             "two_sided": self.two_sided,
+            "extent": np.array(self.tolerance.extent),
             "about": np.frombuffer(text.encode(), dtype=np.uint8),
         }
 
@@ -196,6 +205,7 @@ class Scene:
             two_sided=stored.array("two_sided", np.bool_, n),
             objects=objects,
             materials=materials,
+            tolerance=Tolerance.for_extent(stored.array("extent", np.float64, finite=True).item()),
             images=tuple(images),
             cameras=tuple(_camera(row) for row in about["cameras"]),
             space=_space(about["space"]),

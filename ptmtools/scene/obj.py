@@ -125,7 +125,7 @@ def read_obj(
     if cut.tangled:
         findings.say(
             "PTM-N221",
-            "polygons that cross themselves, or are too intricate, were cut as fans",
+            "polygons with crossing edges, or too many corners, were cut into fans of triangles",
             path.name,
             cut.tangled,
         )
@@ -144,7 +144,7 @@ def read_obj(
         if len(bare):
             findings.say(
                 "PTM-N229",
-                f"faces of the textured material {materials[index].name} have no vt",
+                f"faces of textured material {materials[index].name} have no texture coordinates",
                 f"{path.name}:{line[bare[0]]}",
                 len(bare),
             )
@@ -327,22 +327,11 @@ def _materials(
     for text, line in said.libraries:
         place = f"{path.name}:{line}"
         for name in _library_names(text):
-            found = folder.find(name)
-            if found.path is None:
-                if found.outcome == "outside":
-                    findings.miss(
-                        "PTM-N205", f"mtllib {name}: lies outside the model's folder", place
-                    )
-                else:
-                    findings.miss("PTM-N203", f"mtllib {name}: not found", place)
-                continue
-            label = folder.label(found.path)
-            if found.outcome == "elsewhere":
-                findings.say("PTM-N208", f"mtllib {name}: found as {label}", place)
-            if (real := found.path.resolve()) in read:
+            file = findings.locate(folder, name, f"mtllib {name}", place, "PTM-N203")
+            if file is None or (real := file.resolve()) in read:
                 continue
             read.add(real)
-            for key, material in read_mtl(found.path, label, findings).items():
+            for key, material in read_mtl(file, folder.label(file), findings).items():
                 defined.setdefault(key, material)
 
     materials: list[SourceMaterial] = []
@@ -384,18 +373,11 @@ def _texture(
 ) -> Texture | None:
     if statement is None:
         return None
-    library = folder.label(material.library)
-    place = f"{library}:{statement.line}"
+    place = f"{folder.label(material.library)}:{statement.line}"
     what = f"{key} {statement.file}"
-    found = folder.find(statement.file, material.library.parent)
-    if found.path is None:
-        if found.outcome == "outside":
-            findings.miss("PTM-N205", f"{what}: lies outside the model's folder", place)
-        else:
-            findings.miss("PTM-N204", f"{what}: not found", place)
+    file = findings.locate(folder, statement.file, what, place, base=material.library.parent)
+    if file is None:
         return None
-    if found.outcome == "elsewhere":
-        findings.say("PTM-N208", f"{what}: found as {folder.label(found.path)}", place)
     if statement.ignored:
         findings.say("PTM-N215", f"{what}: ignored {' '.join(statement.ignored)}", place)
     if statement.scale != (1.0, 1.0) or statement.offset != (0.0, 0.0):
@@ -408,8 +390,8 @@ def _texture(
             findings.say("PTM-N215", f"{what}: ignored -s -o", place)
     wrap: Wrap = "clamp" if statement.clamp else "repeat"
     return Texture(
-        read=FileRange(found.path),
-        label=found.path.name,
+        read=FileRange(file),
+        label=file.name,
         what=what,
         place=place,
         wrap_s=wrap,

@@ -4,7 +4,9 @@ Convex polygons become fans around their first vertex, as every viewer draws the
 fan would fold over takes its other diagonal. All others are cut by clipping ears in the plane of
 their Newell normal (Meisters 1975), which also serves concave, slightly bent and keyhole outlines.
 Shapely's constrained Delaunay triangulation was rejected: it refuses outlines that touch
-themselves, and needs a GEOS newer than the one we ask for.
+themselves, and needs a GEOS newer than the one we ask for. So was mapbox_earcut (2.1), which would
+save 60 statements: its time has no bound. A spiral of 10,000 corners takes it 6.6 s, a star of
+100,000 takes 6 s, and one of a million had not ended after a minute; here none of them takes 4 s.
 
 Clipping takes a time that grows with the square of an outline, and for outlines made to be
 difficult faster. The steps that all of them together may take grow with the number of corners

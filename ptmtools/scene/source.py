@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError, LimitError
 from ptmtools.files import open_regular
 from ptmtools.scene.model import Camera, Note, Wrap
+from ptmtools.scene.reference import Folder
 
 #: `Scene.triangles` is int32: more vertices cannot be numbered.
 MAX_VERTICES = 2**31 - 1
@@ -166,12 +167,32 @@ class Findings:
             self._misses.append((code, message, place))
         self.say(code, message, place, count)
 
+    def locate(
+        self,
+        folder: Folder,
+        name: str,
+        what: str,
+        place: str,
+        missing: str = "PTM-N204",
+        base: Path | None = None,
+    ) -> Path | None:
+        """`Folder.find` with a note of where the file is or why there is none."""
+        found = folder.find(name, base)
+        if found.path is None:
+            if found.outcome == "outside":
+                self.miss("PTM-N205", f"{what}: lies outside the model's folder", place)
+            else:
+                self.miss(missing, f"{what}: not found", place)
+        elif found.outcome == "elsewhere":
+            self.say("PTM-N208", f"{what}: found as {folder.label(found.path)}", place)
+        return found.path
+
     @property
     def notes(self) -> tuple[Note, ...]:
         return tuple(Note(*key, count) for key, count in self._notes.items())
 
     def enforce(self) -> None:
-        """Raise the first miss as an `InputError`, and tell how many more there are."""
+        """Raise the first miss as an `InputError`, and say how many more there are."""
         if not self._misses:
             return
         code, message, place = self._misses[0]

@@ -2,7 +2,7 @@
 
 Up: floors and ceilings are large and level, and buildings are wider than high. Both are measured
 as shares and added. Unit: the one in which a building of this size is most plausible. Neither
-can be certain (a house drawn in feet may pass for a hall in metres), so both are told, and the
+can be certain (a house drawn in feet may pass for a hall in metres), so both are noted, and the
 user can give them.
 """
 
@@ -62,7 +62,7 @@ def guess_up(corners: NDArray[np.float64]) -> tuple[Literal["y", "z"], str]:
     other = "z" if up == "y" else "y"
     high, wide = (side[1], side[2]) if up == "y" else (side[2], side[1])
     return up, (
-        f"{share:.0%} of the area square to y or z is level then, "
+        f"with {up} up, {share:.0%} of the area square to y or z is level, "
         f"and the model is {high:.4g} high and {wide:.4g} along {other}"
     )
 
@@ -71,7 +71,7 @@ def guess_unit(width: float, height: float) -> tuple[str, str]:
     """The unit of a model of this horizontal and vertical size, and the reason in a few words."""
     unit = min(UNITS, key=lambda name: _implausible(width, height, name))
     metres = UNITS[unit]
-    return unit, f"{width * metres:.3g} m wide and {height * metres:.3g} m high then"
+    return unit, f"it would be {width * metres:.3g} m wide and {height * metres:.3g} m high"
 
 
 def _implausible(width: float, height: float, unit: str) -> float:

@@ -3,17 +3,21 @@
 The schemas beside this file are published (docs/schemas.md), and they are the only description of
 the shapes: whoever reads a document here reads the schema with it. They are JSON Schema, draft
 2020-12, of which the keywords in `_RULES` are understood; a schema with another one does not
-compile. Two things are stricter than the draft: an integer is written without a fraction (2, not
-2.0), and a number must be finite as a float64.
+compile. Three things are stricter than the draft: an integer is written without a fraction (2, not
+2.0), a number must be finite as a float64, and what a schema says nothing of is not nested deeper
+than `DEEPEST`.
 
 A schema becomes nested functions, once. Lists of numbers, which are most of a large document, are
-checked by their set of types, their least and their greatest, ten times as fast as one by one: the
-whole check takes about as long as parsing the JSON.
+checked by their set of types, their least and their greatest, ten times as fast as one by one. Of
+libraries jsonschema takes 34 times as long for the museum's hints (0.34 s, 0.010), fastjsonschema
+2.4 to 5 times, and 40 ms to compile; jsonschema-rs takes a third. The latter two take 2.0 for an
+integer, which then is no index.
 """
 
 from __future__ import annotations
 
 import json
+import operator
 import re
 import sys
 from collections.abc import Callable, Mapping
@@ -22,7 +26,11 @@ from importlib.resources import files
 from typing import Any
 
 #: Names of the schemas.
-HINTS, MANIFEST, VALIDATION = "hints", "manifest", "validation"
+HINTS, MANIFEST, VALIDATION, GLB = "hints", "manifest", "validation", "glb"
+#: So many lists and objects lie in each other at most, where anything may stand.
+DEEPEST = 16
+#: How the message of a number ends that is beyond float64.
+NOT_FINITE = "is not finite"
 
 Check = Callable[[Any], None]
 Schema = Mapping[str, Any]
@@ -41,6 +49,16 @@ _NUMBERS = {int, float}
 _LARGEST = sys.float_info.max
 #: Keywords that say nothing about validity.
 _ANNOTATIONS = {"$schema", "$id", "$defs", "title", "description"}
+#: Keyword → the types that it bounds, what must hold, and what to say if it does not.
+_BOUNDS: dict[str, tuple[set[type], Callable[[Any, Any], bool], str]] = {
+    "minimum": (_NUMBERS, operator.ge, "is less than"),
+    "maximum": (_NUMBERS, operator.le, "is more than"),
+    "exclusiveMinimum": (_NUMBERS, operator.gt, "is not more than"),
+    "exclusiveMaximum": (_NUMBERS, operator.lt, "is not less than"),
+    "minLength": ({str}, operator.ge, "characters, fewer than"),
+    "minItems": ({list}, operator.ge, "entries, fewer than"),
+    "maxItems": ({list}, operator.le, "entries, more than"),
+}
 
 
 class ShapeError(Exception):
@@ -137,7 +155,17 @@ def _compile(schema: Schema | bool, root: Schema) -> Check:
 
 
 def _anything(value: Any) -> None:
-    pass
+    level = [value]
+    for _ in range(DEEPEST):
+        level = [
+            inner
+            for outer in level
+            if isinstance(outer, (dict, list))
+            for inner in (outer.values() if isinstance(outer, dict) else outer)
+        ]
+        if not level:
+            return
+    raise ShapeError(f"lists in lists, more than {DEEPEST}")
 
 
 def _nothing(value: Any) -> None:
@@ -145,32 +173,38 @@ def _nothing(value: Any) -> None:
 
 
 def _reference(schema: Schema, root: Schema) -> Check:
-    return _compile(root["$defs"][schema["$ref"].removeprefix("#/$defs/")], root)
+    return _compile(_resolved(schema, root), root)
+
+
+def _resolved(schema: Any, root: Schema) -> Any:
+    """What a schema that refers to another refers to; another schema itself."""
+    if isinstance(schema, bool) or "$ref" not in schema:
+        return schema
+    return root["$defs"][schema["$ref"].removeprefix("#/$defs/")]
+
+
+def _types(schema: Schema) -> set[type]:
+    names = schema["type"] if isinstance(schema["type"], list) else [schema["type"]]
+    return set[type]().union(*(_TYPES[name] for name in names))
 
 
 def _type(schema: Schema, root: Schema) -> Check:
-    names = schema["type"] if isinstance(schema["type"], list) else [schema["type"]]
-    types = set[type]().union(*(_TYPES[name] for name in names))
-    wanted = " or ".join(names)
+    types = _types(schema)
+    wanted = schema["type"] if isinstance(schema["type"], str) else " or ".join(schema["type"])
 
     def check_type(value: Any) -> None:
         if type(value) not in types:
             raise ShapeError(f"{_shown(value)} is not of type {wanted}")
         if type(value) in _NUMBERS and not -_LARGEST <= value <= _LARGEST:
-            raise ShapeError(f"{_shown(value)} is not finite")
+            raise ShapeError(f"{_shown(value)} {NOT_FINITE}")
 
     return check_type
 
 
-def _const(schema: Schema, root: Schema) -> Check:
-    return _one_of([schema["const"]])
+def _one_of(schema: Schema, root: Schema) -> Check:
+    """`const` and `enum`."""
+    known = schema["enum"] if "enum" in schema else [schema["const"]]
 
-
-def _enum(schema: Schema, root: Schema) -> Check:
-    return _one_of(schema["enum"])
-
-
-def _one_of(known: list[Any]) -> Check:
     def check_known(value: Any) -> None:
         if not any(type(value) is type(one) and value == one for one in known):
             raise ShapeError(f"{_shown(value)} is not {' or '.join(map(repr, known))}")
@@ -178,34 +212,18 @@ def _one_of(known: list[Any]) -> Check:
     return check_known
 
 
-def _bound(word: str, holds: Callable[[Any, Any], bool], told: str) -> Callable[..., Check]:
-    def make(schema: Schema, root: Schema) -> Check:
-        bound = schema[word]
+def _bounds(schema: Schema, root: Schema) -> Check:
+    """All keywords of `_BOUNDS`."""
+    bounds = [(*_BOUNDS[word], schema[word]) for word in _BOUNDS if word in schema]
 
-        def check_bound(value: Any) -> None:
-            if type(value) in _NUMBERS and not holds(value, bound):
-                raise ShapeError(f"{_shown(value)} is {told} {bound}")
+    def check_bounds(value: Any) -> None:
+        for types, holds, fault, bound in bounds:
+            if type(value) in types:
+                size = value if types is _NUMBERS else len(value)
+                if not holds(size, bound):
+                    raise ShapeError(f"{_shown(size)} {fault} {bound}")
 
-        return check_bound
-
-    return make
-
-
-def _length(
-    word: str, kind: type[str | list[Any]], holds: Callable[[int, int], bool]
-) -> Callable[..., Check]:
-    def make(schema: Schema, root: Schema) -> Check:
-        bound = schema[word]
-        told = f"{'at least' if word.startswith('min') else 'at most'} {bound} belong there"
-
-        def check_length(value: Any) -> None:
-            if type(value) is kind and not holds(len(value), bound):
-                what = "entries" if kind is list else "characters"
-                raise ShapeError(f"{len(value)} {what}, {told}")
-
-        return check_length
-
-    return make
+    return check_bounds
 
 
 def _pattern(schema: Schema, root: Schema) -> Check:
@@ -245,9 +263,7 @@ def _object_fields(schema: Schema, root: Schema) -> Check:
 def _items(schema: Schema, root: Schema) -> Check:
     """`items` and `prefixItems` together."""
     first = [_compile(s, root) for s in schema.get("prefixItems", [])]
-    rest = schema.get("items", True)
-    if isinstance(rest, dict) and set(rest) == {"$ref"}:
-        rest = root["$defs"][rest["$ref"].removeprefix("#/$defs/")]
+    rest = _resolved(schema.get("items", True), root)
     check_rest = _compile(rest, root)
     all_right = _numbers(rest) if not first else lambda values: False
 
@@ -268,8 +284,7 @@ def _numbers(schema: Schema | bool) -> Callable[[list[Any]], bool]:
     known = {"type", "minimum", "maximum"} | _ANNOTATIONS
     if isinstance(schema, bool) or "type" not in schema or set(schema) - known:
         return lambda values: False
-    names = schema["type"] if isinstance(schema["type"], list) else [schema["type"]]
-    types = set[type]().union(*(_TYPES[name] for name in names))
+    types = _types(schema)
     if types - _NUMBERS - {_NULL}:
         return lambda values: False
     low, high = schema.get("minimum", -_LARGEST), schema.get("maximum", _LARGEST)
@@ -278,8 +293,8 @@ def _numbers(schema: Schema | bool) -> Callable[[list[Any]], bool]:
         found = set(map(type, values))
         if not found <= types:
             return False
-        told = [v for v in values if v is not None] if _NULL in found else values
-        return not told or (low <= min(told) and max(told) <= high)
+        held = [v for v in values if v is not None] if _NULL in found else values
+        return not held or (low <= min(held) and max(held) <= high)
 
     return all_right
 
@@ -294,16 +309,10 @@ def _shown(value: Any) -> str:
 _RULES: dict[str, Callable[[Schema, Schema], Check]] = {
     "$ref": _reference,
     "type": _type,
-    "const": _const,
-    "enum": _enum,
-    "minimum": _bound("minimum", lambda value, bound: value >= bound, "less than"),
-    "maximum": _bound("maximum", lambda value, bound: value <= bound, "more than"),
-    "exclusiveMinimum": _bound("exclusiveMinimum", lambda v, bound: v > bound, "not more than"),
-    "exclusiveMaximum": _bound("exclusiveMaximum", lambda v, bound: v < bound, "not less than"),
-    "minLength": _length("minLength", str, lambda n, bound: n >= bound),
+    "const": _one_of,
+    "enum": _one_of,
+    **dict.fromkeys(_BOUNDS, _bounds),
     "pattern": _pattern,
-    "minItems": _length("minItems", list, lambda n, bound: n >= bound),
-    "maxItems": _length("maxItems", list, lambda n, bound: n <= bound),
     "prefixItems": _items,
     "items": _items,
     "required": _object_fields,

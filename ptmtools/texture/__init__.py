@@ -19,7 +19,6 @@ if TYPE_CHECKING:
         read_image,
         read_ptm,
         write_image,
-        write_png,
     )
     from ptmtools.texture.model import Description, EncodeOptions, Level, Limits, PtmHeader
     from ptmtools.texture.pyramid import build_pyramid
@@ -46,7 +45,6 @@ __all__ = [
     "read_ptm",
     "whole_levels",
     "write_image",
-    "write_png",
 ]
 
 _HOME = {
@@ -70,7 +68,6 @@ _HOME = {
     "read_ptm": "images",
     "whole_levels": "container",
     "write_image": "images",
-    "write_png": "images",
 }
 
 __getattr__ = names(__name__, _HOME)

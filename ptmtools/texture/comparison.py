@@ -1,10 +1,10 @@
-"""Size and speed of the profiles beside other lossless formats, on the same texels in one run.
+"""Size and speed of the profiles and of other lossless formats, on the same texels in one run.
 
-A `.ptm` holds all levels; the others hold one image, so for them the finest level alone is told as
-well as all levels in a file each, which is what a client that streams mipmaps would have to fetch.
-Speeds count the bytes of the finest level, raw: of the finest level alone for the others, of all
-levels for `.ptm`. What comes back is compared with what went in. Only ratios within one run mean
-something.
+A `.ptm` holds all levels. The other formats hold one image, so two sizes are given for them: the
+finest level alone, and one file for each level, which is what a client that streams mipmaps would
+fetch. Speeds are in raw bytes of the finest level per second, though a `.ptm` codes all levels in
+that time. Decoded texels are compared with the originals. Timings mean something only as ratios
+within one run.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from ptmtools.errors import PtmError
 from ptmtools.texture.model import EncodeOptions
-from ptmtools.texture.profiles import PROFILE_NUMBERS
+from ptmtools.texture.profiles import PROFILES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,23 +27,22 @@ if TYPE_CHECKING:
 
 _PILLOW = "pip install --force-reinstall pillow"
 _CODECS = "pip install 'ptmtools[codecs]'"
-#: Before it is timed a codec sees a corner of so many texels a side; ours also see grain and a
-#: plain image of that size, so that what is compiled or loaded when first used is not counted,
-#: whichever way they code the image.
+#: Before it is timed, a codec codes a corner of so many texels a side, and ours also noise and a
+#: plain image of that size, so that no compiling or loading is counted.
 _CORNER = 256
 _LENGTH = struct.Struct("<I")
 
 
 @dataclass(frozen=True)
 class Codec:
-    """A way to make an image a string of bytes, and back.
+    """A way to turn an image into bytes, and back.
 
     Attributes
     ----------
     name: what it is called in a table.
     encode, decode: of (h, w, c) texels. Either may raise anything for what it cannot hold.
     pyramid: whether one string holds all levels.
-    remedy: what to install where it is not there; None where it is.
+    remedy: how to install it; None if it is installed.
     """
 
     name: str
@@ -76,8 +75,8 @@ class Measured:
     problem: str | None = None
 
 
-def codecs(profiles: Iterable[str] = PROFILE_NUMBERS) -> list[Codec]:
-    """The profiles, then the other formats: PNG first, then WebP, JPEG XL, JPEG 2000, JPEG-LS."""
+def codecs(profiles: Iterable[str] = PROFILES) -> list[Codec]:
+    """The profiles, then PNG, WebP, JPEG XL, JPEG 2000 and JPEG-LS."""
     return [*map(_profile, profiles), *_rivals()]
 
 
@@ -163,7 +162,7 @@ def _profile(name: str) -> Codec:
     from ptmtools.texture.codec import decode
     from ptmtools.texture.encoder import encode
 
-    options = EncodeOptions(name)  # type: ignore[arg-type]
+    options = EncodeOptions(name)
     return Codec(
         f"ptm {name}",
         lambda image: encode(image, options),
@@ -175,38 +174,42 @@ def _profile(name: str) -> Codec:
 def _rivals() -> list[Codec]:
     from PIL import features
 
+    webp = None if features.check("webp") else _PILLOW
+    jpeg_xl = [
+        _by_imagecodecs(f"JPEG XL effort {effort}", "jpegxl", lossless=True, effort=effort)
+        for effort in (1, 3, 7)
+    ]
+    jpeg_ls = _by_imagecodecs("JPEG-LS, less green", "jpegls")
+    return [
+        Codec("PNG", _png, _by_pillow),
+        Codec("WebP lossless", _webp, _by_pillow, remedy=webp),
+        *jpeg_xl,
+        _by_imagecodecs("JPEG 2000", "jpeg2k", level=0, reversible=True, codecformat="j2k"),
+        replace(jpeg_ls, encode=_jpeg_ls, decode=_from_jpeg_ls),
+    ]
+
+
+def _by_imagecodecs(name: str, function: str, **settings: Any) -> Codec:
+    """A codec of that library: ``function``_encode and ``function``_decode."""
     imagecodecs: Any
     try:
         import imagecodecs
     except ImportError:
         imagecodecs = None
-    webp = features.check("webp")
-    found = [
-        Codec("PNG", _png, _by_pillow),
-        Codec("WebP lossless", _webp, _by_pillow, remedy=None if webp else _PILLOW),
-    ]
-    jxl = imagecodecs is not None and imagecodecs.JPEGXL.available
-    found += [_jpeg_xl(effort, None if jxl else _CODECS) for effort in (1, 3, 7)]
-    j2k = features.check("jpg_2000")
-    found.append(Codec("JPEG 2000", _jpeg_2000, _from_jpeg_2000, remedy=None if j2k else _PILLOW))
-    jls = imagecodecs is not None and imagecodecs.JPEGLS.available
-    remedy = None if jls else _CODECS
-    found.append(Codec("JPEG-LS, less green", _jpeg_ls, _from_jpeg_ls, remedy=remedy))
-    return found
 
-
-def _jpeg_xl(effort: int, remedy: str | None) -> Codec:
     def encode(image: Samples) -> bytes:
-        import imagecodecs
-
-        return bytes(imagecodecs.jpegxl_encode(_plain(image), lossless=True, effort=effort))
+        if function == "jpeg2k":
+            if image.dtype.kind == "f":
+                raise ValueError("it has integers only")
+            settings["mct"] = image.shape[2] > 2
+        return bytes(getattr(imagecodecs, f"{function}_encode")(_plain(image), **settings))
 
     def decode(data: bytes, shape: tuple[int, ...]) -> Samples:
-        import imagecodecs
+        texels: Samples = getattr(imagecodecs, f"{function}_decode")(data)
+        return texels.reshape(shape)
 
-        return imagecodecs.jpegxl_decode(data).reshape(shape)
-
-    return Codec(f"JPEG XL effort {effort}", encode, decode, remedy=remedy)
+    there = imagecodecs is not None and getattr(imagecodecs, function.upper()).available
+    return Codec(name, encode, decode, remedy=None if there else _CODECS)
 
 
 def _plain(image: Samples) -> Samples:
@@ -232,40 +235,6 @@ def _webp(image: Samples) -> bytes:
     return buffer.getvalue()
 
 
-def _jpeg_2000(image: Samples) -> bytes:
-    from PIL import Image
-
-    if image.dtype.kind == "f":
-        raise ValueError("it has integers only")
-    if image.dtype.itemsize > 1:
-        import imagecodecs
-
-        return bytes(
-            imagecodecs.jpeg2k_encode(_plain(image), level=0, reversible=True, codecformat="j2k")
-        )
-    buffer = io.BytesIO()
-    # Six resolutions, the default, are too many for tiny images.
-    resolutions = min(6, min(image.shape[:2]).bit_length())
-    colour_transform = int(image.shape[2] > 2)
-    Image.fromarray(_plain(image)).save(
-        buffer,
-        "JPEG2000",
-        irreversible=False,
-        num_resolutions=resolutions,
-        mct=colour_transform,
-    )
-    return buffer.getvalue()
-
-
-def _from_jpeg_2000(data: bytes, shape: tuple[int, ...]) -> Samples:
-    """By what encoded it: Pillow for 8 bits, imagecodecs for 16."""
-    if data.startswith(b"\0\0\0\x0cjP  "):
-        return _by_pillow(data, shape)
-    import imagecodecs
-
-    return imagecodecs.jpeg2k_decode(data).reshape(shape)
-
-
 def _by_pillow(data: bytes, shape: tuple[int, ...]) -> Samples:
     """What Pillow decodes, or for PNGs of 16 bits `load_image`."""
     import numpy as np
@@ -275,7 +244,7 @@ def _by_pillow(data: bytes, shape: tuple[int, ...]) -> Samples:
         from ptmtools.texture.images import load_image
 
         return load_image(data).array()
-    with Image.open(io.BytesIO(data), formats=("PNG", "WEBP", "JPEG2000")) as image:
+    with Image.open(io.BytesIO(data), formats=("PNG", "WEBP")) as image:
         # WebP leaves out alpha where all is opaque.
         opaque = image.mode == "RGB" and shape[2] in (2, 4)
         texels = np.asarray(image.convert("RGBA") if opaque else image)

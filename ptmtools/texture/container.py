@@ -20,7 +20,7 @@ from ptmtools.texture.model import (
     Level,
     PtmHeader,
 )
-from ptmtools.texture.profiles import EXACT_PROFILES, PROFILE_NUMBERS
+from ptmtools.texture.profiles import PROFILES, profile_numbered
 from ptmtools.texture.pyramid import level_sizes
 from ptmtools.texture.samples import KINDS, KINDS_BY_NUMBER
 from ptmtools.texture.tiling import tile_counts
@@ -45,7 +45,6 @@ HEAD_MAX = _FIXED.size + _MORE.size + MAX_LEVELS * _ENTRY.size + _CRC.size
 #: No description is longer, bytes.
 DESCRIPTION_MAX = 1 << 24
 
-_PROFILES = {number: name for name, number in PROFILE_NUMBERS.items()}
 _ENCODE_AGAIN = "the file is damaged: fetch or encode it again"
 
 
@@ -75,7 +74,7 @@ def pack_head(head: Head, description: bytes, groups: Sequence[tuple[int, int]])
     """
     size = head_size(len(groups))
     counts = (head.components, len(groups), head.trimmed, 0)
-    numbers = (PROFILE_NUMBERS[head.profile], KINDS[head.kind].number, head.width, head.height)
+    numbers = (PROFILES[head.profile].number, KINDS[head.kind].number, head.width, head.height)
     packed = bytearray(_FIXED.pack(MAGIC, VERSION, *numbers, *counts, size))
     packed += _MORE.pack(head.tile, head.max_error, len(description), zlib.crc32(description))
     offset = size + len(description)
@@ -97,7 +96,7 @@ def read_header(data: bytes) -> PtmHeader:
     _check_magic(data)
     if len(data) < _FIXED.size:
         raise _cut_head(len(data))
-    (_, version, profile, kind, width, height, components, count, trimmed, zero, size) = (
+    (_, version, profile_number, kind, width, height, components, count, trimmed, zero, size) = (
         _FIXED.unpack_from(data)
     )
     if not 1 <= version <= VERSION:
@@ -114,14 +113,17 @@ def read_header(data: bytes) -> PtmHeader:
     (crc,) = _CRC.unpack_from(data, size - _CRC.size)
     if crc != zlib.crc32(data[: size - _CRC.size]):
         raise _damaged_head("its checksum is wrong")
+    profile = profile_numbered(profile_number)
     if (
-        profile not in _PROFILES
+        profile is None
+        or version < profile.since
         or kind not in KINDS_BY_NUMBER
-        or (version == 1 and (profile > 1 or kind))
+        or (version == 1 and kind)
     ):
         raise InputError(
             "PTM-I104",
-            f"uses profile {profile} with samples of kind {kind}, which this program does not know",
+            f"uses profile {profile_number} with samples of kind {kind}, which this program does "
+            "not know",
             remedy="use a newer ptmtools, or encode the image again",
         )
     if max(width, height) > MAX_SIDE:
@@ -140,8 +142,7 @@ def read_header(data: bytes) -> PtmHeader:
     if tile and not (low <= tile <= high and tile % 2 == 0):
         raise _damaged_head(f"tiles of {tile} texels are impossible")
     samples = KINDS_BY_NUMBER[kind]
-    exact_only = _PROFILES[profile] in EXACT_PROFILES
-    if max_error > (0 if exact_only else samples.top_error) or described > DESCRIPTION_MAX:
+    if max_error > (samples.top_error if profile.lossy else 0) or described > DESCRIPTION_MAX:
         raise _damaged_head("its largest error or the length of its description is impossible")
     entries = [_ENTRY.unpack_from(data, table + i * _ENTRY.size) for i in range(count)]
     levels: list[Level] = []
@@ -160,7 +161,7 @@ def read_header(data: bytes) -> PtmHeader:
         height=height,
         components=components,
         kind=samples.name,
-        profile=_PROFILES[profile],
+        profile=profile.name,
         version=version,
         trimmed=trimmed,
         tile=tile,

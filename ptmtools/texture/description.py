@@ -73,7 +73,7 @@ def _check(description: Description) -> None:
     ):
         raise InputError(
             "PTM-I111",
-            f"what is said of colour and orientation cannot be: {description!r:.200}",
+            f"these values for colour and orientation are impossible: {description!r:.200}",
             remedy="see ptmtools.texture.Description for the ranges",
         )
 

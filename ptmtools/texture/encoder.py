@@ -12,7 +12,7 @@ import io
 import math
 import zlib
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import IO, TYPE_CHECKING, Any
 
 from ptmtools.errors import LimitError, OutputError
@@ -26,13 +26,10 @@ from ptmtools.texture.container import (
     pack_head,
 )
 from ptmtools.texture.description import pack_description
-from ptmtools.texture.model import (
-    Description,
-    EncodeOptions,
-)
-from ptmtools.texture.options import checked_profile, kept_levels
+from ptmtools.texture.model import Description, EncodeOptions
+from ptmtools.texture.options import checked_coder, kept_levels
 from ptmtools.texture.parallel import ordered
-from ptmtools.texture.profiles import Profile, Tile
+from ptmtools.texture.profiles import Coder, Tile
 from ptmtools.texture.pyramid import build_pyramid, level_sizes, mean_below
 from ptmtools.texture.rows import ImageRows, Rows
 from ptmtools.texture.tiling import Box, tile_box, tile_counts
@@ -97,7 +94,7 @@ def encode_to(
             remedy="open it for writing",
         )
     rows = ImageRows(image)
-    profile = checked_profile(options, rows)
+    coding = _Coding(checked_coder(options, rows), options, threads)
     described = pack_description(description)
     if len(described) > DESCRIPTION_MAX:
         raise LimitError(
@@ -106,30 +103,22 @@ def encode_to(
             remedy="leave it out",
         )
     kept = kept_levels(rows.width, rows.height, options)
-    sizes = level_sizes(rows.width, rows.height)
-    trimmed = len(sizes) - 1 - kept[-1]
-    levels = _levels(rows, sizes, kept)
     start = file.tell()
     file.write(bytes(head_size(len(kept))))
     file.write(described)
+    single, tiled = _split(_levels(rows, kept), options.tile)
+    tiles = coding.single([_whole(level) for level in single], more=bool(tiled))
+    del single
+    below, memory = tiles[-1].texels, tiles[-1].memory
     groups: list[tuple[int, int]] = []
-    whole, tiled = _split(levels, options.tile)
-    del levels
-    base = _whole(whole.pop(0))
-    below, memory = base, None
-    single = [Tile(profile.encode_base(base), base)]
-    if whole:
-        single += _single(profile, options, base, whole, bool(tiled), threads)
-        below, memory = single[-1].texels, single[-1].memory
-    for tile in single:
+    for tile in tiles:
         file.write(tile.data)
         groups.append((len(tile.data), zlib.crc32(tile.data)))
-    del whole, single, base
+    del tiles
     while tiled:
         # The finest of them may be the image itself, of which nothing is kept.
-        made = _Tiled(profile, options, tiled.pop(0), below, memory, finest=not tiled)
-        groups.append(made.write(file, threads))
-        below = made.texels
+        group, below = coding.tiled(file, tiled.pop(0), below, memory, finest=not tiled)
+        groups.append(group)
     end = file.tell()
     head = Head(
         rows.width,
@@ -137,7 +126,7 @@ def encode_to(
         rows.components,
         rows.dtype.name,
         options.profile,
-        trimmed,
+        len(level_sizes(rows.width, rows.height)) - 1 - kept[-1],
         options.tile,
         options.max_error,
     )
@@ -146,143 +135,115 @@ def encode_to(
     file.seek(end)
 
 
-class _Tiled:
-    """One level of several tiles: its group, and its texels as a decoder has them."""
+@dataclass(frozen=True)
+class _Coding:
+    """How the levels of one image are coded."""
 
-    def __init__(
+    coder: Coder
+    options: EncodeOptions
+    threads: int
+
+    def single(self, levels: list[Samples], more: bool) -> list[Tile]:
+        """The levels of one tile each, coarsest first; ``more``: others come after them.
+
+        With an allowed error they are coded with and without it: flat images are smaller without,
+        and a level can be exact only if those below it are.
+        """
+        base = Tile(self.coder.encode_base(levels[0]), levels[0])
+        within = self._chain(base, levels[1:], 1.0)
+        if not self.options.max_error:
+            return within
+        exact = self._chain(base, levels[1:], math.inf)
+        sizes = [sum(len(tile.data) for tile in tiles) for tiles in (exact, within)]
+        return exact if sizes[0] <= (EXACT_FACTOR if more else 1.0) * sizes[1] else within
+
+    def _chain(self, base: Tile, levels: list[Samples], factor: float) -> list[Tile]:
+        tiles = [base]
+        for level in levels:
+            tiles.append(self._tile(level, tiles[-1].texels, tiles[-1].memory, factor))
+        return tiles
+
+    def tiled(
         self,
-        profile: Profile,
-        options: EncodeOptions,
+        file: IO[bytes],
         level: Samples | ImageRows,
         below: Samples,
         memory: object,
         finest: bool,
-    ) -> None:
-        self._profile = profile
-        self._options = options
-        self._level = level
-        self._below = below
-        self._memory = memory
-        height, width = level.shape[:2]
-        self._size = width, height
-        self._counts = tile_counts(width, height, options.tile)
-        self._finest = finest
-        #: What the next level needs; nothing of the finest is kept.
-        self.texels: Samples = below[:0]
-
-    def write(self, file: IO[bytes], threads: int) -> tuple[int, int]:
-        """Writes index and tiles; length of the group and CRC-32 of the index."""
+    ) -> tuple[tuple[int, int], Samples]:
+        """Writes index and tiles of a level of several. Length of the group, CRC-32 of the index;
+        and the texels as a decoder has them, none of the finest level."""
         import numpy as np
 
-        if not self._finest:
-            changed = self._options.max_error > 0
-            whole = _whole(self._level)
-            self.texels = np.empty_like(whole) if changed else whole
+        side = self.options.tile
+        height, width = level.shape[:2]
+        across, down = tile_counts(width, height, side)
+        texels = below[:0]
+        if not finest:
+            whole = _whole(level)
+            texels = np.empty_like(whole) if self.options.max_error else whole
+
+        def boxes() -> Iterator[tuple[Box, Samples]]:
+            """Each tile, with the row of tiles that it is cut from."""
+            for row in range(down):
+                strip = level[row * side : height if row == down - 1 else (row + 1) * side]
+                for column in range(across):
+                    yield tile_box(width, height, side, column, row), strip
+
+        def coded(job: tuple[Box, Samples]) -> tuple[Box, Tile]:
+            box, strip = job
+            piece = np.ascontiguousarray(strip[:, box.x0 : box.x1])
+            under = np.ascontiguousarray(below[box.below.slices])
+            return box, self._tile(piece, under, memory, 1.0 if finest else EXACT_FACTOR, 1)
+
         start = file.tell()
-        across, down = self._counts
         file.write(bytes(across * down * TILE_ENTRY.size))
         index = bytearray()
-        for box, tile in ordered(self._coded, self._boxes(), threads):
+        for box, tile in ordered(coded, boxes(), self.threads):
             file.write(tile.data)
             index += TILE_ENTRY.pack(len(tile.data), zlib.crc32(tile.data))
-            if self._options.max_error and not self._finest:
-                self.texels[box.slices] = tile.texels
+            if self.options.max_error and not finest:
+                texels[box.slices] = tile.texels
         end = file.tell()
         file.seek(start)
         file.write(index)
         file.seek(end)
-        return end - start, zlib.crc32(index)
+        return (end - start, zlib.crc32(index)), texels
 
-    def _boxes(self) -> Iterator[tuple[Box, Samples]]:
-        """Each tile, with the row of tiles that it is cut from."""
-        across, down = self._counts
-        for row in range(down):
-            strip = None
-            for column in range(across):
-                box = tile_box(*self._size, self._options.tile, column, row)
-                if strip is None:
-                    strip = self._level[box.y0 : box.y1]
-                yield box, strip
-
-    def _coded(self, job: tuple[Box, Samples]) -> tuple[Box, Any]:
+    def _tile(
+        self,
+        level: Samples,
+        below: Samples,
+        memory: object,
+        factor: float,
+        threads: int | None = None,
+    ) -> Tile:
+        """One tile; with an allowed error, exactly if that takes at most ``factor`` times the
+        bytes."""
         import numpy as np
 
-        box, strip = job
-        level = np.ascontiguousarray(strip[:, box.x0 : box.x1])
-        below = np.ascontiguousarray(self._below[box.below.slices])
-        factor = 1.0 if self._finest else EXACT_FACTOR
-        return box, _code(self._profile, self._options, level, below, self._memory, factor)
+        encode_tile, max_error = self.coder.encode_tile, self.options.max_error
+        threads = threads or self.threads
+        if not max_error:
+            return encode_tile(level, below, 0, memory, threads)
+        # Profiles that know the mean of a block can be exact only where it is the mean.
+        exact = None
+        if np.array_equal(mean_below(level), below):
+            exact = encode_tile(level, below, 0, memory, threads)
+            exact = replace(exact, data=bytes([EXACT]) + exact.data)
+            if factor == math.inf:
+                return exact
+        within = encode_tile(level, below, max_error, memory, threads)
+        if exact and len(exact.data) - 1 <= factor * len(within.data):
+            return exact
+        return replace(within, data=bytes([WITHIN]) + within.data)
 
 
-def _single(
-    profile: Profile,
-    options: EncodeOptions,
-    base: Samples,
-    levels: list[Samples | ImageRows],
-    more: bool,
-    threads: int,
-) -> list[Tile]:
-    """The levels of one tile each, from the one above ``base``; ``more``: others come after them.
-
-    With an allowed error they are coded with and without it: flat images are smaller without, and a
-    level can be exact only if those below it are.
-    """
-
-    def chain(factor: float) -> list[Tile]:
-        tiles: list[Tile] = []
-        below, memory = base, None
-        for level in levels:
-            tile = _code(profile, options, _whole(level), below, memory, factor, threads)
-            tiles.append(tile)
-            below, memory = tile.texels, tile.memory
-        return tiles
-
-    within = chain(1.0)
-    if not options.max_error:
-        return within
-    exact = chain(math.inf)
-    sizes = [sum(len(tile.data) for tile in tiles) for tiles in (exact, within)]
-    return exact if sizes[0] <= (EXACT_FACTOR if more else 1.0) * sizes[1] else within
-
-
-def _code(
-    profile: Profile,
-    options: EncodeOptions,
-    level: Samples,
-    below: Samples,
-    memory: object,
-    factor: float,
-    threads: int = 1,
-) -> Tile:
-    """One tile; with an allowed error, exactly if that takes at most ``factor`` times the bytes."""
-    if not options.max_error:
-        return profile.encode_tile(level, below, 0, memory, threads)
-    import numpy as np
-
-    # Profiles that know the mean of a block can be exact only where it is the mean.
-    exact = None
-    if np.array_equal(mean_below(level), below):
-        exact = profile.encode_tile(level, below, 0, memory, threads)
-        if factor == math.inf:
-            return replace(exact, data=bytes([EXACT]) + exact.data)
-    within = profile.encode_tile(level, below, options.max_error, memory, threads)
-    if exact is not None and len(exact.data) <= factor * len(within.data):
-        return replace(exact, data=bytes([EXACT]) + exact.data)
-    return replace(within, data=bytes([WITHIN]) + within.data)
-
-
-def _levels(
-    image: ImageRows, sizes: list[tuple[int, int]], kept: list[int]
-) -> list[Samples | ImageRows]:
+def _levels(image: ImageRows, kept: list[int]) -> list[Samples | ImageRows]:
     """The levels to store, coarsest first; the image itself is not read into memory for it."""
-    if len(sizes) == 1:
-        return [image]
-    pyramid: list[Samples | ImageRows] = [
-        *build_pyramid(image, min(sizes[kept[0]]))[:-1],
-        image,
-    ]
-    coarsest = len(sizes) - len(pyramid)
-    return [pyramid[n - coarsest] for n in kept]
+    sizes = level_sizes(image.width, image.height)
+    pyramid = build_pyramid(image, min(sizes[kept[0]]))
+    return [pyramid[n - len(sizes)] for n in kept]
 
 
 def _split(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
 
+from ptmtools.texture.profiles import PROFILES
 from ptmtools.texture.samples import KINDS
 
 #: Longest side of an image, texels.
@@ -22,22 +22,22 @@ class EncodeOptions:
 
     Attributes
     ----------
-    profile: "fast" (compressed), "small" (smaller still, and slow), "raw" (the paper's layout,
-        §4.3) or "paper" (the same with lossless JPEG, for comparison).
-    max_error: no sample of any level differs by more than this from that of the exact pyramid; 0 is
-        lossless. For integer samples only.
-    tile: levels with a side of more than twice this many texels are coded in tiles of this side,
-        each by itself: in parallel, in bounded memory and open to random access. 0 means never.
-    min_side: levels go down to the last one whose shorter side is at least this, texels. 1 stores
-        every level; a client computes the missing ones with the 2×2 mean.
-    max_side: levels whose longer side is above this are left out; 0 keeps all of them.
-    min_level, max_level: the same by number: levels below ``min_level`` and above ``max_level`` are
-        left out, counted from the coarsest of all, 0; -1 is the finest, -2 the next. What is left
-        is renumbered from 0, and the header keeps the size of the original. An image without such a
-        level keeps the nearest that it has, and so it is with sides.
+    profile: how the levels are coded
+    max_error: how far any sample of any level may be from its exact value; 0 is lossless. Larger
+        values make smaller files (4 of 255 is hard to see and halves most of them). Integers only.
+    tile: side of the tiles, texels. A level of more than twice that is cut into tiles that are
+        coded one by one, which allows parallel work, bounded memory and random access. 0 for none.
+    min_side: leave out levels whose shorter side is below this, texels; whoever needs them can
+        compute them.
+    max_side: leave out levels whose longer side is above this, texels; 0 keeps all. Sides halve
+        from level to level, so the finest that is kept may be much smaller.
+    min_level: the coarsest level to keep: 0 is the coarsest of all, -1 the finest, -2 the one
+        below it. An image without such a level keeps the nearest that it has.
+    max_level: the finest level to keep, counted likewise. Levels that are kept are numbered from
+        0 again; the file still tells the size of the original.
     """
 
-    profile: Literal["fast", "small", "raw", "paper"] = "fast"
+    profile: str = field(default="fast", metadata={"choices": PROFILES})
     max_error: int = 0
     tile: int = 512
     min_side: int = 1
@@ -61,7 +61,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Description:
-    """What a file says of its texels besides their numbers; none of it changes a texel.
+    """How the texels are to be shown, as the image file said; none of it changes a texel.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class PtmHeader:
     width, height: size of the original image, texels.
     components: 1 grey, 2 grey and alpha (or any two), 3 RGB, 4 RGB and alpha.
     kind: of the samples, one of `ptmtools.texture.samples.KINDS`: the name of a numpy type.
-    profile: how the groups are coded.
+    profile: how the groups are coded, a name in `ptmtools.texture.profiles.PROFILES`.
     version: of the container.
     trimmed: how many of the finest levels of the original were left out on purpose.
     tile: side of the tiles of a level that has several; 0 if none has.

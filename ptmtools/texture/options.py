@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import fields
 
 from ptmtools.errors import InputError
-from ptmtools.texture.model import TILE_SIDES, EncodeOptions
-from ptmtools.texture.profiles import EXACT_PROFILES, PROFILE_NUMBERS, Profile, profile_named
+from ptmtools.texture.model import TILE_SIDES, EncodeOptions, PtmHeader
+from ptmtools.texture.profiles import PROFILES, Coder
 from ptmtools.texture.pyramid import level_sizes
 from ptmtools.texture.rows import ImageRows
 from ptmtools.texture.samples import KINDS
@@ -18,9 +18,9 @@ def check_options(options: EncodeOptions) -> None:
         value = getattr(options, field.name)
         if isinstance(field.default, int) and type(value) is not type(field.default):
             raise _impossible(f"{field.name} is {value!r}", "it must be a whole number")
-    if options.profile not in PROFILE_NUMBERS:
+    if options.profile not in PROFILES:
         raise _impossible(
-            f"there is no profile {options.profile!r}", f"use one of {', '.join(PROFILE_NUMBERS)}"
+            f"there is no profile {options.profile!r}", f"use one of {', '.join(PROFILES)}"
         )
     if options.min_side < 1 or options.max_side < 0:
         raise _impossible(
@@ -38,14 +38,15 @@ def check_options(options: EncodeOptions) -> None:
         )
     if options.max_error < 0:
         raise _impossible("an error below 0 is impossible", "use 0 for none")
-    if options.max_error and options.profile in EXACT_PROFILES:
+    if options.max_error and not PROFILES[options.profile].lossy:
+        others = " or ".join(name for name, profile in PROFILES.items() if profile.lossy)
         raise _impossible(
-            f"profile {options.profile!r} is always exact", "use fast or small with an error"
+            f"profile {options.profile!r} is always exact", f"use {others} with an error"
         )
 
 
-def checked_profile(options: EncodeOptions, image: ImageRows) -> Profile:
-    """The profile of the options. Raises InputError PTM-I111 for what cannot be."""
+def checked_coder(options: EncodeOptions, image: ImageRows) -> Coder:
+    """What codes an image as the options say. Raises InputError PTM-I111 for what cannot be."""
     check_options(options)
     top = KINDS[image.dtype.name].top_error
     if options.max_error > top:
@@ -53,7 +54,7 @@ def checked_profile(options: EncodeOptions, image: ImageRows) -> Profile:
             f"an error of {options.max_error} cannot be allowed for {image.dtype.name} samples",
             f"use a number from 0 to {top}" if top else "use 0: floats are kept exactly",
         )
-    return profile_named(options.profile)
+    return PROFILES[options.profile].coder
 
 
 def _impossible(what: str, remedy: str) -> InputError:
@@ -73,3 +74,13 @@ def kept_levels(width: int, height: int, options: EncodeOptions) -> list[int]:
     kept = [n for n in range(first, last + 1) if min(sizes[n]) >= options.min_side] or [last]
     small = [n for n in kept if not options.max_side or max(sizes[n]) <= options.max_side]
     return small or kept[:1]
+
+
+def level_above(header: PtmHeader) -> tuple[int, int, int] | None:
+    """Of the coarsest level that was left out on purpose above those in the file: width, height,
+    and about how many bytes it would take, judged by the level below it. None if there is none."""
+    if not header.trimmed:
+        return None
+    width, height = level_sizes(header.width, header.height)[-header.trimmed]
+    finest = header.levels[-1]
+    return width, height, finest.length * width * height // (finest.width * finest.height)

@@ -25,7 +25,7 @@ from ptmtools.texture.container import (
 from ptmtools.texture.description import parse_description
 from ptmtools.texture.model import Description, Level, Limits, PtmHeader
 from ptmtools.texture.parallel import ordered
-from ptmtools.texture.profiles import Profile, Tile, profile_named
+from ptmtools.texture.profiles import PROFILES, Tile
 from ptmtools.texture.sources import Ranges, Source, ranges_of
 from ptmtools.texture.tiling import Box, covering, tiles_under
 
@@ -77,7 +77,7 @@ class PtmReader:
         #: Where the file ends, once a source of unknown size has come to its end.
         self._end: int | None = None
         self.header: PtmHeader = read_header(ranges.read(0, HEAD_MAX))
-        self._profile: Profile = profile_named(self.header.profile)
+        self._coder = PROFILES[self.header.profile].coder
 
     def __enter__(self) -> PtmReader:
         return self
@@ -264,7 +264,7 @@ class PtmReader:
         if below is None:
             data = self._checked(level.offset, level.length, level.crc32, place)
             with naming(place=place):
-                texels = self._profile.decode_base(data, shape, self.dtype)
+                texels = self._coder.decode_base(data, shape, self.dtype)
             return _State(texels[box.slices], box, None)
         if not level.tiled:
             data = self._checked(level.offset, level.length, level.crc32, place)
@@ -310,7 +310,7 @@ class PtmReader:
                 raise damaged("it is neither exact nor within the error")
             max_error = max_error if data[0] == WITHIN else 0
             data = data[1:]
-        return self._profile.decode_tile(data, below, shape, max_error, memory, threads)
+        return self._coder.decode_tile(data, below, shape, max_error, memory, threads)
 
     def _index(self, level: Level, place: str) -> _Index:
         """Offset, length and CRC-32 of every tile of a level."""

@@ -5,10 +5,11 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from threading import Lock
-from typing import BinaryIO, Protocol
+from typing import Any, BinaryIO
 
 from ptmtools.errors import InputError
 
@@ -18,103 +19,29 @@ RangeReader = Callable[[int, int], bytes]
 Source = str | os.PathLike[str] | bytes | bytearray | memoryview | BinaryIO | RangeReader
 
 
-class Ranges(Protocol):
-    """A file that can be read in pieces, from several threads."""
+class Ranges:
+    """A file that can be read in pieces, from several threads.
 
-    name: str | None
+    Attributes
+    ----------
+    name: of the file, for messages; None if it has none.
+    read: that range of it; shorter only where it ends. Raises InputError PTM-I122.
+    size: bytes there are, now; None if that is not known before reading them.
+    close: nothing is read any more.
+    """
 
-    def read(self, offset: int, length: int) -> bytes:
-        """That range of the file; shorter only where the file ends."""
-
-    def size(self) -> int | None:
-        """Bytes there are; None if that is not known before reading them."""
-
-    def close(self) -> None:
-        """Nothing is read any more."""
-
-
-class Bytes:
-    """A file that lies in memory."""
-
-    name: str | None = None
-
-    def __init__(self, data: bytes | bytearray | memoryview) -> None:
-        view = memoryview(data)
-        self._data = (view if view.c_contiguous else memoryview(bytes(view))).cast("B")
-
-    def read(self, offset: int, length: int) -> bytes:
-        """See `Ranges`."""
-        return bytes(self._data[offset : offset + length])
-
-    def size(self) -> int:
-        """See `Ranges`."""
-        return len(self._data)
-
-    def close(self) -> None:
-        """See `Ranges`."""
-
-
-class File:
-    """An open file that can seek. It is closed with this only if it was opened by it."""
-
-    def __init__(self, file: BinaryIO, name: str | None = None, own: bool = False) -> None:
-        self.name = name
-        self._file = file
-        self._own = own
-        self._lock = Lock()
-
-    def read(self, offset: int, length: int) -> bytes:
-        """See `Ranges`. Raises InputError PTM-I122."""
-        with self._lock, self._refusing():
-            self._file.seek(offset)
-            return self._file.read(length)
-
-    def size(self) -> int:
-        """See `Ranges`. Raises InputError PTM-I122."""
-        with self._lock, self._refusing():
-            return self._file.seek(0, os.SEEK_END)
-
-    @contextlib.contextmanager
-    def _refusing(self) -> Iterator[None]:
-        try:
-            yield
-        except (OSError, ValueError) as error:  # ValueError: it is closed
-            reason = getattr(error, "strerror", None) or error
-            raise InputError("PTM-I122", f"cannot be read ({reason})", file=self.name) from None
-
-    def close(self) -> None:
-        """See `Ranges`."""
-        if self._own:
-            self._file.close()
-
-
-class Callback:
-    """Ranges that the caller reads, over a network for instance."""
-
-    name: str | None = None
-
-    def __init__(self, read: RangeReader) -> None:
-        self._read = read
-
-    def read(self, offset: int, length: int) -> bytes:
-        """See `Ranges`. Raises InputError PTM-I122 if no bytes are given."""
-        found: object = self._read(offset, length)
-        if not isinstance(found, bytes | bytearray | memoryview):
-            raise InputError(
-                "PTM-I122", f"what reads ranges gave {type(found).__name__} instead of bytes"
-            )
-        # More than was asked for is no harm: some servers send all there is.
-        return bytes(found)[:length]
-
-    def size(self) -> None:
-        """See `Ranges`."""
-
-    def close(self) -> None:
-        """See `Ranges`."""
+    def __init__(
+        self,
+        read: RangeReader,
+        size: Callable[[], int | None] = lambda: None,
+        close: Callable[[], object] = lambda: None,
+        name: str | None = None,
+    ) -> None:
+        self.read, self.size, self.close, self.name = read, size, close, name
 
 
 def ranges_of(source: Source) -> Ranges:
-    """``source`` as something to read ranges from.
+    """``source`` as something to read ranges from; `Ranges.close` closes what this has opened.
 
     Raises
     ------
@@ -122,11 +49,14 @@ def ranges_of(source: Source) -> Ranges:
     TypeError: for what is none of the kinds of `Source`; text files are not.
     """
     if isinstance(source, bytes | bytearray | memoryview):
-        return Bytes(source)
+        view = memoryview(source)
+        flat = (view if view.c_contiguous else memoryview(bytes(view))).cast("B")
+        return Ranges(lambda offset, length: bytes(flat[offset : offset + length]), flat.__len__)
     if isinstance(source, str | os.PathLike):
-        return File(open_file(source), os.fspath(source), own=True)
+        file = open_file(source)
+        return _ranges_of_file(file, file.close, os.fspath(source))
     if callable(source):
-        return Callback(source)
+        return Ranges(partial(_called, source))
     unknown: object = source
     if isinstance(unknown, io.TextIOBase) or not hasattr(source, "read"):
         raise TypeError(
@@ -134,8 +64,40 @@ def ranges_of(source: Source) -> Ranges:
             f"reads ranges, not from {type(source).__name__}"
         )
     if not (hasattr(source, "seekable") and source.seekable()):
-        return Bytes(source.read())
-    return File(source)
+        return ranges_of(source.read())
+    return _ranges_of_file(source)
+
+
+def _called(read: RangeReader, offset: int, length: int) -> bytes:
+    """What the caller's function gives, over a network for instance."""
+    found: object = read(offset, length)
+    if not isinstance(found, bytes | bytearray | memoryview):
+        raise InputError(
+            "PTM-I122", f"what reads ranges gave {type(found).__name__} instead of bytes"
+        )
+    # More than was asked for is no harm: some servers send all there is.
+    return bytes(found)[:length]
+
+
+def _ranges_of_file(
+    file: BinaryIO, close: Callable[[], object] = lambda: None, name: str | None = None
+) -> Ranges:
+    """An open file that can seek."""
+    lock = Lock()
+
+    def locked(action: Callable[..., Any], *where: int) -> Any:
+        try:
+            with lock:
+                return action(*where)
+        except (OSError, ValueError) as error:  # ValueError: it is closed
+            reason = getattr(error, "strerror", None) or error
+            raise InputError("PTM-I122", f"cannot be read ({reason})", file=name) from None
+
+    def read(offset: int, length: int) -> bytes:
+        file.seek(offset)
+        return file.read(length)
+
+    return Ranges(partial(locked, read), partial(locked, file.seek, 0, os.SEEK_END), close, name)
 
 
 def open_file(path: str | os.PathLike[str]) -> BinaryIO:

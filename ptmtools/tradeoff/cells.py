@@ -1,8 +1,8 @@
 """What the knobs of the subdivision buy.
 
-There is no right subdivision to compare with: what is to be wished is that little of the building
-has to be at hand. The error of a setting is the share of the volume that a viewer anywhere may see,
-weighted by the volume of where he stands.
+There is no right subdivision to compare with; what matters is that a client needs little of the
+building in memory. The error of a setting is the share of the building's volume that is potentially
+visible from a viewer's cell, on average over all places where he may be.
 """
 
 from __future__ import annotations
@@ -13,8 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from ptmtools.cells import SubdivideOptions, subdivide
+from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.scene.model import Scene
 from ptmtools.tradeoff.experiment import Measured, Setting, timed
+from ptmtools.tradeoff.experiments import Subject
 from ptmtools.visibility.options import PvsOptions
 from ptmtools.visibility.pvs import compute_pvs
 
@@ -22,17 +24,21 @@ from ptmtools.visibility.pvs import compute_pvs
 WARM = 4
 
 
-class CellsTrade:
-    """The experiment of the stage ``cells``."""
+def prepare(subject: Subject) -> CellsTrade:
+    """See `EXPERIMENTS`."""
+    return CellsTrade(subject.artifacts[SCENE], subject.options(CELLS))
 
-    stage = "cells"
+
+class CellsTrade:
+    """The experiment of the subdivision."""
+
     work = "leaves"
-    error = "volume at hand"
+    error = "share of the building that a viewer may see"
     reference_error = 0.0
 
     def __init__(self, scene: Scene, options: SubdivideOptions) -> None:
         self._scene, self._options = scene, options
-        few = subdivide(scene, replace(options, max_cells=WARM))
+        few = subdivide(scene, replace(options, max_leaves=WARM))
         compute_pvs(few, PvsOptions(method="fast"))  # now both are compiled
 
     def settings(self) -> Sequence[Setting]:

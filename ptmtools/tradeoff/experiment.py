@@ -1,6 +1,6 @@
 """What a stage's knobs buy: cost against error on the user's own scene.
 
-A stage declares an `Experiment`: which settings of its knobs are worth trying, what each costs, and
+A stage has an `Experiment`: which settings of its knobs are worth trying, what each costs, and
 how far its result is from a reference that does not depend on the knobs. What to make of that is
 the same for all: which settings no other beats (the Pareto front), how the error falls with the
 work (a fitted power), and which is the cheapest for a wanted error.
@@ -9,8 +9,10 @@ work (a fitted power), and which is the cheapest for a wanted error.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from statistics import linear_regression
 from typing import Any, Protocol
 
 from ptmtools.progress import Progress, silent
@@ -44,8 +46,9 @@ class Measured:
     seconds: of one process, for the whole database.
     work: in the units that the experiment names; does not depend on the machine.
     error: as the experiment names it; the mean over what was looked at.
-    worst: the greatest of them.
+    worst: the greatest error of them.
     more: other figures, by name.
+    note: how it was done, where that may differ.
     """
 
     seconds: float
@@ -53,6 +56,7 @@ class Measured:
     error: float
     worst: float
     more: Mapping[str, float] = field(default_factory=dict)
+    note: str = ""
 
 
 class Experiment(Protocol):
@@ -60,12 +64,10 @@ class Experiment(Protocol):
 
     Attributes
     ----------
-    stage: its name.
     work, error: what is counted, and what the error is, with their units.
     reference_error: the standard error of the reference itself, 0 where it is exact.
     """
 
-    stage: str
     work: str
     error: str
     reference_error: float
@@ -92,7 +94,8 @@ class Trade:
 
     Attributes
     ----------
-    stage, work, error, reference_error: as in `Experiment`.
+    stage: its name.
+    work, error, reference_error: as in `Experiment`.
     trials: by cost.
     rates: family → exponent b of error ∝ work^b, by least squares over the logarithms of trials
         that are above twice the error of the reference.
@@ -110,15 +113,15 @@ class Trade:
         return next((t for t in self.trials if t.best and t.measured.error <= error), None)
 
 
-def run(experiment: Experiment, progress: Progress = silent) -> Trade:
-    """Tries all settings of an experiment."""
+def run(stage: str, experiment: Experiment, progress: Progress = silent) -> Trade:
+    """Tries all settings of a stage's experiment."""
     settings = experiment.settings()
     trials = []
     for i, setting in enumerate(settings):
         trials.append(Trial(setting, experiment.measure(setting)))
-        progress(i + 1, len(settings), f"trying {experiment.stage}")
+        progress(i + 1, len(settings), f"trying {stage}")
     return Trade(
-        experiment.stage,
+        stage,
         experiment.work,
         experiment.error,
         experiment.reference_error,
@@ -142,29 +145,22 @@ def pareto(trials: Sequence[Trial]) -> tuple[Trial, ...]:
 def rates(trials: Sequence[Trial], above: float) -> dict[str, float]:
     """See `Trade.rates`; families of fewer than three trials with errors greater than ``above``
     have none."""
-    families: dict[str, list[tuple[float, float]]] = {}
+    families: dict[str, tuple[list[float], list[float]]] = {}
     for trial in trials:
         m = trial.measured
         if trial.setting.family and m.error > above and m.work > 0:
-            families.setdefault(trial.setting.family, []).append((m.work, m.error))
+            work, error = families.setdefault(trial.setting.family, ([], []))
+            work.append(math.log(m.work))
+            error.append(math.log(m.error))
     return {
-        name: slope([math.log(w) for w, _ in points], [math.log(e) for _, e in points])
-        for name, points in families.items()
-        if len({w for w, _ in points}) >= 3
+        name: linear_regression(work, error).slope
+        for name, (work, error) in families.items()
+        if len(set(work)) >= 3
     }
-
-
-def slope(x: Sequence[float], y: Sequence[float]) -> float:
-    """Of the line of least squares through points (x, y)."""
-    mean_x, mean_y = sum(x) / len(x), sum(y) / len(y)
-    across = sum((a - mean_x) ** 2 for a in x)
-    return sum((a - mean_x) * (b - mean_y) for a, b in zip(x, y, strict=True)) / across
 
 
 def timed(work: Callable[[], Any]) -> tuple[Any, float]:
     """What ``work`` returns, and the processor seconds of this process that it took."""
-    import time
-
     start = time.process_time()
     found = work()
     return found, time.process_time() - start

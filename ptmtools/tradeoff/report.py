@@ -15,7 +15,7 @@ def table(trade: Trade, wanted: float | None = None) -> list[str]:
     names = [t.setting.name for t in trade.trials]
     wide = max(map(len, [*names, "setting"]))
     lines = [
-        f"{trade.stage}: {trade.error}, against CPU seconds of one core and {trade.work}",
+        f"{trade.stage}: error is the {trade.error}; work counts {trade.work}; seconds of one core",
         f"  {'setting':<{wide}}  {'seconds':>9} {'work':>11} {'error':>8} {'worst':>8}",
     ]
     for trial in trade.trials:
@@ -24,16 +24,18 @@ def table(trade: Trade, wanted: float | None = None) -> list[str]:
         more = "".join(f"  {k} {v:.3g}" for k, v in m.more.items() if v)
         lines.append(
             f"{star} {trial.setting.name:<{wide}}  {m.seconds:9.2f} {m.work:11,.0f} "
-            f"{m.error:8.4f} {m.worst:8.4f}{more}"
+            f"{m.error:8.4f} {m.worst:8.4f}{more}  {m.note}".rstrip()
         )
     if trade.reference_error:
-        lines.append(f"  the reference's own standard error: {trade.reference_error:.4f}")
+        lines.append(f"  standard error of the reference: {trade.reference_error:.4f}")
     for family, rate in trade.rates.items():
         lines.append(f"  {family}: error ∝ work^{rate:.2f}")
     if wanted is not None:
         found = trade.cheapest(wanted)
-        told = found.setting.name if found else "none of these; the least error is the last star's"
-        lines.append(f"  cheapest for an error of at most {wanted:g}: {told}")
+        answer = (
+            found.setting.name if found else "none of these; the last one with a star is nearest"
+        )
+        lines.append(f"  cheapest for an error of at most {wanted:g}: {answer}")
     return lines
 
 
@@ -58,8 +60,8 @@ def as_csv(trades: Sequence[Trade]) -> str:
     for trade in trades:
         for trial in trade.trials:
             m = trial.measured
-            more = " ".join(f"{k}={v:.6g}" for k, v in m.more.items())
-            figures = [f"{m.seconds:.4f}", f"{m.work:.6g}", trade.work, f"{m.error:.6g}"]
-            told = [f"{m.worst:.6g}", trade.error, int(trial.best), more]
-            rows.writerow([trade.stage, trial.setting.name, *figures, *told])
+            more = " ".join([*(f"{k}={v:.6g}" for k, v in m.more.items()), m.note]).strip()
+            cost = [f"{m.seconds:.4f}", f"{m.work:.6g}", trade.work]
+            error = [f"{m.error:.6g}", f"{m.worst:.6g}", trade.error]
+            rows.writerow([trade.stage, trial.setting.name, *cost, *error, int(trial.best), more])
     return text.getvalue()

@@ -1,8 +1,8 @@
 """What the profiles of the textures buy.
 
-All of them give the pixels back as exactly as is asked for (the profile raw always to the bit), so
-what is to be wished is few bytes. The error of a
-setting is the bytes of all levels over those of the finest level as it is.
+All of them give the pixels back as exactly as was asked for (the profile raw always to the bit), so
+what matters is few bytes. The error of a setting is the bytes of all levels over those of the
+uncompressed finest level.
 """
 
 from __future__ import annotations
@@ -12,20 +12,26 @@ from dataclasses import replace
 
 import numpy as np
 
+from ptmtools.pipeline.stages import SCENE, TEXTURES
 from ptmtools.scene.model import SourceImage
 from ptmtools.texture import EncodeOptions, encode, read_image
 from ptmtools.tradeoff.experiment import Measured, Setting, timed
+from ptmtools.tradeoff.experiments import Subject
 
 #: Texels a side that are encoded of an image.
 CORNER = 512
 
 
-class TexturesTrade:
-    """The experiment of the stage ``textures``."""
+def prepare(subject: Subject) -> TexturesTrade:
+    """See `EXPERIMENTS`."""
+    return TexturesTrade(subject.artifacts[SCENE].images, subject.options(TEXTURES))
 
-    stage = "textures"
+
+class TexturesTrade:
+    """The experiment of the texture profiles."""
+
     work = "texels"
-    error = "bytes stored, of those of the finest level"
+    error = "bytes of all levels, as a share of the uncompressed finest"
     reference_error = 0.0
 
     def __init__(

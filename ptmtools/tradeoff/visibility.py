@@ -1,8 +1,8 @@
 """What the knobs of the visibility buy.
 
 The reference is the full search with a budget that hardly any portal exhausts. The error of a
-setting is the share of its pairs of cells that are too many, or for sampled lines of those that are
-missing, which is worse: a client that loads by such a set shows holes.
+setting is its number of wrong pairs of cells over that of the right ones: pairs too many, or with
+sampled lines also missing ones, which is worse: a client that loads by such a set shows holes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from ptmtools.cells.model import Cells
+from ptmtools.pipeline.stages import CELLS, PVS
 from ptmtools.tradeoff.experiment import Measured, Setting, timed
+from ptmtools.tradeoff.experiments import Subject
 from ptmtools.visibility.options import PvsOptions
 from ptmtools.visibility.pvs import compute_pvs
 
@@ -25,12 +27,16 @@ BUDGETS = (200, 2_000, 20_000, 200_000)
 _BASE = PvsOptions(exact=True)
 
 
-class VisibilityTrade:
-    """The experiment of the stage ``pvs``."""
+def prepare(subject: Subject) -> VisibilityTrade:
+    """See `EXPERIMENTS`."""
+    return VisibilityTrade(subject.artifacts[CELLS], subject.options(PVS))
 
-    stage = "pvs"
+
+class VisibilityTrade:
+    """The experiment of the visibility."""
+
     work = "operations"
-    error = "pairs too many, or missing"
+    error = "wrong pairs of cells, as a share of the right ones"
     reference_error = 0.0
 
     def __init__(self, cells: Cells, options: PvsOptions) -> None:

@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.tolerance import Tolerance
+from ptmtools.tolerance import ROUNDING_SHARE, Tolerance
 from ptmtools.visibility.storage import Geometry
 
 Point = tuple[int, int, int, int]
@@ -123,9 +123,8 @@ class ExactPortals:
         points = g.point[g.start[k] : g.start[k + 1]]
         inward = g.ball[k, :3] - points
         way = np.linalg.norm(inward, axis=1, keepdims=True)
-        share = np.divide(
-            Tolerance.for_points(g.point).noise, way, out=np.ones_like(way), where=way > 0
-        )
+        noise = Tolerance.for_extent(g.slack / ROUNDING_SHARE).noise
+        share = np.divide(noise, way, out=np.ones_like(way), where=way > 0)
         moved: NDArray[np.float64] = points + np.minimum(share, 1.0) * inward
         return moved
 

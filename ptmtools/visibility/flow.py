@@ -70,6 +70,7 @@ class Portals:
     normal: (K, 3) normals pointing from ``leaf[:, 0]`` into ``leaf[:, 1]``.
     point: (Q, 3) float64 convex polygons, either orientation.
     start: (K + 1,) CSR over portals into `point`.
+    tolerance: that of the cells; if not given, it is derived from the points.
     """
 
     leaf_count: int
@@ -77,6 +78,7 @@ class Portals:
     normal: NDArray[np.float64]
     point: NDArray[np.float64]
     start: NDArray[np.int64]
+    tolerance: Tolerance | None = None
 
 
 @dataclass(frozen=True)
@@ -233,7 +235,7 @@ def geometry(portals: Portals) -> Geometry:
     enters = portals.leaf[:, ::-1].reshape(-1).astype(np.int64)
     leaves = portals.leaf.reshape(-1)
     out = np.argsort(leaves, kind="stable")
-    tolerance = Tolerance.for_points(point)
+    tolerance = portals.tolerance or Tolerance.for_points(point)
     radius = np.maximum.reduceat(reach, start[:-1]) + tolerance.rounding
     return Geometry(
         point=np.ascontiguousarray(point),

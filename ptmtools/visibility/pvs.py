@@ -73,6 +73,7 @@ def portals_of(cells: Cells) -> Portals:
         normal=cells.portal_plane.reshape(-1, 4)[:, :3],
         point=cells.portal_point.reshape(-1, 3),
         start=cells.portal_start,
+        tolerance=cells.tolerance,
     )
 
 

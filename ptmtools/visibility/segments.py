@@ -28,7 +28,6 @@ from numpy.typing import NDArray
 from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
-from ptmtools.tolerance import Tolerance
 from ptmtools.visibility.model import Pvs
 
 #: Segments drawn and shot at a time.
@@ -117,7 +116,7 @@ def check_conservative(
     visible = pvs.to_matrix()
     draw = Sampler(cells)
     blockers = Blockers(structural, cells.root_box)
-    jitter = JITTER * Tolerance.for_points(cells.root_box).hairline
+    jitter = JITTER * cells.tolerance.hairline
     tried = unoccluded = hairlines = drawn = batch = 0
     counts: dict[tuple[int, int], int] = {}
     example: dict[tuple[int, int], tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
@@ -226,7 +225,7 @@ class Blockers:
 
         corners = np.concatenate([structural.reshape(-1, 3), box])
         self._middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
-        self._scale = 1 / Tolerance.for_points(corners).extent
+        self._scale = 1 / (float(np.ptp(corners, axis=0).max()) or 1.0)
         self._scene: Any = None
         if len(structural):
             self._scene = EmbreeScene(robust=True)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
 import pytest
 
-from ptmtools.scene.model import Material, Scene
+from ptmtools.scene.model import Scene
+from tests.conftest import scene_of
 
 Corner = Sequence[float]
 BuildScene = Callable[..., Scene]
@@ -15,37 +15,8 @@ BuildScene = Callable[..., Scene]
 
 @pytest.fixture(scope="session")
 def quads() -> BuildScene:
-    """``quads(corners, objects=None, materials=None, material=None)``: a scene of 4-corner faces.
-
-    ``corners`` is (n, 4, 3); ``objects`` one name per face; ``material`` one index per face.
-    Texture coordinates are (0,0) (1,0) (1,1) (0,1).
-    """
-
-    def build(
-        corners: Sequence[Sequence[Corner]],
-        objects: Sequence[str] | None = None,
-        materials: Sequence[Material] = (Material("plain"),),
-        material: Sequence[int] | None = None,
-    ) -> Scene:
-        points = np.array(corners, dtype=np.float64)
-        n = len(points)
-        loop = np.array([[0, 1, 2], [0, 2, 3]])
-        names = list(objects or [f"quad{i}" for i in range(n)])
-        corner_uv = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float64)
-        return Scene(
-            points=points.reshape(-1, 3),
-            triangles=(4 * np.arange(n)[:, None, None] + loop).reshape(-1, 3).astype(np.int32),
-            uv=np.tile(corner_uv[loop], (n, 1, 1)),
-            triangle_object=np.repeat(np.arange(n), 2).astype(np.int32),
-            triangle_material=np.repeat(
-                np.zeros(n, np.int32) if material is None else np.array(material, np.int32), 2
-            ),
-            two_sided=np.ones(2 * n, dtype=bool),
-            objects=tuple(names),
-            materials=tuple(materials),
-        )
-
-    return build
+    """``quads(corners, objects=None, materials=…, material=None)``: see `scene_of`."""
+    return scene_of
 
 
 def box(low: Corner, high: Corner, leave_out: str = "") -> list[list[list[float]]]:

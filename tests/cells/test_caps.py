@@ -1,4 +1,4 @@
-"""Matter that only a polygon smaller than a wall closes, and what is not closed."""
+"""Solids that only a polygon smaller than a wall closes, and what is not closed."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from ptmtools.cells import Cells, subdivide
-from ptmtools.tolerance import Tolerance
 
 
 def ramp(x0: float, x1: float) -> list[list[float]]:
@@ -49,7 +48,7 @@ def test_the_edge_of_a_slab_closes_it_beside_a_slope(quads, room_faces) -> None:
 @pytest.mark.parametrize("gap", [0.001, 0.1])
 def test_an_edge_with_a_gap_is_no_cap(quads, room_faces, gap: float) -> None:
     scene = quads(hall(room_faces, [upright(4, 3, 3.3, -2, 1), upright(4, 3, 3.3, 1 + gap, 2)]))
-    assert gap > Tolerance.for_points(scene.points).hairline
+    assert gap > scene.tolerance.hairline
     assert all(leaf_at(subdivide(scene), p) >= 0 for p in IN_THE_SLAB)
 
 

@@ -6,27 +6,13 @@ import numpy as np
 import pytest
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
-from ptmtools.scene.model import Material, Scene
+from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance
 from ptmtools.visibility import check_conservative, compute_pvs
+from tests.conftest import scene_of
 
 LEAF = SubdivideOptions(cells="leaf")
 LOW, HIGH = (0, 0, -2), (8, 4, 2)
-
-
-def triangles(corners: np.ndarray) -> Scene:
-    """A scene of (n, 3, 3) corners, one object and one material."""
-    count = len(corners)
-    return Scene(
-        points=corners.reshape(-1, 3).astype(np.float64),
-        triangles=np.arange(3 * count, dtype=np.int32).reshape(-1, 3),
-        uv=np.zeros((count, 3, 2)),
-        triangle_object=np.zeros(count, dtype=np.int32),
-        triangle_material=np.zeros(count, dtype=np.int32),
-        two_sided=np.ones(count, dtype=bool),
-        objects=("all",),
-        materials=(Material("plain"),),
-    )
 
 
 def assert_sound(scene: Scene, cells: Cells, segments: int = 20_000) -> None:
@@ -76,7 +62,7 @@ def test_a_wall_of_a_hundred_thousand_slivers(quads, room_faces) -> None:
         corners += [np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)]
     shell = quads(room_faces(LOW, HIGH))
     lintel = np.array([[[4, 3, -1], [4, 4, -1], [4, 4, 1]], [[4, 3, -1], [4, 4, 1], [4, 3, 1]]])
-    scene = triangles(np.concatenate([shell.corners, *corners, lintel]))
+    scene = scene_of(np.concatenate([shell.corners, *corners, lintel]))
     assert len(scene.triangles) > 100_000
     cells = subdivide(scene, LEAF)
     assert cells.leaf_count == 2
@@ -106,7 +92,7 @@ def test_a_room_shaped_like_a_ball() -> None:
     ball = 6 * np.stack([np.sin(ring) * np.cos(step), np.cos(ring), np.sin(ring) * np.sin(step)], 2)
     a, b, c, d = ball[:-1, :-1], ball[1:, :-1], ball[1:, 1:], ball[:-1, 1:]
     corners = np.concatenate([np.stack([a, b, c], 2), np.stack([a, c, d], 2)]).reshape(-1, 3, 3)
-    scene = triangles(corners)
+    scene = scene_of(corners)
     assert len(scene.triangles) > 20_000
     cells = subdivide(scene)
     assert cells.cell_count == 1
@@ -118,7 +104,7 @@ def test_triangles_without_area_change_nothing(quads, room_faces, partition) -> 
     scene = quads(room_faces(LOW, HIGH) + partition(4, (0, 3, -1, 1)))
     needles = np.array([[[1, 1, 0], [1, 1, 0], [2, 1, 0]], [[1, 2, 1], [2, 2, 1], [3, 2, 1]]])
     one, other = (
-        subdivide(triangles(np.concatenate([scene.corners, more])), LEAF)
+        subdivide(scene_of(np.concatenate([scene.corners, more])), LEAF)
         for more in (needles[:0], needles)
     )
     assert np.array_equal(one.portal_point, other.portal_point)

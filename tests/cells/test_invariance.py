@@ -22,10 +22,10 @@ import pytest
 import shapely
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
-from ptmtools.cells.orientation import main_axes
 from ptmtools.cells.planar import intersection, neighbours, union
 from ptmtools.scene import IngestOptions, Scene, ingest
-from ptmtools.tolerance import Tolerance, ranked
+from ptmtools.scene.orientation import main_axes
+from ptmtools.tolerance import ranked
 from ptmtools.visibility import Pvs, compute_pvs
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -50,7 +50,7 @@ class Model:
 
     @property
     def extent(self) -> float:
-        return Tolerance.for_points(self.scene.points).extent
+        return self.scene.tolerance.extent
 
 
 METRES = IngestOptions(unit="m", up="y")
@@ -166,7 +166,7 @@ def test_another_size(models: dict[str, Model], name: str, scale: float) -> None
         wall_area=ROOMS.wall_area * scale**2,
         wall_thickness=ROOMS.wall_thickness * scale,
     )
-    scene = replace(model.scene, points=model.scene.points * scale)
+    scene = model.scene.with_points(model.scene.points * scale)
     assert_same(model, subdivide(scene, options), lambda p: p * scale, scale)
 
 
@@ -226,7 +226,7 @@ def turned(model: Model, turn: np.ndarray, upright: bool = True) -> None:
     def there(points: np.ndarray) -> np.ndarray:
         return points @ turn.T
 
-    scene = replace(model.scene, points=there(model.scene.points))
+    scene = model.scene.with_points(there(model.scene.points))
     assert model.cells.closed
     assert_same(model, subdivide(scene, ROOMS), there, upright=upright)
 
@@ -253,18 +253,18 @@ def test_a_real_model_that_is_open(shared: Path, name: str, change: str) -> None
     if change == "unit":
         scale = 1e-6 if name == "hospital" else 0.3048
         options = replace(ROOMS, wall_area=2 * scale**2, wall_thickness=0.5 * scale)
-        scene = replace(model.scene, points=points * scale)
+        scene = model.scene.with_points(points * scale)
         assert_same(model, subdivide(scene, options), lambda p: p * scale, scale)
     elif change.startswith("far"):
         extents = 1e4 if (name, change) == ("hospital", "far") else 1e6
         shift = extents * model.extent * np.array([1.0, 0.9, -1.1])
-        scene = replace(model.scene, points=(points + shift) - shift)
+        scene = model.scene.with_points((points + shift) - shift)
         assert_same(model, subdivide(scene, ROOMS), lambda p: p, place=FAR_PLACE)
     else:
         axis, turns = change.split()
         turn = quarter_turns("xyz".index(axis), int(turns))
         upright = axis == "y" or turns == "2"
-        scene = replace(model.scene, points=points @ turn.T)
+        scene = model.scene.with_points(points @ turn.T)
         assert_same(model, subdivide(scene, ROOMS), lambda p: p @ turn.T, upright=upright)
 
 
@@ -319,5 +319,7 @@ def test_axes_are_the_buildings_own(room_row) -> None:
     axes = main_axes(scene.corners @ turn.T)
     assert np.allclose(axes @ axes.T, np.eye(3))
     assert np.allclose(np.sort(np.abs(axes @ turn), axis=1), [0, 0, 1])
+    turned = scene.with_points(scene.points @ turn.T)
+    assert turned.tolerance.extent == pytest.approx(scene.tolerance.extent)
     assert np.array_equal(main_axes(scene.corners[:2]), np.eye(3))  # one floor: no second axis
     assert np.array_equal(main_axes(np.zeros((0, 3, 3))), np.eye(3))

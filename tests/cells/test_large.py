@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.cells.polyhedron import Polyhedron
-from ptmtools.scene.model import Material, Scene
+from ptmtools.tolerance import Tolerance
 from ptmtools.visibility import PvsOptions, compute_pvs
 from ptmtools.visibility.segments import check_conservative
+from tests.conftest import scene_of
 
 #: Rooms along each side, and in the floor that is cut as well.
 MANY, FEW = 72, 9
@@ -50,21 +51,6 @@ def shell(side: int) -> NDArray[np.float64]:
                     faces.append(upright(across, at, left + DOOR, high, 0, HEIGHT))
     faces += [[(0, y, 0), (0, y, whole), (whole, y, whole), (whole, y, 0)] for y in (0, HEIGHT)]
     return np.array(faces, dtype=np.float64)
-
-
-def as_scene(quads: NDArray[np.float64]) -> Scene:
-    count = len(quads)
-    loop = np.array([[0, 1, 2], [0, 2, 3]])
-    return Scene(
-        points=quads.reshape(-1, 3),
-        triangles=(4 * np.arange(count)[:, None, None] + loop).reshape(-1, 3).astype(np.int32),
-        uv=np.zeros((2 * count, 3, 2)),
-        triangle_object=np.zeros(2 * count, dtype=np.int32),
-        triangle_material=np.zeros(2 * count, dtype=np.int32),
-        two_sided=np.ones(2 * count, dtype=bool),
-        objects=("floor",),
-        materials=(Material("plain"),),
-    )
 
 
 def as_cells(side: int) -> Cells:
@@ -126,6 +112,7 @@ def as_cells(side: int) -> Cells:
         triangle=empty.astype(np.int32),
         triangle_source=np.zeros(0, dtype=np.int32),
         triangle_cell=np.zeros((0, 2), dtype=np.int32),
+        tolerance=Tolerance.for_extent(side * WIDTH),
     )
 
 
@@ -139,7 +126,7 @@ def test_five_thousand_leaves() -> None:
     ends = many.portal_leaf
     assert visible[ends[:, 0], ends[:, 1]].all()
     assert visible.mean() < 0.05
-    corners = as_scene(shell(MANY)).corners
+    corners = scene_of(shell(MANY)).corners
     report = check_conservative(corners, many, pvs, segments=100_000)
     assert report.tried == 100_000
     assert report.unoccluded > 1000
@@ -148,7 +135,7 @@ def test_five_thousand_leaves() -> None:
 
 def test_cut_they_come_out_the_same() -> None:
     given = as_cells(FEW)
-    cut = subdivide(as_scene(shell(FEW)), SubdivideOptions(cells="leaf"))
+    cut = subdivide(scene_of(shell(FEW)), SubdivideOptions(cells="leaf"))
     assert cut.closed
     assert cut.leaf_count == given.leaf_count
     middles = np.array([given.leaf_points(k).mean(axis=0) for k in range(given.leaf_count)])
@@ -161,10 +148,10 @@ def test_cut_they_come_out_the_same() -> None:
 
 
 def test_a_limit_that_was_reached_is_said() -> None:
-    scene = as_scene(shell(4))
+    scene = scene_of(shell(4))
     whole = subdivide(scene, SubdivideOptions(cells="leaf"))
     assert not any("limit" in note for note in whole.notes)
-    cut = subdivide(scene, SubdivideOptions(cells="leaf", max_cells=10))
+    cut = subdivide(scene, SubdivideOptions(cells="leaf", max_leaves=10))
     (said,) = [note for note in cut.notes if "limit" in note]
     assert said.startswith("the limit of 10 leaves was reached: ")
-    assert "--max-cells" in said
+    assert "--max-leaves" in said

@@ -156,7 +156,7 @@ def test_the_same_cells_turned_and_in_other_units(
     options = replace(WHOLE, gain=0.05)
     here = subdivide(corridor, options)
     there = subdivide(
-        replace(corridor, points=corridor.points @ turn.T),
+        corridor.with_points(corridor.points @ turn.T),
         replace(options, wall_area=2 * scale**2, wall_thickness=0.5 * scale),
     )
     middle = np.array([here.leaf_points(i).mean(axis=0) for i in range(here.leaf_count)])

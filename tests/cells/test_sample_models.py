@@ -42,7 +42,7 @@ def test_a_museum_without_windows_is_closed_and_its_walls_are_nobodys(tmp_path: 
     scene = ingest(tmp_path / "m/museum.obj")
     cells = subdivide(scene)
     assert cells.closed
-    # Every wall between two rooms has faces on both sides; halfway through it is matter.
+    # Every wall between two rooms has faces on both sides; halfway through it is solid.
     names = np.array(scene.objects)[scene.triangle_object]
     walls = np.array(["_wall_" in name for name in names])
     corners = scene.corners[walls]

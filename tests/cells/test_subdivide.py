@@ -14,15 +14,6 @@ from ptmtools.scene.model import Material, Scene
 LEAF = SubdivideOptions(cells="leaf")
 
 
-def volume(cells: Cells, leaf: int) -> float:
-    centre = cells.leaf_points(leaf).mean(axis=0)
-    total = 0.0
-    for loop in cells.leaf_faces(leaf):
-        p = cells.leaf_point[loop] - centre
-        total += sum(float(np.linalg.det(p[[0, i, i + 1]])) for i in range(1, len(p) - 1))
-    return total / 6
-
-
 def piece_areas(cells: Cells) -> np.ndarray:
     p = cells.vertex[cells.triangle]
     return np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / 2
@@ -36,8 +27,7 @@ def test_a_row_of_rooms(room_row, rooms: int) -> None:
     assert cells.cell_count == rooms
     assert cells.portal_count == rooms - 1
     assert np.allclose(cells.portal_area, 6.0)
-    for leaf in range(rooms):
-        assert volume(cells, leaf) == pytest.approx(64)
+    assert np.allclose(cells.leaf_volumes(), 64)
     middles = np.array([[4 * i + 2.0, 2, 0] for i in range(rooms)])
     where = cells.locate(middles)
     assert sorted(where) == list(range(rooms))
@@ -64,7 +54,7 @@ def test_portals_lie_in_both_leaves_and_point_forward(room_row) -> None:
 
 
 @pytest.mark.parametrize("length", [4, 500])
-def test_walls_with_thickness_leave_solid_matter_out(quads, room_faces, length: float) -> None:
+def test_walls_with_thickness_leave_solids_out(quads, room_faces, length: float) -> None:
     # Two rooms 0.3 m apart, a door tunnel between them with jambs, floor and lintel. In a building
     # of 500 m 0.3 m is less than the cluster distance would be without a bound.
     left = room_faces((0, 0, -2), (4, 4, 2), "+x")
@@ -79,11 +69,11 @@ def test_walls_with_thickness_leave_solid_matter_out(quads, room_faces, length: 
     inside = cells.locate(np.array([[2.0, 1, 0], [4.15, 1, 0], [6, 1, 0]]))
     assert len(set(inside)) == 3
     assert np.all(inside >= 0)
-    # The doorway is a cell of its own; the matter around it and the outside are nobody's.
+    # The doorway is a cell of its own; the solid around it and the outside are nobody's.
     assert cells.cell_count == 3
-    matter = [[4.15, 3.5, 0], [4.15, 1, 1.5], [4.15, 1, -1.5]]
+    solid = [[4.15, 3.5, 0], [4.15, 1, 1.5], [4.15, 1, -1.5]]
     outside = [[-0.5, 1, 0], [2, 4.5, 0], [5 + length, 1, 0]]
-    assert np.all(cells.locate(np.array(matter + outside)) == -1)
+    assert np.all(cells.locate(np.array(solid + outside)) == -1)
 
 
 def test_no_ceiling_is_open_and_said(quads, room_faces, partition) -> None:
@@ -173,11 +163,11 @@ def test_detail_and_structural_by_name(quads, room_faces) -> None:
     assert np.all(structural_triangles(scene, both))
 
 
-def test_max_cells_keeps_the_best_splits(room_row) -> None:
+def test_max_leaves_keeps_the_best_splits(room_row) -> None:
     scene, _ = room_row(6)
-    cells = subdivide(scene, SubdivideOptions(max_cells=3))
+    cells = subdivide(scene, SubdivideOptions(max_leaves=3))
     assert cells.cell_count <= 3
-    assert subdivide(scene, SubdivideOptions(max_cells=1)).cell_count == 1
+    assert subdivide(scene, SubdivideOptions(max_leaves=1)).cell_count == 1
 
 
 def test_the_flood_starts_at_the_viewpoints(quads, room_faces) -> None:
@@ -256,14 +246,18 @@ def test_same_input_same_arrays(room_row) -> None:
     scene, _ = room_row(3)
     first, second = subdivide(scene).to_arrays(), subdivide(scene).to_arrays()
     assert all(np.array_equal(first[k], second[k]) for k in first)
-    back = Cells.from_arrays(first).to_arrays()
-    assert all(np.array_equal(first[k], back[k]) for k in first)
+    back = Cells.from_arrays(first)
+    assert all(np.array_equal(first[k], array) for k, array in back.to_arrays().items())
+    assert back.tolerance == scene.tolerance
+    for extent in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match=r"extent"):
+            Cells.from_arrays({**first, "extent": np.array(extent)})
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1e-3, 1e3, 1e6])
 def test_the_subdivision_scales_with_the_scene(room_row, scale: float) -> None:
     scene, _ = room_row(3)
-    large = replace(scene, points=scene.points * scale)
+    large = scene.with_points(scene.points * scale)
     cells = subdivide(large, SubdivideOptions(wall_area=2 * scale**2))
     assert cells.closed
     assert cells.cell_count == 3
@@ -275,7 +269,7 @@ def test_the_subdivision_scales_with_the_scene(room_row, scale: float) -> None:
     [
         (SubdivideOptions(wall_area=0), "PTM-I300"),
         (SubdivideOptions(wall_area=float("nan")), "PTM-I300"),
-        (SubdivideOptions(max_cells=0), "PTM-I300"),
+        (SubdivideOptions(max_leaves=0), "PTM-I300"),
         (SubdivideOptions(viewpoints=((1e3, 0, 0),)), "PTM-I301"),
         (SubdivideOptions(detail=("no such thing",)), "PTM-I302"),
     ],

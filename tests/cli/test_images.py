@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -14,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from ptmtools.cli.main import main
 from ptmtools.texture import (
@@ -119,6 +122,154 @@ def test_each_file_once_and_none_over_another(
     assert [line.partition(":")[0] for line in out.splitlines()] == ["sub/c.ptm", "d.ptm"]
 
 
+@pytest.mark.parametrize(
+    ("named", "output", "made"),
+    [
+        (["*.png"], "new", ["new/a.ptm"]),
+        (["sub/*.png", "a.png"], "new", ["new/a.ptm", "new/c.ptm"]),
+        (["."], "new/deep", ["new/deep/a.ptm", "new/deep/b.ptm"]),
+        (["a.png"], "new/", ["new/a.ptm"]),
+        (["a.png"], "sub", ["sub/a.ptm"]),
+        (["a.png"], "new", ["new"]),
+        (["?.png"], "x.ptm", ["x.ptm"]),
+        (["a.png", "b.PNG"], "x.ptm/", ["x.ptm/a.ptm", "x.ptm/b.ptm"]),
+    ],
+)
+def test_where_results_go(named: list[str], output: str, made: list[str], folder: Path) -> None:
+    before = set(folder.rglob("*"))
+    assert main(["-q", "encode", *named, "-o", output, "--profile", "raw"]) == 0
+    found = {path for path in folder.rglob("*") if path.is_file()} - before
+    assert sorted(path.relative_to(folder).as_posix() for path in found) == made
+    # And back.
+    output = output.replace(".ptm", ".png")
+    named = ["new/*" if name.startswith("new/") else name for name in made[:1]]
+    if made != ["new"]:
+        assert main(["-q", "decode", *made, "-o", f"back/{output}/"]) == 0
+        assert len(list((folder / "back" / output).iterdir())) == len(made)
+
+
+def test_a_folder_is_made_only_where_one_is_meant(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["encode", "a.png", "b.PNG", "-o", "x.ptm"]) == 2
+    assert "x.ptm is one file, and there are 2 to write" in capsys.readouterr().err
+    assert main(["encode", "a.png", "b.PNG", "-o", "notes.txt"]) == 2
+    assert main(["encode", "a.png", "-o", "notes.txt/"]) == 2
+    assert "is a file, not a folder" in capsys.readouterr().err
+    assert main(["encode", "a.png", "-o", "absent/x.ptm"]) == 4
+    assert main(["encode", "no*.png", "-o", "absent"]) == 3
+    assert not Path("absent").exists()
+
+
+def test_what_exists_is_skipped_if_asked_for(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    encoding = ["encode", ".", "-o", "new", "--profile", "raw"]
+    Path("new").mkdir()
+    Path("new/a.ptm").write_bytes(encode(RGB, RAW))
+    assert main([*encoding]) == 4
+    Path("new/b.ptm").unlink()
+    capsys.readouterr()
+    assert main([*encoding, "--skip-existing"]) == 0
+    first, second = capsys.readouterr().out.splitlines()
+    assert first == "new/a.ptm: exists and was skipped"
+    assert second.startswith("new/b.ptm: 5 levels")
+    assert main(["decode", "new", "--skip-existing", "--json"]) == 0
+    assert main(["decode", "new", "--skip-existing", "--json"]) == 0
+    made, skipped = json.JSONDecoder().raw_decode(text := capsys.readouterr().out)[0], text
+    assert [report["skipped"] for report in made] == [False, False]
+    assert skipped.count('"skipped": true') == 2
+    assert main([*encoding, "--skip-existing", "--force"]) == 2
+
+
+def test_sizes_are_told_beside_those_of_the_input(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    image = Image.fromarray(np.tile(RGB, (4, 4, 1)))
+    for name, options in {
+        "l.jpg": {"quality": 30},
+        "m.webp": {"quality": 30},
+        "n.webp": {"lossless": True},
+        "o.webp": {"quality": 30, "exif": b"Exif\0\0"},
+        "p.tif": {"compression": "jpeg"},
+    }.items():
+        image.save(name, **options)
+    assert main(["encode", "l.jpg", "a.png", "-o", "new"]) == 0
+    first, second, hint = capsys.readouterr().out.splitlines()
+    stored = os.path.getsize("new/l.ptm")
+    assert first.endswith(f"{stored / os.path.getsize('l.jpg'):.1f} times l.jpg (1.5 kB)") or (
+        f"times l.jpg ({os.path.getsize('l.jpg') / 1000:.1f} kB)" in first
+    )
+    assert f"% of a.png ({os.path.getsize('a.png') / 1000:.1f} kB)" in second
+    assert hint.startswith("hint: JPEG is small because")
+    assert "--max-error 4" in hint
+    assert main(["encode", "a.png", "n.webp", "-o", "new", "--force"]) == 0
+    assert main(["encode", "l.jpg", "-o", "new", "--force", "--max-error", "1"]) == 0
+    assert "hint" not in capsys.readouterr().out
+    assert main(["encode", ".", "-o", "new", "--json", "--profile", "raw", "--force"]) == 0
+    reports = json.loads(capsys.readouterr().out)
+    assert {os.path.basename(one["image"]): one["lossy"] for one in reports} == {
+        "a.png": None,
+        "b.PNG": None,
+        "l.jpg": "JPEG",
+        "m.webp": "WebP",
+        "n.webp": None,
+        "o.webp": "WebP",
+        "p.tif": "JPEG in TIFF",
+    }
+    assert [one["image_bytes"] for one in reports] == [
+        os.path.getsize(one["image"]) for one in reports
+    ]
+
+
+@pytest.mark.parametrize(
+    ("side", "note"),
+    [
+        (10, "finest within --max-side 10 is 8 x 5; the next, 17 x 10, would add about 4"),
+        (17, None),
+        (34, None),
+        (99, None),
+        (1, "no level is within --max-side 1; the coarsest, 2 x 1, is kept"),
+    ],
+)
+def test_the_side_that_was_chosen(
+    side: int, note: str | None, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["encode", "a.png", "--profile", "raw", "--max-side", str(side)]) == 0
+    _, *notes = capsys.readouterr().out.splitlines()
+    assert (note in notes[0]) if note else not notes
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs terminals")
+@pytest.mark.parametrize("both", [True, False])
+def test_results_stand_above_the_progress_bar(both: bool, folder: Path) -> None:
+    """On a terminal each has a line of its own; a file gets the results and nothing else."""
+    outer, inner = os.openpty()
+    with open("out.txt", "wb") as file:
+        run = subprocess.Popen(
+            [sys.executable, "-m", "ptmtools", "encode", ".", "--profile", "raw", "-j1"],
+            stdout=inner if both else file,
+            stderr=inner,
+            env=os.environ | {"COLUMNS": "300", "TERM": "xterm"},
+        )
+        os.close(inner)
+        shown = b""
+        with contextlib.suppress(OSError):  # the end of a terminal, on Linux
+            while part := os.read(outer, 1 << 16):
+                shown += part
+        assert run.wait() == 0
+    os.close(outer)
+    # What remains of each line once the terminal has done what it was told.
+    lines = [
+        re.split(rb"\r|\x1b\[[0-9?]*[KAhl]", line.strip(b"\r"))[-1] for line in shown.split(b"\n")
+    ]
+    results = [line.split(b":")[0] for line in lines if b" levels" in line]
+    assert b"images" in shown
+    assert results == ([b"a.ptm", b"b.ptm"] if both else [])
+    names = [line.split(b":")[0] for line in Path("out.txt").read_bytes().splitlines()]
+    assert names == ([] if both else [b"a.ptm", b"b.ptm"])
+
+
 def test_a_name_that_is_empty_does_not_stop_the_others(folder: Path) -> None:
     assert main(["-q", "encode", "", "a.png", "--profile", "raw"]) == 3
     np.testing.assert_array_equal(decode("a.ptm"), RGB)
@@ -141,8 +292,8 @@ def test_pipes_are_as_standard_input(folder: Path, through: Callable[..., Any]) 
     assert piped(data, "decode", "pipe", "-q") == (0, png_bytes(RGB), "")
     assert piped(data, "decode", "pipe", "-q", "-o", "x.png") == (0, b"", "")
     np.testing.assert_array_equal(load_image("x.png").array(), RGB)
-    status, told, _ = piped(data, "info", "pipe", "--json")
-    assert (status, json.loads(told)["whole_levels"]) == (0, 5)
+    status, report, _ = piped(data, "info", "pipe", "--json")
+    assert (status, json.loads(report)["whole_levels"]) == (0, 5)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is full")
@@ -171,8 +322,8 @@ def test_stdin_and_stdout(folder: Path, through: Callable[..., Any]) -> None:
     np.testing.assert_array_equal(load_image("x.png").array(), RGB)
     (folder / "a.ptm").write_bytes(data)
     assert through(b"", "decode", "a.ptm", "-o", "-", "-q") == (0, png_bytes(RGB), "")
-    status, told, _ = through(data, "info", "-", "--json")
-    assert json.loads(told)["whole_levels"] == 5
+    status, report, _ = through(data, "info", "-", "--json")
+    assert json.loads(report)["whole_levels"] == 5
     status, _, err = through(b"", "encode", "-")
     assert (status, err[:7], err.strip()[-10:]) == (3, "ptm: -:", "[PTM-I123]")
 
@@ -250,6 +401,7 @@ def test_decode_reports_as_json(folder: Path, through: Callable[..., Any]) -> No
         {
             "file": "x.ptm",
             "image": "x.npy",
+            "skipped": False,
             "level": 3,
             "width": 17,
             "height": 10,
@@ -271,27 +423,27 @@ def test_info_counts(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     header = read_header(data)
     (folder / "x.ptm").write_bytes(data[: header.levels[-1].end - 1])
     assert main(["info", "x.ptm", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["width"], told["kind"], told["profile"], told["trimmed"]) == (
+    report = json.loads(capsys.readouterr().out)
+    assert (report["width"], report["kind"], report["profile"], report["trimmed"]) == (
         102,
         "uint16",
         "raw",
         1,
     )
-    assert told["description"] == {
+    assert report["description"] == {
         "icc_bytes": 9,
         "srgb_intent": 1,
         "gamma": 0.45455,
         "orientation": 6,
     }
-    assert told["whole_levels"] == len(header.levels) - 1
-    assert told["file_bytes"] == len(data) - 1
-    finest, one = told["levels"][-1], told["levels"][0]
+    assert report["whole_levels"] == len(header.levels) - 1
+    assert report["file_bytes"] == len(data) - 1
+    finest, one = report["levels"][-1], report["levels"][0]
     assert finest["tiles"] == [3, 1]
     assert finest["length"] == header.levels[-1].length
     assert finest["bits_per_texel"] == 8 * finest["length"] / (51 * 31)
     assert finest["end"] == header.levels[-1].end
-    assert sum(level["length"] for level in told["levels"]) <= header.file_size
+    assert sum(level["length"] for level in report["levels"]) <= header.file_size
     assert (one["gpu_bytes"], one["gpu_bytes_padded"]) == (3 * 1 * 6, 3 * 1 * 8)
     assert finest["gpu_bytes_padded"] * 3 == finest["gpu_bytes"] * 4
     assert main(["info", "x.ptm"]) == 0
@@ -311,9 +463,9 @@ def test_info_reads_the_head_only(folder: Path, capsys: pytest.CaptureFixture[st
 
 def test_compare(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["compare", "a.png", "b.PNG", "--profiles", "raw", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert [image["image"] for image in told["images"]] == ["a.png", "b.PNG"]
-    by_name = {one["codec"]: one for one in told["images"][0]["codecs"]}
+    report = json.loads(capsys.readouterr().out)
+    assert [image["image"] for image in report["images"]] == ["a.png", "b.PNG"]
+    by_name = {one["codec"]: one for one in report["images"][0]["codecs"]}
     assert by_name["ptm raw"]["all_bytes"] == len(encode(RGB, RAW))
     assert by_name["ptm raw"]["finest_bytes"] is None
     png = by_name["PNG"]
@@ -322,7 +474,7 @@ def test_compare(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert png["raw_bytes"] == RGB.size
     for one in by_name.values():
         assert one["problem"] is None or one["problem"].startswith("not installed: pip install")
-    totals = {one["codec"]: one for one in told["total"]}
+    totals = {one["codec"]: one for one in report["total"]}
     assert totals["PNG"]["all_bytes"] == 2 * png["all_bytes"]
     assert main(["compare", "a.png", "b.PNG", "--profiles", "raw"]) == 0
     out = capsys.readouterr().out

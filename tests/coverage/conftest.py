@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from ptmtools.cells.model import Cells
-from ptmtools.coverage.embree import EmbreeRenderer
-from ptmtools.coverage.eyes import Eyes
+from ptmtools.coverage.backends import BACKENDS
+from ptmtools.coverage.backends.opengl import APT, create_context
 from ptmtools.coverage.item_buffer import Renderer, Surfaces
-from ptmtools.coverage.looking import Looker, Owners
-from ptmtools.coverage.opengl import APT, OpenGLRenderer, create_context
+from ptmtools.coverage.sample_points import SamplePoints
+from ptmtools.coverage.tally import PixelCounter
 from ptmtools.errors import MissingComponentError
 from ptmtools.scene.model import Material, Scene
 
@@ -45,11 +45,7 @@ def pixel_centres() -> Callable[[int], np.ndarray]:
 
 @contextmanager
 def renderer_of(backend: str, surfaces: Surfaces, face: int) -> Iterator[Renderer]:
-    renderer: Renderer
-    if backend == "gl":
-        renderer = OpenGLRenderer(create_context(), surfaces, face)
-    else:
-        renderer = EmbreeRenderer(surfaces, face)
+    renderer = BACKENDS[backend].open(surfaces, face)
     try:
         yield renderer
     finally:
@@ -62,27 +58,28 @@ def drawing() -> Callable[..., AbstractContextManager[Renderer]]:
     return renderer_of
 
 
-def eyes_at(points, near: float = 1e-3, shift=(0.0, 0.0)) -> Eyes:
-    place = np.array(points, dtype=np.float64).reshape(-1, 3)
-    return Eyes(place, np.full(len(place), near), np.tile(np.array(shift, float), (len(place), 1)))
+def sample_points_at(positions, near: float = 1e-3, shift=(0.0, 0.0)) -> SamplePoints:
+    at = np.array(positions, dtype=np.float64).reshape(-1, 3)
+    return SamplePoints(at, np.full(len(at), near), np.tile(np.array(shift, float), (len(at), 1)))
 
 
 @pytest.fixture(scope="session")
-def eyes() -> Callable[..., Eyes]:
-    """``eyes(points, near, shift)``."""
-    return eyes_at
+def sample_points() -> Callable[..., SamplePoints]:
+    """``sample_points(positions, near, shift)``."""
+    return sample_points_at
 
 
-def counted(renderer: Renderer, surfaces: Surfaces, cells: Cells, at: Eyes, face: int) -> list[int]:
-    owners = Owners.of(surfaces, by_image=False)
-    looker = Looker(renderer, surfaces, cells, face, by_angle=False)
-    seen = looker.look(at, owners, np.arange(surfaces.cell_count))
-    return np.append(seen.in_views.sum(axis=0), seen.missed.sum())
+def counted(
+    renderer: Renderer, surfaces: Surfaces, cells: Cells, at: SamplePoints, face: int
+) -> list[int]:
+    counter = PixelCounter(renderer, surfaces, cells, face)
+    tally = counter.count(at, np.arange(surfaces.cell_count))
+    return np.append(tally.in_views.sum(axis=0), tally.missed.sum())
 
 
 @pytest.fixture(scope="session")
 def count() -> Callable[..., np.ndarray]:
-    """``count(renderer, surfaces, cells, eyes, face)``: pixels of each cell, then of none."""
+    """``count(renderer, surfaces, cells, points, face)``: pixels of each cell, then of none."""
     return counted
 
 
@@ -93,7 +90,7 @@ def coverage_at() -> Callable[..., np.ndarray]:
     def at(backend, scene, cells, point, face=64, near=1e-3):
         surfaces = Surfaces.of(scene, cells)
         with renderer_of(backend, surfaces, face) as renderer:
-            return counted(renderer, surfaces, cells, eyes_at(point, near), face)
+            return counted(renderer, surfaces, cells, sample_points_at(point, near), face)
 
     return at
 
@@ -156,7 +153,7 @@ def moved_and_scaled(
         portal_point=cells.portal_point * factor + offset,
         vertex=cells.vertex * factor + offset,
     )
-    return replace(scene, points=scene.points * factor + offset), cut
+    return scene.with_points(scene.points * factor + offset), cut
 
 
 @pytest.fixture(scope="session")

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from ptmtools.coverage.ach import compute_ach
-from ptmtools.coverage.backend import open_renderer, rasterising_pays, triangles_of_a_pvs
-from ptmtools.coverage.item_buffer import Surfaces
+from ptmtools.coverage.backends import BACKENDS, Backend
+from ptmtools.coverage.backends.choice import choose, triangles_of_a_pvs
+from ptmtools.coverage.backends.embree import EmbreeRenderer
 from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.coverage.placement import TRIES
@@ -289,19 +291,67 @@ def test_any_seed_will_do_with_a_tolerance(room_row):
     assert not np.array_equal(found.pixels, other.pixels)
 
 
-def test_auto_goes_by_the_size_of_the_task(room_row, has_gl, require):
-    assert rasterising_pays(1000, 64)
-    assert not rasterising_pays(100_000, 64)
-    assert rasterising_pays(100_000, 512)
+@pytest.mark.parametrize(
+    ("device", "triangles", "face", "expected"),
+    [
+        ("llvmpipe (LLVM 15)", 1000, 64, "gl"),
+        ("llvmpipe (LLVM 15)", 100_000, 64, "embree"),
+        ("llvmpipe (LLVM 15)", 100_000, 512, "gl"),
+        ("llvmpipe (LLVM 15)", 40, 2, "embree"),
+        ("NVIDIA", 100_000, 2, "gl"),
+    ],
+)
+def test_auto_goes_by_the_device_and_the_size_of_the_task(
+    room_row, monkeypatch, device, triangles, face, expected
+):
+    context = SimpleNamespace(info={"GL_RENDERER": device}, release=lambda: None)
+    monkeypatch.setattr("ptmtools.coverage.backends.opengl.create_context", lambda gpu: context)
+    where = "ptmtools.coverage.backends.choice.triangles_of_a_pvs"
+    monkeypatch.setattr(where, lambda cells, pvs: float(triangles))
+    _, cells = room_row(2)
+    assert choose(cells, all_visible(2), AchOptions(face=face)).name == expected
+
+
+@pytest.mark.parametrize(("face", "expected"), [(256, "gl"), (2, "embree")])
+def test_auto_on_this_machine(room_row, has_gl, require, face, expected):
     if not has_gl:
         require("OpenGL", "apt install libegl1 libgl1 libgl1-mesa-dri")
     scene, cells = room_row(2)
     assert triangles_of_a_pvs(cells, all_visible(2)) > len(cells.triangle)
-    surfaces = Surfaces.of(scene, cells)
-    for options, expected in ((AchOptions(face=256), "gl"), (AchOptions(face=2), "embree")):
-        renderer = open_renderer(surfaces, cells, all_visible(2), options)
-        assert renderer.backend == expected
-        renderer.close()
+    options = AchOptions(face=face, samples=1)
+    assert compute_ach(scene, cells, all_visible(2), options).backend == expected
+
+
+class Toy(EmbreeRenderer):
+    """Rays that take every surface for the first triangle."""
+
+    name = "toy 1.0"
+
+    def show(self, points, needed=None):
+        return np.minimum(super().show(points, needed), 0)
+
+
+def open_toy(surfaces, face, gpu):
+    return Toy(surfaces, face)
+
+
+def cost_of_toy(triangles, pixels, gpu):
+    return -1.0
+
+
+@pytest.fixture
+def toy(monkeypatch):
+    """A backend more: one declaration, one line in the table."""
+    declared = Backend("toy", "sees one thing", f"{__name__}:open_toy", f"{__name__}:cost_of_toy")
+    monkeypatch.setitem(BACKENDS, "toy", declared)
+
+
+@pytest.mark.parametrize("backend", ["toy", "auto"])
+def test_a_backend_is_added_by_one_line(room_row, toy, backend):
+    """It is the cheapest too, so auto takes it."""
+    ach = compute_ach(*room_row(3), all_visible(3), AchOptions(backend=backend, preset="fast"))
+    assert (ach.backend, ach.renderer) == ("toy", "toy 1.0")
+    assert [ach.row(0)[0], ach.row(1)[1], ach.row(2)[1]] == [1, 1, 1], "the floor of room 0"
 
 
 def test_hints_of_a_room_are_the_mean_of_its_leaves_by_volume(room_row):

@@ -10,16 +10,16 @@ import pytest
 
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.ach import compute_ach
-from ptmtools.coverage.embree import EmbreeRenderer
-from ptmtools.coverage.eyes import Places
+from ptmtools.coverage.backends import BACKENDS
+from ptmtools.coverage.backends.embree import EmbreeRenderer
 from ptmtools.coverage.item_buffer import VIEWS, Surfaces
-from ptmtools.coverage.looking import Looker, Owners
-from ptmtools.coverage.matter import Surroundings
 from ptmtools.coverage.options import AchOptions
 from ptmtools.coverage.placement import Tetrahedra, Volume
+from ptmtools.coverage.sample_points import PointFinder
 from ptmtools.coverage.sampling import CLEARANCE, Sampler
+from ptmtools.coverage.solids import Obstacles
+from ptmtools.coverage.tally import PixelCounter
 from ptmtools.scene.model import Material, Scene
-from ptmtools.tolerance import Tolerance
 from ptmtools.visibility.model import Pvs
 
 SOME = AchOptions(samples=128, face=4)
@@ -64,7 +64,7 @@ def turned(scene: Scene, cells: Cells, turn: np.ndarray) -> tuple[Scene, Cells]:
         triangle=np.ascontiguousarray(cells.triangle[:, wound]),
     )
     triangles = np.ascontiguousarray(scene.triangles[:, wound])
-    return replace(scene, points=scene.points @ turn.T, triangles=triangles), cut
+    return replace(scene.with_points(scene.points @ turn.T), triangles=triangles), cut
 
 
 def about(axis, degrees: float) -> np.ndarray:
@@ -216,7 +216,7 @@ def test_a_cell_of_a_millimetre(room_row, backend, weighting, through_doors):
         portal_point=squeezed(cells.portal_point),
         vertex=vertex,
     )
-    scene = replace(scene, points=squeezed(scene.points))
+    scene = scene.with_points(squeezed(scene.points))
     assert np.ptp(cells.leaf_points(1)[:, 0]) == pytest.approx(1e-3)
     options = replace(SOME, samples=2048, backend=backend, weighting=weighting)
     ach = compute_ach(scene, cells, all_visible(3), options)
@@ -225,7 +225,7 @@ def test_a_cell_of_a_millimetre(room_row, backend, weighting, through_doors):
     share = through_doors(1, weighting, length=1e-3)
     assert share == pytest.approx(0.375 / 2, rel=0.01), "the door takes up 6 of 16 m²"
     # Too near to the walls beside the doors are 20 µm of the cell on either side.
-    near = 2 * CLEARANCE * Tolerance.for_points(scene.points).thin / 1e-3
+    near = 2 * CLEARANCE * scene.tolerance.thin / 1e-3
     assert near == pytest.approx(0.04, rel=0.01)
     share /= 1 - (1 - 0.375) * near
     row = slice(int(ach.start[1]), int(ach.start[2]))
@@ -337,7 +337,7 @@ def test_a_million_triangles(room_row, through_doors):
     assert ach.missed.tolist() == [0, 0]
 
 
-def test_five_thousand_cells(room_row, furnish, drawing, backend):
+def test_five_thousand_cells(room_row, furnish, backend):
     """Pairs of rooms, 20 km of them; each pair by itself is like the only one."""
     pairs, some = 2500, (0, 1, 2499, 2500, 4999)
     scene, cells = room_row(2 * pairs)
@@ -350,18 +350,19 @@ def test_five_thousand_cells(room_row, furnish, drawing, backend):
     # The default clearance goes by the extent, and would be 5 cm here.
     options = AchOptions(samples=64, face=8, backend=backend, clearance=1e-3)
     expected = compute_ach(*room_row(2), all_visible(2), options)
-    surfaces = Surfaces.of(scene, cells)
-    with drawing(backend, surfaces, 8) as renderer:
-        sampler = Sampler(scene, cells, pvs, options, surfaces, renderer)
-        for cell in some:
-            hints = sampler.of_cell(cell)
-            # A float32 is 1 mm fine here.
-            assert hints.missed <= 2e-3, cell
-            assert hints.row.value == pytest.approx(expected.row(cell % 2), abs=2e-3), cell
+    sampler = Sampler(scene, cells, pvs, options, BACKENDS[backend])
+    for cell in some:
+        hints = sampler.of_cell(cell)
+        # A float32 is 1 mm fine here.
+        assert hints.missed <= 2e-3, cell
+        assert hints.row.value == pytest.approx(expected.row(cell % 2), abs=2e-3), cell
+    sampler.renderer.close()
 
 
 @pytest.mark.parametrize("by_image", [False, True])
-def test_seventy_thousand_cells(room_row, furnish, eyes, backend, drawing, by_image, pixel_centres):
+def test_seventy_thousand_cells(
+    room_row, furnish, sample_points, backend, drawing, by_image, pixel_centres
+):
     """A floor of as many tiles, each a cell of its own: more than 16 bits can tell. What each
     pixel shows is worked out in float64."""
     side = 265
@@ -393,9 +394,6 @@ def test_seventy_thousand_cells(room_row, furnish, eyes, backend, drawing, by_im
         scene = replace(scene, materials=painted, triangle_material=of)
     surfaces = Surfaces.of(scene, cells)
     assert surfaces.cell_count == side**2 > 2**16
-    owners = Owners.of(surfaces, by_image)
-    assert len(owners.first) == side**2 + 1
-    assert np.array_equal(np.unique(owners.of_side), np.unique(owners.of_side.astype(np.int64)))
     eye, face = np.array([85.3, 40.7, 55.1]), 128
     v = 3  # the view down
     right, up, forward = VIEWS[v]
@@ -407,9 +405,11 @@ def test_seventy_thousand_cells(room_row, furnish, eyes, backend, drawing, by_im
     expected = np.bincount(shown.ravel(), minlength=side**2)
     assert (np.flatnonzero(expected) > 2**16).any()
     with drawing(backend, surfaces, face) as renderer:
-        looker = Looker(renderer, surfaces, cells, face, by_angle=False)
+        counter = PixelCounter(renderer, surfaces, cells, face, by_image=by_image)
+        owners = counter.owners
         wanted, begin = owners.in_cells(np.arange(side**2, dtype=np.int32))
-        seen = looker.look(eyes(eye), owners, wanted)
+        seen = counter.count(sample_points(eye), wanted)
+    assert len(owners.first) == side**2 + 1
     found = np.add.reduceat(seen.in_views, begin, axis=1)[v]
     # A pixel whose centre lies on a joint may show either tile.
     assert np.abs(found - expected).sum() / 2 <= 1e-3 * face**2
@@ -420,43 +420,43 @@ def test_seventy_thousand_cells(room_row, furnish, eyes, backend, drawing, by_im
         assert seen.at_points[:, ~painted].sum() == 0
 
 
-def places(room_row, points, clearance):
+def finder(room_row, points, clearance):
     """Where points are taken in turn from those given, in a room."""
     scene, cells = room_row(1)
-    at = Places(Volume(cells, Tetrahedra.of(cells), 0), Surroundings.of(scene, cells), clearance)
+    at = PointFinder(Volume(cells, Tetrahedra.of(cells), 0), Obstacles.of(scene, cells), clearance)
     return at, at.usable(np.array(points, dtype=np.float64).reshape(-1, 3))
 
 
 def test_a_point_on_a_face_an_edge_or_a_corner_is_rejected(room_row):
     on = [[4, 1.7, 0.3], [2, 0, 0], [0, 0, 0.5], [0, 0, -2], [4, 4, 2]]
     clear = [[2, 2, 0], [4 - 1e-3, 1.7, 0.3]]
-    _, usable = places(room_row, on + clear, 1e-4)
+    _, usable = finder(room_row, on + clear, 1e-4)
     assert usable.tolist() == [False] * 5 + [True] * 2
 
 
 def test_the_least_bad_point_is_the_one_farthest_from_all_faces(room_row):
-    at, usable = places(room_row, [[4, 1.7, 0.3], [2, 0.3, 0], [0.2, 2, 0], [0, 0, -2]], 1.0)
+    at, usable = finder(room_row, [[4, 1.7, 0.3], [2, 0.3, 0], [0.2, 2, 0], [0, 0, -2]], 1.0)
     assert not usable.any()
-    eyes = at.least_bad()
-    assert eyes.point.tolist() == [[2, 0.3, 0]]
-    assert eyes.near.tolist() == [0.3]
-    assert eyes.shift.tolist() == [[0, 0]]
+    best = at.least_bad()
+    assert best.position.tolist() == [[2, 0.3, 0]]
+    assert best.near.tolist() == [0.3]
+    assert best.shift.tolist() == [[0, 0]]
 
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_the_best_of_all_batches_is_kept(room_row, order):
-    at, _ = places(room_row, [], 1.0)
+    at, _ = finder(room_row, [], 1.0)
     for points in ([[2, 0.1, 0], [2, 0.2, 0]], [[2, 0.4, 0], [2, 0.3, 0]])[::order]:
         assert not at.usable(np.array(points)).any()
     assert at.least_bad().near.tolist() == [0.4]
 
 
 def test_from_on_a_face_itself_the_near_plane_still_has_a_place(room_row):
-    at, _ = places(room_row, [[4, 1.7, 0.3], [2, 0, 0]], 1e-4)
+    at, _ = finder(room_row, [[4, 1.7, 0.3], [2, 0, 0]], 1e-4)
     assert 0 < at.least_bad().near[0] < 1e-4
 
 
-def test_an_eye_on_a_face_sees_the_rest_of_the_room(room_row, backend, coverage_at):
+def test_a_point_on_a_face_sees_the_rest_of_the_room(room_row, backend, coverage_at):
     """Half of everything is the wall it is on, or what is beyond; no pixel is lost or missed."""
     scene, cells = room_row(1)
     face = 32
@@ -492,13 +492,13 @@ def test_a_cell_that_no_point_is_located_in_is_given_up(room_row, placement, tol
         assert ach.row(1).tolist() == [1, 0]
 
 
-def test_rays_start_where_the_eye_is(room_row, eyes):
+def test_rays_start_at_the_sample_point(room_row, sample_points):
     """At 1e6 extents from the origin too: recentred before anything is rounded to float32."""
     scene, cells = room_row(1)
     far_off = 1e6 * np.array([4.0, -4, 4])
     moved = replace(cells, vertex=cells.vertex + far_off, root_box=cells.root_box + far_off)
-    there = Surfaces.of(replace(scene, points=scene.points + far_off), moved)
-    at = eyes(np.array([2.1, 1.7, 0.3]) + far_off)
+    there = Surfaces.of(scene.with_points(scene.points + far_off), moved)
+    at = sample_points(np.array([2.1, 1.7, 0.3]) + far_off)
     _, place = EmbreeRenderer(there, 8).trace(at, np.arange(6 * 64))
     away = np.abs(place[0] - far_off - [2, 2, 0]).max(axis=1)
     assert away == pytest.approx(np.full(384, 2.0), abs=1e-6)

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from ptmtools.coverage.embree import EmbreeRenderer
+from ptmtools.coverage.backends.embree import EmbreeRenderer
 from ptmtools.coverage.item_buffer import VIEWS, Surfaces
-from ptmtools.coverage.looking import Looker, Owners, owners_at
+from ptmtools.coverage.tally import Owners, PixelCounter
 
 FACE = 64
 
@@ -235,46 +235,44 @@ def test_backends_agree_anywhere(room_row, coverage_at, has_gl, require, eye, fa
 class Doubtful:
     """Rays, but with some pixels shown wrongly, as past a rounded edge."""
 
-    backend, name, most = "embree", "doubtful", 10
+    name, most = "doubtful", 10
 
     def __init__(self, rays, wrong, triangle):
         self.rays, self.wrong, self.triangle = rays, wrong, triangle
 
-    def show(self, eyes, needed=None):
-        found = self.rays.show(eyes, needed)
+    def show(self, points, needed=None):
+        found = self.rays.show(points, needed)
         found.reshape(1, -1)[0, self.wrong] = self.triangle
         return found
 
-    def trace(self, eyes, pixels):
+    def trace(self, points, pixels):
         assert set(self.wrong) <= set(pixels)
-        return self.rays.trace(eyes, pixels)
+        return self.rays.trace(points, pixels)
 
     def close(self):
         self.rays.close()
 
 
-def test_an_unexpected_cell_is_believed_only_if_a_ray_confirms_it(room_row, eyes):
+def test_an_unexpected_cell_is_believed_only_if_a_ray_confirms_it(room_row, sample_points):
     scene, cells = room_row(3)
     surfaces = Surfaces.of(scene, cells)
-    owners = Owners.of(surfaces, by_image=False)
     rays = EmbreeRenderer(surfaces, FACE)
-    eye = eyes([2.0, 1.7, 0.3])
+    eye = sample_points([2.0, 1.7, 0.3])
 
-    def look(renderer, wanted):
-        looker = Looker(renderer, surfaces, cells, FACE, by_angle=False)
-        seen = looker.look(eye, owners, np.array(wanted))
+    def counted(renderer, wanted):
+        seen = PixelCounter(renderer, surfaces, cells, FACE).count(eye, np.array(wanted))
         return [*seen.in_views.sum(axis=0).tolist(), int(seen.missed[0])]
 
-    truth = look(rays, [0, 1, 2])
+    truth = counted(rays, [0, 1, 2])
     assert truth[2] > 0
     in_room_2 = int(np.flatnonzero((cells.triangle_cell == [2, -1]).all(axis=1))[0])
     wrong = Doubtful(rays, [5, 77, 1000], in_room_2)
-    fooled = look(wrong, [0, 1, 2])
+    fooled = counted(wrong, [0, 1, 2])
     assert fooled[2] == truth[2] + 3
-    assert look(wrong, [0, 1]) == [*truth[:2], truth[2]], "what room 2 really covers is missed"
+    assert counted(wrong, [0, 1]) == [*truth[:2], truth[2]], "what room 2 really covers is missed"
 
 
-def test_what_reaches_in_a_hair_is_seen_where_it_is(room_row, furnish, eyes):
+def test_what_reaches_in_a_hair_is_seen_where_it_is(room_row, furnish, sample_points):
     """The end of a wall that belongs to room 2, a tenth of a millimetre deep in room 1: from room
     1, which cannot see room 2, it is part of room 1."""
     scene, cells = room_row(3)
@@ -282,9 +280,9 @@ def test_what_reaches_in_a_hair_is_seen_where_it_is(room_row, furnish, eyes):
     scene, cells = furnish(scene, cells, [reach], [(2, 2)])
     surfaces = Surfaces.of(scene, cells)
     rays = EmbreeRenderer(surfaces, FACE)
-    looker = Looker(rays, surfaces, cells, FACE, by_angle=False)
-    seen = looker.look(eyes([6, 1.7, 0.3]), Owners.of(surfaces, by_image=False), np.array([0, 1]))
-    every = looker.look(eyes([6, 1.7, 0.3]), Owners.of(surfaces, by_image=False), np.arange(3))
+    counter = PixelCounter(rays, surfaces, cells, FACE)
+    at = sample_points([6, 1.7, 0.3])
+    seen, every = counter.count(at, np.array([0, 1])), counter.count(at, np.arange(3))
     in_room_2 = int(every.at_points[..., 2].sum())
     recovered = int(seen.at_points[..., 1].sum()) - int(every.at_points[..., 1].sum())
     assert recovered > 20
@@ -292,12 +290,12 @@ def test_what_reaches_in_a_hair_is_seen_where_it_is(room_row, furnish, eyes):
 
 
 def test_rays_through_some_pixels_are_the_rays_through_all(
-    room_row, furnish, backend, eyes, drawing
+    room_row, furnish, backend, sample_points, drawing
 ):
     scene, cells = room_row(2)
     pane = rectangle_across(4.0, (0, 3), (-1, 1))
     surfaces = Surfaces.of(*furnish(scene, cells, [pane], [(0, 1)], transparent=True))
-    at = eyes([[1.0, 1.7, 0.3], [2.5, 1.1, -0.3]], shift=(0.3, -0.6))
+    at = sample_points([[1.0, 1.7, 0.3], [2.5, 1.1, -0.3]], shift=(0.3, -0.6))
     whole = EmbreeRenderer(surfaces, FACE).show(at)
     assert whole.shape == (2, 2, 6, FACE**2)
     pixels = np.arange(0, 2 * 6 * FACE**2, 7)
@@ -312,7 +310,7 @@ def test_rays_through_some_pixels_are_the_rays_through_all(
     assert np.mean(drawn != whole) < 1e-3  # triangles that share an edge may share its pixels
 
 
-def test_many_points_at_once_are_each_alone(room_row, furnish, backend, eyes, drawing):
+def test_many_points_at_once_are_each_alone(room_row, furnish, backend, sample_points, drawing):
     """More than fit into one target or one batch of rays, some in other rooms."""
     scene, cells = room_row(3)
     pane = rectangle_across(4.0, (0, 3), (-1, 1))
@@ -320,39 +318,41 @@ def test_many_points_at_once_are_each_alone(room_row, furnish, backend, eyes, dr
     points = np.random.default_rng(1).uniform([0.2, 0.2, -1.8], [11.8, 3.8, 1.8], (50, 3))
     face = 16
     with drawing(backend, surfaces, face) as renderer:
-        together = renderer.show(eyes(points, shift=(0.5, 0.25)))
+        together = renderer.show(sample_points(points, shift=(0.5, 0.25)))
         for k in (0, 17, 49):
-            alone = renderer.show(eyes(points[k], shift=(0.5, 0.25)))
+            alone = renderer.show(sample_points(points[k], shift=(0.5, 0.25)))
             assert np.array_equal(together[:, k], alone[:, 0])
     assert (together >= 0).any(axis=(1, 2, 3)).all()
 
 
-def test_culled_surfaces_would_not_show(room_row, eyes, drawing, has_gl, require):
+def test_culled_surfaces_would_not_show(room_row, sample_points, drawing, has_gl, require):
     """Only what the PVS needs is drawn; what stands outside it and shows is drawn nevertheless."""
     if not has_gl:
         require("OpenGL", "apt install libegl1 libgl1 libgl1-mesa-dri")
     scene, cells = room_row(3)
     surfaces = Surfaces.of(scene, cells)
-    at = eyes([[2.0, 1.7, 0.3], [1.0, 1.0, 1.0]])
+    at = sample_points([[2.0, 1.7, 0.3], [1.0, 1.0, 1.0]])
     with drawing("gl", surfaces, FACE) as renderer:
         every = renderer.show(at)
         assert np.array_equal(renderer.show(at, np.array([True, True, True])), every)
         assert np.array_equal(renderer.show(at, np.array([True, False, False])), every)
-        hidden = renderer._culling.lists(surfaces.normalised(at.point), FACE, None)
+        hidden = renderer.lists(at)
     assert sum(len(o) for o, _ in hidden) < 6 * len(surfaces.triangle)
 
 
-def test_many_small_views_between_two_near_surfaces(room_row, eyes, drawing, has_gl, require):
+def test_many_small_views_between_two_near_surfaces(
+    room_row, sample_points, drawing, has_gl, require
+):
     """A slab of 12 m by 4 m and 2 mm: corners are far off, what shows is a hair away. OpenGL has to
     see what rays see though hundreds of views lie side by side."""
     if not has_gl:
         require("OpenGL", "apt install libegl1 libgl1 libgl1-mesa-dri")
     scene, cells = room_row(3)
     flat = np.array([1.0, 5e-4, 1.0])
-    slab = replace(scene, points=scene.points * flat), replace(cells, vertex=cells.vertex * flat)
+    slab = scene.with_points(scene.points * flat), replace(cells, vertex=cells.vertex * flat)
     surfaces = Surfaces.of(*slab)
     points = np.random.default_rng(3).uniform([0.1, 0.2, -1.9], [11.9, 3.8, 1.9], (60, 3)) * flat
-    at = eyes(points, near=5e-5, shift=(0.2, 0.1))
+    at = sample_points(points, near=5e-5, shift=(0.2, 0.1))
     face = 8
     with drawing("embree", surfaces, face) as rays, drawing("gl", surfaces, face) as gl:
         assert gl.most >= len(points)
@@ -368,7 +368,7 @@ def test_an_unknown_image_in_a_cell_counts_as_none_of_it(room_row):
     owner = surfaces.cell.copy()
     owner[0], image[0] = -1, 5
     owners = Owners.of(replace(surfaces, cell=owner, image=image), by_image=True)
-    found = owners_at(owners, np.array([0, 1, -1, 1]), np.array([5, 5, 0, 1]))
+    found = owners.at(np.array([0, 1, -1, 1]), np.array([5, 5, 0, 1]))
     assert owners.cell[found[:2]].tolist() == [0, 1]
     assert owners.image[found[:2]].tolist() == [-1, -1]
     assert found[2] == -1

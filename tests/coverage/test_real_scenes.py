@@ -13,7 +13,7 @@ import pytest
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.subdivision import subdivide
 from ptmtools.coverage.ach import compute_ach
-from ptmtools.coverage.opengl import APT
+from ptmtools.coverage.backends.opengl import APT
 from ptmtools.coverage.options import AchOptions
 from ptmtools.scene.ingestion import ingest
 from ptmtools.visibility.pvs import compute_pvs
@@ -33,7 +33,7 @@ def museum(tmp_path_factory) -> Path:
 def assert_backends_agree(model: Path, transparent: bool) -> None:
     scene = ingest(model)
     assert scene.opaque.all() != transparent
-    cells = subdivide(scene, SubdivideOptions(max_cells=30))
+    cells = subdivide(scene, SubdivideOptions(max_leaves=30))
     pvs = compute_pvs(cells)
     options = AchOptions(samples=4, face=64)
     one, other = (

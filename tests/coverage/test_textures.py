@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 
 from ptmtools.coverage.ach import compute_ach
-from ptmtools.coverage.eyes import Places, Sequence
 from ptmtools.coverage.item_buffer import Surfaces
-from ptmtools.coverage.looking import Owners, owners_at
-from ptmtools.coverage.matter import Surroundings
 from ptmtools.coverage.options import AchOptions
 from ptmtools.coverage.placement import Tetrahedra, Volume
+from ptmtools.coverage.sample_points import PointFinder, PointSequence
 from ptmtools.coverage.sampling import CLEARANCE
+from ptmtools.coverage.solids import Obstacles
+from ptmtools.coverage.tally import Owners
 from ptmtools.scene.model import Material
-from ptmtools.tolerance import Tolerance
 from ptmtools.visibility.model import Pvs
 
 BY_TEXTURE = AchOptions(samples=64, face=8, per_texture=True)
@@ -93,15 +92,15 @@ def test_textures_are_counted_where_they_are_seen(room_row, backend, drawing):
     options = replace(BY_TEXTURE, backend=backend)
     ach = compute_ach(scene, cells, all_visible(2), options)
     surfaces = Surfaces.of(scene, cells)
-    clearance = CLEARANCE * Tolerance.for_points(scene.points).thin
+    clearance = CLEARANCE * scene.tolerance.thin
     for cell in range(2):
         volume = Volume(cells, Tetrahedra.of(cells), cell)
-        places = Places(volume, Surroundings.of(scene, cells), clearance)
-        eyes = Sequence(places, "sobol", 0).take(options.points)
+        finder = PointFinder(volume, Obstacles.of(scene, cells), clearance)
+        points = PointSequence(finder, "sobol", 0).take(options.points)
         with drawing(backend, surfaces, options.side) as renderer:
-            shows = renderer.show(eyes)[0]
+            shows = renderer.show(points)[0]
         counted: dict[tuple[int, int], int] = {}
-        for point, seen in zip(eyes.point, shows, strict=True):
+        for point, seen in zip(points.position, shows, strict=True):
             for t, times in zip(*np.unique(seen, return_counts=True), strict=True):
                 a, b, c = cells.vertex[cells.triangle[t]]
                 behind = np.dot(np.cross(b - a, c - a), point - a) < 0
@@ -169,7 +168,7 @@ def test_owners_of_images(room_row):
     assert begin.tolist() == [0, 2]
     cell = np.array([0, 0, 0, 1, 1, -1], np.int32)
     image = np.array([2, 0, -1, 0, 2, 0], np.int32)
-    assert owners_at(owners, cell, image).tolist() == [1, 0, 0, 3, 2, -1]
+    assert owners.at(cell, image).tolist() == [1, 0, 0, 3, 2, -1]
     plain = Owners.of(Surfaces.of(scene, cells), by_image=False)
     assert plain.cell.tolist() == [0, 1]
     assert plain.image.tolist() == [-1, -1]

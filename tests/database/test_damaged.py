@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from ptmtools.database import EmitOptions, emit, validate_database
-from ptmtools.database.validation import CODES
-from ptmtools.database.vrml import WrlError, parse
+from ptmtools.database.validation.findings import CODES
+from ptmtools.database.vrml.reader import WrlError, parse
 
 #: So many mutations of each kind of file; PTM_FUZZ asks for more.
 ROUNDS = int(os.environ.get("PTM_FUZZ", "40"))
@@ -74,7 +74,7 @@ def everything(artifacts, tmp_path_factory, put_textures, seal) -> Path:
     """A database with files of every kind."""
     db = tmp_path_factory.mktemp("everything") / "db"
     a, records = artifacts, put_textures(db / "www")
-    emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", EmitOptions(format="gltf"))
+    emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", EmitOptions(format="vrml,gltf"))
     for name in ("hints.json", "root.wrl"):
         twin = db / f"www/{name}.gz"
         twin.write_bytes(gzip.compress((db / "www" / name).read_bytes(), mtime=0))

@@ -26,7 +26,7 @@ from ptmtools.database import (
 from ptmtools.database.names import DefNames
 from ptmtools.database.rounding import significant
 from ptmtools.database.served import compressed
-from ptmtools.database.vrml import CellWriter, Node, parse
+from ptmtools.database.vrml.reader import Node, parse
 from ptmtools.errors import DatabaseError, InputError, OutputError
 from ptmtools.scene.model import Material
 from ptmtools.visibility.model import Pvs
@@ -144,15 +144,15 @@ def test_same_bytes_again(artifacts, tmp_path: Path) -> None:
     assert first.bytes == sum((tmp_path / "a" / n).stat().st_size for n in first.files)
 
 
-def test_compressed_twins(artifacts, tmp_path: Path) -> None:
+def test_gzip_copies(artifacts, tmp_path: Path) -> None:
     """Of each text a gzip file without name and time, listed after it; the texts are the same."""
-    plain = write(artifacts, tmp_path / "plain", EmitOptions(format="gltf"))
-    options = EmitOptions(format="gltf", gzip=True)
+    plain = write(artifacts, tmp_path / "plain", EmitOptions(format="vrml,gltf"))
+    options = EmitOptions(format="vrml,gltf", gzip=True)
     twice = [write(artifacts, tmp_path / n, options) for n in ("a", "b")]
     assert twice[0] == twice[1]
     text = [n for n in plain.files if n.endswith((".wrl", ".json"))]
     assert len(text) == 3 + 3, "cells, a root and two hints"
-    wanted = [twin for n in plain.files for twin in ([n, f"{n}.gz"] if n in text else [n])]
+    wanted = [name for n in plain.files for name in ([n, f"{n}.gz"] if n in text else [n])]
     assert list(twice[0].files) == wanted
     for name in plain.files:
         data = (tmp_path / "plain" / name).read_bytes()
@@ -185,29 +185,7 @@ def test_compressing_nothing_and_much() -> None:
         assert gzip.decompress(compressed(data)) == data
 
 
-@pytest.mark.parametrize("compiled", [False, True])
-def test_compiled_loops_write_the_same(artifacts, finished: Path, compiled: bool) -> None:
-    a = artifacts
-    of_image = {record.image: record for record in records()}
-    writer = CellWriter(a.scene, a.cells, a.pvs, a.ach.value, of_image, True, compiled)
-    for c in (2, 0, 1):
-        wanted = (finished / f"www/cells/c000{c}.wrl").read_text()
-        assert writer.cell(c).text == wanted
-
-
-def test_batches_of_shapes(artifacts, finished: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """However many shapes are written at a time, a file is the same."""
-    a = artifacts
-    of_image = {record.image: record for record in records()}
-    for size in (1, 9, 30):
-        monkeypatch.setattr("ptmtools.database.vrml.cell._BATCH", size)
-        writer = CellWriter(a.scene, a.cells, a.pvs, a.ach.value, of_image, True)
-        for c in (0, 1, 2):
-            wanted = (finished / f"www/cells/c000{c}.wrl").read_text()
-            assert writer.cell(c).text == wanted
-
-
-def test_the_level_of_the_twin(artifacts, tmp_path: Path) -> None:
+def test_the_level_of_the_fallback_image(artifacts, tmp_path: Path) -> None:
     a, (first, second) = artifacts, records()
     level = TextureLevel(1, 1, 64, 5, 3)
     given = (replace(first, levels=(level,) * 3), replace(second, levels=(level,) * 4))

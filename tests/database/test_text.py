@@ -10,18 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ptmtools.database.numerals import (
-    Rows,
-    field,
-    listed,
-    loops,
-    numeral,
-    numerals,
-    quoted,
-    single,
-)
-from ptmtools.database.numerals.decimals import LONGEST, shortest, written
+from ptmtools.database.floats import decimal, row_texts, single
 from ptmtools.database.vrml.reader import HEADER, WrlError, parse
+from ptmtools.database.vrml.text import chosen, field, listed, loops, quoted
 from ptmtools.errors import DatabaseError
 
 FLOATS = st.floats(width=32, allow_nan=False, allow_infinity=False)
@@ -78,10 +69,26 @@ def random_bits(count: int, seed: int) -> np.ndarray:
     return bits(random.integers(0, 2**32, count, dtype=np.uint32))
 
 
-def rows_by(values: np.ndarray, *, compiled: bool) -> list[str]:
-    """Every number through `Rows`."""
-    index = np.arange(len(values))
-    return Rows(values[:, None], compiled).list(index, per_line=5).replace("\n", ",").split(",")
+def dragon4(value: np.float32) -> str:
+    """One number by NumPy's own conversion, digit by digit, in our form."""
+    scientific = np.format_float_scientific(value, unique=True, trim="-")
+    mantissa, _, power = scientific.partition("e")
+    sign = "-" if mantissa.startswith("-") else ""
+    digits = mantissa.lstrip("-").replace(".", "").rstrip("0")
+    if not digits:
+        return "0"
+    exponent = int(power) - len(digits) + 1
+    if exponent >= 0:
+        plain = digits + "0" * exponent
+    elif len(digits) > -exponent:
+        plain = f"{digits[:exponent]}.{digits[exponent:]}"
+    else:
+        plain = f"0.{digits:0>{-exponent}}"
+    return sign + min(plain, f"{digits}e{exponent}", key=len)
+
+
+def texts(values: np.ndarray) -> list[str]:
+    return row_texts(values[:, None])
 
 
 def exact(text: str) -> tuple[int, int]:
@@ -96,22 +103,14 @@ def exact(text: str) -> tuple[int, int]:
 
 @pytest.mark.parametrize("values", [hard(), nearly_whole(), random_bits(60_000, 1)])
 def test_arrays_are_written_as_numpy_has_it(values: np.ndarray) -> None:
-    """Digit by digit: `numeral` is NumPy's Dragon4."""
-    wanted = [numeral(v) for v in values]
-    assert written(values) == wanted
-    assert rows_by(values, compiled=True) == wanted
-    digits, exponent = shortest(values)
-    assert list(zip(digits.tolist(), exponent.tolist(), strict=True)) == [*map(exact, wanted)]
-    assert max(map(len, wanted)) <= LONGEST
+    assert texts(values) == [dragon4(v) for v in values]
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_millions_read_back_and_both_ways_agree(seed: int) -> None:
+def test_millions_read_back(seed: int) -> None:
     values = random_bits(1_000_000, seed)
-    text = rows_by(values, compiled=True)
-    np.testing.assert_array_equal(np.array(text, dtype=np.float64).astype(np.float32), values)
-    some = values[:200_000]
-    assert written(some) == text[:200_000]
+    read = np.array(texts(values), dtype=np.float64).astype(np.float32)
+    np.testing.assert_array_equal(read, values)
 
 
 def single_or_inf(text: str) -> np.float32:
@@ -121,7 +120,7 @@ def single_or_inf(text: str) -> np.float32:
 
 @given(FLOATS)
 def test_a_number_reads_back_and_is_short(value: float) -> None:
-    text = numeral(value)
+    text = decimal(value)
     assert np.float32(float(text)) == np.float32(value)
     assert not text.startswith("-0") or text[:3] == "-0."
     digits = len(str(exact(text)[0]))
@@ -141,32 +140,22 @@ def test_numbers_as_written() -> None:
         1.2345678e-3: "0.0012345678", -1.2345678e-12: "-12345678e-19", 1.4e-45: "1e-45",
         3.4028235e38: "34028235e31",
     }  # fmt: skip
-    values = np.array(list(wanted), np.float32) + np.float32(0)
-    assert numerals(values) == list(wanted.values())
-    assert [numeral(v) for v in wanted] == list(wanted.values())
-    assert rows_by(values, compiled=True) == list(wanted.values())
+    assert texts(single(list(wanted), "these")) == list(wanted.values())
+    assert [decimal(v) for v in wanted] == list(wanted.values())
 
 
-@pytest.mark.parametrize("compiled", [False, True])
-def test_rows_of_lists(compiled: bool) -> None:
-    values = np.array([[0, 1, 2], [0.5, -1, 1e7], [3, 3, 3]], np.float32)
-    index = np.array([2, 1, 0, 0, 1, 2, 0])
-    text = Rows(values, compiled).lists(index, np.array([0, 0, 2, 2, 7]), per_line=2)
-    assert text == ["", "3 3 3,0.5 -1 1e7", "", "0 1 2,0 1 2\n0.5 -1 1e7,3 3 3\n0 1 2"]
-    assert Rows(values, compiled).lists(index[:4], np.array([0, 4]), 2) == [
-        "3 3 3,0.5 -1 1e7\n0 1 2,0 1 2"
-    ]
-    assert Rows(values[:0], compiled).lists(index[:0], np.array([0, 0])) == [""]
+def test_rows_of_lists() -> None:
+    rows = row_texts(np.array([[0, 1, 2], [0.5, -1, 1e7], [3, 3, 3]], np.float32))
+    assert rows == ["0 1 2", "0.5 -1 1e7", "3 3 3"]
+    assert chosen(rows, np.array([2, 1, 0]), per_line=2) == "[ 3 3 3,0.5 -1 1e7\n0 1 2 ]"
+    assert chosen(rows, np.zeros(0, np.int64)) == "[ ]"
+    assert row_texts(np.zeros((0, 3), np.float32)) == []
 
 
-@pytest.mark.parametrize("compiled", [False, True])
-def test_loops(compiled: bool) -> None:
-    triangles = np.array([[0, 1, 2], [10, 123456, 9], [99, 100, 2**31 - 1], [5, 4, 3]])
-    some = triangles if compiled else triangles[[0, 1, 1, 3]]
-    last = "99 100 2147483647 -1" if compiled else "10 123456 9 -1"
-    text = loops(some, np.array([0, 3, 3, 4]), 2, compiled)
-    assert text == [f"0 1 2 -1,10 123456 9 -1\n{last}", "", "5 4 3 -1"]
-    assert loops(some[:0], np.array([0, 0]), 2, compiled) == [""]
+def test_loops() -> None:
+    triangles = np.array([[0, 1, 2], [10, 123456, 9], [99, 100, 2**31 - 1]])
+    assert loops(triangles, 2) == "[ 0 1 2 -1,10 123456 9 -1\n99 100 2147483647 -1 ]"
+    assert loops(triangles[:0]) == "[ ]"
 
 
 def test_not_finite_is_refused() -> None:
@@ -198,7 +187,7 @@ def test_strings_read_back(text: str) -> None:
 @given(st.lists(st.tuples(FLOATS, FLOATS, FLOATS), max_size=40))
 def test_points_read_back(points: list[tuple[float, float, float]]) -> None:
     array = np.array(points, np.float32).reshape(-1, 3)
-    text = field(Rows(array + np.float32(0)).list(np.arange(len(array))))
+    text = field(row_texts(array + np.float32(0)))
     data = document(
         f"Shape {{ geometry IndexedFaceSet {{ coord Coordinate {{ point {text} }} }} }}"
     )

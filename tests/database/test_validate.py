@@ -18,7 +18,7 @@ import pytest
 from PIL import Image
 
 from ptmtools.database import EmitOptions, emit, validate_database, validate_ptm
-from ptmtools.database.validation import CODES
+from ptmtools.database.validation.findings import CODES
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.texture import EncodeOptions, Limits, decode, encode, read_header
 from ptmtools.visibility.model import Pvs
@@ -104,7 +104,7 @@ def test_faults_of_leaves(
 def test_gltf(artifacts, tmp_path: Path, put_textures, seal) -> None:
     db = tmp_path / "db"
     a, records = artifacts, put_textures(db / "www")
-    emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", EmitOptions(format="gltf"))
+    emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", EmitOptions(format="vrml,gltf"))
     seal(db)
     assert told(db) == []
 
@@ -140,7 +140,7 @@ def test_tiny_and_huge_worlds(artifacts, tmp_path: Path, put_textures, seal, sca
         portal_area=c.portal_area * scale**2,
         vertex=c.vertex * scale,
     )
-    scene = replace(a.scene, points=a.scene.points * scale)
+    scene = a.scene.with_points(a.scene.points * scale)
     avatar = (0.25 * scale, 1.6 * scale, 0.75 * scale)
     records = put_textures(db / "www")
     options = EmitOptions(avatar_size=avatar)
@@ -587,13 +587,25 @@ def test_shares_of_known_textures_are_no_fault(
 def test_what_the_manifest_says(database: Path) -> None:
     (database / "www/cells/c0001.wrl").unlink()
     flipped(database)
-    (database / "www/notes.txt").write_text("mine")
+    (database / "www/cells/notes.txt").write_text("mine")
+    found = {(i.code, i.file) for i in validate_database(database).issues}
+    assert ("PTM-D651", "www/cells/c0001.wrl") in found
+    assert ("PTM-D652", "www/textures/a.ptm") in found
+    assert ("PTM-D710", "www/textures/a.ptm") in found
+    assert ("PTM-D653", "www/cells/notes.txt") in found
+
+
+def test_what_a_user_adds_is_his(database: Path) -> None:
+    """Beside our files and folders, whatever it is called and holds: mentioned once."""
+    files = ("index.html", "js/walk.js", "map.png", "walk.wrl", "\udcff\n.txt")
+    for name in files:
+        put(name)(database)
     report = validate_database(database)
-    told = {(i.code, i.file) for i in report.issues}
-    assert ("PTM-D651", "www/cells/c0001.wrl") in told
-    assert ("PTM-D652", "www/textures/a.ptm") in told
-    assert ("PTM-D710", "www/textures/a.ptm") in told
-    assert ("PTM-D653", "www/notes.txt") in told
+    assert report.issues == ()
+    (note,) = report.notes
+    assert note.startswith("5 files are")
+    assert note.endswith(": index.html, js/walk.js, map.png, …")
+    assert note.isprintable()
 
 
 @pytest.mark.parametrize(
@@ -604,9 +616,9 @@ def test_what_the_manifest_says(database: Path) -> None:
         ("D652", appended(ROOT, b"# a comment\n")),
         ("D652", rewritten(HINTS, lambda data: data + b" ")),
         ("D652", rewritten(C0, lambda data: data.replace(b"0.8 0.8 0.8", b"0.8 0.8 0.7"))),
-        ("D653", put("notes.txt")),
-        ("D653", put("gone/away.txt")),
-        ("D653", put("\udcff\n.txt")),
+        ("D653", put("cells/notes.txt")),
+        ("D653", put("gltf/away.txt")),
+        ("D653", put("cells/\udcff\n.txt")),
         ("D657", lambda db: (db / "www").rename(db / "w") and (db / "www").symlink_to("w")),
     ],
 )
@@ -757,7 +769,7 @@ def test_what_is_told_can_be_printed(database: Path) -> None:
 
 @pytest.mark.parametrize("workers", [1, 3])
 def test_threads_change_nothing(database: Path, seal: Damage, workers: int) -> None:
-    for damage in (flipped, appended(C0, b"{"), removed(C1), put("notes.txt")):
+    for damage in (flipped, appended(C0, b"{"), removed(C1), put("cells/notes.txt")):
         damage(database)
     report = validate_database(database, workers=workers)
     assert report == validate_database(database)

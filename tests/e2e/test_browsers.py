@@ -67,7 +67,7 @@ def real(
     name = request.param
     folder = tmp_path_factory.mktemp(name)
     model = shared / "scenes" / name / f"{name}.obj"
-    built = ["-q", "build-scene", str(model), "-o", str(folder / "db"), "--max-cells", "60"]
+    built = ["-q", "build-scene", str(model), "-o", str(folder / "db"), "--max-leaves", "60"]
     assert main([*built, *QUICK, "--viewpoint-count", str(ROOMS), "-j", "1"]) == 0
     return Database.open(folder / "db")
 

@@ -157,7 +157,7 @@ def test_damage_is_mended(tmp_path: Path, ptm: Ptm, build: Build) -> None:
 def test_a_stage_that_others_have_left_behind_is_refused(tmp_path: Path, ptm: Ptm) -> None:
     model, db = TWO_ROOMS / "two_rooms.obj", tmp_path / "a.db"
     assert ptm("build-scene", model, "-o", db).status == 0
-    assert ptm("cells", model, "-o", db, "--max-cells", 2).status == 0
+    assert ptm("cells", model, "-o", db, "--max-leaves", 2).status == 0
     before = listing(db)
     outcome = ptm("ach", db)
     assert outcome.status == 5
@@ -240,7 +240,7 @@ def test_a_stage_run_alone_leaves_the_later_ones_stale(tmp_path: Path, ptm: Ptm)
     model = TWO_ROOMS / "two_rooms.obj"
     assert ptm("build-scene", model, "-o", db).status == 0
     assert ptm("validate", db).status == 0
-    assert ptm("cells", model, "-o", db, "--max-cells", 1).status == 0
+    assert ptm("cells", model, "-o", db, "--max-leaves", 1).status == 0
     stale = ptm("validate", db)
     assert stale.status == 8
     assert "PTM-D656" in stale.out + stale.err

@@ -120,7 +120,7 @@ def test_a_plan_says_why(model: Path, tmp_path: Path, ptm: Ptm) -> None:
     assert not db.exists()
     built(ptm, model, db)
     assert {stage["plan"] for stage in planned(ptm, model, db).values()} == {"current"}
-    plan = planned(ptm, model, db, "--max-cells", 2)
+    plan = planned(ptm, model, db, "--max-leaves", 2)
     assert plan["cells"] == {
         "stage": "cells",
         "plan": "run",
@@ -150,7 +150,7 @@ def test_status(model: Path, tmp_path: Path, ptm: Ptm) -> None:
     built(ptm, model, db)
     assert set(states(ptm, db).values()) == {"done"}
     repaint(model.with_name("floor.png"))
-    assert ptm("cells", model, "-o", db, "--max-cells", 2).status == 0
+    assert ptm("cells", model, "-o", db, "--max-leaves", 2).status == 0
     found = states(ptm, db)
     assert (found["pvs"], found["textures"], found["scene"]) == ("stale", "stale", "done")
     assert ptm("emit", db).status == 5

@@ -255,7 +255,7 @@ def test_arrays_that_are_no_images(image: NDArray[np.uint8]) -> None:
 )
 def test_impossible_options(change: dict[str, object]) -> None:
     with pytest.raises(InputError, match="PTM-I111"):
-        encode(small_image(), replace(EncodeOptions(), **change))  # type: ignore[arg-type]
+        encode(small_image(), replace(EncodeOptions(), **change))
 
 
 def test_sides_beyond_the_format() -> None:

@@ -27,7 +27,7 @@ from ptmtools.texture import (
 )
 from ptmtools.texture.images.picture import oriented
 from ptmtools.texture.images.png import png_bytes
-from ptmtools.texture.images.radiance import floats, hdr_bytes
+from ptmtools.texture.images.radiance import floats, save_radiance
 from tests.texture.test_images import png, saved
 
 RNG = np.random.default_rng(5)
@@ -283,7 +283,7 @@ def test_radiance_holds_what_it_holds(tmp_path: Path) -> None:
         np.full((2, 2, 3), 3e38, np.float32),
     ):
         with pytest.raises(OutputError, match="PTM-O102"):
-            hdr_bytes(other)
+            save_radiance(io.BytesIO(), other, Description())
 
 
 @pytest.mark.parametrize(

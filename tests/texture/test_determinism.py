@@ -65,14 +65,14 @@ def here() -> dict[str, str]:
     ids=["another process, two threads", "another processor"],
 )
 def test_elsewhere(here: dict[str, str], environment: dict[str, str], threads: int) -> None:
-    told = subprocess.run(
+    run = subprocess.run(
         [sys.executable, __file__, str(threads)],
         env={**os.environ, **environment},
         check=True,
         capture_output=True,
         text=True,
     )
-    assert json.loads(told.stdout) == here
+    assert json.loads(run.stdout) == here
 
 
 if __name__ == "__main__":

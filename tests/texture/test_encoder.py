@@ -85,8 +85,7 @@ def test_an_allowed_error_never_costs_much(profile: str) -> None:
     flat = np.kron(np.arange(48).reshape(6, 8) * 37 % 5 * 50, np.ones((15, 13)))
     for image in (flat.astype(np.uint8), IMAGE):
         exact, within = (
-            len(encode(image, EncodeOptions(profile, max_error=error)))  # type: ignore[arg-type]
-            for error in (0, 3)
+            len(encode(image, EncodeOptions(profile, max_error=error))) for error in (0, 3)
         )
         assert within <= exact + 20
 

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError
 from ptmtools.texture import build_pyramid, decode, encode
 from ptmtools.texture.profiles import fast
-from ptmtools.texture.profiles.fast import FastProfile
 from ptmtools.texture.profiles.raw import group_length
 
 BYTE = np.dtype(np.uint8)
@@ -28,9 +27,9 @@ def textured(height: int, width: int, components: int, seed: int = 0) -> NDArray
 def groups(image: NDArray[np.uint8]) -> list[tuple[bytes, NDArray[np.uint8]]]:
     """The groups of a whole pyramid, each with its level."""
     levels = build_pyramid(image)
-    found = [(FastProfile().encode_base(levels[0]), levels[0])]
+    found = [(fast.encode_base(levels[0]), levels[0])]
     for below, level in pairwise(levels):
-        found.append((FastProfile().encode_tile(level, below).data, level))
+        found.append((fast.encode_tile(level, below).data, level))
     return found
 
 
@@ -47,9 +46,9 @@ def test_every_small_size_comes_back(components: int) -> None:
 def test_a_coarsest_level_of_any_size_comes_back_and_is_compressed() -> None:
     for height, width in ((1, 1), (1, 40), (37, 1), (2, 2), (64, 61)):
         level = np.tile(textured(8, 8, 3), (8, 8, 1))[:height, :width].copy()
-        data = FastProfile().encode_base(level)
+        data = fast.encode_base(level)
         assert len(data) <= 1 + level.size
-        np.testing.assert_array_equal(FastProfile().decode_base(data, level.shape, BYTE), level)
+        np.testing.assert_array_equal(fast.decode_base(data, level.shape, BYTE), level)
     assert len(data) < 0.2 * level.size
 
 
@@ -93,13 +92,13 @@ def test_the_coder_fits_the_image() -> None:
 def test_nonsense_is_refused(group: bytes) -> None:
     below = np.zeros((4, 4, 3), np.uint8)
     with pytest.raises(InputError, match="PTM-I112"):
-        FastProfile().decode_tile(group, below, (8, 8, 3))
+        fast.decode_tile(group, below, (8, 8, 3))
     with pytest.raises(InputError, match="PTM-I112"):
-        FastProfile().decode_base(group, (8, 8, 3), BYTE)
+        fast.decode_base(group, (8, 8, 3), BYTE)
 
 
 def test_inflation_stops_at_the_size_of_the_level() -> None:
     packer = zlib.compressobj(9, zlib.DEFLATED, -15)
     bomb = packer.compress(bytes(50_000_000)) + packer.flush()
     with pytest.raises(InputError, match="PTM-I112"):
-        FastProfile().decode_base(b"\2" + bomb, (4, 4, 3), BYTE)
+        fast.decode_base(b"\2" + bomb, (4, 4, 3), BYTE)

@@ -37,7 +37,7 @@ except ImportError:
     pass
 taken = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
 resource.setrlimit(resource.RLIMIT_AS, (taken + (1 << 30),) * 2)
-told = {}
+outcomes = {}
 for name in sys.argv[1:]:
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     try:
@@ -47,8 +47,8 @@ for name in sys.argv[1:]:
         what = str(error)
     except BaseException as error:
         what = "crash: " + repr(error)
-    told[name] = what, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-print(json.dumps(told))
+    outcomes[name] = what, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+print(json.dumps(outcomes))
 """
 
 
@@ -205,7 +205,7 @@ HARMLESS: dict[str, bytes] = {
 
 
 @pytest.fixture(scope="module")
-def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[str, int]]:
+def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[str, int]]:
     """What loading each file came to, and by how many bytes the process grew."""
     if not Path("/proc/self/statm").exists():
         pytest.skip("memory is measured on Linux only")
@@ -226,8 +226,8 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[str, int]]
 
 
 @pytest.mark.parametrize("what", [*TOO_LARGE, "a file of a terabyte"])
-def test_too_large(what: str, told: dict[str, tuple[str, int]]) -> None:
-    outcome, grown = told[what]
+def test_too_large(what: str, outcomes: dict[str, tuple[str, int]]) -> None:
+    outcome, grown = outcomes[what]
     assert "[PTM-L104]" in outcome
     # Not because memory ran out while a decoder was at it.
     assert "more than the limit" in outcome or "can be stored" in outcome or "bytes, too" in outcome
@@ -235,15 +235,15 @@ def test_too_large(what: str, told: dict[str, tuple[str, int]]) -> None:
 
 
 @pytest.mark.parametrize("what", DAMAGED)
-def test_damaged(what: str, told: dict[str, tuple[str, int]]) -> None:
-    outcome, grown = told[what]
+def test_damaged(what: str, outcomes: dict[str, tuple[str, int]]) -> None:
+    outcome, grown = outcomes[what]
     assert "[PTM-I12" in outcome or "[PTM-L104]" in outcome
     assert grown < 1 << 27
 
 
 @pytest.mark.parametrize("what", HARMLESS)
-def test_harmless(what: str, told: dict[str, tuple[str, int]]) -> None:
-    outcome, grown = told[what]
+def test_harmless(what: str, outcomes: dict[str, tuple[str, int]]) -> None:
+    outcome, grown = outcomes[what]
     assert outcome == "loaded"
     assert grown < 1 << 25
 

@@ -23,7 +23,6 @@ from ptmtools.texture import (
     read_image,
     read_ptm,
     write_image,
-    write_png,
 )
 
 RNG = np.random.default_rng(11)
@@ -312,22 +311,23 @@ def test_read_ptm_names_the_file(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("image", [GREY[:, :, None], RGBA[:, :, :2], RGB, RGBA])
 def test_written_png_holds_the_texels(image: NDArray[np.uint8], tmp_path: Path) -> None:
-    write_png(tmp_path / "out.png", image)
+    write_image(tmp_path / "out.png", image)
     np.testing.assert_array_equal(read_image(tmp_path / "out.png"), image)
 
 
-def test_png_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
-    write_png(tmp_path / "out.png", RGB)
-    before = (tmp_path / "out.png").read_bytes()
+def test_an_image_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
+    out, folder = tmp_path / "out.png", tmp_path / "folder.png"
+    folder.mkdir()
+    write_image(out, RGB)
     with pytest.raises(OutputError, match="PTM-O001"):
-        write_png(tmp_path / "out.png", 255 - RGB)
-    assert (tmp_path / "out.png").read_bytes() == before
-    write_png(tmp_path / "out.png", 255 - RGB, force=True)
-    np.testing.assert_array_equal(read_image(tmp_path / "out.png"), 255 - RGB)
-    for target in (tmp_path, tmp_path / "absent" / "out.png"):
+        write_image(out, 255 - RGB)
+    np.testing.assert_array_equal(read_image(out), RGB)
+    write_image(out, 255 - RGB, force=True)
+    np.testing.assert_array_equal(read_image(out), 255 - RGB)
+    for target in (folder, tmp_path / "absent" / "out.png"):
         with pytest.raises(OutputError, match="PTM-O002"):
-            write_png(target, RGB, force=True)
-    assert [file.name for file in tmp_path.iterdir()] == ["out.png"]
+            write_image(target, RGB, force=True)
+    assert sorted(tmp_path.iterdir()) == [folder, out]
 
 
 def test_importing_the_package_loads_nothing_heavy() -> None:

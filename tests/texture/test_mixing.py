@@ -6,7 +6,7 @@ import pytest
 from ptmtools.errors import InputError
 from ptmtools.texture.coders.mixing.coder import _split, decode_mixing, encode_mixing
 from ptmtools.texture.coders.mixing.reference import ReferenceState, decode_reference
-from ptmtools.texture.profiles.small import SmallProfile
+from ptmtools.texture.profiles import small
 from ptmtools.texture.pyramid import build_pyramid
 
 
@@ -20,15 +20,14 @@ def _image(height, width, components, seed=1):
 
 def _pyramid_sizes(image, max_error=0, threads=1):
     """Encodes and decodes all levels; the sizes of the groups."""
-    profile = SmallProfile()
     levels = build_pyramid(image)
-    base = profile.encode_base(levels[0])
-    seen = read = profile.decode_base(base, levels[0].shape, image.dtype)
+    base = small.encode_base(levels[0])
+    seen = read = small.decode_base(base, levels[0].shape, image.dtype)
     learned = known = None
     sizes = [len(base)]
     for level in levels[1:]:
-        tile = profile.encode_tile(level, seen, max_error, learned, threads)
-        back = profile.decode_tile(tile.data, read, level.shape, max_error, known, threads)
+        tile = small.encode_tile(level, seen, max_error, learned, threads)
+        back = small.decode_tile(tile.data, read, level.shape, max_error, known, threads)
         assert np.array_equal(tile.texels, back.texels)
         assert np.abs(back.texels.astype(int) - level).max() <= max_error
         seen, read, learned, known = tile.texels, back.texels, tile.memory, back.memory
@@ -91,14 +90,14 @@ def test_memory_is_not_changed_and_makes_a_difference():
     assert len(first) < len(fresh)
 
 
-def test_learning_from_texels_is_what_reading_leaves():
+def test_reading_leaves_the_memory_that_writing_left():
     levels = build_pyramid(_image(40, 44, 3))
-    profile, seen, memory = SmallProfile(), levels[0], None
+    seen, written, read = levels[0], None, None
     for level in levels[1:]:
-        data = profile.encode_tile(level, seen, memory=memory).data
-        tile = profile.decode_tile(data, seen, level.shape, memory=memory)
-        seen, memory = tile.texels, tile.memory
-    for one, two in zip(profile.learn(levels).planes, memory.planes, strict=True):
+        tile = small.encode_tile(level, seen, memory=written)
+        back = small.decode_tile(tile.data, seen, level.shape, memory=read)
+        seen, written, read = back.texels, tile.memory, back.memory
+    for one, two in zip(written.planes, read.planes, strict=True):
         assert all(np.array_equal(a, b) for a, b in zip(one, two, strict=True))
 
 
@@ -135,13 +134,12 @@ def test_damage_is_an_error_or_an_image(width):
 
 
 def test_the_profile_refuses_what_is_not_its_own():
-    profile = SmallProfile()
     below = np.zeros((2, 2, 1), np.uint8)
     for data in (b"", b"\x09", b"\x02abc", b"\x01abc", b"\x01" + bytes(17), b"\x00\x00"):
         with pytest.raises(InputError):
-            profile.decode_tile(data, below, (4, 4, 1))
+            small.decode_tile(data, below, (4, 4, 1))
     with pytest.raises(InputError):
-        profile.decode_base(b"\x01\x02", (4, 4, 1), np.dtype(np.uint8))
+        small.decode_base(b"\x01\x02", (4, 4, 1), np.dtype(np.uint8))
 
 
 @pytest.mark.parametrize(

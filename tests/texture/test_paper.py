@@ -11,12 +11,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, MissingComponentError
-from ptmtools.texture.profiles import paper
-from ptmtools.texture.profiles.paper import PaperProfile
-from ptmtools.texture.profiles.raw import RawProfile
+from ptmtools.texture.profiles import paper, raw
 from ptmtools.texture.pyramid import build_pyramid, mean_below
-
-PAPER = PaperProfile()
 
 
 @pytest.fixture(autouse=True)
@@ -39,14 +35,14 @@ def test_every_level_is_exact(dtype: str, components: int, shape: tuple[int, int
     noise = rng.integers(0, np.iinfo(dtype).max + 1, (*shape, components)).astype(dtype)
     for level in (image(*shape, components, dtype), noise):
         coarsest, *levels = build_pyramid(level)
-        base = PAPER.encode_base(coarsest)
-        below = PAPER.decode_base(base, coarsest.shape, coarsest.dtype)
+        base = paper.encode_base(coarsest)
+        below = paper.decode_base(base, coarsest.shape, coarsest.dtype)
         np.testing.assert_array_equal(below, coarsest)
         for one in levels:
-            data = PAPER.encode_tile(one, below).data
-            found = PAPER.decode_tile(data, below, one.shape).texels
+            data = paper.encode_tile(one, below).data
+            found = paper.decode_tile(data, below, one.shape).texels
             np.testing.assert_array_equal(found, one)
-            assert len(data) <= 1 + len(RawProfile().encode_tile(one, below).data)
+            assert len(data) <= 1 + len(raw.encode_tile(one, below).data)
             below = found
 
 
@@ -54,17 +50,17 @@ def test_every_level_is_exact(dtype: str, components: int, shape: tuple[int, int
 def test_it_is_shorter_than_raw(dtype: str) -> None:
     level = image(128, 129, 3, dtype)
     below = mean_below(level)
-    data = PAPER.encode_tile(level, below).data
+    data = paper.encode_tile(level, below).data
     assert data[0] == paper.JPEG
-    assert len(data) < 0.8 * len(RawProfile().encode_tile(level, below).data)
+    assert len(data) < 0.8 * len(raw.encode_tile(level, below).data)
 
 
 def test_floats_are_refused() -> None:
     level = np.zeros((4, 4, 1), np.float32)
     for attempt in (
-        lambda: PAPER.encode_base(level),
-        lambda: PAPER.encode_tile(level, level[::2, ::2]),
-        lambda: PAPER.decode_tile(b"", level, (8, 8, 1)),
+        lambda: paper.encode_base(level),
+        lambda: paper.encode_tile(level, level[::2, ::2]),
+        lambda: paper.decode_tile(b"", level, (8, 8, 1)),
     ):
         with pytest.raises(InputError, match="PTM-I111"):
             attempt()
@@ -73,7 +69,7 @@ def test_floats_are_refused() -> None:
 def test_without_imagecodecs_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "imagecodecs", None)
     with pytest.raises(MissingComponentError, match=r"ptmtools\[codecs\].*PTM-M102"):
-        PAPER.encode_base(np.zeros((1, 1, 1), np.uint8))
+        paper.encode_base(np.zeros((1, 1, 1), np.uint8))
 
 
 LEVEL = image(35, 38, 3, "uint8")
@@ -88,13 +84,13 @@ BELOW = mean_below(LEVEL)
 def test_a_damaged_group_is_an_error_or_an_image(
     changes: list[tuple[float, int]], cut: float
 ) -> None:
-    group = bytearray(PAPER.encode_tile(LEVEL, BELOW).data)
+    group = bytearray(paper.encode_tile(LEVEL, BELOW).data)
     for position, value in changes:
         group[int(position * len(group))] = value
     del group[int(cut * len(group)) :]
     codes, found = [], None
     try:
-        found = PAPER.decode_tile(bytes(group), BELOW, LEVEL.shape).texels
+        found = paper.decode_tile(bytes(group), BELOW, LEVEL.shape).texels
     except InputError as error:
         codes.append(error.code)
     assert codes == ["PTM-I112"] or (found is not None and found.shape == LEVEL.shape)
@@ -108,9 +104,9 @@ def test_another_size_is_refused_before_it_is_decoded(monkeypatch: pytest.Monkey
     twice = imagecodecs.jpeg8_encode(texels, lossless=True)
     lossy = imagecodecs.jpeg8_encode(texels, 90)
     begin = -(-BELOW.size // 4) + 1 + LEVEL[34:].nbytes
-    prefix = PAPER.encode_tile(LEVEL, BELOW).data[:begin]
+    prefix = paper.encode_tile(LEVEL, BELOW).data[:begin]
     monkeypatch.delattr(imagecodecs, "jpeg8_decode")
     for jpeg in (huge, twice + twice[2:], lossy, b""):
         data = prefix + len(jpeg).to_bytes(4, "little") + bytes(jpeg)
         with pytest.raises(InputError, match="PTM-I112"):
-            PAPER.decode_tile(data, BELOW, LEVEL.shape)
+            paper.decode_tile(data, BELOW, LEVEL.shape)

@@ -12,23 +12,23 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
-from ptmtools.texture.profiles.raw import RawProfile, group_length
+from ptmtools.texture.profiles import raw
+from ptmtools.texture.profiles.raw import group_length
 from ptmtools.texture.pyramid import build_pyramid, mean_below
 from ptmtools.texture.samples import KINDS
 
-RAW = RawProfile()
 DTYPES = [np.dtype(name) for name in KINDS]
 
 
 def assert_exact(image: NDArray) -> None:
     """Every level, bit by bit."""
     coarsest, *levels = build_pyramid(image)
-    base = RAW.decode_base(RAW.encode_base(coarsest), coarsest.shape, coarsest.dtype)
+    base = raw.decode_base(raw.encode_base(coarsest), coarsest.shape, coarsest.dtype)
     assert base.tobytes() == np.ascontiguousarray(coarsest).tobytes()
     below = coarsest
     for level in levels:
-        tile = RAW.encode_tile(level, below)
-        found = RAW.decode_tile(tile.data, below, level.shape).texels
+        tile = raw.encode_tile(level, below)
+        found = raw.decode_tile(tile.data, below, level.shape).texels
         assert found.tobytes() == np.ascontiguousarray(level).tobytes()
         below = level
 
@@ -62,8 +62,8 @@ def test_any_range_of_floats(
 def test_tiles_with_nothing_below(dtype: np.dtype, shape: tuple[int, int, int]) -> None:
     level = np.arange(int(np.prod(shape))).reshape(shape).astype(dtype)
     below = mean_below(level)
-    tile = RAW.encode_tile(level, below)
-    np.testing.assert_array_equal(RAW.decode_tile(tile.data, below, shape).texels, level)
+    tile = raw.encode_tile(level, below)
+    np.testing.assert_array_equal(raw.decode_tile(tile.data, below, shape).texels, level)
 
 
 def test_sixteen_bits_by_hand() -> None:
@@ -73,7 +73,7 @@ def test_sixteen_bits_by_hand() -> None:
     assert below.reshape(-1).tolist() == [2, (300 + 3 * 65535) // 4]
     residuals = 11 % 4 | (300 + 3 * 65535) % 4 << 2
     samples = struct.pack("<8H", 1, 2, 300, 65535, 7, 4, 65535, 8)
-    assert RAW.encode_tile(level, below).data == bytes([residuals]) + samples
+    assert raw.encode_tile(level, below).data == bytes([residuals]) + samples
 
 
 def test_floats_by_hand() -> None:
@@ -84,16 +84,16 @@ def test_floats_by_hand() -> None:
     level[1, 3] = one + unit
     level[1, 5] = one - 3 * unit / 2
     samples = struct.pack("<9f", *[1.0] * 9)
-    data = RAW.encode_tile(level, below).data
+    data = raw.encode_tile(level, below).data
     # Codes 0, 2 (+1), 3 (escape); -3 is 5 in zigzag, of which 3 is told by the code.
     assert data == bytes([0 | 2 << 2 | 3 << 4]) + samples + bytes([5 - 3])
-    np.testing.assert_array_equal(RAW.decode_tile(data, below, level.shape).texels, level)
+    np.testing.assert_array_equal(raw.decode_tile(data, below, level.shape).texels, level)
 
 
 def test_where_the_formula_is_no_number_the_texel_to_the_left_stands_in() -> None:
     level = np.array([[np.inf, 5], [2, 2]], np.float16)[:, :, None]
     level[0, 1] = np.nan
-    data = RAW.encode_tile(level, mean_below(level)).data
+    data = raw.encode_tile(level, mean_below(level)).data
     assert data[0] == 0
     assert len(data) == 7
 
@@ -105,10 +105,10 @@ def test_what_residuals_cost(name: str, share: int) -> None:
     """1/12 of an image of 8 bits (the paper's 6 % of the pyramid), 1/24 of one of 16."""
     image = np.zeros((256, 256, 3), name)
     coarsest, *levels = build_pyramid(image)
-    total = len(RAW.encode_base(coarsest))
+    total = len(raw.encode_base(coarsest))
     below = coarsest
     for level in levels:
-        data = RAW.encode_tile(level, below).data
+        data = raw.encode_tile(level, below).data
         assert len(data) == group_length(level.shape, level.dtype)
         total += len(data)
         below = level
@@ -117,7 +117,7 @@ def test_what_residuals_cost(name: str, share: int) -> None:
 
 def test_floats_of_like_magnitude_cost_little_more_than_three_bits_a_block() -> None:
     level = np.random.default_rng(1).uniform(1, 4, (128, 128, 1)).astype(np.float32)
-    data = RAW.encode_tile(level, mean_below(level)).data
+    data = raw.encode_tile(level, mean_below(level)).data
     extra = 8 * (len(data) - 3 * level.nbytes / 4) / (64 * 64)
     assert 2 < extra < 3.4
 
@@ -134,12 +134,12 @@ def test_a_damaged_group_is_an_error_or_an_image(
 ) -> None:
     level = (np.arange(11 * 10 * 2).reshape(11, 10, 2) * 37 % 101).astype(dtype)
     below = mean_below(level)
-    data = bytearray(RAW.encode_tile(level, below).data)
+    data = bytearray(raw.encode_tile(level, below).data)
     data[int(position * len(data))] = value
     data = data[:change] if change < 0 else data + bytes(change)
     codes, found = [], None
     try:
-        found = RAW.decode_tile(bytes(data), below, level.shape).texels
+        found = raw.decode_tile(bytes(data), below, level.shape).texels
     except InputError as error:
         codes.append(error.code)
     assert codes == ["PTM-I112"] or (found is not None and found.shape == level.shape)
@@ -152,4 +152,4 @@ def test_impossible_escapes_are_refused(escapes: bytes) -> None:
     below = np.ones((1, 1, 1), np.float32)
     data = bytes([3]) + struct.pack("<3f", 1, 1, 1)
     with pytest.raises(InputError, match="PTM-I112"):
-        RAW.decode_tile(data + escapes, below, (2, 2, 1))
+        raw.decode_tile(data + escapes, below, (2, 2, 1))

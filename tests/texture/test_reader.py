@@ -116,7 +116,7 @@ def test_windows_outside(window: tuple[int, int, int, int]) -> None:
 
 @pytest.mark.parametrize("profile", ["raw", "fast"])
 def test_tiles_with_any_number_of_threads(profile: str) -> None:
-    options = EncodeOptions(profile, tile=16)  # type: ignore[arg-type]
+    options = EncodeOptions(profile, tile=16)
     data = encode(picture(), options)
     assert {encode(picture(), options, threads=n) for n in (2, 5)} == {data}
     header = texture.read_header(data)

@@ -32,7 +32,7 @@ SIDES = 67
 def assert_every_level(
     image: Samples, profile: str, one_by_one: bool = False, **options: int
 ) -> bytes:
-    chosen = EncodeOptions(profile, **options)  # type: ignore[arg-type]
+    chosen = EncodeOptions(profile, **options)
     data = encode(image, chosen)
     expected = build_pyramid(image if image.ndim == 3 else image[:, :, None])
     found = list(decode_levels(data))

@@ -16,7 +16,7 @@ from ptmtools.tradeoff.report import as_csv, table
 class Made:
     """Errors that fall as work^-0.5, one dear and bad setting, and one that is not sound."""
 
-    stage, work, error, reference_error = "made", "steps", "distance", 0.01
+    work, error, reference_error = "steps", "distance", 0.01
 
     def settings(self):
         good = [Setting(f"--steps {n}", {"steps": n}, "steps") for n in (400, 100, 4, 1600)]
@@ -34,7 +34,7 @@ class Made:
 
 def test_an_experiment():
     calls = []
-    trade = run(Made(), lambda *call: calls.append(call))
+    trade = run("made", Made(), lambda *call: calls.append(call))
     assert [t.setting.name for t in trade.trials if t.best] == [
         "--steps 4",
         "--steps 100",
@@ -52,7 +52,7 @@ def test_errors_below_twice_that_of_the_reference_fit_no_rate():
     class Blurred(Made):
         reference_error = 0.06  # 100, 400 and 1600 steps are below twice that
 
-    assert run(Blurred()).rates == {}
+    assert run("made", Blurred()).rates == {}
 
 
 @given(
@@ -83,21 +83,21 @@ def test_two_trials_of_a_family_have_no_rate():
 
 
 def test_the_table_names_the_best_and_the_cheapest():
-    lines = table(run(Made()), 0.06)
+    lines = table(run("made", Made()), 0.06)
     assert [line[:13].strip() for line in lines if line.startswith("*")] == [
         "* --steps 4",
         "* --steps 100",
         "* --steps 400",
         "* --steps 160",
     ]
-    assert "  the reference's own standard error: 0.0100" in lines
+    assert "  standard error of the reference: 0.0100" in lines
     assert "  steps: error ∝ work^-0.50" in lines
     assert lines[-1] == "  cheapest for an error of at most 0.06: --steps 400"
-    assert "none of these" in table(run(Made()), 1e-9)[-1]
+    assert "none of these" in table(run("made", Made()), 1e-9)[-1]
 
 
 def test_the_csv_has_every_trial():
-    rows = list(csv.DictReader(io.StringIO(as_csv([run(Made()), run(Made())]))))
+    rows = list(csv.DictReader(io.StringIO(as_csv([run("made", Made()), run("made", Made())]))))
     assert len(rows) == 12
     assert rows[1]["setting"] == "--steps 4"
     assert float(rows[1]["error"]) == 0.5

@@ -18,8 +18,8 @@ from ptmtools.coverage.options import AchOptions
 from ptmtools.pipeline import build_scene
 from ptmtools.scene.model import SourceImage
 from ptmtools.texture import EncodeOptions
+from ptmtools.tradeoff.coverage import REFERENCE_SEED, CoverageTrade
 from ptmtools.tradeoff.experiment import Setting
-from ptmtools.tradeoff.hints import REFERENCE_SEED, CoverageTrade
 from ptmtools.tradeoff.textures import TexturesTrade
 from ptmtools.tradeoff.visibility import VisibilityTrade
 from ptmtools.visibility.options import PvsOptions

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from ptmtools.cells.model import Cells
+from ptmtools.tolerance import Tolerance
 
 #: A door in the wall of room (i, j, k) towards its neighbour along an axis: (u0, u1, v0, v1) in
 #: the coordinates of the two axes that follow it cyclically.
@@ -128,6 +129,7 @@ def make_rooms(
         triangle=np.zeros((0, 3), np.int32),
         triangle_source=np.zeros(0, np.int32),
         triangle_cell=np.zeros((0, 2), np.int32),
+        tolerance=Tolerance.for_points(points),
     )
     triangles = np.concatenate([q[[[0, 1, 2], [0, 2, 3]]] for q in corner])
     return Rooms(triangles, cells, index)

@@ -26,7 +26,7 @@ OPTIONS = {
     "hospital": SubdivideOptions(cells="leaf"),
     "willowgarage": SubdivideOptions(cells="leaf"),
     "gallery": SubdivideOptions(cells="leaf"),
-    "office": SubdivideOptions(cells="leaf", max_cells=100),
+    "office": SubdivideOptions(cells="leaf", max_leaves=100),
     "museum": SubdivideOptions(cells="leaf"),
 }
 

@@ -10,49 +10,34 @@ shape's, and some copy all of it for each shape.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.database.content import Content
 from ptmtools.database.geometry import Geometry, Shape
 from ptmtools.database.gltf.buffer import BufferWriter
 from ptmtools.database.gltf.container import pack
 from ptmtools.database.gltf.material import MaterialWriter
-from ptmtools.database.gltf.names import glb_path
-from ptmtools.database.model import TextureRecord
-from ptmtools.database.names import cell_name
-from ptmtools.progress import Progress, silent
+from ptmtools.database.names import GLTF_HINTS, UP, cell_name, glb_file, glb_path
 from ptmtools.scene.model import Scene
 
 
-def gltf_files(
-    scene: Scene,
-    geometry: Geometry,
-    cells: int,
-    textures: Sequence[TextureRecord],
-    fallback: bool,
-    progress: Progress = silent,
-) -> Iterator[tuple[str, bytes]]:
-    """The GLB of every cell: its path relative to the served folder, and its bytes.
-
-    Parameters
-    ----------
-    cells: how many there are.
-    textures: in the order of the hints; one for every image that a material in use names.
-    fallback: refer to the PNG twins; without, materials only name the `.ptm` in their extras.
+def gltf_files(content: Content) -> Iterator[tuple[str, bytes | str]]:
+    """Path, relative to the served folder, and bytes of every GLB, and of the hints beside them.
 
     Raises
     ------
     LimitError: PTM-L600 a cell is longer than a GLB can be.
     """
-    records = {record.image: (place, record) for place, record in enumerate(textures)}
-    for cell in range(cells):
-        progress(cell, cells, "glTF")
-        materials = MaterialWriter(scene.materials, records, fallback)
-        yield glb_path(cell), _glb(scene, geometry, cell, materials)
-    progress(cells, cells, "glTF")
+    count = content.cells.cell_count
+    for cell in range(count):
+        content.progress(cell, count, "glTF")
+        yield glb_path(cell), _glb(content, cell)
+    content.progress(count, count, "glTF")
+    yield GLTF_HINTS, content.hints(glb_file, UP)
 
 
 def flipped(uv: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -62,8 +47,9 @@ def flipped(uv: NDArray[np.floating]) -> NDArray[np.float32]:
     return turned.astype(np.float32)
 
 
-def _glb(scene: Scene, geometry: Geometry, cell: int, materials: MaterialWriter) -> bytes:
-    buffer = BufferWriter()
+def _glb(content: Content, cell: int) -> bytes:
+    scene, geometry, buffer = content.scene, content.geometry, BufferWriter()
+    materials = MaterialWriter(scene.materials, content.records, content.options.fallback)
     nodes: list[dict[str, Any]] = []
     meshes: list[dict[str, Any]] = []
     last = -1

@@ -5,7 +5,7 @@ glTF                               from
 =================================  =======================================================
 baseColorFactor                    colour and opacity; glTF multiplies linear light, the scene
                                    what is encoded as sRGB, so the colour is converted
-baseColorTexture                   the image's PNG twin, by URI; nothing where there is none
+baseColorTexture                   the fallback image, by URI; nothing where there is none
 metallicFactor 0, roughness 1      nothing known: matt
 doubleSided                        the shape's sidedness
 alphaMode BLEND                    opacity below 1, or a used texel with alpha below 255
@@ -27,8 +27,8 @@ from urllib.parse import quote
 
 import numpy as np
 
-from ptmtools.database.gltf.names import UP
 from ptmtools.database.model import TextureRecord
+from ptmtools.database.names import UP
 from ptmtools.scene.model import Material, Wrap
 
 #: A sampler's number for each way to go on beyond [0, 1]; the first is the default.

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ptmtools.database.validation.findings import Findings
 from ptmtools.database.validation.lists import check_list, check_shares
 from ptmtools.database.validation.solids import MOST_CORNERS, SolidError, farthest, solid_planes
-from ptmtools.database.vrml import Document, Node, convex_hull
+from ptmtools.database.vrml.hull import convex_hull
+from ptmtools.database.vrml.reader import Document, Node
 from ptmtools.errors import DatabaseError
 from ptmtools.tolerance import Tolerance
 
@@ -55,7 +56,7 @@ class ReadCell:
 
 
 def read_cell(document: Document, file: str, found: Findings) -> ReadCell | None:
-    """The cell of a file, or None (told as PTM-D663) if it lacks part of the pattern."""
+    """The cell of a file, or None, and PTM-D663, if it lacks part of the pattern."""
     nodes = document.of_type("PTMCell")
     if len(nodes) != 1:
         found.add("PTM-D663", file, "", f"{len(nodes)} PTMCell nodes, not 1")
@@ -70,7 +71,7 @@ def read_cell(document: Document, file: str, found: Findings) -> ReadCell | None
     textures: dict[int, Node] = {}
     held = [fields["hullPoint"]]
     for shape in document.of_type("Shape"):
-        texture, coord = _child(shape, "appearance", "texture"), _child(shape, "geometry", "coord")
+        texture, coord = shape.child("appearance", "texture"), shape.child("geometry", "coord")
         if texture is not None:
             textures[id(texture)] = texture
         if coord is not None and "point" in coord.fields:
@@ -113,7 +114,7 @@ def check_cell(
     for shape in document.of_type("Shape"):
         where = f"line {shape.line}" + (f", {shape.name}" if shape.name else "")
         _check_shape(shape, file, where, found)
-        coord = _child(shape, "geometry", "coord")
+        coord = shape.child("geometry", "coord")
         if coord is not None and "point" in coord.fields:
             far = body.outside(coord.fields["point"])
             if far > tolerance.cluster:
@@ -124,8 +125,8 @@ def check_cell(
     check_list("adjacentUrl", own, cell.adjacent, file, place, found)
     check_list("visibleUrl", own, cell.visible, file, place, found)
     if len(cell.ach) != len(cell.visible):
-        told = f"{len(cell.ach)} ach values for {len(cell.visible)} visible cells"
-        found.add("PTM-D691", file, place, told)
+        message = f"{len(cell.ach)} ach values for {len(cell.visible)} visible cells"
+        found.add("PTM-D691", file, place, message)
     check_shares(cell.ach, ACH_SLACK, file, place, ("PTM-D692", "PTM-D693"), found)
 
 
@@ -163,8 +164,8 @@ class _Body:
                 self._leaves = leaves
             far = farthest(hull, fields["leafPoint"]).max(initial=0.0)
             if far > tolerance.cluster:
-                told = f"a leaf lies {far:.3g} m outside of the hull"
-                self.faults.append(("PTM-D684", told))
+                message = f"a leaf lies {far:.3g} m outside of the hull"
+                self.faults.append(("PTM-D684", message))
 
     def outside(self, points: NDArray[np.float64]) -> float:
         """How far the farthest of (n, 3) points lies outside, metres; 0 if none does."""
@@ -199,15 +200,6 @@ class _Body:
         return planes[~(outwards & (abs(faces) <= tolerance.plane)).any(axis=1)]
 
 
-def _child(node: Node, *path: str) -> Node | None:
-    for field in path:
-        child = node.fields.get(field)
-        if not isinstance(child, Node):
-            return None
-        node = child
-    return node
-
-
 def _loops(index: NDArray[np.int64], points: int) -> NDArray[np.int64] | None:
     """(m, 3) triangles of an index field over so many points, or None if it is no such list."""
     if len(index) % 4:
@@ -219,11 +211,11 @@ def _loops(index: NDArray[np.int64], points: int) -> NDArray[np.int64] | None:
 
 
 def _check_shape(shape: Node, file: str, place: str, found: Findings) -> None:
-    geometry, appearance = _child(shape, "geometry"), _child(shape, "appearance")
+    geometry, appearance = shape.child("geometry"), shape.child("appearance")
     if geometry is None or appearance is None:
         found.add("PTM-D663", file, place, "a Shape without appearance or geometry")
         return
-    coord, fields = _child(geometry, "coord"), list(geometry.fields)
+    coord, fields = geometry.child("coord"), list(geometry.fields)
     if coord is None or "coordIndex" not in fields or "point" not in coord.fields:
         found.add("PTM-D663", file, place, "an IndexedFaceSet without coord or coordIndex")
         return
@@ -243,7 +235,7 @@ def _check_shape(shape: Node, file: str, place: str, found: Findings) -> None:
 def _check_texture(
     geometry: Node, appearance: Node, count: int, file: str, place: str, found: Findings
 ) -> None:
-    texture, coord = _child(appearance, "texture"), _child(geometry, "texCoord")
+    texture, coord = appearance.child("texture"), geometry.child("texCoord")
     index = geometry.fields.get("texCoordIndex")
     if texture is None and coord is None and index is None:
         return
@@ -264,7 +256,7 @@ def _check_colours(
     geometry: Node, appearance: Node, count: int, file: str, place: str, found: Findings
 ) -> None:
     values: list[Any] = []
-    material, color = _child(appearance, "material"), _child(geometry, "color")
+    material, color = appearance.child("material"), geometry.child("color")
     if material is not None:
         values += list(material.fields.values())
     if color is not None:

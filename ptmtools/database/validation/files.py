@@ -1,4 +1,4 @@
-"""What lies in the folder of a database: which files, of which kind, and their gzip twins."""
+"""What lies in the folder of a database: which files, of which kind, and their gzip copies."""
 
 from __future__ import annotations
 
@@ -8,24 +8,22 @@ import zlib
 from collections.abc import Iterable
 from pathlib import Path
 
+from ptmtools.database.names import SERVED
 from ptmtools.database.validation.findings import Findings
 
-#: Suffix of a gzip twin.
-TWIN = ".gz"
 #: What zlib calls a stream with the header and the checksum of gzip.
 _GZIP = 16 + zlib.MAX_WBITS
 
 
-def served_files(folder: Path, name: str, found: Findings) -> list[str]:
-    """The files below ``folder``, relative to it, in order; ``name`` is the folder's own in
-    findings.
+def served_files(folder: Path, found: Findings) -> list[str]:
+    """The files below the served folder, relative to it, in order.
 
     A link to a file of the folder counts as a file. All else that is neither a file nor a folder
-    is told and left out, and no link to a folder is followed.
+    is a finding and left out, and no link to a folder is followed.
     """
     top = os.path.realpath(folder)
     if folder.is_symlink():
-        found.add("PTM-D657", name, "", f"is a link to {top}")
+        found.add("PTM-D657", SERVED, "", f"is a link to {top}")
     files: list[str] = []
     folders = [""]
     while folders:
@@ -36,22 +34,22 @@ def served_files(folder: Path, name: str, found: Findings) -> list[str]:
         except FileNotFoundError:
             continue
         except OSError as fault:
-            found.add("PTM-D654", f"{name}/{below}", "", f"cannot be read ({_reason(fault)})")
+            found.add("PTM-D654", f"{SERVED}/{below}", "", f"cannot be read ({_reason(fault)})")
             continue
         for entry in there:
             path = f"{below}{entry.name}"
             if entry.is_symlink() and not _within(os.path.realpath(entry.path), top):
-                found.add("PTM-D657", f"{name}/{path}", "", f"is a link to {_target(entry)}")
+                found.add("PTM-D657", f"{SERVED}/{path}", "", f"is a link to {_target(entry)}")
             elif entry.is_dir(follow_symlinks=False):
                 folders.append(f"{path}/")
             elif _is_file(entry):
                 files.append(path)
             else:
-                found.add("PTM-D658", f"{name}/{path}", "", f"is {_kind(entry)}")
+                found.add("PTM-D658", f"{SERVED}/{path}", "", f"is {_kind(entry)}")
     return sorted(files)
 
 
-def check_names(files: Iterable[str], name: str, found: Findings) -> None:
+def check_names(files: Iterable[str], found: Findings) -> None:
     """Names, folders included, that a file system without regard to case takes for one."""
     known: dict[str, str] = {}
     for file in files:
@@ -61,18 +59,18 @@ def check_names(files: Iterable[str], name: str, found: Findings) -> None:
             other = known.setdefault(path.casefold(), path)
             if other != path:
                 known[path.casefold()] = path
-                found.add("PTM-D675", f"{name}/{path}", "", f"there is {other} too")
+                found.add("PTM-D675", f"{SERVED}/{path}", "", f"there is {other} too")
 
 
-def check_twin(twin: bytes, original: bytes | None, file: str, found: Findings) -> None:
-    """A gzip twin beside the bytes of what it is the twin of, None if that is not there. It is
+def check_gzip(copy: bytes, original: bytes | None, file: str, found: Findings) -> None:
+    """A gzip copy beside the bytes of what it is the copy of, None if that is not there. It is
     inflated to one byte more than those at most."""
     if original is None:
         found.add("PTM-D676", file, "", "there is no such file without .gz")
         return
     inflater = zlib.decompressobj(_GZIP)
     try:
-        plain = inflater.decompress(twin, len(original) + 1)
+        plain = inflater.decompress(copy, len(original) + 1)
     except zlib.error as fault:
         found.add("PTM-D676", file, "", f"damaged ({fault})")
         return
@@ -101,7 +99,7 @@ def _kind(entry: os.DirEntry[str]) -> str:
     except OSError:
         return "a link to nothing"
     kinds = ((stat.S_ISDIR, "a link to a folder"), (stat.S_ISFIFO, "a pipe"))
-    return next((told for holds, told in kinds if holds(mode)), "a device")
+    return next((kind for holds, kind in kinds if holds(mode)), "a device")
 
 
 def _target(entry: os.DirEntry[str]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 
 from ptmtools.database.model import Issue, Severity
@@ -11,7 +12,7 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D650": ("error", "the manifest is missing or damaged"),
     "PTM-D651": ("error", "a file of the database is missing"),
     "PTM-D652": ("error", "a file is not what its stage wrote: the hash differs"),
-    "PTM-D653": ("warning", "a file is served that no stage wrote"),
+    "PTM-D653": ("warning", "a file lies among ours that no stage wrote"),
     "PTM-D654": ("error", "a file cannot be read"),
     "PTM-D655": ("warning", "the database is not finished: nothing was emitted yet"),
     "PTM-D656": ("error", "a stage is stale: what it was made from has changed since"),
@@ -28,7 +29,7 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D673": ("error", "a URL is malformed"),
     "PTM-D674": ("error", "two entries of a list name the same file"),
     "PTM-D675": ("warning", "names of served files differ in nothing but case"),
-    "PTM-D676": ("error", "a .gz twin is damaged, or is not that of the file beside it"),
+    "PTM-D676": ("error", "a .gz copy is damaged, or is not that of the file beside it"),
     "PTM-D677": ("warning", "a file is served that no other names"),
     "PTM-D680": ("error", "coordIndex is out of range, or no list of triangles"),
     "PTM-D681": ("error", "texCoordIndex is out of range, or does not match coordIndex"),
@@ -57,8 +58,8 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D708": ("warning", "a texture is listed in hints.json that no cell uses"),
     "PTM-D709": ("error", "a leaf in hints.json is no convex polyhedron, or lies in another"),
     "PTM-D710": ("error", "a .ptm file is damaged"),
-    "PTM-D711": ("error", "a .ptm file and its PNG twin show different images"),
-    "PTM-D712": ("error", "a PNG twin cannot be read"),
+    "PTM-D711": ("error", "a .ptm file and its fallback image show different images"),
+    "PTM-D712": ("error", "a fallback image cannot be read"),
     "PTM-D713": ("warning", "a file is too large to be checked beyond its checksums"),
     "PTM-D720": ("error", "the arrays of a stage cannot be read"),
     "PTM-D721": ("error", "the arrays of the stages do not belong together"),
@@ -74,53 +75,58 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D739": ("error", "a material of a GLB is not that of its shape in the VRML file"),
 }
 
+#: Of files that are not as their stage wrote them: a build sees that by itself.
+SEEN_BY_BUILD = frozenset(f"PTM-D65{n}" for n in "12456")
+#: What no build can mend: files of others, too little memory, and what the model is like.
+NOT_BUILT = frozenset(f"PTM-D{n}" for n in (653, 657, 658, 675, 703, 708, 713))
+
 
 class Findings:
-    """Gathers issues; a fault that repeats all over a file is told so often and then summed up.
+    """Gathers issues. The first few of one code in a file are kept one by one, the others counted.
 
-    What is told comes from files that may hold anything: it is made printable, and cut.
+    Messages come from files that may hold anything: they are made printable, and cut.
     """
 
-    #: Issues of one code told one by one, per file.
+    #: Issues of one code kept one by one, per file.
     MOST = 5
     #: Characters of a place or message.
     LONGEST = 300
 
     def __init__(self) -> None:
         self._issues: dict[tuple[str, str], list[Issue]] = {}
-        self._untold: dict[tuple[str, str], int] = {}
+        self._more: Counter[tuple[str, str]] = Counter()
 
     def add(self, code: str, file: str, place: str, message: str) -> None:
         """One issue; its severity is the code's."""
-        self._take(Issue(code, CODES[code][0], _line(file), _line(place), _line(message)))
+        severity, _ = CODES[code]
+        self.take([Issue(code, severity, one_line(file), one_line(place), one_line(message))])
 
     def take(self, issues: Iterable[Issue]) -> None:
         """Issues that others found."""
         for issue in issues:
-            self._take(issue)
-
-    def _take(self, issue: Issue) -> None:
-        key = (issue.file, issue.code)
-        told = self._issues.setdefault(key, [])
-        if len(told) < self.MOST and issue.count == 1:
-            told.append(issue)
-        else:
-            self._untold[key] = self._untold.get(key, 0) + issue.count
+            key = (issue.file, issue.code)
+            kept = self._issues.setdefault(key, [])
+            if len(kept) < self.MOST and issue.count == 1:
+                kept.append(issue)
+            else:
+                self._more[key] += issue.count
 
     def issues(self) -> tuple[Issue, ...]:
-        """All of them, by file and code."""
-        ordered: list[Issue] = []
-        for (file, code), told in sorted(self._issues.items()):
-            ordered += told
-            if more := self._untold.get((file, code)):
-                message = f"{more} more of these"
-                ordered.append(Issue(code, CODES[code][0], file, "", message, more))
-        return tuple(ordered)
+        """All of them, see `worst_first`."""
+        found = [issue for kept in self._issues.values() for issue in kept]
+        for (file, code), more in self._more.items():
+            message = f"{more} more of these"
+            found.append(Issue(code, CODES[code][0], file, "", message, more))
+        return worst_first(found)
 
 
-def _line(text: str) -> str:
+def worst_first(issues: Iterable[Issue]) -> tuple[Issue, ...]:
+    """By file; of each the errors before the warnings, by code: what is wrong with a file as a
+    whole has the lowest ones."""
+    return tuple(sorted(issues, key=lambda i: (i.file, i.severity != "error", i.code, i.count > 1)))
+
+
+def one_line(text: str) -> str:
     """Text on one line that any terminal prints."""
     text = text if len(text) <= Findings.LONGEST else f"{text[: Findings.LONGEST]}…"
-    if text.isprintable():
-        return text
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

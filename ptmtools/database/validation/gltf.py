@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import posixpath
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -18,150 +18,132 @@ from numpy.typing import NDArray
 from ptmtools.database.gltf.cell import flipped
 from ptmtools.database.gltf.container import GlbError
 from ptmtools.database.gltf.material import WRAPS, linear
-from ptmtools.database.gltf.names import GLTF_FOLDER, GLTF_HINTS, UP
 from ptmtools.database.gltf.reader import ReadGlb, ReadMaterial, read_glb
-from ptmtools.database.names import CELL_FOLDER, HINTS, cell_name
+from ptmtools.database.names import (
+    CELL_FOLDER,
+    GLTF_FOLDER,
+    GLTF_HINTS,
+    HINTS,
+    SERVED,
+    UP,
+    cell_name,
+    glb_file,
+)
 from ptmtools.database.validation.findings import Findings
-from ptmtools.database.vrml import Document, Node
+from ptmtools.database.validation.served import ServedDatabase
+from ptmtools.database.vrml.reader import Document, Node
 
 #: How far a colour may be off that went through the decimals of VRML.
 _SLACK = 1e-5
 
 
-class GltfCheck:
-    """The check of one database's glTF files, if it has any.
+def read_file(name: str, data: bytes, found: Findings) -> Any:
+    """A GLB as `ReadGlb`, or the hints beside them as JSON has them."""
+    try:
+        if name.endswith(".glb"):
+            return read_glb(data)
+        return json.loads(data) if name == f"{SERVED}/{GLTF_HINTS}" else None
+    except GlbError as fault:
+        found.add(fault.code, name, fault.place, fault.message)
+    except (ValueError, RecursionError) as fault:
+        found.add("PTM-D737", name, "", f"damaged: {fault}")
+    return None
 
-    ``served`` is the folder's name in findings, "www".
-    """
 
-    def __init__(self, served: str, found: Findings) -> None:
-        self._served = served
-        self._found = found
-        self._cells: dict[str, ReadGlb] = {}
-        self._hints: dict[str, bytes] = {}
+def check_files(database: ServedDatabase) -> Mapping[str, int]:
+    """Holds them against each other, the hints and the VRML files; counts nothing."""
+    files, held = database.urls.files, database.held
+    wanted, there = _stems(files, CELL_FOLDER, ".wrl"), _stems(files, GLTF_FOLDER, ".glb")
+    for stem in sorted(wanted ^ there):
+        what = "is missing" if stem in wanted else "belongs to no cell"
+        database.add("PTM-D730", f"{GLTF_FOLDER}/{stem}.glb", "", what)
+    if GLTF_HINTS not in files:
+        database.add("PTM-D730", GLTF_HINTS, "", "is missing")
+    hints = held.get(HINTS)
+    wanted_hints = None if hints is None else _moved(hints.document)
+    textures = None
+    if wanted_hints is not None:
+        textures = wanted_hints["textures"]
+        if place := _difference(held.get(GLTF_HINTS, wanted_hints), wanted_hints):
+            database.add("PTM-D737", GLTF_HINTS, place, f"not as in {HINTS}")
+    for stem in sorted(there):
+        path = f"{GLTF_FOLDER}/{stem}.glb"
+        cell: ReadGlb | None = held.get(path)
+        if cell is None:
+            continue
+        if not cell.name == stem == cell_name(cell.cell):
+            message = f"says that it is {cell.name!r}, cell {cell.cell}"
+            database.add("PTM-D732", path, "scene", message)
+        _check_textures(cell, path, textures, database)
+        document: Document | None = held.get(f"{CELL_FOLDER}/{stem}.wrl")
+        if document is not None:
+            _compare_shapes(cell, path, document.of_type("Shape"), database)
+    return {}
 
-    def read(self, name: str, data: bytes) -> None:
-        """Takes a file, named relative to the database, if it is one to be compared."""
-        path = name.removeprefix(f"{self._served}/")
-        if path in (HINTS, GLTF_HINTS):
-            self._hints[path] = data
-        elif posixpath.dirname(path) == GLTF_FOLDER and path.endswith(".glb"):
-            try:
-                self._cells[_stem(path)] = read_glb(data)
-            except GlbError as fault:
-                self._found.add(fault.code, name, fault.place, fault.message)
 
-    def compare(
-        self,
-        files: Collection[str],
-        documents: Mapping[str, Document],
-        resolve: Callable[[str, str], str | None],
-    ) -> None:
-        """Holds what was read against the other files.
+def _moved(hints: Mapping[str, Any]) -> dict[str, Any]:
+    """Hints with the URLs that they have beside the GLBs."""
+    cells = [cell | {"url": glb_file(i)} for i, cell in enumerate(hints["cells"])]
+    urls = ("file", "fallback")
+    textures = [
+        row | {url: UP + row[url] for url in urls if row[url] is not None}
+        for row in hints["textures"]
+    ]
+    return {**hints, "cells": cells, "textures": textures}
 
-        Parameters
-        ----------
-        files: all that is served, relative to the served folder.
-        documents: the VRML files, by their names relative to the database.
-        resolve: takes a file's name and a URL in it; tells a URL that names no file.
-        """
-        if not any(path.startswith(f"{GLTF_FOLDER}/") for path in files):
-            return
-        wanted, there = _stems(files, CELL_FOLDER, ".wrl"), _stems(files, GLTF_FOLDER, ".glb")
-        for stem in sorted(wanted ^ there):
-            what = "is missing" if stem in wanted else "belongs to no cell"
-            self._found.add("PTM-D730", f"{self._served}/{GLTF_FOLDER}/{stem}.glb", "", what)
-        textures = self._compare_hints()
-        for stem, cell in self._cells.items():
-            name = f"{self._served}/{GLTF_FOLDER}/{stem}.glb"
-            if not cell.name == stem == cell_name(cell.cell):
-                told = f"says that it is {cell.name!r}, cell {cell.cell}"
-                self._found.add("PTM-D732", name, "scene", told)
-            self._check_textures(cell, name, textures, resolve)
-            document = documents.get(f"{self._served}/{CELL_FOLDER}/{stem}.wrl")
-            if document is not None:
-                self._compare_shapes(cell, name, document.of_type("Shape"))
 
-    def _compare_hints(self) -> list[Any] | None:
-        """The textures of `hints.json`, if that can be read."""
-        name = f"{self._served}/{GLTF_HINTS}"
-        if GLTF_HINTS not in self._hints:
-            self._found.add("PTM-D730", name, "", "is missing")
-        try:
-            other = json.loads(self._hints[HINTS])
-            for cell in other["cells"]:
-                cell["url"] = f"{cell['name']}.glb"
-            for record in other["textures"]:
-                for url in ("file", "fallback"):
-                    record[url] = UP + record[url] if record[url] is not None else None
-        except (KeyError, TypeError, ValueError, RecursionError):
-            return None  # told by the check of that file
-        if GLTF_HINTS in self._hints:
-            try:
-                own = json.loads(self._hints[GLTF_HINTS])
-            except (ValueError, RecursionError) as fault:
-                self._found.add("PTM-D737", name, "", f"damaged: {fault}")
-            else:
-                if place := _difference(own, other):
-                    self._found.add("PTM-D737", name, place, f"not as in {HINTS}")
-        return list(other["textures"])
+def _check_textures(
+    cell: ReadGlb, path: str, textures: list[Any] | None, database: ServedDatabase
+) -> None:
+    for material in dict.fromkeys(primitive.material for primitive in cell.primitives):
+        for url in (material.image, material.ptm):
+            if url is not None:
+                database.urls.resolve(f"{SERVED}/{path}", url)
+        if textures is None or material.texture is None:
+            continue
+        if not 0 <= material.texture < len(textures):
+            message = f"the hints have no texture {material.texture}"
+            database.add("PTM-D736", path, "materials", message)
+            continue
+        record = textures[material.texture]
+        if (material.ptm, material.image) != (record["file"], record["fallback"]):
+            message = f"{material.ptm} and {material.image} are not texture {material.texture}"
+            database.add("PTM-D736", path, "materials", message)
+        elif material.blends and material.factor[3] == 1 and record["components"] in (1, 3):
+            message = f"blends, but texture {material.texture} is opaque"
+            database.add("PTM-D739", path, "materials", message)
 
-    def _check_textures(
-        self,
-        cell: ReadGlb,
-        name: str,
-        textures: list[Any] | None,
-        resolve: Callable[[str, str], str | None],
-    ) -> None:
-        for material in dict.fromkeys(primitive.material for primitive in cell.primitives):
-            for url in (material.image, material.ptm):
-                if url is not None:
-                    resolve(name, url)
-            if textures is None or material.texture is None:
-                continue
-            if not 0 <= material.texture < len(textures):
-                told = f"the hints have no texture {material.texture}"
-                self._found.add("PTM-D736", name, "materials", told)
-                continue
-            record = textures[material.texture]
-            if (material.ptm, material.image) != (record["file"], record["fallback"]):
-                told = f"{material.ptm} and {material.image} are not texture {material.texture}"
-                self._found.add("PTM-D736", name, "materials", told)
-            elif material.blends and material.factor[3] == 1 and record.get("components") in (1, 3):
-                told = f"blends, but texture {material.texture} is opaque"
-                self._found.add("PTM-D739", name, "materials", told)
 
-    def _compare_shapes(self, cell: ReadGlb, name: str, shapes: list[Node]) -> None:
-        if len(shapes) != len(cell.primitives):
-            told = f"{len(cell.primitives)} primitives for {len(shapes)} shapes"
-            self._found.add("PTM-D738", name, "", told)
-            return
-        for primitive, shape in zip(cell.primitives, shapes, strict=True):
-            geometry = _child(shape, "geometry")
-            corners = _corners(geometry, "coord", "coordIndex")
-            held = primitive.point[primitive.triangle]
-            if corners is not None and not np.array_equal(corners.astype(np.float32), held):
-                told = f"not the triangles of {shape.name}"
-                self._found.add("PTM-D738", name, primitive.place, told)
-            uv = None if primitive.uv is None else primitive.uv[primitive.triangle]
-            mapped = _corners(geometry, "texCoord", "texCoordIndex")
-            if mapped is None:
-                same = uv is None or "texCoord" in geometry
-            else:
-                same = uv is not None and np.array_equal(flipped(mapped.astype(np.float32)), uv)
-            if not same:
-                told = f"not the texture coordinates of {shape.name}"
-                self._found.add("PTM-D738", name, primitive.place, told)
-            if fault := _other_look(primitive.material, shape):
-                self._found.add("PTM-D739", name, primitive.place, f"{fault} {shape.name}")
+def _compare_shapes(cell: ReadGlb, path: str, shapes: list[Node], database: ServedDatabase) -> None:
+    if len(shapes) != len(cell.primitives):
+        message = f"{len(cell.primitives)} primitives for {len(shapes)} shapes"
+        database.add("PTM-D738", path, "", message)
+        return
+    for primitive, shape in zip(cell.primitives, shapes, strict=True):
+        geometry = shape.at("geometry")
+        corners = _corners(shape, "coord", "coordIndex")
+        held = primitive.point[primitive.triangle]
+        if corners is not None and not np.array_equal(corners.astype(np.float32), held):
+            database.add("PTM-D738", path, primitive.place, f"not the triangles of {shape.name}")
+        uv = None if primitive.uv is None else primitive.uv[primitive.triangle]
+        mapped = _corners(shape, "texCoord", "texCoordIndex")
+        if mapped is None:
+            same = uv is None or "texCoord" in geometry
+        else:
+            same = uv is not None and np.array_equal(flipped(mapped.astype(np.float32)), uv)
+        if not same:
+            message = f"not the texture coordinates of {shape.name}"
+            database.add("PTM-D738", path, primitive.place, message)
+        if fault := _other_look(primitive.material, shape):
+            database.add("PTM-D739", path, primitive.place, f"{fault} {shape.name}")
 
 
 def _other_look(material: ReadMaterial, shape: Node) -> str:
     """In what a material differs from a VRML shape; "" if it does not."""
-    geometry, look = _child(shape, "geometry"), _child(shape, "appearance")
+    geometry = shape.at("geometry")
+    texture, surface = shape.at("appearance", "texture"), shape.at("appearance", "material")
     if material.two_sided == geometry.get("solid", True):
         return "not the sides of"
-    texture, surface = _child(look, "texture"), _child(look, "material")
     urls = [url for url in texture.get("url", ()) if isinstance(url, str)]
     if sorted(urls) != sorted(url for url in (material.image, material.ptm) if url is not None):
         return "not the images of"
@@ -172,7 +154,7 @@ def _other_look(material: ReadMaterial, shape: Node) -> str:
         return "does not wrap as"
     color = surface.get("diffuseColor")
     if color is None:
-        color = _child(geometry, "color").get("color", np.ones((1, 3)))
+        color = shape.at("geometry", "color").get("color", np.ones((1, 3)))
     wanted = np.array(
         [*(linear(float(c)) for c in np.ravel(color)[:3]), 1 - _scalar(surface, "transparency")]
     )
@@ -189,19 +171,12 @@ def _scalar(fields: Mapping[str, Any], name: str) -> float:
     return float(values[0]) if len(values) else 0.0
 
 
-def _child(node: Node | Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    """The fields of the node in a field; empty if there is none."""
-    fields = node.fields if isinstance(node, Node) else node
-    child = fields.get(name)
-    return child.fields if isinstance(child, Node) else {}
-
-
-def _corners(geometry: Mapping[str, Any], values: str, index: str) -> NDArray[np.float64] | None:
+def _corners(shape: Node, values: str, index: str) -> NDArray[np.float64] | None:
     """(m, 3, k) the points of a shape's triangles; None without, or if the indices are wrong,
-    which the check of the VRML file tells."""
-    points = _child(geometry, values).get("point")
+    which the check of the VRML file reports."""
+    points = shape.at("geometry", values).get("point")
     try:
-        rows = np.asarray(geometry[index]).reshape(-1, 4)[:, :3]
+        rows = np.asarray(shape.at("geometry")[index]).reshape(-1, 4)[:, :3]
         return None if points is None else np.asarray(points)[rows]
     except (KeyError, ValueError, IndexError):
         return None

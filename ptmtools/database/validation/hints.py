@@ -23,25 +23,27 @@ ACH_SLACK = 1e-9
 MISSED = 1e-4
 
 Row = Mapping[str, Any]
-#: The files of a texture, the PNG twin first, relative to the served folder; None is not there.
+#: The files of a texture in the served folder, the fallback image first; None is not there.
 Images = tuple[str | None, ...]
 
 
 @dataclass(frozen=True)
 class ReadHints:
     """The parts of `hints.json` that other files are compared with, as JSON has them: as the schema
-    says, and every index in range."""
+    says, and every index in range; and all of the `document`."""
 
+    document: Row
     viewpoints: list[Row]
     textures: list[Row]
     cells: list[Row]
 
 
 def read_hints(data: bytes, file: str, found: Findings) -> ReadHints | None:
-    """The hints, or None (told as PTM-D700) if they are not what their schema says."""
+    """The hints, or None, and PTM-D700, if they are not what their schema says."""
     try:
         document = schemas.read(data, schemas.HINTS)
-        hints = ReadHints(document["viewpoints"], document["textures"], document["cells"])
+        lists = (document[name] for name in ("viewpoints", "textures", "cells"))
+        hints = ReadHints(document, *lists)
         _check_indices(hints)
     except schemas.ShapeError as fault:
         found.add("PTM-D700", file, fault.place, fault.message)
@@ -59,8 +61,8 @@ def check_hints(hints: ReadHints, file: str, found: Findings) -> None:
         ach = np.array(cell["ach"], dtype=np.float64)
         check_shares(ach, ACH_SLACK, file, place, ("PTM-D702", "PTM-D702"), found)
         if len(ach) != len(cell["visible"]):
-            told = f"{len(ach)} ach values for {len(cell['visible'])} visible cells"
-            found.add("PTM-D702", file, place, told)
+            message = f"{len(ach)} ach values for {len(cell['visible'])} visible cells"
+            found.add("PTM-D702", file, place, message)
         elif wrong := _misfit(cell["coverage"], ach):
             found.add("PTM-D707", file, place, wrong)
         if cell["missed"] > MISSED:
@@ -100,15 +102,15 @@ def check_against_cells(
         cell = cells.get(name)
         if cell is None:
             continue
-        told, shown = {images[t] for t in row["textures"]}, cell_images[name]
-        complete = not any(None in files for files in told | shown)
+        listed, shown = {images[t] for t in row["textures"]}, cell_images[name]
+        complete = not any(None in files for files in listed | shown)
         same: dict[str, bool] = {
             "name": row["name"] == cell.name,
             "adjacent": tuple(known[c] for c in row["adjacent"]) == cell.adjacent,
             "visible": tuple(known[c] for c in row["visible"]) == cell.visible,
             "ach": _equal_single(row["ach"], cell.ach),
             "leaves": _same_box(row["leaves"], cell.hull) and _same_leaves(row["leaves"], cell),
-            "textures": told == shown or not complete,
+            "textures": listed == shown or not complete,
         }
         for field in (f for f, equal in same.items() if not equal):
             found.add("PTM-D701", file, f"cells[{i}].{field}", f"differs from {name}")

@@ -10,18 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ptmtools.database.gltf.names import GLTF_FOLDER
-from ptmtools.database.names import HINTS
-from ptmtools.database.validation.files import TWIN, check_twin
+from ptmtools.database.emitters import GZIP, owner_of
+from ptmtools.database.names import SERVED
+from ptmtools.database.validation.files import check_gzip
 from ptmtools.database.validation.findings import Findings
-from ptmtools.database.validation.hints import ReadHints, read_hints
 from ptmtools.database.validation.textures import ReadTexture, read_png, read_texture
-from ptmtools.database.vrml import Document, WrlError, parse
 from ptmtools.files import open_regular
 from ptmtools.texture.model import Limits
 
-SERVED = "www"
-_WRL_FAULTS = {"encoding": "PTM-D660", "syntax": "PTM-D661", "finite": "PTM-D662"}
 #: Bytes hashed at a time, of a file that is not held whole.
 _PIECE = 1 << 20
 
@@ -35,17 +31,17 @@ class FileReading:
     found: what is wrong with it by itself.
     size: bytes; None if it could not be read.
     intact: whether its hash is the one in the manifest.
-    document, hints, texture: what it holds, if it is such a file and could be read.
-    kept: its bytes, if the check of the glTF files asks for them.
+    texture: of a `.ptm` that could be read.
+    held: of an emitter's file what its check needs, if that could be read.
+    unreadable: whether it is such a file and could not.
     """
 
     found: Findings = field(default_factory=Findings)
     size: int | None = None
     intact: bool = False
-    document: Document | None = None
-    hints: ReadHints | None = None
     texture: ReadTexture | None = None
-    kept: bytes | None = None
+    held: object | None = None
+    unreadable: bool = False
 
 
 class FileReader:
@@ -70,7 +66,7 @@ class FileReader:
         reading = FileReading()
         served = name.startswith(f"{SERVED}/")
         if served and name.removeprefix(f"{SERVED}/") not in self._served:
-            # What is there and is no file has been told.
+            # What is there and is no file has been found already.
             if not os.path.lexists(self._folder / name):
                 reading.found.add("PTM-D651", name, "", "missing")
             return reading
@@ -80,13 +76,13 @@ class FileReader:
             reading.found.add("PTM-D651", name, "", "missing")
             return reading
         except OSError as fault:
-            told = f"cannot be read ({fault.strerror or fault})"
-            reading.found.add("PTM-D654", name, "", told)
+            message = f"cannot be read ({fault.strerror or fault})"
+            reading.found.add("PTM-D654", name, "", message)
             return reading
         reading.size = size
         reading.intact = self._outputs.get(name) == digest
         if self._outputs and name not in self._outputs:
-            reading.found.add("PTM-D653", name, "", "served, but no stage wrote it")
+            reading.found.add("PTM-D653", name, "", "lies among our files, but no stage wrote it")
         elif self._outputs.get(name, digest) != digest:
             reading.found.add("PTM-D652", name, "", "not what its stage wrote: the hash differs")
         if data is None:
@@ -109,24 +105,19 @@ class FileReader:
             return size, None, digest.hexdigest()
 
     def _look_into(self, reading: FileReading, name: str, data: bytes, digest: str) -> None:
-        found = reading.found
-        stem, suffix = os.path.splitext(name)
-        if suffix == ".wrl":
-            try:
-                reading.document = parse(data)
-            except WrlError as fault:
-                found.add(_WRL_FAULTS[fault.kind], name, fault.place, fault.message)
+        found, (stem, suffix) = reading.found, os.path.splitext(name)
+        emitter = owner_of(name.removeprefix(f"{SERVED}/"))
+        if suffix == GZIP:
+            check_gzip(data, self._neighbour(stem), name, found)
         elif suffix == ".ptm":
-            twin = self._neighbour(f"{stem}.png")
-            reading.texture = read_texture(data, digest, twin, name, self._limits, found)
+            fallback = self._neighbour(f"{stem}.png")
+            reading.texture = read_texture(data, digest, fallback, name, self._limits, found)
+            reading.unreadable = reading.texture is None
         elif suffix == ".png" and not self._is_served(f"{stem}.ptm"):
             read_png(data, name, self._limits, found)
-        elif suffix == TWIN:
-            check_twin(data, self._neighbour(stem), name, found)
-        elif name == f"{SERVED}/{HINTS}":
-            reading.hints = read_hints(data, name, found)
-        if name == f"{SERVED}/{HINTS}" or name.startswith(f"{SERVED}/{GLTF_FOLDER}/"):
-            reading.kept = data
+        elif emitter is not None:
+            reading.held = emitter.read(name, data, found)
+            reading.unreadable = reading.held is None
 
     def _is_served(self, name: str) -> bool:
         return name.removeprefix(f"{SERVED}/") in self._served

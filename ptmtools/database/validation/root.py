@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.database.validation.findings import Findings
-from ptmtools.database.vrml import PATTERN, Document, Node
+from ptmtools.database.vrml.reader import Document, Node
+from ptmtools.database.vrml.root import PATTERN
 from ptmtools.tolerance import PARALLEL_COSINE
 
 _PROTO = {"viewpoint": "SFString", "cellUrl": "MFString"}
@@ -35,7 +36,7 @@ class ReadRoot:
 
 
 def read_root(document: Document, file: str, found: Findings) -> ReadRoot:
-    """The root of a file; parts that are missing are told as PTM-D663 and left out."""
+    """The root of a file; parts that are missing are left out, with PTM-D663."""
     for type in ("WorldInfo", "NavigationInfo"):
         if len(document.of_type(type)) != 1:
             found.add("PTM-D663", file, "", f"not one {type}")
@@ -61,8 +62,8 @@ def read_root(document: Document, file: str, found: Findings) -> ReadRoot:
         if info[:1] != (f"ptm:database {PATTERN}",):
             found.add("PTM-D663", file, f"line {node.line}", "info does not begin with the pattern")
         if {line for line in info if line.startswith("ptm:viewpoint ")} != wanted:
-            told = "info does not say the same of the viewpoints as PTMViewpointCell"
-            found.add("PTM-D699", file, f"line {node.line}", told)
+            message = "info does not say the same of the viewpoints as PTMViewpointCell"
+            found.add("PTM-D699", file, f"line {node.line}", message)
     inlines: dict[str, NDArray[np.float64] | None] = {}
     for node in document.of_type("Inline"):
         fields, place = node.fields, f"line {node.line}"
@@ -110,11 +111,11 @@ def check_viewpoints(
         written = {} if pose is None else pose.fields
         for name in _POSE:
             if name in written and not _same(written[name], view[name]):
-                told = "is not that of the root file"
-                found.add("PTM-D706", file, f"viewpoints[{i}].{name}", told)
+                message = "is not that of the root file"
+                found.add("PTM-D706", file, f"viewpoints[{i}].{name}", message)
         if not _turns(view["orientation"], view["direction"]):
-            told = "does not turn -Z to the direction"
-            found.add("PTM-D706", file, f"viewpoints[{i}].orientation", told)
+            message = "does not turn -Z to the direction"
+            found.add("PTM-D706", file, f"viewpoints[{i}].orientation", message)
 
 
 def _same(written: Any, full: Any) -> bool:

@@ -62,8 +62,8 @@ def check_space(
     for i, view in enumerate(viewpoints):
         inside = _inside(bodies[view["cell"]], np.array([view["position"]], np.float64), tolerance)
         if bodies[view["cell"]] and not inside:
-            told = f"does not lie in cell {view['cell']}"
-            found.add("PTM-D706", file, f"viewpoints[{i}].position", told)
+            message = f"does not lie in cell {view['cell']}"
+            found.add("PTM-D706", file, f"viewpoints[{i}].position", message)
 
 
 def _check_apart(leaves: Sequence[_Leaf], tolerance: Tolerance, file: str, found: Findings) -> None:
@@ -93,8 +93,8 @@ def _check_portals(
     for i, cell in enumerate(cells):
         to = {portal["neighbour"] for portal in cell["portals"]}
         if to != set(cell["adjacent"]):
-            told = "they lead to other cells than the adjacent"
-            found.add("PTM-D705", file, f"cells[{i}].portals", told)
+            message = "they lead to other cells than the adjacent"
+            found.add("PTM-D705", file, f"cells[{i}].portals", message)
         for k, portal in enumerate(cell["portals"]):
             polygon = tuple(map(tuple, portal["polygon"]))
             openings[i][(portal["neighbour"], polygon, portal["area"])] += 1
@@ -107,8 +107,8 @@ def _check_portals(
     for i, of_cell in enumerate(openings):
         for (neighbour, polygon, area), count in of_cell.items():
             if openings[neighbour][(i, polygon[::-1], area)] != count:
-                told = f"a portal to cell {neighbour} does not stand there, turned round"
-                found.add("PTM-D705", file, f"cells[{i}].portals", told)
+                message = f"a portal to cell {neighbour} does not stand there, turned round"
+                found.add("PTM-D705", file, f"cells[{i}].portals", message)
 
 
 def _misplaced(
@@ -128,7 +128,7 @@ def _misplaced(
     if area <= 2 * tolerance.plane * float(np.linalg.norm(np.ptp(polygon, axis=0))):
         plane = None
     for bodies, inwards, whose in ((here, 1.0, "this cell"), (beyond, -1.0, "its neighbour")):
-        # Where no leaf is sound, that has been told.
+        # Where no leaf is sound, that is a finding already.
         if bodies and not any(_in_face(b, polygon, plane, inwards, tolerance) for b in bodies):
             return f"does not lie in a face of {whose}, or faces the wrong way"
     return ""

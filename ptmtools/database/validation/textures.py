@@ -1,4 +1,4 @@
-"""What the texture files must satisfy: by themselves, beside their PNG twins and the hints."""
+"""What the textures must satisfy: by themselves, beside their fallback images and the hints."""
 
 from __future__ import annotations
 
@@ -33,18 +33,19 @@ class ReadTexture:
     ----------
     header: of the file.
     sha256: hex digest of its bytes.
-    twin_level: the level that has the size of the PNG twin; None if there is no twin, or no such.
+    fallback_level: the level that has the size of the fallback image; None if there is no image, or
+        no such level.
     """
 
     header: PtmHeader
     sha256: str
-    twin_level: int | None = None
+    fallback_level: int | None = None
 
 
 def read_texture(
-    data: bytes, digest: str, twin: bytes | None, file: str, limits: Limits, found: Findings
+    data: bytes, digest: str, fallback: bytes | None, file: str, limits: Limits, found: Findings
 ) -> ReadTexture | None:
-    """A `.ptm` and its PNG twin, if there is one. None, told as PTM-D710, without a sound head."""
+    """A `.ptm` and its fallback image, if it has one; None, and PTM-D710, without a sound head."""
     from ptmtools.texture import read_header
 
     texels = check_ptm(data, file, limits, found)
@@ -52,7 +53,9 @@ def read_texture(
         header = read_header(data)
     except PtmError:
         return None
-    level = None if twin is None else _check_twin(twin, data, header, texels, file, limits, found)
+    level = None
+    if fallback is not None:
+        level = _check_fallback(fallback, data, header, texels, file, limits, found)
     return ReadTexture(header, digest, level)
 
 
@@ -64,15 +67,15 @@ def check_ptm(data: bytes, file: str, limits: Limits, found: Findings) -> Sample
         faults, texels = examine(data, limits)
     except LimitError as limit:
         # More than is allowed here is no damage; more than the format allows is.
-        found.add("PTM-D713" if limit.code == "PTM-L103" else "PTM-D710", file, "", str(limit))
+        found.add("PTM-D713" if limit.code == "PTM-L103" else "PTM-D710", file, "", limit.message)
         return None
     for fault in faults:
-        found.add("PTM-D710", file, "", fault)
+        found.add("PTM-D710", file, "", fault.partition(" [PTM-")[0])
     return texels
 
 
 def read_png(data: bytes, file: str, limits: Limits, found: Findings) -> Samples | None:
-    """The texels of a PNG, (h, w, c); None, told as PTM-D712 or PTM-D713, if it is none."""
+    """The texels of a PNG, (h, w, c); None, and PTM-D712 or PTM-D713, if it is none."""
     from ptmtools.texture import load_image
 
     if _png_size(data) is None:
@@ -82,7 +85,7 @@ def read_png(data: bytes, file: str, limits: Limits, found: Findings) -> Samples
         return load_image(data, limits).array()
     except PtmError as fault:
         code = "PTM-D713" if isinstance(fault, LimitError) else "PTM-D712"
-        found.add(code, file, "", f"cannot be read ({fault})")
+        found.add(code, file, "", f"cannot be read ({fault.message})")
         return None
 
 
@@ -111,17 +114,17 @@ def check_record(
         for name, value in zip(_LEVEL, wanted, strict=True):
             if row[name] != value:
                 faults.append(f"level {n}: {name} is {value} in the file")
-    twin, level = record["fallback"], record["fallbackLevel"]
-    if (twin is None) != (level is None):
+    fallback, level = record["fallback"], record["fallbackLevel"]
+    if (fallback is None) != (level is None):
         faults.append("fallback and fallbackLevel do not go together")
-    elif twin is not None and texture.twin_level not in (None, level):
-        faults.append(f"the fallback holds level {texture.twin_level}, not {level}")
+    elif fallback is not None and texture.fallback_level not in (None, level):
+        faults.append(f"the fallback holds level {texture.fallback_level}, not {level}")
     for fault in faults:
         found.add("PTM-D704", file, place, fault)
 
 
-def _check_twin(
-    twin: bytes,
+def _check_fallback(
+    fallback: bytes,
     data: bytes,
     header: PtmHeader,
     texels: Samples | None,
@@ -129,23 +132,23 @@ def _check_twin(
     limits: Limits,
     found: Findings,
 ) -> int | None:
-    """The level that the twin has the size of. Whatever else it says, a PNG of another size is
-    not decoded."""
+    """The level that the fallback image has the size of; a PNG of the size of none is not
+    decoded."""
     from ptmtools.texture import decode
 
-    twin_file = f"{file.removesuffix('.ptm')}.png"
-    size, levels = _png_size(twin), header.levels
+    png = f"{file.removesuffix('.ptm')}.png"
+    size, levels = _png_size(fallback), header.levels
     level = next((n for n, v in enumerate(levels) if (v.width, v.height) == size), None)
     if size is not None and level is None:
-        found.add("PTM-D711", file, "", f"{twin_file} is {size[0]} x {size[1]}, as is no level")
+        found.add("PTM-D711", file, "", f"{png} is {size[0]} x {size[1]}, as is no level")
         return None
-    other = read_png(twin, twin_file, limits, found)
+    other = read_png(fallback, png, limits, found)
     if level is None or texels is None or other is None:
         return level
     if level < len(levels) - 1:
         texels = decode(data, level, limits)
     if not _same_image(texels, other):
-        found.add("PTM-D711", file, f"level {level}", f"it differs from {twin_file}")
+        found.add("PTM-D711", file, f"level {level}", f"it differs from {png}")
     return level
 
 

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterable
 from urllib.parse import unquote_to_bytes
 
-from ptmtools.database.names import CELL_FOLDER
+from ptmtools.database.names import CELL_FOLDER, SERVED
 from ptmtools.database.validation.findings import Findings
 
 #: A path as a relative reference may have it (RFC 3986); all else is percent-encoded there.
@@ -21,23 +21,21 @@ class Urls:
 
     Parameters
     ----------
-    folder: the served folder's name in findings, "www".
-    files: all that is served, relative to it.
+    files: all that is served, relative to the served folder.
     """
 
-    def __init__(self, folder: str, files: Iterable[str], found: Findings) -> None:
-        self._folder = folder
+    def __init__(self, files: Iterable[str], found: Findings) -> None:
         self._found = found
-        self._files = set(files)
-        self._folded = {file.casefold(): file for file in sorted(self._files)}
+        self.files = set(files)
+        self._folded = {file.casefold(): file for file in sorted(self.files)}
         self._known: dict[tuple[str, str], tuple[str, str, str]] = {}
         #: The files that some URL names.
         self.named: set[str] = set()
 
     def resolve(self, file: str, url: str) -> str | None:
-        """The file that a URL names, relative to the served folder; None, and told, if there is
-        none. ``file`` has the URL in it and is named relative to the database."""
-        base = file.removeprefix(f"{self._folder}/").rpartition("/")[0]
+        """The file that a URL names, relative to the served folder; None, and a finding, if
+        there is none. ``file`` has the URL in it and is named relative to the database."""
+        base = file.removeprefix(f"{SERVED}/").rpartition("/")[0]
         key = (base, url)
         if key not in self._known:
             self._known[key] = self._find(base, url)
@@ -69,8 +67,8 @@ class Urls:
         path = posixpath.normpath(posixpath.join(base, plain))
         if path.startswith(("../", "/")) or path in ("..", ".") or "\\" in path:
             return "", "PTM-D670", "leads out of the served folder"
-        if path in self._files:
+        if path in self.files:
             return path, "", ""
         code = "PTM-D672" if path.startswith(f"{CELL_FOLDER}/") else "PTM-D671"
         other = self._folded.get(path.casefold())
-        return "", code, f"is not there, but {other} is" if other else "is not there"
+        return "", code, f"no such file, but there is {other}" if other else "no such file"

@@ -31,30 +31,17 @@ from urllib.parse import quote
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.cells.model import Cells
-from ptmtools.database.geometry import Geometry
+from ptmtools.database.content import Content
+from ptmtools.database.floats import decimal, row_texts, single
 from ptmtools.database.model import TextureRecord
 from ptmtools.database.names import DefNames, cell_file, cell_name
-from ptmtools.database.numerals import (
-    WORTHWHILE,
-    Rows,
-    field,
-    lines,
-    listed,
-    loops,
-    numeral,
-    quoted,
-    single,
-)
 from ptmtools.database.vrml.hull import convex_hull
-from ptmtools.scene.model import Material, Scene
-from ptmtools.visibility.model import Pvs
+from ptmtools.database.vrml.text import chosen, field, listed, loops, quoted
+from ptmtools.scene.model import Material
 
 HEADER = "#VRML V2.0 utf8\n"
 #: How bright an untextured surface is without light, as a share of its colour.
 _GLOW = 0.25
-#: Points whose text is made at a time.
-_BATCH = 1 << 16
 _FIELDS = (
     '  field SFString cellName    ""\n'
     "  field MFVec3f  hullPoint   [ ]\n"
@@ -68,189 +55,98 @@ _LEAF_FIELDS = "  field MFVec3f  leafPoint   [ ]\n  field MFInt32  leafStart   [
 
 @dataclass(frozen=True)
 class CellText:
-    """A cell's file and what the other files need to know of it.
-
-    Attributes
-    ----------
-    text: the file's contents.
-    box: (2, 3) float32 least and greatest corner of all that it holds.
-    images: indices of the scene's images that its shapes use, ascending.
-    shapes, triangles: how many there are.
-    """
+    """A cell's file, and the (2, 3) float32 least and greatest corner of all that it holds."""
 
     text: str
     box: NDArray[np.float32]
-    images: tuple[int, ...]
-    shapes: int
-    triangles: int
-
-
-@dataclass(frozen=True)
-class _Lists:
-    """The number lists of the shapes from ``first`` on, without brackets; those of texture
-    coordinates are empty where there is no texture."""
-
-    first: int
-    point: list[str]
-    loop: list[str]
-    uv: list[str]
-    uv_loop: list[str]
 
 
 class CellWriter:
     """Writes the cells of one scene; what they share is prepared once.
-
-    Parameters
-    ----------
-    ach: (V,) hints, aligned with ``pvs.cell``.
-    fallback: name the PNG twins of textures first.
-    compiled: whether compiled loops write the numbers; None: where they are worth their loading.
 
     Raises
     ------
     DatabaseError: PTM-D601 a number is not finite in float32; PTM-D603 a cell is flat.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        cells: Cells,
-        pvs: Pvs,
-        ach: NDArray[np.float64],
-        textures: Mapping[int, TextureRecord],
-        fallback: bool,
-        compiled: bool | None = None,
-    ) -> None:
-        self.geometry = g = Geometry(scene, cells)
-        if compiled is None:
-            numbers = 3 * len(g.shape_point) + 2 * len(g.shape_uv) + 6 * len(g.triangle)
-            compiled = numbers + len(ach) >= WORTHWHILE
-        self._compiled = compiled
-        self._objects = scene.objects
-        self._materials = scene.materials
-        self._image = np.array([m.image for m in scene.materials], dtype=np.int64)
-        self._textures = {
-            image: f"url {listed(_urls(record, fallback), 2)}" for image, record in textures.items()
+    def __init__(self, content: Content) -> None:
+        self._geometry = g = content.geometry
+        self._objects, self._materials = content.scene.objects, content.scene.materials
+        self._urls = {
+            image: f"url {listed(_urls(record, content.options.fallback), 2)}"
+            for image, (_, record) in content.records.items()
         }
-        self._pvs = pvs
+        cells, self._pvs = content.cells, content.pvs
         self._adjacent = cells.adjacent()
-        self._url = [quoted(cell_file(c)) for c in range(cells.cell_count)]
-        self._ach_text = self._rows(single(ach, "ach")[:, None])
-        self._point_text, self._uv_text = self._rows(g.point), self._rows(g.uv)
-        # The vertices of each cell's leaves, a leaf after the other.
+        self._cell_url = [quoted(cell_file(c)) for c in range(cells.cell_count)]
+        self._ach = row_texts(single(content.ach.value, "ach")[:, None])
+        self._point, self._uv = row_texts(g.point), row_texts(g.uv)
         order = np.argsort(cells.leaf_cell, kind="stable")
-        count = np.diff(cells.leaf_point_start)[order]
-        first = np.repeat(cells.leaf_point_start[order] - (np.cumsum(count) - count), count)
-        leaf_point = single(cells.leaf_point[first + np.arange(len(first))], "leaf points")
-        self._leaf_text = self._rows(leaf_point)
-        self._leaf_start = np.append(0, np.cumsum(count))
-        self._cell_leaf = np.searchsorted(cells.leaf_cell[order], np.arange(cells.cell_count + 1))
-        cut = self._leaf_start[self._cell_leaf[1:-1]]
-        self._hulls = [convex_hull(points) for points in np.split(leaf_point, cut)]
-        self._hull_text = self._rows(np.concatenate([points for points, _ in self._hulls]))
-        self._hull_start = np.cumsum([0] + [len(points) for points, _ in self._hulls])
-        self._lists = _Lists(0, [], [], [], [])
+        cut = np.searchsorted(cells.leaf_cell[order], np.arange(1, cells.cell_count))
+        self._leaves = [
+            [single(cells.leaf_points(leaf), "leaf points") for leaf in leaves.tolist()]
+            for leaves in np.split(order, cut)
+        ]
+        self._hulls = [convex_hull(np.concatenate(leaves)) for leaves in self._leaves]
 
     def cell(self, cell: int) -> CellText:
-        """The file of one cell; in ascending order is fastest."""
-        g = self.geometry
+        """The file of one cell."""
+        g = self._geometry
         hull, triangles = self._hulls[cell]
         seen = np.arange(self._pvs.start[cell], self._pvs.start[cell + 1])
-        leaves = self._leaf_start[self._cell_leaf[cell] : self._cell_leaf[cell + 1] + 1]
-        (loop,) = loops(triangles, np.array([0, len(triangles)]), 16, self._compiled)
-        of_hull = np.arange(*self._hull_start[cell : cell + 2])
-        parts = [HEADER, "PROTO PTMCell [\n", _FIELDS]
-        if len(leaves) > 2:
-            parts.append(_LEAF_FIELDS)
-        parts += [
-            "] {\n  WorldInfo { }\n}\nPTMCell {\n",
-            f"  cellName    {quoted(cell_name(cell))}\n",
-            f"  hullPoint   {field(self._hull_text.list(of_hull))}\n",
-            f"  hullIndex   {field(loop)}\n",
-            f"  adjacentUrl {self._cell_urls(self._adjacent[cell])}\n",
-            f"  visibleUrl  {self._cell_urls(self._pvs.cell[seen])}\n",
-            f"  ach         {field(self._ach_text.list(seen, 16))}\n",
-        ]
-        if len(leaves) > 2:
-            points = np.arange(leaves[0], leaves[-1])
-            parts.append(f"  leafPoint   {field(self._leaf_text.list(points))}\n")
-            begin = [str(i) for i in (leaves[:-1] - leaves[0]).tolist()]
-            parts.append(f"  leafStart   {listed(begin, 16)}\n")
+        leaves = self._leaves[cell]
+        lists = {
+            "cellName": quoted(cell_name(cell)),
+            "hullPoint": _points(hull),
+            "hullIndex": loops(triangles, 16),
+            "adjacentUrl": self._cells(self._adjacent[cell]),
+            "visibleUrl": self._cells(self._pvs.cell[seen]),
+            "ach": chosen(self._ach, seen, 16),
+        }
+        if len(leaves) > 1:
+            start = np.cumsum([0, *map(len, leaves[:-1])])
+            lists["leafPoint"] = _points(np.concatenate(leaves))
+            lists["leafStart"] = listed([str(i) for i in start.tolist()], 16)
+        parts = [HEADER, "PROTO PTMCell [\n", _FIELDS, _LEAF_FIELDS if len(leaves) > 1 else ""]
+        parts.append("] {\n  WorldInfo { }\n}\nPTMCell {\n")
+        parts += [f"  {name:<11} {text}\n" for name, text in lists.items()]
         parts.append("}\n")
 
         names = DefNames(f"C{cell}")
         first, last = g.cell_start[cell : cell + 2].tolist()
         taken = [names.take(self._objects[i]) for i in g.object[first:last].tolist()]
-        textures = _Textures(self._textures, names)
+        textures = _Textures(self._urls, names)
         for shape, name in zip(range(first, last), taken, strict=True):
             parts.append(self._shape(shape, name, textures))
         used = g.point[g.shape_point[g.point_start[first] : g.point_start[last]]]
-        images = np.unique(self._image[g.material[first:last]])
-        return CellText(
-            text="".join(parts),
-            box=np.stack([np.r_[hull, used].min(axis=0), np.r_[hull, used].max(axis=0)]),
-            images=tuple(images[images >= 0].tolist()),
-            shapes=last - first,
-            triangles=int(g.triangle_start[last] - g.triangle_start[first]),
-        )
+        held = np.concatenate([hull, used])
+        return CellText("".join(parts), np.stack([held.min(axis=0), held.max(axis=0)]))
+
+    def _cells(self, cells: NDArray[np.int32]) -> str:
+        return listed([self._cell_url[c] for c in cells.tolist()], 8)
 
     def _shape(self, shape: int, name: str, textures: _Textures) -> str:
-        g = self.geometry
-        lists = self._lists_of(shape)
-        at = shape - lists.first
-        material = self._materials[int(g.material[shape])]
+        s = self._geometry.shape(shape)
+        material = self._materials[s.material]
         parts = [
             f"DEF {name} Shape {{\n  appearance Appearance {{\n",
             _surface(material),
             textures.of(material),
             "  }\n  geometry IndexedFaceSet {\n",
-            "    solid FALSE\n" if g.two_sided[shape] else "",
-            f"    coord Coordinate {{ point {field(lists.point[at])} }}\n",
-            f"    coordIndex {field(lists.loop[at])}\n",
+            "    solid FALSE\n" if s.two_sided else "",
+            f"    coord Coordinate {{ point {chosen(self._point, s.point)} }}\n",
+            f"    coordIndex {loops(s.triangle)}\n",
         ]
         if material.image >= 0:
-            parts.append(f"    texCoord TextureCoordinate {{ point {field(lists.uv[at])} }}\n")
-            parts.append(f"    texCoordIndex {field(lists.uv_loop[at])}\n")
+            uv = chosen(self._uv, s.uv)
+            parts.append(f"    texCoord TextureCoordinate {{ point {uv} }}\n")
+            parts.append(f"    texCoordIndex {loops(s.uv_triangle)}\n")
             if material.opacity >= 1 and material.color != (1.0, 1.0, 1.0):
-                count = int(g.triangle_start[shape + 1] - g.triangle_start[shape])
-                zeros = field(lines(["0"] * count, 48, " "))
+                zeros = field(["0"] * len(s.triangle), 48, " ")
                 parts.append(f"    color Color {{ color [ {_color(material)} ] }}\n")
                 parts.append(f"    colorIndex {zeros}\n    colorPerVertex FALSE\n")
         parts.append("  }\n}\n")
         return "".join(parts)
-
-    def _lists_of(self, shape: int) -> _Lists:
-        """Those of some shapes with this one among them: many at a time are faster."""
-        held = self._lists
-        if not held.first <= shape < held.first + len(held.point):
-            g = self.geometry
-            enough = int(g.point_start[shape]) + _BATCH
-            last = max(shape + 1, int(np.searchsorted(g.point_start, enough, side="right")) - 1)
-            some = slice(shape, last + 1)
-            textured = self._image[g.material[shape:last]] >= 0
-            uv, uv_start = _taken(g.uv_start[some], textured)
-            corner, corner_start = _taken(g.triangle_start[some], textured)
-            rows = slice(g.triangle_start[shape], g.triangle_start[last])
-            points = slice(g.point_start[shape], g.point_start[last])
-            self._lists = held = _Lists(
-                shape,
-                self._point_text.lists(
-                    g.shape_point[points], g.point_start[some] - g.point_start[shape]
-                ),
-                self._loops(g.triangle[rows], g.triangle_start[some] - g.triangle_start[shape]),
-                self._uv_text.lists(g.shape_uv[uv], uv_start),
-                self._loops(g.uv_triangle[corner], corner_start),
-            )
-        return held
-
-    def _rows(self, values: NDArray[np.float32]) -> Rows:
-        return Rows(values, self._compiled)
-
-    def _loops(self, loop: NDArray[np.int64], start: NDArray[np.int64]) -> list[str]:
-        return loops(loop, start, compiled=self._compiled)
-
-    def _cell_urls(self, cells: NDArray[np.int32]) -> str:
-        return listed([self._url[c] for c in cells.tolist()], 8)
 
 
 class _Textures:
@@ -283,12 +179,12 @@ def _surface(material: Material) -> str:
     if material.image < 0:
         fields += f" emissiveColor {_color(material, _GLOW)}"
     if material.opacity < 1:
-        fields += f" transparency {numeral(1 - min(max(material.opacity, 0.0), 1.0))}"
+        fields += f" transparency {decimal(1 - min(max(material.opacity, 0.0), 1.0))}"
     return f"    material Material {{ {fields} }}\n"
 
 
 def _color(material: Material, share: float = 1.0) -> str:
-    return " ".join(numeral(share * min(max(c, 0.0), 1.0)) for c in material.color)
+    return " ".join(decimal(share * min(max(c, 0.0), 1.0)) for c in material.color)
 
 
 def _urls(record: TextureRecord, fallback: bool) -> list[str]:
@@ -296,11 +192,5 @@ def _urls(record: TextureRecord, fallback: bool) -> list[str]:
     return [quoted("../" + quote(file)) for file in files if file is not None]
 
 
-def _taken(
-    start: NDArray[np.int64], lists: NDArray[np.bool_]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """What is in some of the lists that begin at ``start``, the others being empty: indices of
-    it, and where each list begins among those."""
-    count = np.diff(start)
-    taken = np.flatnonzero(np.repeat(lists, count)) + start[0]
-    return taken, np.append(0, np.cumsum(np.where(lists, count, 0)))
+def _points(points: NDArray[np.float32]) -> str:
+    return field(row_texts(points))

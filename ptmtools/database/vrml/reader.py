@@ -93,6 +93,21 @@ class Node:
     fields: dict[str, Any]
     line: int
 
+    def child(self, *path: str) -> Node | None:
+        """The node in a field, or in a field of that; None if there is none."""
+        node: Node = self
+        for name in path:
+            inner = node.fields.get(name)
+            if not isinstance(inner, Node):
+                return None
+            node = inner
+        return node
+
+    def at(self, *path: str) -> dict[str, Any]:
+        """The fields of that node; empty if there is none."""
+        node = self.child(*path)
+        return {} if node is None else node.fields
+
 
 @dataclass(frozen=True)
 class Document:

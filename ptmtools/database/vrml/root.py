@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.database.floats import decimal, row_texts, single
 from ptmtools.database.model import EmitOptions, Viewpoint
 from ptmtools.database.names import cell_path
-from ptmtools.database.numerals import listed, numeral, numerals, quoted, single
 from ptmtools.database.vrml.cell import HEADER
+from ptmtools.database.vrml.text import listed, quoted
 
 #: The version of the emission pattern, in WorldInfo's first info string.
 PATTERN = 1
@@ -33,51 +34,39 @@ def root_text(
     """
     info = [quoted(f"ptm:database {PATTERN}")]
     info += [quoted(f"ptm:viewpoint {v.name} {cell_path(v.cell)}") for v in viewpoints]
-    avatar = ", ".join(numeral(x) for x in options.avatar_size)
+    avatar = ", ".join(decimal(x) for x in options.avatar_size)
     parts = [
         HEADER,
         _PROTO,
         f"WorldInfo {{\n  title {quoted(options.title)}\n  info {listed(info, 1)}\n}}\n",
         f'NavigationInfo {{ type [ "WALK", "ANY" ] avatarSize [ {avatar} ] headlight TRUE }}\n',
     ]
-    parts += _viewpoints(viewpoints)
+    poses = (
+        row_texts(single([np.ravel(getattr(v, name)) for v in viewpoints], "viewpoints"))
+        for name in ("position", "orientation", "field_of_view")
+    )
+    parts += [
+        f"DEF {v.name} Viewpoint {{ position {position} orientation {turn}"
+        f" fieldOfView {field} description {quoted(v.description)} }}\n"
+        for v, position, turn, field in zip(viewpoints, *poses, strict=True)
+    ]
     parts += [
         f"PTMViewpointCell {{ viewpoint {quoted(v.name)} cellUrl [ {quoted(cell_path(v.cell))} ]"
         " }\n"
         for v in viewpoints
     ]
-    for cell, (centre, size) in enumerate(_vectors(*_centred(np.array(boxes)))):
+    for cell, (centre, size) in enumerate(zip(*map(row_texts, _centred(boxes)), strict=True)):
         url = quoted(cell_path(cell))
         parts.append(f"Inline {{ url [ {url} ] bboxCenter {centre} bboxSize {size} }}\n")
     return "".join(parts)
 
 
-def _viewpoints(viewpoints: Sequence[Viewpoint]) -> Iterator[str]:
-    numbers = [
-        single([getattr(v, field) for v in viewpoints], "viewpoints").reshape(len(viewpoints), -1)
-        for field in ("position", "orientation", "field_of_view")
-    ]
-    for v, (position, turn, field) in zip(viewpoints, _vectors(*numbers), strict=True):
-        yield (
-            f"DEF {v.name} Viewpoint {{ position {position} orientation {turn}"
-            f" fieldOfView {field} description {quoted(v.description)} }}\n"
-        )
-
-
-def _vectors(*arrays: NDArray[np.float32]) -> Iterator[tuple[str, ...]]:
-    """Row by row the text of each of (n, k) arrays."""
-    text = numerals(np.concatenate([array.ravel() for array in arrays]))
-    rows, at = [], 0
-    for n, k in (array.shape for array in arrays):
-        rows.append([" ".join(text[i : i + k]) for i in range(at, at + n * k, k)])
-        at += n * k
-    return zip(*rows, strict=True)
-
-
-def _centred(boxes: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def _centred(
+    boxes: Sequence[NDArray[np.float32]],
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Centres and sizes (n, 3) in float32 that together hold the boxes (n, 2, 3): sizes are rounded
     up."""
-    low, high = np.moveaxis(boxes.astype(np.float64), 1, 0)
+    low, high = np.moveaxis(np.array(boxes, np.float64), 1, 0)
     centre = single((low + high) / 2, "bounding boxes")
     half = np.maximum(high - centre, centre - low)
     size = single(2 * half, "bounding boxes")

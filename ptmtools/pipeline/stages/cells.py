@@ -44,7 +44,7 @@ def _fits_scene(cells: Cells, scene: Scene) -> str:
 CELLS: Stage[Cells] = Stage(
     name="cells",
     about="Read a model and cut it into cells and portals.",
-    recipe=1,
+    recipe=2,
     options=SubdivideOptions,
     reads=(SCENE,),
     artifact=Lazy("ptmtools.cells.model:Cells"),

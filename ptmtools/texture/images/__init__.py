@@ -1,10 +1,10 @@
-"""Image files in and out, without ever changing a texel silently.
+"""Reading and writing image files without ever changing a texel silently.
 
-What a format can hold beyond what is asked for, or less, is an error that says so; nothing is
-scaled, rounded or converted on the way. Colour and orientation are *kept*, never applied: texels
-are taken as numbers, in the order of the file's rows, and what the file says of them goes into a
+Nothing is scaled, rounded or converted on the way: what a format cannot hold exactly, or what a
+`.ptm` cannot, is an error that says so. Colour and orientation are *kept*, not applied: texels are
+numbers, in the order of the file's rows, and what the file says of them goes into a
 `ptmtools.texture.Description`. The exception is TIFF, whose orientation says how its rows are
-stored: it is applied.
+stored; it is applied.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 from ptmtools.texture.images.picture import Picture
 from ptmtools.texture.images.png import png_bytes
 from ptmtools.texture.images.reading import SUFFIXES, check_image, load_image, read_image, read_ptm
-from ptmtools.texture.images.writing import WRITTEN, write_image, write_png, write_to
+from ptmtools.texture.images.writing import WRITTEN, write_image, write_to
 
 __all__ = [
     "SUFFIXES",
@@ -24,6 +24,5 @@ __all__ = [
     "read_image",
     "read_ptm",
     "write_image",
-    "write_png",
     "write_to",
 ]

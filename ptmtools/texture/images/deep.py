@@ -10,7 +10,8 @@ without another library: 29 MB/s, where imagecodecs (libpng) reaches 50 and pypn
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.texture.images.declared import check_tile
@@ -36,9 +37,15 @@ _HALVES = {"RGB": ("RGB;16B", "RGB;16L"), "RGBA": ("RGBA;16B", "RGBA;16L")}
 _GREY_ALPHA = 4
 #: Magic, width, height, largest sample of a PPM or PGM, with comments between.
 _PPM = re.compile(rb"P([2356])" + rb"(?:\s|#[^\n]*\n)+(\d+)" * 3 + rb"\s")
-_ICC = 34675
-#: Tag of libtiff's: an image may have several planes behind each other.
-_DEPTH = 32997
+#: Tags of TIFF; `_DEPTH` is libtiff's: an image may have several planes behind each other.
+_TAGS = (256, 257, 258, 262, 277, 322, 323, 339, 34675, 32997, ORIENTATION)
+_WIDTH, _HEIGHT, _BITS, _PHOTOMETRIC, _SAMPLES, _TILE_WIDTH, _TILE_HEIGHT = _TAGS[:7]
+_FORMAT, _ICC, _DEPTH = _TAGS[7:10]
+#: No tag: where the next page is, 0 if there is none.
+_NEXT = 0
+#: Bits and sample format of a TIFF → the type that holds its samples exactly.
+_TYPES = {(16, 1): "uint16", (16, 3): "float16", (32, 3): "float32"}
+Tags = Mapping[int, Any]
 #: So much of a plain PPM is read at a time, and so many digits are the most that a number has.
 _BLOCK, _DIGITS_MAX = 1 << 20, 10
 
@@ -87,38 +94,8 @@ def _unpacked(image: ImageFile, mode: str, raw: str) -> ImageFile:
     return image
 
 
-class TiffLayout(NamedTuple):
-    """What the first page of a TIFF says of its samples."""
-
-    width: int
-    height: int
-    components: int
-    bits: tuple[int, ...]
-    sample_format: tuple[int, ...]
-    photometric: int
-    pages: int
-    orientation: int
-    icc: bytes | None
-    tile: tuple[object, object]
-    depth: object
-
-    @property
-    def deep(self) -> bool:
-        """Whether 8 bits cannot hold them."""
-        return max(self.bits) > 8 or set(self.sample_format) != {1}
-
-    @property
-    def dtype(self) -> str | None:
-        """The type that holds them exactly, if one does."""
-        found = {(*self.bits,), (*self.sample_format,)}
-        kinds = {(16, 1): "uint16", (16, 3): "float16", (32, 3): "float32"}
-        if any(len(set(values)) != 1 for values in found):
-            return None
-        return kinds.get((self.bits[0], self.sample_format[0]))
-
-
-def tiff_layout(file: BinaryIO) -> TiffLayout:
-    """The layout of a TIFF. Raises what Pillow raises."""
+def tiff_tags(file: BinaryIO) -> Tags:
+    """The tags of the first page of a TIFF. Raises what Pillow raises."""
     from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
     file.seek(0)
@@ -129,38 +106,35 @@ def tiff_layout(file: BinaryIO) -> TiffLayout:
     assert directory.next is not None
     file.seek(directory.next)
     directory.load(file)
-    samples = directory.get(277, 1)
-    return TiffLayout(
-        directory[256],
-        directory[257],
-        samples,
-        tuple(directory.get(258, (1,))),
-        tuple(directory.get(339, (1,))),
-        directory.get(262, 1),
-        2 if directory.next else 1,
-        directory.get(ORIENTATION, 1),
-        directory.get(_ICC) or None,
-        (directory.get(322), directory.get(323)),
-        directory.get(_DEPTH, 1),
-    )
+    # The first access parses a value: all of them here, where Pillow's errors are expected.
+    return {tag: directory[tag] for tag in _TAGS if tag in directory} | {_NEXT: directory.next}
 
 
-def read_tiff(file: BinaryIO, layout: TiffLayout, limits: Limits) -> Picture:
+def is_deep(tags: Tags) -> bool:
+    """Whether the samples of a TIFF are more than 8 bits hold."""
+    return max(tags.get(_BITS, (1,))) > 8 or set(tags.get(_FORMAT, (1,))) != {1}
+
+
+def read_tiff(file: BinaryIO, tags: Tags, limits: Limits) -> Picture:
     """A TIFF of samples that 8 bits do not hold.
 
     Raises InputError PTM-I126, PTM-I127, LimitError PTM-L104, MissingComponentError PTM-M100.
     """
     import numpy as np
 
-    dtype, components = layout.dtype, layout.components
-    if dtype is None or layout.photometric not in (1, 2) or components > 4:
+    width, height, components = tags[_WIDTH], tags[_HEIGHT], tags.get(_SAMPLES, 1)
+    bits, formats = tags.get(_BITS, (1,)), tags.get(_FORMAT, (1,))
+    photometric = tags.get(_PHOTOMETRIC, 1)
+    same = len(set(bits)) == len(set(formats)) == 1
+    dtype = _TYPES.get((bits[0], formats[0])) if same else None
+    if dtype is None or photometric not in (1, 2) or components > 4:
         raise unsupported(
-            f"{'/'.join(map(str, layout.bits))} bits of TIFF sample format "
-            f"{layout.sample_format[0]}, photometric interpretation {layout.photometric}"
+            f"{'/'.join(map(str, bits))} bits of TIFF sample format "
+            f"{formats[0]}, photometric interpretation {photometric}"
         )
     texel_bytes = components * np.dtype(dtype).itemsize
-    check_size(layout.width, layout.height, texel_bytes, limits)
-    check_tile(*layout.tile, texel_bytes, limits)
+    check_size(width, height, texel_bytes, limits)
+    check_tile(tags.get(_TILE_WIDTH), tags.get(_TILE_HEIGHT), texel_bytes, limits)
     if components == 1 and dtype != "float16":
         image = opened(file, limits)
         one_frame(image)
@@ -179,7 +153,7 @@ def read_tiff(file: BinaryIO, layout: TiffLayout, limits: Limits) -> Picture:
             "a TIFF of more than one component deeper than 8 bits needs imagecodecs",
             remedy="pip install 'ptmtools[codecs]'",
         ) from None
-    if layout.pages > 1 or layout.depth != 1:
+    if tags[_NEXT] or tags.get(_DEPTH, 1) != 1:
         raise InputError(
             "PTM-I127",
             "holds several pages; a texture is one image",
@@ -190,8 +164,9 @@ def read_tiff(file: BinaryIO, layout: TiffLayout, limits: Limits) -> Picture:
         texels = tiff_decode(file.read(), index=0)
     except Exception as error:  # its errors have no class in common
         raise damaged_image(error) from None
-    texels = texels.reshape(layout.height, layout.width, components).astype(dtype, copy=False)
-    return Picture(oriented(texels, layout.orientation), Description(icc=layout.icc))
+    texels = texels.reshape(height, width, components).astype(dtype, copy=False)
+    icc = tags.get(_ICC) or None
+    return Picture(oriented(texels, tags.get(ORIENTATION, 1)), Description(icc=icc))
 
 
 def read_ppm(file: BinaryIO, path: str | None, limits: Limits) -> Picture | None:

@@ -28,9 +28,9 @@ def check(image: ImageFile, limits: Limits) -> None:
     check_size(*image.size, _COMPONENTS[image.mode], limits)
 
 
-def read(image: ImageFile, depth: int) -> Picture:
+def read(image: ImageFile, depth: int, lossy: str | None) -> Picture:
     """An opened image that was checked, texels exactly as stored; ``depth`` is that of its samples,
-    bits.
+    bits, and ``lossy`` as in `Picture`.
 
     Raises what Pillow raises.
     """
@@ -52,7 +52,7 @@ def read(image: ImageFile, depth: int) -> Picture:
         return with_key(texels, key) if keyed else texels
 
     shape = (image.height, image.width, components + keyed)
-    return Picture(Strips(shape, np.dtype(np.uint8), strip), described(image))
+    return Picture(Strips(shape, np.dtype(np.uint8), strip), described(image), lossy)
 
 
 def one_frame(image: ImageFile) -> None:

@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from tempfile import NamedTemporaryFile, TemporaryDirectory
+from typing import IO, TYPE_CHECKING, Any, BinaryIO
 
-from ptmtools.errors import InputError, MissingComponentError, OutputError
+from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.texture.images.declared import check_file, check_tile
-from ptmtools.texture.images.picture import Picture, check_size, damaged_image, unsupported
-from ptmtools.texture.model import Limits
+from ptmtools.texture.images.picture import (
+    Picture,
+    check_size,
+    damaged_image,
+    not_held,
+    unsupported,
+)
+from ptmtools.texture.model import Description, Limits
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -65,42 +72,31 @@ def read_exr(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
     return Picture(np.stack(planes, axis=2))
 
 
-def exr_bytes(texels: NDArray[Any]) -> bytes:
-    """(h, w, c) float16 or float32 as an OpenEXR file, ZIP-compressed.
+def save_openexr(file: IO[bytes], texels: NDArray[Any], description: Description) -> None:
+    """(h, w, c) float16 or float32 as an OpenEXR file, ZIP-compressed, without the description.
 
     Raises MissingComponentError PTM-M101, OutputError PTM-O102.
     """
     import numpy as np
 
     if texels.dtype.kind != "f":
-        raise OutputError(
-            "PTM-O102",
-            f"a .exr does not hold {texels.dtype} samples",
-            remedy="name the output .png, .npy or .tif",
-        )
-    import tempfile
-
+        raise not_held("exr", texels, ".png, .npy or .tif")
     library = _library()
     names = _CHANNELS[texels.shape[2]]
     channels = {name: np.ascontiguousarray(texels[:, :, i]) for i, name in enumerate(names)}
     head = {"compression": library.ZIP_COMPRESSION, "type": library.scanlineimage}
-    handle, name = tempfile.mkstemp(suffix=".exr")
-    os.close(handle)
-    try:
+    with TemporaryDirectory() as folder:  # the library writes files that have a name
+        path = Path(folder) / "image.exr"
         with library.File(head, channels) as exr:
-            exr.write(name)
-        return Path(name).read_bytes()
-    finally:
-        Path(name).unlink()
+            exr.write(os.fspath(path))
+        file.write(path.read_bytes())
 
 
 def _from_memory(file: BinaryIO, limits: Limits) -> Picture:
     """The library reads files that have a name."""
-    import tempfile
-
     check_file(file, limits)
     file.seek(0)
-    with tempfile.NamedTemporaryFile(suffix=".exr") as named:
+    with NamedTemporaryFile(suffix=".exr") as named:
         named.write(file.read())
         named.flush()
         return read_exr(file, named.name, limits)

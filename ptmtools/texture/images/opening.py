@@ -79,6 +79,18 @@ def opened(file: BinaryIO, limits: Limits) -> ImageFile:
     return image
 
 
+def lossy_format(file: BinaryIO, image: ImageFile) -> str | None:
+    """The name of the format if its compression discards detail, as far as can be told."""
+    if image.format == "TIFF":
+        return "JPEG in TIFF" if "jpeg" in str(image.info.get("compression")) else None
+    if image.format == "WEBP":
+        file.seek(12)
+        while len(head := file.read(8)) == 8 and head[:4] not in (b"VP8 ", b"VP8L"):
+            file.seek(int.from_bytes(head[4:], "little") + 1 & ~1, 1)
+        return "WebP" if head[:4] == b"VP8 " else None
+    return "JPEG" if image.format in ("JPEG", "MPO") else None
+
+
 def load(image: ImageFile) -> None:
     """Its texels are unpacked. Raises what Pillow raises."""
     if image.format == "TIFF":

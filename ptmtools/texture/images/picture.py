@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from ptmtools.errors import InputError, LimitError
+from ptmtools.errors import InputError, LimitError, OutputError
 from ptmtools.texture.model import MAX_SIDE, Description, Limits
 
 if TYPE_CHECKING:
@@ -30,10 +30,12 @@ class Picture:
     texels: rows from the top, (h, w, c) of uint8, uint16, float16 or float32: an array, or what
         makes one when it is sliced.
     description: colour and orientation, as the file has them.
+    lossy: the name of the file's format where that had discarded detail, as JPEG does; else None.
     """
 
     texels: Rows
     description: Description = Description()  # noqa: RUF009  # frozen
+    lossy: str | None = None
 
     def array(self) -> Samples:
         """All texels, (h, w, c)."""
@@ -46,7 +48,7 @@ class Picture:
         if self.description.orientation == 1:
             return self
         texels = oriented(self.array(), self.description.orientation)
-        return Picture(texels, replace(self.description, orientation=1))
+        return replace(self, texels=texels, description=replace(self.description, orientation=1))
 
 
 def oriented(texels: Samples, orientation: int) -> Samples:
@@ -128,4 +130,13 @@ def unsupported(what: str) -> InputError:
         f"has {what}; grey and RGB of 8 or 16 bits or of 16- or 32-bit floats are read, with or "
         "without alpha",
         remedy="convert it yourself, so that you see what that changes",
+    )
+
+
+def not_held(suffix: str, texels: Samples, others: str) -> OutputError:
+    """The error for an image format without such samples; ``others`` have them."""
+    return OutputError(
+        "PTM-O102",
+        f"a .{suffix} does not hold {texels.dtype} samples",
+        remedy=f"name the output {others}",
     )

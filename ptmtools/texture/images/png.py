@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from typing import IO, TYPE_CHECKING, Any, BinaryIO
 
 from ptmtools.texture.images.opening import ORIENTATION
-from ptmtools.texture.images.picture import damaged_image
+from ptmtools.texture.images.picture import damaged_image, not_held
 from ptmtools.texture.model import Description
 
 if TYPE_CHECKING:
@@ -37,7 +37,9 @@ def png_bytes(image: NDArray[Any], description: Description = _PLAIN) -> bytes:
 
 
 def save_png(file: IO[bytes], image: NDArray[Any], description: Description = _PLAIN) -> None:
-    """As `png_bytes`, into an open file."""
+    """As `png_bytes`, into an open file. Raises OutputError PTM-O102 for floats."""
+    if image.dtype.kind == "f":
+        raise not_held("png", image, ".npy, .tif or .exr")
     (_save_deep if image.dtype.itemsize > 1 else _save_shallow)(file, image, description)
 
 
@@ -96,10 +98,10 @@ def check_chunks(file: BinaryIO) -> None:
         while left and (part := file.read(min(left, _STRIP_BYTES))):
             checksum = zlib.crc32(part, checksum)
             left -= len(part)
-        told = file.read(4)
-        if len(told) < 4:
+        stored = file.read(4)
+        if len(stored) < 4:
             raise damaged_image("it ends before its chunk IEND")
-        if told != checksum.to_bytes(4, "big"):
+        if stored != checksum.to_bytes(4, "big"):
             raise damaged_image(f"the checksum of {kind!r} before byte {file.tell()} is wrong")
 
 

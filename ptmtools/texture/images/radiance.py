@@ -11,12 +11,12 @@ not applied.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import IO, TYPE_CHECKING, Any, BinaryIO
 
 from ptmtools.errors import OutputError
 from ptmtools.texture.images.declared import check_file
 from ptmtools.texture.images.picture import Picture, check_size, damaged_image, unsupported
-from ptmtools.texture.model import Limits
+from ptmtools.texture.model import Description, Limits
 
 if TYPE_CHECKING:
     import numpy as np
@@ -79,8 +79,8 @@ def floats(texels: NDArray[np.uint8]) -> NDArray[np.float32]:
     return (texels[:, :, :3] * scale).astype(np.float32)
 
 
-def hdr_bytes(texels: NDArray[Any]) -> bytes:
-    """(h, w, 3) floats as a Radiance picture, scanlines plain.
+def save_radiance(file: IO[bytes], texels: NDArray[Any], description: Description) -> None:
+    """(h, w, 3) floats as a Radiance picture, scanlines plain, without the description.
 
     Raises OutputError PTM-O102 unless it holds every one of them exactly.
     """
@@ -104,7 +104,7 @@ def hdr_bytes(texels: NDArray[Any]) -> bytes:
             remedy="name the output .npy, .tif or .exr",
         )
     head = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n"
-    return head.encode() + mantissas.tobytes()
+    file.write(head.encode() + mantissas.tobytes())
 
 
 def _coded_row(data: bytes, at: int, row: NDArray[np.uint8]) -> int:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 from ptmtools.errors import InputError, naming
@@ -19,7 +21,6 @@ from ptmtools.texture.sources import open_file
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-    from PIL.ImageFile import ImageFile
 
 #: Of the files that are taken for images where a folder is named.
 SUFFIXES = (
@@ -47,8 +48,8 @@ def load_image(source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS)
     Parameters
     ----------
     source: a path, or the bytes of a file.
-    limits: ``decoded_bytes`` is the most that the texels may take in memory, told by the head
-        of the file.
+    limits: ``decoded_bytes`` is the most memory that the texels may take, judged by the size that
+        the head of the file declares.
 
     Raises
     ------
@@ -69,9 +70,7 @@ def load_image(source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS)
 def read_image(
     source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS
 ) -> NDArray[np.uint8]:
-    """An image file of 8 bits a component as (h, w, c) uint8, rows from the top.
-
-    As `load_image`, for those who have a use for nothing else.
+    """The texels of an image file of 8 bits a component: (h, w, c) uint8, rows from the top.
 
     Raises what `load_image` raises; InputError PTM-I126 also for deeper samples.
     """
@@ -82,8 +81,8 @@ def read_image(
 
 
 def check_image(source: bytes, limits: Limits = _LIMITS) -> None:
-    """Raises what `read_image` would raise for an image that Pillow has been seen to decode: its
-    texels are not unpacked once more."""
+    """Raises what `read_image` would raise, without unpacking texels: for an image that Pillow has
+    decoded already."""
     file = cast("BinaryIO", io.BytesIO(source))
     found = _opened(file, None, limits)
     if isinstance(found, Picture):
@@ -112,19 +111,17 @@ def read_ptm(path: str | os.PathLike[str]) -> bytes:
 
 
 def _load(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
-    from ptmtools.texture.images import eight_bit
     from ptmtools.texture.images.opening import pillow_faults
 
     found = _opened(file, path, limits)
     if isinstance(found, Picture):
         return found
     with pillow_faults():
-        return eight_bit.read(*found)
+        return found()
 
 
-def _opened(file: BinaryIO, path: str | None, limits: Limits) -> Picture | tuple[ImageFile, int]:
-    """An image; one of 8 bits as Pillow has opened it, not loaded but found good, and the depth of
-    its samples in the file, bits."""
+def _opened(file: BinaryIO, path: str | None, limits: Limits) -> Picture | Callable[[], Picture]:
+    """An image; of one of 8 bits, which Pillow has opened and found good, what unpacks it."""
     first = file.read(HEAD_MAX)
     if not first:
         raise InputError("PTM-I123", "is empty", remedy="fetch or export it again")
@@ -146,17 +143,22 @@ def _opened(file: BinaryIO, path: str | None, limits: Limits) -> Picture | tuple
 
 def _by_pillow(
     file: BinaryIO, path: str | None, first: bytes, limits: Limits
-) -> Picture | tuple[ImageFile, int]:
+) -> Picture | Callable[[], Picture]:
     from ptmtools.texture.images import deep, eight_bit
-    from ptmtools.texture.images.opening import high_colour, opened, pillow_faults
+    from ptmtools.texture.images.opening import (
+        high_colour,
+        lossy_format,
+        opened,
+        pillow_faults,
+    )
 
     with pillow_faults():
         if first.startswith(_PPM) and (picture := deep.read_ppm(file, path, limits)):
             return picture
         if first.startswith(_PNG):
             check_chunks(file)
-        if first.startswith(_TIFF) and (layout := deep.tiff_layout(file)).deep:
-            return deep.read_tiff(file, layout, limits)
+        if first.startswith(_TIFF) and deep.is_deep(tags := deep.tiff_tags(file)):
+            return deep.read_tiff(file, tags, limits)
         image = opened(file, limits)
         eight_bit.one_frame(image)
         depth = 8
@@ -169,7 +171,7 @@ def _by_pillow(
         elif high_colour(image):
             raise unsupported("samples of 5 or 6 bits")
         eight_bit.check(image, limits)
-        return image, depth
+        return partial(eight_bit.read, image, depth, lossy_format(file, image))
 
 
 def _rescaled(tiles: list[Any]) -> bool:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import PurePath
 from typing import IO, TYPE_CHECKING, Any
 
 from ptmtools.errors import OutputError, naming
-from ptmtools.texture.images.png import save_png
 from ptmtools.texture.model import Description
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     Samples = NDArray[Any]
@@ -57,16 +56,6 @@ def write_to(
     writer(suffix)(file, texels, description)
 
 
-def write_png(path: str | os.PathLike[str], image: NDArray[np.uint8], force: bool = False) -> None:
-    """Write (h, w, c) uint8 or uint16, 1 to 4 components, as a PNG, whole or not at all.
-
-    Raises OutputError (see `ptmtools.files.write_bytes`).
-    """
-    from ptmtools.files import write_with
-
-    write_with(path, lambda file: save_png(file, image), force=force)
-
-
 Writer = Callable[[IO[bytes], "Samples", Description], object]
 
 
@@ -80,49 +69,16 @@ def writer(suffix: str) -> Writer:
             f"the suffix {suffix!r} {why}",
             remedy=f"use one of {', '.join(WRITTEN)}",
         )
-    return found
+    write: Writer = getattr(import_module(f"ptmtools.texture.images.{found}"), f"save_{found}")
+    return write
 
 
-def _png(file: IO[bytes], texels: Samples, description: Description) -> None:
-    if texels.dtype.kind == "f":
-        raise OutputError(
-            "PTM-O102",
-            f"a .png does not hold {texels.dtype} samples",
-            remedy="name the output .npy, .tif or .exr",
-        )
-    save_png(file, texels, description)
-
-
-def _npy(file: IO[bytes], texels: Samples, description: Description) -> None:
-    import numpy as np
-
-    np.lib.format.write_array(file, np.ascontiguousarray(texels), allow_pickle=False)
-
-
-def _tiff(file: IO[bytes], texels: Samples, description: Description) -> None:
-    from ptmtools.texture.images.tiff import save_tiff
-
-    save_tiff(file, texels, description)
-
-
-def _hdr(file: IO[bytes], texels: Samples, description: Description) -> None:
-    from ptmtools.texture.images.radiance import hdr_bytes
-
-    file.write(hdr_bytes(texels))
-
-
-def _exr(file: IO[bytes], texels: Samples, description: Description) -> None:
-    from ptmtools.texture.images.openexr import exr_bytes
-
-    file.write(exr_bytes(texels))
-
-
-#: What writes files of each suffix.
-WRITTEN: dict[str, Writer] = {
-    ".png": _png,
-    ".npy": _npy,
-    ".tif": _tiff,
-    ".tiff": _tiff,
-    ".hdr": _hdr,
-    ".exr": _exr,
+#: The module, and its function ``save_…``, that writes files of each suffix.
+WRITTEN = {
+    ".png": "png",
+    ".npy": "npy",
+    ".tif": "tiff",
+    ".tiff": "tiff",
+    ".hdr": "radiance",
+    ".exr": "openexr",
 }

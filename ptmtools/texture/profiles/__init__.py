@@ -1,15 +1,17 @@
-"""The ways of coding a group: one small interface, one file for each profile.
+"""The profiles: ways of coding the levels of a file, declared in a table.
 
-A profile turns a tile of a level, given the same part of the level below, into bytes and back. It
-knows nothing of files, checksums or numbering; the container knows nothing of texels. A profile is
-a frozen value: what a decoder has to know about it (its number) stands in the file.
+A profile is one value in `PROFILES` and one module, which turns a tile of a level, given the same
+part of the level below, into bytes and back. The module knows nothing of files, checksums or
+numbering; the container knows nothing of texels. Everything else that depends on the profile (what
+the command line offers and says of it, which options it takes, what a file may declare) is read
+from the table, so a new one needs its module and a line here.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 if TYPE_CHECKING:
     import numpy as np
@@ -18,11 +20,55 @@ if TYPE_CHECKING:
     Samples = NDArray[Any]
     Shape = tuple[int, int, int]
 
-#: Profiles by name, with the number that stands for each in a file.
-PROFILE_NUMBERS = {"raw": 0, "fast": 1, "small": 2, "paper": 3}
 
-#: Those that cannot make use of an allowed error.
-EXACT_PROFILES = ("raw", "paper")
+@dataclass(frozen=True)
+class Profile:
+    """A way of coding the levels of a file.
+
+    Attributes
+    ----------
+    name: on the command line and in `EncodeOptions`.
+    number: what stands for it in a file; never that of another, once files have been written.
+    about: what it is for, in a few words, for the help.
+    module: the `Coder`, by name: it is imported when it is first used.
+    lossy: whether it can make use of an allowed error.
+    since: the first version of the container that may hold it.
+    """
+
+    name: str
+    number: int
+    about: str
+    module: str
+    lossy: bool = False
+    since: int = 2
+
+    @property
+    def coder(self) -> Coder:
+        """What codes and decodes."""
+        return cast("Coder", import_module(self.module))
+
+
+#: All profiles, by name.
+PROFILES = {
+    profile.name: profile
+    for profile in (
+        Profile("fast", 1, "for streaming", f"{__name__}.fast", lossy=True, since=1),
+        Profile(
+            "small",
+            2,
+            "for archives: smaller, but 30 to 60 times slower",
+            f"{__name__}.small",
+            lossy=True,
+        ),
+        Profile("raw", 0, "the paper's own layout, uncompressed", f"{__name__}.raw", since=1),
+        Profile("paper", 3, "the same with lossless JPEG, to compare", f"{__name__}.paper"),
+    )
+}
+
+
+def profile_numbered(number: int) -> Profile | None:
+    """The profile that a number in a file stands for, if there is one."""
+    return next((profile for profile in PROFILES.values() if profile.number == number), None)
 
 
 @dataclass(frozen=True)
@@ -42,8 +88,8 @@ class Tile:
     memory: Any = None
 
 
-class Profile(Protocol):
-    """How the groups of a file are coded.
+class Coder(Protocol):
+    """What the module of a profile holds: four functions that code and decode tiles.
 
     All levels are C-contiguous (h, w, c) of uint8, uint16, float16 or float32. ``below`` is
     (h >> 1, w >> 1, c), the level below as a decoder has it: the mean of ``level`` unless
@@ -54,10 +100,6 @@ class Profile(Protocol):
     is what the tile of the level below left, None at first; the tiles of a level of several all
     get what the last single tile left, and what they leave is dropped. It is never changed.
     """
-
-    @property
-    def name(self) -> str:
-        """As in `PROFILE_NUMBERS`."""
 
     def encode_base(self, level: Samples) -> bytes:
         """The coarsest level, which has nothing below it; without error."""
@@ -85,10 +127,3 @@ class Profile(Protocol):
         threads: int = 1,
     ) -> Tile:
         """The inverse of `encode_tile`."""
-
-
-def profile_named(name: str) -> Profile:
-    """The profile of that name, one of `PROFILE_NUMBERS`."""
-    module = import_module(f"{__name__}.{name}")
-    profile: Profile = getattr(module, f"{name.capitalize()}Profile")()
-    return profile

@@ -23,7 +23,6 @@ afterwards, which would be faster, finds too little: surroundings have to be kno
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,16 +31,16 @@ from numpy.typing import NDArray
 from ptmtools.texture.coders.damage import damaged
 from ptmtools.texture.coders.haar import coder as haar
 from ptmtools.texture.coders.repeats import coder as repeats
-from ptmtools.texture.profiles import Tile
-from ptmtools.texture.profiles.raw import RawProfile, group_length
+from ptmtools.texture.profiles import Tile, raw
+from ptmtools.texture.profiles.nested import pack_levels, shapes_to, unpack_levels
+from ptmtools.texture.profiles.raw import group_length
+from ptmtools.texture.pyramid import build_pyramid
 
 if TYPE_CHECKING:
     from ptmtools.texture.profiles import Samples, Shape
 
 #: Coders 1 to 3 are those of files of version 1.
 STORED, HAAR_1, DEFLATED_1, DIFFERENCES_1, HAAR, REPEATS, PYRAMID = range(7)
-#: Bytes of the length of a level in a coarsest level that is a pyramid.
-_LENGTH = 4
 
 #: A group of fewer blocks is coded by both coders; of others a sixteenth is looked at first.
 PROBED_BLOCKS = 16 * 16
@@ -53,94 +52,60 @@ WORTH = 0.97
 #: Texels are counted in 30 bits by `coders.repeats`.
 TOO_MANY_BLOCKS = 1 << 27
 
-_RAW = RawProfile()
 
 Bytes = NDArray[np.uint8]
 
 
-@dataclass(frozen=True)
-class FastProfile:
-    """The shorter of two coders for each tile; see the module."""
+def encode_base(level: Samples) -> bytes:
+    """One byte that names the coder, then what it wrote."""
+    levels = build_pyramid(level)
+    nested = bytes([PYRAMID]) + pack_levels(
+        encode_tile, _nothing(levels[0].shape, level.dtype), levels
+    )
+    return min(nested, bytes([STORED]) + raw.encode_base(level), key=len)
 
-    name: str = "fast"
 
-    def encode_base(self, level: Samples) -> bytes:
-        """One byte that names the coder, then what it wrote."""
-        return _shorter(self._encode_pyramid(level), bytes([STORED]) + _RAW.encode_base(level))
+def decode_base(data: bytes, shape: Shape, dtype: np.dtype[Any]) -> Samples:
+    """The inverse of `encode_base`. Raises InputError PTM-I112."""
+    coder, body = _split(data)
+    if coder == PYRAMID:
+        shapes = shapes_to(shape)
+        return unpack_levels(decode_tile, body, _nothing(shapes[0], dtype), shapes)
+    if coder == DEFLATED_1:
+        from ptmtools.texture.coders.deflated import inflate
 
-    def decode_base(self, data: bytes, shape: Shape, dtype: np.dtype[Any]) -> Samples:
-        """The inverse of `encode_base`. Raises InputError PTM-I112."""
-        coder, body = _split(data)
-        if coder == STORED:
-            return _RAW.decode_base(body, shape, dtype)
-        if coder == PYRAMID:
-            return self._decode_pyramid(body, shape, dtype)
-        if coder == DEFLATED_1:
-            from ptmtools.texture.coders.deflated import inflate
-
-            body = inflate(body, shape[0] * shape[1] * shape[2])
-            return _RAW.decode_base(body, shape, dtype)
+        body = inflate(body, shape[0] * shape[1] * shape[2])
+    elif coder != STORED:
         raise damaged(f"coder {coder} is unknown for the coarsest level")
+    return raw.decode_base(body, shape, dtype)
 
-    def encode_tile(
-        self,
-        level: Samples,
-        below: Samples,
-        max_error: int = 0,
-        memory: Any = None,
-        threads: int = 1,
-    ) -> Tile:
-        """One byte that names the coder, then what it wrote."""
-        if level.dtype == np.uint8 and max_error == 0:
-            return Tile(_encode_bytes(level, below), level)
-        from ptmtools.texture.coders.texel import coder as texel
 
-        data, texels = texel.encode(level, below, max_error)
-        return Tile(data, texels)
+def encode_tile(
+    level: Samples, below: Samples, max_error: int = 0, memory: Any = None, threads: int = 1
+) -> Tile:
+    """One byte that names the coder, then what it wrote."""
+    if level.dtype == np.uint8 and max_error == 0:
+        return Tile(_encode_bytes(level, below), level)
+    from ptmtools.texture.coders.texel import coder as texel
 
-    def decode_tile(
-        self,
-        data: bytes,
-        below: Samples,
-        shape: Shape,
-        max_error: int = 0,
-        memory: Any = None,
-        threads: int = 1,
-    ) -> Tile:
-        """The inverse of `encode_tile`. Raises InputError PTM-I112."""
-        if below.dtype == np.uint8 and max_error == 0:
-            return Tile(b"", _decode_bytes(data, below, shape))
-        from ptmtools.texture.coders.texel import coder as texel
+    data, texels = texel.encode(level, below, max_error)
+    return Tile(data, texels)
 
-        return Tile(b"", texel.decode(data, below, shape, below.dtype, max_error))
 
-    def _encode_pyramid(self, level: Samples) -> bytes:
-        from ptmtools.texture.pyramid import build_pyramid
+def decode_tile(
+    data: bytes,
+    below: Samples,
+    shape: Shape,
+    max_error: int = 0,
+    memory: Any = None,
+    threads: int = 1,
+) -> Tile:
+    """The inverse of `encode_tile`. Raises InputError PTM-I112."""
+    if below.dtype == np.uint8 and max_error == 0:
+        return Tile(b"", _decode_bytes(data, below, shape))
+    from ptmtools.texture.coders.texel import coder as texel
 
-        levels = build_pyramid(level)
-        below = _nothing(levels[0].shape, level.dtype)
-        parts = [bytes([PYRAMID])]
-        for one in levels:
-            group = self.encode_tile(one, below).data
-            parts += [len(group).to_bytes(_LENGTH, "little"), group]
-            below = one
-        return b"".join(parts)
-
-    def _decode_pyramid(self, data: bytes, shape: Shape, dtype: np.dtype[Any]) -> Samples:
-        shapes = [shape]
-        while min(shapes[-1][:2]) > 1:
-            shapes.append((shapes[-1][0] >> 1, shapes[-1][1] >> 1, shape[2]))
-        level = _nothing(shapes[-1], dtype)
-        for one in reversed(shapes):
-            length = int.from_bytes(data[:_LENGTH], "little")
-            end = _LENGTH + length
-            if len(data) < end:
-                raise damaged("it is cut short")
-            level = self.decode_tile(data[_LENGTH:end], level, one).texels
-            data = data[end:]
-        if data:
-            raise damaged("it is too long")
-        return level
+    return Tile(b"", texel.decode(data, below, shape, below.dtype, max_error))
 
 
 def _encode_bytes(level: Bytes, below: Bytes) -> bytes:
@@ -148,7 +113,7 @@ def _encode_bytes(level: Bytes, below: Bytes) -> bytes:
     coded = _encode_best(level, below)
     if len(coded) <= 1 + group_length((level.shape[0], level.shape[1], level.shape[2])):
         return coded
-    return bytes([STORED]) + _RAW.encode_tile(level, below).data
+    return bytes([STORED]) + raw.encode_tile(level, below).data
 
 
 def _encode_best(level: Bytes, below: Bytes) -> bytes:
@@ -193,16 +158,12 @@ def _decode_bytes(data: bytes, below: Bytes, shape: Shape) -> Bytes:
         body = inflate(body, group_length(shape))
     elif coder != STORED:
         raise damaged(f"coder {coder} is unknown")
-    return _RAW.decode_tile(body, below, shape).texels
+    return raw.decode_tile(body, below, shape).texels
 
 
 def _nothing(shape: tuple[int, ...], dtype: np.dtype[Any]) -> Samples:
     """What lies below a level whose shorter side is 1."""
     return np.zeros((shape[0] >> 1, shape[1] >> 1, shape[2]), dtype)
-
-
-def _shorter(one: bytes, other: bytes) -> bytes:
-    return one if len(one) <= len(other) else other
 
 
 def _split(data: bytes) -> tuple[int, bytes]:

@@ -5,12 +5,13 @@ those of r are three images of half the size, each in lossless JPEG (ITU-T T.81,
 libjpeg-turbo writes it; edge texels are stored. Predictor 7, and 4 for 16 bits, where libjpeg-turbo
 3.1 does not decode what it has written with predictors 5, 6 and 7.
 
-The bytes depend on the libjpeg-turbo in use; what they decode to does not. Integers only.
+The bytes depend on the libjpeg-turbo in use; what they decode to does not. Integers only, and
+always exact. All functions raise MissingComponentError (PTM-M102) where imagecodecs is not
+installed, and InputError (PTM-I111) for floats.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -18,9 +19,8 @@ import numpy as np
 
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.texture.coders.damage import damaged
-from ptmtools.texture.profiles import Tile
+from ptmtools.texture.profiles import Tile, raw
 from ptmtools.texture.profiles.raw import (
-    RawProfile,
     corners,
     expect_length,
     pack_pairs,
@@ -41,89 +41,78 @@ PREDICTORS = {1: 7, 2: 4}
 #: Bytes of the length of a JPEG.
 _LENGTH = 4
 
-_RAW = RawProfile()
+
+def encode_base(level: Samples) -> bytes:
+    """All texels, row by row."""
+    _codecs(level.dtype)
+    return raw.encode_base(level)
 
 
-@dataclass(frozen=True)
-class PaperProfile:
-    """Lossless JPEG inside the paper's layout; see the module.
+def decode_base(data: bytes, shape: Shape, dtype: np.dtype[Any]) -> Samples:
+    """The inverse of `encode_base`. Raises InputError PTM-I112."""
+    _codecs(dtype)
+    return raw.decode_base(data, shape, dtype)
 
-    All methods raise MissingComponentError (PTM-M102) where imagecodecs is not installed, and
-    InputError (PTM-I111) for floats. Always exact: an error that is allowed is not made.
-    """
 
-    name: str = "paper"
+def encode_tile(
+    level: Samples,
+    below: Samples,
+    max_error: int = 0,
+    memory: Any = None,
+    threads: int = 1,
+) -> Tile:
+    """One byte that names the form; residual array, edge texels, three JPEGs."""
+    codecs = _codecs(level.dtype)
+    plain = bytes([RAW]) + raw.encode_tile(level, below).data
+    if not below.size:
+        return Tile(plain, level)
+    codes, _ = residuals(level, below)
+    parts = [bytes([JPEG]), pack_pairs(codes), sample_bytes(*_edges(level))]
+    for texels in corners(level, below)[:3]:
+        jpeg = codecs.jpeg8_encode(
+            _plain(texels),
+            lossless=True,
+            predictor=PREDICTORS[level.dtype.itemsize],
+            bitspersample=8 * level.dtype.itemsize,
+        )
+        found = codecs.jpeg8_decode(jpeg).reshape(texels.shape)
+        if not np.array_equal(found, texels):
+            return Tile(plain, level)
+        parts += [len(jpeg).to_bytes(_LENGTH, "little"), bytes(jpeg)]
+    coded = b"".join(parts)
+    return Tile(min(plain, coded, key=len), level)
 
-    def encode_base(self, level: Samples) -> bytes:
-        """All texels, row by row."""
-        _codecs(level.dtype)
-        return _RAW.encode_base(level)
 
-    def decode_base(self, data: bytes, shape: Shape, dtype: np.dtype[Any]) -> Samples:
-        """The inverse of `encode_base`. Raises InputError PTM-I112."""
-        _codecs(dtype)
-        return _RAW.decode_base(data, shape, dtype)
-
-    def encode_tile(
-        self,
-        level: Samples,
-        below: Samples,
-        max_error: int = 0,
-        memory: Any = None,
-        threads: int = 1,
-    ) -> Tile:
-        """One byte that names the form; residual array, edge texels, three JPEGs."""
-        codecs = _codecs(level.dtype)
-        raw = bytes([RAW]) + _RAW.encode_tile(level, below).data
-        if not below.size:
-            return Tile(raw, level)
-        codes, _ = residuals(level, below)
-        parts = [bytes([JPEG]), pack_pairs(codes), sample_bytes(*_edges(level))]
-        for texels in corners(level, below)[:3]:
-            jpeg = codecs.jpeg8_encode(
-                _plain(texels),
-                lossless=True,
-                predictor=PREDICTORS[level.dtype.itemsize],
-                bitspersample=8 * level.dtype.itemsize,
-            )
-            found = codecs.jpeg8_decode(jpeg).reshape(texels.shape)
-            if not np.array_equal(found, texels):
-                return Tile(raw, level)
-            parts += [len(jpeg).to_bytes(_LENGTH, "little"), bytes(jpeg)]
-        coded = b"".join(parts)
-        return Tile(min(raw, coded, key=len), level)
-
-    def decode_tile(
-        self,
-        data: bytes,
-        below: Samples,
-        shape: Shape,
-        max_error: int = 0,
-        memory: Any = None,
-        threads: int = 1,
-    ) -> Tile:
-        """The inverse of `encode_tile`. Raises InputError PTM-I112."""
-        codecs = _codecs(below.dtype)
-        if data[:1] == bytes([RAW]):
-            return _RAW.decode_tile(data[1:], below, shape)
-        if data[:1] != bytes([JPEG]) or not below.size:
-            raise damaged("its form is unknown")
-        level = np.empty(shape, below.dtype)
-        packed = -(-below.size // 4)
-        at = 1 + packed
-        for edge in _edges(level):
-            piece = data[at : at + edge.nbytes]
-            expect_length(piece, edge.nbytes)
-            edge[:] = samples_from(piece, below.dtype).reshape(edge.shape)
-            at += edge.nbytes
-        for texels in corners(level, below)[:3]:
-            end = at + _LENGTH + int.from_bytes(data[at : at + _LENGTH], "little")
-            texels[:] = _decoded(codecs, data[at + _LENGTH : end], texels)
-            at = end
-        expect_length(data, at)
-        codes = unpack_pairs(data[1 : 1 + packed], below.size).reshape(below.shape)
-        place_last(level, below, codes, b"")
-        return Tile(b"", level)
+def decode_tile(
+    data: bytes,
+    below: Samples,
+    shape: Shape,
+    max_error: int = 0,
+    memory: Any = None,
+    threads: int = 1,
+) -> Tile:
+    """The inverse of `encode_tile`. Raises InputError PTM-I112."""
+    codecs = _codecs(below.dtype)
+    if data[:1] == bytes([RAW]):
+        return raw.decode_tile(data[1:], below, shape)
+    if data[:1] != bytes([JPEG]) or not below.size:
+        raise damaged("its form is unknown")
+    level = np.empty(shape, below.dtype)
+    packed = -(-below.size // 4)
+    at = 1 + packed
+    for edge in _edges(level):
+        piece = data[at : at + edge.nbytes]
+        expect_length(piece, edge.nbytes)
+        edge[:] = samples_from(piece, below.dtype).reshape(edge.shape)
+        at += edge.nbytes
+    for texels in corners(level, below)[:3]:
+        end = at + _LENGTH + int.from_bytes(data[at : at + _LENGTH], "little")
+        texels[:] = _decoded(codecs, data[at + _LENGTH : end], texels)
+        at = end
+    expect_length(data, at)
+    codes = unpack_pairs(data[1 : 1 + packed], below.size).reshape(below.shape)
+    place_last(level, below, codes, b"")
+    return Tile(b"", level)
 
 
 def _codecs(dtype: np.dtype[Any]) -> ModuleType:

@@ -20,7 +20,6 @@ was the best of three on data spanning 1e-38 … 1e38 by 1 %; they tie elsewhere
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,52 +36,43 @@ if TYPE_CHECKING:
 ESCAPE = 3
 
 
-@dataclass(frozen=True)
-class RawProfile:
-    """The paper's layout; see the module. Always exact: an error that is allowed is not made."""
+def encode_base(level: Samples) -> bytes:
+    """All texels, row by row."""
+    return sample_bytes(level)
 
-    name: str = "raw"
 
-    def encode_base(self, level: Samples) -> bytes:
-        """All texels, row by row."""
-        return sample_bytes(level)
+def decode_base(data: bytes, shape: Shape, dtype: np.dtype[Any]) -> Samples:
+    """The inverse of `encode_base`. Raises InputError PTM-I112 if the length is wrong."""
+    expect_length(data, shape[0] * shape[1] * shape[2] * dtype.itemsize)
+    return samples_from(data, dtype).reshape(shape).copy()
 
-    def decode_base(self, data: bytes, shape: Shape, dtype: np.dtype[Any]) -> Samples:
-        """The inverse of `encode_base`. Raises InputError PTM-I112 if the length is wrong."""
-        expect_length(data, shape[0] * shape[1] * shape[2] * dtype.itemsize)
-        return samples_from(data, dtype).reshape(shape).copy()
 
-    def encode_tile(
-        self,
-        level: Samples,
-        below: Samples,
-        max_error: int = 0,
-        memory: Any = None,
-        threads: int = 1,
-    ) -> Tile:
-        """Residual array, partial level, escapes."""
-        residual, escapes = residuals(level, below)
-        return Tile(pack_pairs(residual) + sample_bytes(*_partial_level(level)) + escapes, level)
+def encode_tile(
+    level: Samples, below: Samples, max_error: int = 0, memory: Any = None, threads: int = 1
+) -> Tile:
+    """Residual array, partial level, escapes. Always exact, whatever error is allowed."""
+    residual, escapes = residuals(level, below)
+    return Tile(pack_pairs(residual) + sample_bytes(*_partial_level(level)) + escapes, level)
 
-    def decode_tile(
-        self,
-        data: bytes,
-        below: Samples,
-        shape: Shape,
-        max_error: int = 0,
-        memory: Any = None,
-        threads: int = 1,
-    ) -> Tile:
-        """The inverse of `encode_tile` (paper Eq. 3). Raises InputError PTM-I112."""
-        length = group_length(shape, below.dtype)
-        if len(data) < length or not kind_of(below.dtype).is_float:
-            expect_length(data, length)
-        packed = -(-below.size // 4)
-        level = np.empty(shape, below.dtype)
-        _place_partial_level(samples_from(data[packed:length], below.dtype), level)
-        residual = unpack_pairs(data[:packed], below.size).reshape(below.shape)
-        place_last(level, below, residual, data[length:])
-        return Tile(b"", level)
+
+def decode_tile(
+    data: bytes,
+    below: Samples,
+    shape: Shape,
+    max_error: int = 0,
+    memory: Any = None,
+    threads: int = 1,
+) -> Tile:
+    """The inverse of `encode_tile` (paper Eq. 3). Raises InputError PTM-I112."""
+    length = group_length(shape, below.dtype)
+    if len(data) < length or not kind_of(below.dtype).is_float:
+        expect_length(data, length)
+    packed = -(-below.size // 4)
+    level = np.empty(shape, below.dtype)
+    _place_partial_level(samples_from(data[packed:length], below.dtype), level)
+    residual = unpack_pairs(data[:packed], below.size).reshape(below.shape)
+    place_last(level, below, residual, data[length:])
+    return Tile(b"", level)
 
 
 def group_length(shape: Shape, dtype: np.dtype[Any] | type = np.uint8) -> int:

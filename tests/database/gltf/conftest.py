@@ -31,7 +31,7 @@ def emit_gltf(
     ) -> Path:
         records = tuple(map(rename, put_textures(www)))
         a = artifacts
-        given = EmitOptions(**{"format": "gltf", **options})
+        given = EmitOptions(**{"format": "vrml,gltf", **options})
         emit(scene or a.scene, cells or a.cells, a.pvs, a.ach, records, www, given)
         return www
 

@@ -21,7 +21,7 @@ from ptmtools.database.gltf.buffer import BufferWriter
 from ptmtools.database.gltf.container import GlbError, pack, unpack
 from ptmtools.database.gltf.material import linear
 from ptmtools.database.gltf.reader import read_glb
-from ptmtools.database.vrml import Node, parse
+from ptmtools.database.vrml.reader import Node, parse
 from ptmtools.errors import InputError, LimitError, OutputError
 from ptmtools.scene.model import Material
 

@@ -94,7 +94,7 @@ def images() -> dict[str, tuple[Samples, EncodeOptions]]:
                 "deep-error-300": (deep(22, 31, 3), {"max_error": 300}),
             }
         for name, (image, options) in kinds.items():
-            found[f"{profile}-{name}"] = image, EncodeOptions(profile, **options)  # type: ignore[arg-type]
+            found[f"{profile}-{name}"] = image, EncodeOptions(profile, **options)
     return found
 
 

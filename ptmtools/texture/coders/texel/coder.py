@@ -29,7 +29,8 @@ from ptmtools.texture.coders.rans import stream, tables
 from ptmtools.texture.coders.texel import layout
 from ptmtools.texture.coders.texel.fit import fit_weights
 from ptmtools.texture.coders.texel.numbering import Numbering, number_planes, read_numbering
-from ptmtools.texture.profiles.raw import RawProfile, expect_length, sample_bytes, samples_from
+from ptmtools.texture.profiles import raw
+from ptmtools.texture.profiles.raw import expect_length, sample_bytes, samples_from
 from ptmtools.texture.samples import SampleKind, from_ordered, kind_of, to_ordered
 
 if TYPE_CHECKING:
@@ -48,7 +49,6 @@ WINDOW_USUAL, WINDOW_TOP, WINDOW_ROWS = 12, 40, 64
 
 Numbers = NDArray[np.uint32]
 Weights = NDArray[np.int64]
-_RAW = RawProfile()
 
 
 def encode(level: Samples, below: Samples, max_error: int = 0) -> tuple[bytes, Samples]:
@@ -65,7 +65,7 @@ def encode(level: Samples, below: Samples, max_error: int = 0) -> tuple[bytes, S
         candidates += _codings(_Group.of(level, below, max_error))
     # The raw form takes no less than three quarters of the plain one.
     if not max_error and 4 * min(len(one.body) for one in candidates) > 3 * level.nbytes:
-        candidates.append(_Coded(RAW, _RAW.encode_tile(level, below).data, level))
+        candidates.append(_Coded(RAW, raw.encode_tile(level, below).data, level))
     best = min(candidates, key=lambda one: len(one.body))
     return bytes([best.form]) + best.body, best.texels
 
@@ -81,7 +81,7 @@ def decode(
         expect_length(body, shape[0] * shape[1] * shape[2] * dtype.itemsize)
         return samples_from(body, dtype).reshape(shape).copy()
     if form == RAW and not max_error:
-        return _RAW.decode_tile(body, below, shape).texels
+        return raw.decode_tile(body, below, shape).texels
     if form in (CODED, CODED_WITH_WEIGHTS) and below.size:
         return _decode(body, below, shape, max_error, form == CODED_WITH_WEIGHTS)
     raise damaged(f"form {form} is unknown")

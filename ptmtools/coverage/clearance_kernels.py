@@ -1,50 +1,32 @@
-"""Compiled distances of points from triangles, crossings of rays, and descent through the BSP."""
+"""Compiled distances of points from triangles, and crossings of rays with them (`solids`)."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.compiled import kernel
+from ptmtools.compiled import plain_kernel
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
-@kernel
-def locate_leaves(
-    points: Floats, plane: Floats, child: NDArray[np.int32], leaf: NDArray[np.int32]
+@plain_kernel
+def clearances(
+    points: Floats, corners: Floats, first: Ints, end: Ints, enough: float, found: Floats
 ) -> None:
-    """Writes into ``leaf`` (n,) the leaf that contains each of the (n, 3) points, or -1, for a tree
-    of (N, 4) planes and (N, 2) children with N > 0; as `Cells.locate_leaf`, box aside."""
-    for i in range(len(points)):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        node = 0
-        while node >= 0:
-            side = plane[node, 0] * x + plane[node, 1] * y + plane[node, 2] * z + plane[node, 3]
-            node = child[node, 0] if side > 0 else child[node, 1]
-        leaf[i] = -2 - node if node <= -2 else -1
-
-
-@kernel
-def clearances(points: Floats, corners: Floats, enough: float, found: Floats) -> None:
-    """Writes into ``found`` (n,) the distance of each of the (n, 3) points, ascending in x, from
-    the nearest of the (m, 3, 3) triangles, at most ``enough``."""
-    found[:] = enough
-    x = points[:, 0]
+    """Lowers ``found`` (n,) to the distance of each of the (n, 3) points from the nearest of the
+    (m, 3, 3) triangles, each held against the points from its ``first`` to its ``end`` (m,)."""
     for t in range(len(corners)):
         a, b, c = corners[t, 0], corners[t, 1], corners[t, 2]
-        first = np.searchsorted(x, min(a[0], b[0], c[0]) - enough)
-        end = np.searchsorted(x, max(a[0], b[0], c[0]) + enough, side="right")
-        if first == end:
-            continue
         low_y, high_y = min(a[1], b[1], c[1]) - enough, max(a[1], b[1], c[1]) + enough
         low_z, high_z = min(a[2], b[2], c[2]) - enough, max(a[2], b[2], c[2]) + enough
-        for i in range(first, end):
+        for i in range(first[t], end[t]):
             if low_y <= points[i, 1] <= high_y and low_z <= points[i, 2] <= high_z:
                 found[i] = min(found[i], distance(points[i], corners[t]))
 
 
-@kernel
+@plain_kernel
 def distance(p: Floats, corner: Floats) -> float:
     """Distance of a (3,) point from a (3, 3) triangle, a sliver or a point included."""
     o = corner[0]
@@ -71,20 +53,16 @@ def distance(p: Floats, corner: Floats) -> float:
     return nearest
 
 
-@kernel
-def crossings(points: Floats, corners: Floats, crossed: NDArray[np.int64]) -> None:
+@plain_kernel
+def crossings(points: Floats, corners: Floats, first: Ints, end: Ints, crossed: Ints) -> None:
     """Adds to ``crossed`` (n,) how many of the (m, 3, 3) triangles the ray along +z from each of
-    the (n, 3) points, ascending in x, crosses: those that its line passes through ahead of it."""
-    x = points[:, 0]
+    the (n, 3) points crosses: those that its line passes through ahead of it. Each triangle is held
+    against the points from its ``first`` to its ``end`` (m,)."""
     for t in range(len(corners)):
         a, b, c = corners[t, 0], corners[t, 1], corners[t, 2]
-        first = np.searchsorted(x, min(a[0], b[0], c[0]))
-        end = np.searchsorted(x, max(a[0], b[0], c[0]), side="right")
-        if first == end:
-            continue
         low, high = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
         top = max(a[2], b[2], c[2])
-        for i in range(first, end):
+        for i in range(first[t], end[t]):
             p = points[i]
             if not (low <= p[1] <= high) or p[2] > top:
                 continue

@@ -1,33 +1,33 @@
-"""Compiled rays through pixel centres, and the count of whom the pixels belong to."""
+"""Compiled rays through pixel centres, and the tally of whom the pixels belong to."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.compiled import kernel
+from ptmtools.compiled import plain_kernel
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Ints = NDArray[np.int64]
 
 
-@kernel
+@plain_kernel
 def cast_rays(
-    eye: Floats, shift: Floats, face: int, views: Floats, origin: Singles, along: Singles
+    point: Floats, shift: Floats, face: int, views: Floats, origin: Singles, along: Singles
 ) -> None:
     """Writes origins and directions (6 K face², 3) of the rays of K sample points, in the order
     (point, view, row, column).
 
     Parameters
     ----------
-    eye: (K, 3) the points.
+    point: (K, 3) the points.
     shift: (K, 2) how far right and up of the pixel centres, in units of half a view.
     views: (6, 3, 3) right, up and forward of each view; a direction has 1 forward.
     """
     at = 0
-    for k in range(len(eye)):
-        x, y, z = np.float32(eye[k, 0]), np.float32(eye[k, 1]), np.float32(eye[k, 2])
+    for k in range(len(point)):
+        x, y, z = np.float32(point[k, 0]), np.float32(point[k, 1]), np.float32(point[k, 2])
         for v in range(len(views)):
             for row in range(face):
                 up = (2.0 * row + 1.0) / face - 1.0 + shift[k, 1]
@@ -39,22 +39,10 @@ def cast_rays(
                     at += 1
 
 
-@kernel
-def weigh(face: int, shift: Floats, unit: int, weight: Ints) -> None:
-    """Writes into ``weight`` (K, face²) the solid angle of the pixels of a view over that of a
-    pixel in its middle, in ``unit``-ths: (1 + x² + y²)^(-3/2)."""
-    for k in range(len(shift)):
-        for row in range(face):
-            y = (2.0 * row + 1.0) / face - 1.0 + shift[k, 1]
-            for column in range(face):
-                x = (2.0 * column + 1.0) / face - 1.0 + shift[k, 0]
-                weight[k, row * face + column] = round(unit / (1.0 + x * x + y * y) ** 1.5)
-
-
-@kernel
-def tally(
+@plain_kernel
+def add_pixels(
     shows: NDArray[np.int32],
-    eye: Floats,
+    point: Floats,
     plane: Floats,
     owner: NDArray[np.int32],
     column: NDArray[np.int32],
@@ -63,12 +51,12 @@ def tally(
     in_views: Ints,
     doubt: Ints,
 ) -> int:
-    """Adds up whom the pixels belong to; returns how many it could not place.
+    """Adds up whom the pixels belong to; returns how many are in doubt.
 
     Parameters
     ----------
     shows: (K, 6, face²) the triangle in each pixel, -1 for none.
-    eye: (K, 3) the sample points.
+    point: (K, 3) the sample points.
     plane: (M, 4) of the triangles, in the coordinates of the points; it is seen from the front
         where the plane's value is above 0.
     owner: (M, 2) to whom a pixel counts that shows a triangle from its front or back, or -1.
@@ -81,7 +69,7 @@ def tally(
     doubted = 0
     views, size = shows.shape[1], shows.shape[2]
     for k in range(len(shows)):
-        x, y, z = eye[k, 0], eye[k, 1], eye[k, 2]
+        x, y, z = point[k, 0], point[k, 1], point[k, 2]
         of = min(k, len(weight) - 1)
         for v in range(views):
             for i in range(size):

@@ -1,4 +1,4 @@
-"""Which sample points are usable: not inside solid matter, not against a surface.
+"""Which sample points are usable: not inside a solid, not against a surface.
 
 A point too near to a surface sees hardly anything else, and one inside a statue sees the
 statue's inside; either would spoil the average (paper §5 leaves it open).
@@ -6,18 +6,17 @@ statue's inside; either would spoil the average (paper §5 leaves it open).
 *Near* is exact: the distance from the point to the nearest triangle.
 
 *Inside* is a question about closed surfaces only. The scene's triangles are welded by position
-and grouped by shared edges; a group is a *body* if it is closed (every edge is used an even number
+and grouped by shared edges; a group is a *solid* if it is closed (every edge is used an even number
 of times, so that the parity of the crossings along a ray does not depend on the ray), unless
 
 - most of its area lies in cell boundaries: then it is structure, and the subdivision has already
   decided what is behind it (the mesh of a whole building is one group as often as not), or
-- it is wound consistently inwards: a shell that is meant to be seen from within.
+- its faces consistently point inwards: a shell that is meant to be seen from within.
 
-A point is in matter if it is inside a body. So winding need not be right for a statue, a table
-top or a leaf of paper has no inside, a wall modelled twice with opposite winding is closed and
-empty, and an open surface bounds nothing. Rejected: the parity of all crossings (each open or
-single sheet turns it over), and the generalised winding number (wrong wherever faces are wound
-at random, as in most OBJ files).
+So faces need not point the right way for a statue, a table top or a leaf of paper has no inside, a
+wall modelled twice with opposite orientation is closed and empty, and an open surface bounds
+nothing. Rejected: the parity of all crossings (each open or single sheet inverts it), and the
+generalised winding number (wrong wherever faces are oriented at random, as in most OBJ files).
 """
 
 from __future__ import annotations
@@ -49,7 +48,7 @@ FRAMES = _frames()
 
 
 @dataclass(frozen=True)
-class Body:
+class Solid:
     """A closed surface with an inside: its (n, 3, 3) corners and (2, 3) bounding box, metres."""
 
     corners: NDArray[np.float64]
@@ -65,12 +64,12 @@ class Body:
 
     def _odd(self, ray: int, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """(n,) whether one of the rays from each of the (n, 3) points crosses an odd number."""
-        from ptmtools.coverage.clearance.kernels import crossings
+        from ptmtools.coverage.clearance_kernels import crossings
 
         turned = np.einsum("ij,kj->ik", points, FRAMES[ray])
-        order = np.argsort(turned[:, 0], kind="stable")
+        order, first, end = by_x(turned, self._turned[ray], 0.0)
         crossed = np.zeros(len(points), dtype=np.int64)
-        crossings(turned[order], self._turned[ray], crossed)
+        crossings(turned[order], self._turned[ray], first, end, crossed)
         odd = np.empty(len(points), dtype=np.bool_)
         odd[order] = crossed % 2 > 0
         return odd
@@ -81,7 +80,7 @@ class Body:
         return [np.einsum("tij,kj->tik", self.corners, frame) for frame in FRAMES]
 
 
-def bodies(scene: Scene, cells: Cells) -> list[Body]:
+def solids(scene: Scene, cells: Cells) -> list[Solid]:
     """The closed surfaces of a scene that have an inside, in the order of their triangles."""
     if len(scene.triangles) == 0:
         return []
@@ -94,9 +93,9 @@ def bodies(scene: Scene, cells: Cells) -> list[Body]:
     count = len(corner)
     area = np.bincount(group, areas(all_corners), count)
     in_boundary = np.bincount(group, boundary_area(scene, cells), count)
-    solid = closed & (2 * in_boundary <= area)
+    bounds = closed & (2 * in_boundary <= area)
     order = np.argsort(group, kind="stable")
-    order = order[solid[group[order]]]
+    order = order[bounds[group[order]]]
     found = []
     for members in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
         if not len(members):
@@ -105,7 +104,7 @@ def bodies(scene: Scene, cells: Cells) -> list[Body]:
         box = np.array([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
         inwards = balanced[group[members[0]]] and signed_volume(corners - box.mean(axis=0)) < 0
         if not inwards:
-            found.append(Body(corners, box))
+            found.append(Solid(corners, box))
     return found
 
 
@@ -168,54 +167,65 @@ def boundary_area(scene: Scene, cells: Cells) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class Obstacles:
     """What a sample point has to keep clear of.
 
     Attributes
     ----------
     corners: (T, 3, 3) all surfaces, metres.
     nearby: finds those near a box.
-    bodies: the closed ones with an inside.
-    boxes: (B, 2, 3) the bounding boxes of the bodies.
+    solids: the closed ones with an inside.
+    boxes: (B, 2, 3) the bounding boxes of the solids.
     """
 
     corners: NDArray[np.float64]
     nearby: Nearby
-    bodies: tuple[Body, ...]
+    solids: tuple[Solid, ...]
     boxes: NDArray[np.float64]
 
     @staticmethod
-    def of(scene: Scene, cells: Cells) -> Surroundings:
-        """The surroundings in a subdivided scene."""
+    def of(scene: Scene, cells: Cells) -> Obstacles:
+        """Those of a subdivided scene."""
         corners = scene.corners
-        found = tuple(bodies(scene, cells))
-        boxes = np.array([body.box for body in found]).reshape(-1, 2, 3)
-        return Surroundings(corners, Nearby(corners, 0.0), found, boxes)
+        found = tuple(solids(scene, cells))
+        boxes = np.array([solid.box for solid in found]).reshape(-1, 2, 3)
+        return Obstacles(corners, Nearby(corners, 0.0), found, boxes)
 
-    def in_matter(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(n,) whether each of the (n, 3) points is inside a body."""
+    def in_solid(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(n,) whether each of the (n, 3) points is inside a solid."""
         inside = np.zeros(len(points), dtype=np.bool_)
         if len(points) == 0:
             return inside
         low, high = points.min(axis=0), points.max(axis=0)
         near = np.all((self.boxes[:, 0] <= high) & (low <= self.boxes[:, 1]), axis=1)
-        for body in np.flatnonzero(near):
-            lower, upper = self.boxes[body]
+        for solid in np.flatnonzero(near):
+            lower, upper = self.boxes[solid]
             boxed = ~inside & np.all((lower <= points) & (points <= upper), axis=1)
-            inside[boxed] = self.bodies[body].contains(points[boxed])
+            inside[boxed] = self.solids[solid].contains(points[boxed])
         return inside
 
     def clearance(self, points: NDArray[np.float64], enough: float) -> NDArray[np.float64]:
         """(n,) distance in metres from each of the (n, 3) points to the nearest surface, at most
         ``enough``."""
-        from ptmtools.coverage.clearance.kernels import clearances
+        from ptmtools.coverage.clearance_kernels import clearances
 
         found = np.full(len(points), enough)
         if len(points):
             low, high = points.min(axis=0) - enough, points.max(axis=0) + enough
             near = self.corners[self.nearby.meeting(low, high)]
-            order = np.argsort(points[:, 0], kind="stable")
+            order, first, end = by_x(points, near, enough)
             ascending = np.full(len(points), enough)
-            clearances(np.ascontiguousarray(points[order]), near, enough, ascending)
+            clearances(points[order], near, first, end, enough, ascending)
             found[order] = ascending
         return found
+
+
+def by_x(
+    points: NDArray[np.float64], corners: NDArray[np.float64], margin: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """The order of the (n, 3) points by x, and for each of the (m, 3, 3) triangles where those that
+    are within ``margin`` of its extent along x begin and end in that order."""
+    order = np.argsort(points[:, 0], kind="stable")
+    x, along = points[order, 0], corners[:, :, 0]
+    first = np.searchsorted(x, along.min(axis=1) - margin)
+    return order, first, np.searchsorted(x, along.max(axis=1) + margin, side="right")

@@ -1,11 +1,11 @@
-"""From sample points to counts: whose surfaces show, point by point and view by view.
+"""The item-buffer tally: how many pixels show whose surfaces, point by point and view by view.
 
 A pixel counts for the owner, on the viewer's side, of the triangle that it shows. Where that is a
-cell outside the PVS, or none, the pixel is doubted, and asked again in two steps:
+cell outside the PVS, or none, the pixel is in doubt, and looked up again in two steps:
 
 1. a ray through it is cast. A rasteriser rounds corners to 1/256 pixel, and past a rounded edge it
    sees what no straight line reaches;
-2. the point that the ray hits, drawn a little towards the viewer, is located in the BSP tree.
+2. the point that the ray hits, moved a little towards the viewer, is located in the BSP tree.
    Geometry that reaches into a cell by less than a plane's tolerance is not cut off there, and
    belongs to the cell that it mostly lies in, but what is seen of it is seen in this one.
 
@@ -20,9 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
-from ptmtools.coverage.eyes import Eyes
 from ptmtools.coverage.item_buffer import VIEWS, Renderer, Surfaces
-from ptmtools.tolerance import Tolerance
+from ptmtools.coverage.sample_points import SamplePoints
 
 #: Weight of a pixel in the middle of a view where pixels are weighted by solid angle.
 SOLID_ANGLE_UNIT = 2**16
@@ -73,9 +72,18 @@ class Owners:
         within = np.arange(int(size.sum())) - np.repeat(begin, size)
         return np.repeat(self.first[cells], size) + within, begin
 
+    def at(self, cell: NDArray[np.int32], image: NDArray[np.int32]) -> NDArray[np.int64]:
+        """(n,) the owner of each of the (n,) images in each of the (n,) cells; what has no image
+        where the cell has nothing with that one; -1 where the cell is -1."""
+        every = self.cell.astype(np.int64) * self.images + self.image + 1
+        key = cell.astype(np.int64) * self.images + image + 1
+        found = np.minimum(np.searchsorted(every, key), len(every) - 1)
+        bare = self.first[cell]
+        return np.where(cell < 0, -1, np.where(every[found] == key, found, bare)).astype(np.int64)
+
 
 @dataclass(frozen=True)
-class Seen:
+class Tally:
     """Weighted pixels seen from K points.
 
     Attributes
@@ -90,132 +98,132 @@ class Seen:
     missed: NDArray[np.int64]
 
     @staticmethod
-    def join(parts: list[Seen]) -> Seen:
+    def join(parts: list[Tally]) -> Tally:
         """From the points of several, one after the other."""
-        return Seen(
+        return Tally(
             np.concatenate([part.at_points for part in parts]),
             np.sum([part.in_views for part in parts], axis=0),
             np.concatenate([part.missed for part in parts]),
         )
 
-    def grouped(self, begin: NDArray[np.int64]) -> Seen:
+    def grouped(self, begin: NDArray[np.int64]) -> Tally:
         """The owners from each of the (n,) ``begin`` to the next as one."""
         if len(begin) == self.at_points.shape[1]:
             return self
         at_points, in_views = (
             np.add.reduceat(counts, begin, axis=1) for counts in (self.at_points, self.in_views)
         )
-        return Seen(at_points, in_views, self.missed)
+        return Tally(at_points, in_views, self.missed)
 
 
-class Looker:
-    """Looks around from sample points with one renderer."""
+class PixelCounter:
+    """Counts the pixels of a renderer's views, of ``face`` pixels a side, for their owners.
+
+    Pixels are weighted by solid angle if asked for, else alike; `unit` is the weight of one in the
+    middle of a view. `owners` are cells, or images within cells.
+    """
 
     def __init__(
-        self, renderer: Renderer, surfaces: Surfaces, cells: Cells, face: int, *, by_angle: bool
+        self,
+        renderer: Renderer,
+        surfaces: Surfaces,
+        cells: Cells,
+        face: int,
+        *,
+        by_angle: bool = False,
+        by_image: bool = False,
     ) -> None:
-        """``by_angle``: pixels are weighted by solid angle."""
         self.unit = SOLID_ANGLE_UNIT if by_angle else 1
+        self.owners = Owners.of(surfaces, by_image)
         self._renderer = renderer
         self._surfaces = surfaces
         self._cells = cells
         self._face = face
-        self._towards = TOWARDS * Tolerance.for_points(cells.vertex).plane
+        self._towards = TOWARDS * cells.tolerance.plane
 
-    def look(self, eyes: Eyes, owners: Owners, wanted: NDArray[np.int64]) -> Seen:
-        """What is seen of the (m,) ``wanted`` owners."""
-        column = np.full(len(owners.cell) + 1, -1, dtype=np.int32)
+    def count(self, points: SamplePoints, wanted: NDArray[np.int64]) -> Tally:
+        """How many pixels show each of the (m,) ``wanted`` owners."""
+        column = np.full(len(self.owners.cell) + 1, -1, dtype=np.int32)
         column[wanted] = np.arange(len(wanted))
         needed = np.zeros(self._surfaces.cell_count, dtype=np.bool_)
-        needed[owners.cell[wanted]] = True
-        seen = Seen(
-            np.zeros((len(eyes), len(wanted)), dtype=np.int64),
+        needed[self.owners.cell[wanted]] = True
+        tally = Tally(
+            np.zeros((len(points), len(wanted)), dtype=np.int64),
             np.zeros((len(VIEWS), len(wanted)), dtype=np.int64),
-            np.zeros(len(eyes), dtype=np.int64),
+            np.zeros(len(points), dtype=np.int64),
         )
         most = self._renderer.most
-        for first in range(0, len(eyes), most):
+        for first in range(0, len(points), most):
             rows = slice(first, first + most)
-            part = Seen(seen.at_points[rows], seen.in_views, seen.missed[rows])
-            self._add(eyes.part(rows), owners, column, needed, part)
-        return seen
+            part = Tally(tally.at_points[rows], tally.in_views, tally.missed[rows])
+            self._add(points.part(rows), column, needed, part)
+        return tally
 
     def _add(
         self,
-        eyes: Eyes,
-        owners: Owners,
+        points: SamplePoints,
         column: NDArray[np.int32],
         needed: NDArray[np.bool_],
-        seen: Seen,
+        tally: Tally,
     ) -> None:
-        from ptmtools.coverage.tally.kernels import tally
+        """Draws views of the cells ``needed`` and adds their pixels to the ``tally``, whose
+        ``column`` of each owner is -1 for one that is not expected."""
+        from ptmtools.coverage.tally_kernels import add_pixels
 
-        layers = self._renderer.show(eyes, needed)
-        place = self._surfaces.normalised(eyes.point)
-        weight = self._weight(eyes)
+        layers = self._renderer.show(points, needed)
+        position = self._surfaces.normalised(points.position)
+        weight = self._weight(points)
         size = self._face**2
         doubt = np.empty(layers[0].size, dtype=np.int64)
         for layer, shows in enumerate(layers):
-            given = self._surfaces.plane, owners.of_side, column, weight
-            found = tally(shows, place, *given, seen.at_points, seen.in_views, doubt)
-            if not found:
+            given = self._surfaces.plane, self.owners.of_side, column, weight
+            doubted = add_pixels(shows, position, *given, tally.at_points, tally.in_views, doubt)
+            if not doubted:
                 continue
-            pixel = doubt[:found].copy()
-            at, view = pixel // (len(VIEWS) * size), pixel // size % len(VIEWS)
-            owner, hit = self._again(eyes, pixel, layer, owners, column)
-            weighs = weight[np.minimum(at, len(weight) - 1), pixel % size]
+            pixel = doubt[:doubted]
+            point, view = pixel // (len(VIEWS) * size), pixel // size % len(VIEWS)
+            owner, hit = self._again(points, pixel, layer, column)
+            weighs = weight[np.minimum(point, len(weight) - 1), pixel % size]
             expected, lost = owner >= 0, hit & (owner < 0)
             entry = column[owner[expected]]
-            np.add.at(seen.at_points, (at[expected], entry), weighs[expected])
-            np.add.at(seen.in_views, (view[expected], entry), weighs[expected])
-            np.add.at(seen.missed, at[lost], weighs[lost])
+            np.add.at(tally.at_points, (point[expected], entry), weighs[expected])
+            np.add.at(tally.in_views, (view[expected], entry), weighs[expected])
+            np.add.at(tally.missed, point[lost], weighs[lost])
 
     def _again(
         self,
-        eyes: Eyes,
+        points: SamplePoints,
         pixel: NDArray[np.int64],
         layer: int,
-        owners: Owners,
         column: NDArray[np.int32],
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """(n,) the expected owner that each of the (n,) doubted pixels counts for, or -1; (n,)
+        """(n,) the expected owner that each of the (n,) pixels in doubt counts for, or -1; (n,)
         whether it shows anything."""
-        found, place = self._renderer.trace(eyes, pixel)
-        shows, place = found[layer], place[layer]
-        eye = eyes.point[pixel // (len(VIEWS) * self._face**2)]
+        shows, hits = (both[layer] for both in self._renderer.trace(points, pixel))
+        viewer = points.position[pixel // (len(VIEWS) * self._face**2)]
         hit = shows >= 0
         plane = self._surfaces.plane[shows]
-        side = np.einsum("ij,ij->i", plane[:, :3], self._surfaces.normalised(eye)) + plane[:, 3]
-        owner = np.where(hit, owners.of_side[shows, np.where(side > 0, 0, 1)], -1).astype(np.int64)
-        lost = np.flatnonzero(hit & (column[owner] < 0))
+        side = np.einsum("ij,ij->i", plane[:, :3], self._surfaces.normalised(viewer)) + plane[:, 3]
+        owner = self.owners.of_side[shows, np.where(side > 0, 0, 1)].astype(np.int64)
         owner[~hit | (column[owner] < 0)] = -1
+        lost = np.flatnonzero(hit & (owner < 0))
         if len(lost):
-            back = eye[lost] - place[lost]
+            back = viewer[lost] - hits[lost]
             length = np.linalg.norm(back, axis=1, keepdims=True)
             step = np.minimum(self._towards / np.maximum(length, self._towards), 0.5)
-            cell = self._cells.locate(place[lost] + step * back)
-            image = np.where(owners.images > 1, self._surfaces.image[shows[lost]], -1)
-            nearer = owners_at(owners, cell, image)
+            cell = self._cells.locate(hits[lost] + step * back)
+            image = np.where(self.owners.images > 1, self._surfaces.image[shows[lost]], -1)
+            nearer = self.owners.at(cell, image)
             owner[lost] = np.where(column[nearer] >= 0, nearer, -1)
         return owner, hit
 
-    def _weight(self, eyes: Eyes) -> NDArray[np.int64]:
-        from ptmtools.coverage.tally.kernels import weigh
-
+    def _weight(self, points: SamplePoints) -> NDArray[np.int64]:
+        """(1 or K, face²) weights of the pixels of a view: alike, or by solid angle,
+        (1 + x² + y²)^(-3/2) in `unit`-ths."""
         if self.unit == 1:
             return np.ones((1, self._face**2), dtype=np.int64)
-        weight = np.empty((len(eyes), self._face**2), dtype=np.int64)
-        weigh(self._face, eyes.shift / self._face, self.unit, weight)
-        return weight
-
-
-def owners_at(
-    owners: Owners, cell: NDArray[np.int32], image: NDArray[np.int32]
-) -> NDArray[np.int64]:
-    """(n,) the owner of each of the (n,) images in each of the (n,) cells; what has no image where
-    the cell has nothing with that one; -1 where the cell is -1."""
-    every = owners.cell.astype(np.int64) * owners.images + owners.image + 1
-    key = cell.astype(np.int64) * owners.images + image + 1
-    found = np.minimum(np.searchsorted(every, key), len(every) - 1)
-    bare = owners.first[cell]
-    return np.where(cell < 0, -1, np.where(every[found] == key, found, bare)).astype(np.int64)
+        centre = (2.0 * np.arange(self._face) + 1.0) / self._face - 1.0
+        x, y = (centre + shift[:, None] for shift in (points.shift / self._face).T)
+        weight = self.unit / (1.0 + x[:, None, :] ** 2 + y[:, :, None] ** 2) ** 1.5
+        rounded: NDArray[np.int64] = np.round(weight).astype(np.int64)
+        return rounded.reshape(len(points), -1)

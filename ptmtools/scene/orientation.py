@@ -1,4 +1,5 @@
-"""The directions that a building is laid out in, so that turning it changes nothing.
+"""The directions that a building is laid out in, and the tolerances of a scene, so that turning it
+changes nothing.
 
 The tolerances and the first root box depend on the model's extent. Taken along the coordinate axes
 that would grow by up to √3 when the model is turned, and cells with it. They are taken along the
@@ -12,12 +13,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.tolerance import PARALLEL_COSINE, ranked
+from ptmtools.tolerance import PARALLEL_COSINE, Tolerance, ranked
 
 #: The largest triangles, this many, propose directions.
 _CANDIDATES = 64
 #: Directions with a lesser dot product than this are square to one another.
 _SQUARE = 1e-3
+
+
+def tolerance_of(points: NDArray[np.float64], triangles: NDArray[np.integer]) -> Tolerance:
+    """The tolerances for a scene of (T, 3) triangles over (V, 3) points."""
+    return Tolerance.for_points(points @ main_axes(points[triangles]).T)
 
 
 def main_axes(corners: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -32,15 +38,12 @@ def main_axes(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     whole = areas > 0
     normals, areas = normals[whole] / areas[whole, None], areas[whole]
     candidates = normals[ranked(areas)[:_CANDIDATES]]
-    if not len(candidates):
-        return np.eye(3)
-    weights = (np.abs(normals @ candidates.T) >= PARALLEL_COSINE).T @ areas
-    order = ranked(weights)
-    first = candidates[order[0]]
-    square = [i for i in order if abs(float(candidates[i] @ first)) < _SQUARE]
+    weights = [areas @ (np.abs(normals @ c) >= PARALLEL_COSINE) for c in candidates]
+    order = ranked(np.array(weights))
+    square = [i for i in order if abs(float(candidates[i] @ candidates[order[0]])) < _SQUARE]
     if not square:
         return np.eye(3)
-    second = candidates[square[0]]
+    first, second = candidates[order[0]], candidates[square[0]]
     second = second - (second @ first) * first
     second /= np.linalg.norm(second)
     axes = np.stack([first, second, np.cross(first, second)])

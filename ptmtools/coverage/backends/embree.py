@@ -6,7 +6,7 @@ are cast together, since a single point has as few as a hundred.
 
 Embree computes in float32. Its tree is built once, around the middle of the geometry: a vertex is
 off by at most 6e-8 of the extent, 3 µm in a building of 50 m. Rebuilding it around every sample
-point would be exact near the eye and cost more than the rays. Directions have 1 for their forward
+point would be exact near the point and cost more than the rays. Directions have 1 for their forward
 component, so a hit's distance is its depth in the view, as in OpenGL.
 """
 
@@ -17,19 +17,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.coverage.eyes import Eyes
 from ptmtools.coverage.item_buffer import BEFORE, VIEWS, Surfaces
+from ptmtools.coverage.sample_points import SamplePoints
 
 #: Rays that are cast together: their arrays stay within the processor's cache.
 RAYS = 2**16
+#: What a ray takes, µs; fitted, as `opengl.TRIANGLE_COST`, to `benchmarks/ach.py`.
+RAY_COST = 0.25
+
+
+def cost(_triangles: float, pixels: int, _gpu: int | None) -> float:
+    """See `Backend.coster`."""
+    return RAY_COST * pixels
 
 
 class EmbreeRenderer:
     """Draws with Embree, which keeps the interpreter's lock: processes, not threads, add speed."""
 
-    backend = "embree"
-
-    def __init__(self, surfaces: Surfaces, face: int) -> None:
+    def __init__(self, surfaces: Surfaces, face: int, _gpu: int | None = None) -> None:
         """Builds the trees over ``surfaces``, for views of ``face`` pixels a side."""
         self._surfaces = surfaces
         self._face = face
@@ -44,34 +49,35 @@ class EmbreeRenderer:
 
         return f"Embree (embreex {version('embreex')})"
 
-    def show(self, eyes: Eyes, needed: NDArray[np.bool_] | None = None) -> NDArray[np.int32]:
+    def show(
+        self, points: SamplePoints, needed: NDArray[np.bool_] | None = None
+    ) -> NDArray[np.int32]:
         """See `Renderer.show`."""
-        origin, along = self._rays(eyes)
+        origin, along = self._rays(points)
         if self._transparent.empty:
             layers = self._opaque.nearest(origin, along)[None]
         else:
             layers = self._two_layers(origin, along)[0]
-        return layers.reshape(-1, len(eyes), len(VIEWS), self._face**2)
+        return layers.reshape(-1, len(points), len(VIEWS), self._face**2)
 
     def trace(
-        self, eyes: Eyes, pixels: NDArray[np.int64]
+        self, points: SamplePoints, pixels: NDArray[np.int64]
     ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
         """See `Renderer.trace`."""
-        each = len(VIEWS) * self._face**2
-        origin, along = (rays[pixels] for rays in self._rays(eyes))
+        origin, along = (rays[pixels] for rays in self._rays(points))
+        layers = slice(1 if self._transparent.empty else 2)
         found, depth = self._two_layers(origin, along)
-        if self._transparent.empty:
-            found, depth = found[:1], depth[:1]
-        exact = self._surfaces.normalised(eyes.point)[pixels // each]
-        return found, self._surfaces.world(exact + depth[..., None] * along)
+        point = pixels // (len(VIEWS) * self._face**2)
+        exact = self._surfaces.normalised(points.position)[point]
+        return found[layers], self._surfaces.world(exact + depth[layers, :, None] * along)
 
-    def _rays(self, eyes: Eyes) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        from ptmtools.coverage.tally.kernels import cast_rays
+    def _rays(self, points: SamplePoints) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        from ptmtools.coverage.tally_kernels import cast_rays
 
-        count = len(eyes) * len(VIEWS) * self._face**2
+        count = len(points) * len(VIEWS) * self._face**2
         origin, along = (np.empty((count, 3), dtype=np.float32) for _ in range(2))
-        place = self._surfaces.normalised(eyes.point)
-        cast_rays(place, eyes.shift / self._face, self._face, VIEWS, origin, along)
+        position = self._surfaces.normalised(points.position)
+        cast_rays(position, points.shift / self._face, self._face, VIEWS, origin, along)
         return origin, along
 
     def _two_layers(
@@ -87,8 +93,7 @@ class EmbreeRenderer:
 
     def close(self) -> None:
         """Drops the trees."""
-        self.__dict__.pop("_opaque", None)
-        self.__dict__.pop("_transparent", None)
+        vars(self).clear()
 
 
 class _Tree:
@@ -104,7 +109,7 @@ class _Tree:
         self._tree: Any = None
         if not self.empty:
             self._tree = EmbreeScene(robust=True)
-            mesh = surfaces.place.astype(np.float32), surfaces.triangle[which]
+            mesh = surfaces.vertex.astype(np.float32), surfaces.triangle[which]
             TriangleMesh(self._tree, *mesh)
             ray = np.ones((1, 3), dtype=np.float32)
             self._tree.run(ray, ray)  # builds the tree now

@@ -1,7 +1,7 @@
-"""The sample points of a cell: usable places from which its six views are drawn.
+"""The sample points of a cell: the usable positions from which its six views are drawn.
 
-Points inside matter or too near to a surface are passed over and counted (`matter`); the next of
-the sequence, or of the same part of the cell, takes their place.
+Points inside a solid or too near to a surface are rejected and counted (`solids`); the next of the
+sequence, or of the same part of the cell, takes their place.
 """
 
 from __future__ import annotations
@@ -11,67 +11,62 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.coverage.matter import Surroundings
 from ptmtools.coverage.placement import FILLED, TRIES, Volume
 from ptmtools.coverage.sobol import sobol
+from ptmtools.coverage.solids import Obstacles
 
-#: Points of a sequence that are looked at together, at least.
+#: Points of a sequence that are tried together, at least.
 BATCH = 64
 
 
 @dataclass(frozen=True)
-class Eyes:
+class SamplePoints:
     """K sample points.
 
     Attributes
     ----------
-    point: (K, 3) float64, metres, world coordinates.
+    position: (K, 3) float64, metres, world coordinates.
     near: (K,) float64 metres within which each has no surface.
     shift: (K, 2) float64 in (-1, 1): how far right and up of the pixel centres its views are
         drawn, in halves of a pixel.
     """
 
-    point: NDArray[np.float64]
+    position: NDArray[np.float64]
     near: NDArray[np.float64]
     shift: NDArray[np.float64]
 
     def __len__(self) -> int:
-        return len(self.point)
+        return len(self.position)
 
-    def part(self, rows: slice) -> Eyes:
+    def part(self, rows: slice) -> SamplePoints:
         """Some of them."""
-        return Eyes(self.point[rows], self.near[rows], self.shift[rows])
+        return SamplePoints(self.position[rows], self.near[rows], self.shift[rows])
 
     @staticmethod
-    def none() -> Eyes:
-        """No points."""
-        return Eyes(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 2)))
-
-    @staticmethod
-    def join(parts: list[Eyes]) -> Eyes:
+    def join(parts: list[SamplePoints]) -> SamplePoints:
         """Several, one after the other."""
         columns = zip(*(vars(part).values() for part in parts), strict=True)
-        return Eyes(*(np.concatenate(column) for column in columns))
+        return SamplePoints(*(np.concatenate(column) for column in columns))
 
 
 @dataclass
-class Places:
+class PointFinder:
     """Finds usable points in one cell, ``clearance`` metres from all surfaces.
 
-    ``rejected`` counts the points that were passed over so far; the best of them is kept for the
-    case that there is no better one.
+    ``rejected`` counts the points that were rejected so far; the best of them is kept for the case
+    that there is no usable one.
     """
 
     volume: Volume
-    around: Surroundings
+    obstacles: Obstacles
     clearance: float
     rejected: int = 0
     _best: tuple[bool, float, NDArray[np.float64]] | None = field(default=None, init=False)
 
     def usable(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """(n,) which of the (n, 3) points can be looked from; counts none of them."""
-        free = self.around.clearance(points, self.clearance)
-        outside = ~self.around.in_matter(points)
+        """(n,) which of the (n, 3) points are usable; counts none of them."""
+        free = self.obstacles.clearance(points, self.clearance)
+        outside = ~self.obstacles.in_solid(points)
         good = (free >= self.clearance) & outside
         if not good.any():
             for i in np.lexsort((free, outside))[-1:]:
@@ -80,7 +75,7 @@ class Places:
                     self._best = found
         return np.asarray(good)
 
-    def of_parts(self, count: int, seed: int) -> Eyes:
+    def of_parts(self, count: int, seed: int) -> SamplePoints:
         """One point of each of ``count`` equal parts of the cell; a part without a usable one,
         such as one filled by a statue, gives none."""
         chosen = []
@@ -94,58 +89,54 @@ class Places:
         found = np.array(chosen).reshape(-1, 5)
         return self.at(found[:, :3], found[:, 3:])
 
-    def at(self, points: NDArray[np.float64], unit: NDArray[np.float64]) -> Eyes:
-        """Eyes at usable points, shifted by two coordinates in (0, 1) each."""
-        return Eyes(points, np.full(len(points), self.clearance), 2 * unit - 1)
+    def at(self, points: NDArray[np.float64], unit: NDArray[np.float64]) -> SamplePoints:
+        """Sample points at usable positions, shifted by two coordinates in (0, 1) each."""
+        return SamplePoints(points, np.full(len(points), self.clearance), 2 * unit - 1)
 
-    def least_bad(self) -> Eyes:
-        """Where nothing is usable: the one point that is outside matter, if possible, and farthest
+    def least_bad(self) -> SamplePoints:
+        """Where nothing is usable: the one point that is outside solids, if possible, and farthest
         from all surfaces. None in a cell without volume."""
         if self._best is None:
-            return Eyes.none()
+            return self.at(np.zeros((0, 3)), np.zeros((0, 2)))
         _, free, point = self._best
         # On the surface itself, where nothing can be right, the near plane still has to be.
         near = free or self.clearance * np.finfo(np.float32).eps
-        return Eyes(point[None], np.array([near]), np.zeros((1, 2)))
+        return SamplePoints(point[None], np.array([near]), np.zeros((1, 2)))
 
 
-class Sequence:
+class PointSequence:
     """The usable points of one random or scrambled sequence in a cell, in their order."""
 
-    def __init__(self, places: Places, kind: str, seed: int) -> None:
+    def __init__(self, finder: PointFinder, kind: str, seed: int) -> None:
         """``kind`` is "sobol" or "uniform"."""
-        self._places = places
-        self._draw = places.volume.sobol if kind == "sobol" else places.volume.random
+        self._finder = finder
+        self._draw = finder.volume.sobol if kind == "sobol" else finder.volume.random
         self._seed = seed
         self._next = 0
         self._waiting = np.zeros((0, 5))
         self._good = np.zeros(0, dtype=np.bool_)
-        self._refused = self._asked = 0
+        self._rejected = self._asked = 0
 
-    def take(self, count: int) -> Eyes:
-        """The next ``count`` usable points; fewer if more than `TRIES` in the cell are refused
+    def take(self, count: int) -> SamplePoints:
+        """The next ``count`` usable points; fewer if more than `TRIES` in the cell are rejected
         for each, or its box holds hardly any of the cell, against what its volume says."""
-        places = self._places
+        finder = self._finder
         self._asked += count
-        while not places.volume.empty and int(self._good.sum()) < count:
+        while not finder.volume.empty and int(self._good.sum()) < count:
             most = TRIES * self._asked
-            if self._refused > most or self._next > most / FILLED:
+            if self._rejected > most or self._next > most / FILLED:
                 break
             # Every cell asks for the same stretches, which are computed once.
-            size = max(BATCH, self._next // 4) if self._next else _power_of_two(max(count, BATCH))
+            size = max(BATCH, self._next // 4 or 1 << (count - 1).bit_length())
             drawn = self._draw(self._next, size, self._seed)
-            good = places.usable(drawn[:, :3]) if len(drawn) else np.zeros(0, np.bool_)
+            good = finder.usable(drawn[:, :3])
             self._next += size
-            self._refused += int((~good).sum())
+            self._rejected += int((~good).sum())
             self._waiting = np.concatenate([self._waiting, drawn])
             self._good = np.concatenate([self._good, good])
         last = np.flatnonzero(self._good)[:count]
         end = int(last[-1]) + 1 if len(last) == count and count else len(self._good)
         taken = self._waiting[last]
-        places.rejected += end - len(last)
+        finder.rejected += end - len(last)
         self._waiting, self._good = self._waiting[end:], self._good[end:]
-        return places.at(taken[:, :3], taken[:, 3:])
-
-
-def _power_of_two(least: int) -> int:
-    return 1 << (least - 1).bit_length()
+        return finder.at(taken[:, :3], taken[:, 3:])

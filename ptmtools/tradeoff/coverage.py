@@ -13,12 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
-from ptmtools.coverage.backend import open_renderer
-from ptmtools.coverage.item_buffer import VIEWS, Surfaces
+from ptmtools.coverage.backends.choice import choose
+from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.options import MAX_SAMPLES, PRESETS, AchOptions
 from ptmtools.coverage.sampling import CellHints, Sampler
+from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE
 from ptmtools.scene.model import Scene
 from ptmtools.tradeoff.experiment import Measured, Setting, timed
+from ptmtools.tradeoff.experiments import Subject
 from ptmtools.visibility.model import Pvs
 
 #: The seed of the reference, but for a user who takes the same.
@@ -37,12 +39,19 @@ GRID = (
 )
 
 
-class CoverageTrade:
-    """The experiment of the stage ``ach``."""
+def prepare(subject: Subject) -> CoverageTrade:
+    """See `EXPERIMENTS`. Of the options what settings choose is left open."""
+    options = replace(subject.options(ACH), samples=None, face=None, placement=None, tolerance=None)
+    made = subject.artifacts
+    tried, points = subject.cells_tried, subject.reference_points
+    return CoverageTrade(made[SCENE], made[CELLS], made[PVS], options, tried, points)
 
-    stage = "ach"
-    work = "rays a cell"
-    error = "total variation"
+
+class CoverageTrade:
+    """The experiment of the coverage hints."""
+
+    work = "rays per cell"
+    error = "total variation of a cell's hints"
 
     def __init__(
         self,
@@ -57,7 +66,6 @@ class CoverageTrade:
         the cells that stand for all, evenly spread; `truth` their hints by the reference, by cell.
         """
         self._scene, self._cells, self._pvs, self._options = scene, cells, pvs, options
-        self._surfaces = Surfaces.of(scene, cells)
         self._most = reference_points
         every = cells.cell_count
         self.tried = np.unique(np.linspace(0, every - 1, min(cells_tried, every)).astype(int))
@@ -109,8 +117,8 @@ class CoverageTrade:
             more={
                 "p95": float(np.percentile(errors, 95)) if len(errors) else 0.0,
                 "missed": float(missed.sum()) / many,
-                "gl": float(backend == "gl"),
             },
+            note=backend,
         )
 
     def errors(self, found: Mapping[int, CellHints]) -> NDArray[np.float64]:
@@ -127,21 +135,18 @@ class CoverageTrade:
         """The hints of some of the cells tried, by cell, or of all of them; processor seconds for
         all cells of the scene; and the backend."""
         asked = [int(cell) for cell in (self.tried if cells is None else cells)]
-        renderer = open_renderer(self._surfaces, self._cells, self._pvs, options)
-        renderer.close()  # what is loaded but once is no part of the cost
+        backend = choose(self._cells, self._pvs, options)
 
         def ready() -> Sampler:
-            nonlocal renderer
-            renderer = open_renderer(self._surfaces, self._cells, self._pvs, options)
-            given = (self._scene, self._cells, self._pvs, options, self._surfaces, renderer)
-            return Sampler(*given)
+            return Sampler(self._scene, self._cells, self._pvs, options, backend)
 
+        ready().renderer.close()  # what is loaded but once is no part of the cost
         sampler, before = timed(ready)
         try:
             if asked:
                 sampler.of_cell(asked[0])
             found, seconds = timed(lambda: {cell: sampler.of_cell(cell) for cell in asked})
             seconds *= self._cells.cell_count / max(len(asked), 1)
-            return found, before + seconds, renderer.backend
+            return found, before + seconds, backend.name
         finally:
-            renderer.close()
+            sampler.renderer.close()

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ptmtools.coverage.clearance.kernels import distance
-from ptmtools.coverage.matter import Surroundings, bodies, edge_groups, edges
+from ptmtools.coverage.clearance_kernels import distance
+from ptmtools.coverage.solids import Obstacles, edge_groups, edges, solids
 
 SPAN = st.floats(-4, 4).map(lambda x: round(x, 3))
 POINT = st.tuples(SPAN, SPAN, SPAN)
@@ -35,27 +35,27 @@ INSIDE, OUTSIDE = np.array([1.4, 1.3, -0.45]), np.array([3.1, 1.3, 1.15])
 
 def around(room_row, furnish, quads, sides=(0, 0)):
     scene, cells = room_row(1)
-    return Surroundings.of(*furnish(scene, cells, quads, [sides] * len(quads)))
+    return Obstacles.of(*furnish(scene, cells, quads, [sides] * len(quads)))
 
 
 def test_inside_a_statue(room_row, furnish):
     found = around(room_row, furnish, STATUE)
-    assert len(found.bodies) == 1
-    assert found.in_matter(np.atleast_2d(INSIDE))[0]
-    assert not found.in_matter(np.atleast_2d(OUTSIDE))[0]
-    assert not found.in_matter(np.atleast_2d(np.array([1.5, 2.6, -0.5])))[0]
+    assert len(found.solids) == 1
+    assert found.in_solid(np.atleast_2d(INSIDE))[0]
+    assert not found.in_solid(np.atleast_2d(OUTSIDE))[0]
+    assert not found.in_solid(np.atleast_2d(np.array([1.5, 2.6, -0.5])))[0]
 
 
 @pytest.mark.parametrize("flip", [[0], [1, 4], [0, 1, 2]])
 def test_winding_need_not_be_right(room_row, furnish, flip):
     quads = [q[::-1] if i in flip else q for i, q in enumerate(STATUE)]
     found = around(room_row, furnish, quads)
-    assert found.in_matter(np.atleast_2d(INSIDE))[0]
-    assert not found.in_matter(np.atleast_2d(OUTSIDE))[0]
+    assert found.in_solid(np.atleast_2d(INSIDE))[0]
+    assert not found.in_solid(np.atleast_2d(OUTSIDE))[0]
 
 
 def test_a_shell_that_faces_inwards_is_a_room(room_row, furnish):
-    assert around(room_row, furnish, [q[::-1] for q in STATUE]).bodies == ()
+    assert around(room_row, furnish, [q[::-1] for q in STATUE]).solids == ()
 
 
 def test_a_statue_may_stand_on_the_floor(room_row, furnish):
@@ -63,17 +63,17 @@ def test_a_statue_may_stand_on_the_floor(room_row, furnish):
     scene, cells = room_row(1)
     quads = box([1, 0, -1], [2, 2.5, 0])
     sides = [(0, -1) if i == 2 else (0, 0) for i in range(6)]
-    assert Surroundings.of(*furnish(scene, cells, quads, sides)).in_matter(INSIDE[None])[0]
+    assert Obstacles.of(*furnish(scene, cells, quads, sides)).in_solid(INSIDE[None])[0]
 
 
 def test_structure_is_the_subdivisions_business(room_row, furnish):
     """The shell of the room itself, wound outwards: everybody is inside it."""
     scene, cells = room_row(1)
     turned = replace(scene, triangles=scene.triangles[:, ::-1])
-    assert bodies(turned, cells) == []
+    assert solids(turned, cells) == []
     # The same shell, none of it in a boundary, is taken for a solid block.
     loose = replace(cells, triangle_cell=np.zeros_like(cells.triangle_cell))
-    assert len(bodies(turned, loose)) == 1
+    assert len(solids(turned, loose)) == 1
 
 
 def test_open_and_thin_things_have_no_inside(room_row, furnish):
@@ -83,13 +83,13 @@ def test_open_and_thin_things_have_no_inside(room_row, furnish):
     for quads in (sheet, no_lid, twice):
         found = around(room_row, furnish, quads)
         for point in (INSIDE, OUTSIDE, np.array([1.001, 1.3, -0.45])):
-            assert not found.in_matter(np.atleast_2d(point))[0]
+            assert not found.in_solid(np.atleast_2d(point))[0]
 
 
 def test_a_body_within_a_body(room_row, furnish):
     found = around(room_row, furnish, STATUE + box([1.2, 1, -0.8], [1.6, 1.5, -0.2]))
-    assert len(found.bodies) == 2
-    assert found.in_matter(np.atleast_2d(INSIDE))[0]
+    assert len(found.solids) == 2
+    assert found.in_solid(np.atleast_2d(INSIDE))[0]
 
 
 def test_groups_hang_together_by_edges_not_by_corners():

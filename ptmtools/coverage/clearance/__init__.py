@@ -1,1 +1,0 @@
-"""How far points are from surfaces, and what they are inside of (`matter`)."""

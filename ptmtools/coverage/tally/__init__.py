@@ -1,1 +1,0 @@
-"""Counting what the pixels of item buffers show (`item_buffer`)."""

@@ -1,0 +1,52 @@
+"""What all emitters write from: the artifacts, the textures and viewpoints, and what is derived
+from them once for all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from ptmtools.cells.model import Cells
+from ptmtools.coverage.model import Ach
+from ptmtools.database.geometry import Geometry
+from ptmtools.database.hints import hints_text
+from ptmtools.database.model import EmitOptions, TextureRecord, Viewpoint
+from ptmtools.progress import Progress, silent
+from ptmtools.scene.model import Scene
+from ptmtools.visibility.model import Pvs
+
+
+@dataclass(frozen=True)
+class Content:
+    """
+    Attributes
+    ----------
+    textures: in the order of the hints; one for every image that a material in use names.
+    viewpoints: the places to start from.
+    progress: to be told of every cell.
+    """
+
+    scene: Scene
+    cells: Cells
+    pvs: Pvs
+    ach: Ach
+    textures: tuple[TextureRecord, ...]
+    viewpoints: tuple[Viewpoint, ...] = ()
+    options: EmitOptions = EmitOptions()  # noqa: RUF009 - a frozen value
+    progress: Progress = silent
+
+    @cached_property
+    def geometry(self) -> Geometry:
+        """The shapes of all cells; raises PTM-D601 if a number is not finite in float32."""
+        return Geometry(self.scene, self.cells)
+
+    @cached_property
+    def records(self) -> Mapping[int, tuple[int, TextureRecord]]:
+        """Image of the scene → its place in `textures`, and its record there."""
+        return {record.image: (place, record) for place, record in enumerate(self.textures)}
+
+    def hints(self, cell_url: Callable[[int], str], up: str = "") -> str:
+        """The text of a `hints.json`; ``cell_url`` gives a cell's URL from where it lies, ``up`` is
+        the way from there to the served folder. Raises PTM-D601."""
+        return hints_text(self, cell_url, up)

@@ -1,0 +1,64 @@
+"""What an emitter is: one frozen value that says what it is called, what it writes, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ptmtools.lazy import Lazy
+
+if TYPE_CHECKING:
+    from ptmtools.database.content import Content
+    from ptmtools.database.validation.findings import Findings
+    from ptmtools.database.validation.served import ServedDatabase
+
+#: Suffix of a gzip copy.
+GZIP = ".gz"
+
+
+@dataclass(frozen=True)
+class Emitter:
+    """A form in which cells are served.
+
+    Attributes
+    ----------
+    name: as `--format` has it.
+    about: what it is, in a few words, for help.
+    owns: files and folders in the served folder that are its own; a folder ends in a slash. The
+        files must be there once it has been written.
+    entry: the one of its files that leads to the others; written when those are on the disk.
+    writer: function from a `Content` to the files, as (path in the served folder, str or bytes);
+        what it can refuse, it refuses before it gives the first.
+    reader: function from (name, bytes, `Findings`) of one of its files to what the check needs of
+        it, None if that cannot be had; called from several threads. Without one nothing is read.
+    check: function from a `ServedDatabase` to the counts of the manifest that it can tell, by name.
+        Without one there is nothing to check.
+    before: what the name alone meant in the release before, if that was something else.
+    """
+
+    name: str
+    about: str
+    owns: tuple[str, ...]
+    entry: str
+    writer: Lazy[Callable[[Content], Iterator[tuple[str, str | bytes]]]]
+    reader: Lazy[Callable[[str, bytes, Findings], object | None]] | None = None
+    check: Lazy[Callable[[ServedDatabase], Mapping[str, int]]] | None = None
+    before: str = ""
+
+    def is_owner(self, path: str) -> bool:
+        """Whether a path in the served folder is that of one of its files, or of a gzip copy."""
+        plain = path.removesuffix(GZIP)
+        return any(path.startswith(own) if own.endswith("/") else plain == own for own in self.owns)
+
+    def files(self, content: Content) -> Iterator[tuple[str, str | bytes]]:
+        """Path in the served folder and contents of each of its files, in the order of writing."""
+        return self.writer.load()(content)
+
+    def read(self, name: str, data: bytes, found: Findings) -> object | None:
+        """What the check needs of a file, named relative to the database."""
+        return self.reader.load()(name, data, found) if self.reader else data
+
+    def validate(self, database: ServedDatabase) -> Mapping[str, int]:
+        """Holds its files against each other and against those of others; returns counts."""
+        return self.check.load()(database) if self.check else {}

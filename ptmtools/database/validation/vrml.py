@@ -1,0 +1,123 @@
+"""What the VRML files and `hints.json` must satisfy: each by itself, and beside each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ptmtools.database.names import CELL_FOLDER, HINTS, ROOT, SERVED
+from ptmtools.database.validation.cells import ReadCell, check_cell, read_cell
+from ptmtools.database.validation.findings import Findings
+from ptmtools.database.validation.hints import (
+    Images,
+    ReadHints,
+    check_against_cells,
+    check_hints,
+    read_hints,
+)
+from ptmtools.database.validation.lists import check_graph
+from ptmtools.database.validation.root import ReadRoot, check_root, check_viewpoints, read_root
+from ptmtools.database.validation.served import ServedDatabase
+from ptmtools.database.validation.textures import check_record
+from ptmtools.database.vrml.reader import Document, WrlError, parse
+from ptmtools.tolerance import Tolerance
+
+_WRL_FAULTS = {"encoding": "PTM-D660", "syntax": "PTM-D661", "finite": "PTM-D662"}
+
+
+def read_file(name: str, data: bytes, found: Findings) -> Document | ReadHints | None:
+    """A VRML file or the hints; nothing of other files."""
+    if name == f"{SERVED}/{HINTS}":
+        return read_hints(data, name, found)
+    try:
+        return parse(data) if name.endswith(".wrl") else None
+    except WrlError as fault:
+        found.add(_WRL_FAULTS[fault.kind], name, fault.place, fault.message)
+        return None
+
+
+def check_files(database: ServedDatabase) -> Mapping[str, int]:
+    """All of them; counts shapes, triangles and viewpoints."""
+    documents = {p: d for p, d in database.held.items() if isinstance(d, Document)}
+    cells = _check_cells(documents, database)
+    root = _check_root(documents.get(ROOT), cells, database)
+    _check_hints(root, cells, database)
+    nodes = [node for document in documents.values() for node in document.nodes]
+    index = [node.at("geometry").get("coordIndex") for node in nodes if node.type == "Shape"]
+    return {
+        "shapes": sum(corners is not None for corners in index),
+        "triangles": sum(len(corners) // 4 for corners in index if corners is not None),
+        "viewpoints": sum(node.type == "Viewpoint" for node in nodes),
+    }
+
+
+def _check_cells(
+    documents: Mapping[str, Document], database: ServedDatabase
+) -> dict[str, ReadCell]:
+    """The cells by the names of their files."""
+    found, folder = database.found, f"{CELL_FOLDER}/"
+    cells: dict[str, ReadCell] = {}
+    for path, document in documents.items():
+        if path.startswith(folder) and (cell := read_cell(document, f"{SERVED}/{path}", found)):
+            cells[path.removeprefix(folder)] = cell
+    hulls = [c.hull for c in cells.values() if len(c.hull)]
+    points = np.concatenate(hulls) if hulls else np.zeros((1, 3))
+    box = np.stack([points.min(axis=0), points.max(axis=0)])
+    tolerance = Tolerance.for_points(points)
+    for own, cell in cells.items():
+        name = f"{SERVED}/{folder}{own}"
+        check_cell(documents[folder + own], cell, name, box, tolerance, found)
+        for url in (*cell.adjacent, *cell.visible):
+            database.urls.resolve(name, url)
+    check_graph(
+        {own: cell.adjacent for own, cell in cells.items()},
+        {own: cell.visible for own, cell in cells.items()},
+        lambda own: (f"{SERVED}/{folder}{own}", ""),
+        found,
+    )
+    return cells
+
+
+def _check_root(
+    document: Document | None, cells: Mapping[str, ReadCell], database: ServedDatabase
+) -> ReadRoot | None:
+    if document is None:
+        return None
+    name = f"{SERVED}/{ROOT}"
+    root = read_root(document, name, database.found)
+    for url in (*root.inlines, *root.viewpoints.values()):
+        database.urls.resolve(name, url)
+    boxes = {f"{CELL_FOLDER}/{own}": cell.box for own, cell in cells.items()}
+    check_root(root, boxes, name, database.found)
+    return root
+
+
+def _check_hints(
+    root: ReadRoot | None, cells: Mapping[str, ReadCell], database: ServedDatabase
+) -> None:
+    name, found, urls = f"{SERVED}/{HINTS}", database.found, database.urls
+    cell_images = {
+        own: {
+            tuple(urls.resolve_each(f"{SERVED}/{CELL_FOLDER}/{own}", "url", u))
+            for u in cell.textures
+        }
+        for own, cell in cells.items()
+    }
+    hints: ReadHints | None = database.held.get(HINTS)
+    if hints is None:
+        return
+    check_hints(hints, name, found)
+    urls.resolve_each(name, "cells", [row["url"] for row in hints.cells])
+    known = [row["url"].removeprefix(f"{CELL_FOLDER}/") for row in hints.cells]
+    files = urls.resolve_each(name, "textures", [row["file"] for row in hints.textures])
+    images: list[Images] = []
+    for i, (record, path) in enumerate(zip(hints.textures, files, strict=True)):
+        fallback = record["fallback"]
+        images.append((path,) if fallback is None else (urls.resolve(name, fallback), path))
+        if path in database.textures:
+            check_record(record, database.textures[path], name, f"textures[{i}]", found)
+    check_against_cells(hints, known, images, cells, cell_images, name, found)
+    if root is not None:
+        cell_urls = [hints.cells[view["cell"]]["url"] for view in hints.viewpoints]
+        check_viewpoints(root, hints.viewpoints, cell_urls, name, found)
