@@ -62,9 +62,9 @@ def build_command(db: str) -> str:
     with suppress(DatabaseError):
         manifest = read_manifest(Path(db)) or manifest
     recorded = []
-    for name, record in manifest.stages.items():
+    for name, stage in STAGES.items():
         with suppress(KeyError, ValueError):
-            recorded.append(STAGES[name].recorded(record.parameters))
+            recorded.append(stage.recorded(manifest.stages[name].parameters))
     model = shlex.quote(manifest.model) if manifest.model else "MODEL"
     return " ".join(
         ["ptm build-scene", model, "-o", shlex.quote(db), *map(shlex.quote, words(recorded))]

@@ -49,6 +49,10 @@ def build_scene(
     OutputError, DatabaseError: what is wrong with the database, from `DatabaseWriter`.
     """
     start = time.perf_counter()
+    if not Path(model).is_file():
+        from ptmtools.scene.ingestion import check_file
+
+        check_file(Path(model))
     stages = list(STAGES.values())
     if until:
         stages = stages[: stages.index(until) + 1]

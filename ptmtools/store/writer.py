@@ -63,13 +63,19 @@ class DatabaseWriter(DatabaseFolder):
         folder = Path(path)
         if folder.exists() and not folder.is_dir():
             raise OutputError(
-                "PTM-O001", "exists and is not a folder", file=folder, remedy="name another output"
+                "PTM-O001",
+                "exists and is not a folder",
+                file=folder,
+                remedy="name another folder with -o",
             )
-        made = _make(folder)
+        made: list[Path] = []
         try:
+            made = _make(folder)
             lock = acquire(folder)
-        except BaseException:
+        except BaseException as fault:
             _unmake(made)
+            if isinstance(fault, OutputError):
+                fault.remedy = "name a folder that you may write to with -o"
             raise
         try:
             recover(folder)
@@ -122,7 +128,7 @@ def admitted(folder: Path, model: str, *, force: bool) -> Manifest:
                 "PTM-O010",
                 "the folder is not empty and not a ptmtools database",
                 file=folder,
-                remedy="name another folder, or give --force to write into this one",
+                remedy="name another folder with -o, or give --force to write into this one",
             )
         return Manifest(model)
     if manifest.model != model:
@@ -131,7 +137,7 @@ def admitted(folder: Path, model: str, *, force: bool) -> Manifest:
                 "PTM-O011",
                 f"holds the database of another model, {manifest.model}",
                 file=folder,
-                remedy="name another folder, or give --force to replace it",
+                remedy="name another folder with -o, or give --force to replace it",
             )
         return Manifest(model)
     return manifest
