@@ -27,10 +27,15 @@ MODELS = (MUSEUM, "hospital", "willowgarage", "office", "gallery")
 AREA = SubdivideOptions().wall_area
 
 
+def shared(name: str) -> Path:
+    """Where one of the `MODELS` but the museum is, if it is at hand."""
+    return SHARED / f"scenes/{name}/{name}.obj"
+
+
 def opened(name: str) -> Scene:
     """One of the `MODELS`."""
     if name != MUSEUM:
-        return ingest(SHARED / f"scenes/{name}/{name}.obj")
+        return ingest(shared(name))
     with tempfile.TemporaryDirectory() as folder:
         maker = ROOT / "sample_data/make_museum.py"
         command = [sys.executable, maker, "-o", f"{folder}/{name}", "--size", "16"]
@@ -57,7 +62,8 @@ def area_row(name: str, scene: Scene, area: float) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("models", nargs="*", default=MODELS, help=f"default: {' '.join(MODELS)}")
+    at_hand = [name for name in MODELS if name == MUSEUM or shared(name).is_file()]
+    parser.add_argument("models", nargs="*", default=at_hand, help=f"of {' '.join(MODELS)}")
     parser.add_argument("--wall-area", nargs="+", type=float, metavar="M2")
     given = parser.parse_args()
     if given.wall_area:

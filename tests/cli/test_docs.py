@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
 import re
 import sys
@@ -129,3 +130,19 @@ def test_tables_are_known_and_made_by_scripts_that_exist() -> None:
     assert sorted(standing) == sorted(tables.TABLES)
     for table in tables.TABLES.values():
         assert (ROOT / table.command.split()[0]).is_file()
+
+
+def test_messages_are_those_of_the_program() -> None:
+    """Runs of six words or more, in the notes and errors that pages show, stand in the source."""
+    said = "\n".join(
+        node.value
+        for file in (ROOT / "ptmtools").rglob("*.py")
+        for node in ast.walk(ast.parse(file.read_text("utf-8")))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    )
+    unknown = []
+    for page in PAGES:
+        for note in re.findall(r"^ {4}(?:note|ptm): (.*)", page.read_text("utf-8"), re.MULTILINE):
+            runs = re.findall(r"[a-z]+(?: [a-z]+){5,}", note)
+            unknown += [(page.name, run) for run in runs if run not in said]
+    assert unknown == []
