@@ -1,11 +1,12 @@
-"""What the budget and the exact arithmetic of the portal flow cost and bring.
+"""What the budget of the portal flow and the decision of near ties cost and bring.
 
     python benchmarks/budget.py MODEL... [--wall-area 2] [--budgets 0 2000 20000 200000 1000000]
 
-For every model, by leaves: the average share of all leaves that a leaf may see, CPU seconds, and
-portals cut short, for each budget without exact arithmetic; then for the default budget with it:
-sequences of portals rejected by a hair, those decided exactly, those found open, portals cut short,
-the pairs of leaves that are seen because of them, CPU seconds. Two Markdown tables.
+Two Markdown tables, a row for each model. First, for each budget: the average share of all leaves
+that a leaf may see, CPU seconds, and portals cut short. Second, for the default budget: near ties,
+those decided in double-double, those found open; then leaf pairs, pairs of default cells and CPU
+seconds where near ties are decided, where all count as visible, and where all count as hidden
+(which is not conservative).
 """
 
 from __future__ import annotations
@@ -13,60 +14,86 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
+from ptmtools.cells.grouping import grouped
 from ptmtools.scene import ingest
-from ptmtools.visibility import Pvs, PvsOptions, compute_pvs
+from ptmtools.tolerance import Tolerance
+from ptmtools.visibility import Pvs, PvsOptions, compute_pvs, searching
+from ptmtools.visibility.near_ties import Searched
 
 WARM_UP = Path(__file__).resolve().parent.parent / "sample_data/two_rooms/two_rooms.obj"
 BUDGETS = (0, 2_000, 20_000, PvsOptions().budget, 1_000_000)
 
 
-def timed(cells: Cells, budget: int, exact: bool) -> tuple[Pvs, float]:
+def all_count_as(visible: bool) -> Callable[..., Searched]:
+    """A search that takes every near tie for visible, or for hidden."""
+
+    def searched(g, s, test, known, source, budget, seen) -> Searched:  # type: ignore[no-untyped-def]
+        from ptmtools.visibility.flow_kernels import flow
+
+        none = np.zeros(0, np.uint64)
+        work, cut, ties, _ = flow(g, s, known, source, budget, none, visible, seen)
+        return Searched(cut, work, ties, 0, 0)
+
+    return searched
+
+
+def timed(cells: Cells, budget: int = PvsOptions().budget) -> tuple[Pvs, float]:
     """The visible sets, and processor seconds."""
     begun = time.process_time()
-    pvs = compute_pvs(cells, PvsOptions(budget=budget, exact=exact))
+    pvs = compute_pvs(cells, PvsOptions(budget=budget))
     return pvs, time.process_time() - begun
+
+
+def pairs(pvs: Pvs, leaf_cell: np.ndarray) -> str:
+    """Pairs of leaves that see each other, and pairs of the cells that they make up."""
+    one, other = np.nonzero(np.triu(pvs.to_matrix(), 1))
+    ends = np.sort(leaf_cell[np.stack([one, other], axis=1)], axis=1)
+    between = np.unique(ends[ends[:, 0] != ends[:, 1]], axis=0)
+    return f"{len(one):,}, {len(between):,}"
 
 
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("models", nargs="+", type=Path)
     parser.add_argument("--wall-area", type=float, default=SubdivideOptions().wall_area)
-    parser.add_argument("--budgets", nargs="+", type=int, default=BUDGETS)
+    parser.add_argument("--budgets", nargs="*", type=int, default=BUDGETS)
     given = parser.parse_args(arguments)
 
     options = SubdivideOptions(cells="leaf", wall_area=given.wall_area)
     compute_pvs(subdivide(ingest(WARM_UP)))
-    heads = " | ".join(f"{budget:,}" for budget in given.budgets)
-    print(f"| walls ≥ {given.wall_area:g} m² | leaves / portals | {heads} |")
-    print("|" + "---|" * (2 + len(given.budgets)))
-    exactly = []
+    ties = []
+    head = f"walls ≥ {given.wall_area:g} m²"
+    columns = " | ".join(f"{budget:,}" for budget in given.budgets)
+    print(f"| {head} | leaves / portals | {columns} |\n|{'---|' * (2 + len(given.budgets))}")
     for model in given.models:
-        cells = subdivide(ingest(model), options)
+        scene = ingest(model)
+        cells = subdivide(scene, options)
         shown = []
         for budget in given.budgets:
-            pvs, seconds = timed(cells, budget, exact=False)
+            pvs, seconds = timed(cells, budget)
             shown.append(f"{pvs.average_share:.1%}, {seconds:.1f} s, {pvs.fallbacks:,} cut")
         size = f"{cells.leaf_count:,} / {cells.portal_count:,}"
         print(f"| {model.stem} | {size} | {' | '.join(shown)} |", flush=True)
-        rounded, before = timed(cells, PvsOptions().budget, exact=False)
-        pvs, seconds = timed(cells, PvsOptions().budget, exact=True)
-        more = int(np.count_nonzero(pvs.to_matrix() & ~rounded.to_matrix())) // 2
-        exactly.append(
-            f"| {model.stem} | {int(pvs.ties.sum()):,} | {int(pvs.decided.sum()):,} "
-            f"| {int(pvs.opened.sum()):,} | {rounded.fallbacks:,} → {pvs.fallbacks:,} "
-            f"| {more:,} of {(len(pvs.cell) - cells.leaf_count) // 2:,} "
-            f"| {before:.1f} → {seconds:.1f} |"
-        )
-    print(
-        f"\n| walls ≥ {given.wall_area:g} m² | rejected by a hair | decided exactly | open ", end=""
-    )
-    print("| cut short | pairs seen by it | CPU s |\n|" + "---|" * 7)
-    print("\n".join(exactly))
+        tolerance = Tolerance.for_points(scene.points)
+        rooms = grouped(cells, SubdivideOptions(wall_area=given.wall_area), tolerance)
+        pvs, seconds = timed(cells)
+        row = [f"{int(n.sum()):,}" for n in (pvs.ties, pvs.decided, pvs.opened)]
+        row.append(f"{pairs(pvs, rooms.leaf_cell)}, {seconds:.1f} s")
+        for visible in (True, False):
+            with patch.object(searching, "searched", all_count_as(visible)):
+                pvs, seconds = timed(cells)
+            row.append(f"{pairs(pvs, rooms.leaf_cell)}, {seconds:.1f} s")
+        ties.append(f"| {model.stem} | {' | '.join(row)} |")
+    print(f"\n| {head} | near ties | decided | open | decided | all visible | all hidden |")
+    print(f"|{'---|' * 7}")
+    print("\n".join(ties))
     return 0
 
 

@@ -7,13 +7,10 @@ Reads PRT2 (N A B then N points in brackets per portal, then one line of leafs p
 ``shape`` and ``visible`` (rows of big-endian bits). The reference is taken as the AND with its
 transpose, which is still conservative. Leafs that only the reference joins are put to the test
 twice: ``--lines`` random lines from a portal of one to a portal of the other are walked through the
-portals; and every sequence of portals from the one to the other is clipped in exact arithmetic. A
+portals; and every sequence of portals from the one to the other is clipped in double-double. A
 line that arrives would prove that our flow misses a pair (exit status 1); if nothing is left of any
 sequence, there is none. CPU time is that of the process, after one warm-up that loads or compiles
-the kernels, those of the decisions of near-ties with them.
-
-Lines thinner than the rounding are not seen, as in the reference; with ``--exact`` the sequences
-that were rejected by a hair are decided exactly, which takes two to three times as long.
+the kernels, those of the decisions of near ties with them.
 """
 
 from __future__ import annotations
@@ -28,7 +25,7 @@ from numpy.typing import NDArray
 
 from ptmtools.executors import open_executor
 from ptmtools.tolerance import Tolerance
-from ptmtools.visibility.decide import Decisions
+from ptmtools.visibility.double_double import SequenceTest
 from ptmtools.visibility.flow import PortalFlow, Portals, geometry, portal_flow
 from ptmtools.visibility.options import PvsOptions
 from ptmtools.visibility.pvs import leaf_matrix
@@ -42,7 +39,7 @@ def read_prt(path: Path) -> tuple[Portals, NDArray[np.int64]]:
     leafs, clusters, count = (int(line) for line in lines[1:4])
     ends = np.zeros((count, 2), np.int32)
     normal = np.zeros((count, 3))
-    windings = []
+    polygons = []
     for k, line in enumerate(lines[4 : 4 + count]):
         words = line.replace("(", " ").replace(")", " ").split()
         ends[k] = int(words[1]), int(words[2])
@@ -50,12 +47,12 @@ def read_prt(path: Path) -> tuple[Portals, NDArray[np.int64]]:
         arm = points - points[0]
         area = np.cross(arm[1:-1], arm[2:]).sum(axis=0)
         normal[k] = area / np.linalg.norm(area)  # counter-clockwise seen from the second cluster
-        windings.append(points)
+        polygons.append(points)
     cluster = np.full(leafs, -1, np.int64)
     for c, line in enumerate(lines[4 + count : 4 + count + clusters]):
         cluster[[int(word) for word in line.split()[:-1]]] = c
-    start = np.cumsum([0, *(len(w) for w in windings)])
-    return Portals(clusters, ends, normal, np.concatenate(windings), start), cluster
+    start = np.cumsum([0, *(len(p) for p in polygons)])
+    return Portals(clusters, ends, normal, np.concatenate(polygons), start), cluster
 
 
 def visible_leafs(portals: Portals, flow: PortalFlow, cluster: NDArray[np.int64]) -> NDArray:
@@ -125,12 +122,12 @@ def arriving(
 
 
 class Sequences:
-    """All sequences of portals from leaf to leaf, in exact arithmetic."""
+    """All sequences of portals from leaf to leaf, in double-double arithmetic."""
 
     def __init__(self, portals: Portals, may: NDArray[np.bool_]) -> None:
         """``may`` (L, L): only leaves are passed that may see both ends; a line that passes others
         has come to its end."""
-        self._exact = Decisions(geometry(portals))
+        self._test = SequenceTest(geometry(portals))
         self._leaves = portals.leaf.reshape(-1).tolist()
         self._enters = portals.leaf[:, ::-1].reshape(-1).tolist()
         self._out: list[list[int]] = [[] for _ in range(portals.leaf_count)]
@@ -148,7 +145,7 @@ class Sequences:
         stack = [(q,) for q in self._out[a] if passable[self._enters[q]]]
         while stack:
             sequence = stack.pop()
-            if not self._exact.passes(sequence):
+            if not self._test.passes(sequence):
                 self.clipped += 1
                 continue
             leaf = self._enters[sequence[-1]]
@@ -157,7 +154,7 @@ class Sequences:
                     return False
                 self.clipped += 1
                 continue
-            if not any(q not in sequence and self._exact.passes((*sequence, q)) for q in into):
+            if not any(q not in sequence and self._test.passes((*sequence, q)) for q in into):
                 self.clipped += 1
                 continue
             passed = {self._leaves[q] for q in sequence}
@@ -170,14 +167,14 @@ class Sequences:
         of a sequence only the first and last portal narrow, and the last planes bound it."""
         back = tuple(q ^ 1 for q in reversed(sequence))
         return all(
-            self._exact.passes(way[first:]) and self._passes_ahead(way[first:])
+            self._test.passes(way[first:]) and self._passes_ahead(way[first:])
             for way in (back, sequence)
             for first in range(len(way) - 1)
         )
 
     def _passes_ahead(self, part: tuple[int, ...]) -> bool:
         return all(
-            self._exact.passes((*part[:length], q))
+            self._test.passes((*part[:length], q))
             for length in range(1, len(part))
             for q in part[length:]
         )
@@ -191,7 +188,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--budget", type=int, default=PvsOptions().budget)
     parser.add_argument("--lines", type=int, default=2000)
     parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--exact", action="store_true")
     given = parser.parse_args(arguments)
 
     portals, cluster = read_prt(given.map)
@@ -206,10 +202,10 @@ def main(arguments: list[str] | None = None) -> int:
         ),
         1,
     )
-    Decisions(geometry(portals)).passes((0, 2))
+    SequenceTest(geometry(portals)).passes((0, 2))
     cpu, wall = time.process_time(), time.perf_counter()
     with open_executor(given.workers) as executor:
-        flow = portal_flow(portals, given.budget, executor=executor, exact=given.exact)
+        flow = portal_flow(portals, given.budget, executor=executor)
     cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
     ours = visible_leafs(portals, flow, cluster)
     np.savez_compressed(given.output, shape=np.array(ours.shape), visible=np.packbits(ours, axis=1))
@@ -217,8 +213,8 @@ def main(arguments: list[str] | None = None) -> int:
         f"{given.map.name}: {len(ours)} leafs, {len(portals.leaf)} portals, "
         f"average visible {ours.sum() / len(ours):.2f}, CPU {cpu:.2f} s, wall {wall:.2f} s, "
         f"{flow.operations / 1e6:.2f} M operations ({flow.operations / 1e6 / cpu:.2f} M/s), "
-        f"cut short {int(flow.cut.sum())}; {int(flow.ties.sum()):,} sequences rejected by a hair, "
-        f"{int(flow.decided.sum()):,} decided exactly, {int(flow.opened.sum()):,} of them open"
+        f"cut short {int(flow.cut.sum())}; {int(flow.ties.sum()):,} near ties, "
+        f"{int(flow.decided.sum()):,} decided in double-double, {int(flow.opened.sum()):,} open"
     )
     if given.reference:
         with np.load(given.reference) as stored:
@@ -244,7 +240,7 @@ def main(arguments: list[str] | None = None) -> int:
         sequences = Sequences(portals, seen)
         hidden = [sequences.refuted(*pair) for pair in lost.tolist()]
         print(
-            f"in exact arithmetic {sum(hidden)} of {len(hidden)} pairs cannot see each other "
+            f"in double-double {sum(hidden)} of {len(hidden)} pairs cannot see each other "
             f"({sequences.clipped:,} sequences of portals clipped to nothing)"
         )
         return int(arrived.any())

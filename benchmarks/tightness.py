@@ -22,11 +22,12 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from prt import arriving
 
 from ptmtools.cells.model import Cells
 from ptmtools.pipeline.validation import structure_of
 from ptmtools.visibility.pvs import portals_of
-from ptmtools.visibility.sampled import confirmed, sampled_leaves
+from ptmtools.visibility.sampled import sampled_leaves
 from ptmtools.visibility.segments import Blockers, tetrahedra
 
 #: Segments shot at once, and at each open pair in a round.
@@ -107,7 +108,7 @@ def by_portals(cells: Cells, visible: NDArray[np.bool_], lines: int, aimed: int)
     a, b = cells.leaf_cell[one], cells.leaf_cell[other]
     open_ = visible[a, b] & ~seen[a, b]
     pairs = np.stack([one[open_], other[open_]], axis=1).astype(np.int32)
-    shown = pairs[confirmed(portals, pairs, aimed)]
+    shown = pairs[arriving(portals, pairs, aimed) > 0]
     seen[cells.leaf_cell[shown[:, 0]], cells.leaf_cell[shown[:, 1]]] = True
     seen |= seen.T
     return int(np.count_nonzero(np.triu(seen & visible, 1))), outside
