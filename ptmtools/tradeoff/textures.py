@@ -8,13 +8,17 @@ uncompressed finest level.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from ptmtools.errors import MissingComponentError
 from ptmtools.pipeline.stages import SCENE, TEXTURES
 from ptmtools.scene.model import SourceImage
 from ptmtools.texture import EncodeOptions, encode, read_image
+from ptmtools.texture.profiles import PROFILES
 from ptmtools.tradeoff.experiment import Measured, Setting, timed
 from ptmtools.tradeoff.experiments import Subject
 
@@ -45,14 +49,19 @@ class TexturesTrade:
         part = tried / max(sum(pixels.size for pixels in whole), 1)
         self._times = len(images) / max(len(whole), 1) / (part or 1)
         self._options = options
-        if self._pixels:
-            for setting in self.settings():  # compiles what is compiled
-                encode(self._pixels[0][:8, :8], replace(options, **setting.knobs))
+        self._settings: list[Setting] = []
+        for name, profile in PROFILES.items():
+            knobs: dict[str, Any] = (
+                {"profile": name} if profile.lossy else {"profile": name, "max_error": 0}
+            )
+            with suppress(MissingComponentError):
+                if self._pixels:  # compiles what is compiled
+                    encode(self._pixels[0][:8, :8], replace(options, **knobs))
+                self._settings.append(Setting(f"--profile {name}", knobs))
 
     def settings(self) -> Sequence[Setting]:
         """See `Experiment.settings`."""
-        raw = Setting("--profile raw", {"profile": "raw", "max_error": 0})  # it knows no other
-        return [raw, *(Setting(f"--profile {p}", {"profile": p}) for p in ("fast", "small"))]
+        return self._settings
 
     def measure(self, setting: Setting) -> Measured:
         """See `Experiment.measure`."""

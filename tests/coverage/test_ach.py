@@ -18,6 +18,7 @@ from ptmtools.coverage.options import AchOptions
 from ptmtools.coverage.placement import TRIES
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.executors import Local
+from ptmtools.lazy import Lazy
 from ptmtools.visibility.model import Pvs
 
 #: Eight points, at the middles of equal parts.
@@ -346,7 +347,8 @@ def cost_of_toy(triangles, pixels, gpu):
 @pytest.fixture
 def toy(monkeypatch):
     """A backend more: one declaration, one line in the table."""
-    declared = Backend("toy", "sees one thing", f"{__name__}:open_toy", f"{__name__}:cost_of_toy")
+    opener, coster = Lazy(f"{__name__}:open_toy"), Lazy(f"{__name__}:cost_of_toy")
+    declared = Backend("toy", "sees one thing", opener, coster)
     monkeypatch.setitem(BACKENDS, "toy", declared)
 
 

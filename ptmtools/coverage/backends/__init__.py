@@ -8,10 +8,12 @@ backend by its name.
 from __future__ import annotations
 
 from collections import ChainMap
+from collections.abc import Callable
 from dataclasses import dataclass
-from pkgutil import resolve_name
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
+
+from ptmtools.lazy import Lazy
 
 if TYPE_CHECKING:
     from ptmtools.coverage.item_buffer import Renderer, Surfaces
@@ -22,7 +24,7 @@ AUTO = "auto"
 
 @dataclass(frozen=True)
 class Backend:
-    """One way to draw item buffers. Functions are named "module:function", and loaded when needed.
+    """One way to draw item buffers.
 
     Attributes
     ----------
@@ -39,18 +41,17 @@ class Backend:
 
     name: str
     about: str
-    opener: str
-    coster: str
+    opener: Lazy[Callable[[Surfaces, int, int | None], Renderer]]
+    coster: Lazy[Callable[[float, int, int | None], float]]
     in_processes: bool = False
 
     def open(self, surfaces: Surfaces, face: int, gpu: int | None = None) -> Renderer:
         """A renderer, to be closed after use; see ``opener``."""
-        renderer: Renderer = resolve_name(self.opener)(surfaces, face, gpu)
-        return renderer
+        return self.opener.load()(surfaces, face, gpu)
 
     def cost(self, triangles: float, pixels: int, gpu: int | None = None) -> float:
         """See ``coster``."""
-        return float(resolve_name(self.coster)(triangles, pixels, gpu))
+        return self.coster.load()(triangles, pixels, gpu)
 
 
 #: By name; of equally cheap ones "auto" takes the first.
@@ -60,14 +61,14 @@ BACKENDS: dict[str, Backend] = {
         Backend(
             "gl",
             "OpenGL, on graphics hardware or in software",
-            "ptmtools.coverage.backends.opengl:OpenGLRenderer",
-            "ptmtools.coverage.backends.opengl:cost",
+            Lazy("ptmtools.coverage.backends.opengl:OpenGLRenderer"),
+            Lazy("ptmtools.coverage.backends.opengl:cost"),
         ),
         Backend(
             "embree",
             "rays on the processor",
-            "ptmtools.coverage.backends.embree:EmbreeRenderer",
-            "ptmtools.coverage.backends.embree:cost",
+            Lazy("ptmtools.coverage.backends.embree:EmbreeRenderer"),
+            Lazy("ptmtools.coverage.backends.embree:cost"),
             in_processes=True,
         ),
     )
