@@ -169,8 +169,8 @@ class EmitOptions:
         if emitter is None or not emitter.before:
             return ()
         return (
-            f"--format {self.format} wrote {emitter.before} and still does, but from the next "
-            f"release on it means {self.format} alone; write --format {emitter.before}",
+            f"--format {self.format} writes {emitter.before} for now; the next release will write "
+            f"{self.format} alone: say --format {emitter.before} to keep both",
         )
 
 

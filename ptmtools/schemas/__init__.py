@@ -97,18 +97,28 @@ def read(data: bytes, name: str) -> Any:
 
     Raises
     ------
-    ShapeError: not UTF-8, not JSON, a name twice in an object, or not as the schema says.
+    ShapeError: as `parse`, or it is not as the schema says.
+    """
+    document = parse(data)
+    check(document, name)
+    return document
+
+
+def parse(data: bytes) -> Any:
+    """The document in ``data``.
+
+    Raises
+    ------
+    ShapeError: not UTF-8, not JSON, or a name twice in an object.
     """
     try:
-        document = json.loads(
+        return json.loads(
             data.decode("utf-8"), parse_constant=_not_finite, object_pairs_hook=_object
         )
     except UnicodeDecodeError as fault:
         raise ShapeError(f"byte {fault.start} is not UTF-8") from None
     except (ValueError, RecursionError) as fault:
         raise ShapeError(f"not JSON ({fault})") from None
-    check(document, name)
-    return document
 
 
 def check(document: Any, name: str) -> None:

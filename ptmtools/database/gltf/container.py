@@ -17,6 +17,7 @@ import struct
 from collections.abc import Mapping
 from typing import Any, NoReturn
 
+from ptmtools import schemas
 from ptmtools.errors import LimitError
 
 _HEADER, _CHUNK = struct.Struct("<4sII"), struct.Struct("<I4s")
@@ -51,7 +52,7 @@ def pack(document: Mapping[str, Any], binary: bytes) -> bytes:
         raise LimitError(
             "PTM-L600",
             f"a cell takes {length:,} bytes as GLB, more than the format can hold",
-            remedy="make smaller cells, or leave --format gltf out",
+            remedy="make smaller cells, or leave gltf out of --format",
         )
     parts = [_HEADER.pack(_MAGIC, _VERSION, length)]
     for kind, body in chunks:
@@ -86,18 +87,14 @@ def unpack(data: bytes) -> tuple[Any, bytes]:
     if [kind for kind, _ in chunks] not in ([_JSON], [_JSON, _BINARY]):
         _damaged(f"byte {_HEADER.size}", "the chunks are not JSON and BIN")
     try:
-        document = json.loads(chunks[0][1].decode("utf-8"), parse_constant=_no_constant)
-    except (ValueError, RecursionError) as fault:
-        _damaged("JSON", str(fault))
+        document = schemas.parse(chunks[0][1])
+    except schemas.ShapeError as fault:
+        _damaged("JSON", fault.message)
     return document, chunks[1][1] if len(chunks) > 1 else b""
 
 
 def _padded(body: bytes, filling: bytes) -> bytes:
     return body + filling * (-len(body) % 4)
-
-
-def _no_constant(name: str) -> NoReturn:
-    raise ValueError(f"{name} is no number of JSON")
 
 
 def _damaged(place: str, message: str) -> NoReturn:

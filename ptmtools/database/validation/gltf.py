@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools import schemas
 from ptmtools.database.gltf.cell import flipped
 from ptmtools.database.gltf.container import GlbError
 from ptmtools.database.gltf.material import WRAPS, linear
@@ -42,11 +43,11 @@ def read_file(name: str, data: bytes, found: Findings) -> Any:
     try:
         if name.endswith(".glb"):
             return read_glb(data)
-        return json.loads(data) if name == f"{SERVED}/{GLTF_HINTS}" else None
+        return schemas.parse(data) if name == f"{SERVED}/{GLTF_HINTS}" else None
     except GlbError as fault:
         found.add(fault.code, name, fault.place, fault.message)
-    except (ValueError, RecursionError) as fault:
-        found.add("PTM-D737", name, "", f"damaged: {fault}")
+    except schemas.ShapeError as fault:
+        found.add("PTM-D737", name, "", fault.message)
     return None
 
 

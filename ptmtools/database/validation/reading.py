@@ -33,7 +33,7 @@ class FileReading:
     intact: whether its hash is the one in the manifest.
     texture: of a `.ptm` that could be read.
     held: of an emitter's file what its check needs, if that could be read.
-    unreadable: whether it is such a file and could not.
+    unreadable: whether it is of a kind that is read, and was not.
     """
 
     found: Findings = field(default_factory=Findings)
@@ -86,6 +86,7 @@ class FileReader:
         elif self._outputs.get(name, digest) != digest:
             reading.found.add("PTM-D652", name, "", "not what its stage wrote: the hash differs")
         if data is None:
+            reading.unreadable = True
             reading.found.add("PTM-D713", name, "", f"{size} bytes")
         elif served:
             with np.errstate(all="ignore"):
