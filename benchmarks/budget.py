@@ -3,9 +3,10 @@
     python benchmarks/budget.py MODEL... [--wall-area 2] [--budgets 0 2000 20000 200000 1000000]
 
 Two Markdown tables, a row for each model. First, for each budget: the average share of all leaves
-that a leaf may see, CPU seconds, and portals cut short. Second, for the default budget: near ties, those decided in double-double, those found open; then leaf pairs, pairs of default cells
-and CPU seconds where near ties are decided, where all count as visible, and where all count as
-hidden (which is not conservative).
+that a leaf may see, CPU seconds, and portals cut short. Second, for the default budget: near ties,
+those decided in double-double, those found open; then leaf pairs, pairs of default cells and CPU
+seconds where near ties are decided, where all count as visible, and where all count as hidden
+(which is not conservative).
 """
 
 from __future__ import annotations
