@@ -63,7 +63,7 @@ def test_sizes_and_work_add_up(leaky):
     assert summary.average == pytest.approx(sizes.mean())
     assert summary.operations == pvs.work.sum() > 0
     costliest = [one.operations for one in summary.costliest]
-    assert costliest == sorted(pvs.work.tolist(), reverse=True)[: len(dearest)]
+    assert costliest == sorted(pvs.work.tolist(), reverse=True)[: len(costliest)]
     assert summary.fallbacks == sum(compute_pvs(leaky.cells).cut)
     assert summary.conservative
 
