@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ptmtools.executors import Local
-from ptmtools.visibility import PvsOptions
+from ptmtools.visibility import PvsOptions, near_ties
 from ptmtools.visibility.flow import portal_flow
 from ptmtools.visibility.pvs import leaf_matrix
 
@@ -22,6 +22,14 @@ def prt():
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _every_near_tie_is_decided():
+    """As many as there are: otherwise the search from one portal counts as cut short."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(near_ties, "DECIDED", 10_000)
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -227,7 +227,12 @@ def test_too_many_portals_is_an_error_before_memory_is_taken():
         portal_flow(portals, 0)
 
 
-def test_progress_is_told(build_rooms):
-    told = []
-    compute_pvs(build_rooms(*ROW, ZIGZAG).cells, progress=lambda *step: told.append(step))
-    assert told[-1] == (6, 6, "portals")
+def test_progress_is_reported(build_rooms):
+    steps = []
+    compute_pvs(build_rooms(*ROW, ZIGZAG).cells, progress=lambda *step: steps.append(step))
+    assert steps[-1] == (6, 6, "portals")
+
+
+def test_the_deprecated_option_is_accepted_with_a_note():
+    assert PvsOptions().notes == ()
+    assert "--no-pvs-exact" in PvsOptions(exact=False).notes[0]

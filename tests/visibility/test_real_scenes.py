@@ -54,11 +54,11 @@ def test_nothing_visible_is_missed_and_without_a_portal_it_is(
 
     if name == "office":
         return  # so open that what one portal shows, others show as well
-    poorer = without_the_dearest_portal(cells, pvs)
+    poorer = without_the_costliest_portal(cells, pvs)
     assert check_conservative(walls, cells, poorer, SEGMENTS).missed
 
 
-def without_the_dearest_portal(cells: Cells, pvs: Pvs) -> Pvs:
+def without_the_costliest_portal(cells: Cells, pvs: Pvs) -> Pvs:
     """The PVS without that one of the ten largest portals that costs it most."""
     largest = np.argsort(-cells.portal_area, kind="stable")[:10]
     poorer = [compute_pvs(without_portal(cells, int(k))) for k in largest]

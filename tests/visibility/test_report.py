@@ -38,10 +38,10 @@ def leaky(build_rooms):
 
 def test_the_smallest_opening_that_shows_half_is_named(leaky):
     cells = leaky.cells
-    told = report(cells, compute_pvs(cells))
+    summary = report(cells, compute_pvs(cells))
     row = [leaky.index(i, 0, ROWS - 1) for i in range(LONG)]
-    assert {leak.cell for leak in told.leaks} <= set(row)
-    first = next(leak for leak in told.leaks if leak.cell == row[0])
+    assert {leak.cell for leak in summary.leaks} <= set(row)
+    first = next(leak for leak in summary.leaks if leak.cell == row[0])
     assert set(first.cells) == {row[GAP], row[GAP + 1]}
     assert (first.sees, first.through) == (LONG, LONG - GAP - 1)
     assert first.area == pytest.approx(0.04)
@@ -55,17 +55,17 @@ def test_rooms_that_all_see_as_much_do_not_leak(room_row):
 
 def test_sizes_and_work_add_up(leaky):
     pvs = compute_pvs(leaky.cells)
-    told = report(leaky.cells, pvs)
+    summary = report(leaky.cells, pvs)
     sizes = np.diff(pvs.start)
-    assert told.sizes[0] == (0.0, sizes.min())
-    assert told.sizes[-1] == (1.0, sizes.max())
-    assert dict(told.sizes)[0.5] == np.sort(sizes)[len(sizes) // 2 - 1]
-    assert told.average == pytest.approx(sizes.mean())
-    assert told.operations == pvs.work.sum() > 0
-    dearest = [one.operations for one in told.costliest]
-    assert dearest == sorted(pvs.work.tolist(), reverse=True)[: len(dearest)]
-    assert told.fallbacks == sum(compute_pvs(leaky.cells).cut)
-    assert told.conservative
+    assert summary.sizes[0] == (0.0, sizes.min())
+    assert summary.sizes[-1] == (1.0, sizes.max())
+    assert dict(summary.sizes)[0.5] == np.sort(sizes)[len(sizes) // 2 - 1]
+    assert summary.average == pytest.approx(sizes.mean())
+    assert summary.operations == pvs.work.sum() > 0
+    costliest = [one.operations for one in summary.costliest]
+    assert costliest == sorted(pvs.work.tolist(), reverse=True)[: len(costliest)]
+    assert summary.fallbacks == sum(compute_pvs(leaky.cells).cut)
+    assert summary.conservative
 
 
 def test_methods_are_ordered(leaky):

@@ -119,9 +119,9 @@ def test_what_does_not_belong_together_is_an_error(room_row):
 
 def test_progress_ends_at_the_total(room_row):
     scene, cells = room_row(2)
-    told = []
+    steps = []
     check_conservative(
         scene.points[scene.triangles], cells, compute_pvs(cells), 1_000, 0,
-        lambda *step: told.append(step),
+        lambda *step: steps.append(step),
     )  # fmt: skip
-    assert told[-1] == (1_000, 1_000, "segments")
+    assert steps[-1] == (1_000, 1_000, "segments")

@@ -111,6 +111,6 @@ def test_a_conservative_set_that_misses_a_pair_is_a_failure(tmp_path: Path) -> N
 
 
 def test_every_column_is_explained() -> None:
-    told = (pvs_trade.__doc__ or "").split()
+    words = (pvs_trade.__doc__ or "").split()
     columns = [f.name for f in fields(pvs_trade.Row)][4:]
-    assert [c for c in columns if c not in told and f"{c}," not in told] == []
+    assert [c for c in columns if c not in words and f"{c}," not in words] == []
