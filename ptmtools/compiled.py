@@ -20,31 +20,19 @@ import re
 import sys
 import tempfile
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property, update_wrapper
 from hashlib import sha256
+from importlib import import_module
 from pathlib import Path
 from threading import Lock
 from typing import Any, TypeVar, cast
 
-from ptmtools.progress import announce
+import llvmlite.ir  # type: ignore[import-untyped]
+import numba
+import numba.core.event
+import numba.extending
 
-# As it loads, numba asks for SciPy's BLAS, for products of matrices, of which no kernel has any.
-# Where SciPy happens to be installed that takes longer than everything else that `ptm encode` of a
-# small image imports but numba itself (0.2 s), and where little memory is left OpenBLAS tries for
-# ever to get some.
-_SCIPY = "scipy.linalg"
-_hidden = _SCIPY not in sys.modules
-if _hidden:
-    sys.modules[_SCIPY] = None  # type: ignore[assignment]
-try:
-    import llvmlite.ir  # type: ignore[import-untyped]
-    import numba
-    import numba.core.event
-    import numba.extending
-    import numba.np.arraymath
-finally:
-    if _hidden:
-        del sys.modules[_SCIPY]
+from ptmtools.progress import announce
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -64,7 +52,7 @@ def kernel(function: Function) -> Function:
     Floating point is strict: no operation is reordered or fused with another, so that results are
     the same on every machine with IEEE arithmetic.
     """
-    return _compiled(function)
+    return cast("Function", _Kernel(function))
 
 
 def plain_kernel(function: Function) -> Function:
@@ -73,7 +61,7 @@ def plain_kernel(function: Function) -> Function:
     Where small kernels hand arrays to each other in an inner loop, counting (an atomic operation
     for every array that is passed, unpacked or viewed) takes several times as long as the work.
     """
-    return _compiled(function, _nrt=False)
+    return cast("Function", _Kernel(function, _nrt=False))
 
 
 def inlined_kernel(function: Function) -> Function:
@@ -81,7 +69,7 @@ def inlined_kernel(function: Function) -> Function:
 
     A call hands over seven words for every array, those of tuples included.
     """
-    return _compiled(function, _nrt=False, forceinline=True)
+    return cast("Function", _Kernel(function, _nrt=False, forceinline=True))
 
 
 def _prefetch(_: Any, array: Any, index: Any) -> Any:
@@ -103,23 +91,72 @@ def _prefetch(_: Any, array: Any, index: Any) -> Any:
 prefetch: Any = numba.extending.intrinsic(_prefetch)
 
 
-#: The folder is a setting of the whole process, and kernels may be imported by several threads.
+class _Kernel:
+    """A function that is compiled in two forms, either of them when it is first needed.
+
+    Called from Python, it takes and returns Python's objects, and its machine code is kept. Called
+    from another kernel it becomes a part of that, and has nothing to do with either: compiling it
+    takes half of the time.
+    """
+
+    def __init__(self, function: Callable[..., Any], **options: bool) -> None:
+        self.py_func = function
+        self._options = {"nogil": True, "fastmath": False, "no_cfunc_wrapper": True, **options}
+        update_wrapper(self, function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self._entry(*arguments)
+
+    @cached_property
+    def _entry(self) -> Any:
+        settings: Any = numba.config
+        with _setting:
+            before = settings.CACHE_DIR
+            folder = _folder(before, self.py_func.__code__.co_filename)
+            settings.CACHE_DIR = folder
+            try:
+                entry = self._compiler(cache=bool(folder))
+            finally:
+                settings.CACHE_DIR = before
+        if folder:
+            # To load machine code takes none of what a compiler must know, all types and functions
+            # of numba, which numba would set up before: a quarter of a second run of `ptm encode`.
+            # Where something is to be compiled after all, they are set up then.
+            entry._cache.load_overload = entry._cache._load_overload
+        return entry
+
+    @cached_property
+    def _part(self) -> Any:
+        return self._compiler(no_cpython_wrapper=True)
+
+    @property
+    def _numba_type_(self) -> Any:
+        return numba.typeof(self._part)  # type: ignore[no-untyped-call]
+
+    def _compiler(self, **options: bool) -> Any:
+        compile_: Any = numba.njit
+        return compile_(**self._options, **options)(self.py_func)
+
+
+#: The folder is a setting of the whole process, and kernels may be called by several threads.
 _setting = Lock()
 
 
-def _compiled(function: Function, **options: bool) -> Function:
-    settings: Any = numba.config
-    with _setting:
-        before = settings.CACHE_DIR
-        settings.CACHE_DIR = _folder(before, function.__code__.co_filename)
-        try:
-            compile_: Any = numba.njit
-            compiled: Any = compile_(
-                cache=bool(settings.CACHE_DIR), nogil=True, fastmath=False, **options
-            )(function)
-        finally:
-            settings.CACHE_DIR = before
-    return cast("Function", compiled)
+def _load_without_scipy() -> None:
+    """Loads the part of numba that asks for SciPy's BLAS, for products of matrices, of which no
+    kernel has any.
+
+    Where SciPy happens to be installed that takes 0.2 s, and where little memory is left OpenBLAS
+    tries for ever to get some.
+    """
+    hidden = "scipy.linalg" not in sys.modules
+    if hidden:
+        sys.modules["scipy.linalg"] = None  # type: ignore[assignment]
+    try:
+        import_module("numba.np.arraymath")
+    finally:
+        if hidden:
+            del sys.modules["scipy.linalg"]
 
 
 class _FirstCompilation(numba.core.event.Listener):
@@ -130,6 +167,7 @@ class _FirstCompilation(numba.core.event.Listener):
     def on_start(self, event: Any) -> None:
         if not self._announced:
             self._announced = True
+            _load_without_scipy()
             announce("compiling for this machine, as on every first run; up to a minute")
 
     def on_end(self, event: Any) -> None:

@@ -7,6 +7,7 @@ frequency tables; the number of escapes and the escapes; the rANS words to the e
 from __future__ import annotations
 
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from ptmtools.texture.coders.haar import layout
 from ptmtools.texture.coders.haar.weights import fit_weights
 from ptmtools.texture.coders.rans import tables
 from ptmtools.texture.coders.rans.stream import encode_symbols, read_stream
+
+if TYPE_CHECKING:
+    from ptmtools.texture.coders.haar.kernels import Sink, Source
 
 #: Flag bits: weights are sent; from bit 4 on, component i is coded by rank.
 SENT_WEIGHTS = 1
@@ -70,16 +74,20 @@ def _if_sparse(values: NDArray[np.intp], samples: int) -> NDArray[np.intp] | Non
 
 def encode(level: Bytes, below: Bytes) -> bytes:
     """The group that refines ``below`` (h >> 1, w >> 1, c) to ``level`` (h, w, c)."""
+    from ptmtools.texture.coders.haar import kernels
+
     components = level.shape[2]
     sets = _sparse_values(level[: 2 * below.shape[0], : 2 * below.shape[1]])
     ranks = _ranks(sets)
     sent = fit_weights(level, below, ranks.ranks)
     n = level.size - below.size
-    symbols = np.zeros(n, np.uint16)
-    contexts = np.zeros(n, np.uint8)
-    counts = np.zeros((layout.TABLES, 256), np.int64)
-    _pass(True, level, below, sent, ranks, symbols, contexts, counts)
-    frequency, packed_tables = tables.choose(counts, layout.EDGE_TABLE)
+    sink = kernels.Sink(
+        symbols=np.zeros(n, np.uint16),
+        contexts=np.zeros(n, np.uint8),
+        counts=np.zeros((layout.TABLES, 256), np.int64),
+    )
+    _pass(level, below, sent, ranks, sink, None)
+    frequency, packed_tables = tables.choose(sink.counts, layout.EDGE_TABLE)
     flags = SENT_WEIGHTS if sent is not None else 0
     flags |= sum(RANKED << c for c in range(components) if sets[c] is not None)
     return b"".join(
@@ -88,7 +96,7 @@ def encode(level: Bytes, below: Bytes) -> bytes:
             *(_bitmap(used) for used in sets if used is not None),
             b"" if sent is None else sent[_sent_mask(components)].astype("<i2").tobytes(),
             packed_tables,
-            encode_symbols(symbols, contexts, frequency, layout.EDGE_TABLE),
+            encode_symbols(sink.symbols, sink.contexts, frequency, layout.EDGE_TABLE),
         ]
     )
 
@@ -121,10 +129,26 @@ def decode(
     level = np.empty(shape, np.uint8)
     edge = level.size - 4 * below.size
     stream = read_stream(reader.rest(), max(below.shape[1], edge))
-    result = _pass(
-        False, level, below, sent, _ranks(sets), words=stream.words, limit=stream.limit,
-        escapes=stream.escapes, lookup=tables.row_tables(frequency), turning=not version_1,
-    )  # fmt: skip
+    table, begins = tables.row_tables(frequency)
+    classes = layout.class_of_activity()
+    ranks = _ranks(sets)
+    source = kernels.Source(
+        words=stream.words,
+        limit=stream.limit,
+        escapes=stream.escapes,
+        table=table,
+        starts=begins[[classes, layout.CLASSES + classes, 0 * classes + layout.EDGE_TABLE]],
+        turning=not version_1,
+        values=ranks.values,
+        tops=ranks.tops,
+        flat=level.reshape(-1),
+        state=np.zeros(4, np.uint64),
+        decoded=np.zeros(max(below.shape[1], edge), np.int32),
+        zeros=np.zeros(edge, np.int32),
+        pairs=np.zeros((2, components, below.shape[1]), np.uint16),
+        mixed=np.zeros(components * below.shape[1], np.uint16),
+    )
+    result = _pass(level, below, sent, ranks, None, source)
     if result == kernels.TRUNCATED:
         raise damaged("its stream ends early")
     if result != kernels.OK:
@@ -133,53 +157,30 @@ def decode(
 
 
 def _pass(
-    encoding: bool,
     level: Bytes,
     below: Bytes,
     sent: NDArray[np.int32] | None,
     ranks: _Ranks,
-    symbols: NDArray[np.uint16] | None = None,
-    contexts: Bytes | None = None,
-    counts: NDArray[np.int64] | None = None,
-    words: NDArray[np.uint16] | None = None,
-    limit: int = 0,
-    escapes: NDArray[np.uint16] | None = None,
-    lookup: tuple[NDArray[np.uint32], NDArray[np.int64]] | None = None,
-    turning: bool = True,
+    sink: Sink | None,
+    source: Source | None,
 ) -> int:
-    """`kernels.haar_pass`, with empty arrays for what a direction does not use."""
+    """`kernels.haar_pass`."""
     from ptmtools.texture.coders.haar import kernels
 
     components = level.shape[2]
-    classes = layout.class_of_activity()
-    edge = level.size - 4 * below.size
     references = layout.references(components)
-    none = np.zeros(0, np.uint16)
-    no_bytes = np.zeros(0, np.uint8)
-    return int(
-        kernels.haar_pass(
-            encoding,
-            turning,
-            level,
-            no_bytes if encoding else level.reshape(-1),
-            below,
-            np.array(layout.plane_order(components), np.int64),
-            references,
-            layout.BUILT_IN_WEIGHTS[references] if sent is None else sent,
-            layout.ACTIVITY_WEIGHTS[references],
-            classes,
-            ranks.ranks,
-            ranks.values,
-            ranks.tops,
-            none if symbols is None else symbols,
-            no_bytes if contexts is None else contexts,
-            np.zeros((layout.TABLES, 0), np.int64) if counts is None else counts,
-            none if words is None else words,
-            limit,
-            none if escapes is None else escapes,
-            *(lookup or (np.zeros(0, np.uint32), np.zeros(layout.TABLES, np.int64))),
-            kernels.workspace(below.shape[1], components, edge, len(classes)),
-        )
+    return kernels.haar_pass(
+        level,
+        below,
+        np.array(layout.plane_order(components), np.int64),
+        references,
+        layout.BUILT_IN_WEIGHTS[references] if sent is None else sent,
+        layout.ACTIVITY_WEIGHTS[references],
+        layout.class_of_activity(),
+        ranks.ranks,
+        sink,
+        source,
+        kernels.workspace(below.shape[1], components),
     )
 
 

@@ -29,6 +29,7 @@ from ptmtools.texture.coders.haar.contexts import (
     context_v,
     gradient_row,
 )
+from ptmtools.texture.coders.haar.layout import CLASSES, EDGE_TABLE
 from ptmtools.texture.coders.rans.kernels import (
     ESCAPE,
     STATE_LOW,
@@ -46,57 +47,58 @@ OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2
 
 
 class Workspace(NamedTuple):
-    """What a pass needs besides its arguments.
+    """What a pass needs besides its arguments: made outside, so that nothing compiled allocates.
 
-    Made outside the compiled code, which is quicker to compile without allocations.
+    Coefficients are numbered: V, h1, h2'. Of two rows the one is block row y, the other y - 1.
     """
 
-    rows: Any
-    gradient: Any
-    v: Any
-    h: Any
-    g: Any
-    ev: Any
-    eh: Any
-    eg: Any
-    near_v: Any
-    near_h: Any
-    near_g: Any
-    prediction: Any
-    activity: Any
-    decoded: Any
-    pairs: Any
-    mixed: Any
-    zeros: Any
-    starts: Any
-    state: Any
+    rows: Any  # (c, 8, blocks + 4) int32: ranks of the level below
+    gradient: Any  # (c, 2, blocks) int32
+    differences: Any  # (3, c, 2, blocks + 2) int32
+    residuals: Any  # (3, c + 1, 2, blocks + 2) int32: those of plane c stay 0, for no reference
+    near: Any  # (3, c, blocks + 2) int32: magnitudes of the residuals above
+    prediction: Any  # (blocks,) int32
+    activity: Any  # (blocks,) int32
 
 
-def workspace(blocks: int, components: int, edge: int, activities: int) -> Workspace:
-    """For groups ``blocks`` wide, with so many ``edge`` samples and distinct ``activities``."""
+class Source(NamedTuple):
+    """Where a decoder's symbols come from, and what it needs to make texels of them."""
+
+    words: Any  # uint16, the stream, with a row's length and 8 more of padding behind `limit`
+    limit: Any
+    escapes: Any  # uint16
+    table: Any  # uint32 of `rans.tables.row_tables`
+    starts: Any  # (3, 1024) uint64: where the tables begin, by activity, of V and h1, h2', edges
+    turning: Any  # the states take turns from row to row; in version 1 each row begins anew
+    values: Any  # (c, 256) int32, by component: rank to value
+    tops: Any  # (c,) int64: the highest rank, 0 where values stand for themselves
+    flat: Any  # all samples of the level in one dimension
+    state: Any  # (4,) uint64
+    decoded: Any  # int32, a row or the edge
+    zeros: Any  # int32, likewise
+    pairs: Any  # (2, c, blocks) uint16
+    mixed: Any  # (c * blocks,) uint16
+
+
+class Sink(NamedTuple):
+    """Where an encoder's symbols go."""
+
+    symbols: Any  # (n,) uint16
+    contexts: Any  # (n,) uint8
+    counts: Any  # (tables, 256) int64, zeros before
+
+
+def workspace(blocks: int, components: int) -> Workspace:
+    """For groups ``blocks`` wide."""
     wide = blocks + 2
-    # One plane more than there are: its residuals stay 0 and stand for an absent reference.
-    more = components + 1
     return Workspace(
         rows=np.zeros((components, 8, blocks + 4), i32),
         gradient=np.zeros((components, 2, blocks), i32),
-        v=np.zeros((components, 2, wide), i32),
-        h=np.zeros((components, 2, wide), i32),
-        g=np.zeros((components, 2, wide), i32),
-        ev=np.zeros((more, 2, wide), i32),
-        eh=np.zeros((more, 2, wide), i32),
-        eg=np.zeros((more, wide), i32),
-        near_v=np.zeros((components, wide), i32),
-        near_h=np.zeros((components, wide), i32),
-        near_g=np.zeros((components, wide), i32),
+        differences=np.zeros((3, components, 2, wide), i32),
+        residuals=np.zeros((3, components + 1, 2, wide), i32),
+        near=np.zeros((3, components, wide), i32),
         prediction=np.zeros(blocks, i32),
         activity=np.zeros(blocks, i32),
-        decoded=np.zeros(max(blocks, edge), i32),
-        pairs=np.zeros((2, components, blocks), u16),
-        mixed=np.zeros(components * blocks, u16),
-        zeros=np.zeros(edge, i32),
-        starts=np.zeros((3, activities), np.uint64),
-        state=np.zeros(4, np.uint64),
     )
 
 
@@ -181,169 +183,139 @@ def mark_values(level: Any, used: Any) -> None:
 
 @kernel
 def haar_pass(
-    encoding: bool, turning: bool, level: Any, flat: Any, below: Any, planes: Any, references: Any,
-    weights: Any, activities: Any, classes: Any, ranks: Any, values: Any, tops: Any, symbols: Any,
-    contexts: Any, counts: Any, words: Any, limit: int, escapes: Any, table: Any, begins: Any,
-    work: Any,
+    level: Any, below: Any, planes: Any, references: Any, weights: Any, activities: Any,
+    classes: Any, ranks: Any, sink: Any, source: Any, work: Any,
 ) -> int:  # fmt: skip
-    """One group in either direction.
+    """One group in either direction: of ``sink`` and ``source`` one is None.
+
+    Each direction is compiled on its own, without what only the other one needs.
 
     Parameters
     ----------
-    encoding: True reads ``level`` and fills ``symbols``, ``contexts`` and ``counts``; False reads
-        ``words``, ``escapes`` and ``table`` and fills ``level``.
-    turning: the states take turns from row to row; False in version 1, where each row begins with
-        the first.
-    level: (h, w, c) uint8; ``flat``: decoding, all its samples in one dimension.
-    below: (h >> 1, w >> 1, c) uint8, the level below.
+    level: (h, w, c) uint8. below: (h >> 1, w >> 1, c) uint8, the level below.
     planes: (c,) int64, the components in coding order.
     references: (c,) int64, how many of the planes coded first each plane's residuals refer to.
     weights: (c, 3, 7) int32 and activities: (c, 3, 7) int32, by plane in coding order.
     classes: (1024,) int64, class of an activity.
-    ranks, values: (c, 256) int32, by component: value to rank, rank to value. tops: (c,) int64, the
-        highest rank, or 0 where values stand for themselves (``ranks`` is the identity then).
-    symbols: (n,) uint16, contexts: (n,) uint8, counts: (2 * classes + 1, 256) int64; decoding,
-        (2 * classes + 1, 0).
-    words: uint16, the stream, with a row's length and 8 more of padding behind ``limit``.
-    escapes: uint16. table: uint32 and begins: (2 * classes + 1,) int64 of `rans.tables.row_tables`.
-    work: from `workspace`.
+    ranks: (c, 256) int32, by component: value to rank.
 
     Returns OK, TRUNCATED (the stream ended early) or IMPOSSIBLE (no encoder writes this).
     """
     bh, bw, nc = below.shape
-    per_kind = (counts.shape[0] - 1) // 2
-    rows, gradient, state, starts = work.rows, work.gradient, work.state, work.starts
-    v, h, g = work.v, work.h, work.g
-    ev, eh, eg = work.ev, work.eh, work.eg
-    near_v, near_h, near_g = work.near_v, work.near_h, work.near_g
-    prediction, activity, decoded = work.prediction, work.activity, work.decoded
-    pairs, mixed = work.pairs, work.mixed
+    prediction, activity = work.prediction, work.activity
     height, width = level.shape[0], level.shape[1]
     tall = 2 * bh if width > 2 * bw else 0
     edge = nc * (tall + (width if height > 2 * bh else 0))
-    for j in range(classes.size):
-        starts[0, j] = begins[classes[j]]
-        starts[1, j] = begins[per_kind + classes[j]]
-        starts[2, j] = begins[2 * per_kind]
-
     # Of one type, or the helpers are compiled once more for the literal 0.
     zero: Any = np.int64(0)
     at, escaped, n = zero, zero, zero
-    if not encoding:
-        start_states(words, state)
+    if source is not None:
+        start_states(source.words, source.state)
         at = np.int64(8)
 
     for c in range(nc if below.size else 0):
         for y in range(-2, 2):
-            _load_row(below, planes[c], y, ranks[planes[c]], rows[c, y & 7])
+            _load_row(below, planes[c], y, ranks[planes[c]], work.rows[c, y & 7])
     stray = 0
     for y in range(bh + 1):
         now, before = y & 1, 1 - (y & 1)
         for c in range(nc):
-            plane = planes[c]
+            plane, rows = planes[c], work.rows[c]
             ref1 = 0 if references[c] > 0 else nc
             ref2 = 1 if references[c] > 1 else nc
+            v, h, g = work.differences[0, c], work.differences[1, c], work.differences[2, c]
+            ev, eh = work.residuals[0, c], work.residuals[1, c]
             if y < bh:
-                _load_row(below, plane, y + 2, ranks[plane], rows[c, (y + 2) & 7])
+                _load_row(below, plane, y + 2, ranks[plane], rows[(y + 2) & 7])
                 gradient_row(
-                    rows[c, (y - 1) & 7], rows[c, y & 7], rows[c, (y + 1) & 7], gradient[c, now]
+                    rows[(y - 1) & 7], rows[y & 7], rows[(y + 1) & 7], work.gradient[c, now]
                 )
-                if encoding:
-                    read_differences(level, plane, y, ranks[plane], v[c, now], h[c, now], g[c, now])
-                for k in range(2):
-                    if k == 0:
-                        found, residual, near = v[c, now], ev[c, now], near_v[c]
-                        context_v(
-                            rows[c], y, gradient[c, now], ev[ref1, now], ev[ref2, now], near,
-                            weights[c, 0], activities[c, 0], prediction, activity,
-                        )  # fmt: skip
-                    else:
-                        found, residual, near = h[c, now], eh[c, now], near_h[c]
-                        context_h(
-                            rows[c], y, gradient[c, now], v[c, now], ev[c, now], eh[ref1, now],
-                            eh[ref2, now], near, weights[c, 1], activities[c, 1], prediction,
-                            activity,
-                        )  # fmt: skip
-                    if encoding:
-                        _emit(
-                            found, prediction, activity, classes, zero, residual, near,
-                            symbols[n : n + bw], contexts[n : n + bw], counts,
-                        )  # fmt: skip
-                        n += bw
-                    else:
-                        at = decode_row(state, words, at, table, starts[0], activity, bw, decoded)
-                        if turning:
-                            rotate_states(state, bw)
-                        escaped = fill_escapes(decoded, bw, escapes, escaped)
-                        if at > limit or escaped < 0:
-                            return TRUNCATED
-                        _absorb(decoded, prediction, residual, near, found)
+                if sink is not None:
+                    read_differences(level, plane, y, ranks[plane], v[now], h[now], g[now])
             else:
                 for x in range(bw + 2):
-                    h[c, now, x] = h[c, before, x]
-                    eh[c, now, x] = 0
-            if y > 0:
-                context_g(
-                    rows[c], y - 1, gradient[c, before], v[c, before], h[c, before], h[c, now],
-                    ev[c, before], eh[c, before], eh[c, now], eg[ref1], eg[ref2], near_g[c],
-                    weights[c, 2], activities[c, 2], prediction, activity,
-                )  # fmt: skip
-                if encoding:
+                    h[now, x] = h[before, x]
+                    eh[now, x] = 0
+            for k in range(3):
+                row = before if k == 2 else now
+                r1, r2 = work.residuals[k, ref1, row], work.residuals[k, ref2, row]
+                residual, near = work.residuals[k, c, row], work.near[k, c]
+                w, a = weights[c, k], activities[c, k]
+                if k == 2:
+                    if y == 0:
+                        continue
+                    context_g(
+                        rows, y - 1, work.gradient[c, before], v[before], h[before], h[now],
+                        ev[before], eh[before], eh[now], r1, r2, near, w, a, prediction, activity,
+                    )  # fmt: skip
+                elif y == bh:
+                    continue
+                elif k == 0:
+                    context_v(
+                        rows, y, work.gradient[c, now], r1, r2, near, w, a, prediction, activity
+                    )
+                else:
+                    context_h(
+                        rows, y, work.gradient[c, now], v[now], ev[now], r1, r2, near, w, a,
+                        prediction, activity,
+                    )  # fmt: skip
+                found = work.differences[k, c, row]
+                if sink is not None:
                     _emit(
-                        g[c, before], prediction, activity, classes, per_kind, eg[c], near_g[c],
-                        symbols[n : n + bw], contexts[n : n + bw], counts,
+                        found, prediction, activity, classes, CLASSES if k == 2 else zero, residual,
+                        near, sink.symbols[n : n + bw], sink.contexts[n : n + bw], sink.counts,
                     )  # fmt: skip
                     n += bw
-                else:
-                    at = decode_row(state, words, at, table, starts[1], activity, bw, decoded)
-                    if turning:
-                        rotate_states(state, bw)
-                    escaped = fill_escapes(decoded, bw, escapes, escaped)
-                    if at > limit or escaped < 0:
+                if source is not None:
+                    at = decode_row(
+                        source.state, source.words, at, source.table, source.starts[k >> 1],
+                        activity, bw, source.decoded,
+                    )  # fmt: skip
+                    if source.turning:
+                        rotate_states(source.state, bw)
+                    escaped = fill_escapes(source.decoded, bw, source.escapes, escaped)
+                    if at > source.limit or escaped < 0:
                         return TRUNCATED
-                    _absorb(decoded, prediction, eg[c], near_g[c], g[c, before])
-                    upper, lower = pairs[0, plane], pairs[1, plane]
-                    if tops[plane] > 0:
-                        stray |= rebuild_ranked(
-                            below[y - 1], ranks[plane], values[plane], tops[plane], v[c, before],
-                            h[c, before], g[c, before], plane, upper, lower,
-                        )  # fmt: skip
-                    else:
-                        stray |= rebuild(
-                            rows[c, (y - 1) & 7],
-                            v[c, before],
-                            h[c, before],
-                            g[c, before],
-                            upper,
-                            lower,
-                        )
-        if y > 0 and not encoding:
-            for i in range(2):
-                begin = (2 * y - 2 + i) * width * nc
-                write_row(pairs[i], mixed, flat[begin : begin + 2 * bw * nc])
-    if edge:
-        # The odd last column, then the odd last row: modulo 256, so nothing can escape.
-        if not encoding:
-            at = decode_row(state, words, at, table, starts[2], work.zeros, edge, decoded)
-            if at > limit:
-                return TRUNCATED
-        i = 0
-        for j in range(edge // nc):
-            y, x = (j, width - 1) if j < tall else (height - 1, j - tall)
-            for plane in range(nc):
-                guess = _edge_prediction(level, y, x, plane)
-                if encoding:
-                    e = i32(i32(i32(i32(level[y, x, plane]) - guess + 128) & 255) - 128)
-                    z = i32(i32(e << 1) ^ i32(e >> 31))
-                    symbols[n + i] = z
-                    contexts[n + i] = 2 * per_kind
-                    counts[2 * per_kind, z] += 1
+                    _absorb(source.decoded, prediction, residual, near, found)
+            if source is not None and y > 0:
+                upper, lower = source.pairs[0, plane], source.pairs[1, plane]
+                if source.tops[plane] > 0:
+                    stray |= rebuild_ranked(
+                        below[y - 1], ranks[plane], source.values[plane], source.tops[plane],
+                        v[before], h[before], g[before], plane, upper, lower,
+                    )  # fmt: skip
                 else:
-                    z = decoded[i]
-                    level[y, x, plane] = (guess + ((z >> 1) ^ -(z & 1))) & 255
-                i += 1
-    if encoding:
-        return OK
-    for lane in range(4):
-        stray |= state[lane] != STATE_LOW
-    return IMPOSSIBLE if stray or at != limit or escaped != escapes.size else OK
+                    stray |= rebuild(
+                        rows[(y - 1) & 7], v[before], h[before], g[before], upper, lower
+                    )
+        if source is not None:
+            for i in range(2 if y > 0 else 0):
+                begin = (2 * y - 2 + i) * width * nc
+                write_row(source.pairs[i], source.mixed, source.flat[begin : begin + 2 * bw * nc])
+    # The odd last column, then the odd last row: modulo 256, so nothing can escape.
+    if source is not None and edge:
+        at = decode_row(
+            source.state, source.words, at, source.table, source.starts[2], source.zeros, edge,
+            source.decoded,
+        )  # fmt: skip
+        if at > source.limit:
+            return TRUNCATED
+    for i in range(edge):
+        j, plane = i // nc, i % nc
+        y, x = (j, width - 1) if j < tall else (height - 1, j - tall)
+        guess = _edge_prediction(level, y, x, plane)
+        if sink is not None:
+            e = i32(i32(i32(i32(level[y, x, plane]) - guess + 128) & 255) - 128)
+            z = i32(i32(e << 1) ^ i32(e >> 31))
+            sink.symbols[n + i] = z
+            sink.contexts[n + i] = EDGE_TABLE
+            sink.counts[EDGE_TABLE, z] += 1
+        if source is not None:
+            z = source.decoded[i]
+            level[y, x, plane] = (guess + ((z >> 1) ^ -(z & 1))) & 255
+    if source is not None:
+        for lane in range(4):
+            stray |= source.state[lane] != STATE_LOW
+        if stray or at != source.limit or escaped != source.escapes.size:
+            return IMPOSSIBLE
+    return OK

@@ -175,7 +175,7 @@ def _read(
     return frequency
 
 
-def row_tables(frequency: Frequencies) -> tuple[NDArray[np.uint32], NDArray[np.int64]]:
+def row_tables(frequency: Frequencies) -> tuple[NDArray[np.uint32], NDArray[np.uint64]]:
     """For `kernels.decode_row`: entries symbol << 24 | frequency << 12 | offset of all tables in
     use, one after the other, and where each table (t,) begins. Those not in use share one of zeros,
     which only a damaged stream asks for.
@@ -183,7 +183,7 @@ def row_tables(frequency: Frequencies) -> tuple[NDArray[np.uint32], NDArray[np.i
     from ptmtools.texture.coders.rans import frequencies
 
     used = frequency.any(axis=1)
-    begins = np.where(used, np.cumsum(used) * TABLE_SIZE, 0)
+    begins = np.where(used, np.cumsum(used) * TABLE_SIZE, 0).astype(np.uint64)
     table = np.empty((1 + int(used.sum())) * TABLE_SIZE, np.uint32)
     table[:TABLE_SIZE] = 0
     frequencies.fill_row_tables(frequency, begins, table)

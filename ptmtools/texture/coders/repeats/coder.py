@@ -6,6 +6,7 @@ Layout of a coded group: the frequency tables; the stream of `rans.stream`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,9 @@ from numpy.typing import NDArray
 from ptmtools.texture.coders.damage import damaged
 from ptmtools.texture.coders.rans import tables
 from ptmtools.texture.coders.rans.stream import encode_symbols, read_stream
+
+if TYPE_CHECKING:
+    from ptmtools.texture.coders.repeats.symbols import Source
 
 #: Weights in 1/64 of W, N, NW and NE, each less the block's mean, in predictions of p, q and r.
 WEIGHTS = np.array([[20, 24, -10, -7], [2, 27, -12, -2], [13, -7, -6, -39]], np.int64)
@@ -69,8 +73,7 @@ def find(level: Bytes, below: Bytes) -> Symbols:
     edge = level.shape[0] * level.shape[1] - 4 * blocks
     numbers = np.empty(kernels.MOST_SYMBOLS * blocks + 5 * edge, np.uint32)
     state = np.zeros(9, np.int64)
-    nothing = np.zeros(0, np.uint16)
-    _pass(True, _packed(level), _packed(below), level.shape[2], 0, numbers, nothing, state)
+    _pass(_packed(level), _packed(below), level.shape, numbers, None, state)
     numbers = numbers[: state[4]]
     symbols = np.empty(len(numbers), np.uint16)
     contexts = np.empty(len(numbers), np.uint8)
@@ -89,7 +92,7 @@ def write(found: Symbols) -> bytes:
 def decode(data: bytes, below: Bytes, shape: tuple[int, int, int]) -> Bytes:
     """The inverse of `find` and `write`. Raises InputError PTM-I112 for what no encoder writes."""
     from ptmtools.texture.coders.repeats import kernels
-    from ptmtools.texture.coders.repeats.symbols import TABLES
+    from ptmtools.texture.coders.repeats.symbols import TABLES, Source
 
     frequency, used = tables.parse(data, TABLES)
     stream = read_stream(memoryview(data)[used:], kernels.MOST_SYMBOLS)
@@ -97,10 +100,9 @@ def decode(data: bytes, below: Bytes, shape: tuple[int, int, int]) -> Bytes:
     state = np.zeros(9, np.int64)
     state[7] = escaped
     level = np.empty(shape[:2], np.uint32)
-    result = _pass(
-        False, level, _packed(below), shape[2], escaped + stream.limit,
-        tables.single_tables(frequency), np.concatenate([stream.escapes, stream.words]), state,
-    )  # fmt: skip
+    words = np.concatenate([stream.escapes, stream.words])
+    source = Source(tables.single_tables(frequency), words, escaped + stream.limit)
+    result = _pass(level, _packed(below), shape, None, source, state)
     if result == kernels.TRUNCATED:
         raise damaged("its stream ends early")
     if result != kernels.OK:
@@ -109,24 +111,23 @@ def decode(data: bytes, below: Bytes, shape: tuple[int, int, int]) -> Bytes:
 
 
 def _pass(
-    encoding: bool,
     level: NDArray[np.uint32],
     below: NDArray[np.uint32],
-    components: int,
-    limit: int,
-    numbers: NDArray[np.uint32],
-    words: NDArray[np.uint16],
+    shape: tuple[int, ...],
+    sink: NDArray[np.uint32] | None,
+    source: Source | None,
     state: NDArray[np.int64],
 ) -> int:
     """`kernels.repeats_pass`, with the tables that it fills."""
     from ptmtools.texture.coders.haar.layout import plane_order
     from ptmtools.texture.coders.repeats import kernels
 
+    height, width, components = shape
     bits = min(max(below.size.bit_length(), 6), MOST_BITS)
-    result = kernels.repeats_pass(
-        encoding,
-        level,
+    return kernels.repeats_pass(
         level.reshape(-1),
+        height,
+        width,
         below,
         np.array(plane_order(components), np.int64),
         WEIGHTS,
@@ -134,16 +135,12 @@ def _pass(
         np.zeros((5, 1 << bits), np.uint32),
         np.zeros(1 << bits, np.uint32),
         np.zeros(below.shape[1] + 1, np.int64),
-        np.zeros(4, np.uint64),
-        np.zeros(8, np.uint64),
         np.zeros(3, np.int64),
-        32 - bits,
-        limit,
-        numbers,
-        words,
+        np.uint64(32 - bits),
+        sink,
+        source,
         state,
     )
-    return int(result)
 
 
 def _packed(level: Bytes) -> NDArray[np.uint32]:

@@ -1,8 +1,8 @@
 """Compiled loop of the repeats coder: blocks, texels and samples that were seen before.
 
 One pass serves both directions. It goes through the 2×2 blocks in row-major order. Runs of blocks
-that are flat like all around them are one symbol. For each other block it asks
-tables of the last block seen in the same surroundings. If none of these is the one, smooth blocks
+that are flat like all around them are one symbol. For each other block it asks tables of the last
+block seen in the same surroundings. If none of these is the one, smooth blocks
 are coded by their Haar differences, rough ones texel by texel: each is a neighbour, or the last
 texel seen in the same surroundings, or new, and then its samples are predicted. A texel is one
 32-bit number, so that components cost nothing while something repeats. There is no search: encoder
@@ -30,15 +30,16 @@ from ptmtools.texture.coders.repeats.seen import (
     K3,
     K4,
     K5,
-    OTHER,
+    block_at,
     choices,
-    kept_block,
     known,
     minus,
-    plus,
-    seen_texel,
+    put_block,
+    same,
+    shifted,
     slot,
     spread,
+    texel_slot,
 )
 from ptmtools.texture.coders.repeats.symbols import (
     ESCAPES_END,
@@ -51,12 +52,7 @@ from ptmtools.texture.coders.repeats.symbols import (
     WORD,
     symbol,
 )
-from ptmtools.texture.coders.repeats.unseen import (
-    differences,
-    edge_samples,
-    remainders,
-    samples,
-)
+from ptmtools.texture.coders.repeats.unseen import differences, edge_texel, remainders, texel
 
 OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2
 
@@ -70,6 +66,8 @@ LONGEST_RUN = 254
 #: No block takes more symbols, so that words need to be counted once a block only.
 MOST_SYMBOLS = 24
 
+#: Positions in a block. Of one type: the helpers are compiled once for all of them.
+_P, _Q, _R = np.int64(0), np.int64(1), np.int64(2)
 _C0, _C1, _C2, _C3 = np.uint64(0), np.uint64(1), np.uint64(2), np.uint64(3)
 
 
@@ -104,125 +102,113 @@ def move_texels(packing: bool, level: Any, texels: Any) -> None:
 
 @kernel
 def repeats_pass(
-    encoding: bool, level: Any, flat: Any, below: Any, order: Any, weights: Any, classes: Any,
-    slots: Any, seen: Any, outcome: Any, block: Any, around: Any, errors: Any, shift: int,
-    limit: int, numbers: Any, words: Any, state: Any,
+    texels: Any, height: int, width: int, below: Any, order: Any, weights: Any, classes: Any,
+    slots: Any, seen: Any, outcome: Any, errors: Any, shift: Any, sink: Any, source: Any,
+    state: Any,
 ) -> int:  # fmt: skip
-    """One group in either direction.
+    """One group in either direction: of ``sink`` and ``source`` one is None.
+
+    Each direction is compiled on its own, without what only the other one needs.
 
     Parameters
     ----------
-    encoding: True reads ``level`` and fills ``numbers`` with symbol | context << 16; False fills
-        ``level`` from ``words``.
-    level: (h, w) uint32, texels with component c in bits 8 c to 8 c + 7. below: (h >> 1, w >> 1).
+    texels: (height * width,) uint32, with component c in bits 8 c to 8 c + 7; decoding fills it.
+    below: (height >> 1, width >> 1) uint32.
     order: (c,) int64, components in coding order. weights: (3, 4) int64, of p, q and r.
     classes: (1024,) uint8, class of an activity.
-    slots: (5, 2^b) and seen: (2^b,) uint32, zeros; shift: 32 - b.
-    outcome: (w // 2 + 1,) int64, zeros. block: (4,), around: (8,) uint64 and errors: (3,)
-        int64, overwritten.
-    limit: index of the word behind the last.
-    numbers: uint32; decoding, of `tables.single_tables`.
-    words: uint16, the escapes and behind them the words, with room for `MOST_SYMBOLS` more.
-    state: (9,) int64: see `COUNT`.
+    slots: (5, 2^b) and seen: (2^b,) uint32, zeros; shift: uint64, 32 - b.
+    outcome: (width // 2 + 1,) int64, zeros: 1 where the block above was new.
+    errors: (3,) int64, overwritten.
+    sink: uint32, filled with symbol | context << 16. source: `symbols.Source`.
+    state: (9,) int64: see `symbols.COUNT`.
 
     Returns OK, TRUNCATED or IMPOSSIBLE.
     """
     bh, bw = below.shape
-    height, width = level.shape
-    down = np.uint64(shift)
     one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
     wide = np.uint64(width)
-    if not encoding:
+    if source is not None:
         for lane in range(4):
             at = state[ESCAPES_END] + 2 * lane
-            state[lane] = np.int64(words[at]) | (np.int64(words[at + 1] & 0x7FFF) << 16)
+            state[lane] = np.int64(source.words[at]) | (
+                np.int64(source.words[at + 1] & 0x7FFF) << 16
+            )
         state[WORD] = state[ESCAPES_END] + 8
     for y in range(bh):
-        y0, y1 = 2 * y, 2 * y + 1
         before = 0
         # The block that ends a run: it is known not to be flat.
         after = -1
         x = -1
         while x + 1 < bw:
             x += 1
-            x0, x1 = 2 * x, 2 * x + 1
+            here = np.uint64(2 * (y * width + x))
+            above = here - wide
             mean = np.uint64(below[y, x])
             n0, n1, nw, ne = mean, mean, mean, mean
             w0, w1 = mean, mean
             if x > 0:
-                w0, w1 = np.uint64(level[y0, x0 - 1]), np.uint64(level[y1, x0 - 1])
+                w0, w1 = np.uint64(texels[here - one]), np.uint64(texels[here + wide - one])
                 nw = w0
             if y > 0:
-                n0, n1 = np.uint64(level[y0 - 1, x0]), np.uint64(level[y0 - 1, x1])
-                nw = np.uint64(level[y0 - 1, x0 - 1]) if x > 0 else n0
-                ne = np.uint64(level[y0 - 1, x1 + 1]) if x + 1 < bw else n1
-            even = n0 == mean and n1 == mean and w0 == mean and w1 == mean
-            if y > 0 and x != after and even:
+                n0, n1 = np.uint64(texels[above]), np.uint64(texels[above + one])
+                nw = np.uint64(texels[above - one]) if x > 0 else n0
+                ne = np.uint64(texels[above + two]) if x + 1 < bw else n1
+            flat = (mean, mean, mean, mean)
+            if y > 0 and x != after and same(flat, (n0, n1, w0, w1)):
                 many = 1
-                while (
-                    many < LONGEST_RUN and x + many < bw and np.uint64(below[y, x + many]) == mean
-                    and np.uint64(level[y0 - 1, x0 + 2 * many]) == mean
-                    and np.uint64(level[y0 - 1, x1 + 2 * many]) == mean
-                ):  # fmt: skip
+                while many < LONGEST_RUN and x + many < bw:
+                    at = above + np.uint64(2 * many)
+                    if below[y, x + many] != mean or texels[at] != mean or texels[at + one] != mean:
+                        break
                     many += 1
                 size = 0
                 while many >> (size + 1):
                     size += 1
                 plain = 0
-                if encoding:
-                    while plain < many and (
-                        np.uint64(level[y0, x0 + 2 * plain]) == mean
-                        and np.uint64(level[y0, x1 + 2 * plain]) == mean
-                        and np.uint64(level[y1, x0 + 2 * plain]) == mean
-                        and np.uint64(level[y1, x1 + 2 * plain]) == mean
+                if sink is not None:
+                    while plain < many and same(
+                        flat, block_at(texels, here + np.uint64(2 * plain), wide)
                     ):
                         plain += 1
-                rest = symbol(encoding, many - plain, RUN + size, numbers, words, state)
-                if rest > many:
-                    return IMPOSSIBLE
-                if not encoding:
-                    plain = many - rest
-                    for j in range(x0, x0 + 2 * plain):
-                        level[y0, j] = mean
-                        level[y1, j] = mean
-                    if state[WORD] > limit:
+                rest = symbol(many - plain, RUN + size, sink, source, state)
+                if source is not None:
+                    if rest > many:
+                        return IMPOSSIBLE
+                    if state[WORD] > source.limit:
                         return TRUNCATED
-                for j in range(x, x + plain):
-                    outcome[j] = 0
+                    plain = many - rest
+                    for i in range(plain):
+                        put_block(texels, here + np.uint64(2 * i), wide, flat)
+                for i in range(x, x + plain):
+                    outcome[i] = 0
                 if rest > 0:
                     after = x + plain
                 if plain > 0:
                     before = 0
                     x += plain - 1
                     continue
-            p, q, r, s = mean, mean, mean, mean
-            if encoding:
-                p, q = np.uint64(level[y0, x0]), np.uint64(level[y0, x1])
-                r, s = np.uint64(level[y1, x0]), np.uint64(level[y1, x1])
-            here = np.uint64(y0 * width + x0)
-            near = min(before, 1) + min(outcome[x], 1)
+            near = before + outcome[x]
+            before = 0
+            outcome[x] = 0
+            block = flat
+            if sink is not None:
+                block = block_at(texels, here, wide)
 
-            a = slot(mean * K0 + n0 * K2 + n1 * K3 + w0 * K4 + w1 * K5, down)
+            a = slot(mean * K0 + n0 * K2 + n1 * K3 + w0 * K4 + w1 * K5, shift)
             entry = np.uint64(slots[0, a])
             trust = np.int64(entry & three)
-            source = entry >> two
-            hit = 0
-            if encoding:
-                g0, g1, g2, g3 = kept_block(flat, source, wide, mean, trust > 0)
-                hit = 0 if p == g0 and q == g1 and r == g2 and s == g3 else 1
-            hit = symbol(encoding, hit, FIRST + 3 * trust + near, numbers, words, state)
-            if hit == 0:
+            guess = block_at(texels, entry >> two, wide) if trust > 0 else flat
+            missed = 0
+            if sink is not None:
+                missed = 0 if same(block, guess) else 1
+            if symbol(missed, FIRST + 3 * trust + near, sink, source, state) == 0:
                 if trust == 0:
                     slots[0, a] = here << two | one
                 elif trust < 3:
                     slots[0, a] = entry + one
-                before = 0
-                outcome[x] = 0
-                if not encoding:
-                    g0, g1, g2, g3 = kept_block(flat, source, wide, mean, trust > 0)
-                    level[y0, x0], level[y0, x1] = g0, g1
-                    level[y1, x0], level[y1, x1] = g2, g3
-                    if state[WORD] > limit:
+                if source is not None:
+                    put_block(texels, here, wide, guess)
+                    if state[WORD] > source.limit:
                         return TRUNCATED
                 continue
             slots[0, a] = here << two | one
@@ -230,143 +216,134 @@ def repeats_pass(
             up, under = max(y - 1, 0), min(y + 1, bh - 1)
             left, right = max(x - 1, 0), min(x + 1, bw - 1)
             east, south = np.uint64(below[y, right]), np.uint64(below[under, x])
+            south_west, south_east = np.uint64(below[under, left]), np.uint64(below[under, right])
             all_around = (
-                mean * K0 + east * K1 + south * K2 + np.uint64(below[up, x]) * K3
-                + np.uint64(below[y, left]) * K4
-                + (np.uint64(below[under, right]) ^ np.uint64(0x55)) * K5
-                + (np.uint64(below[under, left]) * K1 + np.uint64(below[up, right]) * K4)
-                * np.uint64(3)
-                + np.uint64(below[up, left]) * np.uint64(5)
+                mean * K0 + east * K1 + south * K2 + below[up, x] * K3 + below[y, left] * K4
+                + (south_east ^ np.uint64(0x55)) * K5
+                + (south_west * K1 + below[up, right] * K4) * three
+                + below[up, left] * np.uint64(5)
             )  # fmt: skip
-            b = slot(all_around, down)
-            c = slot(mean * K0, down)
+            b = slot(all_around, shift)
+            c = slot(mean * K0, shift)
             d = slot(
                 minus(n0, mean) * K0 + minus(n1, mean) * K2 + minus(w0, mean) * K3
                 + minus(w1, mean) * K4 + minus(east, mean) * K5 + minus(south, mean) * K1,
-                down,
+                shift,
             )  # fmt: skip
-            found = DIFFERENCES
-            context = GUESS + 4 * near
-            guesses = (slots[1, b], slots[2, c], slots[3, d])
-            if guesses[0] > 0:
-                context += 1
-            if guesses[1] > 0:
-                context += 2
+            places = (np.uint64(slots[1, b]), np.uint64(slots[2, c]), np.uint64(slots[3, d]))
             change = minus(mean, np.uint64(slots[4, d]))
-            slot_p = slot(mean * K0 + w0 * K2 + n0 * K3 + nw * K4 + n1 * K5, down)
+            context = GUESS + 4 * near
+            if places[0] > 0:
+                context += 1
+            if places[1] > 0:
+                context += 2
+            slot_p = texel_slot(mean, K0, w0, K2, n0, K3, nw, K4, n1, K5, shift)
             slot_q, slot_r, slot_s = slot_p, slot_p, slot_p
-            if encoding:
-                slot_q = slot(mean * K1 + p * K2 + n1 * K3 + n0 * K4 + ne * K5, down)
-                slot_r = slot(mean * K2 + w1 * K3 + p * K4 + w0 * K5 + q * K0, down)
-                slot_s = slot(mean * K3 + p * K4 + q * K5 + r * K0, down)
+            found = DIFFERENCES
+            if sink is not None:
+                p, q, r, s = block
+                slot_q = texel_slot(mean, K1, p, K2, n1, K3, n0, K4, ne, K5, shift)
+                slot_r = texel_slot(mean, K2, w1, K3, p, K4, w0, K5, q, K0, shift)
+                slot_s = slot(mean * K3 + p * K4 + q * K5 + r * K0, shift)
                 familiar = 1 if known(p, np.uint64(seen[slot_p]), w0, n0, nw, n1) < 5 else 0
                 familiar += 1 if known(q, np.uint64(seen[slot_q]), p, n1, n0, ne) < 5 else 0
                 familiar += 1 if known(r, np.uint64(seen[slot_r]), w1, p, w0, q) < 5 else 0
-                if familiar * order.size >= SMOOTH_KNOWN or spread(p, q, r, s, order.size) >= ROUGH:
+                if familiar * order.size >= SMOOTH_KNOWN or spread(block, order.size) >= ROUGH:
                     found = TEXELS
-            if encoding:
-                for k in range(2, -1, -1):
-                    kept = np.uint64(guesses[k])
-                    g0, g1, g2, g3 = kept_block(flat, kept - one, wide, mean, kept > 0)
-                    if kept > 0 and k == 2:
-                        g0, g1 = plus(g0, change), plus(g1, change)
-                        g2, g3 = plus(g2, change), plus(g3, change)
-                    if p == g0 and q == g1 and r == g2 and s == g3:
-                        found = k
-            found = symbol(encoding, found, context, numbers, words, state)
+                for i in range(2, -1, -1):
+                    guess = flat
+                    if places[i] > 0:
+                        guess = block_at(texels, places[i] - one, wide)
+                        if i == 2:
+                            guess = shifted(guess, change)
+                    if same(block, guess):
+                        found = i
+            found = symbol(found, context, sink, source, state)
             slots[1, b] = here + one
             slots[2, c] = here + one
             slots[3, d] = here + one
             slots[4, d] = mean
             if found < GUESSES:
-                before = 0
-                outcome[x] = 0
-                if not encoding and guesses[found] > 0:
-                    p, q, r, s = kept_block(flat, np.uint64(guesses[found]) - one, wide, mean, True)
+                if source is not None and places[found] > 0:
+                    block = block_at(texels, places[found] - one, wide)
                     if found == 2:
-                        p, q = plus(p, change), plus(q, change)
-                        r, s = plus(r, change), plus(s, change)
+                        block = shifted(block, change)
             else:
                 before = 1
                 outcome[x] = 1
+                p, q, r, s = block
                 if found == TEXELS:
                     context = TEXEL + 4 * near
-                    block[0], block[1], block[2], block[3] = p, q, r, s
-                    for j in range(3):
-                        west, north, corner, other = w0, n0, nw, n1
-                        key = mean * K0 + w0 * K2 + n0 * K3 + nw * K4 + n1 * K5
-                        if j == 1:
-                            west, north, corner, other = block[0], n1, n0, ne
-                            key = mean * K1 + block[0] * K2 + n1 * K3 + n0 * K4 + ne * K5
-                        if j == 2:
-                            west, north, corner, other = w1, block[0], w0, block[1]
-                            key = mean * K2 + w1 * K3 + block[0] * K4 + w0 * K5 + block[1] * K0
-                        last = np.uint64(seen[slot(key, down)])
-                        texel = seen_texel(
-                            encoding, block[j], last, west, north, corner, other, context + 12 * j,
-                            numbers, words, state,
-                        )  # fmt: skip
-                        if texel == OTHER:
-                            texel = samples(
-                                encoding, block[j], mean, west, north, corner, other, j, order,
-                                weights, classes, numbers, words, state,
-                            )  # fmt: skip
-                        block[j] = texel
-                    p, q, r = block[0], block[1], block[2]
-                    slot_s = slot(mean * K3 + p * K4 + q * K5 + r * K0, down)
+                    p = texel(
+                        _P, p, np.uint64(seen[slot_p]), mean, w0, n0, nw, n1, context, order,
+                        weights, classes, sink, source, state,
+                    )  # fmt: skip
+                    if source is not None:
+                        slot_q = texel_slot(mean, K1, p, K2, n1, K3, n0, K4, ne, K5, shift)
+                    q = texel(
+                        _Q, q, np.uint64(seen[slot_q]), mean, p, n1, n0, ne, context + 12, order,
+                        weights, classes, sink, source, state,
+                    )  # fmt: skip
+                    if source is not None:
+                        slot_r = texel_slot(mean, K2, w1, K3, p, K4, w0, K5, q, K0, shift)
+                    r = texel(
+                        _R, r, np.uint64(seen[slot_r]), mean, w1, p, w0, q, context + 24, order,
+                        weights, classes, sink, source, state,
+                    )  # fmt: skip
+                    if source is not None:
+                        slot_s = slot(mean * K3 + p * K4 + q * K5 + r * K0, shift)
                     last = np.uint64(seen[slot_s])
-                    possible, place, _ = choices(mean, p, q, r, last, w1, s, 0)
+                    possible, place, _ = choices(mean, p, q, r, last, w1, s, np.int64(0))
                     if place < 0:
                         place = possible
                     if possible > 0:
                         context += 36 + min(possible - 1, 3)
-                        place = symbol(encoding, place, context, numbers, words, state)
+                        place = symbol(place, context, sink, source, state)
                     else:
                         place = 0
                     if place >= possible:
-                        s = remainders(encoding, s, mean, p, q, r, order, numbers, words, state)
-                    elif not encoding:
+                        s = remainders(s, mean, p, q, r, order, sink, source, state)
+                    elif source is not None:
                         _, _, s = choices(mean, p, q, r, last, w1, s, place)
                 else:
-                    block[0], block[1], block[2], block[3] = p, q, r, s
-                    around[0], around[1], around[2], around[3] = w0, w1, n0, n1
-                    around[4], around[5] = east, south
-                    around[6] = np.uint64(below[under, left])
-                    around[7] = np.uint64(below[under, right])
-                    differences(
-                        encoding, block, mean, around, errors, order, classes, numbers, words, state
-                    )
-                    p, q, r, s = block[0], block[1], block[2], block[3]
-                slot_q = slot(mean * K1 + p * K2 + n1 * K3 + n0 * K4 + ne * K5, down)
-                slot_r = slot(mean * K2 + w1 * K3 + p * K4 + w0 * K5 + q * K0, down)
-                slot_s = slot(mean * K3 + p * K4 + q * K5 + r * K0, down)
+                    p, q, r, s = differences(
+                        block, mean, (w0, w1, n0, n1, east, south, south_west, south_east), errors,
+                        order, classes, sink, source, state,
+                    )  # fmt: skip
+                    if source is not None:
+                        slot_q = texel_slot(mean, K1, p, K2, n1, K3, n0, K4, ne, K5, shift)
+                        slot_r = texel_slot(mean, K2, w1, K3, p, K4, w0, K5, q, K0, shift)
+                        slot_s = slot(mean * K3 + p * K4 + q * K5 + r * K0, shift)
                 seen[slot_p], seen[slot_q], seen[slot_r], seen[slot_s] = p, q, r, s
-            if not encoding:
-                level[y0, x0], level[y0, x1] = p, q
-                level[y1, x0], level[y1, x1] = r, s
-                if state[WORD] > limit:
+                block = (p, q, r, s)
+            if source is not None:
+                put_block(texels, here, wide, block)
+                if state[WORD] > source.limit:
                     return TRUNCATED
     tall = 2 * bh if width > 2 * bw else 0
     for i in range(tall + (width if height > 2 * bh else 0)):
         y, x = (i, width - 1) if i < tall else (height - 1, i - tall)
-        texel = np.uint64(level[y, x])
-        w = np.uint64(level[y, x - 1]) if x > 0 else np.uint64(level[y - 1, x] if y > 0 else 0)
-        n = np.uint64(level[y - 1, x]) if y > 0 else w
-        nw = np.uint64(level[y - 1, x - 1]) if y > 0 and x > 0 else n
-        slot_p = slot(w * K4 + n * K3 + nw * K2, down)
+        here = np.uint64(y * width + x)
+        above = here - wide
+        own = np.uint64(texels[here])
+        n = np.uint64(texels[above]) if y > 0 else np.uint64(0)
+        w = np.uint64(texels[here - one]) if x > 0 else n
+        if y == 0:
+            n = w
+        nw = np.uint64(texels[above - one]) if y > 0 and x > 0 else n
+        slot_p = slot(w * K4 + n * K3 + nw * K2, shift)
         last = np.uint64(seen[slot_p])
-        kept = texel
-        texel = seen_texel(encoding, texel, last, w, n, nw, nw, TEXEL + 48, numbers, words, state)
-        if texel == OTHER:
-            texel = edge_samples(encoding, kept, w, n, nw, order.size, numbers, words, state)
-        seen[slot_p] = texel
-        level[y, x] = texel
-        if not encoding and state[WORD] > limit:
-            return TRUNCATED
-    if encoding:
-        return OK
-    stray = state[STRAY] != 0 or state[WORD] != limit
-    stray |= state[NEXT_ESCAPE] != state[ESCAPES_END]
-    for lane in range(4):
-        stray |= state[lane] != STATE_LOW
-    return IMPOSSIBLE if stray else OK
+        own = edge_texel(own, last, w, n, nw, order.size, sink, source, state)
+        seen[slot_p] = own
+        if source is not None:
+            texels[here] = own
+            if state[WORD] > source.limit:
+                return TRUNCATED
+    if source is not None:
+        stray = state[STRAY] != 0 or state[WORD] != source.limit
+        stray |= state[NEXT_ESCAPE] != state[ESCAPES_END]
+        for lane in range(4):
+            stray |= state[lane] != STATE_LOW
+        if stray:
+            return IMPOSSIBLE
+    return OK

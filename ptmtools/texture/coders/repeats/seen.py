@@ -1,6 +1,7 @@
 """Blocks and texels that were seen before: where they are looked for, and which of them it is.
 
-A texel is one number of 32 bits; numbers are of 64, sums modulo 2^32.
+A texel is one number of 32 bits; numbers are of 64, sums modulo 2^32. A block is its four texels
+p q r s.
 """
 
 from __future__ import annotations
@@ -20,13 +21,15 @@ K3, K4, K5 = np.uint64(0x27D4EB2F), np.uint64(0x165667B1), np.uint64(0xA24BAED5)
 _MASK32 = np.uint64(0xFFFFFFFF)
 _HIGH = np.uint64(0x80808080)
 _LOW7 = np.uint64(0x7F7F7F7F)
-_ONE = np.uint64(1)
+_EVEN = np.uint64(0x00FF00FF)
+_ONE, _TWO, _EIGHT, _FIFTEEN = np.uint64(1), np.uint64(2), np.uint64(8), np.uint64(15)
+_BYTE = np.uint64(255)
 
 
 @kernel
 def slot(h: Any, shift: Any) -> Any:
     h &= _MASK32
-    h ^= h >> np.uint64(15)
+    h ^= h >> _FIFTEEN
     return ((h * K1) & _MASK32) >> shift
 
 
@@ -37,13 +40,56 @@ def minus(a: Any, b: Any) -> Any:
 
 
 @kernel
-def plus(a: Any, b: Any) -> Any:
+def _plus(a: Any, b: Any) -> Any:
     """a + b, byte by byte."""
     return ((a & _LOW7) + (b & _LOW7)) ^ ((a ^ b) & _HIGH)
 
 
 @kernel
-def known(texel: Any, seen: Any, w: Any, n: Any, nw: Any, ne: Any) -> int:
+def shifted(block: Any, change: Any) -> Any:
+    """A block with ``change`` added to each byte of its texels."""
+    p, q, r, s = block
+    return _plus(p, change), _plus(q, change), _plus(r, change), _plus(s, change)
+
+
+@kernel
+def same(one: Any, other: Any) -> Any:
+    p, q, r, s = one
+    a, b, c, d = other
+    return (p == a) & (q == b) & (r == c) & (s == d)
+
+
+@kernel
+def block_at(texels: Any, place: Any, wide: Any) -> Any:
+    """The block that begins at ``place``."""
+    return (
+        np.uint64(texels[place]),
+        np.uint64(texels[place + _ONE]),
+        np.uint64(texels[place + wide]),
+        np.uint64(texels[place + wide + _ONE]),
+    )
+
+
+@kernel
+def put_block(texels: Any, place: Any, wide: Any, block: Any) -> None:
+    p, q, r, s = block
+    texels[place] = p
+    texels[place + _ONE] = q
+    texels[place + wide] = r
+    texels[place + wide + _ONE] = s
+
+
+@kernel
+def texel_slot(
+    mean: Any, k: Any, w: Any, kw: Any, n: Any, kn: Any, nw: Any, knw: Any, ne: Any, kne: Any,
+    shift: Any,
+) -> Any:  # fmt: skip
+    """Where the last texel in such surroundings is kept."""
+    return slot(mean * k + w * kw + n * kn + nw * knw + ne * kne, shift)
+
+
+@kernel
+def known(texel: Any, seen: Any, w: Any, n: Any, nw: Any, ne: Any) -> Any:
     """Number of the first guess that is the texel; 5 for none."""
     found = 4 if texel == ne else 5
     if texel == nw:
@@ -57,57 +103,49 @@ def known(texel: Any, seen: Any, w: Any, n: Any, nw: Any, ne: Any) -> int:
 
 @kernel
 def seen_texel(
-    encoding: bool, texel: Any, seen: Any, w: Any, n: Any, nw: Any, ne: Any, context: int,
-    numbers: Any, words: Any, state: Any,
+    texel: Any, seen: Any, w: Any, n: Any, nw: Any, ne: Any, context: Any, sink: Any, source: Any,
+    state: Any,
 ) -> Any:  # fmt: skip
     """A texel that is one of five guesses, or `OTHER`."""
     found = known(texel, seen, w, n, nw, ne)
     if w == n:
         context += 1
-    if seen in (w, n):
+    if (seen == w) | (seen == n):
         context += 2
-    found = symbol(encoding, found, context, numbers, words, state)
-    if found == 0:
-        texel = seen
-    elif found == 1:
-        texel = w
-    elif found == 2:
-        texel = n
-    elif found == 3:
-        texel = nw
-    elif found == 4:
-        texel = ne
-    else:
-        texel = OTHER
-    return texel
+    found = symbol(found, context, sink, source, state)
+    if source is not None:
+        texel = nw if found == 3 else ne
+        if found == 2:
+            texel = n
+        if found == 1:
+            texel = w
+        if found == 0:
+            texel = seen
+    return texel if found < 5 else OTHER
 
 
 @kernel
 def _fits(mean: Any, p: Any, q: Any, r: Any, s: Any) -> Any:
     """Whether a block has this mean in every component."""
-    even = np.uint64(0x00FF00FF)
-    eight = np.uint64(8)
-    low = (p & even) + (q & even) + (r & even) + (s & even)
+    low = (p & _EVEN) + (q & _EVEN) + (r & _EVEN) + (s & _EVEN)
     high = (
-        ((p >> eight) & even) + ((q >> eight) & even) + ((r >> eight) & even)
-        + ((s >> eight) & even)
+        ((p >> _EIGHT) & _EVEN) + ((q >> _EIGHT) & _EVEN) + ((r >> _EIGHT) & _EVEN)
+        + ((s >> _EIGHT) & _EVEN)
     )  # fmt: skip
-    return ((low >> np.uint64(2)) & even) == (mean & even) and ((high >> np.uint64(2)) & even) == (
-        (mean >> eight) & even
-    )
+    return (((low >> _TWO) & _EVEN) | (((high >> _TWO) & _EVEN) << _EIGHT)) == mean
 
 
 @kernel
-def choices(mean: Any, p: Any, q: Any, r: Any, seen: Any, west: Any, wanted: Any, nth: int) -> Any:
+def choices(mean: Any, p: Any, q: Any, r: Any, seen: Any, west: Any, wanted: Any, nth: Any) -> Any:
     """Fourth texels that the mean allows: their number, the place of ``wanted``, the ``nth``."""
     texels = (seen, r, q, p, west)
     possible, place, chosen = 0, -1, seen
     for i in range(5):
         one = texels[i]
-        fresh = True
+        fresh = _fits(mean, p, q, r, one)
         for j in range(i):
             fresh &= texels[j] != one
-        if fresh and _fits(mean, p, q, r, one):
+        if fresh:
             if one == wanted:
                 place = possible
             if possible == nth:
@@ -117,23 +155,12 @@ def choices(mean: Any, p: Any, q: Any, r: Any, seen: Any, west: Any, wanted: Any
 
 
 @kernel
-def kept_block(flat: Any, place: Any, wide: Any, mean: Any, kept: Any) -> Any:
-    """The block that begins at ``place``, if one is kept, else four times the mean."""
-    p, q, r, s = mean, mean, mean, mean
-    if kept:
-        p, q = np.uint64(flat[place]), np.uint64(flat[place + _ONE])
-        r, s = np.uint64(flat[place + wide]), np.uint64(flat[place + wide + _ONE])
-    return p, q, r, s
-
-
-@kernel
-def spread(p: Any, q: Any, r: Any, s: Any, components: int) -> Any:
+def spread(block: Any, components: Any) -> Any:
     """The largest difference between texels of a block, over the components."""
+    p, q, r, s = block
     most: Any = 0
-    for c in range(components):
-        at = np.uint64(8 * c)
-        byte = np.uint64(255)
-        a, b = np.int64((p >> at) & byte), np.int64((q >> at) & byte)
-        d, e = np.int64((r >> at) & byte), np.int64((s >> at) & byte)
-        most = max(most, max(max(a, b), max(d, e)) - min(min(a, b), min(d, e)))
+    for _ in range(components):
+        a, b, c, d = p & _BYTE, q & _BYTE, r & _BYTE, s & _BYTE
+        most = max(most, np.int64(max(max(a, b), max(c, d)) - min(min(a, b), min(c, d))))
+        p, q, r, s = p >> _EIGHT, q >> _EIGHT, r >> _EIGHT, s >> _EIGHT
     return most

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,22 +21,30 @@ TABLES = RUN + 8
 COUNT, WORD, NEXT_ESCAPE, ESCAPES_END, STRAY = 4, 5, 6, 7, 8
 
 
+class Source(NamedTuple):
+    """Where a decoder's symbols come from."""
+
+    table: Any  # uint32 of `rans.tables.single_tables`
+    words: Any  # uint16, the escapes and behind them the words, with room for a block's more
+    limit: Any  # index of the word behind the last
+
+
 @kernel
-def symbol(encoding: bool, z: Any, context: Any, numbers: Any, words: Any, state: Any) -> Any:
-    """Symbol ``z`` to ``numbers`` or, decoding, the next one from ``words``."""
+def symbol(z: Any, context: Any, sink: Any, source: Any, state: Any) -> Any:
+    """Symbol ``z`` to ``sink`` as symbol | context << 16 or, decoding, the next of ``source``."""
     n = state[COUNT]
     state[COUNT] = n + 1
-    if encoding:
-        numbers[np.uint64(n)] = z | context << 16
-        return np.int64(z)
-    at = np.uint64(state[WORD])
-    z, refill = decode_single(numbers, context, state, np.uint64(n & 3), words[at])
-    state[WORD] = at + (np.uint64(1) if refill else np.uint64(0))
-    if z == ESCAPE:
-        at = np.uint64(state[NEXT_ESCAPE])
-        if state[NEXT_ESCAPE] < state[ESCAPES_END]:
-            z = np.int64(words[at])
-            state[NEXT_ESCAPE] = at + np.uint64(1)
-        else:
-            state[STRAY] = 1
-    return z
+    if sink is not None:
+        sink[np.uint64(n)] = z | context << 16
+    if source is not None:
+        at = np.uint64(state[WORD])
+        z, refill = decode_single(source.table, context, state, np.uint64(n & 3), source.words[at])
+        state[WORD] = at + (np.uint64(1) if refill else np.uint64(0))
+        if z == ESCAPE:
+            at = np.uint64(state[NEXT_ESCAPE])
+            if state[NEXT_ESCAPE] < state[ESCAPES_END]:
+                z = np.int64(source.words[at])
+                state[NEXT_ESCAPE] = at + np.uint64(1)
+            else:
+                state[STRAY] = 1
+    return np.int64(z)

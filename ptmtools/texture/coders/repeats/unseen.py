@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ptmtools.compiled import plain_kernel as kernel
+from ptmtools.texture.coders.repeats.seen import OTHER, seen_texel
 from ptmtools.texture.coders.repeats.symbols import (
     CLASSES,
     EDGE,
@@ -14,6 +15,7 @@ from ptmtools.texture.coders.repeats.symbols import (
     REMAINDER,
     SAMPLE,
     STRAY,
+    TEXEL,
     symbol,
 )
 
@@ -26,9 +28,9 @@ def _index(activity: Any) -> Any:
 
 
 @kernel
-def samples(
-    encoding: bool, texel: Any, mean: Any, w: Any, n: Any, nw: Any, ne: Any, position: int,
-    order: Any, weights: Any, classes: Any, numbers: Any, words: Any, state: Any,
+def _samples(
+    texel: Any, mean: Any, w: Any, n: Any, nw: Any, ne: Any, position: Any, order: Any,
+    weights: Any, classes: Any, sink: Any, source: Any, state: Any,
 ) -> Any:  # fmt: skip
     """p, q or r of a block, sample by sample, each predicted from its surroundings."""
     out = np.uint64(0)
@@ -54,7 +56,7 @@ def samples(
         guess = min(max(guess, 0), 255)
         level = np.int64(classes[_index(activity)])
         e = ((np.int64((texel >> at) & byte) - guess + 128) & 255) - 128
-        z = symbol(encoding, (e << 1) ^ (e >> 63), context + level, numbers, words, state)
+        z = symbol((e << 1) ^ (e >> 63), context + level, sink, source, state)
         value = (guess + ((z >> 1) ^ -(z & 1))) & 255
         if c == 0:
             reference = value - guess
@@ -65,9 +67,22 @@ def samples(
 
 
 @kernel
+def texel(
+    position: Any, wanted: Any, seen: Any, mean: Any, w: Any, n: Any, nw: Any, ne: Any,
+    context: Any, order: Any, weights: Any, classes: Any, sink: Any, source: Any, state: Any,
+) -> Any:  # fmt: skip
+    """p, q or r of a block."""
+    found = seen_texel(wanted, seen, w, n, nw, ne, context, sink, source, state)
+    if found == OTHER:
+        found = _samples(
+            wanted, mean, w, n, nw, ne, position, order, weights, classes, sink, source, state
+        )
+    return found
+
+
+@kernel
 def remainders(
-    encoding: bool, s: Any, mean: Any, p: Any, q: Any, r: Any, order: Any, numbers: Any,
-    words: Any, state: Any,
+    s: Any, mean: Any, p: Any, q: Any, r: Any, order: Any, sink: Any, source: Any, state: Any,
 ) -> Any:  # fmt: skip
     """s of a block by the remainder of the sum in each component."""
     out = np.uint64(0)
@@ -81,7 +96,7 @@ def remainders(
         kind = 0 if guess < 0 else 1 if guess < 4 else 2
         guess = min(max(guess, 0), 3)
         value = np.int64((s >> at) & byte) - base
-        z = symbol(encoding, (value - guess) & 3, REMAINDER + kind, numbers, words, state)
+        z = symbol((value - guess) & 3, REMAINDER + kind, sink, source, state)
         value = base + ((z + guess) & 3)
         if value < 0 or value > 255:
             state[STRAY] = 1
@@ -91,10 +106,10 @@ def remainders(
 
 @kernel
 def differences(
-    encoding: bool, block: Any, mean: Any, around: Any, errors: Any, order: Any, classes: Any,
-    numbers: Any, words: Any, state: Any,
-) -> None:  # fmt: skip
-    """The four texels of ``block`` by their Haar differences, component by component.
+    block: Any, mean: Any, around: Any, errors: Any, order: Any, classes: Any, sink: Any,
+    source: Any, state: Any,
+) -> Any:  # fmt: skip
+    """A block by their Haar differences, component by component.
 
     around: w0, w1, n0, n1 and the means to the east, south, south-west and south-east.
     """
@@ -136,7 +151,7 @@ def differences(
                 activity = (activity >> 2) + 3 * abs(reference)
             e = value - guess
             context += np.int64(classes[_index(activity)])
-            z = symbol(encoding, (e << 1) ^ (e >> 63), context, numbers, words, state)
+            z = symbol((e << 1) ^ (e >> 63), context, sink, source, state)
             e = (z >> 1) ^ -(z & 1)
             if kind == 0:
                 v = guess + e
@@ -161,15 +176,20 @@ def differences(
         out1 |= np.uint64(q & 255) << at
         out2 |= np.uint64(r & 255) << at
         out3 |= np.uint64(s & 255) << at
-    block[0], block[1], block[2], block[3] = out0, out1, out2, out3
+    return out0, out1, out2, out3
 
 
 @kernel
-def edge_samples(
-    encoding: bool, texel: Any, w: Any, n: Any, nw: Any, components: int, numbers: Any, words: Any,
+def edge_texel(
+    texel: Any, seen: Any, w: Any, n: Any, nw: Any, components: Any, sink: Any, source: Any,
     state: Any,
 ) -> Any:  # fmt: skip
-    """A texel that belongs to no block, sample by sample, less the median of W, N, W + N - NW."""
+    """A texel that belongs to no block; a new one sample by sample, less the median of W, N and
+    W + N - NW.
+    """
+    found = seen_texel(texel, seen, w, n, nw, nw, TEXEL + 48, sink, source, state)
+    if found != OTHER:
+        return found
     out = np.uint64(0)
     byte = np.uint64(255)
     for c in range(components):
@@ -177,6 +197,6 @@ def edge_samples(
         a, b = np.int64((w >> at) & byte), np.int64((n >> at) & byte)
         guess = max(min(a, b), min(max(a, b), a + b - np.int64((nw >> at) & byte)))
         e = ((np.int64((texel >> at) & byte) - guess + 128) & 255) - 128
-        z = symbol(encoding, (e << 1) ^ (e >> 63), EDGE, numbers, words, state)
+        z = symbol((e << 1) ^ (e >> 63), EDGE, sink, source, state)
         out |= np.uint64((guess + ((z >> 1) ^ -(z & 1))) & 255) << at
     return out
