@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.vectors import cross
-from ptmtools.stored import Stored, texts
+from ptmtools.store.checked import Stored, texts
 from ptmtools.tolerance import Tolerance
 
 #: A child of a BSP node that is no node: ``OUTSIDE``, or leaf i as ``-2 - i``.

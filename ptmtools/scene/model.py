@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.scene.orientation import tolerance_of
-from ptmtools.stored import Stored, numbers, texts, whole
+from ptmtools.store.checked import Stored, numbers, texts, whole
 from ptmtools.tolerance import Tolerance
 
 Wrap = Literal["repeat", "clamp"]
