@@ -29,6 +29,7 @@ from ptmtools.pipeline.options import TextureOptions
 from ptmtools.pipeline.run import Artifacts, Job, Run
 from ptmtools.pipeline.shared_disk import ImageTask, encoded_there, shared_disk
 from ptmtools.pipeline.stage import Stage
+from ptmtools.quantities import count, size
 from ptmtools.store.layout import SERVED, sha256
 from ptmtools.store.manifest import StageRecord
 from ptmtools.store.transaction import Transaction
@@ -54,10 +55,10 @@ def texture_names(images: Iterable[str]) -> list[str]:
     for (_, _, suffix), stem in zip(names, stems, strict=True):
         shared = often[stem.casefold()] > 1
         wanted = f"{stem}_{re.sub('[^A-Za-z0-9]', '', suffix)}" if shared else stem
-        name, count = wanted, 1
+        name, number = wanted, 1
         while name.casefold() in taken:
-            count += 1
-            name = f"{wanted}_{count}"
+            number += 1
+            name = f"{wanted}_{number}"
         taken.add(name.casefold())
         found.append(name)
     return found
@@ -129,8 +130,13 @@ class TexturesJob(Job):
         if self.left:
             self.encode(self.run.workers.executor)
         if transaction := self._transaction:
-            outputs = transaction.pending()
-            record = replace(self._work, outputs=outputs, counts=self._counted(transaction))
+            headers = list(self._headers(transaction))
+            record = replace(
+                self._work,
+                outputs=transaction.pending(),
+                counts=counts_of(headers),
+                notes=tuple(notes_on_size(self._names, headers, self.options.max_side)),
+            )
             self.run.settle(self.stage, transaction, record)
         self.run.report(self.stage, self._why, self._seconds, self._tasks)
 
@@ -209,15 +215,42 @@ class TexturesJob(Job):
                     transaction.take(name, Path(file), digest)
                 yield files
 
-    def _counted(self, transaction: Transaction) -> dict[str, int]:
-        raw = stored = 0
+    def _headers(self, transaction: Transaction) -> Iterator[PtmHeader]:
+        """Of all textures, wherever they are."""
         for ptm, *_ in map(self._files, self._names):
             place = transaction.folder / ptm
-            header = header_of(place if place.is_file() else self.run.db.path / ptm)
-            finest = header.levels[-1]
-            raw += finest.width * finest.height * header.texel_bytes
-            stored += header.file_size
-        return {"textures": len(self._names), "raw_bytes": raw, "ptm_bytes": stored}
+            yield header_of(place if place.is_file() else self.run.db.path / ptm)
+
+
+def counts_of(headers: Iterable[PtmHeader]) -> dict[str, int]:
+    """The figures of the stage."""
+    found = {"textures": 0, "raw_bytes": 0, "ptm_bytes": 0}
+    for header in headers:
+        finest = header.levels[-1]
+        found["textures"] += 1
+        found["raw_bytes"] += finest.width * finest.height * header.texel_bytes
+        found["ptm_bytes"] += header.file_size
+    return found
+
+
+def notes_on_size(names: Iterable[str], headers: Iterable[PtmHeader], most: int) -> Iterator[str]:
+    """What ``--max-side`` has chosen where no level is of that size, as levels halve: the texture
+    that is farthest below it."""
+    from ptmtools.texture.options import level_above
+
+    below = []
+    for name, header in zip(names, headers, strict=True):
+        finest, above = header.levels[-1], level_above(header)
+        side = max(finest.width, finest.height)
+        if above and side < most:
+            below.append((side, name, finest, above))
+    if below:
+        _, name, finest, (width, height, more) = min(below, key=lambda each: each[:2])
+        yield (
+            f"--max-side {most} leaves {count(len(below), 'texture')} smaller still, since each "
+            f"level is half the next: {name} has {finest.width} x {finest.height}; "
+            f"{width} x {height} would add about {size(more)}"
+        )
 
 
 def header_of(file: Path) -> PtmHeader:

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image, PngImagePlugin
 
 from ptmtools.executors import Serial
-from ptmtools.pipeline import TextureOptions, background, build_scene
+from ptmtools.pipeline import TextureOptions, background, build_scene, run_stage
 from ptmtools.pipeline.background import Workers
 from ptmtools.pipeline.encoding import bare_png
 from ptmtools.pipeline.run import Run
@@ -75,3 +75,14 @@ def test_many_textures_are_encoded_beside_the_cells(tmp_path, monkeypatch) -> No
         found[db] = {f.relative_to(db): f.read_bytes() for f in db.rglob("*") if f.is_file()}
     one, *others = found.values()
     assert all(other == one for other in others)
+
+
+def test_a_note_says_what_max_side_leaves_and_what_more_would_cost(tmp_path: Path) -> None:
+    build_scene(TWO_ROOMS, tmp_path / "db", until=CELLS)
+    for most, wanted in ((50, "4 textures"), (32, None), (0, None)):
+        report = run_stage(tmp_path / "db", TextureOptions(max_side=most))
+        notes = [note for note in report.notes if "--max-side" in note]
+        assert len(notes) == (wanted is not None)
+        if wanted:
+            assert wanted in notes[0]
+            assert "32 x 32; 64 x 64 would add" in notes[0]
