@@ -118,10 +118,11 @@ class _Kernel:
                 entry = self._compiler(cache=bool(folder))
             finally:
                 settings.CACHE_DIR = before
-        if folder:
+        if folder and not self._options.get("_nrt", True):
             # To load machine code takes none of what a compiler must know, all types and functions
             # of numba, which numba would set up before: a quarter of a second run of `ptm encode`.
-            # Where something is to be compiled after all, they are set up then.
+            # Where something is to be compiled after all, they are set up then. Not for functions
+            # that allocate: what does that for them is set up there, too.
             entry._cache.load_overload = entry._cache._load_overload
         return entry
 
