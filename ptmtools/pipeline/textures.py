@@ -127,6 +127,7 @@ class TexturesJob(Job):
         self._prepare()
         if self._background:
             self._background.finish()
+            self._background = None
         if self.left:
             self.encode(self.run.workers.executor)
         if transaction := self._transaction:
