@@ -198,12 +198,14 @@ def print_report(voice: Voice, report: BuildReport, as_json: bool) -> None:
         ptm, db = _invoked(), shlex.quote(report.database)
         voice.say("")
         voice.say(f"The database is {db}. Next:")
-        for command, purpose in (
-            (f"{ptm} plot {db} -o plan.png", "its floor plan"),
-            (f"{ptm} validate {db}", "check every file"),
-            (f"python3 -m http.server -d {db}/www", "serve it; start at root.wrl"),
-        ):
-            voice.say(f"  {command:<50} {purpose}")
+        commands = {
+            f"{ptm} plot {db} -o plan.png": "draw its floor plan",
+            f"{ptm} validate {db}": "check every file",
+            f"python3 -m http.server -d {db}/www": "look at it on this machine: open root.wrl",
+        }
+        width = max(map(len, commands))
+        for command, purpose in commands.items():
+            voice.say(f"  {command:<{width}}  {purpose}")
 
 
 def _tasks(stage: StageReport) -> str:
