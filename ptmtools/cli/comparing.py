@@ -58,7 +58,8 @@ def compare(
     """Compare the size and speed of .ptm with other lossless image formats.
 
     An IMAGE may be a file, a pattern such as 'scans/*.tif' or a folder (all images in it). A .ptm
-    holds all levels; the other formats take one file for the finest level, or one for each level.
+    holds all levels; with other formats, sizes are given for one file of the finest level and for
+    one file for each level.
     Speeds are those of one thread, in MB of raw texels of the finest level per second.
     """
     from ptmtools.texture.comparison import codecs, measure, total

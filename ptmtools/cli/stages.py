@@ -42,8 +42,8 @@ SHOWN_NOTES = 12
 #: returns it as a document and as lines.
 REPORTS: dict[Stage[Any], tuple[str, Lazy[Callable[..., tuple[Any, list[str]]]]]] = {
     PVS: (
-        "Describe the sets: how large they are, the most expensive portals, and openings that show "
-        "suspiciously much.",
+        "Print a summary of the sets: their sizes, the most expensive portals, and openings "
+        "through which suspiciously much is visible.",
         Lazy("ptmtools.cli.visibility:visibility_report"),
     )
 }
@@ -57,7 +57,7 @@ model_argument = click.argument("model", type=click.Path())
 @options_of(*(stage.options for stage in STAGES.values()))
 @many_machines
 @forced
-@click.option("--dry-run", is_flag=True, help="Say what would be done, and why; write nothing.")
+@click.option("--dry-run", is_flag=True, help="Show what would be done, and why; write nothing.")
 @as_json
 @voiced
 def build_scene(
@@ -193,7 +193,7 @@ def print_report(voice: Voice, report: BuildReport, as_json: bool) -> None:
     for note in shown:
         voice.say(f"note: {note}")
     if len(shown) < len(report.notes):
-        voice.say(f"note: {len(report.notes) - len(shown):,} more; -v shows them all")
+        voice.say(f"note: {len(report.notes) - len(shown):,} more notes; -v shows them all")
     if any(stage.stage == EMIT.name for stage in report.stages):
         ptm, db = _invoked(), shlex.quote(report.database)
         voice.say("")

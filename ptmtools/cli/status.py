@@ -34,7 +34,7 @@ _PLANNED = {"current": "unchanged", "run": "would run", "maybe": "may run"}
 @as_json
 @voiced
 def status(voice: Voice, db: str, as_json: bool) -> None:
-    """Say which stages of DB are done, stale or damaged, and who is writing it."""
+    """Show which stages of DB are done, stale or damaged, and which process is writing it."""
     from ptmtools.pipeline.status import database_status
 
     found = database_status(db)
