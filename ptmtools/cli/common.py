@@ -42,7 +42,10 @@ def as_json(function: Command) -> Command:
 
 def forced(function: Command) -> Command:
     """Adds ``--force``."""
-    text = "Replace existing files, and databases of another model."
+    text = (
+        "Replace existing files, or a database of another model; write into a folder that is not a "
+        "database."
+    )
     return click.option("--force", is_flag=True, help=text)(function)
 
 

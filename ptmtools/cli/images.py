@@ -320,7 +320,7 @@ def _refuse_image_suffix(output: str) -> None:
     if suffix in (*SUFFIXES, *WRITTEN, *LOSSY):
         raise OutputError(
             "PTM-O101",
-            f"the suffix {suffix!r} is that of an image; a .ptm is written",
+            f"the suffix {suffix!r} is that of an image, but a .ptm would be written",
             file=output,
             remedy="name the output .ptm",
         )

@@ -214,7 +214,7 @@ def _tasks(stage: StageReport) -> str:
     if not kept and not resumed:
         return ""
     taken = f", {resumed:,} by the run that was interrupted" if resumed else ""
-    return f"; {total - kept - resumed:,} encoded, {kept:,} as they were{taken}"
+    return f"; {total - kept - resumed:,} encoded, {kept:,} unchanged{taken}"
 
 
 def _invoked() -> str:

@@ -50,7 +50,7 @@ def status(voice: Voice, db: str, as_json: bool) -> None:
     if found.writer:
         voice.say(f"being written by {found.writer}")
     if found.interrupted:
-        waiting = f"; {count(found.waiting, 'finished texture')} will be taken over"
+        waiting = f"; {count(found.waiting, 'finished texture')} will be kept"
         voice.say(f"a run was interrupted{waiting if found.waiting else ''}")
     if not found.finished and not found.writer:
         voice.say(f"not finished: run `{build_command(db)}`")

@@ -116,13 +116,13 @@ class AchOptions:
             )
         if self.points < GROUPS:  # of which each needs one
             raise _refused(
-                f"{self.points} sample points do not tell how far they are from a tolerance",
-                f"allow {GROUPS} or more, or leave --samples out",
+                f"{self.points} sample points are too few to estimate their error",
+                f"allow {GROUPS} or more, or omit --samples",
             )
         if self.placed == "kd":
             raise _refused(
-                "--tolerance adds points one by one, which --placement kd cannot",
-                "take --placement sobol",
+                "--tolerance adds points step by step, which --placement kd does not support",
+                "use --placement sobol",
             )
 
 

@@ -107,7 +107,7 @@ def check(theirs: tuple[str, ...], here: str) -> None:
         if one != other:
             raise WorkerError(
                 "PTM-W003",
-                f"the worker has {other}, this process {one}",
+                f"the worker has {other}, this process has {one}",
                 file=here,
                 remedy="install the same software on all machines",
             )

@@ -96,7 +96,7 @@ def acquire(folder: Path) -> Lock:
         "PTM-D007",
         "another ptm is writing this database" + (f", {found}" if found else ""),
         file=folder,
-        remedy="wait until it has ended",
+        remedy="wait until it has finished",
     )
 
 

@@ -151,7 +151,7 @@ def test_a_folder_is_made_only_where_one_is_meant(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["encode", "a.png", "b.PNG", "-o", "x.ptm"]) == 2
-    assert "x.ptm is one file, and there are 2 to write" in capsys.readouterr().err
+    assert "x.ptm is one file, but there are 2 to write" in capsys.readouterr().err
     assert main(["encode", "a.png", "b.PNG", "-o", "notes.txt"]) == 2
     assert main(["encode", "a.png", "-o", "notes.txt/"]) == 2
     assert "is a file, not a folder" in capsys.readouterr().err

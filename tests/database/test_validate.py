@@ -513,7 +513,7 @@ def test_what_a_user_adds_is_his(database: Path) -> None:
     report = validate_database(database)
     assert report.issues == ()
     (note,) = report.notes
-    assert note.startswith("5 files are")
+    assert note.startswith("5 files in www/ are")
     assert note.endswith(": index.html, js/walk.js, map.png, …")
     assert note.isprintable()
 

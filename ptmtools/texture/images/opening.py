@@ -123,7 +123,7 @@ def pillow_faults() -> Iterator[None]:
         raise
     except SyntaxError:  # what a plug-in says of a file that is none of its own
         raise InputError(
-            "PTM-I124", "is not an image that can be read", remedy=f"it must be {READABLE}"
+            "PTM-I124", "is not an image of a supported format", remedy=f"it must be {READABLE}"
         ) from None
     except (DecompressionBombError, MemoryError) as error:
         raise LimitError(
