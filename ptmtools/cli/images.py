@@ -98,7 +98,7 @@ def encode(
     check_options(options)
     sources = expanded(images, SUFFIXES)
     jobs = jobs_for(sources, output, images, ".ptm", (".ptm", *SUFFIXES))
-    voice.aside = any(job.to_stdout for job in jobs)
+    voice.to_stderr = any(job.to_stdout for job in jobs)
     if output and any(job.target and not job.folder for job in jobs):
         _refuse_image_suffix(output)
 
@@ -144,10 +144,10 @@ def encode(
             return
         raw, stored, image = (report[f"{what}_bytes"] for what in ("raw", "ptm", "image"))
         name = "the input" if report["image"] == STANDARD else os.path.basename(report["image"])
-        beside = f", {_share(stored, image)} {name} ({size(image)})" if image else ""
+        compared = f", {_share(stored, image)} {name} ({size(image)})" if image else ""
         yield (
             f"{report['file']}: {count(report['levels'], 'level')}, {size(stored)}: "
-            f"{_share(stored, raw)} the raw texels ({size(raw)}){beside}"
+            f"{_share(stored, raw)} the raw texels ({size(raw)}){compared}"
         )
         if note := _note_on_sides(report, options.max_side):
             yield f"  {note}"
@@ -253,7 +253,7 @@ def decode(
 
     sources = expanded(files, (".ptm",))
     jobs = jobs_for(sources, output, files, "", tuple(WRITTEN))
-    voice.aside = any(job.to_stdout for job in jobs)
+    voice.to_stderr = any(job.to_stdout for job in jobs)
     # One name is an image's; what goes into a folder, or beside its file, gets a suffix.
     named = output is not None and any(job.target and not job.folder for job in jobs)
     if named:

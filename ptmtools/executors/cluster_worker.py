@@ -1,7 +1,7 @@
 """What runs in the workers of a cluster: copies of shared values, and tasks over them.
 
 A copy is made of the block that Dask has brought here, and brought up to date with the changes
-that `receive` was told of. A worker that missed some (it joined late) says so, and is sent them.
+that `receive` was sent. A worker that missed some (it joined late) says so, and is sent them.
 """
 
 from __future__ import annotations

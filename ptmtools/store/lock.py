@@ -101,7 +101,7 @@ def acquire(folder: Path) -> Lock:
 
 
 def holder(folder: Path) -> Holder | None:
-    """Whom the lock file of a folder names, whether or not he is still there."""
+    """The process that the lock file of a folder names, whether or not it still runs."""
     try:
         with open_regular(folder / LOCK) as file:
             found = json.loads(file.read(4096))

@@ -1,4 +1,4 @@
-"""Who may write in a database folder, and what becomes of it when he is done."""
+"""Who may write in a database folder, and what becomes of it afterwards."""
 
 from __future__ import annotations
 

@@ -80,7 +80,7 @@ def opened(file: BinaryIO, limits: Limits) -> ImageFile:
 
 
 def lossy_format(file: BinaryIO, image: ImageFile) -> str | None:
-    """The name of the format if its compression discards detail, as far as can be told."""
+    """The name of the format if its compression discards detail, as far as can be recognised."""
     if image.format == "TIFF":
         return "JPEG in TIFF" if "jpeg" in str(image.info.get("compression")) else None
     if image.format == "WEBP":
