@@ -73,9 +73,9 @@ def build_scene(
 ) -> None:
     """Build a database from MODEL, or bring it up to date.
 
-    MODEL is an OBJ, glTF or GLB file, or one of the formats that pymeshlab reads. The database is
-    a folder: museum.db beside museum.obj, or what -o names. Only what changed since the last build
-    is computed again.
+    MODEL is an OBJ, glTF or GLB file, or in a format that trimesh or pymeshlab reads. The database
+    is a folder: museum.obj makes museum.db, unless -o names another. Only what has changed since
+    the last build is computed again.
     """
     options: list[Any] = [take(stage.options, values) for stage in STAGES.values()]
     if dry_run:

@@ -1,6 +1,6 @@
 """The check of a database on disk, or of one `.ptm`: everything that a client may rely on.
 
-Each file is read once, held against the hash in the manifest, and then against the others, by the
+Each file is read once, compared with the hash in the manifest, and then against the others, by the
 checks of the emitters that wrote them. A finding never ends the check: what cannot be read is left
 out of the comparisons that need it.
 

@@ -63,7 +63,7 @@ PROFILES = {
         Profile(
             "raw",
             0,
-            "the layout of Marvie & Bouatouch (2003), uncompressed",
+            "uncompressed, the layout of Marvie & Bouatouch, 2003",
             f"{__name__}.raw",
             since=1,
         ),
