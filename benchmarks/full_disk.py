@@ -73,12 +73,12 @@ def fill(model: Path, disk: Path, spare: Path, steps: int, options: list[str]) -
         left = int(need * step / steps)
         ballast.write_bytes(bytes(max(0, free(disk) - left)))
         done = ptm("build-scene", model, "-o", db, *options, *UPDATE)
-        told = done.stderr.strip()
+        printed = done.stderr.strip()
         if done.returncode == 0:
             outcome = "room enough" if database(db) == wanted else "OTHER bytes"
         else:
             full += 1
-            clear = done.returncode == 4 and "the disk is full" in told and "PTM-O003" in told
+            clear = done.returncode == 4 and "the disk is full" in printed and "PTM-O003" in printed
             # What an earlier stage of the update committed is new, and whole.
             sound = ptm("validate", db, "--json").returncode in (0, 8)
             whole = all(
@@ -93,7 +93,7 @@ def fill(model: Path, disk: Path, spare: Path, steps: int, options: list[str]) -
             wrong = [name for name, good in faults.items() if not good]
             outcome = "full: clear error, intact, mended by the next"
             if wrong:
-                outcome = f"WRONG, not {' nor '.join(wrong)}: {told[:200]}"
+                outcome = f"WRONG, not {' nor '.join(wrong)}: {printed[:200]}"
         failed += "OTHER" in outcome or "WRONG" in outcome
         print(f"{left / 1e6:6.2f} MB free: {outcome}")
     print(f"{full} of {steps} builds found the disk full; {failed} wrong")

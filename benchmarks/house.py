@@ -90,8 +90,8 @@ def docstring(node: ast.AST) -> ast.stmt | None:
     if not isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
         return None
     first = node.body[0] if node.body else None
-    told = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
-    return first if told and isinstance(first.value.value, str) else None  # type: ignore[union-attr]
+    is_text = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
+    return first if is_text and isinstance(first.value.value, str) else None  # type: ignore[union-attr]
 
 
 def imported(tree: ast.AST, root: Path) -> Iterator[str]:

@@ -58,7 +58,7 @@ def shares(taken: Taken, full: dict[int, Taken]) -> str:
     return ", ".join(f"{taken.seconds / full[j].seconds:.1%} of -j {j}" for j in (1, 2))
 
 
-def told(stages: list[dict[str, Any]]) -> str:
+def summary_of(stages: list[dict[str, Any]]) -> str:
     return ", ".join(f"{stage['stage']} {stage['seconds']:.2f}" for stage in stages)
 
 
@@ -78,7 +78,7 @@ def main() -> int:
         anew(1)
         full = {workers: fastest(asked.runs, lambda w=workers: anew(w)) for workers in (1, 2)}
         for workers, taken in full.items():
-            stages = told(taken.report["stages"])
+            stages = summary_of(taken.report["stages"])
             print(f"-j {workers}: {taken.seconds:.2f} s ({stages}); {taken.peaks}")
         same = state(folder / "j1") == state(folder / "j2")
         ratio = full[1].seconds / full[2].seconds
@@ -109,7 +109,7 @@ def main() -> int:
         ran = [stage for stage in one.report["stages"] if stage["ran"]]
         assert [stage["stage"] for stage in ran] == ["scene", "textures", "emit"]
         print(
-            f"1 of {len(images)} textures painted over: {one.seconds:.2f} s ({told(ran)}), "
+            f"1 of {len(images)} textures painted over: {one.seconds:.2f} s ({summary_of(ran)}), "
             f"{shares(one, full)}"
         )
         build(model, folder / "fresh")

@@ -151,9 +151,9 @@ def tasks(given: argparse.Namespace) -> dict[str, Any]:
     for name, stage in stages.items():
         _row_of(f"{name}: tasks", list(chain(*stage["rounds"])))
         _row_of(f"{name}: alone", [stage["alone"]])
-    for told in ("sent", "received"):
-        size = sum(image[told] for image in images)
-        print(f"{told}: {size / 1e6:.1f} MB, {size / len(images) / 1e6:.2f} each")
+    for way in ("sent", "received"):
+        size = sum(image[way] for image in images)
+        print(f"{way}: {size / 1e6:.1f} MB, {size / len(images) / 1e6:.2f} each")
     return {"images": images, "stages": stages}
 
 
@@ -162,14 +162,14 @@ def _building(model: Path) -> dict[str, Any]:
     coverage.WORTH_A_PROCESS = 0.0
     scene, reading = cpu(lambda: ingest(model))
     cells, cutting = cpu(lambda: subdivide(scene))
-    looking, sampling = Recorder(), Recorder()
-    pvs, seeing = cpu(lambda: compute_pvs(cells, executor=looking))
+    tracing, sampling = Recorder(), Recorder()
+    pvs, seeing = cpu(lambda: compute_pvs(cells, executor=tracing))
     options = AchOptions(backend="embree")
     _, covering = cpu(lambda: coverage.compute_ach(scene, cells, pvs, options, executor=sampling))
     return {
         "scene": {"alone": reading, "rounds": []},
         "cells": {"alone": cutting, "rounds": []},
-        "pvs": _stage(looking, seeing),
+        "pvs": _stage(tracing, seeing),
         "ach": _stage(sampling, covering),
     }
 

@@ -83,10 +83,10 @@ class Database:
 
     @property
     def side(self) -> int:
-        """The longest side of a PNG twin, texels; 0 if there is none."""
+        """The longest side of a fallback image, texels; 0 if there is none."""
         longest = 0
-        for twin in (self.www / "textures").glob("*.png"):
-            with Image.open(twin) as image:
+        for file in (self.www / "textures").glob("*.png"):
+            with Image.open(file) as image:
                 longest = max(longest, *image.size)
         return longest
 

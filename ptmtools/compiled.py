@@ -169,7 +169,7 @@ class _FirstCompilation(numba.core.event.Listener):
         if not self._announced:
             self._announced = True
             _load_without_scipy()
-            announce("compiling for this machine, as on every first run; up to a minute")
+            announce("compiling for this machine (first run only, up to a minute)")
 
     def on_end(self, event: Any) -> None:
         pass

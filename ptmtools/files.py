@@ -117,7 +117,7 @@ def refuse_existing(path: str | os.PathLike[str]) -> None:
     if os.path.lexists(path):
         raise OutputError(
             "PTM-O001",
-            "already exists and was left as it is",
+            "already exists and was not changed",
             file=path,
             remedy="use --force to replace it, or name another file",
         )
@@ -211,7 +211,7 @@ def _steps(root: Path, relative: str | os.PathLike[str]) -> list[str]:
     ):
         raise OutputError(
             "PTM-O002",
-            f"{name[:80]!r} would lead out of the folder, or too deep into it",
+            f"{name[:80]!r} would lead out of the folder, or is nested too deep",
             file=root,
             remedy="nothing was written; the name comes from a damaged file",
         )

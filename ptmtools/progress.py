@@ -20,12 +20,12 @@ Listener = Callable[[str], None]
 _listeners: list[Listener] = []
 
 
-def listen(tell: Listener) -> None:
-    """From now on ``tell`` hears, in a few words, of each wait that is announced."""
-    _listeners.append(tell)
+def listen(listener: Listener) -> None:
+    """From now on ``listener`` is called with a few words for each wait that is announced."""
+    _listeners.append(listener)
 
 
 def announce(what: str) -> None:
-    """Tells whoever listens that something takes a while."""
-    for tell in _listeners:
-        tell(what)
+    """Calls the listeners before something that takes a while."""
+    for listener in _listeners:
+        listener(what)

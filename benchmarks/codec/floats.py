@@ -129,8 +129,8 @@ def main() -> None:
             print(f"  {'ptm ' + profile:22} {size / image.nbytes:7.4f}  {speed} MB/s", flush=True)
         for rival, size in rivals(image).items():
             print(f"  {rival:22} {size / image.nbytes:7.4f}")
-        if told := formula(image):
-            print(f"  {told}")
+        if formulas := formula(image):
+            print(f"  {formulas}")
 
 
 if __name__ == "__main__":

@@ -112,14 +112,14 @@ def one(task: str, folder: Path, side: int, profile: str, threads: int) -> None:
 
 def run(label: str, command: list[str], raw: int) -> None:
     """One row of the table."""
-    told = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    result = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
     extra = ""
-    if "bytes" in told:
-        extra = f"  {told['size']} texels, {told['bytes']:,} bytes read"
-    rate = raw / told["seconds"] / 1e6
+    if "bytes" in result:
+        extra = f"  {result['size']} texels, {result['bytes']:,} bytes read"
+    rate = raw / result["seconds"] / 1e6
     print(
-        f"{label:36} {told['seconds']:8.2f} {rate:9.1f} {told['peak'] / 1e6:9.0f} "
-        f"{told['peak'] / raw:7.2f}{extra}",
+        f"{label:36} {result['seconds']:8.2f} {rate:9.1f} {result['peak'] / 1e6:9.0f} "
+        f"{result['peak'] / raw:7.2f}{extra}",
         flush=True,
     )
 
@@ -128,14 +128,14 @@ def through_pillow(folder: Path, profile: str, raw: int) -> None:
     """The command, as a user calls it."""
     command = [sys.executable, "-m", "ptmtools", "encode", str(folder / "a.ppm"), "--force"]
     command += ["-o", str(folder / "b.ptm"), "--profile", profile]
-    measure: Callable[[list[str]], str] = lambda told: subprocess.run(  # noqa: E731
-        [sys.executable, "-c", MEASURED, *told], check=True, capture_output=True, text=True
+    measure: Callable[[list[str]], str] = lambda command: subprocess.run(  # noqa: E731
+        [sys.executable, "-c", MEASURED, *command], check=True, capture_output=True, text=True
     ).stdout.splitlines()[-1]
-    told = json.loads(measure(command))
+    result = json.loads(measure(command))
     print(
-        f"{'ptm encode, through Pillow':36} {told['seconds']:8.2f} "
-        f"{raw / told['seconds'] / 1e6:9.1f} {told['peak'] / 1e6:9.0f} {told['peak'] / raw:7.2f}"
-        "  (of the whole process)",
+        f"{'ptm encode, through Pillow':36} {result['seconds']:8.2f} "
+        f"{raw / result['seconds'] / 1e6:9.1f} {result['peak'] / 1e6:9.0f} "
+        f"{result['peak'] / raw:7.2f}  (of the whole process)",
         flush=True,
     )
 

@@ -58,11 +58,11 @@ def commanded(*arguments: str) -> tuple[int, str]:
     with redirect_stdout(stream), redirect_stderr(stream):
         status = main(list(arguments))
     stream.flush()
-    told = stream.buffer.getvalue().decode()  # type: ignore[attr-defined]
-    assert status != 1, f"ptm {arguments[0]}: {told[told.find('internal error') :][:200]}"
-    assert status != 7 or "[PTM-L099]" not in told, f"ptm {arguments[0]}: {told[-300:]}"
-    assert "\x1b" not in told, f"ptm {arguments[0]} says what terminals obey"
-    return status, told
+    printed = stream.buffer.getvalue().decode()  # type: ignore[attr-defined]
+    assert status != 1, f"ptm {arguments[0]}: {printed[printed.find('internal error') :][:200]}"
+    assert status != 7 or "[PTM-L099]" not in printed, f"ptm {arguments[0]}: {printed[-300:]}"
+    assert "\x1b" not in printed, f"ptm {arguments[0]} says what terminals obey"
+    return status, printed
 
 
 class Npz:

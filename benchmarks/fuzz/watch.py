@@ -78,10 +78,10 @@ class Watch:
     def _changed(self, event: str, path: Any, descriptor: Any) -> None:
         if isinstance(path, int):
             return
-        told = os.fsdecode(path)
-        if isinstance(descriptor, int) and descriptor >= 0 and not os.path.isabs(told):
-            told = os.path.join(os.path.realpath(f"/proc/self/fd/{descriptor}"), told)
-        real = _itself(told)
+        name = os.fsdecode(path)
+        if isinstance(descriptor, int) and descriptor >= 0 and not os.path.isabs(name):
+            name = os.path.join(os.path.realpath(f"/proc/self/fd/{descriptor}"), name)
+        real = _itself(name)
         if not self._mine(real):
             self._faults.append(f"{event} {real}")
 
@@ -104,8 +104,8 @@ def listing(folder: Path) -> dict[str, tuple[int, int, int]]:
     """Kind, size and time of change of all that lies in a folder; links are not followed."""
     found = {}
     for path in sorted(folder.rglob("*")):
-        told = os.lstat(path)
-        found[str(path)] = (told.st_mode, told.st_size, told.st_mtime_ns)
+        status = os.lstat(path)
+        found[str(path)] = (status.st_mode, status.st_size, status.st_mtime_ns)
     return found
 
 

@@ -134,5 +134,5 @@ def _around(points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArra
     x, y = np.einsum("nki,ni->nk", points, u), np.einsum("nki,ni->nk", points, v)
     order = np.argsort(np.arctan2(y, x), axis=1)
     x, y = np.take_along_axis(x, order, 1), np.take_along_axis(y, order, 1)
-    doubled: NDArray[np.float64] = (x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1)).sum(axis=1)
-    return doubled / 2
+    twice: NDArray[np.float64] = (x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1)).sum(axis=1)
+    return twice / 2

@@ -22,22 +22,23 @@ class SubdivideOptions:
     Attributes
     ----------
     wall_area: walls of at least this area, in m², divide the building into leaves, its convex
-        pieces. Smaller: more and tighter cells, and slower visibility.
-    wall_thickness: parallel walls nearer to each other than this, in metres, are the two faces of
-        one wall; jambs, lintels and sills between them divide it whatever their area. What stands
-        off a wall by less than 0.12 of this, or 1/1000 of the building's extent, is part of it.
-    max_leaves: stop at this many leaves; the best splits come first.
-    structural: names of objects or materials, with * and ?, of what divides the building whatever
-        its area.
-    detail: names, with * and ?, of what never divides the building nor hides anything, such as
-        furniture; structural wins.
-    cells: a cell, the unit that is loaded and drawn, is a single "leaf" or a "room", all leaves
-        between its doors; but see gain.
+        pieces. A smaller value gives more and tighter cells, and slower visibility.
+    wall_thickness: parallel walls closer together than this, in metres, are the two faces of one
+        wall; jambs, lintels and sills between them divide the building whatever their area.
+        Whatever stands off a wall by less than 0.12 of this, or by less than 1/1000 of the
+        building's extent, is part of the wall.
+    max_leaves: stop at this many leaves. The best splits come first.
+    structural: objects or materials (names, with * and ?) that divide the building whatever their
+        area. May be given several times.
+    detail: objects or materials (names, with * and ?) that never divide the building and never hide
+        anything, such as furniture; --structural takes precedence. May be given several times.
+    cells: what a cell, the unit that clients load and draw, consists of: a single "leaf", or a
+        "room", all leaves between its doors; but see --gain.
     gain: keep the leaves of a room as separate cells if that saves viewers at least this share of
         what they download; 0 keeps all of them apart, 1 makes every room one cell.
-    viewpoints: a place X,Y,Z[,YAW] to start from, inside the building: metres, Y up; the yaw in
-        degrees, counter-clockwise from -Z. What cannot be reached from the places given is
-        dropped. If none is given, one is chosen.
+    viewpoints: a starting point inside the building: metres, Y up, and the yaw in degrees,
+        counter-clockwise from -Z. What cannot be reached from the given points is dropped. By
+        default one is chosen. May be given several times.
     """
 
     wall_area: float = 2.0

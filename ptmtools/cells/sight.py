@@ -109,8 +109,8 @@ def _lines(
     x = begin + share[:, 1] * (width[k] + up * slope)
     origin = polygon[0] + np.stack([x, height[k] + up * rise[k]], axis=1) @ frame[:2]
     radius, turn = np.sqrt(share[:, 2]), 2 * np.pi * share[:, 3]
-    aside = np.stack([radius * np.cos(turn), radius * np.sin(turn), np.sqrt(1 - share[:, 2])])
-    return origin, aside.T @ frame
+    along = np.stack([radius * np.cos(turn), radius * np.sin(turn), np.sqrt(1 - share[:, 2])])
+    return origin, along.T @ frame
 
 
 def _chords(

@@ -43,7 +43,7 @@ def expanded(names: Iterable[str], suffixes: Sequence[str]) -> list[str]:
             if not inside:
                 raise InputError(
                     "PTM-I128",
-                    "is a folder without any file of the kind that is wanted",
+                    "is a folder without such files",
                     file=name,
                     remedy=f"their names end with {', '.join(suffixes)}",
                 )
@@ -127,7 +127,7 @@ def jobs_for(
         return nameless + _apart({n: _beside(n, folder, suffix) for n in named}, folder)
     if len(named) > 1:
         raise click.BadParameter(
-            f"{output} is one file, and there are {len(named)} to write: name a folder, or end the "
+            f"{output} is one file, but there are {len(named)} to write: name a folder, or end the "
             "name with a slash",
             None,
             None,
@@ -188,7 +188,7 @@ def _apart(targets: dict[str, Path], folder: Path | None) -> list[Job]:
             both = "both" if len(names) == 2 else "all"
             fault = OutputError(
                 "PTM-O103",
-                f"{', '.join(names[:-1])} and {names[-1]} would {both} be written to it",
+                f"{', '.join(names[:-1])} and {names[-1]} would {both} be written to this file",
                 file=target,
                 remedy="name one of them alone, or write them into different folders",
             )
@@ -273,5 +273,5 @@ def to_standard_output(write: Callable[[IO[bytes]], object]) -> None:
                 "PTM-O003" if full else "PTM-O002",
                 "the disk is full" if full else f"cannot be written ({error.strerror})",
                 file="standard output",
-                remedy="what was written is not whole",
+                remedy="the output is incomplete",
             ) from error

@@ -22,7 +22,7 @@ def voiced(function: Command) -> Command:
     """Adds ``-q`` and ``-v``, and hands the `Voice` in as the first argument."""
 
     @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
-    @click.option("-v", "--verbose", is_flag=True, help="Print more; for errors, the traceback.")
+    @click.option("-v", "--verbose", is_flag=True, help="Print more, and tracebacks of errors.")
     @click.pass_obj
     @wraps(function)
     def command(voice: Voice, /, quiet: bool, verbose: bool, **values: Any) -> Any:
@@ -42,7 +42,10 @@ def as_json(function: Command) -> Command:
 
 def forced(function: Command) -> Command:
     """Adds ``--force``."""
-    text = "Replace files or folders that ptm did not make, or that belong to another model."
+    text = (
+        "Replace existing files, or a database of another model; write into a folder that is not a "
+        "database."
+    )
     return click.option("--force", is_flag=True, help=text)(function)
 
 
@@ -55,8 +58,8 @@ def workers(function: Command) -> Command:
         type=click.IntRange(0, 1024),
         default=0,
         metavar="N",
-        help="Number of workers; 0, the default, is one for each processor. The result is the "
-        "same.",
+        help="Number of workers; 0, the default, is one for each processor. It does not change the "
+        "result.",
     )(function)
 
 
@@ -67,7 +70,7 @@ def many_machines(function: Command) -> Command:
         metavar="ADDRESS",
         callback=_address,
         help="Run the tasks on the cluster of this Dask scheduler, such as tcp://10.0.0.1:8786; "
-        "-j is then how many run at a time, and 0 as many as the cluster has threads.",
+        "-j then limits how many run at a time; 0 is as many as the cluster has threads.",
     )(workers(function))
 
 
@@ -86,7 +89,7 @@ def limited(function: Command) -> Command:
         default=1024,
         show_default=True,
         metavar="MIB",
-        help="Refuse an image whose texels would take more memory than this, MiB.",
+        help="Refuse an image that takes more memory than this once decoded, in MiB.",
     )
     @wraps(function)
     def command(*arguments: Any, limit: int, **values: Any) -> Any:
@@ -111,7 +114,7 @@ def new_database(function: Command) -> Command:
         "db",
         type=click.Path(),
         metavar="DB",
-        help="The database, a folder; if not given, museum.db beside museum.obj.",
+        help="The database, a folder. By default museum.obj makes museum.db, in the same folder.",
     )
     @wraps(function)
     def command(*arguments: Any, model: str, db: str | None, **values: Any) -> Any:

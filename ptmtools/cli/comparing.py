@@ -58,7 +58,8 @@ def compare(
     """Compare the size and speed of .ptm with other lossless image formats.
 
     An IMAGE may be a file, a pattern such as 'scans/*.tif' or a folder (all images in it). A .ptm
-    holds all levels; the other formats take one file for the finest level, or one for each level.
+    holds all levels; with other formats, sizes are given for one file of the finest level and for
+    one file for each level.
     Speeds are those of one thread, in MB of raw texels of the finest level per second.
     """
     from ptmtools.texture.comparison import codecs, measure, total
@@ -76,7 +77,7 @@ def compare(
         if not as_json:
             height, width, components = texels.shape
             what = f"{width} x {height}, {count(components, 'component')} of {texels.dtype}"
-            _tell(voice, f"{source}: {what}, {size(texels.nbytes)}", measured[-1])
+            _print_table(voice, f"{source}: {what}, {size(texels.nbytes)}", measured[-1])
     sums = total(measured)
     if as_json:
         voice.emit_json(
@@ -90,10 +91,10 @@ def compare(
         )
     elif len(sources) > 1:
         voice.say("")
-        _tell(voice, f"all {len(sources)} images", sums)
+        _print_table(voice, f"all {len(sources)} images", sums)
 
 
-def _tell(voice: Voice, title: str, found: list[Measured]) -> None:
+def _print_table(voice: Voice, title: str, found: list[Measured]) -> None:
     """A table, sizes as they are and over that of the finest level as PNG."""
     png = next((one.finest_bytes for one in found if one.codec == "PNG"), None)
     voice.say(title)

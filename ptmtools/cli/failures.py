@@ -55,7 +55,10 @@ def describe(fault: BaseException) -> tuple[int, str]:
         case OSError(errno=errno.ENOSPC | errno.EDQUOT):
             return 4, f"{_file_of(fault)}the disk is full; free some space and run again [PTM-O003]"
         case OSError(errno=int()):
-            return 3, f"{_file_of(fault)}{fault.strerror}; check the path and its rights [PTM-I099]"
+            return (
+                3,
+                f"{_file_of(fault)}{fault.strerror}; check the path and its permissions [PTM-I099]",
+            )
         case SystemExit():
             return fault.code if isinstance(fault.code, int) else INTERNAL, ""
     message = " ".join(str(fault).split())

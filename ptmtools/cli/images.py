@@ -31,12 +31,12 @@ def _skipping(function: Callable[..., Any]) -> Callable[..., Any]:
     @click.option(
         "--skip-existing",
         is_flag=True,
-        help="Leave out what has its result already, as after a run that was interrupted.",
+        help="Skip files whose result exists already, for example after an interrupted run.",
     )
     @wraps(function)
     def command(*arguments: Any, force: bool, skip_existing: bool, **values: Any) -> Any:
         if force and skip_existing:
-            raise click.UsageError("--force and --skip-existing exclude each other")
+            raise click.UsageError("give either --force or --skip-existing, not both")
         return function(*arguments, force=force, skip_existing=skip_existing, **values)
 
     return command
@@ -57,13 +57,14 @@ def _skipped(target: Path | None, force: bool, skip_existing: bool) -> bool:
     "-o",
     "--output",
     type=click.Path(),
-    help="The .ptm file to write, - for stdout, or for several images a folder, which is made if "
-    "need be. A name that ends with / is a folder. By default each .ptm lies beside its image.",
+    help="The .ptm file to write; - for stdout; for several images a folder, which is created if "
+    "it does not exist. A name that ends with / is a folder. By default each .ptm is written next "
+    "to its image.",
 )
 @options_of(EncodeOptions)
 @click.option(
     "--orient / --no-orient",
-    help="Turn the texels upright as the image's EXIF orientation says, instead of recording it.",
+    help="Rotate the texels upright by the image's EXIF orientation, instead of recording it.",
 )
 @_skipping
 @limited
@@ -86,7 +87,7 @@ def encode(
     """Encode images as progressive textures (.ptm).
 
     An IMAGE may be a file, a pattern such as 'scans/*.tif', a folder (all images in it), or - for
-    stdin. An image that cannot be read is reported, and the others are encoded.
+    stdin. If an image cannot be read, that is reported and the others are encoded.
     """
     from ptmtools.texture.container import HEAD_MAX, read_header
     from ptmtools.texture.encoder import encode_to
@@ -97,7 +98,7 @@ def encode(
     check_options(options)
     sources = expanded(images, SUFFIXES)
     jobs = jobs_for(sources, output, images, ".ptm", (".ptm", *SUFFIXES))
-    voice.aside = any(job.to_stdout for job in jobs)
+    voice.to_stderr = any(job.to_stdout for job in jobs)
     if output and any(job.target and not job.folder for job in jobs):
         _refuse_image_suffix(output)
 
@@ -143,10 +144,10 @@ def encode(
             return
         raw, stored, image = (report[f"{what}_bytes"] for what in ("raw", "ptm", "image"))
         name = "the input" if report["image"] == STANDARD else os.path.basename(report["image"])
-        beside = f", {_share(stored, image)} {name} ({size(image)})" if image else ""
+        compared = f", {_share(stored, image)} {name} ({size(image)})" if image else ""
         yield (
             f"{report['file']}: {count(report['levels'], 'level')}, {size(stored)}: "
-            f"{_share(stored, raw)} the raw texels ({size(raw)}){beside}"
+            f"{_share(stored, raw)} the raw texels ({size(raw)}){compared}"
         )
         if note := _note_on_sides(report, options.max_side):
             yield f"  {note}"
@@ -205,22 +206,22 @@ def _share(part: int, whole: int) -> str:
 @click.option(
     "--level",
     type=int,
-    help="Which level to decode; 0 is the coarsest. By default the finest that the file holds "
-    "whole.",
+    help="Which level to decode; 0 is the coarsest. By default the finest that is complete in "
+    "the file.",
 )
 @click.option(
     "--window",
     type=Numbers([4], int),
     metavar="X,Y,W,H",
-    help="Decode only this part of the level: W x H texels from column X and row Y on.",
+    help="Decode only this part of the level: W x H texels, starting at column X and row Y.",
 )
 @click.option(
     "-o",
     "--output",
     type=click.Path(),
-    help="The image to write (.png, .npy, .tif, .hdr or .exr), - for stdout, or for several files "
-    "a folder, which is made if need be. A name that ends with / is a folder. By default each "
-    "image lies beside its file: a .png, or an .npy for floats.",
+    help="The image to write (.png, .npy, .tif, .hdr or .exr); - for stdout; for several files a "
+    "folder, which is created if it does not exist. A name that ends with / is a folder. By "
+    "default each image is written next to its file: a .png, or an .npy for floats.",
 )
 @_skipping
 @limited
@@ -242,9 +243,9 @@ def decode(
 ) -> int:
     """Decode .ptm files to images.
 
-    A FILE may be a .ptm, or the beginning of one that is still being loaded; a pattern such as
-    'textures/*.ptm'; a folder (all .ptm files in it); or - for stdin. A file that cannot be decoded
-    is reported, and the others are decoded.
+    A FILE may be a .ptm, or the beginning of one that is still downloading; a pattern such as
+    'textures/*.ptm'; a folder (all .ptm files in it); or - for stdin. If a file cannot be
+    decoded, that is reported and the others are decoded.
     """
     from ptmtools.texture.images import WRITTEN, write_to
     from ptmtools.texture.images.writing import writer
@@ -252,7 +253,7 @@ def decode(
 
     sources = expanded(files, (".ptm",))
     jobs = jobs_for(sources, output, files, "", tuple(WRITTEN))
-    voice.aside = any(job.to_stdout for job in jobs)
+    voice.to_stderr = any(job.to_stdout for job in jobs)
     # One name is an image's; what goes into a folder, or beside its file, gets a suffix.
     named = output is not None and any(job.target and not job.folder for job in jobs)
     if named:
@@ -319,7 +320,7 @@ def _refuse_image_suffix(output: str) -> None:
     if suffix in (*SUFFIXES, *WRITTEN, *LOSSY):
         raise OutputError(
             "PTM-O101",
-            f"the suffix {suffix!r} is that of an image; a .ptm is written",
+            f"the suffix {suffix!r} is that of an image, but a .ptm would be written",
             file=output,
             remedy="name the output .ptm",
         )

@@ -27,9 +27,9 @@ _PADDED = {1: 1, 2: 2, 3: 4, 4: 4}
 @as_json
 @voiced
 def info(voice: Voice, target: str, as_json: bool) -> None:
-    """Say what is in a database or a .ptm file (- for stdin), level by level.
+    """Show what is in a database, or level by level in a .ptm file (- for stdin).
 
-    Of a .ptm no more than its head is read.
+    Only the head of a .ptm is read.
     """
     if not target:
         raise no_name()

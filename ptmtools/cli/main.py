@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 #: Command → (module, function, what `ptm --help` says); besides, each stage has one.
 COMMANDS = {
     "build-scene": ("stages", "build_scene", "Build or update a database from a model."),
-    "status": ("status", "status", "Say which stages of a database are done."),
+    "status": ("status", "status", "Show which stages of a database are up to date."),
     "validate": ("reports", "validate", "Check a database or a .ptm file."),
-    "info": ("information", "info", "Say what is in a database or a .ptm file."),
+    "info": ("information", "info", "Show what is in a database or a .ptm file."),
     "plot": ("reports", "plot", "Draw the floor plan of a database."),
-    "tradeoff": ("tradeoff", "tradeoff", "Measure what the options of the stages cost and bring."),
+    "tradeoff": ("tradeoff", "tradeoff", "Measure what settings cost, and how accurate they are."),
     "encode": ("images", "encode", "Encode images as .ptm files."),
     "decode": ("images", "decode", "Decode .ptm files to images."),
     "compare": ("comparing", "compare", "Compare .ptm with other image formats: size and speed."),
@@ -81,14 +81,15 @@ def _stages() -> dict[str, Stage[Any]]:
 @click.group(
     cls=Commands,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog="`ptm COMMAND --help` explains a command. Exit statuses: docs/cli.md.",
+    epilog="`ptm COMMAND --help` explains a command. Exit statuses: docs/cli.md. Terms: "
+    "docs/glossary.md.",
 )
 @click.version_option(__version__, prog_name="ptm", message="%(prog)s %(version)s")
-@click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
-@click.option("-v", "--verbose", is_flag=True, help="Say more; with errors, the traceback.")
+@click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+@click.option("-v", "--verbose", is_flag=True, help="Print more, and tracebacks of errors.")
 @click.pass_context
 def ptm(ctx: click.Context, quiet: bool, verbose: bool) -> None:
-    """Turn an architectural model into a database that streams."""
+    """Turn an architectural model into a database that clients can stream."""
     voice = ctx.ensure_object(Voice)
     voice.quiet, voice.verbose = quiet, verbose
     if not quiet and sys.stderr.isatty():
@@ -98,7 +99,7 @@ def ptm(ctx: click.Context, quiet: bool, verbose: bool) -> None:
 def main(arguments: Sequence[str]) -> int:
     """Runs one command; returns its exit status. Never raises."""
     voice = Voice()
-    warnings.filterwarnings("ignore", module=r"PIL\.")  # whatever matters becomes an error of ours
+    warnings.filterwarnings("ignore", module=r"PIL\.")  # what is serious becomes an error of ours
     try:
         status = ptm.main(list(arguments), "ptm", standalone_mode=False, obj=voice)
         sys.stdout.flush()

@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 class Voice:
     """How much to say: `quiet` nothing but errors, `verbose` every note and tracebacks.
 
-    With `aside`, stdout carries a file, and what is said goes to stderr.
+    With `to_stderr`, stdout carries a file, and what is said goes to stderr.
     """
 
     quiet: bool = False
     verbose: bool = False
-    aside: bool = False
+    to_stderr: bool = False
     #: Where a progress bar is being shown.
     _bars: Bars | None = None
 
@@ -36,7 +36,7 @@ class Voice:
         """A line of the result, on stdout."""
         if not self.quiet:
             with self.above_progress():
-                click.echo(printable(text), err=self.aside)
+                click.echo(printable(text), err=self.to_stderr)
 
     def warn(self, text: str) -> None:
         """A line on stderr, of what is wrong and does not stop the command."""
@@ -60,7 +60,7 @@ class Voice:
         import json
 
         text = json.dumps(_finite(document), indent=1, ensure_ascii=False, allow_nan=False)
-        click.echo(text.encode("utf-8", "backslashreplace"), err=self.aside)
+        click.echo(text.encode("utf-8", "backslashreplace"), err=self.to_stderr)
 
     @contextmanager
     def progress(self) -> Iterator[Progress]:
@@ -83,14 +83,14 @@ class Voice:
         ) as bars:
             task: dict[str, TaskID] = {}
 
-            def tell(done: int, total: int, what: str) -> None:
+            def update(done: int, total: int, what: str) -> None:
                 if what not in task:
                     task[what] = bars.add_task(what, total=total)
                 bars.update(task[what], completed=done, total=total)
 
             self._bars = bars
             try:
-                yield tell
+                yield update
             finally:
                 self._bars = None
 

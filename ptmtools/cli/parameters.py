@@ -2,13 +2,14 @@
 
 The dataclass stays the one home of names, defaults and their explanation: a field `wall_area:
 float = 2.0` with the line ``wall_area: the least area …`` under "Attributes" of the docstring
-becomes ``--wall-area FLOAT`` with that default and that help. The metadata of a field may say more:
+becomes ``--wall-area FLOAT`` with that default and that help, with a capital
+letter. The metadata of a field may say more:
 
 * ``option``: its name on the command line, where that is not the field's own;
 * ``was``: former names, which work for one release, with a note;
 * ``deprecated``: why it does nothing any more; it is hidden, and giving it draws a note;
 * ``choices``: a table of what may be given, by name, each with an ``about``; with ``several``,
-  names may be joined by commas;
+  several names may be given, separated by commas;
 * ``numbers``: how many numbers one value consists of, where that varies, such as (3, 4);
 * ``parse``, ``print``: from what the command line gives to the field's value, and back.
 
@@ -207,7 +208,7 @@ def _option(field: Field[Any], hint: Any, text: str | None, former: str = "") ->
     name = former or _option_name(field)
     settings: dict[str, Any] = {
         "default": default,
-        "help": text,
+        "help": text and text[:1].upper() + text[1:],
         "hidden": bool(former or field.metadata.get("deprecated")),
     }
     if former:
@@ -222,7 +223,7 @@ def _option(field: Field[Any], hint: Any, text: str | None, former: str = "") ->
         flag = f"{flag}/--no-{name}"
     elif (table := field.metadata.get("choices")) is not None:
         settings["type"] = named = Named(table, several=field.metadata.get("several", False))
-        settings["help"] = text and f"{text}: {named.explained}."
+        settings["help"] = settings["help"] and f"{settings['help']}: {named.explained}."
     elif get_origin(hint) is Literal:
         settings["type"] = click.Choice([str(choice) for choice in get_args(hint)])
     elif counts := field.metadata.get("numbers"):

@@ -49,8 +49,8 @@ def _print_codes(context: click.Context, option: click.Option, asked: bool) -> N
     type=click.IntRange(0),
     default=0,
     metavar="N",
-    help="Also try N random lines between points in cells: where nothing is in the way, the cells "
-    "must be listed as seeing each other.",
+    help="Also try N random lines between points in cells: if nothing is in the way, each of the "
+    "two cells must be in the other's visible set.",
 )
 @click.option("--strict / --no-strict", help="Fail on warnings too.")
 @click.option(
@@ -76,8 +76,8 @@ def validate(
 ) -> None:
     """Check a database or a .ptm file.
 
-    Says of each file first what is worst, and at the end which command repairs it. Exits with 8 if
-    it finds an error.
+    Prints the worst finding of each file first, and ends with the command that repairs them. The
+    exit status is 8 if there is an error.
     """
     if not target:
         raise no_name()
@@ -94,7 +94,7 @@ def validate(
         repair = _repair(target, report)
         raise CheckError(
             "PTM-C001",
-            f"not in order: {count(failed, 'finding')}",
+            f"{count(failed, 'finding')}",
             file=target,
             remedy=f"repair it with `{repair}`" if repair else None,
         )
@@ -166,13 +166,14 @@ def _print_findings(
     for pair in shot.missed if shot else ():
         a, b = pair.cells
         lines.append(
-            f"{target}: error: cells {a} and {b} see each other, but not in their visible sets"
+            f"{target}: error: cells {a} and {b} see each other, but are not in each other's "
+            "visible sets"
         )
     if shot:
         lines.append(
             f"{target}: {count(shot.tried, 'random segment')}, {shot.unoccluded:,} of them free; "
-            f"{shot.missed_segments:,} between cells that are not said to see each other, "
-            f"{shot.hairlines:,} too near to an edge to tell"
+            f"{shot.missed_segments:,} between cells that are not in each other's visible sets, "
+            f"{shot.hairlines:,} too close to an edge to decide"
         )
     lines += [f"note: {note}" for note in report.notes]
     for line in lines:

@@ -42,8 +42,8 @@ SHOWN_NOTES = 12
 #: returns it as a document and as lines.
 REPORTS: dict[Stage[Any], tuple[str, Lazy[Callable[..., tuple[Any, list[str]]]]]] = {
     PVS: (
-        "Describe the sets: how large they are, the most expensive portals, and openings that show "
-        "suspiciously much.",
+        "Print a summary of the sets: their sizes, the most expensive portals, and openings "
+        "through which suspiciously much is visible.",
         Lazy("ptmtools.cli.visibility:visibility_report"),
     )
 }
@@ -57,7 +57,7 @@ model_argument = click.argument("model", type=click.Path())
 @options_of(*(stage.options for stage in STAGES.values()))
 @many_machines
 @forced
-@click.option("--dry-run", is_flag=True, help="Say what would be done, and why; write nothing.")
+@click.option("--dry-run", is_flag=True, help="Show what would be done, and why; write nothing.")
 @as_json
 @voiced
 def build_scene(
@@ -73,9 +73,9 @@ def build_scene(
 ) -> None:
     """Build a database from MODEL, or bring it up to date.
 
-    MODEL is an OBJ, glTF or GLB file, or one of the formats that pymeshlab reads. The database is
-    a folder: museum.db beside museum.obj, or what -o names. Only what changed since the last build
-    is computed again.
+    MODEL is an OBJ, glTF or GLB file, or in a format that trimesh or pymeshlab reads. The database
+    is a folder: museum.obj makes museum.db, unless -o names another. Only what has changed since
+    the last build is computed again.
     """
     options: list[Any] = [take(stage.options, values) for stage in STAGES.values()]
     if dry_run:
@@ -193,7 +193,7 @@ def print_report(voice: Voice, report: BuildReport, as_json: bool) -> None:
     for note in shown:
         voice.say(f"note: {note}")
     if len(shown) < len(report.notes):
-        voice.say(f"note: {len(report.notes) - len(shown):,} more; -v shows them all")
+        voice.say(f"note: {len(report.notes) - len(shown):,} more notes; -v shows them all")
     if any(stage.stage == EMIT.name for stage in report.stages):
         ptm, db = _invoked(), shlex.quote(report.database)
         voice.say("")
@@ -216,7 +216,7 @@ def _tasks(stage: StageReport) -> str:
     if not kept and not resumed:
         return ""
     taken = f", {resumed:,} by the run that was interrupted" if resumed else ""
-    return f"; {total - kept - resumed:,} encoded, {kept:,} as they were{taken}"
+    return f"; {total - kept - resumed:,} encoded, {kept:,} unchanged{taken}"
 
 
 def _invoked() -> str:

@@ -34,7 +34,7 @@ _PLANNED = {"current": "unchanged", "run": "would run", "maybe": "may run"}
 @as_json
 @voiced
 def status(voice: Voice, db: str, as_json: bool) -> None:
-    """Say which stages of DB are done, stale or damaged, and who is writing it."""
+    """Show which stages of DB are done, stale or damaged, and which process is writing it."""
     from ptmtools.pipeline.status import database_status
 
     found = database_status(db)
@@ -50,7 +50,7 @@ def status(voice: Voice, db: str, as_json: bool) -> None:
     if found.writer:
         voice.say(f"being written by {found.writer}")
     if found.interrupted:
-        waiting = f"; {count(found.waiting, 'finished texture')} will be taken over"
+        waiting = f"; {count(found.waiting, 'finished texture')} will be kept"
         voice.say(f"a run was interrupted{waiting if found.waiting else ''}")
     if not found.finished and not found.writer:
         voice.say(f"not finished: run `{build_command(db)}`")

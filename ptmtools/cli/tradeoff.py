@@ -33,7 +33,7 @@ LEAST_POINTS = 64
     "stages",
     type=click.Choice(list(EXPERIMENTS)),
     multiple=True,
-    help="Try only this stage; may be given several times. By default all are tried.",
+    help="Try only this stage. May be given several times. By default all are tried.",
 )
 @click.option(
     "--error",
@@ -46,7 +46,7 @@ LEAST_POINTS = 64
     type=click.IntRange(1),
     default=16,
     show_default=True,
-    help="Try coverage hints in so many cells, which stand for all.",
+    help="Try coverage hints in this many cells, as a sample of all.",
 )
 @click.option(
     "--reference",
@@ -54,11 +54,13 @@ LEAST_POINTS = 64
     default=MAX_SAMPLES,
     show_default=True,
     metavar="POINTS",
-    help="Compare coverage hints with those of so many other sample points in a cell; settings "
-    "with fewer are tried.",
+    help="Compare coverage hints with those of this many other sample points in each cell; only "
+    "settings with fewer points are tried.",
 )
 @click.option("--csv", "csv_file", type=click.Path(), help="Also write every trial as CSV.")
-@click.option("--plot", "plot_file", type=click.Path(), help="Also draw error against cost, a PNG.")
+@click.option(
+    "--plot", "plot_file", type=click.Path(), help="Also plot error against cost, as a PNG."
+)
 @forced
 @as_json
 @voiced
@@ -76,7 +78,7 @@ def tradeoff(
 ) -> None:
     """Measure what settings of each stage cost, and how accurate they are, on the scene of DB.
 
-    A star marks the settings that no cheaper one beats in accuracy. DB is not changed.
+    A star marks a setting if no cheaper one is more accurate. DB is not changed.
     """
     for file in (csv_file, plot_file):
         if file:

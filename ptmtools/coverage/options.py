@@ -31,24 +31,24 @@ class AchOptions:
 
     Attributes
     ----------
-    preset: how many sample points, how large the views and how the points are placed, where that is
-        not given: "fast", "default", "high", or "paper" for what Marvie & Bouatouch (2003) used, 8
-        points with views of 256 x 256 pixels, slow and less accurate than "fast".
-    samples: sample points in each cell; with --tolerance, the most.
-    face: pixels a side of each point's six square views. More points help far more than larger
-        views.
+    preset: defaults for --samples, --face and --placement: "fast", "default", "high", or "paper",
+        which is what Marvie & Bouatouch (2003) used: 8 points with views of 256 x 256 pixels, slow
+        and less accurate than "fast".
+    samples: sample points in each cell; with --tolerance, the most that may be used.
+    face: side of each sample point's six square views, in pixels. More points help far more than
+        larger views.
     placement: how sample points are spread over a cell: "sobol", evenly (a scrambled Sobol
         sequence); "kd", in the middles of equal parts, best for fewer than 16; or "uniform", at
         random.
-    tolerance: add points in each cell until its hints are within this of the truth (total
-        variation, with about 95 % confidence), or --samples points are reached.
-    weighting: "pixel" counts every pixel of a view alike; "solid-angle" counts those near the edges
-        and corners of a view less, by how much of the sphere they cover.
+    tolerance: add sample points in each cell until its hints are within this of the truth (total
+        variation, with about 95 % confidence), or until --samples is reached.
+    weighting: "pixel" counts every pixel of a view equally; "solid-angle" weights each by how much
+        of the sphere it covers, which is less near the edges and corners.
     backend: what draws the views
-    gpu: number of the graphics device to draw with; by default the first.
-    clearance: least distance of a sample point from every surface, metres; by default a quarter of
-        the thickness of the thinnest cell that the subdivision allows.
-    seed: another number takes other sample points.
+    gpu: number of the graphics device to draw with. By default the first.
+    clearance: smallest distance of a sample point from any surface, in metres. By default a quarter
+        of the thickness of the thinnest cell that the subdivision allows.
+    seed: random seed: another number gives other sample points.
     per_texture: also measure how much of the view each texture of each visible cell covers.
     """
 
@@ -116,13 +116,13 @@ class AchOptions:
             )
         if self.points < GROUPS:  # of which each needs one
             raise _refused(
-                f"{self.points} sample points do not tell how far they are from a tolerance",
-                f"allow {GROUPS} or more, or leave --samples out",
+                f"{self.points} sample points are too few to estimate their error",
+                f"allow {GROUPS} or more, or omit --samples",
             )
         if self.placed == "kd":
             raise _refused(
-                "--tolerance adds points one by one, which --placement kd cannot",
-                "take --placement sobol",
+                "--tolerance adds points step by step, which --placement kd does not support",
+                "use --placement sobol",
             )
 
 

@@ -88,7 +88,7 @@ def solids(scene: Scene, cells: Cells) -> list[Solid]:
     corner = weld.reshape(-1)[scene.triangles]
     edge, forward = edges(corner)
     group = edge_groups(edge)
-    closed, balanced = winding(edge, forward, group)
+    closed, balanced = closed_and_oriented(edge, forward, group)
     all_corners = scene.corners
     count = len(corner)
     area = np.bincount(group, areas(all_corners), count)
@@ -132,7 +132,7 @@ def edge_groups(edge: NDArray[np.int64]) -> NDArray[np.int64]:
         group = better
 
 
-def winding(
+def closed_and_oriented(
     edge: NDArray[np.int64], forward: NDArray[np.bool_], group: NDArray[np.int64]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """(T,) whether the group with each number is closed, and whether it is wound consistently, from

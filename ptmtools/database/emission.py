@@ -59,7 +59,7 @@ def emit(
         if not force and os.path.lexists(folder / name):
             raise OutputError(
                 "PTM-O001",
-                "exists already",
+                "already exists",
                 file=folder / name,
                 remedy="name another folder, or give --force to overwrite it",
             )

@@ -118,19 +118,19 @@ class EmitOptions:
     """
     Attributes
     ----------
-    title: of the world, which browsers show in their title bar.
-    fallback: refer to the fallback image of each texture too, a PNG for clients that cannot read
-        `.ptm`; without it only to the `.ptm`.
-    viewpoints: where to begin; empty takes the model's cameras, or a place in the largest room if
-        there are none.
-    viewpoint_count: give at most so many more rooms a viewpoint, the largest first; they are listed
-        in the order in which one would walk through them.
-    avatar_size: the visitor: distance that he keeps from walls, height of his eyes above the floor,
-        highest step that he climbs, metres.
-    field_of_view: of viewpoints that are no cameras of the model, radians.
+    title: title of the world, which browsers show in their title bar.
+    fallback: refer to the PNG of each texture as well, for clients that cannot read `.ptm`;
+        otherwise only to the `.ptm`.
+    viewpoints: where to begin. By default the model's cameras, or a place in the largest room if
+        there are none. May be given several times.
+    viewpoint_count: give viewpoints to at most this many further rooms, the largest first. They are
+        listed in the order of a walk through them.
+    avatar_size: the visitor: distance kept from walls, eye height above the floor, and highest step
+        climbed, all in metres.
+    field_of_view: field of view of viewpoints that are not cameras of the model, in radians.
     gzip: also write a gzip copy of each VRML and JSON file, such as root.wrl.gz, for servers that
-        send those instead.
-    format: what to write, names with commas in between
+        send precompressed files.
+    format: what to write, one or more names separated by commas
     """
 
     title: str = "ptmtools database"
@@ -156,9 +156,9 @@ class EmitOptions:
         if not 0 < self.field_of_view < math.pi:
             wrong = f"a field of view of {self.field_of_view:g} is not between 0 and pi radians"
         elif not all(0 <= size < math.inf for size in self.avatar_size):
-            wrong = "an avatar's sizes are metres of at least 0"
+            wrong = "the sizes of --avatar-size must be 0 or more"
         elif self.viewpoint_count < 0:
-            wrong = f"at most {self.viewpoint_count} viewpoints is less than none"
+            wrong = f"--viewpoint-count {self.viewpoint_count} is below 0"
         if wrong:
             raise InputError("PTM-I603", wrong, remedy="leave the option out for its default")
 
@@ -271,12 +271,12 @@ class PlotOptions:
     """
     Attributes
     ----------
-    cell: the number of a cell: shade every cell that can be seen from it by its average share of
+    cell: shade every cell that can be seen from the cell with this number, by its average share of
         the view.
-    height: how far above a storey's floor the building is cut, metres.
-    storey_gap: floors farther apart than this belong to different storeys, metres.
-    width: of the picture, inches.
-    dpi: dots per inch.
+    height: how far above each storey's floor the building is cut, in metres.
+    storey_gap: floors farther apart than this belong to different storeys, in metres.
+    width: width of the picture, in inches.
+    dpi: resolution, in dots per inch.
     """
 
     cell: int | None = None

@@ -122,15 +122,15 @@ class Cluster(Executor):
             if isinstance(fault, KilledWorker) or self._client.status == "running":
                 raise WorkerError(
                     "PTM-W004",
-                    "workers ended in the middle of their work, again and again",
+                    "workers repeatedly ended while they worked",
                     file=self.address,
-                    remedy="if they were killed for want of memory, start fewer on each machine",
+                    remedy="if they ran out of memory, start fewer on each machine",
                 ) from fault
             raise WorkerError(
                 "PTM-W001",
                 "the scheduler was lost",
                 file=self.address,
-                remedy="start it again and run the same command, which resumes",
+                remedy="start it again, then run the same command to resume",
             ) from fault
 
     def forget_last(self) -> None:

@@ -1,7 +1,7 @@
 """What runs in the workers of a cluster: copies of shared values, and tasks over them.
 
 A copy is made of the block that Dask has brought here, and brought up to date with the changes
-that `receive` was told of. A worker that missed some (it joined late) says so, and is sent them.
+that `receive` was sent. A worker that missed some (it joined late) says so, and is sent them.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def check(theirs: tuple[str, ...], here: str) -> None:
         if one != other:
             raise WorkerError(
                 "PTM-W003",
-                f"the worker has {other}, this process {one}",
+                f"the worker has {other}, this process has {one}",
                 file=here,
                 remedy="install the same software on all machines",
             )

@@ -219,8 +219,8 @@ def lost() -> WorkerError:
     """The error for a process that is no more, PTM-W004."""
     return WorkerError(
         "PTM-W004",
-        "a worker process ended in the middle of its work",
-        remedy="if it was killed for want of memory, take fewer workers (-j 1); a script "
+        "a worker process ended while it worked",
+        remedy="if it ran out of memory, use fewer workers (-j 1); a script "
         "that starts processes needs `if __name__ == '__main__'`",
     )
 

@@ -20,7 +20,7 @@ def reasons(before: StageRecord | None, work: StageRecord, db: DatabaseFolder) -
         return NEVER_RUN
     found = []
     if before.recipe != work.recipe:
-        found.append(f"ptmtools does it in another way since (recipe {before.recipe})")
+        found.append(f"this ptmtools computes it differently (recipe {before.recipe} before)")
     names = [*before.parameters, *(n for n in work.parameters if n not in before.parameters)]
     for name in names:
         old, new = before.parameters.get(name), work.parameters.get(name)
@@ -38,8 +38,8 @@ def _changed(before: Mapping[str, str], after: Mapping[str, str]) -> dict[str, l
     both = [n for n in after if n in before and after[n] != before[n]]
     return {
         "changed": [n for n in both if before[n] and after[n]],
-        "came": [n for n in both if not before[n]] + [n for n in after if n not in before],
-        "is gone": [n for n in both if not after[n]] + [n for n in before if n not in after],
+        "added": [n for n in both if not before[n]] + [n for n in after if n not in before],
+        "removed": [n for n in both if not after[n]] + [n for n in before if n not in after],
     }
 
 

@@ -30,7 +30,7 @@ def image_rows(data: bytes) -> list[Mapping[str, Any]]:
     rows: list[Mapping[str, Any]] = json.loads(data)["images"]
     for row in rows:
         if not (_IMAGE_NAME.fullmatch(row["name"]) and _SHA256.fullmatch(row["sha256"])):
-            raise ValueError("an image of an impossible name or digest")
+            raise ValueError("an image with an impossible name or digest")
         texts = isinstance(row["files"], list) and all(isinstance(f, str) for f in row["files"])
         if not texts or not isinstance(row["plain"], bool):
             raise TypeError("an image without a list of files")

@@ -13,11 +13,11 @@ class TextureOptions(EncodeOptions):
 
     Attributes
     ----------
-    fallback: write a PNG of each texture, for clients that cannot read `.ptm`.
-    fallback_size: the fallback image holds the finest level whose longer side is at most this many
-        texels, or the coarsest if none is: a browser that cannot read `.ptm` loads all of them. 0
-        is the finest.
-    limit: as in `IngestOptions`.
+    fallback: also write a PNG of each texture, for clients that cannot read `.ptm`.
+    fallback_size: the PNG holds the finest level whose longer side is at most this many texels, or
+        the coarsest if there is none; 0 is the finest. Browsers that cannot read `.ptm` load the
+        PNGs of all textures.
+    limit: refuse an image that takes more memory than this once decoded, in MiB.
     """
 
     fallback: bool = True

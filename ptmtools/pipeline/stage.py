@@ -40,8 +40,8 @@ class Stage(Generic[A]):
     ----------
     name: in the manifest, as a command, and of its arrays' file.
     about: what it does, a sentence for ``--help``.
-    recipe: a number that is raised when the stage makes other bytes of the same inputs, so that a
-        new release runs again what it changed and nothing else.
+    recipe: a number that is raised when the stage makes different bytes from the same inputs, so
+        that a new release runs again what it changed and nothing else.
     options: the frozen class of its options.
     reads: the stages that it reads, in the order in which `compute` takes their artifacts; a
         function of the options if it depends on them.

@@ -67,7 +67,7 @@ class DatabaseStatus:
 
 
 def database_status(path: str | os.PathLike[str]) -> DatabaseStatus:
-    """Looks at a database. Every file is held against its hash, but for those that have not been
+    """Looks at a database. Every file is compared with its hash, but for those that have not been
     touched since that was last done.
 
     Raises

@@ -44,7 +44,7 @@ def read_other(
     if suffix not in SUPPORTED:
         raise InputError(
             "PTM-I243",
-            f"models of type {suffix or '(no suffix)'} are not read",
+            f"models of type {suffix or '(no suffix)'} are not supported",
             file=path,
             remedy=f"give one of {' '.join(SUPPORTED)}",
         )

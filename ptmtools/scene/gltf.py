@@ -174,7 +174,7 @@ def _draws(
         mesh = tree["meshes"][entry["mesh"]]
         name = str(entry.get("name") or mesh.get("name") or f"node {node}")
         if "skin" in entry:
-            findings.say("PTM-N224", "skin: taken in its rest pose", f"node {node}")
+            findings.say("PTM-N224", "skin: shown in its rest pose", f"node {node}")
         if "EXT_mesh_gpu_instancing" in entry.get("extensions", {}):
             findings.miss("PTM-N224", "EXT_mesh_gpu_instancing: one instance only", f"node {node}")
         for k, primitive in enumerate(mesh["primitives"]):
@@ -204,7 +204,7 @@ def _draws(
     if vertices > most:
         raise LimitError(
             "PTM-L200",
-            f"more than {most} vertices, those that several primitives share counted for each",
+            f"more than {most} vertices, counting shared ones once for each primitive",
             file=path,
             remedy="raise the limit (--max-triangles), or split the model",
         )

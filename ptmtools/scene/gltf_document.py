@@ -107,7 +107,7 @@ def open_document(path: Path, folder: Folder) -> Document:
     except (ValueError, RecursionError) as error:
         raise damaged(path, f"its JSON cannot be read ({error})") from None
     if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
-        raise damaged(path, "its JSON is no glTF document")
+        raise damaged(path, "its JSON is not a glTF document")
     version = str(tree["asset"].get("version", ""))
     if not version.startswith("2."):
         raise damaged(path, f"version {version!r}")
@@ -124,7 +124,7 @@ def _parsed(text: str) -> Any:
 
 
 def _no_constant(name: str) -> float:
-    raise ValueError(f"{name} is no JSON")
+    raise ValueError(f"{name} is not valid JSON")
 
 
 def _buffers(
@@ -157,7 +157,7 @@ def _buffers(
     for index, (buffer, length) in enumerate(zip(buffers, lengths, strict=True)):
         if len(buffer.data) < length:
             raise damaged(
-                path, f"{length} bytes expected, {len(buffer.data)} there", f"buffer {index}"
+                path, f"{length} bytes expected, {len(buffer.data)} found", f"buffer {index}"
             )
     return buffers
 
@@ -201,7 +201,7 @@ def _external(path: Path, folder: Folder, uri: str, place: str) -> Path:
             f"{uri[:80]}: " + ("lies outside the model's folder" if outside else "not found"),
             file=path,
             place=place,
-            remedy="allow reading outside of it" if outside else "put it beside the model",
+            remedy="give --allow-outside" if outside else "put it into the model's folder",
         )
     return found.path.resolve()
 

@@ -69,7 +69,7 @@ class VerifiedBytes:
                 "PTM-I252",
                 f"cannot be read again ({error.strerror or error})",
                 file=self.label,
-                remedy="put it back, or build again",
+                remedy="restore it, or build again",
             ) from None
         if hashlib.sha256(data).hexdigest() != self.sha256:
             raise InputError(

@@ -94,7 +94,7 @@ def ingest(
         raise InputError(
             "PTM-I248",
             f"none of the {len(source.triangles)} faces has an area "
-            f"({kept.degenerate} degenerate, {kept.not_finite} with coordinates not finite)",
+            f"({kept.degenerate} degenerate, {kept.not_finite} with non-finite coordinates)",
             file=model,
         )
     _note_faces(kept, source, findings)

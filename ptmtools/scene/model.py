@@ -218,9 +218,9 @@ def _material(row: Mapping[str, Any], images: int) -> Material:
     (opacity,) = numbers([row["opacity"]], 1, "opacities")
     name, wrap_s, wrap_t = texts([row["name"], row["wrap_s"], row["wrap_t"]], "names")
     if not all(0 <= share <= 1 for share in (r, g, b, opacity)):
-        raise ValueError("a colour or an opacity is no share")
+        raise ValueError("a colour or an opacity is not a share")
     if not {wrap_s, wrap_t} <= {"repeat", "clamp"} or not isinstance(row["transparent"], bool):
-        raise ValueError("a material is none")
+        raise ValueError("a material is malformed")
     image = whole(row["image"], -1, images, "an image")
     s, t = cast("tuple[Wrap, Wrap]", (wrap_s, wrap_t))
     return Material(name, (r, g, b), opacity, image, s, t, row["transparent"])

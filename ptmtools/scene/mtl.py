@@ -153,7 +153,7 @@ def read_mtl(path: Path, label: str, findings: Findings) -> dict[str, MtlMateria
                 "PTM-L204",
                 f"is larger than {LARGEST} MiB",
                 file=path,
-                remedy="leave out the materials that are not used",
+                remedy="remove the materials that are not used",
             )
         data = stream.read()
     materials: dict[str, MtlMaterial] = {}

@@ -12,13 +12,13 @@ class IngestOptions:
 
     Attributes
     ----------
-    unit: the model's unit: m, cm, mm, in, ft, or how many metres it is; guessed from the size if
-        not given.
-    up: the model's up axis, "y" or "z"; guessed from floor area and size if not given.
-    strict: missing files, unknown materials, unreadable images and dropped faces end the build.
-    allow_outside: read files outside the model's folder if the model refers to them.
-    limit: refuse an image of the model that takes more memory than this once decoded, MiB.
-    max_triangles: refuse a model of more triangles than this.
+    unit: the model's unit: m, cm, mm, in, ft, or its length in metres. By default it is guessed
+        from the size of the model.
+    up: the model's up axis, "y" or "z". By default it is guessed from the floor area and the size.
+    strict: stop the build at missing files, unknown materials, unreadable images and dropped faces.
+    allow_outside: also read files outside the model's folder that the model refers to.
+    limit: refuse an image that takes more memory than this once decoded, in MiB.
+    max_triangles: refuse a model with more triangles than this.
     """
 
     unit: str | float | None = None

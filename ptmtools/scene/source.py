@@ -202,5 +202,5 @@ class Findings:
             message + (f" (and {more} more findings)" if more else ""),
             file=self.model,
             place=place or None,
-            remedy="mend the model, or go on without --strict",
+            remedy="correct the model, or build without --strict",
         )

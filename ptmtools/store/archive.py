@@ -75,7 +75,7 @@ def unpack_arrays(data: bytes, *, file: str | PathLike[str]) -> dict[str, NDArra
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = archive.infolist()
             if sum(member.file_size for member in members) > len(data):
-                raise ValueError("its members claim more bytes than it has")
+                raise ValueError("its members claim more bytes than the file has")
             for member in members:
                 name = _checked_name(member)
                 if name in arrays:

@@ -23,7 +23,7 @@ from typing import Any
 from ptmtools.files import open_regular
 
 #: A clock may stand still for so long, in nanoseconds: most tick every 1 to 10 ms, some disks'
-#: every 2 s; theirs are told by whole seconds.
+#: every 2 s; theirs are recognised by whole seconds.
 TICK, COARSE_TICK = 50_000_000, 3_000_000_000
 #: Files for databases that were not built for so many days are removed.
 KEPT_DAYS = 90

@@ -1,4 +1,4 @@
-"""A database on disk, to read: every file is held against its recorded hash."""
+"""A database on disk, to read: every file is compared with its recorded hash."""
 
 from __future__ import annotations
 

@@ -96,12 +96,12 @@ def acquire(folder: Path) -> Lock:
         "PTM-D007",
         "another ptm is writing this database" + (f", {found}" if found else ""),
         file=folder,
-        remedy="wait until it has ended",
+        remedy="wait until it has finished",
     )
 
 
 def holder(folder: Path) -> Holder | None:
-    """Whom the lock file of a folder names, whether or not he is still there."""
+    """The process that the lock file of a folder names, whether or not it still runs."""
     try:
         with open_regular(folder / LOCK) as file:
             found = json.loads(file.read(4096))

@@ -1,4 +1,4 @@
-"""Who may write in a database folder, and what becomes of it when he is done."""
+"""Who may write in a database folder, and what becomes of it afterwards."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def admitted(folder: Path, model: str, *, force: bool) -> Manifest:
                 "PTM-O010",
                 "the folder is not empty and not a ptmtools database",
                 file=folder,
-                remedy="name another folder with -o, or give --force to write into this one",
+                remedy="name another folder with -o, or give --force to write into it",
             )
         return Manifest(model)
     if manifest.model != model:

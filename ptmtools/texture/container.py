@@ -107,7 +107,7 @@ def read_header(data: bytes) -> PtmHeader:
         )
     table = _FIXED.size + (_MORE.size if version > 1 else 0)
     if size != table + count * _ENTRY.size + _CRC.size or count > MAX_LEVELS:
-        raise _damaged_head("its size does not match its number of levels")
+        raise _damaged_head("its size does not match the number of levels")
     if len(data) < size:
         raise _cut_head(len(data))
     (crc,) = _CRC.unpack_from(data, size - _CRC.size)
@@ -201,7 +201,7 @@ def _check_magic(data: bytes) -> None:
     if data.startswith(MAGIC):
         return
     if not data:
-        raise InputError("PTM-I101", "is empty", remedy="fetch or encode it again")
+        raise InputError("PTM-I101", "is empty", remedy="download or encode it again")
     if data.startswith(b"PTM_1"):
         raise InputError(
             "PTM-I102",
@@ -220,9 +220,9 @@ def _check_magic(data: bytes) -> None:
 def _cut_head(size: int) -> InputError:
     return InputError(
         "PTM-I103",
-        f"is cut inside its head, after {size} bytes",
+        f"is incomplete: cut inside its head, after {size} bytes",
         place=f"byte {size}",
-        remedy="no level is whole; fetch or encode it again",
+        remedy="no level is complete; download or encode it again",
     )
 
 

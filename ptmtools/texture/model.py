@@ -24,17 +24,19 @@ class EncodeOptions:
     ----------
     profile: how the levels are coded
     max_error: how far any sample of any level may be from its exact value; 0 is lossless. Larger
-        values make smaller files (4 of 255 is hard to see and halves most of them). Integers only.
-    tile: side of the tiles, texels. A level of more than twice that is cut into tiles that are
-        coded one by one, which allows parallel work, bounded memory and random access. 0 for none.
-    min_side: leave out levels whose shorter side is below this, texels; whoever needs them can
-        compute them.
-    max_side: leave out levels whose longer side is above this, texels; 0 keeps all. Sides halve
-        from level to level, so the finest that is kept may be much smaller.
-    min_level: the coarsest level to keep: 0 is the coarsest of all, -1 the finest, -2 the one
-        below it. An image without such a level keeps the nearest that it has.
-    max_level: the finest level to keep, counted likewise. Levels that are kept are numbered from
-        0 again; the file still tells the size of the original.
+        values make smaller files (4 of 255 is hard to see and about halves most of them). For
+        integer images only.
+    tile: side of the tiles in texels (pixels of a texture). A level with a side of more than twice
+        that is cut into tiles that are coded one by one, which allows parallel work, bounded memory
+        and random access. 0 turns tiles off.
+    min_side: leave out levels whose shorter side is below this, in texels; clients that need them
+        can compute them.
+    max_side: leave out levels whose longer side is above this, in texels; 0 keeps all. Sides halve
+        from level to level, so the finest level kept may be much smaller.
+    min_level: the coarsest level to keep: 0 is the coarsest of all, -1 the finest, -2 the next
+        coarser one. An image without that level keeps the nearest one that it has.
+    max_level: the finest level to keep, counted in the same way. The levels kept are numbered from
+        0 again; the file still records the size of the original.
     """
 
     profile: str = field(default="fast", metadata={"choices": PROFILES})

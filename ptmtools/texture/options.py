@@ -17,7 +17,7 @@ def check_options(options: EncodeOptions) -> None:
     for field in fields(options):
         value = getattr(options, field.name)
         if isinstance(field.default, int) and type(value) is not type(field.default):
-            raise _impossible(f"{field.name} is {value!r}", "it must be a whole number")
+            raise _impossible(f"{field.name} is {value!r}", "give a whole number")
     if options.profile not in PROFILES:
         raise _impossible(
             f"there is no profile {options.profile!r}", f"use one of {', '.join(PROFILES)}"
@@ -29,7 +29,9 @@ def check_options(options: EncodeOptions) -> None:
         )
     first, last = options.min_level, options.max_level
     if (first < 0) == (last < 0) and first > last:
-        raise _impossible(f"there are no levels {first} to {last}", "min_level is the coarser one")
+        raise _impossible(
+            f"there are no levels {first} to {last}", "min_level must be the coarser one"
+        )
     low, high = TILE_SIDES
     if options.tile and not (low <= options.tile <= high and options.tile % 2 == 0):
         raise _impossible(

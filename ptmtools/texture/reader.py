@@ -251,7 +251,7 @@ class PtmReader:
                 f"{width} x {height} texels of {header.texel_bytes} bytes take "
                 f"up to {needed} bytes to decode, more than the limit of {limit}",
                 place=f"level {number}",
-                remedy="ask for a coarser level or raise the limit",
+                remedy="choose a coarser level, or raise the limit (--limit)",
             )
 
     def _step(self, number: int, box: Box, below: _State | None) -> _State:
@@ -340,8 +340,8 @@ class PtmReader:
                 "PTM-I108",
                 "the checksum is wrong",
                 place=place,
-                remedy="the file is damaged, but coarser levels may be intact; fetch or encode it "
-                "again",
+                remedy="the file is damaged, but coarser levels may be intact; download or "
+                "encode it again",
             )
         return data
 

@@ -73,7 +73,8 @@ def _called(read: RangeReader, offset: int, length: int) -> bytes:
     found: object = read(offset, length)
     if not isinstance(found, bytes | bytearray | memoryview):
         raise InputError(
-            "PTM-I122", f"what reads ranges gave {type(found).__name__} instead of bytes"
+            "PTM-I122",
+            f"the function that reads ranges returned {type(found).__name__} instead of bytes",
         )
     # More than was asked for is no harm: some servers send all there is.
     return bytes(found)[:length]

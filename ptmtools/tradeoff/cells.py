@@ -2,7 +2,7 @@
 
 There is no right subdivision to compare with; what matters is that a client needs little of the
 building in memory. The error of a setting is the share of the building's volume that is potentially
-visible from a viewer's cell, on average over all places where he may be.
+visible from a viewer's cell, on average over all places where the viewer may be.
 """
 
 from __future__ import annotations

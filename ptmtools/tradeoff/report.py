@@ -33,7 +33,7 @@ def table(trade: Trade, wanted: float | None = None) -> list[str]:
     if wanted is not None:
         found = trade.cheapest(wanted)
         answer = (
-            found.setting.name if found else "none of these; the last one with a star is nearest"
+            found.setting.name if found else "none of these; the last one with a star comes closest"
         )
         lines.append(f"  cheapest for an error of at most {wanted:g}: {answer}")
     return lines

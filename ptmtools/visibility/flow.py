@@ -135,7 +135,7 @@ def portal_flow(
         raise LimitError(
             "PTM-L400",
             f"{count // 2:,} portals are too many for the portal flow",
-            remedy="subdivide less finely (a greater wall area, fewer cells)",
+            remedy="subdivide less finely (a larger --wall-area, or --max-leaves)",
         )
     cut = np.zeros(count, dtype=np.bool_)
     counts = np.zeros((4, count), dtype=np.int64)

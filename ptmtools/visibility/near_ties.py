@@ -58,7 +58,7 @@ def searched(
     work, cut, ties, used = kernels.flow(g, s, known, source, budget, none, False, seen)
     rejected = set(noted := _sequences(s.near_tie[:used]))
     overflown = len(noted) < ties
-    if not (overflown or _that_matter(known, known[source] & ~seen, rejected)):
+    if not (overflown or _deciding(known, known[source] & ~seen, rejected)):
         return Searched(cut, work, ties, 0, 0)
     # With all of them let through, what more is seen? What is seen already need not be found again.
     most = seen.copy()
@@ -66,7 +66,7 @@ def searched(
     work += more
     passes: dict[tuple[int, ...], bool] = {}
     while not (cut or loosely or overflown) and work < COSTLIEST * budget:
-        new = _that_matter(known, most & ~seen, rejected - passes.keys())
+        new = _deciding(known, most & ~seen, rejected - passes.keys())
         if len(passes) + len(new) > DECIDED:
             break
         for sequence in new:
@@ -100,13 +100,13 @@ def _sequences(words: NDArray[np.int64]) -> list[tuple[int, ...]]:
     return found
 
 
-def _that_matter(
+def _deciding(
     known: NDArray[np.uint64], doubtful: NDArray[np.uint64], rejected: set[tuple[int, ...]]
 ) -> list[tuple[int, ...]]:
     """The rejected sequences, in order, whose last portal, or what may lie behind it, is among the
     ``doubtful`` (W,)."""
     lasts = np.array(sorted({sequence[-1] for sequence in rejected}), np.int64)
     itself = doubtful[lasts >> 6] >> (lasts & 63).astype(np.uint64) & np.uint64(1)
-    matter = itself.astype(bool) | np.any(known[lasts] & doubtful, axis=1)
-    kept = set(lasts[matter].tolist())
+    decides = itself.astype(bool) | np.any(known[lasts] & doubtful, axis=1)
+    kept = set(lasts[decides].tolist())
     return sorted(sequence for sequence in rejected if sequence[-1] in kept)

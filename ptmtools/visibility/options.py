@@ -14,14 +14,14 @@ class PvsOptions:
 
     Attributes
     ----------
-    method: how the potentially visible set (PVS) of each cell is found. full: search every sequence
-        of portals (openings between cells), within the budget; fast: look at the first two portals
-        only, which gives larger sets; sampled: try random lines, which misses visible cells and is
-        for comparison only.
-    budget: operations (tests and clips of portals) that the search from one side of a portal may
-        take. When it is spent, what is still undecided counts as visible, so a lower budget makes
-        sets larger, never wrong.
-    lines: random lines through each portal, for the sampled method.
+    method: how the potentially visible set (PVS: the cells that may be visible) of each cell is
+        found. full: follow every sequence of portals (openings between cells), within the budget;
+        fast: look only at the first two portals, which gives larger sets; sampled: try random
+        lines, which misses visible cells and is for comparison only.
+    budget: how many operations (tests and clips of portals) the search from one side of a portal
+        may take. When they are spent, everything still undecided counts as visible, so a lower
+        budget makes sets larger, never wrong.
+    lines: random lines through each portal, with --pvs sampled.
     exact: deprecated, does nothing: lines of sight too thin for floating point are always decided
         in higher precision.
     """

@@ -107,7 +107,7 @@ def check_conservative(
     if pvs.cell_count != cells.cell_count:
         raise InputError(
             "PTM-I403",
-            f"the PVS is of {pvs.cell_count} cells, the subdivision has {cells.cell_count}",
+            f"the PVS has {pvs.cell_count} cells, the subdivision {cells.cell_count}",
             remedy="compute the PVS again",
         )
     if cells.cell_count == 0:

@@ -4,9 +4,9 @@ Leaves may be numbered otherwise; they are matched by where they lie and how lar
 compared as graphs. The PVS may differ where lines touch and no more: in at most as many pairs as
 the flow has counted near-ties. Rooms must hold the same leaves.
 
-Rooms are told from doors in plan, so up must be where it was, or be told (``--up``, as ``--unit``).
-Laid on its side unsaid, a building has the same leaves and the same PVS, but other rooms; on its
-head it has the same rooms.
+Rooms are distinguished from doors in plan, so up must be where it was, or be given (``--up``, as
+``--unit``). Laid on its side without ``--up``, a building has the same leaves and the same PVS, but
+other rooms; upside down it has the same rooms.
 """
 
 from __future__ import annotations

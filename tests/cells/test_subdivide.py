@@ -123,10 +123,10 @@ def test_a_slit_between_staggered_walls_stays_open(quads, room_faces) -> None:
 
 
 def test_walls_present_twice_and_overlapping_unite(quads, room_faces, partition) -> None:
-    doubled = partition(4, (0, 3, -1, 1))
-    doubled += [face[::-1] for face in doubled]
-    doubled.append([[4, 0, 0.9], [4, 4, 0.9], [4, 4, 2], [4, 0, 2]])
-    cells = subdivide(quads(room_faces((0, 0, -2), (8, 4, 2)) + doubled))
+    two_walls = partition(4, (0, 3, -1, 1))
+    two_walls += [face[::-1] for face in two_walls]
+    two_walls.append([[4, 0, 0.9], [4, 4, 0.9], [4, 4, 2], [4, 0, 2]])
+    cells = subdivide(quads(room_faces((0, 0, -2), (8, 4, 2)) + two_walls))
     assert cells.cell_count == 2
     assert cells.portal_area == pytest.approx([3 * 1.9])
 

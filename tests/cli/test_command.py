@@ -152,8 +152,8 @@ def test_quiet_says_nothing_and_json_is_json(
     assert main(["-q", "encode", str(tmp_path / "a.png")]) == 0
     assert capsys.readouterr() == ("", "")
     assert main(["encode", str(tmp_path / "a.png"), "--force", "--json"]) == 0
-    (told,) = json.loads(capsys.readouterr().out)
-    assert (told["raw_bytes"], told["levels"]) == (45, 2)
+    (report,) = json.loads(capsys.readouterr().out)
+    assert (report["raw_bytes"], report["levels"]) == (45, 2)
     assert main(["info", str(tmp_path / "a.ptm"), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["width"], told["height"], told["whole_levels"]) == (5, 3, 2)
+    report = json.loads(capsys.readouterr().out)
+    assert (report["width"], report["height"], report["whole_levels"]) == (5, 3, 2)

@@ -44,7 +44,7 @@ def documented() -> tuple[set[str], set[str]]:
     return named, between
 
 
-def told() -> set[str]:
+def all_codes() -> set[str]:
     """Codes that the program can give."""
     return {
         f"PTM-{letter}{number}"
@@ -56,13 +56,13 @@ def told() -> set[str]:
 def test_every_code_is_documented() -> None:
     named, between = documented()
     #: An example, in the docstring of what holds a code.
-    assert sorted(told() - named - between - {"PTM-I001"}) == []
+    assert sorted(all_codes() - named - between - {"PTM-I001"}) == []
 
 
 def test_every_documented_code_exists() -> None:
     named, _ = documented()
-    strict = {code.replace("-N", "-I") for code in told()}
-    assert sorted(named - told() - strict) == []
+    strict = {code.replace("-N", "-I") for code in all_codes()}
+    assert sorted(named - all_codes() - strict) == []
 
 
 def anchors(page: Path) -> set[str]:

@@ -151,7 +151,7 @@ def test_a_folder_is_made_only_where_one_is_meant(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["encode", "a.png", "b.PNG", "-o", "x.ptm"]) == 2
-    assert "x.ptm is one file, and there are 2 to write" in capsys.readouterr().err
+    assert "x.ptm is one file, but there are 2 to write" in capsys.readouterr().err
     assert main(["encode", "a.png", "b.PNG", "-o", "notes.txt"]) == 2
     assert main(["encode", "a.png", "-o", "notes.txt/"]) == 2
     assert "is a file, not a folder" in capsys.readouterr().err
@@ -180,7 +180,7 @@ def test_what_exists_is_skipped_if_asked_for(
     assert main([*encoding, "--skip-existing", "--force"]) == 2
 
 
-def test_sizes_are_told_beside_those_of_the_input(
+def test_sizes_are_printed_beside_those_of_the_input(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     image = Image.fromarray(np.tile(RGB, (4, 4, 1)))
@@ -373,7 +373,7 @@ def test_colour_and_orientation_come_back(folder: Path) -> None:
         np.testing.assert_array_equal(ptm.level(), np.rot90(RGB, -1))
 
 
-def test_a_damaged_description_is_told_and_left_out(
+def test_a_damaged_description_is_reported_and_left_out(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     data = bytearray(encode(RGB, RAW, description=Description(b"a profile", orientation=6)))

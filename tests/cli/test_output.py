@@ -29,9 +29,9 @@ def test_names_are_shown_harmlessly(
     assert printable(text) == shown
     Voice().say(text)
     Voice().warn(text)
-    told = capsysbinary.readouterr()
-    assert told.out.decode() == shown + "\n"
-    assert told.err.decode() == f"ptm: {shown}\n"
+    printed = capsysbinary.readouterr()
+    assert printed.out.decode() == shown + "\n"
+    assert printed.err.decode() == f"ptm: {shown}\n"
 
 
 def test_json_of_what_is_no_text(capsysbinary: pytest.CaptureFixture[bytes]) -> None:

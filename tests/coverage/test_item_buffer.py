@@ -150,13 +150,13 @@ def test_of_coincident_faces_it_does_not_matter_which_wins(room_row, furnish, co
     scene, cells = room_row(2)
     boundary = np.flatnonzero((cells.triangle_cell >= 0).all(axis=1))
     turned = np.concatenate([np.arange(len(cells.triangle)), boundary])
-    doubled = picked(cells, turned)
-    doubled.triangle[len(cells.triangle) :] = doubled.triangle[len(cells.triangle) :, ::-1]
-    doubled.triangle_cell[len(cells.triangle) :] = doubled.triangle_cell[
+    both_sides = picked(cells, turned)
+    both_sides.triangle[len(cells.triangle) :] = both_sides.triangle[len(cells.triangle) :, ::-1]
+    both_sides.triangle_cell[len(cells.triangle) :] = both_sides.triangle_cell[
         len(cells.triangle) :, ::-1
     ]
     added = np.arange(len(scene.triangles), len(turned), dtype=np.int32)
-    doubled.triangle_source[len(cells.triangle) :] = added
+    both_sides.triangle_source[len(cells.triangle) :] = added
     twice = replace(
         scene,
         triangles=np.concatenate([scene.triangles, scene.triangles[boundary][:, ::-1]]),
@@ -164,7 +164,7 @@ def test_of_coincident_faces_it_does_not_matter_which_wins(room_row, furnish, co
     )
     for eye in ([1, 1.7, 0.3], [6.5, 2.2, -1.1]):
         expected = coverage_at(backend, scene, cells, eye)
-        assert coverage_at(backend, twice, doubled, eye).tolist() == expected.tolist()
+        assert coverage_at(backend, twice, both_sides, eye).tolist() == expected.tolist()
 
 
 def test_the_order_of_the_triangles_does_not_matter(room_row, coverage_at, backend):

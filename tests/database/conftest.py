@@ -88,7 +88,7 @@ def artifacts(room_row: Callable[[int], tuple[Scene, Cells]]) -> Artifacts:
 
 
 def write_textures(www: Path) -> tuple[TextureRecord, ...]:
-    """Two textures with their twins, and their records."""
+    """Two textures with their fallback images, and their records."""
     (www / "textures").mkdir(parents=True)
     random = np.random.default_rng(3)
     records = []

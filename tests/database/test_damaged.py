@@ -76,8 +76,8 @@ def everything(artifacts, tmp_path_factory, put_textures, seal) -> Path:
     a, records = artifacts, put_textures(db / "www")
     emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", EmitOptions(format="vrml,gltf"))
     for name in ("hints.json", "root.wrl"):
-        twin = db / f"www/{name}.gz"
-        twin.write_bytes(gzip.compress((db / "www" / name).read_bytes(), mtime=0))
+        copy = db / f"www/{name}.gz"
+        copy.write_bytes(gzip.compress((db / "www" / name).read_bytes(), mtime=0))
     seal(db)
     return db
 
@@ -98,7 +98,7 @@ def everything(artifacts, tmp_path_factory, put_textures, seal) -> Path:
 )
 def test_mutations(everything: Path, seal: Callable[[Path], None], name: str) -> None:
     path, good = everything / name, (everything / name).read_bytes()
-    told = 0
+    found = 0
     try:
         for round in range(ROUNDS):
             rng = random.Random(f"{name} {round}")
@@ -112,11 +112,11 @@ def test_mutations(everything: Path, seal: Callable[[Path], None], name: str) ->
                 seal(everything)
             report = validate_database(everything, workers=1)
             assert {i.code for i in report.issues} <= set(CODES)
-            told += bool(report.issues)
+            found += bool(report.issues)
     finally:
         path.write_bytes(good)
         seal(everything)
-    assert told > ROUNDS // 2, "most mutations are faults"
+    assert found > ROUNDS // 2, "most mutations are faults"
 
 
 @pytest.mark.parametrize(

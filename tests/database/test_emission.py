@@ -171,7 +171,7 @@ def test_gzip_copies(artifacts, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["cells/c0000.wrl", "cells/c0002.wrl", "hints.json"])
 def test_a_file_that_cannot_be_written(artifacts, tmp_path: Path, name: str) -> None:
-    """The fault is told, and there is no root that leads to it."""
+    """The fault is reported, and there is no root that leads to it."""
     (tmp_path / name).mkdir(parents=True)
     a = artifacts
     with pytest.raises(OutputError, match="PTM-O002") as fault:

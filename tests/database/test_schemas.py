@@ -91,11 +91,11 @@ def test_schemas_are_schemas(name: str) -> None:
 
 def test_every_field_of_the_hints_is_described() -> None:
     schema = json.loads(schemas.schema_text(schemas.HINTS))
-    told = (DOCS / "hints.md").read_text()
+    page = (DOCS / "hints.md").read_text()
     objects = [schema, *(d for d in schema["$defs"].values() if d.get("type") == "object")]
     for parent in objects:
         for name, field in parent["properties"].items():
-            assert re.search(rf"`[^`\n]*\b{name}\b[^`\n]*`", told), name
+            assert re.search(rf"`[^`\n]*\b{name}\b[^`\n]*`", page), name
             if field.get("type") in ("number", "integer"):
                 assert "description" in field, name
 
@@ -206,7 +206,7 @@ def test_validate_refuses_what_the_schema_refuses(hints) -> None:
 
 
 @pytest.mark.parametrize(
-    ("data", "told"),
+    ("data", "message"),
     [
         (b"", "not JSON"),
         (b"\xff", "byte 0 is not UTF-8"),
@@ -219,13 +219,13 @@ def test_validate_refuses_what_the_schema_refuses(hints) -> None:
         (b"[]", "a list is not of type object"),
     ],
 )
-def test_what_is_no_document(data: bytes, told: str) -> None:
-    with pytest.raises(schemas.ShapeError, match=re.escape(told)):
+def test_what_is_no_document(data: bytes, message: str) -> None:
+    with pytest.raises(schemas.ShapeError, match=re.escape(message)):
         schemas.read(data, schemas.HINTS)
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "message"),
     [
         (lambda d: d.pop("unit"), "unit is missing"),
         (lambda d: d.update(unit="m"), 'unit: "m" is not of type number'),
@@ -241,11 +241,11 @@ def test_what_is_no_document(data: bytes, told: str) -> None:
     ],
 )
 def test_faults_are_told_with_their_place(
-    hints, change: Callable[[dict], object], told: str
+    hints, change: Callable[[dict], object], message: str
 ) -> None:
     changed = copy.deepcopy(hints)
     change(changed)
-    assert told in shape_fault(changed, schemas.HINTS)
+    assert message in shape_fault(changed, schemas.HINTS)
 
 
 def test_a_keyword_that_is_not_understood_does_not_compile() -> None:

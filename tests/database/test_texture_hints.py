@@ -28,9 +28,9 @@ def test_textures_of_visible_cells(artifacts, tmp_path: Path) -> None:
     place = {1: "textures/1.ptm", 0: "textures/0.ptm"}
     listed = [texture["file"] for texture in document["textures"]]
     for i, cell in enumerate(document["cells"]):
-        told = cell["coverage"]["textures"]
-        assert len(told) == len(cell["ach"])
-        for k, (entry, share) in enumerate(zip(told, cell["ach"], strict=True)):
+        shares = cell["coverage"]["textures"]
+        assert len(shares) == len(cell["ach"])
+        for k, (entry, share) in enumerate(zip(shares, cell["ach"], strict=True)):
             assert math.fsum(s for _, s in entry) == pytest.approx(share, rel=1e-3)
             at = int(ach.start[i]) + k
             part = slice(int(ach.texture_start[at]), int(ach.texture_start[at + 1]))

@@ -43,7 +43,7 @@ def codes(db: Path) -> set[str]:
     return {issue.code for issue in validate_database(db).issues}
 
 
-def told(db: Path) -> list[str]:
+def findings(db: Path) -> list[str]:
     return [str(issue) for issue in validate_database(db).issues]
 
 
@@ -87,7 +87,7 @@ def roomy(artifacts, tmp_path_factory, put_textures, made_up_hints, seal) -> Pat
 
 
 def test_cells_of_several_leaves(roomy: Path) -> None:
-    assert told(roomy) == []
+    assert findings(roomy) == []
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_faults_of_leaves(
     shutil.copytree(roomy, db)
     replaced(C0, pattern, new)(db)
     seal(db)
-    assert codes(db) == {f"PTM-{c}" for c in expected.split()}, told(db)
+    assert codes(db) == {f"PTM-{c}" for c in expected.split()}, findings(db)
 
 
 def test_gltf(artifacts, tmp_path: Path, put_textures, seal) -> None:
@@ -117,14 +117,14 @@ def test_gltf(artifacts, tmp_path: Path, put_textures, seal) -> None:
     a, records = artifacts, put_textures(db / "www")
     emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", EmitOptions(format="vrml,gltf"))
     seal(db)
-    assert told(db) == []
+    assert findings(db) == []
 
 
 def test_gzip_copies(database: Path, seal: Damage) -> None:
     for name in ("root.wrl", "hints.json", "cells/c0001.wrl"):
         zipped(name)(database)
     seal(database)
-    assert told(database) == []
+    assert findings(database) == []
 
 
 @pytest.mark.parametrize("level", [0, 2, -1])
@@ -133,7 +133,7 @@ def test_a_fallback_image_of_a_coarser_level(database: Path, seal: Damage, level
     count = len(read_header((database / "www/textures/a.ptm").read_bytes()).levels)
     hinted(lambda d: d["textures"][0].update(fallbackLevel=range(count)[level]))(database)
     seal(database)
-    assert told(database) == []
+    assert findings(database) == []
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1e-3, 1e6, 1e15])
@@ -157,7 +157,7 @@ def test_tiny_and_huge_worlds(artifacts, tmp_path: Path, put_textures, seal, sca
     options = EmitOptions(avatar_size=avatar)
     emit(scene, cells, a.pvs, a.ach, records, db / "www", options)
     seal(db)
-    assert told(db) == []
+    assert findings(db) == []
 
 
 # Faults, and what plants them
@@ -249,7 +249,7 @@ VISIBLE = r'visibleUrl +\[ ("\w+.wrl"), ("\w+.wrl"), ("\w+.wrl") \]'
 #: A bomb: a thousand times as long as it is.
 LONG = gzip.compress(bytes(1 << 22))
 
-#: What is told, and what plants it. The manifest is written afterwards, so that no hash gives the
+#: What is found, and what plants it. The manifest is written afterwards, so that no hash gives the
 #: fault away. Where a fault makes two files contradict each other, both codes are named.
 FAULTS: list[tuple[str, Damage]] = [
     ("D657 D671", linked("textures/a.png", "/etc/hostname")),
@@ -468,7 +468,9 @@ def test_each_planted_fault_is_found(
     damage(database)
     seal(database)
     report = validate_database(database)
-    assert {i.code for i in report.issues} == {f"PTM-{c}" for c in expected.split()}, told(database)
+    assert {i.code for i in report.issues} == {f"PTM-{c}" for c in expected.split()}, findings(
+        database
+    )
     assert report.ok == all(CODES[i.code][0] == "warning" for i in report.issues)
 
 
@@ -488,7 +490,7 @@ def test_shares_of_known_textures_are_no_fault(
 ) -> None:
     painted(texture)(database)
     seal(database)
-    assert told(database) == []
+    assert findings(database) == []
 
 
 # Faults of which the manifest is the witness
@@ -505,7 +507,7 @@ def test_what_the_manifest_says(database: Path) -> None:
     assert ("PTM-D653", "www/cells/notes.txt") in found
 
 
-def test_what_a_user_adds_is_his(database: Path) -> None:
+def test_other_files_belong_to_the_user(database: Path) -> None:
     """Beside our files and folders, whatever it is called and holds: mentioned once."""
     files = ("index.html", "js/walk.js", "map.png", "walk.wrl", "\udcff\n.txt")
     for name in files:
@@ -513,7 +515,7 @@ def test_what_a_user_adds_is_his(database: Path) -> None:
     report = validate_database(database)
     assert report.issues == ()
     (note,) = report.notes
-    assert note.startswith("5 files are")
+    assert note.startswith("5 files in www/ are")
     assert note.endswith(": index.html, js/walk.js, map.png, …")
     assert note.isprintable()
 
@@ -534,7 +536,7 @@ def test_what_a_user_adds_is_his(database: Path) -> None:
 )
 def test_only_the_manifest_tells(database: Path, expected: str, damage: Damage) -> None:
     damage(database)
-    assert codes(database) == {f"PTM-{expected}"}, told(database)
+    assert codes(database) == {f"PTM-{expected}"}, findings(database)
 
 
 def with_stage(db: Path, name: str, **record: object) -> None:
@@ -569,7 +571,7 @@ def test_counts(database: Path, stage: str) -> None:
             index.count("-1") for index in re.findall(r" coordIndex [^]]*", text)
         )
     with_stage(database, stage, counts=counts)
-    assert told(database) == []
+    assert findings(database) == []
     large = validate_database(database, limits=Limits(decoded_bytes=300))
     assert "PTM-D659" not in {issue.code for issue in large.issues}, (
         "what is not read is not counted"
@@ -666,15 +668,15 @@ def test_repeated_faults_are_summed_up(database: Path) -> None:
     path = database / "www/cells/c0001.wrl"
     path.write_text(re.sub(r" coordIndex \[ \d+", " coordIndex [ 99", path.read_text()))
     report = validate_database(database)
-    told = [i for i in report.issues if i.code == "PTM-D680"]
-    assert len(told) == 6
-    assert (told[-1].message, told[-1].count) == ("4 more of these", 4)
+    repeated = [i for i in report.issues if i.code == "PTM-D680"]
+    assert len(repeated) == 6
+    assert (repeated[-1].message, repeated[-1].count) == ("4 more of these", 4)
     assert report.error_count == 10, "and one hash"
 
 
-def test_what_is_told_can_be_printed(database: Path) -> None:
+def test_findings_can_be_printed(database: Path) -> None:
     hinted(lambda d: d["textures"][0].update(fallback="\ud800\x1b[2J\n" + 10_000 * "x"))(database)
-    lines = told(database)
+    lines = findings(database)
     assert len(lines) > 1
     for line in lines:
         assert line.isprintable()

@@ -378,7 +378,7 @@ def test_a_cut_file_decodes_to_its_last_whole_level(folder: Path, ptm: Ptm) -> N
         assert found.size == (16, 16)
 
 
-def test_a_bug_is_told_in_one_line_and_status_1(
+def test_a_bug_is_reported_in_one_line_and_status_1(
     folder: Path, ptm: Ptm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(*arguments: object) -> None:

@@ -26,7 +26,8 @@ from screenshots import Album, Database, Picture, by_view3dscene, by_x_ite  # no
 
 Require = Callable[[str, str], None]
 SIZE = (320, 240)
-#: What coverage hints cost is of no matter here; small twins, since X_ITE loads one for each shape.
+#: Few sample points: hints are not looked at here. Small fallback images: X_ITE loads one for each
+#: shape.
 QUICK = ["--samples", "1", "--face", "8", "--pvs", "fast", "--fallback-size", "256"]
 #: Rooms that are compared: the first in the order of the viewpoints.
 ROOMS = 3
@@ -167,23 +168,23 @@ def test_x_ite_walks_through_what_rays_see(web: Any, museum: Path) -> None:
     assert shots.menu == tuple(v["description"] for v in database.viewpoints)
 
 
-def only_twins(museum: Path, folder: Path) -> tuple[Path, Path]:
-    """The root file, and the gzip twin of another without any ``.wrl`` beside it.
+def without_originals(museum: Path, folder: Path) -> tuple[Path, Path]:
+    """The root file, and the gzip copies of the others without any ``.wrl`` beside it.
 
-    A server that knows twins hands them out under the plain name; a file manager does not.
+    A server that supports gzip copies sends them under the plain name; a file manager does not.
     """
-    www = Path(shutil.copytree(museum / "www", folder / "twins"))
+    www = Path(shutil.copytree(museum / "www", folder / "copies"))
     for file in www.rglob("*.wrl"):
         file.unlink()
-    for twin in www.glob("cells/*.wrl.gz"):
-        twin.rename(twin.with_suffix(""))
+    for copy in www.glob("cells/*.wrl.gz"):
+        copy.rename(copy.with_suffix(""))
     return museum / "www" / "root.wrl", www / "root.wrl.gz"
 
 
 @pytest.mark.parametrize("museum", ["room"], indirect=True)
-def test_view3dscene_opens_gzip_twins(castle: Any, museum: Path, tmp_path: Path) -> None:
+def test_view3dscene_opens_gzip_copies(castle: Any, museum: Path, tmp_path: Path) -> None:
     pictures = []
-    for file in only_twins(museum, tmp_path):
+    for file in without_originals(museum, tmp_path):
         picture = tmp_path / f"{file.name}.png"
         assert castle.screenshot(file, picture, width=160, height=120) == []
         pictures.append(picture.read_bytes())
@@ -191,10 +192,10 @@ def test_view3dscene_opens_gzip_twins(castle: Any, museum: Path, tmp_path: Path)
 
 
 @pytest.mark.parametrize("museum", ["room"], indirect=True)
-def test_x_ite_opens_gzip_twins(web: Any, museum: Path, tmp_path: Path) -> None:
-    plain, twin = (web.show(f, width=160, height=120) for f in only_twins(museum, tmp_path))
-    assert plain.messages == twin.messages == ()
-    assert plain.pictures == twin.pictures
+def test_x_ite_opens_gzip_copies(web: Any, museum: Path, tmp_path: Path) -> None:
+    plain, copy = (web.show(f, width=160, height=120) for f in without_originals(museum, tmp_path))
+    assert plain.messages == copy.messages == ()
+    assert plain.pictures == copy.pictures
     assert Album.of(plain.pictures, ()).pictures[0].std() > 10
 
 
@@ -210,29 +211,29 @@ Bend = Callable[[Database], None]
 
 
 def mirror_textures(database: Database) -> None:
-    for twin in (database.www / "textures").glob("*.png"):
-        with Image.open(twin) as image:
+    for file in (database.www / "textures").glob("*.png"):
+        with Image.open(file) as image:
             flipped = image.transpose(Image.Transpose.FLIP_LEFT_RIGHT)
-        flipped.save(twin)
+        flipped.save(file)
 
 
 def exchange_textures(database: Database) -> None:
-    twins = sorted((database.www / "textures").glob("*.png"))
-    contents = [twin.read_bytes() for twin in twins]
-    for twin, content in zip(twins, contents[1:] + contents[:1], strict=True):
-        twin.write_bytes(content)
+    files = sorted((database.www / "textures").glob("*.png"))
+    contents = [file.read_bytes() for file in files]
+    for file, content in zip(files, contents[1:] + contents[:1], strict=True):
+        file.write_bytes(content)
 
 
 def lose_a_texture(database: Database) -> None:
     """The largest file."""
-    max((database.www / "textures").glob("*.png"), key=lambda twin: twin.stat().st_size).unlink()
+    max((database.www / "textures").glob("*.png"), key=lambda file: file.stat().st_size).unlink()
 
 
 def darken(database: Database) -> None:
     """By a tenth."""
-    for twin in (database.www / "textures").glob("*.png"):
-        with Image.open(twin) as image:
-            image.convert("RGB").point([round(0.9 * k) for k in range(256)] * 3).save(twin)
+    for file in (database.www / "textures").glob("*.png"):
+        with Image.open(file) as image:
+            image.convert("RGB").point([round(0.9 * k) for k in range(256)] * 3).save(file)
 
 
 def rewrite(database: Database, old: str, new: str, folder: str = "cells") -> None:

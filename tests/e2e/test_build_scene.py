@@ -65,9 +65,9 @@ def test_two_rooms(tmp_path: Path) -> None:
 
     served = {p.relative_to(db / "www").as_posix() for p in (db / "www").rglob("*") if p.is_file()}
     assert {"root.wrl", "hints.json", "cells/c0000.wrl", "textures/floor.ptm"} <= served
-    told = (db / "manifest.json").read_text()
-    assert str(tmp_path) not in told
-    assert str(TWO_ROOMS) not in told
+    manifest = (db / "manifest.json").read_text()
+    assert str(tmp_path) not in manifest
+    assert str(TWO_ROOMS) not in manifest
 
 
 def test_the_same_bytes_anywhere_and_with_any_number_of_workers(
@@ -184,9 +184,9 @@ def test_a_build_that_was_stopped_is_resumed(
             assert time.monotonic() < deadline
             time.sleep(0.002)
         process.send_signal(end)
-        told = process.stderr.read()
+        printed = process.stderr.read()
     if process.returncode == 130:
-        assert told.startswith("ptm: interrupted")
+        assert printed.startswith("ptm: interrupted")
     else:
         assert process.returncode in (0, -signal.SIGKILL)
     report = build(model, db)

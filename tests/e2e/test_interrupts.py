@@ -54,7 +54,7 @@ Build = subprocess.Popen[str]
 def disturbed(
     museum: Path, db: Path, moment: Callable[[Build], bool], deed: Callable[[Build], object]
 ) -> tuple[int, str]:
-    """The status of a build to which something is done at a moment, and what it has told."""
+    """The status of a build to which something is done at a moment, and what it has printed."""
     command = [*PTM, "build-scene", museum, "-o", db, "-j", "2", "-q"]
     with subprocess.Popen(
         command,
@@ -66,9 +66,9 @@ def disturbed(
     ) as build:
         until(lambda: moment(build))
         deed(build)
-        _, told = build.communicate()
+        _, printed = build.communicate()
     until(lambda: not in_session(build.pid))
-    return build.returncode, told
+    return build.returncode, printed
 
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="another system")
@@ -81,11 +81,11 @@ def test_all_end_at_once_and_only_the_parent_speaks(tmp_path: Path, museum: Path
         lambda build: len(in_session(build.pid)) > 1,  # one is being started
         lambda _: any(staged.rglob("*.ptm")),
     ):
-        status, told = disturbed(
+        status, printed = disturbed(
             museum, db, begun, lambda build: os.killpg(build.pid, signal.SIGINT)
         )
         assert status == 130
-        assert told == "ptm: interrupted; run the same command again to resume [PTM-X130]\n"
+        assert printed == "ptm: interrupted; run the same command again to resume [PTM-X130]\n"
     again = [*PTM, "build-scene", museum, "-q", "-o"]
     subprocess.run([*again, db, "-j", "2"], check=True)
     subprocess.run([*again, tmp_path / "whole", "-j", "1"], check=True)
@@ -103,9 +103,9 @@ def test_a_lost_worker_ends_the_build_and_leaves_what_is_finished(
             if b"spawn_main" in Path(f"/proc/{process}/cmdline").read_bytes():
                 os.kill(process, signal.SIGKILL)
 
-    status, told = disturbed(museum, db, lambda _: any(staged.rglob("*.ptm")), kill_the_workers)
-    assert (status, told.count("\n")) == (9, 1), told
-    assert "PTM-W004" in told
+    status, printed = disturbed(museum, db, lambda _: any(staged.rglob("*.ptm")), kill_the_workers)
+    assert (status, printed.count("\n")) == (9, 1), printed
+    assert "PTM-W004" in printed
     again = [*PTM, "build-scene", museum, "-o", db, "--json"]
     done = subprocess.run(again, check=True, stdout=subprocess.PIPE)
     (textures,) = (s for s in json.loads(done.stdout)["stages"] if s["stage"] == "textures")

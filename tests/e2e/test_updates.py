@@ -90,7 +90,7 @@ def test_one_texture_painted_over_is_one_texture_encoded(
     assert listing(db) == listing(tmp_path / "fresh.db")
 
 
-@pytest.mark.parametrize("change", ["alpha", "twin", "broken", "format"])
+@pytest.mark.parametrize("change", ["alpha", "fallback", "broken", "format"])
 def test_an_image_that_bears_on_the_scene_is_not_only_painted_over(
     model: Path, tmp_path: Path, ptm: Ptm, change: str
 ) -> None:
@@ -101,7 +101,7 @@ def test_an_image_that_bears_on_the_scene_is_not_only_painted_over(
             alpha = image.convert("RGBA")
         alpha.putalpha(100)
         alpha.save(file)
-    elif change == "twin":
+    elif change == "fallback":
         shutil.copy(model.with_name("room_a.png"), file)
     elif change == "broken":
         file.write_bytes(file.read_bytes()[:100])
@@ -156,9 +156,9 @@ def test_status(model: Path, tmp_path: Path, ptm: Ptm) -> None:
     assert ptm("emit", db).status == 5
     (db / "stages/pvs.npz").unlink()
     assert states(ptm, db)["pvs"] == "damaged"
-    told = ptm("status", db).out
-    assert "stages/pvs.npz is missing or damaged" in told
-    assert "not finished" in told
+    printed = ptm("status", db).out
+    assert "stages/pvs.npz is missing or damaged" in printed
+    assert "not finished" in printed
 
 
 @pytest.fixture

@@ -170,10 +170,10 @@ def test_planted_faults(ptm: Ptm, database: Path, name: str) -> None:
     codes = {f"PTM-{code}" for code in expected.split()}
     assert issues(ptm, database) == (status, codes)
     assert issues(ptm, database, "--strict") == (8 if codes else 0, codes)
-    told = ptm("validate", database)
-    assert told.status == status
-    assert all(code in told.out for code in codes)
-    assert ("PTM-C001" in told.err) is (status == 8)
+    result = ptm("validate", database)
+    assert result.status == status
+    assert all(code in result.out for code in codes)
+    assert ("PTM-C001" in result.err) is (status == 8)
 
 
 def test_what_is_no_database(ptm: Ptm, tmp_path: Path) -> None:

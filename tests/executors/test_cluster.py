@@ -40,7 +40,9 @@ def test_limits(scheduler):
 def test_workers_with_other_software(scheduler, cluster, monkeypatch):
     ours = software()
     monkeypatch.setattr(module, "software", lambda: ("ptmtools 0.0.1", *ours[1:]))
-    with pytest.raises(WorkerError, match=r"has ptmtools .*, this process ptmtools 0\.0\.1.*W003"):
+    with pytest.raises(
+        WorkerError, match=r"has ptmtools .*, this process has ptmtools 0\.0\.1.*W003"
+    ):
         open_executor(scheduler=scheduler)
     with pytest.raises(WorkerError, match="PTM-W003"):  # one that joined since
         list(cluster.each(tasks.refuse, 0, [1]))

@@ -95,9 +95,9 @@ def test_ctrl_c_ends_all_at_once_and_only_the_parent_speaks(tmp_path):
     parent = started(tmp_path)
     children = workers(tmp_path)
     os.killpg(parent.pid, signal.SIGINT)  # as a terminal does
-    _, told = parent.communicate()
-    assert told.count("KeyboardInterrupt") == 1
-    assert "Process Spawn" not in told
+    _, printed = parent.communicate()
+    assert printed.count("KeyboardInterrupt") == 1
+    assert "Process Spawn" not in printed
     until(lambda: all(gone(child) for child in children))
 
 
@@ -110,9 +110,9 @@ def test_a_worker_that_is_killed_is_an_error_and_not_the_end(local):
 
 def test_a_script_without_a_guard_is_told_what_it_needs(tmp_path):
     parent = started(tmp_path, 0, "if True:")
-    _, told = parent.communicate()
+    _, printed = parent.communicate()
     assert parent.returncode == 1
-    assert "needs `if __name__ == '__main__'` [PTM-W004]" in told
+    assert "needs `if __name__ == '__main__'` [PTM-W004]" in printed
 
 
 def test_a_full_disk_is_told(local, monkeypatch):

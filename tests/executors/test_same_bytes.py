@@ -43,14 +43,14 @@ def grid():
 @pytest.mark.parametrize("options", [PvsOptions(), PvsOptions(budget=50)])
 def test_pvs(grid, local: Executor, cluster: Executor, options):
     assert grid.portal_count == 84
-    told: list[tuple[int, int, str]] = []
+    steps: list[tuple[int, int, str]] = []
     first = compute_pvs(grid, options)
     if options.budget > 50:
         assert first.decided.sum() > 0
     for executor in (local, cluster):
-        found = compute_pvs(grid, options, lambda *step: told.append(step), executor)
+        found = compute_pvs(grid, options, lambda *step: steps.append(step), executor)
         assert pack_arrays(found.to_arrays()) == pack_arrays(first.to_arrays())
-    assert [done for done, _, _ in told] == [64, 128, 168] * 2
+    assert [done for done, _, _ in steps] == [64, 128, 168] * 2
 
 
 def test_sampled_pvs(grid, local: Executor, cluster: Executor):

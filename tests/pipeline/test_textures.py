@@ -34,13 +34,13 @@ def test_names_are_unique_without_regard_to_case() -> None:
 def test_a_bare_png_has_the_same_texels_and_nothing_else(mode: str, transparent: bool) -> None:
     noise = np.random.default_rng(0).integers(0, 256, (9, 7, 4), np.uint8)
     image = Image.fromarray(noise).convert(mode)
-    told = PngImagePlugin.PngInfo()
-    told.add_text("Comment", "made on a Monday")
-    told.add(b"gAMA", (45455).to_bytes(4, "big"))
+    info = PngImagePlugin.PngInfo()
+    info.add_text("Comment", "made on a Monday")
+    info.add(b"gAMA", (45455).to_bytes(4, "big"))
     key = {"L": 3, "P": 3, "RGB": (1, 2, 3)}.get(mode) if transparent else None
     out = io.BytesIO()
     image.save(
-        out, "PNG", pnginfo=told, dpi=(72, 72), **({} if key is None else {"transparency": key})
+        out, "PNG", pnginfo=info, dpi=(72, 72), **({} if key is None else {"transparency": key})
     )
     bare = bare_png(out.getvalue())
     assert np.array_equal(read_image(bare), read_image(out.getvalue()))

@@ -136,7 +136,7 @@ def test_heads_that_lie(put: Put, pymeshlab: None, name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("program", "told"),
+    ("program", "message"),
     [
         ("import os; os.abort()", "it ended with status -6"),
         ("print('noise')", "it ended with status 0"),
@@ -145,7 +145,7 @@ def test_heads_that_lie(put: Put, pymeshlab: None, name: str) -> None:
     ],
 )
 def test_a_reader_that_fails_does_no_harm(
-    put: Put, pymeshlab: None, monkeypatch: pytest.MonkeyPatch, program: str, told: str
+    put: Put, pymeshlab: None, monkeypatch: pytest.MonkeyPatch, program: str, message: str
 ) -> None:
     path = put("a.dae", DAE)
     command = put("python", f"#!{sys.executable}\n{program}\n")
@@ -154,7 +154,7 @@ def test_a_reader_that_fails_does_no_harm(
     monkeypatch.setattr(meshlab, "_SECONDS", 1.0)
     with pytest.raises(InputError, match=r"a\.dae.*PTM-I254") as caught:
         ingest(path)
-    assert told in str(caught.value)
+    assert message in str(caught.value)
 
 
 def test_nothing_is_imported_from_the_present_folder(

@@ -94,7 +94,7 @@ def test_every_truncation(profile: str) -> None:
         else:
             with pytest.raises(InputError, match="PTM-I107"):
                 decode(cut)
-            last = "no level is whole"
+            last = "no level is complete"
         for n in range(whole, len(header.levels)):
             with pytest.raises(InputError, match=f"level {n}.*{last}.*PTM-I107"):
                 decode(cut, n)

@@ -46,10 +46,10 @@ def test_all_stages(db, tmp_path, capsys) -> None:
     table, plot = tmp_path / "t.csv", tmp_path / "t.png"
     asked = ["tradeoff", str(db), *LITTLE, "--csv", str(table), "--plot", str(plot)]
     assert main([*asked, "--error", "0.05"]) == 0
-    told = capsys.readouterr().out
+    output = capsys.readouterr().out
     for stage in ("cells:", "pvs:", "ach:", "textures:"):
-        assert told.count(stage) == 1
-    assert told.count("cheapest for an error of at most 0.05") == 4
+        assert output.count(stage) == 1
+    assert output.count("cheapest for an error of at most 0.05") == 4
     assert contents(db) == before
     rows = table.read_text().splitlines()
     assert {row.split(",")[0] for row in rows[1:]} == {"cells", "pvs", "ach", "textures"}
@@ -94,8 +94,8 @@ def test_cells_without_usable_points_give_json_and_rates(tmp_path, capsys) -> No
 def test_what_is_no_number_is_null_in_json(capsys) -> None:
     document = {"a": [math.nan, {"b": np.float64("inf")}], "c": (-math.inf, 1.5, True, None, "NaN")}
     Voice().emit_json(document)
-    told = json.loads(capsys.readouterr().out, parse_constant=no_constant)
-    assert told == {"a": [None, {"b": None}], "c": [None, 1.5, True, None, "NaN"]}
+    document = json.loads(capsys.readouterr().out, parse_constant=no_constant)
+    assert document == {"a": [None, {"b": None}], "c": [None, 1.5, True, None, "NaN"]}
 
 
 def test_a_database_of_lossy_textures() -> None:
@@ -114,7 +114,7 @@ def test_a_database_of_lossy_textures() -> None:
 
 @pytest.mark.parametrize("option", ["--csv", "--plot"])
 @pytest.mark.parametrize("file", ["absent/x", "file/x", "folder"])
-def test_what_cannot_be_written_is_told_before_anything_runs(
+def test_what_cannot_be_written_is_refused_before_anything_runs(
     db, tmp_path, capsys, monkeypatch, option, file
 ) -> None:
     monkeypatch.setattr("ptmtools.cli.tradeoff.run", pytest.fail)
@@ -124,7 +124,7 @@ def test_what_cannot_be_written_is_told_before_anything_runs(
     assert "PTM-O002" in capsys.readouterr().err
 
 
-def test_a_plot_without_matplotlib_is_told_before_anything_runs(
+def test_a_plot_without_matplotlib_is_refused_before_anything_runs(
     db, tmp_path, capsys, monkeypatch
 ) -> None:
     monkeypatch.setattr("ptmtools.cli.tradeoff.run", pytest.fail)

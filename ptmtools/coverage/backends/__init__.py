@@ -74,6 +74,6 @@ BACKENDS: dict[str, Backend] = {
     )
 }
 
-_AUTO = SimpleNamespace(about="the one of them that can run here and is expected to be fastest")
+_AUTO = SimpleNamespace(about="whichever can run here and should be fastest")
 #: What ``--backend`` takes, each with what it is `about`.
 CHOICES: ChainMap[str, Any] = ChainMap(BACKENDS, {AUTO: _AUTO})

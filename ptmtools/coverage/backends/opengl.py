@@ -2,7 +2,7 @@
 
 Every fragment writes its triangle's number into R32UI pixels. The views of many sample points lie
 side by side in one large target, which is cleared and read once; each is a draw with a viewport of
-its own. Measured and rejected: one instanced draw for all points, tiles told apart in the shader
+its own. Measured and rejected: one instanced draw for all points, tiles distinguished in the shader
 (in a 2 mm cell beside walls of 10 m adding a tile's place to a position costs whole pixels);
 occlusion queries (slower), layered cube rendering (slower, or wrong in moderngl), a histogram in a
 compute shader (bit for bit the same, and needs OpenGL 4.3).
@@ -168,8 +168,8 @@ class OpenGLRenderer:
             ahead = deepest > 0
             for axis in (right, up):
                 least, most = _along(axis, low, high)
-                aside = np.maximum(np.maximum(least, -most), 0.0)
-                ahead &= aside <= (1 + 1 / self._face) * deepest
+                sideways = np.maximum(np.maximum(least, -most), 0.0)
+                ahead &= sideways <= (1 + 1 / self._face) * deepest
             shown = kept[ahead]
             opaque = self._surfaces.opaque[shown]
             lists.append([shown[opaque], shown[~opaque]])

@@ -25,7 +25,7 @@ def chosen_emitters(format: str) -> tuple[Emitter, ...]:
     alone = EMITTERS[format].before if format in EMITTERS else ""
     names = set((alone or format).split(","))
     if unknown := sorted(names - set(EMITTERS)):
-        raise ValueError(f"{unknown[0]!r} is none of {', '.join(EMITTERS)}")
+        raise ValueError(f"{unknown[0]!r} is not one of {', '.join(EMITTERS)}")
     return tuple(emitter for name, emitter in EMITTERS.items() if name in names)
 
 

@@ -8,7 +8,7 @@ from ptmtools.lazy import Lazy
 
 GLTF = Emitter(
     name="gltf",
-    about="a GLB of each cell, and hints for them, in gltf/",
+    about="a GLB of each cell, and hints.json for them, in gltf/",
     owns=(f"{GLTF_FOLDER}/",),
     entry=GLTF_HINTS,
     writer=Lazy("ptmtools.database.gltf.cell:gltf_files"),

@@ -168,7 +168,7 @@ class _Reader:
             raise GlbError("PTM-D733", place, str(fault)) from None
         begin = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
         if begin % unit:
-            raise GlbError("PTM-D733", place, f"begins at byte {begin}, no multiple of {unit}")
+            raise GlbError("PTM-D733", place, f"begins at byte {begin}, not a multiple of {unit}")
         return found
 
     def _check_bounds(self, index: int, point: NDArray[np.float32]) -> None:

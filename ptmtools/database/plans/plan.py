@@ -79,7 +79,7 @@ def plot_plan(
         )
     if options.cell is not None and pvs is None:
         raise InputError(
-            "PTM-I601", "what the cell sees is not known yet", remedy="run `ptm pvs` first"
+            "PTM-I601", "what the cell sees has not been computed yet", remedy="run `ptm pvs` first"
         )
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -146,7 +146,7 @@ class _Body:
         points, fields = node.fields["hullPoint"], node.fields
         triangles = _loops(fields["hullIndex"], len(points))
         if triangles is None or len(triangles) < 4:
-            self.faults.append(("PTM-D683", "hullIndex is no list of triangles over hullPoint"))
+            self.faults.append(("PTM-D683", "hullIndex is not a list of triangles over hullPoint"))
         else:
             try:
                 hull = solid_planes(points, triangles.tolist(), tolerance)
@@ -224,7 +224,9 @@ def _check_shape(shape: Node, file: str, place: str, found: Findings) -> None:
     points = len(coord.fields["point"])
     triangles = _loops(geometry.fields["coordIndex"], points)
     if triangles is None:
-        found.add("PTM-D680", file, place, f"coordIndex is no triangles over {points} points")
+        found.add(
+            "PTM-D680", file, place, f"coordIndex is not a list of triangles over {points} points"
+        )
     elif len(triangles) == 0 or (triangles == np.roll(triangles, 1, axis=1)).any():
         found.add("PTM-D680", file, place, "coordIndex has a triangle with two equal corners")
     count = len(geometry.fields["coordIndex"]) // 4
@@ -247,7 +249,12 @@ def _check_texture(
     points = len(coord.fields["point"])
     triangles = _loops(index, points)
     if triangles is None:
-        found.add("PTM-D681", file, place, f"texCoordIndex is no triangles over {points} points")
+        found.add(
+            "PTM-D681",
+            file,
+            place,
+            f"texCoordIndex is not a list of triangles over {points} points",
+        )
     elif len(triangles) != count:
         found.add("PTM-D681", file, place, f"texCoordIndex has {len(triangles)} faces of {count}")
 
@@ -265,6 +272,11 @@ def _check_colours(
         index = geometry.fields.get("colorIndex", np.zeros(0, np.int64))
         in_range = ((index >= 0) & (index < colours)).all()
         if geometry.fields.get("colorPerVertex", True) or len(index) != count or not in_range:
-            found.add("PTM-D682", file, place, f"colorIndex is no colour for each of {count} faces")
+            found.add(
+                "PTM-D682",
+                file,
+                place,
+                f"colorIndex does not give a colour to each of {count} faces",
+            )
     if any(((v < 0) | (v > 1)).any() for v in values):
         found.add("PTM-D682", file, place, "a colour or transparency is outside 0 to 1")

@@ -1,6 +1,6 @@
 """The check of a database on disk, or of one `.ptm`: everything that a client may rely on.
 
-Each file is read once, held against the hash in the manifest, and then against the others, by the
+Each file is read once, compared with the hash in the manifest, and then against the others, by the
 checks of the emitters that wrote them. A finding never ends the check: what cannot be read is left
 out of the comparisons that need it.
 
@@ -87,7 +87,7 @@ def validate_ptm(path: str | os.PathLike[str], *, limits: Limits = _LIMITS) -> V
             "PTM-I602",
             f"cannot be read ({fault.strerror or fault})",
             file=file,
-            remedy="check the name and the rights",
+            remedy="check the name and the permissions",
         ) from fault
     check_ptm(data, os.fspath(path), limits, found)
     return ValidationReport(found.issues(), 1, len(data))
@@ -166,11 +166,15 @@ class _Check:
         return written or path.startswith(f"{TEXTURE_FOLDER}/") or owner_of(path) is not None
 
     def _note_others(self, paths: Sequence[str]) -> None:
-        """What a user adds beside our files is his."""
+        """Other files that users add are theirs."""
         if paths:
             named = ", ".join([*map(one_line, paths[:_NAMED]), *(["…"] if paths[_NAMED:] else [])])
-            what = "1 file is" if len(paths) == 1 else f"{len(paths):,} files are"
-            self.notes = (f"{what} served beside those of ptmtools, and not checked: {named}",)
+            what, was = (
+                ("1 file in www/ is", "was")
+                if len(paths) == 1
+                else (f"{len(paths):,} files in www/ are", "were")
+            )
+            self.notes = (f"{what} not from ptmtools, and {was} not checked: {named}",)
 
     def _asked_for(self, present: Sequence[Emitter]) -> Sequence[Emitter]:
         """The emitters that the manifest names; if it names none, those that there are, or the

@@ -75,7 +75,7 @@ def check_gzip(copy: bytes, original: bytes | None, file: str, found: Findings) 
         found.add("PTM-D676", file, "", f"damaged ({fault})")
         return
     if plain != original:
-        found.add("PTM-D676", file, "", "holds something else than the file beside it")
+        found.add("PTM-D676", file, "", "does not hold what the file without .gz holds")
     elif not inflater.eof:
         found.add("PTM-D676", file, "", "is cut short")
     elif inflater.unused_data:

@@ -1,4 +1,4 @@
-"""One file of a database at a time: held against its hash, and read as what its name says."""
+"""One file of a database at a time: compared with its hash, and read as what its name says."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ def read_root(document: Document, file: str, found: Findings) -> ReadRoot:
         if len(url) != 1 or not boxed:
             found.add("PTM-D663", file, place, "an Inline without a URL or a bounding box")
         if len(url) == 1 and url[0] in inlines:
-            found.add("PTM-D699", file, place, f"{url[0]} stands here twice")
+            found.add("PTM-D699", file, place, f"{url[0]} is listed twice")
         elif len(url) == 1:
             box = np.stack([fields["bboxCenter"], fields["bboxSize"]]) if boxed else None
             inlines[url[0]] = box

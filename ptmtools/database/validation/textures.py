@@ -140,7 +140,12 @@ def _check_fallback(
     size, levels = _png_size(fallback), header.levels
     level = next((n for n, v in enumerate(levels) if (v.width, v.height) == size), None)
     if size is not None and level is None:
-        found.add("PTM-D711", file, "", f"{png} is {size[0]} x {size[1]}, as is no level")
+        found.add(
+            "PTM-D711",
+            file,
+            "",
+            f"{png} is {size[0]} x {size[1]}, which is not the size of any level",
+        )
         return None
     other = read_png(fallback, png, limits, found)
     if level is None or texels is None or other is None:

@@ -158,7 +158,7 @@ def _given(cells: Cells, ground: Ground, walls: Walls, options: EmitOptions) -> 
             x, y, z = wanted.position
             raise InputError(
                 "PTM-I600",
-                f"the viewpoint {x:g},{y:g},{z:g} lies in no cell",
+                f"the viewpoint {x:g},{y:g},{z:g} is not inside any cell",
                 remedy="give world metres, Y up, with the origin at the centre of the floor",
             )
         if wanted.yaw is None:

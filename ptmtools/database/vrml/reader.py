@@ -192,7 +192,7 @@ class _Reader:
             type = self._word("a node")
         known = self._types.get(type)
         if known is None:
-            self._fail(f"{type} is no node of the emission pattern")
+            self._fail(f"{type} is not a node of the emission pattern")
         line = self._line(self._at)
         self._take("{")
         fields: dict[str, Any] = {}
@@ -262,7 +262,7 @@ class _Reader:
         try:
             values = np.array(words, dtype=np.int64 if whole else np.float64)
         except (ValueError, OverflowError):
-            self._fail(f"{self._bad(words, kind)!r} is no {kind}", begin)
+            self._fail(f"{self._bad(words, kind)!r} is not a valid {kind}", begin)
         if whole:
             limits = np.iinfo(np.int32)
             if ((values < limits.min) | (values > limits.max)).any():
@@ -288,7 +288,7 @@ class _Reader:
     def _no_number(self) -> NoReturn:
         if _NOT_FINITE.match(self._text, self._at):
             raise WrlError("finite", self._place(self._at), "a number is not finite")
-        self._fail(f"{self._text[self._at : self._at + 12]!r} is no number")
+        self._fail(f"{self._text[self._at : self._at + 12]!r} is not a number")
 
     def _strings(self) -> tuple[str, ...]:
         self._take("[")

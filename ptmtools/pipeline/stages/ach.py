@@ -41,17 +41,17 @@ def _notes(ach: Ach, options: AchOptions) -> Iterator[str]:
             yield (
                 f"{short:,} cells did not reach the tolerance of {options.tolerance:g} "
                 f"with {options.points:,} sample points (`--samples`); their `uncertain` says how "
-                "near they came"
+                "close they came"
             )
 
 
 def _fits_pvs(ach: Ach, pvs: Pvs) -> str:
     same = len(pvs.start) == len(ach.start) and (pvs.start == ach.start).all()
-    return "" if same else "the hints are of other sets"
+    return "" if same else "the hints belong to other sets"
 
 
 def _fits_scene(ach: Ach, scene: Scene) -> str:
-    return "a share is of no image" if (ach.texture >= len(scene.images)).any() else ""
+    return "a share refers to no image" if (ach.texture >= len(scene.images)).any() else ""
 
 
 ACH: Stage[Ach] = Stage(

@@ -38,7 +38,7 @@ def _summary(n: Mapping[str, Any]) -> str:
 
 def _fits_scene(cells: Cells, scene: Scene) -> str:
     strange = (cells.triangle_source >= len(scene.triangles)).any()
-    return "a piece is of no triangle of the scene" if strange else ""
+    return "a piece belongs to no triangle of the scene" if strange else ""
 
 
 CELLS: Stage[Cells] = Stage(

@@ -40,18 +40,18 @@ def _notes(pvs: Pvs, _: PvsOptions) -> Iterator[str]:
         )
     if not pvs.conservative:
         yield (
-            "these visible sets hold only what random lines happened to show: a client that loads "
+            "these visible sets hold only what random lines happened to hit: a client that loads "
             "by them will show holes (build with `--pvs full` or `--pvs fast` before you publish)"
         )
     if pvs.fallbacks:
         yield (
             f"the search was cut short at {pvs.fallbacks:,} portals; "
-            "their sets are larger than need be, never smaller"
+            "their sets are larger than necessary, never smaller"
         )
 
 
 def _fits_cells(pvs: Pvs, cells: Cells) -> str:
-    return "" if pvs.cell_count == cells.cell_count else "the sets are of other cells"
+    return "" if pvs.cell_count == cells.cell_count else "the sets belong to other cells"
 
 
 PVS: Stage[Pvs] = Stage(

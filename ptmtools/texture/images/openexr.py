@@ -51,7 +51,7 @@ def read_exr(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
         raise InputError(
             "PTM-I127",
             f"holds {parts} parts; a texture is one image",
-            remedy="export the one you want alone",
+            remedy="export only the one you want",
         )
     wanted = next((order for order in _CHANNELS.values() if set(order) == names), None)
     if wanted is None or sampled:

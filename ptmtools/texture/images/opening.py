@@ -80,7 +80,7 @@ def opened(file: BinaryIO, limits: Limits) -> ImageFile:
 
 
 def lossy_format(file: BinaryIO, image: ImageFile) -> str | None:
-    """The name of the format if its compression discards detail, as far as can be told."""
+    """The name of the format if its compression discards detail, as far as can be recognised."""
     if image.format == "TIFF":
         return "JPEG in TIFF" if "jpeg" in str(image.info.get("compression")) else None
     if image.format == "WEBP":
@@ -123,7 +123,7 @@ def pillow_faults() -> Iterator[None]:
         raise
     except SyntaxError:  # what a plug-in says of a file that is none of its own
         raise InputError(
-            "PTM-I124", "is not an image that can be read", remedy=f"it must be {READABLE}"
+            "PTM-I124", "is not an image of a supported format", remedy=f"it must be {READABLE}"
         ) from None
     except (DecompressionBombError, MemoryError) as error:
         raise LimitError(

@@ -119,7 +119,7 @@ def damaged_image(what: object) -> InputError:
     return InputError(
         "PTM-I125",
         f"is damaged or cut short ({what})",
-        remedy="fetch or export it again",
+        remedy="download or export it again",
     )
 
 
@@ -127,7 +127,7 @@ def unsupported(what: str) -> InputError:
     """The error for what no kind of sample holds exactly."""
     return InputError(
         "PTM-I126",
-        f"has {what}; grey and RGB of 8 or 16 bits or of 16- or 32-bit floats are read, with or "
+        f"has {what}; supported are grey and RGB of 8 or 16 bits or 16- or 32-bit floats, with or "
         "without alpha",
         remedy="convert it yourself, so that you see what that changes",
     )

@@ -124,7 +124,7 @@ def _opened(file: BinaryIO, path: str | None, limits: Limits) -> Picture | Calla
     """An image; of one of 8 bits, which Pillow has opened and found good, what unpacks it."""
     first = file.read(HEAD_MAX)
     if not first:
-        raise InputError("PTM-I123", "is empty", remedy="fetch or export it again")
+        raise InputError("PTM-I123", "is empty", remedy="download or export it again")
     if first.startswith((MAGIC, b"PTM_1")):
         read_header(first)  # says so if it is HP's format
         raise InputError(

@@ -60,8 +60,14 @@ PROFILES = {
             f"{__name__}.small",
             lossy=True,
         ),
-        Profile("raw", 0, "the paper's own layout, uncompressed", f"{__name__}.raw", since=1),
-        Profile("paper", 3, "the same with lossless JPEG, to compare", f"{__name__}.paper"),
+        Profile(
+            "raw",
+            0,
+            "uncompressed, the layout of Marvie & Bouatouch, 2003",
+            f"{__name__}.raw",
+            since=1,
+        ),
+        Profile("paper", 3, "the same with lossless JPEG, for comparison", f"{__name__}.paper"),
     )
 }
 

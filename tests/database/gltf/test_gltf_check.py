@@ -240,7 +240,7 @@ def test_each_code_is_planted() -> None:
 
 
 def test_a_damaged_vrml_file_is_told_once(gltf_database: Path, seal: Damage) -> None:
-    """What is wrong with the VRML file is not told of the GLB as well."""
+    """What is wrong with the VRML file is not reported of the GLB as well."""
     path = gltf_database / "www/cells/c0001.wrl"
     path.write_text(path.read_text().replace(" coordIndex [ 0", " coordIndex [ 99", 1))
     seal(gltf_database)

@@ -223,17 +223,17 @@ def test_an_empty_cell_is_a_file(
 
 def test_hints_are_the_same_but_for_their_urls(gltf_finished: Path) -> None:
     hints = json.loads((gltf_finished / "hints.json").read_text())
-    twin = json.loads((gltf_finished / "gltf/hints.json").read_text())
-    assert [c["url"] for c in twin["cells"]] == ["c0000.glb", "c0001.glb", "c0002.glb"]
-    for cell in [*hints["cells"], *twin["cells"]]:
+    beside_glbs = json.loads((gltf_finished / "gltf/hints.json").read_text())
+    assert [c["url"] for c in beside_glbs["cells"]] == ["c0000.glb", "c0001.glb", "c0002.glb"]
+    for cell in [*hints["cells"], *beside_glbs["cells"]]:
         del cell["url"]
-    for own, other in zip(twin["textures"], hints["textures"], strict=True):
+    for own, other in zip(beside_glbs["textures"], hints["textures"], strict=True):
         for url in ("file", "fallback"):
             assert (gltf_finished / "gltf" / own[url]).resolve() == (
                 gltf_finished / other[url]
             ).resolve()
             other[url] = own[url]
-    assert twin == hints
+    assert beside_glbs == hints
 
 
 def test_names_are_percent_encoded(

@@ -69,12 +69,14 @@ def validate(folder: Path, *, seconds: float = 300) -> dict[str, Validated]:
         name: Validated(
             complaints=tuple(
                 f"{code} {pointer}: {message}"
-                for severity, code, message, pointer in told["issues"]
+                for severity, code, message, pointer in report["issues"]
                 if severity <= WARNING
             ),
-            remarks=frozenset(code for severity, code, *_ in told["issues"] if severity > WARNING),
-            triangles=told["triangles"],
-            images=told["resources"],
+            remarks=frozenset(
+                code for severity, code, *_ in report["issues"] if severity > WARNING
+            ),
+            triangles=report["triangles"],
+            images=report["resources"],
         )
-        for name, told in json.loads(done.stdout).items()
+        for name, report in json.loads(done.stdout).items()
     }

@@ -130,11 +130,11 @@ def walk(
         (Path(folder) / "walk.js").write_text(client())
         folders = {"three": three, "client": Path(folder), "www": www}
         seen = web.visit(page, folders, width=width, height=height, seconds=seconds)
-    told = json.loads(seen.body)
+    answer = json.loads(seen.body)
     return Walked(
-        png=base64.b64decode(told["picture"].partition(",")[2]),
-        cell=told["cell"],
-        levels=tuple((file, level) for file, level in told["levels"]),
+        png=base64.b64decode(answer["picture"].partition(",")[2]),
+        cell=answer["cell"],
+        levels=tuple((file, level) for file, level in answer["levels"]),
         files=frozenset(p.removeprefix("/www/") for p in seen.paths if p.startswith("/www/")),
         messages=tuple(seen.messages),
     )

@@ -8,7 +8,7 @@ has drawn.
 X_ITE's own TextureQuality, MEDIUM, picks single texels of a pyramid's levels, which sparkle; the
 page asks for HIGH, which blends them as view3dscene does. X_ITE makes a texture of its own for
 every ImageTexture node, so each cell of the sample museum has its own, 179 in all: 1 GB at 1024².
-Twins of ``--fallback-size 256`` are for such browsers.
+Fallback images of ``--fallback-size 256`` are for such browsers.
 """
 
 from __future__ import annotations
@@ -135,9 +135,9 @@ def show(
     )
     folders = {"x_ite": library, "db": path.parent}
     seen = web.visit(page, folders, width=width, height=height, seconds=seconds)
-    told = json.loads(seen.body)
+    answer = json.loads(seen.body)
     return Shots(
-        pictures=tuple(base64.b64decode(p.partition(",")[2]) for p in told["pictures"]),
-        menu=tuple(told["menu"]),
+        pictures=tuple(base64.b64decode(p.partition(",")[2]) for p in answer["pictures"]),
+        menu=tuple(answer["menu"]),
         messages=tuple(seen.messages),
     )

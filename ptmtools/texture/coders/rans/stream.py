@@ -65,7 +65,7 @@ def read_stream(data: bytes | memoryview, longest_row: int) -> Stream:
     escaped = int.from_bytes(data[:4], "little")
     begin = 4 + 2 * escaped
     if len(data) < begin + 16 or len(data) % 2:
-        raise damaged("its stream has no whole number of words")
+        raise damaged("its stream is not a whole number of words")
     limit = (len(data) - begin) // 2
     words = np.empty(limit + longest_row + kernels.PADDING, np.uint16)
     words[limit:] = 0
