@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, get_args
+
+from ptmtools.errors import InputError
 
 CellKind = Literal["leaf", "room"]
 Position = tuple[float, float, float]
@@ -51,3 +53,15 @@ class SubdivideOptions:
     viewpoints: tuple[Position, ...] = field(
         default=(), metadata={"option": "viewpoint", "numbers": (3, 4), "parse": _positions}
     )
+
+    def __post_init__(self) -> None:
+        area, thickness, gain = self.wall_area, self.wall_thickness, self.gain
+        for sound, fault, remedy in (
+            (area > 0, f"wall area {area:g} m² is not positive", "try 2"),
+            (thickness >= 0, f"wall thickness {thickness:g} m is negative", "try 0.5"),
+            (0 <= gain <= 1, f"a gain of {gain:g} is not between 0 and 1", "try 0.1"),
+            (self.cells in get_args(CellKind), f"unknown cells {self.cells!r}", "leaf or room"),
+            (self.max_leaves >= 1, f"at most {self.max_leaves} leaves is too few", "try 500"),
+        ):
+            if not sound:
+                raise InputError("PTM-I300", fault, remedy=remedy)

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,7 @@ from ptmtools.cells.bsp import Tree, build_tree
 from ptmtools.cells.caps import Caps
 from ptmtools.cells.grouping import grouped
 from ptmtools.cells.model import OUTSIDE, Cells, sunk
-from ptmtools.cells.options import CellKind, SubdivideOptions
+from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import Portals, find_portals, portals_rejoined
@@ -142,16 +141,6 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
             "a single triangle makes no room",
             remedy="give a model with floors and walls",
         )
-    area, thickness, gain = options.wall_area, options.wall_thickness, options.gain
-    for sound, fault, remedy in (
-        (area > 0, f"wall area {area:g} m² is not positive", "try 2"),
-        (thickness >= 0, f"wall thickness {thickness:g} m is negative", "try 0.5"),
-        (0 <= gain <= 1, f"a gain of {gain:g} is not between 0 and 1", "try 0.1"),
-        (options.cells in get_args(CellKind), f"unknown cells {options.cells!r}", "leaf or room"),
-        (options.max_leaves >= 1, f"at most {options.max_leaves} leaves is too few", "try 500"),
-    ):
-        if not sound:
-            raise InputError("PTM-I300", fault, remedy=remedy)
     names = (*scene.objects, *(material.name for material in scene.materials))
     for pattern in (*options.structural, *options.detail):
         if not any(matches(name, (pattern,)) for name in names):

@@ -118,7 +118,9 @@ def new_database(function: Command) -> Command:
     )
     @wraps(function)
     def command(*arguments: Any, model: str, db: str | None, **values: Any) -> Any:
-        place = os.fspath(Path(model).with_suffix(".db")) if db is None and model else db
+        if not model or db == "":
+            raise click.UsageError("a name is empty")
+        place = os.fspath(Path(model).with_suffix(".db")) if db is None else db
         return function(*arguments, model=model, db=place, **values)
 
     return command

@@ -8,6 +8,7 @@ letter. The metadata of a field may say more:
 * ``option``: its name on the command line, where that is not the field's own;
 * ``was``: former names, which work for one release, with a note;
 * ``deprecated``: why it does nothing any more; it is hidden, and giving it draws a note;
+* ``note``: a function of what was given that returns what there is to say of it, or None;
 * ``choices``: a table of what may be given, by name, each with an ``about``; with ``several``,
   several names may be given, separated by commas;
 * ``numbers``: how many numbers one value consists of, where that varies, such as (3, 4);
@@ -28,6 +29,7 @@ from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
 import click
+from click.core import ParameterSource
 
 T = TypeVar("T")
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
@@ -112,6 +114,7 @@ def options_of(*classes: type, omit: Sequence[str] = ()) -> Decorator:
     found: dict[str, Decorator] = {}
     former: dict[str, str] = {}
     deprecated: dict[str, tuple[Any, str]] = {}
+    notes: dict[str, Callable[[Any], str | None]] = {}
     for cls in classes:
         hints, texts = typing.get_type_hints(cls), descriptions(cls)
         for field in fields(cls):
@@ -120,6 +123,8 @@ def options_of(*classes: type, omit: Sequence[str] = ()) -> Decorator:
                 found[name] = _option(field, hints[field.name], texts.get(field.name))
                 if reason := field.metadata.get("deprecated"):
                     deprecated[name] = _default(field), reason
+                if "note" in field.metadata:
+                    notes[name] = field.metadata["note"]
                 for old in field.metadata.get("was", ()):
                     found[old] = _option(field, hints[field.name], None, former=old)
                     former[old] = name
@@ -129,12 +134,19 @@ def options_of(*classes: type, omit: Sequence[str] = ()) -> Decorator:
         def renamed(*arguments: Any, **values: Any) -> Any:
             for old, new in former.items():
                 given = values.pop(_variable(old))
-                if given is not None:
+                if given not in (None, ()):
+                    source = click.get_current_context().get_parameter_source(_variable(new))
+                    if source == ParameterSource.COMMANDLINE:
+                        raise click.UsageError(f"--{old} is now called --{new}; give one of them")
                     click.echo(f"ptm: note: --{old} is now called --{new}", err=True)
                     values[_variable(new)] = given
             for name, (default, reason) in deprecated.items():
                 if values[_variable(name)] != default:
-                    click.echo(f"ptm: note: --{name} does nothing any more: {reason}", err=True)
+                    word = f"no-{name}" if default is True else name
+                    click.echo(f"ptm: note: --{word} does nothing any more: {reason}", err=True)
+            for name, note in notes.items():
+                if text := note(values[_variable(name)]):
+                    click.echo(f"ptm: note: {text}", err=True)
             return function(*arguments, **values)
 
         command: Callable[..., Any] = renamed
@@ -164,7 +176,7 @@ def words(options: Iterable[Any]) -> list[str]:
     for each in options:
         for field in fields(each):
             value, name = getattr(each, field.name), _option_name(field)
-            if value == _default(field):
+            if value == _default(field) or "deprecated" in field.metadata:
                 continue
             value = field.metadata.get("print", lambda value: value)(value)
             if isinstance(value, bool):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shlex
 from dataclasses import asdict
 from itertools import groupby
@@ -16,7 +15,6 @@ from ptmtools.cli.common import as_json, database, forced, limited, voiced, work
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
 from ptmtools.database import PlotOptions, ValidationReport
-from ptmtools.database.names import MANIFEST
 from ptmtools.database.validation.findings import NOT_BUILT, SEEN_BY_BUILD
 from ptmtools.errors import CheckError
 from ptmtools.pipeline import Artifacts, shoot_segments
@@ -194,8 +192,8 @@ def _repair(target: str, report: ValidationReport) -> str | None:
     if not Path(target).is_dir():
         again = f"ptm encode IMAGE -o {shlex.quote(target)} --force"
         return again if target.endswith(".ptm") else None
-    if "PTM-D650" not in codes and codes & SEEN_BY_BUILD:
-        return build_command(target)
-    # Files are as they were written, so nothing but a new build changes them.
-    manifest = shlex.quote(os.path.join(target, MANIFEST))
-    return f"rm -f {manifest} && {build_command(target)} --force"
+    if "PTM-D650" in codes:
+        return f"{build_command(target)} --rebuild --force"
+    # A file that is as it was written is made again only when that is asked for.
+    seen = codes - NOT_BUILT <= SEEN_BY_BUILD
+    return build_command(target) + ("" if seen else " --rebuild")

@@ -57,6 +57,7 @@ model_argument = click.argument("model", type=click.Path())
 @options_of(*(stage.options for stage in STAGES.values()))
 @many_machines
 @forced
+@click.option("--rebuild", is_flag=True, help="Run every stage again, even if it is up to date.")
 @click.option("--dry-run", is_flag=True, help="Show what would be done, and why; write nothing.")
 @as_json
 @voiced
@@ -66,6 +67,7 @@ def build_scene(
     db: str,
     as_json: bool,
     dry_run: bool,
+    rebuild: bool,
     workers: int,
     scheduler: str | None,
     force: bool,
@@ -92,6 +94,7 @@ def build_scene(
             workers=workers,
             scheduler=scheduler,
             force=force,
+            rebuild=rebuild,
             progress=progress,
         )
     print_report(voice, report, as_json)

@@ -82,7 +82,7 @@ def emit(
         triangles=len(content.geometry.triangle),
         collapsed=content.geometry.collapsed,
         bytes=size,
-        notes=(*notes, *options.notes),
+        notes=notes,
     )
 
 

@@ -113,6 +113,17 @@ def _numbers(viewpoints: Sequence[GivenViewpoint]) -> list[tuple[float, ...]]:
     return [(*v.position, *(() if v.yaw is None else (v.yaw,))) for v in viewpoints]
 
 
+def _former_meaning(format: str) -> str | None:
+    """What there is to say of a format whose name alone meant something else before."""
+    emitter = EMITTERS.get(format)
+    if emitter is None or not emitter.before:
+        return None
+    return (
+        f"--format {format} writes {emitter.before} for now; the next release will write {format} "
+        f"alone: say --format {emitter.before} to keep both"
+    )
+
+
 @dataclass(frozen=True)
 class EmitOptions:
     """
@@ -143,14 +154,15 @@ class EmitOptions:
     avatar_size: Vector = (0.25, 1.6, 0.75)
     field_of_view: float = 1.1
     gzip: bool = False
-    format: str = field(default="vrml", metadata={"choices": EMITTERS, "several": True})
+    format: str = field(
+        default="vrml", metadata={"choices": EMITTERS, "several": True, "note": _former_meaning}
+    )
 
     def __post_init__(self) -> None:
         wrong = None
         try:
             names = ",".join(emitter.name for emitter in chosen_emitters(self.format))
-            if self.format not in EMITTERS:
-                object.__setattr__(self, "format", names)
+            object.__setattr__(self, "format", names)
         except ValueError as fault:
             wrong = f"--format: {fault}"
         if not 0 < self.field_of_view < math.pi:
@@ -161,17 +173,6 @@ class EmitOptions:
             wrong = f"--viewpoint-count {self.viewpoint_count} is below 0"
         if wrong:
             raise InputError("PTM-I603", wrong, remedy="leave the option out for its default")
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What there is to say of the options as they were given."""
-        emitter = EMITTERS.get(self.format)
-        if emitter is None or not emitter.before:
-            return ()
-        return (
-            f"--format {self.format} writes {emitter.before} for now; the next release will write "
-            f"{self.format} alone: say --format {emitter.before} to keep both",
-        )
 
 
 @dataclass(frozen=True)

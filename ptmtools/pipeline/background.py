@@ -120,4 +120,5 @@ class BackgroundLoop:
     def _run(self, work: Callable[[Executor, Event], object]) -> None:
         self._free.wait()
         with self._executor:
-            work(self._executor, self._stop)
+            if not self._stop.is_set():
+                work(self._executor, self._stop)

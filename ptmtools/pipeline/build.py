@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ def build_scene(
     workers: int = 0,
     scheduler: str | None = None,
     force: bool = False,
+    rebuild: bool = False,
     progress: Progress = silent,
 ) -> BuildReport:
     """Builds a database, or brings it up to date: only stages whose inputs, options or recipe
@@ -42,6 +44,7 @@ def build_scene(
     until: the last stage to run; all if not given.
     workers, scheduler: of the executor, see `open_executor`. They change nothing in the result.
     force: write into a folder that is not ours, or over the database of another model.
+    rebuild: run every stage, whether or not it is current.
 
     Raises
     ------
@@ -61,7 +64,7 @@ def build_scene(
         DatabaseWriter.open_for_model(db, Path(model).name, force=force) as writer,
         Workers(workers, scheduler) as used,
     ):
-        run = Run(writer, used, progress, Path(model))
+        run = Run(writer, used, progress, Path(model), rebuild=rebuild)
         return _run(run, stages, chosen, start)
 
 
@@ -123,8 +126,9 @@ def _run(
             run.end_of_turn(job.stage)
             finished.add(job.stage)
     except BaseException:
-        for job in jobs:
-            job.abandon()
+        with ExitStack() as abandoned:
+            for job in jobs:
+                abandoned.callback(job.abandon)
         raise
     return _report(run, start)
 

@@ -24,7 +24,8 @@ def reasons(before: StageRecord | None, work: StageRecord, db: DatabaseFolder) -
     names = [*before.parameters, *(n for n in work.parameters if n not in before.parameters)]
     for name in names:
         old, new = before.parameters.get(name), work.parameters.get(name)
-        if old != new:
+        both = name in before.parameters and name in work.parameters
+        if old != new and (both or before.recipe == work.recipe):
             found.append(f"{name.replace('_', ' ')}: {_text(old)} → {_text(new)}")
     for what, files in _changed(before.inputs, work.inputs).items():
         if files:

@@ -75,7 +75,7 @@ class _Planning:
         """Of a stage, after those that it reads."""
         before, work = self._artifacts.before(stage), self._work(stage)
         why = reasons(before, work, self._artifacts.db)
-        tasks = stage.tasks.load()(before, work) if stage.tasks else []
+        tasks = stage.tasks.load()(self._artifacts, work) if stage.tasks else []
         textures = tuple(Path(name).stem for name in tasks)
         reads = stage.read_with(self._options[stage])
         anew = [read.name for read in reads if read in self._changing]

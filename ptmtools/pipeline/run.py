@@ -45,9 +45,17 @@ class Artifacts:
         self._stages: dict[Stage[Any], Any] = {}
 
     def __getitem__(self, stage: Stage[A]) -> A:
-        """Raises PTM-D004 to PTM-D006; also where artifacts do not fit together."""
+        """Raises PTM-D004 to PTM-D006, also where artifacts do not fit together; PTM-D008 if
+        another release of ptmtools made the artifact."""
         if stage not in self._stages:
             assert stage.artifact is not None
+            if self.record(stage).recipe != stage.recipe:
+                raise DatabaseError(
+                    "PTM-D008",
+                    f"the {stage.name} stage was run by another release of ptmtools",
+                    file=self.db.path,
+                    remedy="run `ptm build-scene MODEL -o DB` to bring the database up to date",
+                )
             arrays = self.db.read_arrays(stage.name, "this command")
             kind = stage.artifact.load()
             with self.reading(arrays_of(stage.name)):
@@ -100,6 +108,8 @@ class Artifacts:
     def outdated(self, stage: Stage[Any]) -> str:
         """What a stage that has run was made from and is another by now; "" if there is none."""
         record = self.record(stage)
+        if record.recipe != stage.recipe:
+            return "release of ptmtools"
         try:
             options = self.recorded(stage)
             if not stage.read_with(options):  # but the model, which need not be at hand
@@ -160,8 +170,11 @@ class Run(Artifacts):
         workers: Workers,
         progress: Progress = silent,
         model: Path | None = None,
+        *,
+        rebuild: bool = False,
     ) -> None:
         super().__init__(db, model)
+        self._rebuild = rebuild
         self.writer = db
         self.workers = workers
         self.progress = progress
@@ -172,6 +185,10 @@ class Run(Artifacts):
     def record(self, stage: Stage[Any]) -> StageRecord:
         """As `Artifacts.record`, of this run if it is not committed yet."""
         return self._uncommitted.get(stage.name) or super().record(stage)
+
+    def before(self, stage: Stage[Any]) -> StageRecord | None:
+        """As `Artifacts.before`; None for a run that does everything again."""
+        return None if self._rebuild else super().before(stage)
 
     def work(self, stage: Stage[Any], options: Options) -> StageRecord:
         """What a stage is to do.
@@ -188,7 +205,7 @@ class Run(Artifacts):
                     "PTM-D008",
                     f"the {read.name} stage was made from an earlier {earlier}",
                     file=self.db.path,
-                    remedy=f"run `ptm {read.name} DB` or `ptm build-scene MODEL -o DB` first",
+                    remedy="run `ptm build-scene MODEL -o DB` first",
                 )
         return work_of(stage, options, inputs)
 

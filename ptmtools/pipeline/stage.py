@@ -57,8 +57,8 @@ class Stage(Generic[A]):
         all the files of one that has none.
     foresee: ``foresee(artifacts, work)``: whether what others read of it is known before a run
         that would do ``work``; ``artifacts`` then hold it.
-    tasks: ``tasks(before, work)``: of a stage that consists of tasks, the names of those that a run
-        would do.
+    tasks: ``tasks(artifacts, work)``: of a stage that consists of tasks, the names of those that a
+        run would do.
     load: its artifact of the stored arrays, where that takes more than them.
     check: ``check(artifacts, artifact)``: what else of its files is missing, as (file, place,
         message), for ``ptm validate``.
@@ -83,7 +83,7 @@ class Stage(Generic[A]):
     job: Lazy[type[Job]] = field(default=Lazy("ptmtools.pipeline.run:ArraysJob"))
     inputs: Lazy[Callable[[Artifacts], Mapping[str, str]]] | None = None
     foresee: Lazy[Callable[[Artifacts, StageRecord], bool]] | None = None
-    tasks: Lazy[Callable[[StageRecord | None, StageRecord], list[str]]] | None = None
+    tasks: Lazy[Callable[[Artifacts, StageRecord], list[str]]] | None = None
     load: Lazy[Callable[[Artifacts, Mapping[str, Any]], A]] | None = None
     check: Lazy[Callable[[Artifacts, A], Iterable[tuple[str, str, str]]]] | None = None
     from_model: bool = False
@@ -109,9 +109,15 @@ class Stage(Generic[A]):
         passed over, and those that it has gained have their default.
         """
         hints = typing.get_type_hints(self.options)
-        known = {f.name for f in fields(self.options)} & set(parameters)
+        given: dict[str, Any] = {}
         try:
-            return self.options(**{n: _restored(hints[n], parameters[n]) for n in sorted(known)})
+            for each in fields(self.options):
+                former = (name.replace("-", "_") for name in each.metadata.get("was", ()))
+                for name in (each.name, *former):
+                    if name in parameters and each.compare:
+                        given[each.name] = _restored(hints[each.name], parameters[name])
+                        break
+            return self.options(**given)
         except (PtmError, AttributeError, LookupError, TypeError) as fault:
             raise ValueError(f"stage {self.name} has impossible parameters: {fault}") from fault
 

@@ -43,6 +43,14 @@ def _check_artifact(
     found: Findings,
 ) -> None:
     alone = Artifacts(db)
+    if alone.record(stage).recipe != stage.recipe:
+        message = "made by another release of ptmtools; run build-scene"
+        found.add("PTM-D656", MANIFEST, f"stages.{stage.name}", message)
+        return
+    try:
+        alone.recorded(stage)
+    except DatabaseError as fault:
+        found.add("PTM-D650", MANIFEST, f"stages.{stage.name}.parameters", fault.message)
     try:
         made = alone[stage]
     except DatabaseError as fault:

@@ -29,6 +29,7 @@ from ptmtools.pipeline.options import TextureOptions
 from ptmtools.pipeline.run import Artifacts, Job, Run
 from ptmtools.pipeline.shared_disk import ImageTask, encoded_there, shared_disk
 from ptmtools.pipeline.stage import Stage
+from ptmtools.pipeline.stages.textures import TEXTURES
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import SERVED, sha256
 from ptmtools.store.manifest import StageRecord
@@ -88,6 +89,21 @@ def stale_textures(before: StageRecord | None, work: StageRecord) -> list[str]:
     return [name for name in work.inputs if before.inputs.get(name) != work.inputs[name]]
 
 
+def waiting_textures(artifacts: Artifacts, work: StageRecord) -> list[str]:
+    """See `Stage.tasks`: also those whose files are lost."""
+    before = artifacts.before(TEXTURES)
+    stale = set(stale_textures(before, work))
+    outputs = before.outputs if before else {}
+    lost = {
+        name
+        for name in work.inputs.keys() - stale
+        if artifacts.db.damaged(
+            {file: digest for file, digest in outputs.items() if Path(file).stem == Path(name).stem}
+        )
+    }
+    return [name for name in work.inputs if name in stale | lost]
+
+
 class TexturesJob(Job):
     """Encodes the images of the scene, in the background as far as that is worth it."""
 
@@ -97,6 +113,7 @@ class TexturesJob(Job):
         self._transaction: Transaction | None = None
         self._left: deque[int] = deque()
         self._names: list[str] = []
+        self._prepared = False
         self._background: BackgroundLoop | None = None
 
     @property
@@ -143,8 +160,9 @@ class TexturesJob(Job):
 
     def _prepare(self) -> None:
         """Once: keeps what the last run made, and takes over what an interrupted one left."""
-        if self._names:
+        if self._prepared:
             return
+        self._prepared = True
         self._work, self._why = self.planned()
         self._names = list(self._work.inputs)
         self._tasks = (len(self._names), len(self._names), 0)

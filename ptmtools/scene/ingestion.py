@@ -76,12 +76,6 @@ def ingest(
     """
     model = Path(path)
     metres = None if options.unit is None else spaces.parse_unit(options.unit)
-    if options.up not in (None, "y", "z"):
-        raise InputError("PTM-I251", f"up axis {options.up!r} is not known", remedy="give y or z")
-    if options.limit < 1 or options.max_triangles < 1:
-        raise InputError(
-            "PTM-I257", "a limit is below 1", remedy="give --limit and --max-triangles of 1 or more"
-        )
     check_file(model)
     findings = Findings(model)
     folder = Folder(model.absolute().parent, options.allow_outside)

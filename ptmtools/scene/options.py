@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from ptmtools.errors import InputError
+
 
 @dataclass(frozen=True)
 class IngestOptions:
@@ -28,3 +30,17 @@ class IngestOptions:
     # Limits end a build or change nothing in it, so they do not decide whether a stage is current.
     limit: int = field(default=1024, compare=False)
     max_triangles: int = field(default=20_000_000, compare=False)
+
+    def __post_init__(self) -> None:
+        if self.up not in (None, "y", "z"):
+            raise InputError("PTM-I251", f"up axis {self.up!r} is not known", remedy="give y or z")
+        if self.limit < 1 or self.max_triangles < 1:
+            raise InputError(
+                "PTM-I257",
+                "a limit is below 1",
+                remedy="give --limit and --max-triangles of 1 or more",
+            )
+        if self.unit is not None:
+            from ptmtools.scene.space import parse_unit
+
+            parse_unit(self.unit)

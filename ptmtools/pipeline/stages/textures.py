@@ -26,6 +26,6 @@ TEXTURES: Stage[None] = Stage(
     reads=(SCENE,),
     inputs=Lazy("ptmtools.pipeline.textures:inputs_of"),
     job=Lazy("ptmtools.pipeline.textures:TexturesJob"),
-    tasks=Lazy("ptmtools.pipeline.textures:stale_textures"),
+    tasks=Lazy("ptmtools.pipeline.textures:waiting_textures"),
     summary=_summary,
 )
