@@ -118,7 +118,9 @@ def jobs_for(
         return nameless + [Job(name) for name in named]
     if output is None:
         return nameless + _apart({name: _beside(name, None, suffix) for name in named}, None)
-    several = len(named) > 1 or any(name != STANDARD and _several(name) for name in given)
+    several = max(len(given), len(named)) > 1 or any(
+        name != STANDARD and _several(name) for name in given
+    )
     is_file = Path(output).suffix.lower() in suffixes
     if os.path.isdir(output) or output.endswith(("/", os.sep)) or (several and not is_file):
         folder = Path(output)
