@@ -239,43 +239,6 @@ def test_a_level_below_that_is_no_mean_costs_more_and_nothing_else() -> None:
         assert bits(coder.decode(data, below, level.shape, level.dtype)) == bits(level)
 
 
-CASES = EXACT + [(dtype, 3) for dtype in INTEGERS]
-
-
-@settings(deadline=None, max_examples=300)
-@given(
-    case=st.sampled_from(CASES),
-    changes=st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), max_size=3),
-    cut=st.floats(0, 1) | st.just(1.0),
-    form=st.none() | st.integers(0, 4),
-)
-def test_a_damaged_group_is_an_error_or_an_image(
-    case: tuple[np.dtype, int],
-    changes: list[tuple[float, int]],
-    cut: float,
-    form: int | None,
-) -> None:
-    dtype, max_error = case
-    level = smooth(33, 38, 3, dtype)
-    values = to_ordered(level)
-    values[:, :, 0] |= values.dtype.type(15)
-    values[:, :, 1] = values[:, :, 1] // 32 * 31
-    level = from_ordered(values, dtype)
-    below = mean_below(level)
-    group = bytearray(coder.encode(level, below, max_error)[0])
-    for position, value in changes:
-        group[int(position * len(group))] = value
-    if form is not None:
-        group[0] = form
-    del group[int(cut * len(group)) :]
-    codes, found = [], None
-    try:
-        found = coder.decode(bytes(group), below, level.shape, dtype, max_error)
-    except InputError as error:
-        codes.append(error.code)
-    assert codes == ["PTM-I112"] or (found is not None and found.shape == level.shape)
-
-
 @settings(deadline=None, max_examples=200)
 @given(body=st.binary(max_size=200), form=st.integers(0, 5), dtype=st.sampled_from(DTYPES))
 def test_nonsense_is_refused(body: bytes, form: int, dtype: np.dtype) -> None:

@@ -13,6 +13,9 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.texture.images.declared import check_tile
 from ptmtools.texture.images.eight_bit import one_frame, with_key
@@ -28,8 +31,6 @@ from ptmtools.texture.images.picture import (
 from ptmtools.texture.model import Description, Limits
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
     from PIL.ImageFile import ImageFile
 
 #: Pillow's unpackers that keep the upper and the lower byte of each sample, by mode.
@@ -52,8 +53,6 @@ _BLOCK, _DIGITS_MAX = 1 << 20, 10
 
 def read_png(file: BinaryIO, image: ImageFile, colour: int, limits: Limits) -> Picture:
     """A PNG of 16 bits a sample; ``colour`` is its colour type."""
-    import numpy as np
-
     components = {0: 1, 2: 3, 4: 2, 6: 4}.get(colour, 3)
     check_size(*image.size, 2 * components, limits)
     key = image.info.get("transparency")
@@ -120,8 +119,6 @@ def read_tiff(file: BinaryIO, tags: Tags, limits: Limits) -> Picture:
 
     Raises InputError PTM-I126, PTM-I127, LimitError PTM-L104, MissingComponentError PTM-M100.
     """
-    import numpy as np
-
     width, height, components = tags[_WIDTH], tags[_HEIGHT], tags.get(_SAMPLES, 1)
     bits, formats = tags.get(_BITS, (1,)), tags.get(_FORMAT, (1,))
     photometric = tags.get(_PHOTOMETRIC, 1)
@@ -174,8 +171,6 @@ def read_ppm(file: BinaryIO, path: str | None, limits: Limits) -> Picture | None
 
     Raises InputError PTM-I125, LimitError PTM-L104, and for what is no number ValueError.
     """
-    import numpy as np
-
     file.seek(0)
     head = _PPM.match(file.read(4096))
     if head is None or int(head[4]) != 0xFFFF:
@@ -206,8 +201,6 @@ def read_ppm(file: BinaryIO, path: str | None, limits: Limits) -> Picture | None
 
 def _plain_samples(file: BinaryIO, count: int) -> NDArray[np.uint16]:
     """So many samples (count,) from decimal numbers. Raises InputError PTM-I125, ValueError."""
-    import numpy as np
-
     # Before memory is taken: each has a digit, and all but the last something after it.
     start, end = file.tell(), file.seek(0, 2)
     if end - start < 2 * count - 1:

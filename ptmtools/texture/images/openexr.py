@@ -5,7 +5,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 from tempfile import NamedTemporaryFile, TemporaryDirectory
-from typing import IO, TYPE_CHECKING, Any, BinaryIO
+from typing import IO, Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.texture.images.declared import check_file, check_tile
@@ -18,9 +21,6 @@ from ptmtools.texture.images.picture import (
 )
 from ptmtools.texture.model import Description, Limits
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 MAGIC = b"v/1\x01"
 #: Channels of the images that are read, in the order of the texel's components.
 _CHANNELS = {1: ["Y"], 2: ["Y", "A"], 3: ["R", "G", "B"], 4: ["R", "G", "B", "A"]}
@@ -31,8 +31,6 @@ def read_exr(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
 
     Raises InputError PTM-I125 to PTM-I127, LimitError PTM-L104, MissingComponentError PTM-M101.
     """
-    import numpy as np
-
     library = _library()
     if path is None:
         return _from_memory(file, limits)
@@ -77,8 +75,6 @@ def save_openexr(file: IO[bytes], texels: NDArray[Any], description: Description
 
     Raises MissingComponentError PTM-M101, OutputError PTM-O102.
     """
-    import numpy as np
-
     if texels.dtype.kind != "f":
         raise not_held("exr", texels, ".png, .npy or .tif")
     library = _library()
