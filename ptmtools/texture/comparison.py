@@ -120,8 +120,8 @@ def _measured(levels: list[Samples], codec: Codec, repeat: int) -> Measured:
             first += [grain.astype(image.dtype), np.zeros(size, image.dtype)]
         for one in first:
             codec.decode(codec.encode(one), one.shape)
-        encoding, data = _best(lambda: codec.encode(image), repeat)
-        decoding, back = _best(lambda: codec.decode(data, image.shape), repeat)
+        encoding, data = best(lambda: codec.encode(image), repeat)
+        decoding, back = best(lambda: codec.decode(data, image.shape), repeat)
         if back.dtype != image.dtype or back.tobytes() != image.tobytes():
             return replace(none, problem=f"does not give back {image.dtype} texels exactly")
         rest = 0 if codec.pyramid else sum(len(codec.encode(level)) for level in levels[:-1])
@@ -142,7 +142,8 @@ def _measured(levels: list[Samples], codec: Codec, repeat: int) -> Measured:
     )
 
 
-def _best(action: Callable[[], Any], repeat: int) -> tuple[float, Any]:
+def best(action: Callable[[], Any], repeat: int) -> tuple[float, Any]:
+    """Shortest time of some repetitions, seconds, and the last result."""
     shortest, result = float("inf"), None
     for _ in range(repeat):
         start = time.perf_counter()

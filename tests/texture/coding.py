@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import tracemalloc
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -50,14 +47,3 @@ def coded_groups(
         below, learned, known = back.texels, tile.memory, back.memory
         found.append((tile.data, level))
     return found
-
-
-@contextmanager
-def little_memory(most: int) -> Iterator[None]:
-    """What happens inside takes fewer bytes than ``most`` at any time."""
-    tracemalloc.start()
-    try:
-        yield
-        assert tracemalloc.get_traced_memory()[1] < most
-    finally:
-        tracemalloc.stop()

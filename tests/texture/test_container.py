@@ -24,7 +24,7 @@ from ptmtools.texture import (
     whole_levels,
 )
 from ptmtools.texture.container import HEAD_MAX, MAGIC
-from tests.texture.coding import little_memory
+from tests.memory import little_memory
 
 Y, X = np.mgrid[:11, :13]
 IMAGE = np.stack([(X * 17 + Y * 5 * c) % 256 for c in range(3)], axis=2).astype(np.uint8)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from ptmtools.errors import InputError
 from ptmtools.texture.profiles import raw
@@ -18,13 +17,6 @@ from ptmtools.texture.samples import KINDS
 from tests.texture.coding import coded_groups
 
 DTYPES = [np.dtype(name) for name in KINDS]
-
-
-@settings(deadline=None, max_examples=120)
-@given(data=st.data(), dtype=st.sampled_from(DTYPES))
-def test_any_bit_pattern_at_every_level(data: st.DataObject, dtype: np.dtype) -> None:
-    shape = st.tuples(st.integers(1, 20), st.integers(1, 20), st.integers(1, 4))
-    coded_groups(raw, data.draw(arrays(np.dtype(f"u{dtype.itemsize}"), shape)).view(dtype))
 
 
 @settings(deadline=None, max_examples=60)

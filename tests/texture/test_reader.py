@@ -18,7 +18,7 @@ from ptmtools.errors import InputError, LimitError
 from ptmtools.texture import Description, EncodeOptions, Limits, build_pyramid, encode
 from ptmtools.texture.container import Head, pack_head
 from ptmtools.texture.tiling import Box, covering, tiles_under
-from tests.texture.coding import little_memory
+from tests.memory import little_memory
 
 TILED = EncodeOptions("raw", tile=16)
 

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import InputError, MissingComponentError
+from ptmtools.errors import InputError
+from ptmtools.lazy import component
 from ptmtools.texture.images.declared import check_tile
 from ptmtools.texture.images.eight_bit import one_frame, with_key
 from ptmtools.texture.images.opening import ORIENTATION, described, load, opened
@@ -142,14 +143,12 @@ def read_tiff(file: BinaryIO, tags: Tags, limits: Limits) -> Picture:
 
         shape = (image.height, image.width, 1)
         return Picture(Strips(shape, np.dtype(dtype), strip), described(image))
-    try:
-        from imagecodecs import tiff_decode
-    except ImportError:
-        raise MissingComponentError(
-            "PTM-M100",
-            "a TIFF of more than one component deeper than 8 bits needs imagecodecs",
-            remedy="pip install 'ptmtools[codecs]'",
-        ) from None
+    codecs = component(
+        "imagecodecs",
+        "PTM-M100",
+        "a TIFF of more than one component deeper than 8 bits needs imagecodecs",
+        "codecs",
+    )
     if tags[_NEXT] or tags.get(_DEPTH, 1) != 1:
         raise InputError(
             "PTM-I127",
@@ -158,7 +157,7 @@ def read_tiff(file: BinaryIO, tags: Tags, limits: Limits) -> Picture:
         )
     file.seek(0)
     try:
-        texels = tiff_decode(file.read(), index=0)
+        texels = codecs.tiff_decode(file.read(), index=0)
     except Exception as error:  # its errors have no class in common
         raise damaged_image(error) from None
     texels = texels.reshape(height, width, components).astype(dtype, copy=False)

@@ -10,7 +10,8 @@ from typing import IO, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import InputError, MissingComponentError
+from ptmtools.errors import InputError
+from ptmtools.lazy import component
 from ptmtools.texture.images.declared import check_file, check_tile
 from ptmtools.texture.images.picture import (
     Picture,
@@ -99,10 +100,4 @@ def _from_memory(file: BinaryIO, limits: Limits) -> Picture:
 
 
 def _library() -> Any:
-    try:
-        import OpenEXR
-    except ImportError:
-        raise MissingComponentError(
-            "PTM-M101", "OpenEXR files need OpenEXR", remedy="pip install 'ptmtools[exr]'"
-        ) from None
-    return OpenEXR
+    return component("OpenEXR", "PTM-M101", "OpenEXR files need OpenEXR", "exr")
