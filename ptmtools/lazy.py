@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Generic, TypeVar, cast
 
+from ptmtools.errors import MissingComponentError
+
 T = TypeVar("T")
 
 
@@ -35,3 +37,15 @@ def names(package: str, home: Mapping[str, str]) -> Callable[[str], Any]:
         return getattr(import_module(f"{package}.{home[name]}"), name)
 
     return attribute
+
+
+def component(module: str, code: str, message: str, extra: str) -> Any:
+    """A module that is an optional component, of the extra of that name.
+
+    Raises MissingComponentError with that code and message where it is not installed.
+    """
+    try:
+        return import_module(module)
+    except ImportError:
+        remedy = f"pip install 'ptmtools[{extra}]'"
+        raise MissingComponentError(code, message, remedy=remedy) from None

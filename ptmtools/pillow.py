@@ -35,8 +35,10 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, replace
-from typing import IO, TYPE_CHECKING, Any, cast
+from typing import IO, Any, cast
 
+import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, ImageFile
 
 from ptmtools.errors import InputError, PtmError
@@ -47,9 +49,6 @@ from ptmtools.texture.images.picture import Strips
 from ptmtools.texture.model import Description, EncodeOptions, Limits, PtmHeader
 from ptmtools.texture.reader import PtmReader
 from ptmtools.texture.sources import ranges_of
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 FORMAT = "PTM"
 #: Kind of sample and components → mode.
@@ -183,8 +182,6 @@ class PtmImageFile(ImageFile.ImageFile):
         whole = self._ptm.whole
         if self._chosen < whole or not whole or not ImageFile.LOAD_TRUNCATED_IMAGES:
             return self._ptm.level(self._chosen)
-        import numpy as np
-
         texels = self._ptm.level(whole - 1)
         width, height = self.size
         # As many as the level below has for each, and the last for what is odd.
@@ -270,8 +267,6 @@ def _exif(given: Image.Exif | bytes | None) -> Image.Exif:
 
 
 def _rows(im: Image.Image) -> Strips:
-    import numpy as np
-
     if im.mode == "1":
         im = im.convert("L")
     elif im.mode in ("P", "PA"):

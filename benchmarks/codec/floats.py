@@ -20,10 +20,11 @@ from typing import Any
 
 import imagecodecs
 import numpy as np
-from images import OUTPUT, best
+from images import OUTPUT
 from numpy.typing import NDArray
 
 from ptmtools.texture import EncodeOptions, build_pyramid, decode_levels, encode, load_image
+from ptmtools.texture.comparison import best
 
 Samples = NDArray[Any]
 SIDE = 768

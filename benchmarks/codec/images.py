@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import os
-import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from numpy.typing import NDArray
 
@@ -18,7 +16,6 @@ SHARED = Path(os.environ.get("PTM_SHARED", ROOT.parent / "shared"))
 OUTPUT = ROOT / "build" / "bench"
 SUFFIXES = {".png", ".jpg", ".jpeg", ".tga", ".bmp", ".tif", ".tiff", ".webp"}
 
-Result = TypeVar("Result")
 
 
 def image_files(folder: Path) -> list[Path]:
@@ -39,13 +36,3 @@ def sets() -> dict[str, list[Path]]:
 def sample(name: str = "kodim05.png") -> NDArray[Any]:
     """One of the images."""
     return read_image(SHARED / "textures" / name)
-
-
-def best(action: Callable[[], Result], repeat: int) -> tuple[float, Result]:
-    """Shortest time of some repetitions, seconds, and the last result."""
-    shortest = float("inf")
-    for _ in range(repeat):
-        start = time.perf_counter()
-        result = action()
-        shortest = min(shortest, time.perf_counter() - start)
-    return shortest, result

@@ -14,17 +14,16 @@ import struct
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.errors import PtmError
 from ptmtools.texture.model import EncodeOptions
 from ptmtools.texture.profiles import PROFILES
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Samples = NDArray[Any]
-
+Samples = NDArray[Any]
 _PILLOW = "pip install --force-reinstall pillow"
 _CODECS = "pip install 'ptmtools[codecs]'"
 #: Before it is timed, a codec codes a corner of so many texels a side, and ours also noise and a
@@ -82,8 +81,6 @@ def codecs(profiles: Iterable[str] = PROFILES) -> list[Codec]:
 
 def measure(image: Samples, contenders: Sequence[Codec], repeat: int = 1) -> list[Measured]:
     """What each codec makes of (h, w, c) texels; times are the best of ``repeat``."""
-    import numpy as np
-
     from ptmtools.texture.pyramid import build_pyramid
 
     levels = [np.ascontiguousarray(level) for level in build_pyramid(image)]
@@ -95,12 +92,10 @@ def total(measured: Sequence[Sequence[Measured]]) -> list[Measured]:
     sums = []
     for column in zip(*measured, strict=True):
         bad = next((one for one in column if one.problem), None)
-        if bad:
-            sums.append(bad)
-            continue
         finest = [one.finest_bytes for one in column if one.finest_bytes is not None]
         sums.append(
-            Measured(
+            bad
+            or Measured(
                 column[0].codec,
                 sum(finest) if finest else None,
                 sum(one.all_bytes for one in column),
@@ -113,8 +108,6 @@ def total(measured: Sequence[Sequence[Measured]]) -> list[Measured]:
 
 
 def _measured(levels: list[Samples], codec: Codec, repeat: int) -> Measured:
-    import numpy as np
-
     image = levels[-1]
     none = Measured(codec.name)
     if codec.remedy:
@@ -127,8 +120,8 @@ def _measured(levels: list[Samples], codec: Codec, repeat: int) -> Measured:
             first += [grain.astype(image.dtype), np.zeros(size, image.dtype)]
         for one in first:
             codec.decode(codec.encode(one), one.shape)
-        encoding, data = _best(lambda: codec.encode(image), repeat)
-        decoding, back = _best(lambda: codec.decode(data, image.shape), repeat)
+        encoding, data = best(lambda: codec.encode(image), repeat)
+        decoding, back = best(lambda: codec.decode(data, image.shape), repeat)
         if back.dtype != image.dtype or back.tobytes() != image.tobytes():
             return replace(none, problem=f"does not give back {image.dtype} texels exactly")
         rest = 0 if codec.pyramid else sum(len(codec.encode(level)) for level in levels[:-1])
@@ -149,7 +142,8 @@ def _measured(levels: list[Samples], codec: Codec, repeat: int) -> Measured:
     )
 
 
-def _best(action: Callable[[], Any], repeat: int) -> tuple[float, Any]:
+def best(action: Callable[[], Any], repeat: int) -> tuple[float, Any]:
+    """Shortest time of some repetitions, seconds, and the last result."""
     shortest, result = float("inf"), None
     for _ in range(repeat):
         start = time.perf_counter()
@@ -237,7 +231,6 @@ def _webp(image: Samples) -> bytes:
 
 def _by_pillow(data: bytes, shape: tuple[int, ...]) -> Samples:
     """What Pillow decodes, or for PNGs of 16 bits `load_image`."""
-    import numpy as np
     from PIL import Image
 
     if data[1:4] == b"PNG" and data[24] == 16:
@@ -257,7 +250,6 @@ def _by_pillow(data: bytes, shape: tuple[int, ...]) -> Samples:
 def _jpeg_ls(image: Samples) -> bytes:
     """Each plane by itself, red and blue less green: JPEG-LS has no colour transform."""
     import imagecodecs
-    import numpy as np
 
     if image.dtype.kind == "f":
         raise ValueError("it has integers only")
@@ -270,7 +262,6 @@ def _jpeg_ls(image: Samples) -> bytes:
 
 def _from_jpeg_ls(data: bytes, shape: tuple[int, ...]) -> Samples:
     import imagecodecs
-    import numpy as np
 
     planes, at = [], 0
     while at < len(data):

@@ -13,7 +13,9 @@ import math
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO
+
+import numpy as np
 
 from ptmtools.errors import LimitError, OutputError
 from ptmtools.texture.container import (
@@ -31,13 +33,8 @@ from ptmtools.texture.options import checked_coder, kept_levels
 from ptmtools.texture.parallel import ordered
 from ptmtools.texture.profiles import Coder, Tile
 from ptmtools.texture.pyramid import build_pyramid, level_sizes, mean_below
-from ptmtools.texture.rows import ImageRows, Rows
+from ptmtools.texture.rows import ImageRows, Rows, Samples
 from ptmtools.texture.tiling import Box, tile_box, tile_counts
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Samples = NDArray[Any]
 
 #: A tile below others is coded without error, though one is allowed, if that takes at most so many
 #: times the bytes: it lets those above it be exact, which takes fewer where an image is flat.
@@ -173,8 +170,6 @@ class _Coding:
     ) -> tuple[tuple[int, int], Samples]:
         """Writes index and tiles of a level of several. Length of the group, CRC-32 of the index;
         and the texels as a decoder has them, none of the finest level."""
-        import numpy as np
-
         side = self.options.tile
         height, width = level.shape[:2]
         across, down = tile_counts(width, height, side)
@@ -220,8 +215,6 @@ class _Coding:
     ) -> Tile:
         """One tile; with an allowed error, exactly if that takes at most ``factor`` times the
         bytes."""
-        import numpy as np
-
         encode_tile, max_error = self.coder.encode_tile, self.options.max_error
         threads = threads or self.threads
         if not max_error:

@@ -10,7 +10,10 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, LimitError, naming
 from ptmtools.texture.coders.damage import damaged
@@ -29,12 +32,7 @@ from ptmtools.texture.profiles import PROFILES, Tile
 from ptmtools.texture.sources import Ranges, Source, ranges_of
 from ptmtools.texture.tiling import Box, covering, tiles_under
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Samples = NDArray[Any]
-
+Samples = NDArray[Any]
 _LIMITS = Limits()
 #: Bytes that decoding a tile takes for each of its samples, besides the level: at most, where
 #: samples are of 8 bits without an error, and otherwise (numbers of 32 and 64 bits).
@@ -97,8 +95,6 @@ class PtmReader:
     @property
     def dtype(self) -> np.dtype[Any]:
         """Of the samples."""
-        import numpy as np
-
         return np.dtype(self.header.kind)
 
     @property
@@ -256,8 +252,6 @@ class PtmReader:
 
     def _step(self, number: int, box: Box, below: _State | None) -> _State:
         """The texels of a level within ``box``, given at least what lies under its tiles."""
-        import numpy as np
-
         header, level = self.header, self.header.levels[number]
         shape = (level.height, level.width, header.components)
         place = f"level {number}"
@@ -314,8 +308,6 @@ class PtmReader:
 
     def _index(self, level: Level, place: str) -> _Index:
         """Offset, length and CRC-32 of every tile of a level."""
-        import numpy as np
-
         size = level.tiles[0] * level.tiles[1] * TILE_ENTRY.size
         if size <= level.length:
             data = self._checked(level.offset, size, level.crc32, place)

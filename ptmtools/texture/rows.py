@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, LimitError
 from ptmtools.texture.model import MAX_COMPONENTS, MAX_SIDE
 from ptmtools.texture.samples import KINDS
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Samples = NDArray[Any]
+Samples = NDArray[Any]
 
 
 class Rows(Protocol):
@@ -34,8 +33,6 @@ class ImageRows:
     """The image as (h, w, c) rows of a native dtype. Raises InputError PTM-I110."""
 
     def __init__(self, image: Rows) -> None:
-        import numpy as np
-
         if not (hasattr(image, "shape") and hasattr(image, "dtype")):
             raise InputError(
                 "PTM-I110",
@@ -64,8 +61,6 @@ class ImageRows:
         self.shape = (self.height, self.width, self.components)
 
     def __getitem__(self, rows: slice) -> Samples:
-        import numpy as np
-
         part = np.asarray(self._rows[rows])
         # The kernels are compiled for writable, contiguous arrays only.
         return np.require(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import struct
-import tracemalloc
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -17,6 +16,7 @@ from hypothesis.extra import numpy as npst
 
 from ptmtools.errors import DatabaseError
 from ptmtools.store.archive import pack_arrays, unpack_arrays
+from tests.memory import little_memory
 
 DTYPES = st.sampled_from(["<f8", "<i4", "<i8", "|u1", "|b1"])
 ARRAYS = st.dictionaries(
@@ -209,14 +209,9 @@ ATTACKS: dict[str, bytes] = {
 @pytest.mark.parametrize("what", ATTACKS)
 def test_attacks(what: str) -> None:
     data = ATTACKS[what]
-    tracemalloc.start()
-    try:
-        with pytest.raises(DatabaseError, match="PTM-D006"):
-            unpack_arrays(data, file="x.npz")
-        _, most = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    assert most < 8 * len(data) + (1 << 20)
+    most = 8 * len(data) + (1 << 20)
+    with little_memory(most), pytest.raises(DatabaseError, match="PTM-D006"):
+        unpack_arrays(data, file="x.npz")
 
 
 def test_the_attacks_fail_for_what_is_wrong_with_them() -> None:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import io
-import struct
 import sys
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -28,7 +26,8 @@ from ptmtools.texture import (
 from ptmtools.texture.images.picture import oriented
 from ptmtools.texture.images.png import png_bytes
 from ptmtools.texture.images.radiance import floats, save_radiance
-from tests.texture.test_images import png, saved
+from tests.texture.coding import same
+from tests.texture.files import chunk, png, saved
 
 RNG = np.random.default_rng(5)
 COUNTS = (1, 2, 3, 4)
@@ -43,12 +42,6 @@ def random(kind: str, components: int, shape: tuple[int, int] = (9, 7)) -> NDArr
     )
 
 
-def same(found: Any, wanted: NDArray[Any]) -> None:
-    """The same type, shape and bits."""
-    assert (found.dtype, found.shape) == (wanted.dtype, wanted.shape)
-    assert found.tobytes() == wanted.tobytes()
-
-
 @pytest.mark.parametrize("components", COUNTS)
 @pytest.mark.parametrize("smooth", [False, True])
 def test_16_bit_png(components: int, smooth: bool) -> None:
@@ -60,7 +53,7 @@ def test_16_bit_png(components: int, smooth: bool) -> None:
     same(load_image(data).array(), texels)
     colour = {1: 0, 2: 4, 3: 2, 4: 6}[components]
     same(
-        load_image(png(16, colour, [r.astype(">u2").tobytes() for r in texels], 33)).array(), texels
+        load_image(png(33, [r.astype(">u2").tobytes() for r in texels], 16, colour)).array(), texels
     )
     same(load_image(data).texels[11:30], texels[11:30])
     assert len(data) < texels.nbytes or not smooth
@@ -80,14 +73,12 @@ def test_interlaced_16_bit_png(colour: int, components: int) -> None:
     texels = random("u2", components, (13, 11))
     passes = [(0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4)]
     passes += [(0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2)]
-    body = b""
-    for x, y, across, down in passes:
-        for row in texels[y::down, x::across]:
-            body += b"\0" + row.astype(">u2").tobytes()
-    head = struct.pack(">IIBBBBB", 11, 13, 16, colour, 0, 0, 1)
-    data = b"\x89PNG\r\n\x1a\n"
-    for chunk in (b"IHDR" + head, b"IDAT" + zlib.compress(body), b"IEND"):
-        data += struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
+    rows = [
+        row.astype(">u2").tobytes()
+        for x, y, across, down in passes
+        for row in texels[y::down, x::across]
+    ]
+    data = png(11, rows, 16, colour, height=13, interlaced=1)
     same(load_image(data).array(), texels)
 
 
@@ -97,7 +88,7 @@ def test_colour_key_of_16_bits() -> None:
     near = texels.copy()
     near[0, 0] = key ^ 1  # differs in low bytes only
     rows = [r.astype(">u2").tobytes() for r in near]
-    found = load_image(png(16, 2, rows, 7, b"tRNS" + key.astype(">u2").tobytes())).array()
+    found = load_image(png(7, rows, 16, 2, chunk(b"tRNS", key.astype(">u2").tobytes()))).array()
     np.testing.assert_array_equal(found[:, :, :3], near)
     assert np.argwhere(found[:, :, 3] == 0).tolist() == [[2, 3]]
     assert found[0, 0, 3] == 0xFFFF
@@ -191,6 +182,9 @@ def npy(texels: object) -> bytes:
     return buffer.getvalue()
 
 
+#: Of no image, and what is said of them.
+SHAPES = ((), (9,), (9, 7, 0), (9, 7, 5), (4, 4, 5), (1, 9, 7, 3))
+NO_IMAGE = r"\(height, width, 1 to 4 components\).*PTM-I126"
 WHOLE = npy(np.zeros((9, 7, 3), np.uint16))
 VAST = npy(np.zeros((3, 4, 4), np.float32)).replace(
     b"(3, 4, 4), }" + 8 * b" ", b"(60000, 60000, 4), }"
@@ -202,8 +196,7 @@ VAST = npy(np.zeros((3, 4, 4), np.float32)).replace(
     [
         (npy(np.array([{}], object)), "PTM-I12[56]"),
         (npy(np.zeros((4, 4))), "PTM-I126"),
-        (npy(np.zeros((4, 4, 5), np.uint8)), "PTM-I126"),
-        (npy(np.zeros((2, 2, 2, 2), np.uint8)), "PTM-I126"),
+        *((npy(np.zeros(shape, np.uint8)), NO_IMAGE) for shape in SHAPES),
         (npy(np.zeros((4, 4), np.int16)), "PTM-I126"),
         (npy(np.zeros((0, 4), np.uint8)), "PTM-I125"),
         (npy(np.zeros((1, 65537), np.uint8)), "PTM-L104"),
@@ -229,12 +222,6 @@ def test_npy_that_is_too_large(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     (tmp_path / "a.npy").write_bytes(VAST)
     with pytest.raises(InputError, match="PTM-I125"):  # what is mapped takes none
         load_image(tmp_path / "a.npy")
-
-
-@pytest.mark.parametrize("shape", [(), (9,), (9, 7, 0), (9, 7, 5), (1, 9, 7, 3)])
-def test_npy_of_another_shape(shape: tuple[int, ...]) -> None:
-    with pytest.raises(InputError, match=r"\(height, width, 1 to 4 components\).*PTM-I126"):
-        load_image(npy(np.zeros(shape, np.uint8)))
 
 
 def hdr(body: bytes, size: str = "-Y 2 +X 9", kind: str = "32-bit_rle_rgbe") -> bytes:

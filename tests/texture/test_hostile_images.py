@@ -6,7 +6,6 @@ declares and whose memory is measured.
 
 from __future__ import annotations
 
-import io
 import json
 import struct
 import subprocess
@@ -18,9 +17,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ptmtools.errors import InputError, LimitError, PtmError
+from ptmtools.errors import LimitError, PtmError
 from ptmtools.texture import Limits
 from ptmtools.texture.images import declared, load_image
+from tests.texture import files
+from tests.texture.files import chunk
 
 SIDE = 40_000
 #: Loads the files that are named and tells of each its error and by how much the process grew.
@@ -53,20 +54,12 @@ print(json.dumps(outcomes))
 
 
 def saved(kind: str, mode: str = "RGB", side: int = 16, **settings: object) -> bytes:
-    stream = io.BytesIO()
     noise = np.random.default_rng(1).integers(0, 255, (side, side, 4), np.uint8)
-    Image.fromarray(noise).convert(mode).save(stream, kind, **settings)
-    return stream.getvalue()
-
-
-def chunk(kind: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    return files.saved(Image.fromarray(noise).convert(mode), kind, **settings)
 
 
 def png(width: int, height: int, depth: int = 8, colour: int = 2, *more: bytes) -> bytes:
-    head = struct.pack(">IIBBBBB", width, height, depth, colour, 0, 0, 0)
-    data = chunk(b"IDAT", zlib.compress(bytes(64)))
-    return b"\x89PNG\r\n\x1a\n" + b"".join([chunk(b"IHDR", head), *more, data, chunk(b"IEND", b"")])
+    return files.png(width, [bytes(63)], depth, colour, *more, height=height)
 
 
 def patched(data: bytes, at: int, packed: bytes) -> bytes:
@@ -270,16 +263,6 @@ def test_scans_of_a_jpeg_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     data = saved("JPEG")
     segment = b"\xff\xe5" + struct.pack(">H", 60_002) + b"\xff\xda" * 30_000
     assert load_image(data[:2] + segment + data[2:]).texels.shape == (16, 16, 3)
-
-
-def test_an_array_maps_what_is_there(tmp_path: Path) -> None:
-    """The limit is for memory, which a file that is mapped does not take; its size is checked."""
-    path = tmp_path / "a.npy"
-    path.write_bytes(npy(shape("(40000, 40000, 3)")))
-    with pytest.raises(InputError, match="PTM-I125"):
-        load_image(path)
-    with pytest.raises(LimitError, match="PTM-L104"):
-        load_image(path.read_bytes())
 
 
 @pytest.mark.parametrize("what", TOO_LARGE | DAMAGED)

@@ -7,7 +7,8 @@ from ptmtools.errors import InputError
 from ptmtools.texture.coders.mixing.coder import _split, decode_mixing, encode_mixing
 from ptmtools.texture.coders.mixing.reference import ReferenceState, decode_reference
 from ptmtools.texture.profiles import small
-from ptmtools.texture.pyramid import build_pyramid
+from ptmtools.texture.pyramid import build_pyramid, mean_below
+from tests.texture.coding import coded_groups
 
 
 def _image(height, width, components, seed=1):
@@ -18,21 +19,9 @@ def _image(height, width, components, seed=1):
     return (shade + 40 * (x + y > 25)[..., None] + noise).clip(0, 255).astype(np.uint8)
 
 
-def _pyramid_sizes(image, max_error=0, threads=1):
+def _pyramid_sizes(image, max_error=0):
     """Encodes and decodes all levels; the sizes of the groups."""
-    levels = build_pyramid(image)
-    base = small.encode_base(levels[0])
-    seen = read = small.decode_base(base, levels[0].shape, image.dtype)
-    learned = known = None
-    sizes = [len(base)]
-    for level in levels[1:]:
-        tile = small.encode_tile(level, seen, max_error, learned, threads)
-        back = small.decode_tile(tile.data, read, level.shape, max_error, known, threads)
-        assert np.array_equal(tile.texels, back.texels)
-        assert np.abs(back.texels.astype(int) - level).max() <= max_error
-        seen, read, learned, known = tile.texels, back.texels, tile.memory, back.memory
-        sizes.append(len(tile.data))
-    return sizes
+    return [len(data) for data, _ in coded_groups(small, image, max_error)]
 
 
 @pytest.mark.parametrize("components", [1, 2, 3, 4])
@@ -45,11 +34,7 @@ def test_every_small_size_comes_back():
     for height in range(1, 18):
         for width in range(1, 18):
             level = _image(height, width, 1 + (height + width) % 4, height)
-            below = np.full((height >> 1, width >> 1, level.shape[2]), 128, np.uint8)
-            if below.size:
-                below = level[: height & ~1, : width & ~1].astype(int)
-                below = below[::2, ::2] + below[1::2, ::2] + below[::2, 1::2] + below[1::2, 1::2]
-                below = (below >> 2).astype(np.uint8)
+            below = mean_below(level)
             data, _, _ = encode_mixing(level, below)
             assert np.array_equal(decode_mixing(data, below, level.shape)[0], level)
 
@@ -67,7 +52,7 @@ def test_an_allowed_error_is_kept_and_saves_bytes(max_error, components):
 def test_threads_change_no_byte(components, size, max_error):
     """Odd heights too, whose last blocks look at the odd row of the plane before."""
     level = _image(*size, components)
-    below = build_pyramid(level)[-2]
+    below = mean_below(level)
     data, texels, memory = encode_mixing(level, below, max_error)
     for threads in (2, 4):
         again, _, same = encode_mixing(level, below, max_error, threads=threads)
@@ -83,7 +68,7 @@ def test_threads_change_no_byte(components, size, max_error):
 
 def test_memory_is_not_changed_and_makes_a_difference():
     level = _image(48, 48, 3)
-    below = build_pyramid(level)[-2]
+    below = mean_below(level)
     fresh, _, memory = encode_mixing(level, below)
     first = encode_mixing(level, below, memory=memory)[0]
     assert encode_mixing(level, below, memory=memory)[0] == first
@@ -114,7 +99,7 @@ def test_noise_costs_one_percent():
 @pytest.mark.parametrize("width", [40, 140])
 def test_damage_is_an_error_or_an_image(width):
     level = _image(30, width, 3)
-    below = build_pyramid(level)[-2]
+    below = mean_below(level)
     data, _, _ = encode_mixing(level, below)
     rng = np.random.default_rng(5)
     wrong = 0

@@ -6,13 +6,12 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.texture.profiles import paper, raw
-from ptmtools.texture.pyramid import build_pyramid, mean_below
+from ptmtools.texture.pyramid import mean_below
+from tests.texture.coding import coded_groups
 
 
 @pytest.fixture(autouse=True)
@@ -33,17 +32,9 @@ def image(height: int, width: int, components: int, dtype: str) -> NDArray:
 def test_every_level_is_exact(dtype: str, components: int, shape: tuple[int, int]) -> None:
     rng = np.random.default_rng(2)
     noise = rng.integers(0, np.iinfo(dtype).max + 1, (*shape, components)).astype(dtype)
-    for level in (image(*shape, components, dtype), noise):
-        coarsest, *levels = build_pyramid(level)
-        base = paper.encode_base(coarsest)
-        below = paper.decode_base(base, coarsest.shape, coarsest.dtype)
-        np.testing.assert_array_equal(below, coarsest)
-        for one in levels:
-            data = paper.encode_tile(one, below).data
-            found = paper.decode_tile(data, below, one.shape).texels
-            np.testing.assert_array_equal(found, one)
-            assert len(data) <= 1 + len(raw.encode_tile(one, below).data)
-            below = found
+    for finest in (image(*shape, components, dtype), noise):
+        for data, level in coded_groups(paper, finest)[1:]:
+            assert len(data) <= 1 + len(raw.encode_tile(level, mean_below(level)).data)
 
 
 @pytest.mark.parametrize("dtype", ["uint8", "uint16"])
@@ -74,26 +65,6 @@ def test_without_imagecodecs_it_says_what_to_install(monkeypatch: pytest.MonkeyP
 
 LEVEL = image(35, 38, 3, "uint8")
 BELOW = mean_below(LEVEL)
-
-
-@settings(deadline=None, max_examples=300)
-@given(
-    changes=st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), max_size=3),
-    cut=st.floats(0, 1) | st.just(1.0),
-)
-def test_a_damaged_group_is_an_error_or_an_image(
-    changes: list[tuple[float, int]], cut: float
-) -> None:
-    group = bytearray(paper.encode_tile(LEVEL, BELOW).data)
-    for position, value in changes:
-        group[int(position * len(group))] = value
-    del group[int(cut * len(group)) :]
-    codes, found = [], None
-    try:
-        found = paper.decode_tile(bytes(group), BELOW, LEVEL.shape).texels
-    except InputError as error:
-        codes.append(error.code)
-    assert codes == ["PTM-I112"] or (found is not None and found.shape == LEVEL.shape)
 
 
 def test_another_size_is_refused_before_it_is_decoded(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -30,6 +30,8 @@ RNG = np.random.default_rng(3)
 RGB = RNG.integers(0, 256, (45, 70, 3), dtype=np.uint8)
 RAW = EncodeOptions("raw")
 LEVELS = build_pyramid(RGB)
+DATA = encode(RGB, RAW)
+HEADER = read_header(DATA)
 SIZES = [(level.shape[1], level.shape[0]) for level in LEVELS]
 
 
@@ -110,7 +112,7 @@ def test_opening_reads_the_head_and_a_draft_no_finer_groups() -> None:
     ("asked", "number"), [((70, 45), 5), ((36, 1), 5), ((35, 22), 4), ((1, 1), 0), ((17, 12), 4)]
 )
 def test_draft_is_not_smaller_than_asked(asked: tuple[int, int], number: int) -> None:
-    image = opened(encode(RGB, RAW))
+    image = opened(DATA)
     assert image.levels == SIZES
     assert image.draft("L", asked) is not None
     assert (image.level, image.size, image.mode) == (number, SIZES[number], "RGB")
@@ -119,28 +121,28 @@ def test_draft_is_not_smaller_than_asked(asked: tuple[int, int], number: int) ->
 
 
 def test_nothing_is_large_enough() -> None:
-    image = opened(encode(RGB, RAW))
+    image = opened(DATA)
     assert image.draft(None, (71, 1)) is None
     assert image.size == (70, 45)
 
 
 def test_reduce_and_level() -> None:
-    image = opened(encode(RGB, RAW))
+    image = opened(DATA)
     assert callable(image.reduce)
     image.reduce = 2
     assert image.size == SIZES[-3]
     np.testing.assert_array_equal(np.asarray(image), LEVELS[-3])
     assert image.reduce(2).size == (9, 6)  # Pillow's, rounding up
-    image = opened(encode(RGB, RAW))
+    image = opened(DATA)
     image.reduce = 2
     assert image.reduce == 2
     assert image.reduce(2).size == (9, 6)
-    image = opened(encode(RGB, RAW))
+    image = opened(DATA)
     image.reduce = 2
     assert image.resize((5, 5), reducing_gap=1.0).size == (5, 5)
     with pytest.raises(ValueError, match="is loaded"):
         image.level = 0
-    image = opened(encode(RGB, RAW))
+    image = opened(DATA)
     with pytest.raises(ValueError, match="levels 0 to 5"):
         image.level = 6
     image.level = 0
@@ -254,30 +256,28 @@ def test_what_pillow_has_no_mode_for() -> None:
 @pytest.mark.parametrize("truncated", [False, True])
 def test_a_file_cut_short(truncated: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ImageFile, "LOAD_TRUNCATED_IMAGES", truncated)
-    data = encode(RGB, RAW)
-    header = read_header(data)
-    image = opened(data[: header.levels[-1].end - 1])
+    data = DATA[: HEADER.levels[-1].end - 1]
+    image = opened(data)
     assert image.size == (70, 45)
     if truncated:
-        coarse = LEVELS[-2]
         found = np.asarray(image)
         assert found.shape == (45, 70, 3)
-        np.testing.assert_array_equal(found[:44, :70][::2, ::2], coarse)
+        np.testing.assert_array_equal(found[:44, :70][::2, ::2], LEVELS[-2])
         np.testing.assert_array_equal(found[44], found[43])
     else:
         with pytest.raises(OSError, match="PTM-I107"):
             image.load()
-    image = opened(data[: header.levels[-1].end - 1])
+    image = opened(data)
     image.reduce = 1
     np.testing.assert_array_equal(np.asarray(image), LEVELS[-2])
     with pytest.raises(OSError, match="PTM-I103"):
         Image.open(io.BytesIO(data[:60]))
     with pytest.raises(OSError, match="PTM-I107"):
-        opened(data[: header.levels[0].offset]).load()
+        opened(DATA[: HEADER.levels[0].offset]).load()
 
 
 def test_damage_is_told() -> None:
-    data = bytearray(encode(RGB, RAW))
+    data = bytearray(DATA)
     data[-9] ^= 1
     with pytest.raises(OSError, match="PTM-I108"):
         opened(bytes(data)).load()
@@ -295,7 +295,7 @@ def test_other_files_of_that_suffix(tmp_path: Path) -> None:
 def test_pillows_limit_holds(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 1000)
     with pytest.raises(Image.DecompressionBombError):
-        Image.open(io.BytesIO(encode(RGB, RAW)))
+        Image.open(io.BytesIO(DATA))
 
 
 def test_files_are_closed(tmp_path: Path) -> None:

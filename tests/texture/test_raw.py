@@ -8,36 +8,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
-from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
 from ptmtools.texture.profiles import raw
 from ptmtools.texture.profiles.raw import group_length
-from ptmtools.texture.pyramid import build_pyramid, mean_below
+from ptmtools.texture.pyramid import mean_below
 from ptmtools.texture.samples import KINDS
+from tests.texture.coding import coded_groups
 
 DTYPES = [np.dtype(name) for name in KINDS]
-
-
-def assert_exact(image: NDArray) -> None:
-    """Every level, bit by bit."""
-    coarsest, *levels = build_pyramid(image)
-    base = raw.decode_base(raw.encode_base(coarsest), coarsest.shape, coarsest.dtype)
-    assert base.tobytes() == np.ascontiguousarray(coarsest).tobytes()
-    below = coarsest
-    for level in levels:
-        tile = raw.encode_tile(level, below)
-        found = raw.decode_tile(tile.data, below, level.shape).texels
-        assert found.tobytes() == np.ascontiguousarray(level).tobytes()
-        below = level
-
-
-@settings(deadline=None, max_examples=120)
-@given(data=st.data(), dtype=st.sampled_from(DTYPES))
-def test_any_bit_pattern_at_every_level(data: st.DataObject, dtype: np.dtype) -> None:
-    shape = st.tuples(st.integers(1, 20), st.integers(1, 20), st.integers(1, 4))
-    assert_exact(data.draw(arrays(np.dtype(f"u{dtype.itemsize}"), shape)).view(dtype))
 
 
 @settings(deadline=None, max_examples=60)
@@ -54,7 +33,7 @@ def test_any_range_of_floats(
     values = 10.0 ** rng.uniform(min(exponents), max(exponents), (18, 21, 3))
     values *= np.where(signed & (rng.random(values.shape) < 0.5), -1, 1)
     with np.errstate(over="ignore"):
-        assert_exact(values.astype(dtype))
+        coded_groups(raw, values.astype(dtype))
 
 
 @pytest.mark.parametrize("dtype", DTYPES, ids=str)
@@ -104,14 +83,10 @@ def test_where_the_formula_is_no_number_the_texel_to_the_left_stands_in() -> Non
 def test_what_residuals_cost(name: str, share: int) -> None:
     """1/12 of an image of 8 bits (the paper's 6 % of the pyramid), 1/24 of one of 16."""
     image = np.zeros((256, 256, 3), name)
-    coarsest, *levels = build_pyramid(image)
-    total = len(raw.encode_base(coarsest))
-    below = coarsest
-    for level in levels:
-        data = raw.encode_tile(level, below).data
+    groups = coded_groups(raw, image)
+    total = sum(len(data) for data, _ in groups)
+    for data, level in groups[1:]:
         assert len(data) == group_length(level.shape, level.dtype)
-        total += len(data)
-        below = level
     assert 0 <= total - image.nbytes * (1 + 1 / share) <= 16
 
 
@@ -120,31 +95,6 @@ def test_floats_of_like_magnitude_cost_little_more_than_three_bits_a_block() -> 
     data = raw.encode_tile(level, mean_below(level)).data
     extra = 8 * (len(data) - 3 * level.nbytes / 4) / (64 * 64)
     assert 2 < extra < 3.4
-
-
-@settings(deadline=None, max_examples=200)
-@given(
-    dtype=st.sampled_from(DTYPES),
-    position=st.floats(0, 1, exclude_max=True),
-    value=st.integers(0, 255),
-    change=st.integers(-3, 3),
-)
-def test_a_damaged_group_is_an_error_or_an_image(
-    dtype: np.dtype, position: float, value: int, change: int
-) -> None:
-    level = (np.arange(11 * 10 * 2).reshape(11, 10, 2) * 37 % 101).astype(dtype)
-    below = mean_below(level)
-    data = bytearray(raw.encode_tile(level, below).data)
-    data[int(position * len(data))] = value
-    data = data[:change] if change < 0 else data + bytes(change)
-    codes, found = [], None
-    try:
-        found = raw.decode_tile(bytes(data), below, level.shape).texels
-    except InputError as error:
-        codes.append(error.code)
-    assert codes == ["PTM-I112"] or (found is not None and found.shape == level.shape)
-    if change and dtype.kind == "u":
-        assert codes
 
 
 @pytest.mark.parametrize("escapes", [b"\xff\xff\xff\xff\xff\xff\x7f", b"\x88", b"\x11\x11", b""])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import tracemalloc
 import zlib
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from ptmtools.errors import InputError, LimitError
 from ptmtools.texture import Description, EncodeOptions, Limits, build_pyramid, encode
 from ptmtools.texture.container import Head, pack_head
 from ptmtools.texture.tiling import Box, covering, tiles_under
+from tests.memory import little_memory
 
 TILED = EncodeOptions("raw", tile=16)
 
@@ -26,6 +26,12 @@ TILED = EncodeOptions("raw", tile=16)
 def picture(height: int = 75, width: int = 101) -> NDArray[np.uint8]:
     y, x = np.mgrid[:height, :width]
     return np.stack([(x * 7 + y * 5 * c) % 251 for c in range(3)], axis=2).astype(np.uint8)
+
+
+PICTURE = picture()
+LEVELS = build_pyramid(PICTURE)
+DATA = encode(PICTURE, TILED)
+HEADER = texture.read_header(DATA)
 
 
 class Recorder:
@@ -45,22 +51,21 @@ class Recorder:
 
 
 def test_every_kind_of_source(tmp_path: Path) -> None:
-    data = encode(picture(), TILED)
     path = tmp_path / "a.ptm"
-    path.write_bytes(data)
+    path.write_bytes(DATA)
     with path.open("rb") as file:
-        for source in (path, str(path), data, memoryview(data), io.BytesIO(data), file):
+        for source in (path, str(path), DATA, memoryview(DATA), io.BytesIO(DATA), file):
             with texture.open(source) as ptm:
-                np.testing.assert_array_equal(ptm.level(), picture())
+                np.testing.assert_array_equal(ptm.level(), PICTURE)
         assert not file.closed
-    with texture.open(Recorder(data)) as ptm:
+    with texture.open(Recorder(DATA)) as ptm:
         assert ptm.whole == len(ptm.header.levels)
-        np.testing.assert_array_equal(ptm.level(), picture())
+        np.testing.assert_array_equal(ptm.level(), PICTURE)
 
 
 def test_errors_name_the_file(tmp_path: Path) -> None:
     path = tmp_path / "a.ptm"
-    path.write_bytes(encode(picture())[:-1])
+    path.write_bytes(encode(PICTURE)[:-1])
     with texture.open(path) as ptm:
         assert ptm.whole == len(ptm.header.levels) - 1
         with pytest.raises(InputError, match=r"a\.ptm: level 6: is cut.*PTM-I107"):
@@ -70,11 +75,11 @@ def test_errors_name_the_file(tmp_path: Path) -> None:
 
 
 def test_a_level_costs_the_bytes_up_to_it() -> None:
-    reader = Recorder(encode(picture(), TILED))
+    reader = Recorder(DATA)
     with texture.open(reader) as ptm:
         head = reader.bytes_read
         level = ptm.header.levels[3]
-        np.testing.assert_array_equal(ptm.level(3), build_pyramid(picture())[3])
+        np.testing.assert_array_equal(ptm.level(3), LEVELS[3])
     assert max(offset + length for offset, length in reader.asked[1:]) == level.end
     assert reader.bytes_read - head == level.end - ptm.header.levels[0].offset
 
@@ -110,30 +115,30 @@ def test_any_window_of_any_level(data: st.DataObject) -> None:
 
 @pytest.mark.parametrize("window", [(-1, 0, 2, 2), (0, 0, 0, 1), (100, 0, 2, 1), (0, 70, 1, 6)])
 def test_windows_outside(window: tuple[int, int, int, int]) -> None:
-    with texture.open(encode(picture(), TILED)) as ptm, pytest.raises(InputError, match="PTM-I106"):
+    with texture.open(DATA) as ptm, pytest.raises(InputError, match="PTM-I106"):
         ptm.window(6, *window)
 
 
 @pytest.mark.parametrize("profile", ["raw", "fast"])
 def test_tiles_with_any_number_of_threads(profile: str) -> None:
     options = EncodeOptions(profile, tile=16)
-    data = encode(picture(), options)
-    assert {encode(picture(), options, threads=n) for n in (2, 5)} == {data}
+    data = encode(PICTURE, options)
+    assert {encode(PICTURE, options, threads=n) for n in (2, 5)} == {data}
     header = texture.read_header(data)
     assert header.levels[-1].tiles == (6, 4)
     for threads in (1, 2, 7):
         with texture.open(data, threads=threads) as ptm:
-            for level, expected in zip(ptm.levels(), build_pyramid(picture()), strict=True):
+            for level, expected in zip(ptm.levels(), LEVELS, strict=True):
                 np.testing.assert_array_equal(level, expected)
 
 
 def test_a_damaged_tile_spares_the_others() -> None:
-    data = bytearray(encode(picture(), TILED))
+    data = bytearray(DATA)
     header = texture.read_header(bytes(data))
     data[-1] ^= 1
     finest = len(header.levels) - 1
     with texture.open(bytes(data)) as ptm:
-        np.testing.assert_array_equal(ptm.window(finest, 0, 0, 20, 20), picture()[:20, :20])
+        np.testing.assert_array_equal(ptm.window(finest, 0, 0, 20, 20), PICTURE[:20, :20])
         with pytest.raises(InputError, match=r"level 6, tile 23: the checksum.*PTM-I108"):
             ptm.level()
     assert len(texture.check(bytes(data))) == 1
@@ -172,14 +177,12 @@ def test_what_the_tiles_under_a_window_cover(width: int, height: int, side: int,
 def test_a_million_tiles_are_not_listed_to_be_refused() -> None:
     head = Head(65536, 65536, 4, "float32", "fast", 0, 16, 0)
     data = pack_head(head, b"", [(1, zlib.crc32(b"\0"))] * 17) + bytes(17)
-    tracemalloc.start()
-    try:
-        with texture.open(data) as ptm, pytest.raises(LimitError, match="PTM-L103"):
-            ptm.level()
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    assert peak < 1 << 22
+    with (
+        little_memory(1 << 22),
+        texture.open(data) as ptm,
+        pytest.raises(LimitError, match="PTM-L103"),
+    ):
+        ptm.level()
 
 
 DESCRIBED = Description(
@@ -193,14 +196,14 @@ DESCRIBED = Description(
 
 @pytest.mark.parametrize("description", [Description(), Description(orientation=3), DESCRIBED])
 def test_a_description_comes_back(description: Description) -> None:
-    data = encode(picture(), description=description)
+    data = encode(PICTURE, description=description)
     with texture.open(data) as ptm:
         assert ptm.description() == description
-        np.testing.assert_array_equal(ptm.level(), picture())
+        np.testing.assert_array_equal(ptm.level(), PICTURE)
 
 
 def test_a_damaged_description_is_found() -> None:
-    data = bytearray(encode(picture(), description=DESCRIBED))
+    data = bytearray(encode(PICTURE, description=DESCRIBED))
     offset, length, _ = texture.read_header(bytes(data)).description
     data[offset + length - 1] ^= 1
     with texture.open(bytes(data)) as ptm, pytest.raises(InputError, match="PTM-I108"):
@@ -212,26 +215,22 @@ def test_a_damaged_description_is_found() -> None:
 
 
 def test_a_source_of_unknown_size_that_ends() -> None:
-    data = encode(picture(), TILED)
-    header = texture.read_header(data)
-    pyramid = build_pyramid(picture())
-    for cut, whole in ((header.levels[3].end, 4), (header.levels[5].end + 70, 6)):
-        with texture.open(Recorder(data[:cut])) as ptm:
-            np.testing.assert_array_equal(ptm.level(), pyramid[whole - 1])
+    for cut, whole in ((HEADER.levels[3].end, 4), (HEADER.levels[5].end + 70, 6)):
+        with texture.open(Recorder(DATA[:cut])) as ptm:
+            np.testing.assert_array_equal(ptm.level(), LEVELS[whole - 1])
             assert ptm.whole == whole
-        with texture.open(Recorder(data[:cut])) as ptm:
+        with texture.open(Recorder(DATA[:cut])) as ptm:
             assert len(list(ptm.levels())) == whole
         with (
-            texture.open(Recorder(data[:cut])) as ptm,
+            texture.open(Recorder(DATA[:cut])) as ptm,
             pytest.raises(InputError, match=f"level {whole}: is cut after {cut} of .*PTM-I107"),
         ):
             ptm.level(6)
 
 
 def test_a_reader_of_ranges_may_give_more_but_not_something_else() -> None:
-    data = encode(picture(), TILED)
-    with texture.open(lambda offset, length: memoryview(data)[offset : offset + length + 9]) as ptm:
-        np.testing.assert_array_equal(ptm.level(), picture())
+    with texture.open(lambda offset, length: memoryview(DATA)[offset : offset + length + 9]) as ptm:
+        np.testing.assert_array_equal(ptm.level(), PICTURE)
     with pytest.raises(InputError, match=r"NoneType.*PTM-I122"):
         texture.open(lambda offset, length: None)  # type: ignore[arg-type, return-value]
 
@@ -240,14 +239,14 @@ def test_what_is_no_source() -> None:
     for source in (5, None, io.StringIO("x")):
         with pytest.raises(TypeError, match="binary mode"):
             texture.open(source)  # type: ignore[arg-type]
-    every_other = memoryview(bytes(2 * len(encode(picture()))))[::2]
+    every_other = memoryview(bytes(2 * len(encode(PICTURE))))[::2]
     with pytest.raises(InputError, match="PTM-I101"):
         texture.open(every_other)
 
 
 def test_a_closed_reader_says_so(tmp_path: Path) -> None:
     path = tmp_path / "a.ptm"
-    path.write_bytes(encode(picture()))
+    path.write_bytes(encode(PICTURE))
     ptm = texture.open(path)
     ptm.close()
     with pytest.raises(InputError, match=r"a\.ptm.*PTM-I122"):
@@ -268,11 +267,11 @@ def test_a_closed_reader_says_so(tmp_path: Path) -> None:
 )
 def test_descriptions_that_cannot_be(changes: dict[str, Any]) -> None:
     with pytest.raises(InputError, match="PTM-I111"):
-        encode(picture(), description=Description(**changes))
+        encode(PICTURE, description=Description(**changes))
 
 
 def test_an_allowed_error_in_an_exact_profile_is_damage() -> None:
-    data = bytearray(encode(picture(), EncodeOptions("raw")))
+    data = bytearray(encode(PICTURE, EncodeOptions("raw")))
     end = texture.read_header(bytes(data)).description[0]
     data[32] = 5
     data[end - 4 : end] = zlib.crc32(data[: end - 4]).to_bytes(4, "little")

@@ -74,9 +74,17 @@ def test_all_sizes_to_67(profile: str, quarter: int) -> None:
 @pytest.mark.parametrize("profile", PROFILES)
 def test_all_small_sizes_with_any_number_of_components(profile: str, components: int) -> None:
     step = 1 if profile != "small" else 2
-    for height in range(1, 18, step):
-        for width in range(1, 18, step):
-            assert_every_level(canvas()[:height, :width, :components], profile)
+    for height in range(1, 21, step):
+        for width in range(1, 21, step):
+            image = canvas()[:height, :width, :components]
+            if width % 2:
+                image[: height // 2] = 7
+            assert_every_level(image, profile)
+
+
+#: NaNs with payloads, infinities, denormals, negative zeros, and others at the edge of something.
+SPECIAL = (0, 1, 0x7C00, 0xFC00, 0x7E01, 0xFE00, 0x8000, 0x7BFF, 0x3C00, 0x7F800000, 0xFF800000)
+SPECIAL += (0x7FC00123, 0x80000000, 0x7F7FFFFF, 0x3F800000)
 
 
 @st.composite
@@ -85,12 +93,14 @@ def images(draw: st.DrawFn, most: int = 40) -> Samples:
     kind = KINDS[draw(st.sampled_from(sorted(KINDS)))]
     shape = st.tuples(st.integers(1, most), st.integers(1, most), st.integers(1, 4))
     bits = np.dtype(f"u{kind.size}")
-    return draw(arrays(bits, shape, elements=st.integers(0, kind.top))).view(kind.name)
+    elements = st.integers(0, kind.top) | st.sampled_from([v for v in SPECIAL if v <= kind.top])
+    return draw(arrays(bits, shape, elements=elements)).view(kind.name)
 
 
+@pytest.mark.parametrize("profile", PROFILES)
 @settings(deadline=None, max_examples=120)
-@given(image=images(), profile=st.sampled_from(PROFILES))
-def test_anything(image: Samples, profile: str) -> None:
+@given(image=images())
+def test_anything(profile: str, image: Samples) -> None:
     assert_every_level(image, profile, one_by_one=True)
 
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
@@ -63,21 +62,6 @@ def assert_within(level: NDArray, below: NDArray, max_error: int) -> tuple[bytes
 def test_every_size_and_kind(dtype: np.dtype, shape: tuple[int, int]) -> None:
     for components in range(1, 5):
         assert_exact(smooth(*shape, components, dtype))
-
-
-@settings(deadline=None, max_examples=60)
-@given(data=st.data(), dtype=st.sampled_from(WIDE))
-def test_any_bit_pattern(data: st.DataObject, dtype: np.dtype) -> None:
-    """NaNs with payloads, infinities, denormals and negative zeros among them."""
-    unsigned = np.dtype(f"u{dtype.itemsize}")
-    special = [0, 1, 0x7C00, 0xFC00, 0x7E01, 0xFE00, 0x8000, 0x7BFF, 0x3C00]
-    if dtype.itemsize == 4:
-        special = [0, 1, 0x7F800000, 0xFF800000, 0x7FC00123, 0x80000000, 0x7F7FFFFF, 0x3F800000]
-    elements = st.integers(0, np.iinfo(unsigned).max) | st.sampled_from(special)
-    shape = st.tuples(st.integers(2, 12), st.integers(2, 12), st.integers(1, 3))
-    level = data.draw(arrays(unsigned, shape, elements=elements)).view(dtype)
-    for one in build_pyramid(level):
-        assert_exact(one)
 
 
 @settings(deadline=None, max_examples=60)
@@ -237,43 +221,6 @@ def test_a_level_below_that_is_no_mean_costs_more_and_nothing_else() -> None:
     assert data[0] in (coder.RAW, coder.PLAIN)
     if data[0] == coder.PLAIN:
         assert bits(coder.decode(data, below, level.shape, level.dtype)) == bits(level)
-
-
-CASES = EXACT + [(dtype, 3) for dtype in INTEGERS]
-
-
-@settings(deadline=None, max_examples=300)
-@given(
-    case=st.sampled_from(CASES),
-    changes=st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), max_size=3),
-    cut=st.floats(0, 1) | st.just(1.0),
-    form=st.none() | st.integers(0, 4),
-)
-def test_a_damaged_group_is_an_error_or_an_image(
-    case: tuple[np.dtype, int],
-    changes: list[tuple[float, int]],
-    cut: float,
-    form: int | None,
-) -> None:
-    dtype, max_error = case
-    level = smooth(33, 38, 3, dtype)
-    values = to_ordered(level)
-    values[:, :, 0] |= values.dtype.type(15)
-    values[:, :, 1] = values[:, :, 1] // 32 * 31
-    level = from_ordered(values, dtype)
-    below = mean_below(level)
-    group = bytearray(coder.encode(level, below, max_error)[0])
-    for position, value in changes:
-        group[int(position * len(group))] = value
-    if form is not None:
-        group[0] = form
-    del group[int(cut * len(group)) :]
-    codes, found = [], None
-    try:
-        found = coder.decode(bytes(group), below, level.shape, dtype, max_error)
-    except InputError as error:
-        codes.append(error.code)
-    assert codes == ["PTM-I112"] or (found is not None and found.shape == level.shape)
 
 
 @settings(deadline=None, max_examples=200)

@@ -9,13 +9,7 @@ from ptmtools.executors import Local
 from ptmtools.visibility.flow import Portals, portal_flow
 from ptmtools.visibility.pvs import leaf_matrix, portals_of
 from ptmtools.visibility.sampled import sampled_leaves
-
-ROW = (np.arange(5) * 4.0, [0.0, 3.0], [0.0, 4.0])
-ZIGZAG = {
-    (0, 0, 0, 0): [(0.0, 2.0, 0.0, 1.0)],
-    (1, 0, 0, 0): [(0.0, 2.0, 3.0, 4.0)],
-    (2, 0, 0, 0): [(0.0, 2.0, 0.0, 1.0)],
-}
+from tests.visibility.test_pvs import ROW, ZIGZAG
 
 
 @pytest.fixture(scope="module")

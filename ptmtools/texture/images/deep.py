@@ -13,7 +13,11 @@ import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from ptmtools.errors import InputError, MissingComponentError
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.errors import InputError
+from ptmtools.lazy import component
 from ptmtools.texture.images.declared import check_tile
 from ptmtools.texture.images.eight_bit import one_frame, with_key
 from ptmtools.texture.images.opening import ORIENTATION, described, load, opened
@@ -28,8 +32,6 @@ from ptmtools.texture.images.picture import (
 from ptmtools.texture.model import Description, Limits
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
     from PIL.ImageFile import ImageFile
 
 #: Pillow's unpackers that keep the upper and the lower byte of each sample, by mode.
@@ -52,8 +54,6 @@ _BLOCK, _DIGITS_MAX = 1 << 20, 10
 
 def read_png(file: BinaryIO, image: ImageFile, colour: int, limits: Limits) -> Picture:
     """A PNG of 16 bits a sample; ``colour`` is its colour type."""
-    import numpy as np
-
     components = {0: 1, 2: 3, 4: 2, 6: 4}.get(colour, 3)
     check_size(*image.size, 2 * components, limits)
     key = image.info.get("transparency")
@@ -120,8 +120,6 @@ def read_tiff(file: BinaryIO, tags: Tags, limits: Limits) -> Picture:
 
     Raises InputError PTM-I126, PTM-I127, LimitError PTM-L104, MissingComponentError PTM-M100.
     """
-    import numpy as np
-
     width, height, components = tags[_WIDTH], tags[_HEIGHT], tags.get(_SAMPLES, 1)
     bits, formats = tags.get(_BITS, (1,)), tags.get(_FORMAT, (1,))
     photometric = tags.get(_PHOTOMETRIC, 1)
@@ -145,14 +143,12 @@ def read_tiff(file: BinaryIO, tags: Tags, limits: Limits) -> Picture:
 
         shape = (image.height, image.width, 1)
         return Picture(Strips(shape, np.dtype(dtype), strip), described(image))
-    try:
-        from imagecodecs import tiff_decode
-    except ImportError:
-        raise MissingComponentError(
-            "PTM-M100",
-            "a TIFF of more than one component deeper than 8 bits needs imagecodecs",
-            remedy="pip install 'ptmtools[codecs]'",
-        ) from None
+    codecs = component(
+        "imagecodecs",
+        "PTM-M100",
+        "a TIFF of more than one component deeper than 8 bits needs imagecodecs",
+        "codecs",
+    )
     if tags[_NEXT] or tags.get(_DEPTH, 1) != 1:
         raise InputError(
             "PTM-I127",
@@ -161,7 +157,7 @@ def read_tiff(file: BinaryIO, tags: Tags, limits: Limits) -> Picture:
         )
     file.seek(0)
     try:
-        texels = tiff_decode(file.read(), index=0)
+        texels = codecs.tiff_decode(file.read(), index=0)
     except Exception as error:  # its errors have no class in common
         raise damaged_image(error) from None
     texels = texels.reshape(height, width, components).astype(dtype, copy=False)
@@ -174,8 +170,6 @@ def read_ppm(file: BinaryIO, path: str | None, limits: Limits) -> Picture | None
 
     Raises InputError PTM-I125, LimitError PTM-L104, and for what is no number ValueError.
     """
-    import numpy as np
-
     file.seek(0)
     head = _PPM.match(file.read(4096))
     if head is None or int(head[4]) != 0xFFFF:
@@ -206,8 +200,6 @@ def read_ppm(file: BinaryIO, path: str | None, limits: Limits) -> Picture | None
 
 def _plain_samples(file: BinaryIO, count: int) -> NDArray[np.uint16]:
     """So many samples (count,) from decimal numbers. Raises InputError PTM-I125, ValueError."""
-    import numpy as np
-
     # Before memory is taken: each has a digit, and all but the last something after it.
     start, end = file.tell(), file.seek(0, 2)
     if end - start < 2 * count - 1:

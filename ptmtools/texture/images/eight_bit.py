@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ptmtools.errors import InputError
 from ptmtools.texture.images.opening import described, load
 from ptmtools.texture.images.picture import Picture, Strips, check_size, unsupported
 from ptmtools.texture.model import Limits
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
     from PIL.Image import Image
     from PIL.ImageFile import ImageFile
 
@@ -34,8 +36,6 @@ def read(image: ImageFile, depth: int, lossy: str | None) -> Picture:
 
     Raises what Pillow raises.
     """
-    import numpy as np
-
     # Before loading: Pillow drops or rewrites some of it while converting.
     key = _full_scale(image.info.get("transparency"), image, depth)
     load(image)
@@ -68,16 +68,12 @@ def one_frame(image: ImageFile) -> None:
 
 def with_key(texels: NDArray[Any], key: object) -> NDArray[Any]:
     """An alpha of 0 where the texels are the key, of all bits elsewhere."""
-    import numpy as np
-
     opaque = (texels != np.array(key)).any(axis=2)
     alpha = np.where(opaque, np.iinfo(texels.dtype).max, 0).astype(texels.dtype)
     return np.concatenate([texels, alpha[:, :, None]], axis=2)
 
 
 def _texels(strip: Image, components: int) -> NDArray[Any]:
-    import numpy as np
-
     if strip.mode in ("P", "PA"):
         strip = strip.convert("RGBA" if components == 4 else "RGB")
     elif strip.mode == "1":

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import io
-from typing import IO, TYPE_CHECKING, Any, BinaryIO
+from typing import IO, Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
 from ptmtools.texture.images.picture import Picture, check_size, damaged_image, unsupported
 from ptmtools.texture.model import Description, Limits
 from ptmtools.texture.samples import KINDS
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 MAGIC = b"\x93NUMPY"
 #: Longest head that is read, bytes: numpy evaluates it, and writes 118 for an image.
@@ -24,8 +23,6 @@ def read_npy(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
 
     Raises InputError PTM-I125, PTM-I126, LimitError PTM-L104.
     """
-    import numpy as np
-
     shape, in_columns, dtype = _head(file)
     components = shape[2] if len(shape) == 3 else 1
     if len(shape) not in (2, 3) or not 1 <= components <= 4:
@@ -58,8 +55,6 @@ def read_npy(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
 
 def save_npy(file: IO[bytes], texels: NDArray[Any], description: Description) -> None:
     """(h, w, c) of any kind as an array of that shape, without the description."""
-    import numpy as np
-
     np.lib.format.write_array(file, np.ascontiguousarray(texels), allow_pickle=False)
 
 

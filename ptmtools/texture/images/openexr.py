@@ -5,9 +5,13 @@ from __future__ import annotations
 import os
 from pathlib import Path
 from tempfile import NamedTemporaryFile, TemporaryDirectory
-from typing import IO, TYPE_CHECKING, Any, BinaryIO
+from typing import IO, Any, BinaryIO
 
-from ptmtools.errors import InputError, MissingComponentError
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.errors import InputError
+from ptmtools.lazy import component
 from ptmtools.texture.images.declared import check_file, check_tile
 from ptmtools.texture.images.picture import (
     Picture,
@@ -17,9 +21,6 @@ from ptmtools.texture.images.picture import (
     unsupported,
 )
 from ptmtools.texture.model import Description, Limits
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 MAGIC = b"v/1\x01"
 #: Channels of the images that are read, in the order of the texel's components.
@@ -31,8 +32,6 @@ def read_exr(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
 
     Raises InputError PTM-I125 to PTM-I127, LimitError PTM-L104, MissingComponentError PTM-M101.
     """
-    import numpy as np
-
     library = _library()
     if path is None:
         return _from_memory(file, limits)
@@ -77,8 +76,6 @@ def save_openexr(file: IO[bytes], texels: NDArray[Any], description: Description
 
     Raises MissingComponentError PTM-M101, OutputError PTM-O102.
     """
-    import numpy as np
-
     if texels.dtype.kind != "f":
         raise not_held("exr", texels, ".png, .npy or .tif")
     library = _library()
@@ -103,10 +100,4 @@ def _from_memory(file: BinaryIO, limits: Limits) -> Picture:
 
 
 def _library() -> Any:
-    try:
-        import OpenEXR
-    except ImportError:
-        raise MissingComponentError(
-            "PTM-M101", "OpenEXR files need OpenEXR", remedy="pip install 'ptmtools[exr]'"
-        ) from None
-    return OpenEXR
+    return component("OpenEXR", "PTM-M101", "OpenEXR files need OpenEXR", "exr")

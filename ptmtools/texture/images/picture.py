@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from ptmtools.errors import InputError, LimitError, OutputError
 from ptmtools.texture.model import MAX_SIDE, Description, Limits
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from ptmtools.texture.rows import Rows
-
-    Samples = NDArray[Any]
+from ptmtools.texture.rows import Rows, Samples
 
 #: About so many texels are taken from an image at a time.
 _STRIP_TEXELS = 1 << 18
@@ -82,8 +77,6 @@ class Strips:
         self._make = make
 
     def __getitem__(self, rows: slice) -> Samples:
-        import numpy as np
-
         height, width, components = self.shape
         start, stop, _ = rows.indices(height)
         found = np.empty((max(0, stop - start), width, components), self.dtype)

@@ -11,15 +11,14 @@ import io
 import struct
 import zlib
 from collections.abc import Iterator
-from typing import IO, TYPE_CHECKING, Any, BinaryIO
+from typing import IO, Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.texture.images.opening import ORIENTATION
 from ptmtools.texture.images.picture import damaged_image, not_held
 from ptmtools.texture.model import Description
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 _MAGIC = b"\x89PNG\r\n\x1a\n"
 #: Colour type by number of components.
@@ -107,8 +106,6 @@ def check_chunks(file: BinaryIO) -> None:
 
 def _filtered(image: NDArray[np.uint16]) -> Iterator[bytes]:
     """Rows as PNG has them before deflating: number of the filter, filtered bytes."""
-    import numpy as np
-
     height, width, components = image.shape
     texel = 2 * components
     step = max(1, _STRIP_BYTES // (width * texel))
@@ -137,8 +134,6 @@ def _paeth(
     left: NDArray[np.uint8], above: NDArray[np.uint8], corner: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
     """Whichever of the three is nearest to left + above - corner."""
-    import numpy as np
-
     a, b, c = (part.astype(np.int16) for part in (left, above, corner))
     to_left, to_above, to_corner = abs(b - c), abs(a - c), abs(a + b - 2 * c)
     return np.where(

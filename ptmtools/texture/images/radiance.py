@@ -11,16 +11,15 @@ not applied.
 from __future__ import annotations
 
 import re
-from typing import IO, TYPE_CHECKING, Any, BinaryIO
+from typing import IO, Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.errors import OutputError
 from ptmtools.texture.images.declared import check_file
 from ptmtools.texture.images.picture import Picture, check_size, damaged_image, unsupported
 from ptmtools.texture.model import Description, Limits
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 MAGIC = (b"#?RADIANCE", b"#?RGBE")
 _HEAD_MAX = 1 << 16
@@ -36,8 +35,6 @@ def read_hdr(file: BinaryIO, limits: Limits) -> Picture:
 
     Raises InputError PTM-I125, PTM-I126, LimitError PTM-L104.
     """
-    import numpy as np
-
     check_file(file, limits)
     file.seek(0)
     data = file.read()
@@ -72,8 +69,6 @@ def read_hdr(file: BinaryIO, limits: Limits) -> Picture:
 
 def floats(texels: NDArray[np.uint8]) -> NDArray[np.float32]:
     """Mantissas and exponents (h, w, 4) as numbers (h, w, 3). An exponent of 0 is black."""
-    import numpy as np
-
     exponent = texels[:, :, 3:].astype(np.int16)
     scale = np.where(exponent > 0, np.ldexp(1.0, exponent - _BIAS), 0)
     return (texels[:, :, :3] * scale).astype(np.float32)
@@ -84,8 +79,6 @@ def save_radiance(file: IO[bytes], texels: NDArray[Any], description: Descriptio
 
     Raises OutputError PTM-O102 unless it holds every one of them exactly.
     """
-    import numpy as np
-
     height, width, components = texels.shape
     mantissas = np.zeros((height, width, 4), np.uint8)
     if components == 3:
@@ -109,8 +102,6 @@ def save_radiance(file: IO[bytes], texels: NDArray[Any], description: Descriptio
 
 def _coded_row(data: bytes, at: int, row: NDArray[np.uint8]) -> int:
     """One run-length coded scanline into (w, 4); where the next one begins."""
-    import numpy as np
-
     width = len(row)
     for component in range(4):
         parts = []
@@ -139,7 +130,5 @@ def _coded_row(data: bytes, at: int, row: NDArray[np.uint8]) -> int:
 
 def _old_run(row: bytes) -> bool:
     """Whether a plain scanline has a run of the kind that was used before 1991."""
-    import numpy as np
-
     texels = np.frombuffer(row, np.uint8).reshape(-1, 4)
     return bool((texels[:, :3] == 1).all(axis=1).any())

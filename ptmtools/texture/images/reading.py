@@ -6,7 +6,10 @@ import io
 import os
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any, BinaryIO, cast
+from typing import Any, BinaryIO, cast
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, naming
 from ptmtools.texture.container import HEAD_MAX, MAGIC, read_header
@@ -17,10 +20,6 @@ from ptmtools.texture.images.picture import Picture, unsupported
 from ptmtools.texture.images.png import check_chunks
 from ptmtools.texture.model import Limits
 from ptmtools.texture.sources import open_file
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 #: Of the files that are taken for images where a folder is named.
 SUFFIXES = (

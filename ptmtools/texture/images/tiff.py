@@ -6,13 +6,13 @@ from __future__ import annotations
 
 import struct
 import zlib
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.errors import OutputError
 from ptmtools.texture.model import Description
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _STRIP_BYTES = 1 << 20
 #: Magic, and where the directory is.
@@ -28,8 +28,6 @@ def save_tiff(file: IO[bytes], texels: NDArray[Any], description: Description) -
 
     Raises OutputError PTM-O102 for what does not fit into 4 GiB.
     """
-    import numpy as np
-
     height, width, components = texels.shape
     row = texels[:1].nbytes
     per_strip = max(1, _STRIP_BYTES // row)

@@ -6,16 +6,14 @@ import os
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import PurePath
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
+
+from numpy.typing import NDArray
 
 from ptmtools.errors import OutputError, naming
 from ptmtools.texture.model import Description
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Samples = NDArray[Any]
-
+Samples = NDArray[Any]
 _PLAIN = Description()
 #: Suffixes of formats that would change texels, or might.
 LOSSY = (".jpg", ".jpeg", ".jxl", ".webp", ".avif", ".heic", ".gif")

@@ -12,12 +12,12 @@ installed, and InputError (PTM-I111) for floats.
 
 from __future__ import annotations
 
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptmtools.errors import InputError, MissingComponentError
+from ptmtools.errors import InputError
+from ptmtools.lazy import component
 from ptmtools.texture.coders.damage import damaged
 from ptmtools.texture.profiles import Tile, raw
 from ptmtools.texture.profiles.raw import (
@@ -115,7 +115,7 @@ def decode_tile(
     return Tile(b"", level)
 
 
-def _codecs(dtype: np.dtype[Any]) -> ModuleType:
+def _codecs(dtype: np.dtype[Any]) -> Any:
     """imagecodecs, for samples that lossless JPEG has."""
     if dtype.kind != "u":
         raise InputError(
@@ -123,16 +123,7 @@ def _codecs(dtype: np.dtype[Any]) -> ModuleType:
             f"profile paper has no samples of type {dtype.name}",
             remedy="use another profile; this one is for integers of 8 and 16 bits",
         )
-    try:
-        import imagecodecs
-    except ImportError:
-        raise MissingComponentError(
-            "PTM-M102",
-            "profile paper needs imagecodecs",
-            remedy="pip install 'ptmtools[codecs]'",
-        ) from None
-    module: ModuleType = imagecodecs
-    return module
+    return component("imagecodecs", "PTM-M102", "profile paper needs imagecodecs", "codecs")
 
 
 def _edges(level: Samples) -> tuple[Samples, Samples]:
@@ -147,7 +138,7 @@ def _plain(texels: Samples) -> Samples:
     return copy[:, :, 0] if copy.shape[2] == 1 else copy
 
 
-def _decoded(codecs: ModuleType, jpeg: bytes, like: Samples) -> Samples:
+def _decoded(codecs: Any, jpeg: bytes, like: Samples) -> Samples:
     """The image in a JPEG, which has to have this size and type. Raises InputError PTM-I112."""
     _check_frame(jpeg, like)
     try:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from functools import cache
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from ptmtools.texture.coders.damage import damaged
 from ptmtools.texture.coders.mixing.memory import Memory, fresh_memory, level_tables
+from ptmtools.texture.coders.varints import pack_varints, read_varints
 
 if TYPE_CHECKING:
     from ptmtools.texture.coders.mixing.kernels import Canvas, Place
@@ -57,9 +59,8 @@ def decode_mixing(
 
 def encode_even(level: Level, below: Level) -> bytes:
     """``level`` as if all blocks with the same mean were equally likely: the coder for noise."""
-    height, width, components = level.shape
     coder, buffer = _coder(None), np.zeros(2 * level.size + 64, np.uint8)
-    _even(True, level, below, (height, width, components), coder, buffer)
+    _even(level, below, level.shape, coder, buffer)
     return _closed(coder, buffer)
 
 
@@ -67,16 +68,15 @@ def decode_even(data: bytes, below: Level, shape: tuple[int, int, int]) -> Level
     """The inverse of `encode_even`. Raises InputError PTM-I112 for what no encoder writes."""
     buffer = np.frombuffer(bytearray(data), np.uint8)
     coder = _coder(buffer)
-    level = _even(False, None, below, shape, coder, buffer)
+    level = _even(None, below, shape, coder, buffer)
     _check(coder, buffer)
     return level
 
 
 def _even(
-    encoding: bool,
     level: Level | None,
     below: Level,
-    shape: tuple[int, int, int],
+    shape: tuple[int, ...],
     coder: NDArray[np.int64],
     buffer: NDArray[np.uint8],
 ) -> Level:
@@ -87,8 +87,8 @@ def _even(
     canvas, places = _canvas(level, below, height, width, order)
     for place in places:
         code_even(
-            encoding, height, width, place, canvas.cells, canvas.parents, canvas.goal, _ways(),
-            coder, buffer,
+            level is not None, height, width, place, canvas.cells, canvas.parents, canvas.goal,
+            _ways(), coder, buffer,
         )  # fmt: skip
     return _cropped(canvas, places, order, shape)
 
@@ -174,7 +174,7 @@ class _Pass:
         if any(c[3] > b.size for c, b in zip(self.coders, self.buffers, strict=True)):
             return None
         parts = [_closed(c, b) for c, b in zip(self.coders, self.buffers, strict=True)]
-        return b"".join([*(_varint(len(part)) for part in parts[:-1]), *parts])
+        return b"".join([pack_varints(*map(len, parts[:-1])), *parts])
 
     def check(self) -> None:
         for coder, buffer in zip(self.coders, self.buffers, strict=True):
@@ -185,7 +185,7 @@ class _Pass:
 
 
 def _cropped(
-    canvas: Canvas, places: list[Place], order: list[int], shape: tuple[int, int, int]
+    canvas: Canvas, places: list[Place], order: list[int], shape: tuple[int, ...]
 ) -> Level:
     height, width, components = shape
     level = np.empty(shape, np.uint8)
@@ -268,34 +268,10 @@ def _check(coder: NDArray[np.int64], buffer: NDArray[np.uint8]) -> None:
         raise damaged("its stream does not end with its last texel")
 
 
-def _varint(n: int) -> bytes:
-    out = bytearray()
-    while n > 127:
-        out.append(n & 127 | 128)
-        n >>= 7
-    out.append(n)
-    return bytes(out)
-
-
 def _split(data: bytes, streams: int) -> list[bytes]:
     """Lengths of all streams but the last, then the streams."""
-    at, lengths = 0, []
-    for _ in range(streams - 1):
-        n, shift = 0, 0
-        while True:
-            if at >= len(data) or shift > 28:
-                raise damaged("the lengths of its streams are cut short")
-            byte = data[at]
-            at += 1
-            n |= (byte & 127) << shift
-            shift += 7
-            if byte < 128:
-                break
-        lengths.append(n)
-    parts = []
-    for n in lengths:
-        if at + n > len(data):
-            raise damaged("its streams are cut short")
-        parts.append(data[at : at + n])
-        at += n
-    return [*parts, data[at:]]
+    lengths, at = read_varints(data, 0, streams - 1)
+    ends = [*accumulate(lengths, initial=at), len(data)]
+    if ends[-2] > ends[-1]:
+        raise damaged("its streams are cut short")
+    return [data[begin:end] for begin, end in pairwise(ends)]

@@ -150,15 +150,8 @@ class Tables(NamedTuple):
 @plain_kernel
 def _five(e: int) -> Any:
     """Residual to one of 9 classes: five magnitudes, two signs."""
-    if e == 0:
-        return 0
     a = abs(e)
-    s = 1 if e > 0 else 2
-    if a <= 1:
-        return s
-    if a <= 3:
-        return s + 2
-    return s + 4 if a <= 8 else s + 6
+    return 0 if a == 0 else (1 if e > 0 else 2) + 2 * ((a > 1) + (a > 3) + (a > 8))
 
 
 @plain_kernel

@@ -70,9 +70,8 @@ def _rounded(value: int, bits: int) -> int:
 @cache
 def squash() -> Table:
     """1 / (1 + e^-x) with 16 fractional bits, for x = -3072 … 3072 in units of 1/256."""
-    upper = []
-    for e in _exponentials(LOGIT_TOP + 1):
-        upper.append(_rounded((_ONE << _PRECISION) // (_ONE + e), 16))
+    tails = _exponentials(LOGIT_TOP + 1)
+    upper = [_rounded((_ONE << _PRECISION) // (_ONE + e), 16) for e in tails]
     lower = [65536 - p for p in upper[:0:-1]]
     return np.array(lower + upper, np.int32)
 
@@ -100,22 +99,17 @@ def survival() -> Table:
     half = _exponentials(2)[1]
     # e^(-1/512): the square root of e^(-1/256), by integers.
     root = isqrt(half << _PRECISION)
-    out = []
-    for e in _exponentials(LOGIT_TOP + 1):
-        middle = e * root >> _PRECISION
-        out.append(_rounded(_logarithm((middle << _PRECISION) // (_ONE - middle)), 8))
-    return np.array(out, np.int32)
+    middles = [e * root >> _PRECISION for e in _exponentials(LOGIT_TOP + 1)]
+    odds = [(middle << _PRECISION) // (_ONE - middle) for middle in middles]
+    return np.array([_rounded(_logarithm(each), 8) for each in odds], np.int32)
 
 
 @cache
 def magnitude() -> Table:
     """Level 0 … 23 of a magnitude 0 … 1023: 2.4 log2(1 + ¾ a), rounded, at most 23."""
     # 2.4 log2(y) >= L - ½ with y = (4 + 3a) / 4 is (4 + 3a)^24 >= 2^(10 L + 43).
-    levels = []
-    for a in range(MAGNITUDE_TOP + 1):
-        bits = ((4 + 3 * a) ** 24).bit_length() - 1
-        levels.append(min(MAGNITUDES - 1, (bits - 43) // 10))
-    return np.array(levels, np.int32)
+    bits = [((4 + 3 * a) ** 24).bit_length() - 1 for a in range(MAGNITUDE_TOP + 1)]
+    return np.minimum((np.array(bits, np.int32) - 43) // 10, MAGNITUDES - 1)
 
 
 def rates() -> Table:

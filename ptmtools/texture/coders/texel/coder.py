@@ -121,7 +121,7 @@ class _Group:
         means = to_ordered(below).astype(np.uint32)
         numbering = number_planes(values, kind_of(level.dtype).top, max_error)
         work = _enlarged(numbering.nearest(means), level.shape)
-        return cls(level, means, numbering, numbering.numbers(values), work, max_error)
+        return cls(level, means, numbering, numbering.nearest(values), work, max_error)
 
 
 def _codings(group: _Group) -> list[_Coded]:

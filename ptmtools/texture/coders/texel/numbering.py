@@ -9,15 +9,14 @@ came from a Radiance file, and their means) it is said of each whether they are.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.texture.coders.damage import damaged
+from ptmtools.texture.coders.varints import pack_varints, read_varints
 
 ITSELF, LATTICE, LIST, GRID = 0, 1, 2, 3
 #: A list is sent if it holds fewer than so many of a hundred points of the lattice …
@@ -63,18 +62,22 @@ class Numbering:
         itself = (self.steps == 1) & (self.tops == self.largest) & (self.grids == 0)
         return bool(itself.all())
 
-    def numbers(self, values: Numbers) -> Numbers:
-        """Numbers of values (h, w, c) that all occur."""
-        return self._map(values, lambda plane, c: np.searchsorted(self._list(c), plane), 0)
-
     def nearest(self, values: Numbers) -> Numbers:
         """Numbers of the nearest values that occur, of any values (h, w, c)."""
-
-        def from_list(plane: NDArray[Any], c: int) -> NDArray[np.intp]:
-            used = self._list(c)
-            return np.searchsorted((used[:-1] + used[1:]) >> 1, plane)
-
-        return self._map(values, from_list, 1)
+        out = values
+        for c, step in enumerate(self.steps.tolist()):
+            offset, top = int(self.offsets[c]), int(self.tops[c])
+            if step == 1 and offset == 0 and top == self.largest:
+                continue
+            if out is values:
+                out = values.copy()
+            plane = values[:, :, c].astype(np.int64)
+            if step:
+                out[:, :, c] = np.clip((plane - offset + (step >> 1)) // step, 0, top)
+            else:
+                used = self._list(c)
+                out[:, :, c] = np.searchsorted((used[:-1] + used[1:]) >> 1, plane)
+        return out
 
     def values(self, numbers: Numbers) -> Numbers:
         """Values (h, w, c) of numbers up to the top."""
@@ -95,62 +98,68 @@ class Numbering:
             top = int(self.tops[c])
             if self.grids[c]:
                 kinds |= GRID << 2 * c
-                parts += _varint(int(self.grids[c]))
+                parts += pack_varints(int(self.grids[c]))
             elif step == 0:
                 kinds |= LIST << 2 * c
                 used = self._list(c).tolist()
                 gaps = [b - a for a, b in pairwise(used)]
-                parts += _varint(top) + _varint(used[0]) + b"".join(map(_varint, gaps))
+                parts += pack_varints(top, used[0], *gaps)
             elif step > 1 or top < self.largest:
                 kinds |= LATTICE << 2 * c
-                parts += _varint(int(self.offsets[c])) + _varint(step) + _varint(top)
+                parts += pack_varints(int(self.offsets[c]), step, top)
         return bytes([kinds]) + parts
 
     def _list(self, c: int) -> NDArray[np.int64]:
         return self.lists[c, : int(self.tops[c]) + 1]
 
-    def _map(
-        self, values: Numbers, from_list: Callable[[NDArray[Any], int], NDArray[Any]], rounding: int
-    ) -> Numbers:
-        out = values
-        for c, step in enumerate(self.steps.tolist()):
-            offset, top = int(self.offsets[c]), int(self.tops[c])
-            if step == 1 and offset == 0 and top == self.largest:
-                continue
-            if out is values:
-                out = values.copy()
-            plane: NDArray[Any] = values[:, :, c].astype(np.int64)
-            if step:
-                plane = np.clip((plane - offset + rounding * (step >> 1)) // step, 0, top)
-            else:
-                plane = from_list(plane, c)
-            out[:, :, c] = plane
-        return out
-
 
 def number_planes(values: Numbers, largest: int, max_error: int = 0) -> Numbering:
     """The numbering of values (h, w, c); each its own number if an error is allowed."""
-    nc = values.shape[2]
-    steps, offsets = np.ones(nc, np.int64), np.zeros(nc, np.int64)
-    tops, grids = np.full(nc, largest, np.int64), np.zeros(nc, np.int64)
-    lists: list[NDArray[np.int64]] = [np.zeros(1, np.int64)] * nc
-    for c in range(nc if not max_error else 0):
-        plane = np.ascontiguousarray(values[:, :, c]).reshape(-1)
-        low, high = int(plane.min()), int(plane.max())
-        if low == high:
-            offsets[c], tops[c] = low, 0
-            continue
-        step = int(np.gcd.reduce(plane - np.uint32(low)))
-        if step > 1:
-            steps[c], offsets[c], tops[c] = step, low, (high - low) // step
-        used = _few_values(plane, 1 + (high - low) // step)
-        if used is not None:
-            lists[c], steps[c], offsets[c], tops[c] = used, 0, 0, len(used) - 1
-            continue
-        grid = _grid(plane, largest)
-        if grid >= step.bit_length():
-            grids[c], steps[c], offsets[c], tops[c] = grid, 1, 0, largest
-    return Numbering(steps, offsets, tops, _stacked(lists), grids, largest)
+    if max_error:
+        return _numbering([_Plane(top=largest)] * values.shape[2], largest)
+    return _numbering(
+        [_number_plane(plane, largest) for plane in np.moveaxis(values, 2, 0)], largest
+    )
+
+
+@dataclass(frozen=True)
+class _Plane:
+    """How the values of one component are numbered, as in `Numbering`."""
+
+    top: int
+    step: int = 1
+    offset: int = 0
+    grid: int = 0
+    used: NDArray[np.int64] = field(default_factory=lambda: np.zeros(1, np.int64))
+
+
+def _numbering(planes: list[_Plane], largest: int) -> Numbering:
+    longest = max(len(plane.used) for plane in planes)
+    return Numbering(
+        steps=np.array([plane.step for plane in planes], np.int64),
+        offsets=np.array([plane.offset for plane in planes], np.int64),
+        tops=np.array([plane.top for plane in planes], np.int64),
+        lists=np.stack([np.pad(p.used, (0, longest - len(p.used)), "edge") for p in planes]),
+        grids=np.array([plane.grid for plane in planes], np.int64),
+        largest=largest,
+    )
+
+
+def _number_plane(values: Numbers, largest: int) -> _Plane:
+    plane = np.ascontiguousarray(values).reshape(-1)
+    low, high = int(plane.min()), int(plane.max())
+    if low == high:
+        return _Plane(top=0, offset=low)
+    step = int(np.gcd.reduce(plane - np.uint32(low)))
+    used = _few_values(plane, 1 + (high - low) // step)
+    if used is not None:
+        return _Plane(top=len(used) - 1, step=0, used=used)
+    grid = _grid(plane, largest)
+    if grid >= step.bit_length():
+        return _Plane(top=largest, grid=grid)
+    if step > 1:
+        return _Plane(top=(high - low) // step, step=step, offset=low)
+    return _Plane(top=largest)
 
 
 def _few_values(plane: Numbers, points: int) -> NDArray[np.int64] | None:
@@ -181,64 +190,27 @@ def read_numbering(data: bytes, components: int, largest: int) -> tuple[Numberin
     """
     if not data:
         raise damaged("it is cut short")
-    kinds, at = data[0], 1
-    steps, offsets = np.ones(components, np.int64), np.zeros(components, np.int64)
-    tops, grids = np.full(components, largest, np.int64), np.zeros(components, np.int64)
-    lists: list[NDArray[np.int64]] = [np.zeros(1, np.int64)] * components
-    for c in range(4):
-        kind = kinds >> 2 * c & 3
-        if kind == LATTICE and c < components:
-            (offset, step, top), at = _read_varints(data, at, 3)
+    kinds, at, planes = data[0], 1, []
+    for c in range(components):
+        kind, plane = kinds >> 2 * c & 3, _Plane(top=largest)
+        if kind == LATTICE:
+            (offset, step, top), at = read_varints(data, at, 3)
             if step == 0 or offset + step * top > largest:
                 raise damaged("a lattice is impossible")
-            steps[c], offsets[c], tops[c] = step, offset, top
-        elif kind == LIST and c < components:
-            (top,), at = _read_varints(data, at, 1)
-            gaps, at = _read_varints(data, at, top + 1)
+            plane = _Plane(top, step, offset)
+        elif kind == LIST:
+            (top,), at = read_varints(data, at, 1)
+            gaps, at = read_varints(data, at, top + 1)
             used = np.cumsum(np.array(gaps, np.int64))
             if top == 0 or used[-1] > largest or min(gaps[1:]) == 0:
                 raise damaged("a list of values is impossible")
-            steps[c], offsets[c], tops[c], lists[c] = 0, 0, top, used
-        elif kind == GRID and c < components:
-            (grid,), at = _read_varints(data, at, 1)
+            plane = _Plane(top, step=0, used=used)
+        elif kind == GRID:
+            (grid,), at = read_varints(data, at, 1)
             if not 1 <= grid < largest.bit_length():
                 raise damaged("a grid is impossible")
-            grids[c] = grid
-        elif kind:
-            raise damaged("a numbering is unknown")
-    return Numbering(steps, offsets, tops, _stacked(lists), grids, largest), at
-
-
-def _stacked(lists: list[NDArray[np.int64]]) -> NDArray[np.int64]:
-    longest = max(map(len, lists))
-    return np.stack([np.pad(one, (0, longest - len(one)), "edge") for one in lists])
-
-
-def _varint(number: int) -> bytes:
-    """Seven bits a byte, lowest first, 128 added where more follow."""
-    out = bytearray()
-    while number > 127:
-        out.append(128 | number & 127)
-        number >>= 7
-    out.append(number)
-    return bytes(out)
-
-
-def _read_varints(data: bytes, at: int, n: int) -> tuple[list[int], int]:
-    """n numbers below 2^35."""
-    if n > len(data) - at:
-        raise damaged("it is cut short")
-    out: list[int] = []
-    for _ in range(n):
-        number = 0
-        for shift in range(0, 35, 7):
-            if at >= len(data):
-                raise damaged("it is cut short")
-            number |= (data[at] & 127) << shift
-            at += 1
-            if data[at - 1] < 128:
-                break
-        else:
-            raise damaged("a number is too long")
-        out.append(number)
-    return out, at
+            plane = _Plane(largest, grid=grid)
+        planes.append(plane)
+    if kinds >> 2 * components:
+        raise damaged("a numbering is unknown")
+    return _numbering(planes, largest), at
