@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools import schemas
-from ptmtools.accessor import COMPONENTS, ITEMS, elements
 from ptmtools.database.gltf.container import GlbError, unpack
 from ptmtools.database.gltf.material import WHITE, WRAPS
+from ptmtools.glb import COMPONENTS, ITEMS, elements
 
 _VERTICES, _INDICES, _FLOAT = 34962, 34963, 5126
 _LARGEST = float(np.finfo(np.float32).max)
