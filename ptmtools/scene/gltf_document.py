@@ -152,8 +152,7 @@ def _buffers(
     for file, length in longest.items():
         with open_regular(file) as stream:
             # Reading takes memory for all that is asked for.
-            there = os.fstat(stream.fileno()).st_size
-            read[file] = Buffer(stream.read(min(length, there)), file)
+            read[file] = Buffer(stream.read(min(length, os.fstat(stream.fileno()).st_size)), file)
     buffers = [read[entry] if isinstance(entry, Path) else entry for entry in found]
     for index, (buffer, length) in enumerate(zip(buffers, lengths, strict=True)):
         if len(buffer.data) < length:

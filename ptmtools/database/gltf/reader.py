@@ -112,8 +112,7 @@ class _Reader:
             if self._row("nodes", index)["mesh"] != index:
                 _foreign(f"nodes[{index}]", "has the mesh of another")
             for n, primitive in enumerate(self._row("meshes", index)["primitives"]):
-                place = f"meshes[{index}].primitives[{n}]"
-                primitives.append(self._primitive(primitive, place))
+                primitives.append(self._primitive(primitive, f"meshes[{index}].primitives[{n}]"))
         return ReadGlb(scene["name"], scene["extras"]["cell"], tuple(primitives))
 
     def _row(self, name: str, index: int) -> dict[str, Any]:

@@ -249,7 +249,6 @@ class _Plan:
             x, y = self._shown(middle)
             dark = self._shade is not None and self._shade.get(cell, 0.0) > _DARK
             ink, paper = (_PAPER, _INK) if dark else (_INK, _PAPER)
-            halo = [withStroke(linewidth=1.6, foreground=paper, alpha=0.6)]
             axis.text(
                 x,
                 y,
@@ -259,7 +258,7 @@ class _Plan:
                 ha="center",
                 va="center",
                 zorder=7,
-                path_effects=halo,
+                path_effects=[withStroke(linewidth=1.6, foreground=paper, alpha=0.6)],
             )
 
     def _scale_bar(self, axis: Any) -> None:

@@ -85,9 +85,8 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
 def _moved(hints: Mapping[str, Any]) -> dict[str, Any]:
     """Hints with the URLs that they have beside the GLBs."""
     cells = [cell | {"url": glb_file(i)} for i, cell in enumerate(hints["cells"])]
-    urls = ("file", "fallback")
     textures = [
-        row | {url: UP + row[url] for url in urls if row[url] is not None}
+        row | {url: UP + row[url] for url in (("file", "fallback")) if row[url] is not None}
         for row in hints["textures"]
     ]
     return {**hints, "cells": cells, "textures": textures}

@@ -76,8 +76,7 @@ class FileReader:
             reading.found.add("PTM-D651", name, "", "missing")
             return reading
         except OSError as fault:
-            message = f"cannot be read ({fault.strerror or fault})"
-            reading.found.add("PTM-D654", name, "", message)
+            reading.found.add("PTM-D654", name, "", f"cannot be read ({fault.strerror or fault})")
             return reading
         reading.size = size
         reading.intact = self._outputs.get(name) == digest
