@@ -16,7 +16,6 @@ from ptmtools.cli.common import as_json, database, forced, limited, voiced, work
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
 from ptmtools.database import PlotOptions, ValidationReport
-from ptmtools.database.names import MANIFEST
 from ptmtools.database.validation.findings import NOT_BUILT, SEEN_BY_BUILD
 from ptmtools.errors import CheckError
 from ptmtools.pipeline import Artifacts, shoot_segments
@@ -24,6 +23,7 @@ from ptmtools.pipeline import validate as check
 from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE
 from ptmtools.quantities import count, size
 from ptmtools.store.folder import DatabaseFolder
+from ptmtools.store.layout import MANIFEST
 from ptmtools.texture.model import Limits
 from ptmtools.visibility import SegmentReport
 

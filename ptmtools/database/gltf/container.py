@@ -7,22 +7,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from ptmtools import schemas
+from ptmtools.database.fault import FileError
 from ptmtools.errors import LimitError
 from ptmtools.glb import BINARY, JSON, glb, glb_chunks
 
 _LARGEST = 2**32 - 1
 #: The most bytes around JSON and buffer: headers and padding.
 _AROUND = 34
-
-
-class GlbError(Exception):
-    """The first thing in a file that is wrong: a code of `validation`, where, and what."""
-
-    def __init__(self, code: str, place: str, message: str) -> None:
-        self.code = code
-        self.place = place
-        self.message = message
-        super().__init__(f"{place}: {message}")
 
 
 def pack(document: Mapping[str, Any], binary: bytes) -> bytes:
@@ -49,7 +40,7 @@ def unpack(data: bytes) -> tuple[Any, bytes]:
 
     Raises
     ------
-    GlbError: PTM-D731 if it is not what `pack` writes.
+    FileError: PTM-D731 if it is not what `pack` writes.
     """
     try:
         chunks = [(kind, body) for kind, _, body in glb_chunks(data)]
@@ -57,6 +48,6 @@ def unpack(data: bytes) -> tuple[Any, bytes]:
             raise ValueError("not JSON and BIN alone, each of a multiple of 4 bytes", "byte 12")
         return schemas.parse(chunks[0][1]), b"".join(body for _, body in chunks[1:])
     except schemas.ShapeError as fault:
-        raise GlbError("PTM-D731", "JSON", fault.message) from None
+        raise FileError("PTM-D731", "JSON", fault.message) from None
     except ValueError as fault:
-        raise GlbError("PTM-D731", fault.args[1], fault.args[0]) from None
+        raise FileError("PTM-D731", fault.args[1], fault.args[0]) from None

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from ptmtools.database.emitters import GZIP, owner_of
-from ptmtools.database.names import SERVED
 from ptmtools.database.validation.files import check_gzip
 from ptmtools.database.validation.findings import Findings
 from ptmtools.database.validation.textures import ReadTexture, read_png, read_texture
 from ptmtools.files import open_regular
+from ptmtools.store.layout import SERVED
 from ptmtools.texture.model import Limits
 
 #: Bytes hashed at a time, of a file that is not held whole.
