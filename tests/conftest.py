@@ -44,6 +44,12 @@ def shared() -> Path:
     return SHARED
 
 
+def files_below(folder: Path) -> dict[str, bytes]:
+    """Every file below a folder with its bytes."""
+    files = (file for file in sorted(folder.rglob("*")) if file.is_file())
+    return {str(file.relative_to(folder)): file.read_bytes() for file in files}
+
+
 #: Texture coordinates of the corners of a face.
 CORNER_UV = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], dtype=np.float64)
 

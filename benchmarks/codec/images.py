@@ -17,7 +17,6 @@ OUTPUT = ROOT / "build" / "bench"
 SUFFIXES = {".png", ".jpg", ".jpeg", ".tga", ".bmp", ".tif", ".tiff", ".webp"}
 
 
-
 def image_files(folder: Path) -> list[Path]:
     """Every image under a folder, in order."""
     return sorted(file for file in folder.rglob("*") if file.suffix.lower() in SUFFIXES)

@@ -419,9 +419,10 @@ class Vrml:
 
     def read(self, case: Case) -> str:
         """Parses it."""
-        from ptmtools.database.vrml.reader import WrlError, parse
+        from ptmtools.database.fault import FileError
+        from ptmtools.database.vrml.reader import parse
 
         try:
             return f"{len(parse(case.data).nodes)} nodes"
-        except WrlError as error:
-            return f"PTM-{error.kind}"
+        except FileError as error:
+            return error.code

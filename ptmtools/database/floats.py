@@ -82,8 +82,7 @@ def _json(values: NDArray[Any]) -> str:
 
 def _plain(values: NDArray[np.generic]) -> str:
     """The JSON of an array; NaN is null."""
-    held = np.ascontiguousarray(values)
-    return orjson.dumps(held, option=orjson.OPT_SERIALIZE_NUMPY).decode()
+    return orjson.dumps(np.ascontiguousarray(values), option=orjson.OPT_SERIALIZE_NUMPY).decode()
 
 
 def _shortest(number: str) -> str:

@@ -9,9 +9,6 @@ from __future__ import annotations
 import re
 import unicodedata
 
-#: Of a database: what it says of itself, and the folder that is served.
-MANIFEST = "manifest.json"
-SERVED = "www"
 #: In the served folder.
 ROOT = "root.wrl"
 HINTS = "hints.json"

@@ -43,8 +43,7 @@ def size(pieces: Sequence[Piece]) -> int:
 def unpacked(block: memoryview) -> Any:
     """The value. Its arrays are those in the ``block``, to be changed if that can be written."""
     end = 8 + int.from_bytes(block[:8], "little")
-    lengths = pickle.loads(block[8:end])
-    stream, *buffers = _parts(block, end, lengths)
+    stream, *buffers = _parts(block, end, pickle.loads(block[8:end]))
     return pickle.loads(stream, buffers=buffers)
 
 

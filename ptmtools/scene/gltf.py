@@ -4,7 +4,7 @@ The document is read here and not by trimesh, which (5.2) reads only TEXCOORD_0,
 integers unscaled, drops the mesh and children of a camera's node, keeps neither wrap modes nor the
 images' own bytes, and takes a time that grows with the third power of the graph's depth (six
 minutes for a file of 100 KB). It decoded the accessors alone, from a reduced copy of the document,
-until `ptmtools.accessor` did the same in a quarter of the lines. Metres and Y up are fixed by the
+until `ptmtools.glb` did the same in a quarter of the lines. Metres and Y up are fixed by the
 format.
 """
 
@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.accessor import natural
 from ptmtools.errors import InputError, LimitError
+from ptmtools.glb import natural
 from ptmtools.scene.gltf_document import Document, damaged, open_document
 from ptmtools.scene.gltf_material import MaterialReader, Painted
 from ptmtools.scene.model import Camera

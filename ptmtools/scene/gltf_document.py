@@ -12,7 +12,6 @@ import binascii
 import json
 import os
 import re
-import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,13 +21,12 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.accessor import elements, meaning, natural
 from ptmtools.errors import InputError
 from ptmtools.files import open_regular
+from ptmtools.glb import BINARY, MAGIC, elements, glb_chunks, meaning, natural
 from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import FileRange, HeldBytes, decode
 
-_MAGIC, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
 #: How JSON writes halves of characters of UTF-16, of which one alone is no text.
 _HALF = re.compile(r"\\u[dD][89a-fA-F]")
 
@@ -96,10 +94,13 @@ def open_document(path: Path, folder: Folder) -> Document:
     """
     data = path.read_bytes()
     binary: Buffer | None = None
-    if data[:4] == b"glTF":
-        text, binary = _chunks(path, data)
-    elif path.suffix.lower() == ".glb":
-        raise damaged(path, "the magic bytes are missing", "byte 0")
+    if data.startswith(MAGIC) or path.suffix.lower() == ".glb":
+        try:
+            (_, _, text), *more = glb_chunks(data)
+        except ValueError as error:
+            raise damaged(path, *error.args) from None
+        bodies = (Buffer(body, path.absolute(), at) for kind, at, body in more if kind == BINARY)
+        binary = next(bodies, None)
     else:
         text = data
     try:
@@ -151,8 +152,7 @@ def _buffers(
     for file, length in longest.items():
         with open_regular(file) as stream:
             # Reading takes memory for all that is asked for.
-            there = os.fstat(stream.fileno()).st_size
-            read[file] = Buffer(stream.read(min(length, there)), file)
+            read[file] = Buffer(stream.read(min(length, os.fstat(stream.fileno()).st_size)), file)
     buffers = [read[entry] if isinstance(entry, Path) else entry for entry in found]
     for index, (buffer, length) in enumerate(zip(buffers, lengths, strict=True)):
         if len(buffer.data) < length:
@@ -160,35 +160,6 @@ def _buffers(
                 path, f"{length} bytes expected, {len(buffer.data)} found", f"buffer {index}"
             )
     return buffers
-
-
-def _chunks(path: Path, data: bytes) -> tuple[bytes, Buffer | None]:
-    """The JSON and the binary chunk of a GLB file."""
-    if len(data) < 20:
-        raise damaged(path, "cut short", f"byte {len(data)}")
-    _, version, length = struct.unpack_from("<III", data)
-    if version != 2:
-        raise damaged(path, f"version {version}", "byte 4")
-    if length > len(data):
-        raise damaged(path, f"cut short, {length} bytes expected", f"byte {len(data)}")
-    text: bytes | None = None
-    binary: Buffer | None = None
-    at = 12
-    while at + 8 <= length:
-        size, kind = struct.unpack_from("<II", data, at)
-        at += 8
-        if at + size > length:
-            raise damaged(path, "a chunk ends beyond the file", f"byte {at - 8}")
-        if text is None:
-            if kind != _JSON:
-                raise damaged(path, "the first chunk is not JSON", f"byte {at - 8}")
-            text = data[at : at + size]
-        elif kind == _BINARY and binary is None:
-            binary = Buffer(data[at : at + size], path.absolute(), at)
-        at += size
-    if text is None:
-        raise damaged(path, "no chunk", "byte 12")
-    return text, binary
 
 
 def _external(path: Path, folder: Folder, uri: str, place: str) -> Path:

@@ -13,8 +13,9 @@ from pathlib import Path
 import pytest
 
 from ptmtools.database import EmitOptions, emit, validate_database
+from ptmtools.database.fault import FileError
 from ptmtools.database.validation.findings import CODES
-from ptmtools.database.vrml.reader import WrlError, parse
+from ptmtools.database.vrml.reader import parse
 
 #: So many mutations of each kind of file; PTM_FUZZ asks for more.
 ROUNDS = int(os.environ.get("PTM_FUZZ", "40"))
@@ -146,5 +147,5 @@ def test_mutations(everything: Path, seal: Callable[[Path], None], name: str) ->
 )
 def test_the_reader_takes_time_by_length(text: str) -> None:
     """None of these takes a moment; one that took time by the square would take minutes."""
-    with contextlib.suppress(WrlError):
+    with contextlib.suppress(FileError):
         parse(f"#VRML V2.0 utf8\n{text}".encode())

@@ -7,7 +7,6 @@ import json
 import os
 import re
 import shutil
-import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -29,6 +28,7 @@ from ptmtools.database.vrml.reader import Node, parse
 from ptmtools.errors import DatabaseError, InputError, OutputError
 from ptmtools.scene.model import Material
 from ptmtools.visibility.model import Pvs
+from tests.e2e.browsers import view3dscene
 
 ONE_LEVEL = (TextureLevel(1, 1, 0, 100, 3),)
 
@@ -40,9 +40,17 @@ def records() -> tuple[TextureRecord, ...]:
     )
 
 
-def write(artifacts, out: Path, options: EmitOptions = EmitOptions(), **changes):  # noqa: B008
+def write(
+    artifacts,
+    out: Path,
+    options: EmitOptions = EmitOptions(),  # noqa: B008
+    textures: tuple[TextureRecord, ...] = records(),
+    *,
+    force: bool = False,
+    **changes,
+):
     a = replace(artifacts, **changes)
-    return emit(a.scene, a.cells, a.pvs, a.ach, records(), out, options)
+    return emit(a.scene, a.cells, a.pvs, a.ach, textures, out, options, force=force)
 
 
 def shapes(db: Path) -> list[Node]:
@@ -164,8 +172,7 @@ def test_gzip_copies(artifacts, tmp_path: Path) -> None:
             assert (tmp_path / "b" / f"{name}.gz").read_bytes() == packed
             assert len(packed) < len(data)
     assert twice[0].bytes == sum((tmp_path / "a" / n).stat().st_size for n in wanted)
-    a = artifacts
-    emit(a.scene, a.cells, a.pvs, a.ach, records(), tmp_path / "a", EmitOptions(), force=True)
+    write(artifacts, tmp_path / "a", force=True)
     assert not list((tmp_path / "a").glob("*.gz")), "none is left of another emission"
 
 
@@ -173,9 +180,8 @@ def test_gzip_copies(artifacts, tmp_path: Path) -> None:
 def test_a_file_that_cannot_be_written(artifacts, tmp_path: Path, name: str) -> None:
     """The fault is reported, and there is no root that leads to it."""
     (tmp_path / name).mkdir(parents=True)
-    a = artifacts
     with pytest.raises(OutputError, match="PTM-O002") as fault:
-        emit(a.scene, a.cells, a.pvs, a.ach, records(), tmp_path, force=True)
+        write(artifacts, tmp_path, force=True)
     assert name in str(fault.value)
     assert not (tmp_path / "root.wrl").exists()
 
@@ -186,7 +192,7 @@ def test_compressing_nothing_and_much() -> None:
 
 
 def test_the_level_of_the_fallback_image(artifacts, tmp_path: Path) -> None:
-    a, (first, second) = artifacts, records()
+    first, second = records()
     level = TextureLevel(1, 1, 64, 5, 3)
     given = (replace(first, levels=(level,) * 3), replace(second, levels=(level,) * 4))
     lower = (replace(given[0], fallback_level=1), replace(given[1], fallback=None))
@@ -196,7 +202,7 @@ def test_the_level_of_the_fallback_image(artifacts, tmp_path: Path) -> None:
         (lower, False, [None, None]),
     ):
         out = tmp_path / f"{fallback}{levels}"
-        emit(a.scene, a.cells, a.pvs, a.ach, some, out, EmitOptions(fallback=fallback))
+        write(artifacts, out, EmitOptions(fallback=fallback), some)
         hints = json.loads((out / "hints.json").read_text())
         assert [t["fallbackLevel"] for t in hints["textures"]] == levels
 
@@ -297,22 +303,18 @@ def test_faults_before_anything_is_written(artifacts, tmp_path: Path) -> None:
     out = tmp_path / "www"
     cells, pvs, ach = artifacts.cells, artifacts.pvs, artifacts.ach
     nothing = replace(cells, leaf_cell=np.zeros(0, np.int32), triangle_source=np.zeros(0, np.int32))
-    for code, changes in {
-        "PTM-D600": {"cells": nothing},
-        "PTM-D604": {"pvs": replace(pvs, start=pvs.start[:-1])},
-    }.items():
-        with pytest.raises(DatabaseError, match=code):
-            write(artifacts, out, **changes)
-    with pytest.raises(DatabaseError, match="PTM-D604"):
-        write(artifacts, out, ach=replace(ach, start=ach.start * 2))
-    with pytest.raises(DatabaseError, match=r"'b\.png'.*PTM-D602"):
-        emit(artifacts.scene, cells, pvs, ach, records()[:1], out)
     vertex = cells.vertex.copy()
     vertex[3, 1] = np.nan
-    with pytest.raises(DatabaseError, match="PTM-D601"):
-        write(artifacts, out, cells=replace(cells, vertex=vertex))
-    with pytest.raises(DatabaseError, match="PTM-D601"):
-        write(artifacts, out, cells=replace(cells, vertex=cells.vertex * 1e40))
+    for fault, changes in (
+        ("PTM-D600", {"cells": nothing}),
+        ("PTM-D604", {"pvs": replace(pvs, start=pvs.start[:-1])}),
+        ("PTM-D604", {"ach": replace(ach, start=ach.start * 2)}),
+        (r"'b\.png'.*PTM-D602", {"textures": records()[:1]}),
+        ("PTM-D601", {"cells": replace(cells, vertex=vertex)}),
+        ("PTM-D601", {"cells": replace(cells, vertex=cells.vertex * 1e40)}),
+    ):
+        with pytest.raises(DatabaseError, match=fault):
+            write(artifacts, out, **changes)
     with pytest.raises(InputError, match="PTM-I600"):
         write(artifacts, out, EmitOptions(viewpoints=(GivenViewpoint((50, 1, 0)),)))
     assert not out.exists()
@@ -323,8 +325,7 @@ def test_what_is_there_stays(artifacts, tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="PTM-O001"):
         write(artifacts, tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["root.wrl"]
-    a = artifacts
-    emit(a.scene, a.cells, a.pvs, a.ach, records(), tmp_path, force=True)
+    write(artifacts, tmp_path, force=True)
     assert (tmp_path / "root.wrl").read_text().startswith("#VRML V2.0 utf8\n")
 
 
@@ -352,32 +353,13 @@ def test_colours_beyond_the_range_are_held(artifacts, tmp_path: Path) -> None:
     assert "material Material { diffuseColor 1 0 0.5 emissiveColor 0.25 0 0.125 }" in text
 
 
-def log_of_view3dscene(file: Path, home: Path) -> list[str]:
-    """What view3dscene complains of. It exits with 0 for bad files too, and warns of every file
-    that is opened from the command line."""
-    shutil.rmtree(home, ignore_errors=True)
-    home.mkdir()
-    subprocess.run(
-        ["view3dscene", "--write", file],
-        env={**os.environ, "HOME": str(home)},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        timeout=60,
-        check=True,
-    )
-    (log,) = home.rglob("view3dscene.log")
-    lines = [line for line in log.read_text().splitlines() if "Warning" in line]
-    return [line for line in lines if "before the Application.OnInitialize was called" not in line]
-
-
 def test_view3dscene_has_nothing_to_say(
     finished: Path, tmp_path: Path, require: Callable[[str, str], None]
 ) -> None:
     if shutil.which("view3dscene") is None:
         require("view3dscene", "apt install view3dscene")
-    for file in sorted((finished / "www").rglob("*.wrl")):
-        assert log_of_view3dscene(file, tmp_path / "home") == [], file.name
+    assert view3dscene.check_all(finished / "www") == {}
     bad = tmp_path / "bad.wrl"
     text = (finished / "www/cells/c0000.wrl").read_text()
     bad.write_text(text.replace("coordIndex", "coordIdx", 1))
-    assert log_of_view3dscene(bad, tmp_path / "home"), "the check must be able to fail"
+    assert view3dscene.check(bad), "the check must be able to fail"

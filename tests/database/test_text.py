@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from ptmtools.database.fault import FileError
 from ptmtools.database.floats import decimal, row_texts, single
-from ptmtools.database.vrml.reader import HEADER, WrlError, parse
+from ptmtools.database.vrml.reader import HEADER, parse
 from ptmtools.database.vrml.text import chosen, field, listed, loops, quoted
 from ptmtools.errors import DatabaseError
 
@@ -186,50 +187,54 @@ def test_points_read_back(points: list[tuple[float, float, float]]) -> None:
 @pytest.mark.parametrize(
     ("body", "kind", "place"),
     [
-        ("Viewpoint { position 1 nan 2 }", "finite", "line 2"),
-        ("Viewpoint { position 1 1e39 2 }", "finite", "line 2"),
-        ("\nShape { geometry IndexedFaceSet { coordIndex [ 0, 1.5 ] } }", "syntax", "line 3"),
-        ("Shape { geometry IndexedFaceSet { coordIndex [ 0, 99999999999 ] } }", "syntax", "line 2"),
-        ("Shape { geometry IndexedFaceSet { coordIndex 0 } }", "syntax", "line 2"),
-        ("Shape { geometry Box { } }", "syntax", "line 2"),
-        ("Shape { geometry IndexedFaceSet { solid true } }", "syntax", "line 2"),
-        ("Shape { geometry IndexedFaceSet { solid TRUE solid TRUE } }", "syntax", "line 2"),
-        ("Shape { geometry Material { } }", "syntax", "line 2"),
-        ("DEF a.b Shape { }", "syntax", "line 2"),
-        ("DEF a Shape { }\nDEF a Shape { }", "syntax", "line 3"),
-        ("USE a", "syntax", "line 2"),
-        ("PTMCell { }", "syntax", "line 2"),
-        ("PROTO P [ field SFFoo a 1 ] { WorldInfo { } }", "syntax", "line 2"),
-        ("PROTO P [ exposedField SFBool a TRUE ] { WorldInfo { } }", "syntax", "line 2"),
-        ("PROTO P [ ] { Shape { } }", "syntax", "line 2"),
-        ("WorldInfo { title 'x' }", "syntax", "line 2"),
-        ('WorldInfo { info "x" }', "syntax", "line 2"),
-        ("WorldInfo {", "syntax", "line 3"),
+        ("Viewpoint { position 1 nan 2 }", "PTM-D662", "line 2"),
+        ("Viewpoint { position 1 1e39 2 }", "PTM-D662", "line 2"),
+        ("\nShape { geometry IndexedFaceSet { coordIndex [ 0, 1.5 ] } }", "PTM-D661", "line 3"),
+        (
+            "Shape { geometry IndexedFaceSet { coordIndex [ 9999999999 ] } }",
+            "PTM-D661",
+            "line 2",
+        ),
+        ("Shape { geometry IndexedFaceSet { coordIndex 0 } }", "PTM-D661", "line 2"),
+        ("Shape { geometry Box { } }", "PTM-D661", "line 2"),
+        ("Shape { geometry IndexedFaceSet { solid true } }", "PTM-D661", "line 2"),
+        ("Shape { geometry IndexedFaceSet { solid TRUE solid TRUE } }", "PTM-D661", "line 2"),
+        ("Shape { geometry Material { } }", "PTM-D661", "line 2"),
+        ("DEF a.b Shape { }", "PTM-D661", "line 2"),
+        ("DEF a Shape { }\nDEF a Shape { }", "PTM-D661", "line 3"),
+        ("USE a", "PTM-D661", "line 2"),
+        ("PTMCell { }", "PTM-D661", "line 2"),
+        ("PROTO P [ field SFFoo a 1 ] { WorldInfo { } }", "PTM-D661", "line 2"),
+        ("PROTO P [ exposedField SFBool a TRUE ] { WorldInfo { } }", "PTM-D661", "line 2"),
+        ("PROTO P [ ] { Shape { } }", "PTM-D661", "line 2"),
+        ("WorldInfo { title 'x' }", "PTM-D661", "line 2"),
+        ('WorldInfo { info "x" }', "PTM-D661", "line 2"),
+        ("WorldInfo {", "PTM-D661", "line 3"),
         ("Shape { geometry IndexedFaceSet { coord Coordinate { point [ 1 2 ] } } }",)
-        + ("syntax", "line 2"),
+        + ("PTM-D661", "line 2"),
         (
             "Shape { geometry IndexedFaceSet { coord Coordinate { point [ 1 2 1_0 ] } } }",
-            "syntax",
+            "PTM-D661",
             "line 2",
         ),
     ],
 )
 def test_what_the_pattern_does_not_have(body: str, kind: str, place: str) -> None:
-    with pytest.raises(WrlError) as fault:
+    with pytest.raises(FileError) as fault:
         parse(document(body))
-    assert (fault.value.kind, fault.value.place) == (kind, place)
+    assert (fault.value.code, fault.value.place) == (kind, place)
 
 
 def test_the_header_and_the_encoding() -> None:
     for data, kind in (
-        (b"", "syntax"),
-        (b"#VRML V1.0 ascii\n", "syntax"),
-        (b"\xef\xbb\xbf#VRML V2.0 utf8\n", "syntax"),
-        (document("# \u00e4").replace(b"\xc3", b""), "encoding"),
+        (b"", "PTM-D661"),
+        (b"#VRML V1.0 ascii\n", "PTM-D661"),
+        (b"\xef\xbb\xbf#VRML V2.0 utf8\n", "PTM-D661"),
+        (document("# \u00e4").replace(b"\xc3", b""), "PTM-D660"),
     ):
-        with pytest.raises(WrlError) as fault:
+        with pytest.raises(FileError) as fault:
             parse(data)
-        assert fault.value.kind == kind
+        assert fault.value.code == kind
 
 
 def test_the_sample_pattern_is_read(shared) -> None:

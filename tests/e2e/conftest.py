@@ -62,14 +62,22 @@ def database(_built: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(_built / "db", tmp_path / "db"))
 
 
+def make_museum(folder: Path, rooms: int = 1, textures: int = 9, size: int = 64) -> Path:
+    """The model of a made-up museum, the smallest unless more is asked for."""
+    sizes = {"--rooms": rooms, "--textures": textures, "--size": size}
+    words = [str(word) for option in sizes.items() for word in option]
+    script = TWO_ROOMS.parent / "make_museum.py"
+    subprocess.run(
+        [sys.executable, script, "-o", folder, *words], check=True, capture_output=True, timeout=300
+    )
+    return folder / "museum.obj"
+
+
 @pytest.fixture(scope="session")
 def gltf_museum(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The database of the smallest museum, with glTF files; not to be changed."""
     folder = tmp_path_factory.mktemp("museum")
-    script, options = TWO_ROOMS.parent / "make_museum.py", ["--rooms", "1", "--textures", "9"]
-    model = [sys.executable, str(script), "-o", str(folder / "model"), *options, "--size", "64"]
-    subprocess.run(model, check=True, capture_output=True)
-    built = ["-q", "build-scene", str(folder / "model/museum.obj"), "-o", str(folder / "db")]
+    built = ["-q", "build-scene", str(make_museum(folder / "model")), "-o", str(folder / "db")]
     assert main([*built, "-j", "1", "--format", "gltf"]) == 0
     return folder / "db"
 

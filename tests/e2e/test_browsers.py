@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,6 +15,7 @@ import pytest
 from PIL import Image
 
 from ptmtools.cli.main import main
+from tests.e2e.conftest import make_museum
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests" / "e2e"), str(ROOT / "benchmarks")]
@@ -51,11 +51,8 @@ def web(require: Require) -> Any:
 def museum(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Path:
     """The database of the smallest museum: a room, a corridor, windows, pictures."""
     folder = tmp_path_factory.mktemp("museum")
-    script, options = ROOT / "sample_data" / "make_museum.py", ["--rooms", "1", "--textures", "9"]
-    model = [sys.executable, str(script), "-o", str(folder / "model"), *options, "--size", "64"]
-    subprocess.run(model, check=True, capture_output=True)
     database = folder / "db"
-    built = ["-q", "build-scene", str(folder / "model" / "museum.obj"), "-o", str(database)]
+    built = ["-q", "build-scene", str(make_museum(folder / "model")), "-o", str(database)]
     assert main([*built, *QUICK, "--cells", request.param, "--gzip", "-j", "1"]) == 0
     return database
 

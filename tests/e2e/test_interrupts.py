@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.e2e.conftest import TWO_ROOMS, listing
+from tests.e2e.conftest import listing, make_museum
 
 PTM = [sys.executable, "-m", "ptmtools"]
 
@@ -21,11 +21,7 @@ PTM = [sys.executable, "-m", "ptmtools"]
 @pytest.fixture(scope="module")
 def museum(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Large enough for processes beside: 4,000 triangles, and 8 textures."""
-    folder = tmp_path_factory.mktemp("museum")
-    script = TWO_ROOMS.parent / "make_museum.py"
-    options = ["--rooms", "4", "--textures", "18", "--size", "512"]
-    subprocess.run([sys.executable, script, "-o", folder, *options], check=True)
-    return folder / "museum.obj"
+    return make_museum(tmp_path_factory.mktemp("museum"), rooms=4, textures=18, size=512)
 
 
 def until(condition: Callable[[], bool]) -> None:

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import gzip
 import json
-import shutil
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,9 +11,9 @@ import pytest
 
 from ptmtools import schemas
 from ptmtools.store.layout import sha256
-from tests.e2e.conftest import TWO_ROOMS, Ptm
+from tests.database.damage import Damage, copied, hinted, put, removed, replaced, rewritten
+from tests.e2e.conftest import TWO_ROOMS, Ptm, make_museum
 
-ROOT = Path(__file__).parents[2]
 MODEL = TWO_ROOMS / "two_rooms.obj"
 
 
@@ -50,16 +47,9 @@ def test_what_is_built_is_good(ptm: Ptm, tmp_path: Path, options: str) -> None:
 
 
 def test_the_smallest_museum_is_good(ptm: Ptm, tmp_path: Path) -> None:
-    script, sizes = ROOT / "sample_data/make_museum.py", "--rooms 1 --textures 9 --size 64"
-    made = [sys.executable, str(script), "-o", str(tmp_path / "model"), *sizes.split()]
-    subprocess.run(made, check=True, capture_output=True, timeout=300)
-    db = tmp_path / "db"
-    model = tmp_path / "model/museum.obj"
+    model, db = make_museum(tmp_path / "model"), tmp_path / "db"
     assert ptm("-q", "build-scene", model, "-o", db, "--gzip", "--format", "gltf").status == 0
     assert issues(ptm, db, "--strict") == (0, set())
-
-
-Damage = Callable[[Path], object]
 
 
 def resealed(*damages: Damage) -> Damage:
@@ -83,54 +73,33 @@ def resealed(*damages: Damage) -> Damage:
     return damage
 
 
-def replaced(name: str, old: str, new: str) -> Damage:
-    def damage(db: Path) -> None:
-        path = db / name
-        text = path.read_text()
-        assert old in text
-        path.write_text(text.replace(old, new, 1))
-
-    return damage
-
-
 def spoilt(name: str) -> Damage:
-    def damage(db: Path) -> None:
-        path = db / name
-        data = bytearray(path.read_bytes())
-        data[len(data) // 2] ^= 1
-        path.write_bytes(data)
+    """One bit is another."""
 
-    return damage
+    def changed(data: bytes) -> bytes:
+        middle = len(data) // 2
+        return data[:middle] + bytes([data[middle] ^ 1]) + data[middle + 1 :]
+
+    return rewritten(name, changed)
 
 
 def stages(change: Callable[[dict], object]) -> Damage:
     """Changes the stages in the manifest."""
-
-    def damage(db: Path) -> None:
-        path = db / "manifest.json"
-        document = json.loads(path.read_text())
-        change(document["stages"])
-        path.write_text(json.dumps(document))
-
-    return damage
+    return hinted(lambda document: change(document["stages"]), "../manifest.json")
 
 
-def copied(name: str, other: str) -> Damage:
-    return lambda db: shutil.copy(db / name, db / other)
-
-
-C0 = "www/cells/c0000.wrl"
+C0 = "cells/c0000.wrl"
 FAULTS: dict[str, tuple[int, str, Damage]] = {
-    "a file is gone": (8, "D651 D672", lambda db: (db / "www/cells/c0001.wrl").unlink()),
-    "a file is changed": (8, "D652", replaced("www/root.wrl", "ptmtools database", "Museum")),
-    "a file is put there": (0, "", lambda db: (db / "www/mine").write_text("mine")),
+    "a file is gone": (8, "D651 D672", removed("cells/c0001.wrl")),
+    "a file is changed": (8, "D652", replaced("root.wrl", "ptmtools database", "Museum")),
+    "a file is put there": (0, "", put("mine")),
     "a file is put among ours": (
         0,
         "D653",
-        lambda db: (db / "www/cells/mine").write_text("mine"),
+        put("cells/mine"),
     ),
-    "a stage is exchanged": (8, "D652", spoilt("stages/pvs.npz")),
-    "a stage is damaged, its hash not": (8, "D720", resealed(spoilt("stages/cells.npz"))),
+    "a stage is exchanged": (8, "D652", spoilt("../stages/pvs.npz")),
+    "a stage is damaged, its hash not": (8, "D720", resealed(spoilt("../stages/cells.npz"))),
     "a count is wrong": (8, "D659", stages(lambda s: s["cells"]["counts"].update(leaves=4))),
     "a stage is stale": (
         8,
@@ -141,24 +110,24 @@ FAULTS: dict[str, tuple[int, str, Damage]] = {
     "a cell does not see another": (
         8,
         "D691 D695 D696 D701",
-        resealed(replaced(C0, '[ "c0000.wrl", "c0001.wrl" ]', '[ "c0000.wrl" ]')),
+        resealed(replaced(C0, r'\[ "c0000.wrl", "c0001.wrl" \]', '[ "c0000.wrl" ]')),
     ),
-    "hints are no hints": (8, "D700", resealed(replaced("www/hints.json", '"unit"', '"units"'))),
-    "a texture is damaged": (8, "D704 D710", resealed(spoilt("www/textures/floor.ptm"))),
+    "hints are no hints": (8, "D700", resealed(replaced("hints.json", '"unit"', '"units"'))),
+    "a texture is damaged": (8, "D704 D710", resealed(spoilt("textures/floor.ptm"))),
     "a fallback image is another": (
         8,
         "D711",
-        resealed(copied("www/textures/room_b.png", "www/textures/room_a.png")),
+        resealed(copied("textures/room_b.png", "textures/room_a.png")),
     ),
     "a fallback image is too much": (
         0,
         "D653 D677",
-        copied("www/textures/floor.png", "www/textures/more.png"),
+        copied("textures/floor.png", "textures/more.png"),
     ),
     "a bomb": (
         8,
         "D653 D676",
-        lambda db: (db / "www/root.wrl.gz").write_bytes(gzip.compress(bytes(1 << 24))),
+        put("root.wrl.gz", gzip.compress(bytes(1 << 24))),
     ),
 }
 

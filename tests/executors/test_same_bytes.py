@@ -15,6 +15,7 @@ from ptmtools.executors import Executor
 from ptmtools.pipeline import build_scene
 from ptmtools.store.archive import pack_arrays
 from ptmtools.visibility import Pvs, PvsOptions, compute_pvs
+from tests.conftest import files_below
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -77,8 +78,5 @@ def test_whole_databases(tmp_path, scheduler: str, monkeypatch):
     ach = AchOptions(backend="embree")
     for folder, workers, address in (("one", 1, None), ("two", 2, None), ("many", 0, scheduler)):
         build_scene(model, tmp_path / folder, ach, workers=workers, scheduler=address)
-    one, two, many = (
-        {file.relative_to(root): file.read_bytes() for file in root.rglob("*") if file.is_file()}
-        for root in (tmp_path / name for name in ("one", "two", "many"))
-    )
+    one, two, many = (files_below(tmp_path / name) for name in ("one", "two", "many"))
     assert one == two == many

@@ -57,14 +57,19 @@ def opened(db: Path) -> list[object]:
     return [artifacts[stage] for stage in (SCENE, CELLS, PVS, ACH)]
 
 
-def first(name: str, value: object) -> Change:
-    """The first element of an array is another."""
+def first(name: str, value: object, at: int = 0) -> Change:
+    """The first element of an array, or another one, is another."""
 
     def change(arrays: Arrays) -> None:
         arrays[name] = arrays[name].copy()
-        arrays[name].flat[0] = value
+        arrays[name].flat[at] = value
 
     return change
+
+
+def fallen(name: str) -> Change:
+    """Two starts the wrong way round."""
+    return lambda arrays: first(name, arrays[name][-1] + 1, at=1)(arrays)
 
 
 def shorter(name: str) -> Change:
@@ -92,26 +97,6 @@ def about(change: Callable[[Any], object]) -> Change:
         arrays["about"] = np.frombuffer(json.dumps(document).encode(), np.uint8)
 
     return edit
-
-
-def fallen(name: str) -> Change:
-    """Two starts the wrong way round."""
-
-    def change(arrays: Arrays) -> None:
-        arrays[name] = arrays[name].copy()
-        arrays[name][1] = arrays[name][-1] + 1
-
-    return change
-
-
-def starting(name: str, row: int, at: int) -> Change:
-    """A row that begins elsewhere."""
-
-    def change(arrays: Arrays) -> None:
-        arrays[name] = arrays[name].copy()
-        arrays[name][row] = at
-
-    return change
 
 
 def raw(data: bytes) -> Change:
@@ -163,7 +148,7 @@ CHANGES: dict[str, list[Change]] = {
     ],
     "cells": [
         *(
-            starting(name, 1, 1)
+            first(name, 1, at=1)
             for name in ("face_start", "leaf_face_start", "leaf_point_start", "portal_start")
         ),
         first("leaf_cell", 99),

@@ -24,6 +24,7 @@ vt 1 0
 vt 1 1
 vt 0 1
 """
+FACE = "f 1/1 2/2 3/3 4/4\n"
 
 
 def png(pixels: np.ndarray, **options: Any) -> bytes:
@@ -56,11 +57,10 @@ def put(tmp_path: Path) -> Put:
 def textured(put: Put) -> Callable[..., Path]:
     """``textured(mtl_lines, **files)``: one textured quad whose material has these lines."""
 
-    def write(mtl: str, files: dict[str, bytes] | None = None, faces: str = "") -> Path:
+    def write(mtl: str, files: dict[str, bytes] | None = None, faces: str = FACE) -> Path:
         put("room.mtl", "newmtl wall\n" + mtl + "\n")
         for name, data in (files or {}).items():
             put(name, data)
-        faces = faces or "f 1/1 2/2 3/3 4/4\n"
         return put("room.obj", "mtllib room.mtl\n" + QUAD + "usemtl wall\n" + faces)
 
     return write
@@ -85,6 +85,14 @@ class Gltf:
             "accessors": [],
             "scene": 0,
         }
+
+    @classmethod
+    def wall(cls, change: Callable[[Gltf], object] = lambda doc: None, **node: Any) -> Gltf:
+        """A quad at one node; then changed."""
+        doc = cls()
+        doc.place(doc.quad(), **node)
+        change(doc)
+        return doc
 
     def view(self, data: bytes, **more: Any) -> int:
         self.blob += b"\0" * (-len(self.blob) % 4)
@@ -141,3 +149,8 @@ class Gltf:
         uri = uri or f"data:application/octet-stream;base64,{body}"
         self.tree["buffers"] = [{"byteLength": len(self.blob), "uri": uri}]
         return json.dumps(self.tree).encode()
+
+
+def broken(change: Callable[[Gltf], object]) -> bytes:
+    """The GLB of a wall, changed."""
+    return Gltf.wall(change).glb()

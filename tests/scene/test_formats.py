@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable
 from ctypes.util import find_library
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,9 +16,7 @@ from ptmtools.scene.formats import read_other
 from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import Findings
 
-from .conftest import noise, png
-
-Put = Callable[..., Path]
+from .conftest import Put, noise, png
 
 CORNERS = "0 0 0\n10 0 0\n10 4 0\n0 4 0\n"
 STL = "solid wall\n" + "".join(

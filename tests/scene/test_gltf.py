@@ -6,7 +6,6 @@ import base64
 import io
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +16,7 @@ from PIL import Image
 from ptmtools.errors import InputError, PtmError
 from ptmtools.scene import IngestOptions, Scene, ingest
 
-from .conftest import Gltf, noise, png
-
-Put = Callable[..., Path]
+from .conftest import Gltf, Put, broken, noise, png
 
 
 def codes(scene: Scene) -> set[str]:
@@ -43,9 +40,7 @@ def with_image(doc: Gltf, data: bytes, sampler: dict[str, int] | None = None) ->
 
 
 def test_a_quad(put: Put) -> None:
-    doc = Gltf()
-    doc.place(doc.quad())
-    scene = ingest(put("a.glb", doc.glb()))
+    scene = ingest(put("a.glb", Gltf.wall().glb()))
     assert scene.objects == ("wall",)
     assert (scene.space.metres, scene.space.up) == (1.0, "y")
     assert (scene.space.unit_guessed, scene.space.up_guessed) == (False, False)
@@ -60,8 +55,7 @@ def test_a_quad(put: Put) -> None:
 
 @pytest.mark.parametrize("kind", ["embedded", "beside"])
 def test_gltf_with_buffers_of_its_own_or_beside_it(put: Put, kind: str) -> None:
-    doc = Gltf()
-    doc.place(doc.quad())
+    doc = Gltf.wall()
     put("Büffer 1.bin", doc.blob)
     uri = "" if kind == "embedded" else "B%C3%BCffer%201.bin"
     scene = ingest(put("a.gltf", doc.gltf(uri)))
@@ -70,8 +64,7 @@ def test_gltf_with_buffers_of_its_own_or_beside_it(put: Put, kind: str) -> None:
 
 
 def test_nodes_move_turn_and_mirror(put: Put) -> None:
-    doc = Gltf()
-    doc.place(doc.quad(), scale=[-1, 1, 1], translation=[0, 0, 7])
+    doc = Gltf.wall(scale=[-1, 1, 1], translation=[0, 0, 7])
     half = math.sqrt(0.5)
     doc.tree["nodes"] += [
         {"mesh": 0, "rotation": [0, half, 0, half]},
@@ -241,8 +234,7 @@ def test_strips_and_no_indices(put: Put) -> None:
 
 
 def test_cameras_and_what_hangs_below_them(put: Put) -> None:
-    doc = Gltf()
-    doc.place(doc.quad())
+    doc = Gltf.wall()
     doc.tree["cameras"] = [
         {"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.1}},
         {"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "znear": 0, "zfar": 1}},
@@ -268,69 +260,58 @@ def test_cameras_and_what_hangs_below_them(put: Put) -> None:
 
 
 def test_space_may_be_given(put: Put) -> None:
-    doc = Gltf()
-    doc.place(doc.quad())
-    scene = ingest(put("a.glb", doc.glb()), IngestOptions(unit="cm", up="z"))
+    scene = ingest(put("a.glb", Gltf.wall().glb()), IngestOptions(unit="cm", up="z"))
     assert np.ptp(scene.points, axis=0) == pytest.approx([0.1, 0, 0.04])
     assert (scene.space.metres, scene.space.up) == (0.01, "z")
 
 
 def test_a_size_that_is_unlikely_is_told(put: Put) -> None:
-    doc = Gltf()
-    doc.place(doc.quad(), scale=[100, 100, 100])
-    assert "PTM-N227" in codes(ingest(put("a.glb", doc.glb())))
-
-
-def breaks(change: Callable[[Gltf], object]) -> bytes:
-    doc = Gltf()
-    doc.place(doc.quad())
-    change(doc)
-    return doc.glb()
+    assert "PTM-N227" in codes(ingest(put("a.glb", Gltf.wall(scale=[100, 100, 100]).glb())))
 
 
 DAMAGED: dict[str, tuple[str, bytes]] = {
-    "cut short": ("PTM-I249", breaks(lambda d: None)[:-30]),
-    "cut in the header": ("PTM-I249", breaks(lambda d: None)[:10]),
+    "cut short": ("PTM-I249", broken(lambda d: None)[:-30]),
+    "cut in the header": ("PTM-I249", broken(lambda d: None)[:10]),
     "not glTF": ("PTM-I249", b"PK\x03\x04" + bytes(100)),
-    "version 1": ("PTM-I249", breaks(lambda d: d.tree.update(asset={"version": "1.0"}))),
-    "no asset": ("PTM-I249", breaks(lambda d: d.tree.pop("asset"))),
-    "no nodes": ("PTM-I247", breaks(lambda d: d.tree.update(nodes=[], scenes=[{"nodes": []}]))),
+    "version 1": ("PTM-I249", broken(lambda d: d.tree.update(asset={"version": "1.0"}))),
+    "no asset": ("PTM-I249", broken(lambda d: d.tree.pop("asset"))),
+    "no nodes": ("PTM-I247", broken(lambda d: d.tree.update(nodes=[], scenes=[{"nodes": []}]))),
     "no positions": (
         "PTM-I249",
-        breaks(lambda d: d.tree["meshes"][0]["primitives"][0]["attributes"].pop("POSITION")),
+        broken(lambda d: d.tree["meshes"][0]["primitives"][0]["attributes"].pop("POSITION")),
     ),
     "view too long": (
         "PTM-I249",
-        breaks(lambda d: d.tree["bufferViews"][0].update(byteLength=10**12)),
+        broken(lambda d: d.tree["bufferViews"][0].update(byteLength=10**12)),
     ),
     "accessor too long": (
         "PTM-I249",
-        breaks(lambda d: d.tree["accessors"][0].update(count=100)),
+        broken(lambda d: d.tree["accessors"][0].update(count=100)),
     ),
     "too many vertices": (
         "PTM-L200",
-        breaks(lambda d: d.tree["accessors"][0].update(count=10**12)),
+        broken(lambda d: d.tree["accessors"][0].update(count=10**12)),
     ),
-    "index out of range": ("PTM-I249", breaks(lambda d: d.tree["accessors"][2].update(count=5))),
-    "vertices too few": ("PTM-I249", breaks(lambda d: d.tree["accessors"][0].update(count=3))),
-    "no such mesh": ("PTM-I249", breaks(lambda d: d.tree["nodes"][0].update(mesh=7))),
-    "negative child": ("PTM-I249", breaks(lambda d: d.tree["nodes"][0].update(children=[-1]))),
-    "a ring of nodes": ("PTM-I249", breaks(lambda d: d.tree["nodes"][0].update(children=[0]))),
-    "a matrix of 3": ("PTM-I249", breaks(lambda d: d.tree["nodes"][0].update(matrix=[1, 2, 3]))),
-    "sparse": ("PTM-I255", breaks(lambda d: d.tree["accessors"][0].update(sparse={"count": 1}))),
+    "index out of range": ("PTM-I249", broken(lambda d: d.tree["accessors"][2].update(count=5))),
+    "vertices too few": ("PTM-I249", broken(lambda d: d.tree["accessors"][0].update(count=3))),
+    "no such mesh": ("PTM-I249", broken(lambda d: d.tree["nodes"][0].update(mesh=7))),
+    "negative child": ("PTM-I249", broken(lambda d: d.tree["nodes"][0].update(children=[-1]))),
+    "a ring of nodes": ("PTM-I249", broken(lambda d: d.tree["nodes"][0].update(children=[0]))),
+    "a matrix of 3": ("PTM-I249", broken(lambda d: d.tree["nodes"][0].update(matrix=[1, 2, 3]))),
+    "sparse": ("PTM-I255", broken(lambda d: d.tree["accessors"][0].update(sparse={"count": 1}))),
     "compressed": (
         "PTM-I255",
-        breaks(lambda d: d.tree.update(extensionsRequired=["EXT_meshopt_compression"])),
+        broken(lambda d: d.tree.update(extensionsRequired=["EXT_meshopt_compression"])),
     ),
     "draco": (
         "PTM-I255",
-        breaks(
+        broken(
             lambda d: d.tree["meshes"][0]["primitives"][0].update(
                 extensions={"KHR_draco_mesh_compression": {}}
             )
         ),
     ),
-    "types all wrong": ("PTM-I249", breaks(lambda d: d.tree.update(meshes={"a": 1}))),
+    "types all wrong": ("PTM-I249", broken(lambda d: d.tree.update(meshes={"a": 1}))),
 }
 
 
@@ -344,8 +325,7 @@ def test_damaged(put: Put, name: str) -> None:
 
 
 def test_buffers_that_are_missing_or_outside(put: Put, tmp_path: Path) -> None:
-    doc = Gltf()
-    doc.place(doc.quad())
+    doc = Gltf.wall()
     put("out.bin", doc.blob)
     (tmp_path / "in").mkdir()
     with pytest.raises(InputError, match="PTM-I203"):

@@ -5,18 +5,23 @@ Each of them is small. None may lead out of its folder, and each is read or refu
 
 from __future__ import annotations
 
+import io
+import json
 import os
 import struct
+import subprocess
 import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock, create_autospec
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from ptmtools.errors import InputError, LimitError, PtmError
-from ptmtools.scene import IngestOptions, Scene, ingest
+from ptmtools.scene import IngestOptions, Scene, gltf_document, ingest
 from ptmtools.scene import mtl as mtl_module
 from ptmtools.scene import obj as obj_module
 from ptmtools.scene.images import ImageStore
@@ -25,10 +30,8 @@ from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import FileRange, Findings
 from tests.memory import little_memory
 
-from .conftest import QUAD, Gltf, noise, png
+from .conftest import FACE, QUAD, Gltf, Put, broken, noise, png
 
-Put = Callable[..., Path]
-FACE = "f 1/1 2/2 3/3 4/4\n"
 SECRET = png(noise(9))
 
 
@@ -209,13 +212,8 @@ POSTSCRIPT = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 8 8\n%%EndComments\ns
 def test_postscript_is_no_texture(
     textured: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import subprocess
-
-    def called(*arguments: object, **settings: object) -> None:
-        raise AssertionError("an interpreter was called")
-
-    monkeypatch.setattr(subprocess, "Popen", called)
-    monkeypatch.setattr(subprocess, "check_call", called)
+    for name in ("Popen", "check_call"):
+        monkeypatch.setattr(subprocess, name, Mock(side_effect=AssertionError("was called")))
     scene = ingest(textured("map_Kd wall.png", {"wall.png": POSTSCRIPT}))
     no_image(scene)
     assert "PTM-N206" in {note.code for note in scene.notes}
@@ -223,10 +221,6 @@ def test_postscript_is_no_texture(
 
 def test_grey_of_16_bits_with_a_colour_for_holes(textured: Callable[..., Path]) -> None:
     """Pillow does not convert these; they are examined all the same."""
-    import io
-
-    from PIL import Image
-
     stream = io.BytesIO()
     texels = np.arange(64, dtype=np.uint16).reshape(8, 8) * 1000
     Image.fromarray(texels).save(stream, "png", transparency=5000)
@@ -254,14 +248,8 @@ def test_masks_are_kept_in_bits(textured: Callable[..., Path]) -> None:
 def test_an_image_that_many_materials_name_is_read_once(
     put: Put, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    calls = []
-    original = FileRange.__call__
-
-    def counted(self: FileRange) -> bytes:
-        calls.append(self.path.name)
-        return original(self)
-
-    monkeypatch.setattr(FileRange, "__call__", counted)
+    read = create_autospec(FileRange.__call__, side_effect=FileRange.__call__)
+    monkeypatch.setattr(FileRange, "__call__", read)
     put("wall.png", png(noise(1)))
     put("bad.png", b"no image")
     names = range(50)
@@ -270,7 +258,8 @@ def test_an_image_that_many_materials_name_is_read_once(
     faces = "".join(f"usemtl m{i}\nv {i} 0 9\nf 1/1 2/2 -1/3\n" for i in names)
     scene = ingest(put("a.obj", "mtllib a.mtl\n" + QUAD + faces))
     assert len(scene.images) == 1
-    assert sorted(calls) == ["bad.png", "bad.png", "wall.png", "wall.png"]
+    names = sorted(call.args[0].path.name for call in read.call_args_list)
+    assert names == ["bad.png", "bad.png", "wall.png", "wall.png"]
 
 
 def read(path: Path, max_triangles: int = 1 << 31) -> int:
@@ -322,21 +311,15 @@ def test_limits_are_no_part_of_what_a_stage_was_told() -> None:
 
 
 def test_a_library_is_read_once(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
-    calls = []
-    original = obj_module.read_mtl
-
-    def counted(path: Path, label: str, findings: Findings) -> object:
-        calls.append(path)
-        return original(path, label, findings)
-
-    monkeypatch.setattr(obj_module, "read_mtl", counted)
+    read = Mock(wraps=obj_module.read_mtl)
+    monkeypatch.setattr(obj_module, "read_mtl", read)
     put("a.mtl", "newmtl a\nKd 1 0 0\n")
     put("x/b.mtl", "newmtl b\n")
     names = ["a.mtl", "A.MTL", "./a.mtl", "x/../a.mtl", "/tmp/a.mtl"] * 200
     path = put("a.obj", "".join(f"mtllib {n}\n" for n in names) + QUAD + "usemtl a\n" + FACE)
     scene = ingest(path)
     assert scene.materials[0].color == (1, 0, 0)
-    assert len(calls) == 1
+    assert read.call_count == 1
 
 
 def test_large_libraries_are_refused(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -368,8 +351,7 @@ def test_indices_out_of_range(put: Put, face: str) -> None:
 
 def placed(count: int) -> Gltf:
     """One mesh at so many nodes."""
-    doc = Gltf()
-    doc.place(doc.quad())
+    doc = Gltf.wall()
     doc.tree["nodes"] = [{"mesh": 0}] * count
     doc.tree["scenes"] = [{"nodes": list(range(count))}]
     return doc
@@ -412,17 +394,12 @@ def test_a_chain_of_nodes(put: Put) -> None:
 
 
 def test_a_buffer_that_many_name_is_read_once(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
-    doc = Gltf()
-    doc.place(doc.quad())
+    doc = Gltf.wall()
     put("a.bin", doc.blob + bytes(1000))
-    import json
-
     tree = json.loads(doc.gltf("a.bin"))
     (entry,) = tree["buffers"]
     tree["buffers"] = [{**entry, "uri": f"{'./' * i}a.bin"} for i in range(100)]
     opened = []
-    from ptmtools.scene import gltf_document
-
     original = gltf_document.open_regular
 
     class Counted:
@@ -450,11 +427,8 @@ def test_a_buffer_that_many_name_is_read_once(put: Put, monkeypatch: pytest.Monk
 
 @pytest.mark.parametrize("length", [2**31, 2**40, 2**62, 2**70])
 def test_a_buffer_that_declares_more_than_its_file_has(put: Put, length: int) -> None:
-    doc = Gltf()
-    doc.place(doc.quad())
+    doc = Gltf.wall()
     put("a.bin", doc.blob)
-    import json
-
     tree = json.loads(doc.gltf("a.bin"))
     tree["buffers"][0]["byteLength"] = length
     path = put("a.gltf", json.dumps(tree))
@@ -462,34 +436,27 @@ def test_a_buffer_that_declares_more_than_its_file_has(put: Put, length: int) ->
         ingest(path)
 
 
-def changed(change: Callable[[Gltf], object]) -> bytes:
-    doc = Gltf()
-    doc.place(doc.quad())
-    change(doc)
-    return doc.glb()
-
-
 NAN = float("nan")
 LIES: dict[str, bytes] = {
-    "a length of the file": changed(lambda d: None)[:8] + struct.pack("<I", 2**32 - 1),
-    "a length below what there is": changed(lambda d: None).replace(b"glTF", b"glTF\2\0\0\0", 1),
-    "an offset below 0": changed(lambda d: d.tree["bufferViews"][0].update(byteOffset=-4)),
-    "an offset that is a half": changed(lambda d: d.tree["bufferViews"][0].update(byteOffset=0.5)),
-    "a view of a view": changed(lambda d: d.tree["bufferViews"][0].update(buffer=7)),
-    "a stride of 0": changed(lambda d: d.tree["bufferViews"][0].update(byteStride=0)),
-    "a stride below 0": changed(lambda d: d.tree["bufferViews"][0].update(byteStride=-12)),
-    "a stride without end": changed(lambda d: d.tree["bufferViews"][0].update(byteStride=2**62)),
-    "a count of a float": changed(lambda d: d.tree["accessors"][0].update(count=4.0)),
-    "a count that is no number": changed(lambda d: d.tree["accessors"][0].update(count=NAN)),
-    "a count without end": changed(lambda d: d.tree["accessors"][0].update(count=float("inf"))),
-    "a count that is true": changed(lambda d: d.tree["accessors"][0].update(count=True)),
-    "a count of indices": changed(lambda d: d.tree["accessors"][2].update(count=2**40)),
-    "a sparse accessor": changed(lambda d: d.tree["accessors"][0].update(sparse={"count": 2**40})),
-    "no view": changed(lambda d: d.tree["accessors"][0].pop("bufferView")),
-    "a matrix": changed(lambda d: d.tree["accessors"][0].update(type="MAT4")),
-    "a type of a list": changed(lambda d: d.tree["accessors"][0].update(componentType=[5126])),
-    "a node in a list": changed(lambda d: d.tree["scenes"][0].update(nodes=[[0]])),
-    "a tint that is no number": changed(
+    "a length of the file": broken(lambda d: None)[:8] + struct.pack("<I", 2**32 - 1),
+    "a length below what there is": broken(lambda d: None).replace(b"glTF", b"glTF\2\0\0\0", 1),
+    "an offset below 0": broken(lambda d: d.tree["bufferViews"][0].update(byteOffset=-4)),
+    "an offset that is a half": broken(lambda d: d.tree["bufferViews"][0].update(byteOffset=0.5)),
+    "a view of a view": broken(lambda d: d.tree["bufferViews"][0].update(buffer=7)),
+    "a stride of 0": broken(lambda d: d.tree["bufferViews"][0].update(byteStride=0)),
+    "a stride below 0": broken(lambda d: d.tree["bufferViews"][0].update(byteStride=-12)),
+    "a stride without end": broken(lambda d: d.tree["bufferViews"][0].update(byteStride=2**62)),
+    "a count of a float": broken(lambda d: d.tree["accessors"][0].update(count=4.0)),
+    "a count that is no number": broken(lambda d: d.tree["accessors"][0].update(count=NAN)),
+    "a count without end": broken(lambda d: d.tree["accessors"][0].update(count=float("inf"))),
+    "a count that is true": broken(lambda d: d.tree["accessors"][0].update(count=True)),
+    "a count of indices": broken(lambda d: d.tree["accessors"][2].update(count=2**40)),
+    "a sparse accessor": broken(lambda d: d.tree["accessors"][0].update(sparse={"count": 2**40})),
+    "no view": broken(lambda d: d.tree["accessors"][0].pop("bufferView")),
+    "a matrix": broken(lambda d: d.tree["accessors"][0].update(type="MAT4")),
+    "a type of a list": broken(lambda d: d.tree["accessors"][0].update(componentType=[5126])),
+    "a node in a list": broken(lambda d: d.tree["scenes"][0].update(nodes=[[0]])),
+    "a tint that is no number": broken(
         lambda d: (
             d.tree.update(materials=[{"pbrMetallicRoughness": {"baseColorFactor": [NAN] * 4}}]),
             d.tree["meshes"][0]["primitives"][0].update(material=0),

@@ -14,11 +14,9 @@ from PIL import Image
 from ptmtools.errors import InputError, LimitError, PtmError
 from ptmtools.scene import IngestOptions, Scene, ingest
 
-from .conftest import QUAD, noise, png
+from .conftest import FACE, QUAD, Put, noise, png
 
-Put = Callable[..., Path]
 Textured = Callable[..., Path]
-FACE = "f 1/1 2/2 3/3 4/4\n"
 
 
 def rgba(alpha: int, where: tuple[slice, slice] = (slice(None), slice(None))) -> bytes:

@@ -15,7 +15,7 @@ from ptmtools.scene.obj import read_obj
 from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import Findings, Source
 
-QUAD = "v 0 0 0\nv 10 0 0\nv 10 4 0\nv 0 4 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+from .conftest import QUAD
 
 
 def read(path: Path) -> Source:

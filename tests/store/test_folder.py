@@ -11,12 +11,7 @@ from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import MANIFEST
 from ptmtools.store.manifest import SCHEMA, StageRecord
 from ptmtools.store.writer import DatabaseWriter
-
-
-def state(folder: Path) -> dict[str, bytes]:
-    """Every file below a folder with its bytes."""
-    files = (f for f in sorted(folder.rglob("*")) if f.is_file())
-    return {str(f.relative_to(folder)): f.read_bytes() for f in files}
+from tests.conftest import files_below
 
 
 def write(db: Path, files: dict[str, bytes], stage: str = "cells", model: str = "m.obj") -> None:
@@ -33,20 +28,20 @@ def test_commits_and_reads_back(tmp_path: Path) -> None:
     outputs = db.record("cells").outputs
     assert db.read("stages/x", outputs["stages/x"]) == b"1"
     assert db.damaged(outputs) is None
-    assert set(state(db.path)) == {MANIFEST, "stages/x", "www/y"}
+    assert set(files_below(db.path)) == {MANIFEST, "stages/x", "www/y"}
 
 
 def test_what_a_stage_no_longer_makes_goes_and_what_is_foreign_stays(tmp_path: Path) -> None:
     write(tmp_path, {"www/old/a": b"1", "www/keep": b"2"})
     (tmp_path / "www" / "mine.txt").write_text("mine")
     write(tmp_path, {"www/keep": b"3"})
-    assert set(state(tmp_path)) == {MANIFEST, "www/keep", "www/mine.txt"}
+    assert set(files_below(tmp_path)) == {MANIFEST, "www/keep", "www/mine.txt"}
     assert not (tmp_path / "www" / "old").exists()
 
 
 def test_without_a_commit_it_stays_what_it_was(tmp_path: Path) -> None:
     write(tmp_path, {"www/a": b"1"})
-    before = state(tmp_path)
+    before = files_below(tmp_path)
 
     def update() -> None:
         with DatabaseWriter.open_for_model(tmp_path, "m.obj") as writer:
@@ -55,7 +50,7 @@ def test_without_a_commit_it_stays_what_it_was(tmp_path: Path) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         update()
-    assert state(tmp_path) == before
+    assert files_below(tmp_path) == before
 
 
 def test_a_new_folder_goes_again_if_nothing_was_committed(tmp_path: Path) -> None:
@@ -84,7 +79,7 @@ def test_force_guards_what_is_not_ours(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="PTM-O011"):
         DatabaseWriter.open_for_model(foreign, "other.obj")
     write(foreign, {"www/b": b"1"}, "pvs", model="other.obj")
-    assert set(state(foreign)) == {MANIFEST, "www/b", "mine.txt"}
+    assert set(files_below(foreign)) == {MANIFEST, "www/b", "mine.txt"}
 
     file = tmp_path / "file"
     file.write_text("mine")
@@ -108,7 +103,7 @@ def test_a_database_of_an_earlier_schema_is_built_again(tmp_path: Path) -> None:
         staged = writer.begin("some")
         staged.put("www/keep", b"3")
         staged.commit({"cells": StageRecord(1, {}, {}, staged.pending())})
-    assert set(state(tmp_path)) == {MANIFEST, "www/keep", "www/mine.txt"}
+    assert set(files_below(tmp_path)) == {MANIFEST, "www/keep", "www/mine.txt"}
     manifest.write_text(earlier.replace('"schema": 1', f'"schema": {SCHEMA + 1}'))
     with pytest.raises(DatabaseError, match="PTM-D003"):
         DatabaseWriter.open_for_model(tmp_path, "m.obj")

@@ -19,6 +19,7 @@ from ptmtools.errors import PtmError
 from ptmtools.store.layout import sha256
 from ptmtools.store.manifest import Manifest, StageRecord
 from ptmtools.store.writer import DatabaseWriter
+from tests.conftest import files_below
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"
 OLD, NEW, SECRET = b"old", b"new", b"secret"
@@ -76,10 +77,6 @@ def attempted(db: Path) -> bool:
     return True
 
 
-def contents(folder: Path) -> dict[str, bytes]:
-    return {str(path): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
 def test_a_commit_that_was_interrupted_is_completed(db: Path) -> None:
     written(db)
     assert (db / "www/textures/b.ptm").read_bytes() == NEW
@@ -100,12 +97,12 @@ PLACES = [
 @pytest.mark.parametrize("to", ["", "textures", "a.ptm", "nothing"])
 def test_links(db: Path, place: str, to: str) -> None:
     outside = db.parent / "outside"
-    before = contents(outside)
+    before = files_below(outside)
     replaced(db, place, lambda at: at.symlink_to(outside / to))
     if attempted(db):
         for file in db.rglob("*"):
             assert not file.is_symlink() or file == db / place
-    assert contents(outside) == before
+    assert files_below(outside) == before
 
 
 @pytest.mark.parametrize("place", PLACES)

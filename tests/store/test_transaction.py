@@ -14,6 +14,7 @@ from ptmtools.store.layout import MANIFEST, STAGING
 from ptmtools.store.manifest import StageRecord
 from ptmtools.store.transaction import finished_tasks
 from ptmtools.store.writer import DatabaseWriter
+from tests.conftest import files_below
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Replaces the outputs of one stage: one stays as it is, one changes, one goes, one is new.
@@ -36,11 +37,6 @@ BEFORE = {"www/same": b"0", "www/a": b"1", "www/gone/x": b"1"}
 AFTER = {"www/same": b"0", "www/a": b"2", "www/deep/new": b"2"}
 
 
-def state(folder: Path) -> dict[str, bytes]:
-    files = (f for f in sorted(folder.rglob("*")) if f.is_file())
-    return {str(f.relative_to(folder)): f.read_bytes() for f in files}
-
-
 def write(db: Path, files: dict[str, bytes], recipe: int) -> None:
     with DatabaseWriter.open_for_model(db, "m.obj") as writer:
         staged = writer.begin("some")
@@ -58,7 +54,7 @@ def test_killed_at_any_change_of_a_name(tmp_path: Path) -> None:
     write(first, BEFORE, 1)
     write(second, BEFORE, 1)
     write(second, AFTER, 2)
-    before, after = state(first), state(second)
+    before, after = files_below(first), files_below(second)
     assert without(after) == AFTER
     outcomes = []
     for n in range(1, 100):
@@ -72,12 +68,12 @@ def test_killed_at_any_change_of_a_name(tmp_path: Path) -> None:
         assert status == -signal.SIGKILL
         with DatabaseWriter.open_for_model(db, "m.obj"):
             pass
-        found = state(db)
+        found = files_below(db)
         assert found.pop("www/mine.txt") == b"mine"
         assert found in (before, after), n
         outcomes.append(found == after)
         write(db, AFTER, 2)
-        assert state(db) == {**after, "www/mine.txt": b"mine"}, n
+        assert files_below(db) == {**after, "www/mine.txt": b"mine"}, n
     else:
         pytest.fail("it never came to its end")
     # First the old state, from the commit on the new one.

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools import schemas
-from ptmtools.accessor import COMPONENTS, ITEMS, elements
-from ptmtools.database.gltf.container import GlbError, unpack
+from ptmtools.database.fault import FileError
+from ptmtools.database.gltf.container import unpack
 from ptmtools.database.gltf.material import WHITE, WRAPS
+from ptmtools.glb import COMPONENTS, ITEMS, elements
 
 _VERTICES, _INDICES, _FLOAT = 34962, 34963, 5126
 _LARGEST = float(np.finfo(np.float32).max)
@@ -77,7 +78,7 @@ def read_glb(data: bytes) -> ReadGlb:
 
     Raises
     ------
-    GlbError: PTM-D731 no GLB; PTM-D732 not in the emission pattern; PTM-D733 an accessor out of
+    FileError: PTM-D731 no GLB; PTM-D732 not in the emission pattern; PTM-D733 an accessor out of
         its bytes; PTM-D734 indices; PTM-D735 numbers.
     """
     document, binary = unpack(data)
@@ -85,7 +86,7 @@ def read_glb(data: bytes) -> ReadGlb:
         schemas.check(document, schemas.GLB)
     except schemas.ShapeError as fault:
         code = "PTM-D735" if fault.message.endswith(schemas.NOT_FINITE) else "PTM-D732"
-        raise GlbError(code, fault.place or "document", fault.message) from None
+        raise FileError(code, fault.place or "document", fault.message) from None
     return _Reader(document, binary).cell()
 
 
@@ -97,7 +98,7 @@ class _Reader:
             _foreign("buffers", f"{len(buffers)} buffers for {len(binary)} bytes")
         length = buffers[0]["byteLength"] if buffers else 0
         if not 0 <= len(binary) - length < 4:
-            raise GlbError("PTM-D733", "buffers[0]", f"{length} bytes of {len(binary)}")
+            raise FileError("PTM-D733", "buffers[0]", f"{length} bytes of {len(binary)}")
         self._data = binary[:length]
 
     def cell(self) -> ReadGlb:
@@ -112,8 +113,7 @@ class _Reader:
             if self._row("nodes", index)["mesh"] != index:
                 _foreign(f"nodes[{index}]", "has the mesh of another")
             for n, primitive in enumerate(self._row("meshes", index)["primitives"]):
-                place = f"meshes[{index}].primitives[{n}]"
-                primitives.append(self._primitive(primitive, place))
+                primitives.append(self._primitive(primitive, f"meshes[{index}].primitives[{n}]"))
         return ReadGlb(scene["name"], scene["extras"]["cell"], tuple(primitives))
 
     def _row(self, name: str, index: int) -> dict[str, Any]:
@@ -136,14 +136,14 @@ class _Reader:
         index = self._elements(primitive["indices"], "SCALAR", (5123, 5125), _INDICES).ravel()
         if len(index) % 3 or int(index.max()) >= len(point):
             message = f"{len(index)} indices up to {index.max()} into {len(point)} vertices"
-            raise GlbError("PTM-D734", place, message)
+            raise FileError("PTM-D734", place, message)
         triangle = index.astype(np.int64).reshape(-1, 3)
         return ReadPrimitive(place, point, uv, triangle, self._material(primitive["material"]))
 
     def _vertices(self, index: int, form: str) -> NDArray[np.float32]:
         rows = self._elements(index, form, (_FLOAT,), _VERTICES)
         if not np.isfinite(rows).all():
-            raise GlbError("PTM-D735", f"accessors[{index}]", "a number is not finite")
+            raise FileError("PTM-D735", f"accessors[{index}]", "a number is not finite")
         return rows.astype(np.float32)
 
     def _elements(
@@ -165,10 +165,10 @@ class _Reader:
         try:
             found = elements(accessor, view, self._data)
         except ValueError as fault:
-            raise GlbError("PTM-D733", place, str(fault)) from None
+            raise FileError("PTM-D733", place, str(fault)) from None
         begin = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
         if begin % unit:
-            raise GlbError("PTM-D733", place, f"begins at byte {begin}, not a multiple of {unit}")
+            raise FileError("PTM-D733", place, f"begins at byte {begin}, not a multiple of {unit}")
         return found
 
     def _check_bounds(self, index: int, point: NDArray[np.float32]) -> None:
@@ -179,7 +179,7 @@ class _Reader:
             # In single precision, as they are written.
             bounds = zip(accessor[name], held, strict=True)
             if any(abs(v) > _LARGEST or np.float32(v) != h for v, h in bounds):
-                raise GlbError(
+                raise FileError(
                     "PTM-D735", place, f"{name} is not that of the data, {held.tolist()}"
                 )
 
@@ -210,4 +210,4 @@ def _wrap(sampler: dict[str, Any]) -> tuple[int, int]:
 
 
 def _foreign(place: str, message: str) -> NoReturn:
-    raise GlbError("PTM-D732", place, message)
+    raise FileError("PTM-D732", place, message)

@@ -22,6 +22,7 @@ from ptmtools.database.plans.storeys import cut_height, storeys
 from ptmtools.database.section import area, leaf_section, polygon_section, triangle_section
 from ptmtools.errors import DatabaseError, InputError, MissingComponentError
 from ptmtools.files import write_bytes
+from ptmtools.quantities import count
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
 
@@ -199,7 +200,7 @@ class _Plan:
         self._scale_bar(axis)
         numbers = len({cell for cell, _ in sections})
         axis.set_title(
-            f"floor {floor:+.2f} m, cut at {height:+.2f} m: {_count(numbers, 'cell')}",
+            f"floor {floor:+.2f} m, cut at {height:+.2f} m: {count(numbers, 'cell')}",
             fontsize=9,
             color=_INK,
             loc="left",
@@ -249,7 +250,6 @@ class _Plan:
             x, y = self._shown(middle)
             dark = self._shade is not None and self._shade.get(cell, 0.0) > _DARK
             ink, paper = (_PAPER, _INK) if dark else (_INK, _PAPER)
-            halo = [withStroke(linewidth=1.6, foreground=paper, alpha=0.6)]
             axis.text(
                 x,
                 y,
@@ -259,7 +259,7 @@ class _Plan:
                 ha="center",
                 va="center",
                 zorder=7,
-                path_effects=halo,
+                path_effects=[withStroke(linewidth=1.6, foreground=paper, alpha=0.6)],
             )
 
     def _scale_bar(self, axis: Any) -> None:
@@ -288,8 +288,10 @@ class _Plan:
         from matplotlib.lines import Line2D
 
         cells, chosen = self._cells, self._options.cell
-        doors = _count(len(self._doors()), "portal")
-        parts = [_count(cells.cell_count, "cell"), f"{doors} between them"]
+        parts = [
+            count(cells.cell_count, "cell"),
+            f"{count(len(self._doors()), 'portal')} between them",
+        ]
         if self._pvs is not None:
             parts.append(f"on average a cell sees {100 * self._pvs.average_share:.1f} %")
         if len(self._floors) > 1:
@@ -338,10 +340,6 @@ def _outlines(
         rim = shapely.boundary(shapely.union_all(leaves) if len(leaves) > 1 else leaves[0])
         found[cell] = [shapely.get_coordinates(line) for line in shapely.get_parts(rim)]
     return found
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number:,} {what}" + "s" * (number != 1)
 
 
 def _round_length(length: float) -> float:

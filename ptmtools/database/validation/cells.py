@@ -164,8 +164,7 @@ class _Body:
                 self._leaves = leaves
             far = farthest(hull, fields["leafPoint"]).max(initial=0.0)
             if far > tolerance.cluster:
-                message = f"a leaf lies {far:.3g} m outside of the hull"
-                self.faults.append(("PTM-D684", message))
+                self.faults.append(("PTM-D684", f"a leaf lies {far:.3g} m outside of the hull"))
 
     def outside(self, points: NDArray[np.float64]) -> float:
         """How far the farthest of (n, 3) points lies outside, metres; 0 if none does."""

@@ -20,7 +20,7 @@ import numpy as np
 from ptmtools import schemas
 from ptmtools.database.emitters import EMITTERS, Emitter, chosen_emitters, owner_of
 from ptmtools.database.model import EmitOptions, ValidationReport
-from ptmtools.database.names import MANIFEST, SERVED, TEXTURE_FOLDER
+from ptmtools.database.names import TEXTURE_FOLDER
 from ptmtools.database.validation.files import check_names, served_files
 from ptmtools.database.validation.findings import Findings, one_line
 from ptmtools.database.validation.reading import FileReader
@@ -30,6 +30,7 @@ from ptmtools.database.validation.urls import Urls
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.files import open_regular
 from ptmtools.progress import Progress, silent
+from ptmtools.store.layout import MANIFEST, SERVED
 from ptmtools.texture.model import Limits
 
 #: Files of others that are named.

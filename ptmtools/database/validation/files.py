@@ -8,8 +8,8 @@ import zlib
 from collections.abc import Iterable
 from pathlib import Path
 
-from ptmtools.database.names import SERVED
 from ptmtools.database.validation.findings import Findings
+from ptmtools.store.layout import SERVED
 
 #: What zlib calls a stream with the header and the checksum of gzip.
 _GZIP = 16 + zlib.MAX_WBITS

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools import schemas
+from ptmtools.database.fault import FileError
 from ptmtools.database.gltf.cell import flipped
-from ptmtools.database.gltf.container import GlbError
 from ptmtools.database.gltf.material import WRAPS, linear
 from ptmtools.database.gltf.reader import ReadGlb, ReadMaterial, read_glb
 from ptmtools.database.names import (
@@ -25,7 +25,6 @@ from ptmtools.database.names import (
     GLTF_FOLDER,
     GLTF_HINTS,
     HINTS,
-    SERVED,
     UP,
     cell_name,
     glb_file,
@@ -33,6 +32,7 @@ from ptmtools.database.names import (
 from ptmtools.database.validation.findings import Findings
 from ptmtools.database.validation.served import ServedDatabase
 from ptmtools.database.vrml.reader import Document, Node
+from ptmtools.store.layout import SERVED
 
 #: How far a colour may be off that went through the decimals of VRML.
 _SLACK = 1e-5
@@ -44,7 +44,7 @@ def read_file(name: str, data: bytes, found: Findings) -> Any:
         if name.endswith(".glb"):
             return read_glb(data)
         return schemas.parse(data) if name == f"{SERVED}/{GLTF_HINTS}" else None
-    except GlbError as fault:
+    except FileError as fault:
         found.add(fault.code, name, fault.place, fault.message)
     except schemas.ShapeError as fault:
         found.add("PTM-D737", name, "", fault.message)
@@ -85,9 +85,8 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
 def _moved(hints: Mapping[str, Any]) -> dict[str, Any]:
     """Hints with the URLs that they have beside the GLBs."""
     cells = [cell | {"url": glb_file(i)} for i, cell in enumerate(hints["cells"])]
-    urls = ("file", "fallback")
     textures = [
-        row | {url: UP + row[url] for url in urls if row[url] is not None}
+        row | {url: UP + row[url] for url in (("file", "fallback")) if row[url] is not None}
         for row in hints["textures"]
     ]
     return {**hints, "cells": cells, "textures": textures}

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from ptmtools.database.emitters import GZIP, owner_of
-from ptmtools.database.names import SERVED
 from ptmtools.database.validation.files import check_gzip
 from ptmtools.database.validation.findings import Findings
 from ptmtools.database.validation.textures import ReadTexture, read_png, read_texture
 from ptmtools.files import open_regular
+from ptmtools.store.layout import SERVED
 from ptmtools.texture.model import Limits
 
 #: Bytes hashed at a time, of a file that is not held whole.
@@ -76,8 +76,7 @@ class FileReader:
             reading.found.add("PTM-D651", name, "", "missing")
             return reading
         except OSError as fault:
-            message = f"cannot be read ({fault.strerror or fault})"
-            reading.found.add("PTM-D654", name, "", message)
+            reading.found.add("PTM-D654", name, "", f"cannot be read ({fault.strerror or fault})")
             return reading
         reading.size = size
         reading.intact = self._outputs.get(name) == digest

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from ptmtools.database.names import SERVED
 from ptmtools.database.validation.findings import Findings
 from ptmtools.database.validation.textures import ReadTexture
 from ptmtools.database.validation.urls import Urls
+from ptmtools.store.layout import SERVED
 
 
 @dataclass

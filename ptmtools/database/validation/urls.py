@@ -8,8 +8,9 @@ from collections import Counter
 from collections.abc import Iterable
 from urllib.parse import unquote_to_bytes
 
-from ptmtools.database.names import CELL_FOLDER, SERVED
+from ptmtools.database.names import CELL_FOLDER
 from ptmtools.database.validation.findings import Findings
+from ptmtools.store.layout import SERVED
 
 #: A path as a relative reference may have it (RFC 3986); all else is percent-encoded there.
 _PATH = re.compile(r"(?:[A-Za-z0-9._~!$&'()*+,;=:@/-]|%[0-9A-Fa-f]{2})+")

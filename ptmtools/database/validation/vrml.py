@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ptmtools.database.names import CELL_FOLDER, HINTS, ROOT, SERVED
+from ptmtools.database.fault import FileError
+from ptmtools.database.names import CELL_FOLDER, HINTS, ROOT
 from ptmtools.database.validation.cells import ReadCell, check_cell, read_cell
 from ptmtools.database.validation.findings import Findings
 from ptmtools.database.validation.hints import (
@@ -20,10 +21,9 @@ from ptmtools.database.validation.lists import check_graph
 from ptmtools.database.validation.root import ReadRoot, check_root, check_viewpoints, read_root
 from ptmtools.database.validation.served import ServedDatabase
 from ptmtools.database.validation.textures import check_record
-from ptmtools.database.vrml.reader import Document, WrlError, parse
+from ptmtools.database.vrml.reader import Document, parse
+from ptmtools.store.layout import SERVED
 from ptmtools.tolerance import Tolerance
-
-_WRL_FAULTS = {"encoding": "PTM-D660", "syntax": "PTM-D661", "finite": "PTM-D662"}
 
 
 def read_file(name: str, data: bytes, found: Findings) -> Document | ReadHints | None:
@@ -32,8 +32,8 @@ def read_file(name: str, data: bytes, found: Findings) -> Document | ReadHints |
         return read_hints(data, name, found)
     try:
         return parse(data) if name.endswith(".wrl") else None
-    except WrlError as fault:
-        found.add(_WRL_FAULTS[fault.kind], name, fault.place, fault.message)
+    except FileError as fault:
+        found.add(fault.code, name, fault.place, fault.message)
         return None
 
 

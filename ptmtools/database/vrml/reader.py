@@ -13,11 +13,14 @@ taken ("++", "*+"), so that the time is linear in the length of any file.
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ptmtools.database.fault import FileError
 
 HEADER = "#VRML V2.0 utf8"
 
@@ -70,19 +73,6 @@ _ESCAPED = re.compile(r"\\(.)")
 _NOT_FINITE = re.compile(r"[+-]?(?:nan|inf|infinity)\b", re.IGNORECASE)
 
 
-class WrlError(Exception):
-    """The first thing in a file that is not the emission pattern.
-
-    `kind` is "encoding", "finite" (a number is not) or "syntax"; `place` says where.
-    """
-
-    def __init__(self, kind: str, place: str, message: str) -> None:
-        self.kind = kind
-        self.place = place
-        self.message = message
-        super().__init__(f"{place}: {message}")
-
-
 @dataclass(frozen=True)
 class Node:
     """A node: strings and truths are Python's; numbers are arrays, (n, width) for multiple values
@@ -125,12 +115,13 @@ def parse(data: bytes) -> Document:
 
     Raises
     ------
-    WrlError: at the first thing that the emission pattern does not have.
+    FileError: at the first thing that the emission pattern does not have: PTM-D660 for bytes that
+        are not UTF-8, PTM-D662 for a number that is not finite, PTM-D661 for all else.
     """
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as fault:
-        raise WrlError("encoding", f"byte {fault.start}", "not UTF-8") from fault
+        raise FileError("PTM-D660", f"byte {fault.start}", "not UTF-8") from fault
     return _Reader(text).document()
 
 
@@ -138,7 +129,7 @@ class _Reader:
     def __init__(self, text: str) -> None:
         self._text = text
         self._at = 0
-        self._counted = (0, 1)
+        self._breaks = [found.start() for found in re.finditer("\n", text)]
         self._types = dict(NODES)
         self._names: dict[str, Node | None] = {}
 
@@ -149,13 +140,12 @@ class _Reader:
         nodes: list[Node] = []
         while self._skip() < len(self._text):
             if self._peek("PROTO"):
-                name, fields = self._proto()
-                protos[name] = fields
+                self._proto(protos)
             else:
                 nodes.append(self._node(self._word("a node")))
         return Document(protos, tuple(nodes))
 
-    def _proto(self) -> tuple[str, dict[str, str]]:
+    def _proto(self, protos: dict[str, dict[str, str]]) -> None:
         self._word("PROTO")
         name = self._word("a PROTO's name")
         if name in self._types:
@@ -179,8 +169,7 @@ class _Reader:
         if body.type != "WorldInfo":
             self._fail("a PROTO's body is a WorldInfo, it draws nothing")
         self._take("}")
-        self._types[name] = fields
-        return name, fields
+        self._types[name] = protos[name] = fields
 
     def _node(self, type: str) -> Node:
         name = ""
@@ -209,19 +198,13 @@ class _Reader:
             self._names[name] = node
         return node
 
-    def _used(self) -> Node:
-        name = self._word("a DEF name")
-        node = self._names.get(name)
-        if node is None:
-            self._fail(f"no node above is called {name}")
-        return node
-
     def _value(self, type: str) -> Any:
         if type in self._types:
             word = self._word("a node")
-            node = self._used() if word == "USE" and type in USED else self._node(word)
-            if node.type != type:
-                self._fail(f"a {node.type} stands where a {type} belongs")
+            used = word == "USE" and type in USED
+            node = self._names.get(self._word("a DEF name")) if used else self._node(word)
+            if node is None or node.type != type:
+                self._fail(f"no {type} where one belongs")
             return node
         if type == "SFBool":
             word = self._word("TRUE or FALSE")
@@ -229,7 +212,7 @@ class _Reader:
                 self._fail(f"{word!r} is neither TRUE nor FALSE")
             return word == "TRUE"
         if type == "SFString":
-            return self._string()
+            return _ESCAPED.sub(r"\1", self._word("a string", _STRING)[1:-1])
         if type == "MFString":
             return self._strings()
         kind = type[2:]
@@ -238,8 +221,7 @@ class _Reader:
     def _single(self, kind: str) -> NDArray[np.float64]:
         values = []
         for _ in range(_WIDTH[kind]):
-            self._skip()
-            found = _NUMBER.match(self._text, self._at)
+            found = _NUMBER.match(self._text, self._skip())
             if found is None:
                 self._no_number()
             self._at = found.end()
@@ -282,12 +264,12 @@ class _Reader:
     def _finite(self, values: NDArray[Any], at: int) -> NDArray[Any]:
         with np.errstate(over="ignore"):
             if not np.isfinite(values.astype(np.float32)).all():
-                raise WrlError("finite", self._place(at), "a number is not finite")
+                self._fail("a number is not finite", at, "PTM-D662")
         return values
 
     def _no_number(self) -> NoReturn:
         if _NOT_FINITE.match(self._text, self._at):
-            raise WrlError("finite", self._place(self._at), "a number is not finite")
+            self._fail("a number is not finite", code="PTM-D662")
         self._fail(f"{self._text[self._at : self._at + 12]!r} is not a number")
 
     def _strings(self) -> tuple[str, ...]:
@@ -303,17 +285,8 @@ class _Reader:
             strings = [_ESCAPED.sub(r"\1", string) for string in strings]
         return tuple(strings)
 
-    def _string(self) -> str:
-        self._skip()
-        found = _STRING.match(self._text, self._at)
-        if found is None:
-            self._fail("no string")
-        self._at = found.end()
-        return _ESCAPED.sub(r"\1", found.group(1))
-
-    def _word(self, what: str) -> str:
-        self._skip()
-        found = _WORD.match(self._text, self._at)
+    def _word(self, what: str, pattern: re.Pattern[str] = _WORD) -> str:
+        found = pattern.match(self._text, self._skip())
         if found is None:
             self._fail(f"{self._text[self._at : self._at + 12]!r} is not {what}")
         self._at = found.end()
@@ -334,14 +307,7 @@ class _Reader:
         return self._at
 
     def _line(self, at: int) -> int:
-        before, line = self._counted
-        if at < before:
-            before, line = 0, 1
-        self._counted = (at, line + self._text.count("\n", before, at))
-        return self._counted[1]
+        return 1 + bisect_left(self._breaks, at)
 
-    def _place(self, at: int) -> str:
-        return f"line {self._line(at)}"
-
-    def _fail(self, message: str, at: int | None = None) -> NoReturn:
-        raise WrlError("syntax", self._place(self._at if at is None else at), message)
+    def _fail(self, message: str, at: int | None = None, code: str = "PTM-D661") -> NoReturn:
+        raise FileError(code, f"line {self._line(self._at if at is None else at)}", message)

@@ -53,8 +53,9 @@ def meshes(glb: Path) -> list[Any]:
     return list(scene.geometry.values())
 
 
-def document(glb: Path) -> dict[str, Any]:
-    return unpack(glb.read_bytes())[0]
+def documents(www: Path) -> list[dict[str, Any]]:
+    """The JSON of the three cells."""
+    return [unpack((www / f"gltf/c{c:04d}.glb").read_bytes())[0] for c in range(3)]
 
 
 def shapes(www: Path, cell: int) -> list[Node]:
@@ -94,8 +95,7 @@ def test_trimesh_finds_the_images(gltf_finished: Path) -> None:
 def test_each_kind_of_material(gltf_finished: Path) -> None:
     """Colours are linear light; only what alpha shows through blends."""
     kinds = set()
-    for c in range(3):
-        tree = document(gltf_finished / f"gltf/c{c:04d}.glb")
+    for tree in documents(gltf_finished):
         for material in tree["materials"]:
             surface = material["pbrMetallicRoughness"]
             texture = tree["textures"][surface.get("baseColorTexture", {"index": 0})["index"]]
@@ -147,8 +147,8 @@ def test_alpha_of_a_texture_blends_where_it_is_used(
     www = emit_gltf(tmp_path / "www", scene=scene)
     modes = {
         material["name"]: material.get("alphaMode", "OPAQUE")
-        for c in range(3)
-        for material in document(www / f"gltf/c{c:04d}.glb")["materials"]
+        for tree in documents(www)
+        for material in tree["materials"]
     }
     assert modes == {"00": "OPAQUE", "01": "OPAQUE", "10": "OPAQUE", "11": "BLEND"}
 
@@ -156,8 +156,7 @@ def test_alpha_of_a_texture_blends_where_it_is_used(
 def test_sides_and_objects(artifacts: Any, gltf_finished: Path) -> None:
     """A node for each object with its own name; a primitive for each of its shapes."""
     sides = set()
-    for c in range(3):
-        tree = document(gltf_finished / f"gltf/c{c:04d}.glb")
+    for c, tree in enumerate(documents(gltf_finished)):
         names = [node["name"] for node in tree["nodes"]]
         assert set(names) <= set(artifacts.scene.objects)
         assert len(names) == len(set(names))
@@ -173,7 +172,7 @@ def test_sides_and_objects(artifacts: Any, gltf_finished: Path) -> None:
         ]
         assert not {"extensionsUsed", "extensionsRequired"} & set(tree)
     assert sides == {True, False}
-    assert "Wände.001" in names or "Wände.001" in str(document(gltf_finished / "gltf/c0000.glb"))
+    assert "Wände.001" in names or "Wände.001" in str(documents(gltf_finished)[0])
 
 
 def test_without_fallback_only_the_ptm_is_named(
@@ -181,8 +180,7 @@ def test_without_fallback_only_the_ptm_is_named(
 ) -> None:
     www = emit_gltf(tmp_path / "db/www", fallback=False)
     wraps = []
-    for c in range(3):
-        tree = document(www / f"gltf/c{c:04d}.glb")
+    for tree in documents(www):
         assert not {"textures", "images", "samplers"} & set(tree)
         extras = [m["extras"] for m in tree["materials"] if "extras" in m]
         assert {e["ptm"] for e in extras} <= {"../textures/a.ptm", "../textures/b.ptm"}
@@ -247,7 +245,7 @@ def test_names_are_percent_encoded(
         return replace(record, file=f"{stem}.ptm", fallback=f"{stem}.png")
 
     www = emit_gltf(tmp_path / "db/www", rename=rename)
-    uris = {i["uri"] for c in range(3) for i in document(www / f"gltf/c{c:04d}.glb")["images"]}
+    uris = {i["uri"] for tree in documents(www) for i in tree["images"]}
     assert uris == {f"../textures/{n}%20%C3%BC%23%2541.png" for n in "ab"}
     seal(tmp_path / "db")
     assert validate_database(tmp_path / "db").issues == ()

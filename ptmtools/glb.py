@@ -1,0 +1,100 @@
+"""What readers and writers of glTF 2.0 share: the container GLB, and the numbers of a buffer.
+
+Sections 3.6.1, 3.6.2 and 4.4 of the specification. Everything that a file says is held against the
+bytes that are there before an array is made. A GLB is a header, a chunk of JSON, a chunk of bytes:
+
+=======  ==========================================================
+offset   little-endian uint32
+=======  ==========================================================
+0        "glTF", version 2, length of the file
+12       length of the JSON, "JSON", the JSON, spaces up to 4 bytes
+then     length of the bytes, "BIN\\0", the bytes, zeros up to 4;
+         left out where there are none
+=======  ==========================================================
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+MAGIC, JSON, BINARY = b"glTF", b"JSON", b"BIN\0"
+_HEADER, _CHUNK = struct.Struct("<4sII"), struct.Struct("<I4s")
+#: Component types, and how many components an element has.
+COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+ITEMS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
+
+
+def glb(chunks: Iterable[tuple[bytes, bytes]]) -> bytes:
+    """A GLB of chunks, given as (kind, bytes)."""
+    parts = []
+    for kind, body in chunks:
+        filling = (b" " if kind == JSON else b"\0") * (-len(body) % 4)
+        parts += [_CHUNK.pack(len(body) + len(filling), kind), body, filling]
+    return b"".join([_HEADER.pack(MAGIC, 2, _HEADER.size + sum(map(len, parts))), *parts])
+
+
+def glb_chunks(data: bytes) -> list[tuple[bytes, int, bytes]]:
+    """(kind, offset, bytes with padding) of the chunks of a GLB, the first of them JSON.
+
+    Raises ValueError with what is wrong, and where.
+    """
+    if not data.startswith(MAGIC):
+        raise ValueError("the magic bytes are missing", "byte 0")
+    if len(data) < _HEADER.size + _CHUNK.size:
+        raise ValueError("cut short", f"byte {len(data)}")
+    _, version, length = _HEADER.unpack_from(data)
+    if version != 2:
+        raise ValueError(f"version {version}", "byte 4")
+    if length > len(data):
+        raise ValueError(f"cut short, {length} bytes expected", f"byte {len(data)}")
+    found: list[tuple[bytes, int, bytes]] = []
+    at = _HEADER.size
+    while (begin := at + _CHUNK.size) <= length:
+        size, kind = _CHUNK.unpack_from(data, at)
+        if begin + size > length:
+            raise ValueError("a chunk ends beyond the file", f"byte {at}")
+        at = begin + size
+        found.append((kind, begin, data[begin:at]))
+    if [kind for kind, *_ in found[:1]] != [JSON]:
+        raise ValueError("the first chunk is not JSON", f"byte {_HEADER.size}")
+    return found
+
+
+def elements(
+    accessor: Mapping[str, Any], view: Mapping[str, Any], data: bytes | memoryview
+) -> NDArray[Any]:
+    """(count, items) the elements of an accessor whose buffer view lies in ``data``, as stored.
+
+    Raises ValueError if it has no elements or ends beyond its view or the data, and KeyError for a
+    member that is missing or another component type than those of `COMPONENTS`.
+    """
+    kind, items = np.dtype(COMPONENTS[accessor["componentType"]]), ITEMS[accessor["type"]]
+    begin, length = natural(view.get("byteOffset", 0)), natural(view["byteLength"])
+    first, count = natural(accessor.get("byteOffset", 0)), natural(accessor["count"])
+    size = items * kind.itemsize
+    stride = natural(view.get("byteStride", size))
+    if begin + length > len(data):
+        raise ValueError(f"a view of {length} bytes from byte {begin} ends beyond {len(data)}")
+    if count < 1 or stride < size or first + (count - 1) * stride + size > length:
+        raise ValueError(f"{count} elements from byte {first} end beyond a view of {length}")
+    return np.ndarray((count, items), kind, data, begin + first, (stride, kind.itemsize))
+
+
+def meaning(stored: NDArray[Any], normalized: bool) -> NDArray[np.float64]:
+    """What stored numbers mean: normalised integers are shares (section 3.6.2.2)."""
+    values = stored.astype(np.float64)
+    if normalized and stored.dtype.kind != "f":
+        values = np.maximum(values / np.iinfo(stored.dtype).max, -1.0)
+    return values
+
+
+def natural(value: object) -> int:
+    """The value, if it is an index or a size; ValueError otherwise."""
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise ValueError(f"{value!r} is not an index or a size")
+    return value
