@@ -1,4 +1,4 @@
-"""The images that the benchmarks of the codec run on, and how they take time."""
+"""The images that the benchmarks of the codec run on."""
 
 from __future__ import annotations
 
