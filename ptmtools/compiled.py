@@ -25,13 +25,14 @@ from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 from threading import Lock
-from typing import Any, TypeVar, cast
+from typing import IO, Any, TypeVar, cast
 
 import llvmlite.ir  # type: ignore[import-untyped]
 import numba
 import numba.core.event
 import numba.extending
 
+from ptmtools.ahead import start_ahead
 from ptmtools.progress import announce
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -118,12 +119,10 @@ class _Kernel:
                 entry = self._compiler(cache=bool(folder))
             finally:
                 settings.CACHE_DIR = before
-        if folder and not self._options.get("_nrt", True):
-            # To load machine code takes none of what a compiler must know, all types and functions
-            # of numba, which numba would set up before: a quarter of a second run of `ptm encode`.
-            # Where something is to be compiled after all, they are set up then. Not for functions
-            # that allocate: what does that for them is set up there, too.
-            entry._cache.load_overload = entry._cache._load_overload
+        if folder and hasattr(entry, "_cache"):
+            code = self.py_func.__code__
+            lock = Path(folder, f"{Path(code.co_filename).stem}-{code.co_firstlineno}.lock")
+            entry._cache = _Kept(entry._cache, lock, allocates=self._options.get("_nrt", True))
         return entry
 
     @cached_property
@@ -137,6 +136,69 @@ class _Kernel:
     def _compiler(self, **options: bool) -> Any:
         compile_: Any = numba.njit
         return compile_(**self._options, **options)(self.py_func)
+
+
+class _Kept:
+    """The machine code of a function that is kept, in place of numba's object for it.
+
+    What one process finds missing, and so compiles, the others wait for. That two of them make the
+    same is a waste; and two that keep code for different arguments at a time could keep one's under
+    the other's name, as numba lists a function's machine code in a file that it reads and writes.
+    """
+
+    def __init__(self, numbas: Any, lock: Path, *, allocates: bool) -> None:
+        self._numbas = numbas
+        self._place = lock
+        self._lock: IO[bytes] | None = None
+        self._load = numbas.load_overload
+        if not allocates:
+            # To load such machine code takes nothing that numba would set up before, the functions
+            # that allocate and all types and functions that a compiler must know: a quarter of a
+            # second run of `ptm encode`. Where something is to be compiled after all, they are set
+            # up then. A numba that has no such function sets them up.
+            self._load = getattr(numbas, "_load_overload", self._load)
+
+    def load_overload(self, *arguments: Any) -> Any:
+        found = self._load(*arguments)
+        if found is None and self._lock is None:
+            self._lock = _locked(self._place)
+            found = self._lock and self._load(*arguments)
+            if found is not None:
+                self._release()
+        return found
+
+    def save_overload(self, *arguments: Any) -> None:
+        try:
+            self._numbas.save_overload(*arguments)
+        finally:
+            self._release()
+
+    def _release(self) -> None:
+        if self._lock:
+            self._lock.close()
+            self._lock = None
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._numbas, name)
+
+
+def _locked(place: Path) -> IO[bytes] | None:
+    """That file, locked until it is closed or this process ends; None where there are no locks."""
+    try:
+        import fcntl
+    except ImportError:
+        return None
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        file = place.open("wb")
+    except OSError:
+        return None
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX)
+    except OSError:
+        file.close()
+        return None
+    return file
 
 
 #: The folder is a setting of the whole process, and kernels may be called by several threads.
@@ -168,6 +230,7 @@ class _FirstCompilation(numba.core.event.Listener):
     def on_start(self, event: Any) -> None:
         if not self._announced:
             self._announced = True
+            start_ahead()
             _load_without_scipy()
             announce("compiling for this machine (first run only, up to a minute)")
 

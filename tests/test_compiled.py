@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -61,15 +62,21 @@ def run(program: str, folder: Path, **environment: str) -> list[str]:
     return done.stdout.decode().splitlines()
 
 
-@pytest.mark.parametrize("chosen", ["", "chosen"])
-def test_what_a_kernel_sees_decides_about_its_machine_code(tmp_path: Path, chosen: str) -> None:
-    """Numba alone would run yesterday's inner kernel, with yesterday's table."""
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A package of this name, of `SOURCES`."""
     package = tmp_path / "ptmtools"
     package.mkdir()
     for name, source in SOURCES.items():
         (package / f"{name}.py").write_text(source)
-    for name in ("compiled.py", "progress.py"):
+    for name in ("ahead.py", "compiled.py", "lazy.py", "progress.py"):
         shutil.copy(ROOT / name, package)
+    return package
+
+
+@pytest.mark.parametrize("chosen", ["", "chosen"])
+def test_what_a_kernel_sees_decides_about_its_machine_code(package: Path, chosen: str) -> None:
+    """Numba alone would run yesterday's inner kernel, with yesterday's table."""
     for edited, old, new, result, fresh in (
         ("one", "", "", 12, True),
         ("tables", "10", "20", 22, True),
@@ -80,9 +87,54 @@ def test_what_a_kernel_sees_decides_about_its_machine_code(tmp_path: Path, chose
     ):
         file = package / f"{edited}.py"
         file.write_text(file.read_text().replace(old, new))
-        *announced, found = run(PROGRAM, tmp_path, NUMBA_CACHE_DIR=chosen)
+        *announced, found = run(PROGRAM, package.parent, NUMBA_CACHE_DIR=chosen)
         assert int(found) == result
         assert len(announced) == fresh
+
+
+def test_one_of_two_processes_compiles(package: Path) -> None:
+    """The other waits for it, and loads what it made."""
+    with ThreadPoolExecutor(2) as pool:
+        printed = list(pool.map(lambda _: run(PROGRAM, package.parent, NUMBA_CACHE_DIR=""), "ab"))
+    assert [lines[-1] for lines in printed] == ["12", "12"]
+    assert sorted(len(lines) for lines in printed) == [1, 2]
+
+
+def test_another_process_compiles_ahead(package: Path) -> None:
+    """It begins when something is to be compiled; one that fails is not noticed."""
+    (package / "task.py").write_text(
+        "from pathlib import Path; from ptmtools.two import inner\n"
+        "def begin():\n    inner(1.0)\n    Path('done').touch()\n    raise ValueError"
+    )
+    program = f"""
+import os, time
+from ptmtools.ahead import compile_ahead
+from ptmtools.lazy import Lazy
+compile_ahead(Lazy("ptmtools.task:begin"))
+{PROGRAM}
+while {{0}} and not os.path.exists("done"):
+    time.sleep(0.01)
+from ptmtools.two import inner
+print(inner(1.0))
+"""
+    for wait, announced in ((1, 1), (0, 0)):
+        lines = run(program.format(wait), package.parent, NUMBA_CACHE_DIR="")
+        assert lines[announced:] == ["12", "11.0"]
+
+
+def test_a_numba_that_loads_machine_code_in_another_way(tmp_path: Path) -> None:
+    class Other:
+        load_overload = list
+        cache_path = "somewhere"
+
+        def save_overload(self, *_: object) -> None:
+            raise OSError("full")
+
+    kept = compiled._Kept(Other(), tmp_path / "lock", allocates=False)
+    assert kept.load_overload("ab") == ["a", "b"]
+    assert kept.cache_path == "somewhere"
+    with pytest.raises(OSError, match="full"):
+        kept.save_overload()
 
 
 def test_a_constant_of_this_package(tmp_path: Path) -> None:

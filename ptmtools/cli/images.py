@@ -11,11 +11,13 @@ from typing import IO, TYPE_CHECKING, Any
 
 import click
 
+from ptmtools.ahead import compile_ahead
 from ptmtools.cli.batch import STANDARD, Job, Report, expanded, for_each, jobs_for, standard_input
 from ptmtools.cli.common import as_json, forced, limited, voiced, workers
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import Numbers, options_of, take
 from ptmtools.errors import InputError, OutputError, naming
+from ptmtools.executors.model import processors
 from ptmtools.files import refuse_existing
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Description, EncodeOptions
@@ -96,6 +98,9 @@ def encode(
 
     options = take(EncodeOptions, values)
     check_options(options)
+    ahead = PROFILES[options.profile].ahead
+    if ahead and (workers or processors()) > 1:
+        compile_ahead(ahead)
     sources = expanded(images, SUFFIXES)
     jobs = jobs_for(sources, output, images, ".ptm", (".ptm", *SUFFIXES))
     voice.to_stderr = any(job.to_stdout for job in jobs)

@@ -106,7 +106,7 @@ def test_symbols_come_back_one_by_one(coded: Any) -> None:
     for i, context in enumerate(contexts):
         z, used = kernels.decode_single(table, context, state, np.uint64(i & 3), stream.words[at])
         at += used
-        found.append(next(escapes) if z == kernels.ESCAPE else z)
+        found.append(next(escapes) if z == tables.ESCAPE else z)
     assert found == symbols.tolist()
     assert at == stream.limit
     assert (state == kernels.STATE_LOW).all()
@@ -118,8 +118,3 @@ def test_symbols_come_back_one_by_one(coded: Any) -> None:
 def test_impossible_tables_are_refused(data: bytes) -> None:
     with pytest.raises(InputError, match="PTM-I112"):
         tables.parse(data, TABLES)
-
-
-def test_two_words_for_the_same_numbers_agree() -> None:
-    assert kernels.TABLE_BITS == tables.TABLE_BITS
-    assert kernels.ESCAPE == tables.ESCAPE

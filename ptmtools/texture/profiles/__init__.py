@@ -9,9 +9,12 @@ from the table, so a new one needs its module and a line here.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol, cast
+
+from ptmtools.lazy import Lazy
 
 if TYPE_CHECKING:
     import numpy as np
@@ -33,6 +36,7 @@ class Profile:
     module: the `Coder`, by name: it is imported when it is first used.
     lossy: whether it can make use of an allowed error.
     since: the first version of the container that may hold it.
+    ahead: what another process may compile while the coder compiles the first of its loops.
     """
 
     name: str
@@ -41,6 +45,7 @@ class Profile:
     module: str
     lossy: bool = False
     since: int = 2
+    ahead: Lazy[Callable[[], object]] | None = None
 
     @property
     def coder(self) -> Coder:
@@ -52,7 +57,15 @@ class Profile:
 PROFILES = {
     profile.name: profile
     for profile in (
-        Profile("fast", 1, "for streaming", f"{__name__}.fast", lossy=True, since=1),
+        Profile(
+            "fast",
+            1,
+            "for streaming",
+            f"{__name__}.fast",
+            lossy=True,
+            since=1,
+            ahead=Lazy(f"{__name__}.fast:compile_ahead"),
+        ),
         Profile(
             "small",
             2,

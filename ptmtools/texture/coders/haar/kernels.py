@@ -31,13 +31,13 @@ from ptmtools.texture.coders.haar.contexts import (
 )
 from ptmtools.texture.coders.haar.layout import CLASSES, EDGE_TABLE
 from ptmtools.texture.coders.rans.kernels import (
-    ESCAPE,
     STATE_LOW,
     decode_row,
     fill_escapes,
     rotate_states,
     start_states,
 )
+from ptmtools.texture.coders.rans.tables import ESCAPE
 
 i32, u16 = np.int32, np.uint16
 

@@ -13,12 +13,8 @@ from typing import Any
 import numpy as np
 
 from ptmtools.compiled import plain_kernel as kernel
+from ptmtools.texture.coders.rans.tables import ESCAPE, TABLE_BITS, TABLE_SIZE
 
-#: Symbols of this number escape to a 16-bit value, but for tables without escape.
-ESCAPE = 255
-#: Bits of a frequency table.
-TABLE_BITS = 11
-TABLE_SIZE = 1 << TABLE_BITS
 #: A state stays at or above this and below 2^31.
 STATE_LOW = 1 << 15
 #: Numbers of 32 bits of a table for `decode_single`: symbols by slot, intervals by symbol.

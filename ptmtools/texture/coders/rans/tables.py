@@ -20,6 +20,7 @@ from ptmtools.texture.coders.damage import damaged
 #: Bits of a table and its size: the frequencies of a table in use sum to this.
 TABLE_BITS = 11
 TABLE_SIZE = 1 << TABLE_BITS
+#: Symbols of this number escape to a 16-bit value, but for tables without escape.
 ESCAPE = 255
 #: Mean magnitudes, in sixteenths, of the built-in distributions 1, 2, …
 BUILT_IN_MEANS = (

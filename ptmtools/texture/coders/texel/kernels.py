@@ -21,11 +21,11 @@ import numpy as np
 
 from ptmtools.compiled import kernel
 from ptmtools.texture.coders.rans.kernels import (
-    ESCAPE,
     STATE_LOW,
     decode_single,
     start_states,
 )
+from ptmtools.texture.coders.rans.tables import ESCAPE
 
 OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2
 #: How the fourth texel follows from the others: not at all, as integers, as floats of 16, 32 bits.
