@@ -23,7 +23,8 @@ from ptmtools.version import __version__
 if TYPE_CHECKING:
     from ptmtools.pipeline.stage import Stage
 
-#: Command → (module, function, what `ptm --help` says); besides, each stage has one.
+#: Command → (module, the command in it or a function that makes it, what `ptm --help` says);
+#: besides, each stage has one.
 COMMANDS = {
     "build-scene": ("stages", "build_scene", "Build or update a database from a model."),
     "status": ("status", "status", "Show which stages of a database are up to date."),
@@ -54,7 +55,8 @@ class Commands(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name in COMMANDS:
             module, function, _ = COMMANDS[cmd_name]
-            command = getattr(importlib.import_module(f"ptmtools.cli.{module}"), function)
+            found = getattr(importlib.import_module(f"ptmtools.cli.{module}"), function)
+            command = found if isinstance(found, click.Command) else found()
             assert isinstance(command, click.Command)
             return command
         stage = _stages().get(cmd_name)

@@ -51,53 +51,62 @@ REPORTS: dict[Stage[Any], tuple[str, Lazy[Callable[..., tuple[Any, list[str]]]]]
 model_argument = click.argument("model", type=click.Path())
 
 
-@click.command("build-scene")
-@model_argument
-@new_database
-@options_of(*(stage.options for stage in STAGES.values()))
-@many_machines
-@forced
-@click.option("--rebuild", is_flag=True, help="Run every stage again, even if it is up to date.")
-@click.option("--dry-run", is_flag=True, help="Show what would be done, and why; write nothing.")
-@as_json
-@voiced
-def build_scene(
-    voice: Voice,
-    model: str,
-    db: str,
-    as_json: bool,
-    dry_run: bool,
-    rebuild: bool,
-    workers: int,
-    scheduler: str | None,
-    force: bool,
-    **values: Any,
-) -> None:
-    """Build a database from MODEL, or bring it up to date.
+def build_scene() -> click.Command:
+    """The command that runs all stages, with the options of all."""
 
-    MODEL is an OBJ, glTF or GLB file, or in a format that trimesh or pymeshlab reads. The database
-    is a folder: museum.obj makes museum.db, unless -o names another. Only what has changed since
-    the last build is computed again.
-    """
-    options: list[Any] = [take(stage.options, values) for stage in STAGES.values()]
-    if dry_run:
-        from ptmtools.cli.status import print_plan
-        from ptmtools.pipeline.plan import plan_build
+    @click.command("build-scene")
+    @model_argument
+    @new_database
+    @options_of(*(stage.options for stage in STAGES.values()))
+    @many_machines
+    @forced
+    @click.option(
+        "--rebuild", is_flag=True, help="Run every stage again, even if it is up to date."
+    )
+    @click.option(
+        "--dry-run", is_flag=True, help="Show what would be done, and why; write nothing."
+    )
+    @as_json
+    @voiced
+    def command(
+        voice: Voice,
+        model: str,
+        db: str,
+        as_json: bool,
+        dry_run: bool,
+        rebuild: bool,
+        workers: int,
+        scheduler: str | None,
+        force: bool,
+        **values: Any,
+    ) -> None:
+        """Build a database from MODEL, or bring it up to date.
 
-        print_plan(voice, plan_build(model, db, *options, force=force), as_json)
-        return
-    with voice.progress() as progress:
-        report = build(
-            model,
-            db,
-            *options,
-            workers=workers,
-            scheduler=scheduler,
-            force=force,
-            rebuild=rebuild,
-            progress=progress,
-        )
-    print_report(voice, report, as_json)
+        MODEL is an OBJ, glTF or GLB file, or in a format that trimesh or pymeshlab reads. The
+        database is a folder: museum.obj makes museum.db, unless -o names another. Only what has
+        changed since the last build is computed again.
+        """
+        options: list[Any] = [take(stage.options, values) for stage in STAGES.values()]
+        if dry_run:
+            from ptmtools.cli.status import print_plan
+            from ptmtools.pipeline.plan import plan_build
+
+            print_plan(voice, plan_build(model, db, *options, force=force), as_json)
+            return
+        with voice.progress() as progress:
+            report = build(
+                model,
+                db,
+                *options,
+                workers=workers,
+                scheduler=scheduler,
+                force=force,
+                rebuild=rebuild,
+                progress=progress,
+            )
+        print_report(voice, report, as_json)
+
+    return command
 
 
 def stage_command(stage: Stage[Any]) -> click.Command:
