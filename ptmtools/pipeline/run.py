@@ -14,7 +14,7 @@ from ptmtools.pipeline.report import StageReport
 from ptmtools.pipeline.stage import Options, Stage, parameters
 from ptmtools.progress import Progress, silent
 from ptmtools.store.folder import DatabaseFolder
-from ptmtools.store.layout import arrays_of
+from ptmtools.store.layout import MANIFEST, arrays_of
 from ptmtools.store.manifest import StageRecord
 from ptmtools.store.transaction import Transaction
 from ptmtools.store.writer import DatabaseWriter
@@ -148,8 +148,6 @@ class Artifacts:
 
 @contextmanager
 def _damaged_record(db: DatabaseFolder) -> Iterator[None]:
-    from ptmtools.store.layout import MANIFEST
-
     try:
         yield
     except ValueError as fault:
