@@ -24,11 +24,11 @@ from benchmarks.fuzz.mutation import NAMES, NUMBERS, damaged, dumped, garbled, t
 from benchmarks.fuzz.target import Case
 from ptmtools.cli.main import main
 from ptmtools.pipeline.run import Artifacts
-from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE
+from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE, STAGES
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import IMAGE_LIST, arrays_of, sha256
-from ptmtools.store.manifest import Manifest
+from ptmtools.store.manifest import Manifest, StageRecord
 from ptmtools.store.writer import DatabaseWriter
 
 MODEL = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"
@@ -111,6 +111,9 @@ class _Held(DatabaseFolder):
         self.path = Path("db")
         self._stages = stages
         self._images = images
+
+    def record(self, stage: str, needed_for: str = "this") -> StageRecord:
+        return StageRecord(STAGES[stage].recipe, {}, {}, {})
 
     def read_output(self, stage: str, name: str, needed_for: str = "this") -> bytes:
         return self._images

@@ -68,7 +68,7 @@ def examine(data: bytes, limits: Limits = _LIMITS) -> tuple[list[str], NDArray[A
             header = ptm.header
             whole = whole_levels(header, len(data))
             if whole < len(header.levels):
-                what = f"the last whole level is {whole - 1}" if whole else "no level is whole"
+                what = f"the last whole level is {whole - 1}" if whole else "no level is complete"
                 problems.append(f"cut after {len(data)} of {header.file_size} bytes: {what}")
             if len(data) > header.file_size:
                 problems.append(f"{len(data) - header.file_size} bytes behind the last group")

@@ -342,7 +342,7 @@ class PtmReader:
         of = f" after {size} of {self.header.file_size} bytes" if size is not None else ""
         remedy = None
         if whole is not None:
-            remedy = f"the last whole level is {whole - 1}" if whole else "no level is whole"
+            remedy = f"the last whole level is {whole - 1}" if whole else "no level is complete"
         return InputError(
             "PTM-I107", f"is cut{of}, inside or before this", place=place, remedy=remedy
         )

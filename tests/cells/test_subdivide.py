@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -267,14 +268,17 @@ def test_the_subdivision_scales_with_the_scene(room_row, scale: float) -> None:
 @pytest.mark.parametrize(
     ("options", "code"),
     [
-        (SubdivideOptions(wall_area=0), "PTM-I300"),
-        (SubdivideOptions(wall_area=float("nan")), "PTM-I300"),
-        (SubdivideOptions(max_leaves=0), "PTM-I300"),
-        (SubdivideOptions(viewpoints=((1e3, 0, 0),)), "PTM-I301"),
-        (SubdivideOptions(detail=("no such thing",)), "PTM-I302"),
+        ({"wall_area": 0}, "PTM-I300"),
+        ({"wall_area": float("nan")}, "PTM-I300"),
+        ({"wall_thickness": -1}, "PTM-I300"),
+        ({"gain": float("nan")}, "PTM-I300"),
+        ({"cells": "hall"}, "PTM-I300"),
+        ({"max_leaves": 0}, "PTM-I300"),
+        ({"viewpoints": ((1e3, 0, 0),)}, "PTM-I301"),
+        ({"detail": ("no such thing",)}, "PTM-I302"),
     ],
 )
-def test_bad_options(room_row, options: SubdivideOptions, code: str) -> None:
+def test_bad_options(room_row, options: dict[str, Any], code: str) -> None:
     with pytest.raises(InputError) as caught:
-        subdivide(room_row(1)[0], options)
+        subdivide(room_row(1)[0], SubdivideOptions(**options))
     assert caught.value.code == code

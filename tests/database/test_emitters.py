@@ -87,13 +87,17 @@ def test_names_in_any_order() -> None:
 def test_gltf_alone_still_means_both(artifacts, tmp_path: Path, put_textures) -> None:
     assert chosen_emitters("gltf") == chosen_emitters("vrml,gltf")
     a, records = artifacts, put_textures(tmp_path)
-    for format, notes in (("gltf", 1), ("vrml,gltf", 0)):
-        out = tmp_path / format
+    for format in ("gltf", "vrml,gltf"):
         options = EmitOptions(format=format)
-        report = emit(a.scene, a.cells, a.pvs, a.ach, records, out, options)
+        assert options == EmitOptions(format="gltf,vrml")
+        report = emit(a.scene, a.cells, a.pvs, a.ach, records, tmp_path / format, options)
         assert {"root.wrl", "gltf/hints.json"} <= set(report.files)
-        assert len(report.notes) == notes
-        assert all("--format vrml,gltf" in note for note in report.notes)
+
+
+@pytest.mark.parametrize("format", ["gltf", "vrml,gltf", "vrml"])
+def test_a_note_where_a_name_has_changed_its_meaning(tmp_path: Path, capsys, format: str) -> None:
+    main(["emit", str(tmp_path), "--format", format])
+    assert ("say --format vrml,gltf" in capsys.readouterr().err) is (format == "gltf")
 
 
 def test_each_declaration_names_what_there_is() -> None:

@@ -118,7 +118,8 @@ def test_the_schema_of_the_manifest_is_that_of_its_reader(manifest) -> None:
     schema = json.loads(schemas.schema_text(schemas.MANIFEST))
     assert schema["properties"]["format"]["const"] == FORMAT
     assert schema["properties"]["schema"]["const"] == SCHEMA
-    assert tuple(schema["properties"]["stages"]["properties"]) == STAGES
+    names = re.compile(schema["properties"]["stages"]["propertyNames"]["pattern"])
+    assert all(map(names.fullmatch, STAGES))
     for document, _ in mutations(manifest):
         if shape_fault(document, schemas.MANIFEST) == "":
             Manifest.from_bytes(json.dumps(document).encode(), file="manifest.json")

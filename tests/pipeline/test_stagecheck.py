@@ -14,6 +14,7 @@ import pytest
 from ptmtools.coverage.model import Ach
 from ptmtools.pipeline import validate
 from ptmtools.pipeline.stagecheck import check_stages
+from ptmtools.pipeline.stages import PVS, STAGES
 from ptmtools.store.archive import pack_arrays
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import sha256
@@ -70,7 +71,8 @@ def written(db: Path, stages: Arrays, damage: Callable[[bytes], bytes] = bytes) 
         for file, content in files.items():
             (db / file).write_bytes(content)
         outputs = {file: sha256(content) for file, content in files.items()}
-        records[name] = StageRecord(1, {}, {}, outputs, counts(name, stages))
+        recipe = STAGES[name].recipe
+        records[name] = StageRecord(recipe, {}, {}, outputs, counts(name, stages))
     manifest = Manifest("rooms.obj", records)
     (db / "manifest.json").write_bytes(manifest.to_bytes())
     return manifest
@@ -239,7 +241,7 @@ def test_counts(stages: Arrays, tmp_path: Path, stage: str, name: str, value: ob
 
 
 def test_a_stage_that_lists_no_arrays(stages: Arrays, tmp_path: Path) -> None:
-    manifest = written(tmp_path, stages).with_stages({"pvs": StageRecord(1, {}, {}, {})})
+    manifest = written(tmp_path, stages).with_stages({"pvs": StageRecord(PVS.recipe, {}, {}, {})})
     assert ("PTM-D720", "manifest.json", "") in found(tmp_path, manifest)
 
 

@@ -6,6 +6,7 @@ import io
 import pickle
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -329,16 +330,16 @@ def test_supported_formats_are_listed(put: Put) -> None:
 
 def test_bad_places_and_options(put: Put, tmp_path: Path) -> None:
     path = put("a.obj", QUAD + FACE)
-    cases: list[tuple[Path | str, IngestOptions, str]] = [
-        (tmp_path, IngestOptions(), "PTM-I241"),
-        (tmp_path / "gone.obj", IngestOptions(), "PTM-I240"),
-        ("a\0.obj", IngestOptions(), "PTM-I240"),
-        (path, IngestOptions(unit="mile"), "PTM-I250"),
-        (path, IngestOptions(up="x"), "PTM-I251"),
+    cases: list[tuple[Path | str, dict[str, Any], str]] = [
+        (tmp_path, {}, "PTM-I241"),
+        (tmp_path / "gone.obj", {}, "PTM-I240"),
+        ("a\0.obj", {}, "PTM-I240"),
+        (path, {"unit": "mile"}, "PTM-I250"),
+        (path, {"up": "x"}, "PTM-I251"),
     ]
     for place, options, code in cases:
         with pytest.raises(PtmError, match=code):
-            ingest(place, options)
+            ingest(place, IngestOptions(**options))
 
 
 def test_progress_ends_at_its_total(textured: Textured) -> None:

@@ -109,6 +109,7 @@ def test_a_database_of_lossy_textures() -> None:
         setting.knobs["profile"]: lossy.measure(setting).error < exact.measure(setting).error
         for setting in lossy.settings()
     }
+    assert smaller.pop("paper", False) is False  # needs an optional component
     assert smaller == {"raw": False, "fast": True, "small": True}
 
 

@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from ptmtools.cells.model import Cells
+from ptmtools.cli.main import main
 from ptmtools.errors import InputError
 from ptmtools.executors import Local
 from ptmtools.visibility import Pvs, PvsOptions, check_conservative, compute_pvs
@@ -233,6 +234,8 @@ def test_progress_is_reported(build_rooms):
     assert steps[-1] == (6, 6, "portals")
 
 
-def test_the_deprecated_option_is_accepted_with_a_note():
-    assert PvsOptions().notes == ()
-    assert "--no-pvs-exact" in PvsOptions(exact=False).notes[0]
+def test_the_deprecated_option_is_accepted_with_a_note(tmp_path, capsys):
+    assert PvsOptions(exact=False) == PvsOptions()
+    for option, noted in (("--no-pvs-exact", True), ("--pvs-exact", False)):
+        main(["pvs", str(tmp_path), option])
+        assert ("--no-pvs-exact does nothing any more" in capsys.readouterr().err) is noted
