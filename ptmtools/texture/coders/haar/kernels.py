@@ -37,7 +37,7 @@ from ptmtools.texture.coders.rans.kernels import (
     rotate_states,
     start_states,
 )
-from ptmtools.texture.coders.rans.tables import ESCAPE
+from ptmtools.texture.coders.rans.sizes import ESCAPE
 
 i32, u16 = np.int32, np.uint16
 

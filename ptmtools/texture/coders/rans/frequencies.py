@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ptmtools.compiled import plain_kernel as kernel
-from ptmtools.texture.coders.rans.tables import ESCAPE, TABLE_SIZE
+from ptmtools.texture.coders.rans.sizes import ESCAPE, TABLE_SIZE
 
 
 @kernel

@@ -16,12 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.texture.coders.damage import damaged
+from ptmtools.texture.coders.rans.sizes import ESCAPE, TABLE_BITS, TABLE_SIZE
 
-#: Bits of a table and its size: the frequencies of a table in use sum to this.
-TABLE_BITS = 11
-TABLE_SIZE = 1 << TABLE_BITS
-#: Symbols of this number escape to a 16-bit value, but for tables without escape.
-ESCAPE = 255
 #: Mean magnitudes, in sixteenths, of the built-in distributions 1, 2, …
 BUILT_IN_MEANS = (
     1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96, 112, 128, 160,

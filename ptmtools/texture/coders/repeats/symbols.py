@@ -8,7 +8,7 @@ import numpy as np
 
 from ptmtools.compiled import plain_kernel as kernel
 from ptmtools.texture.coders.rans.kernels import decode_single
-from ptmtools.texture.coders.rans.tables import ESCAPE
+from ptmtools.texture.coders.rans.sizes import ESCAPE
 
 #: First table of each sort of symbol: is the block the first guess; which guess it is; which guess
 #: a texel is, by position; the samples of texels that belong to no block; Haar differences; samples

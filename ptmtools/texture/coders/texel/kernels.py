@@ -25,7 +25,7 @@ from ptmtools.texture.coders.rans.kernels import (
     decode_single,
     start_states,
 )
-from ptmtools.texture.coders.rans.tables import ESCAPE
+from ptmtools.texture.coders.rans.sizes import ESCAPE
 
 OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2
 #: How the fourth texel follows from the others: not at all, as integers, as floats of 16, 32 bits.
