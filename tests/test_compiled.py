@@ -137,6 +137,23 @@ def test_a_numba_that_loads_machine_code_in_another_way(tmp_path: Path) -> None:
         kept.save_overload()
 
 
+def test_what_allocates_is_loaded_as_numba_does(tmp_path: Path) -> None:
+    """Only numba's way sets up the allocator: a second run ended with a segmentation fault."""
+
+    class Numbas:
+        def load_overload(self) -> str:
+            return "set up"
+
+        def _load_overload(self) -> str:
+            return "at once"
+
+    for allocates, way in ((True, "set up"), (False, "at once")):
+        kept = compiled._Kept(Numbas(), tmp_path / "lock", allocates=allocates)
+        assert kept.load_overload() == way
+    for decorated, allocates in ((compiled.kernel, True), (compiled.plain_kernel, False)):
+        assert decorated(len)._options.get("_nrt", True) is allocates
+
+
 def test_a_constant_of_this_package(tmp_path: Path) -> None:
     shutil.copytree(
         ROOT, tmp_path / "ptmtools", ignore=shutil.ignore_patterns("__pycache__", "schemas")
