@@ -172,7 +172,7 @@ class Run(Artifacts):
         rebuild: bool = False,
     ) -> None:
         super().__init__(db, model)
-        self._rebuild = rebuild
+        self.rebuild = rebuild
         self.writer = db
         self.workers = workers
         self.progress = progress
@@ -186,7 +186,7 @@ class Run(Artifacts):
 
     def before(self, stage: Stage[Any]) -> StageRecord | None:
         """As `Artifacts.before`; None for a run that does everything again."""
-        return None if self._rebuild else super().before(stage)
+        return None if self.rebuild else super().before(stage)
 
     def work(self, stage: Stage[Any], options: Options) -> StageRecord:
         """What a stage is to do.
@@ -283,6 +283,8 @@ class Job:
     def planned(self) -> tuple[StageRecord, tuple[str, ...]]:
         """What is to be done, and why; no reasons if the stage is current. Raises as `Run.work`."""
         work = self.run.work(self.stage, self.options)
+        if self.run.rebuild:
+            return work, ("a rebuild was asked for",)
         return work, reasons(self.run.before(self.stage), work, self.run.db)
 
     def make(self, transaction: Transaction) -> Made:
