@@ -23,6 +23,8 @@ from __future__ import annotations
 import heapq
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,19 +56,23 @@ class Tree:
 
     Attributes
     ----------
-    planes: (N, 4) the nodes' planes; walls: what lies in them.
+    walls: the nodes' planes, and what lies in them.
     children: (N, 2) int32 as in `Cells.node_child`.
     leaves: the convex polyhedra, face tags are node indices.
     unsplit: how many of them hold walls that the limit left in one piece.
     capped: for each node that a cap splits, its polyhedron.
     """
 
-    planes: NDArray[np.float64]
     walls: tuple[WallPlane, ...]
     children: NDArray[np.int32]
     leaves: tuple[Polyhedron, ...]
     unsplit: int = 0
     capped: Mapping[int, Polyhedron] = field(default_factory=dict)
+
+    @cached_property
+    def planes(self) -> NDArray[np.float64]:
+        """(N, 4) the nodes' planes."""
+        return np.array([wall.frame.plane for wall in self.walls]).reshape(-1, 4)
 
 
 @dataclass(frozen=True)
@@ -81,16 +87,16 @@ class _Fragment:
     section_area: float
 
 
-@dataclass(order=True)
-class _Task:
-    """A node that waits for its split, and what its fragments are of: walls, reveals or caps."""
+class _Task(NamedTuple):
+    """A node that waits for its split, and what its fragments are of: walls, reveals or caps. No
+    two have one ``priority``."""
 
     priority: tuple[bool, int, int, int]
-    body: Polyhedron = field(compare=False)
-    fragments: list[_Fragment] = field(compare=False)
-    best: int = field(compare=False)
-    parent: tuple[int, int] = field(compare=False)
-    source: int = field(compare=False)
+    body: Polyhedron
+    fragments: list[_Fragment]
+    best: int
+    parent: tuple[int, int]
+    source: int
 
 
 def build_tree(
@@ -105,7 +111,6 @@ def build_tree(
     """Split ``box`` by the planes of ``walls``, then of ``reveals``, then of ``caps``; in
     the order that the module describes."""
     least = (FRAGMENT_SHARE * options.wall_area, 0.0, 0.0)
-    planes: list[NDArray[np.float64]] = []
     taken: list[WallPlane] = []
     children: list[list[int]] = []
     leaves: list[Polyhedron] = []
@@ -124,17 +129,17 @@ def build_tree(
     def push(
         body: Polyhedron, fragments: list[_Fragment], parent: tuple[int, int], source: int
     ) -> None:
-        best = _best_split(body, fragments, least[source], planes, taken, tolerance)
+        best = _best_split(body, fragments, least[source], taken, tolerance)
         while best < 0 and source < _CAPS:
             source += 1
-            more = reveals.within(body, planes) if source == _REVEALS else caps.within(body)
+            more = reveals.within(body, taken) if source == _REVEALS else caps.within(body)
             fragments = _sections(body, more, tolerance, whole=source == _CAPS)
-            best = _best_split(body, fragments, least[source], planes, taken, tolerance)
+            best = _best_split(body, fragments, least[source], taken, tolerance)
         if best < 0:
             finish(body, parent)
             return
         share = fragments[best].area / tolerance.extent**2
-        priority = (source == _CAPS, -round(share / TIE_SHARE), len(planes), parent[1])
+        priority = (source == _CAPS, -round(share / TIE_SHARE), len(taken), parent[1])
         heapq.heappush(queue, _Task(priority, body, fragments, best, parent, source))
 
     push(box, _sections(box, walls, tolerance), (-1, 0), _WALLS)
@@ -146,8 +151,7 @@ def build_tree(
             continue
         wall = task.fragments[task.best].wall
         plane = wall.frame.plane
-        node = len(planes)
-        planes.append(plane)
+        node = len(taken)
         taken.append(wall)
         children.append([OUTSIDE, OUTSIDE])
         if task.source == _CAPS:
@@ -171,7 +175,6 @@ def build_tree(
                 push(body, _fragments(inherited, tolerance), (node, side), task.source)
         progress(len(leaves), len(leaves) + len(queue), "splitting")
     return Tree(
-        np.array(planes).reshape(-1, 4),
         tuple(taken),
         np.array(children, dtype=np.int32).reshape(-1, 2),
         tuple(leaves),
@@ -258,7 +261,6 @@ def _best_split(
     body: Polyhedron,
     fragments: list[_Fragment],
     least: float,
-    planes: list[NDArray[np.float64]],
     taken: list[WallPlane],
     tolerance: Tolerance,
 ) -> int:
@@ -275,7 +277,7 @@ def _best_split(
         depth = min(reach.max(), -reach.min())
         if depth < tolerance.thin:
             continue
-        if depth < tolerance.cluster and _closes(body, f, planes, taken, tolerance) < max(
+        if depth < tolerance.cluster and _closes(body, f, taken, tolerance) < max(
             least, tolerance.hairline**2
         ):
             continue
@@ -294,7 +296,6 @@ def _best_split(
 def _closes(
     body: Polyhedron,
     fragment: _Fragment,
-    planes: list[NDArray[np.float64]],
     taken: list[WallPlane],
     tolerance: Tolerance,
 ) -> float:
@@ -304,7 +305,8 @@ def _closes(
     frame = fragment.wall.frame
     for tag in sorted({tag for tag in body.tags if tag >= 0}):
         near = taken[tag].frame
-        if np.max(np.abs(fragment.points @ planes[tag][:3] + planes[tag][3])) < tolerance.cluster:
+        plane = near.plane
+        if np.max(np.abs(fragment.points @ plane[:3] + plane[3])) < tolerance.cluster:
             moved = shapely.transform(
                 fragment.shape,
                 lambda flat, near=near: near.to_plane(frame.to_space(flat)),

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.polyhedron import BOX_FACE
-from ptmtools.cells.portals import Portals
+from ptmtools.cells.portals import Portal
 from ptmtools.cells.vectors import cross
 from ptmtools.tolerance import ranked
 
@@ -51,43 +51,33 @@ class Reach:
         return Reach(reached, self.closed, start)
 
 
-def flood(
-    tree: Tree, portals: Portals, corners: NDArray[np.float64], start: tuple[int, ...]
-) -> Reach:
-    """Flood through the portals from ``start``, or from the leaf that the module describes.
-
-    Parameters
-    ----------
-    corners: (T, 3, 3) structural triangles, in which the floor is looked for.
-    """
-    outer = np.array([BOX_FACE in body.tags for body in tree.leaves], dtype=bool)
-    if not start:
-        start = largest_with_floor(tree, ~outer, corners)
-    if not start and not outer.all():
-        start = (_by_volume(tree, ~outer)[0],)
+def flood(tree: Tree, portals: list[Portal], start: tuple[int, ...]) -> Reach:
+    """Flood through the portals from the leaves ``start``."""
+    ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
     reached, count = np.zeros(len(tree.leaves), dtype=bool), 0
     reached[list(start)] = True
     while count < (count := int(reached.sum())):
-        reached[portals.leaves[reached[portals.leaves].any(axis=1)]] = True
-    closed = bool(start) and not bool(np.any(reached & outer))
-    return Reach(reached, closed, start)
+        reached[ends[reached[ends].any(axis=1)]] = True
+    return Reach(reached, bool(start) and not np.any(reached & at_box(tree)), start)
 
 
-def largest_with_floor(
+def at_box(tree: Tree) -> NDArray[np.bool_]:
+    """(L,) which leaves touch the root box."""
+    return np.array([BOX_FACE in body.tags for body in tree.leaves], dtype=bool)
+
+
+def largest_leaf(
     tree: Tree, allowed: NDArray[np.bool_], corners: NDArray[np.float64]
 ) -> tuple[int, ...]:
-    """The largest allowed leaf with floor below its middle, as a tuple of one, or ()."""
-    for leaf in _by_volume(tree, allowed):
+    """The largest of the (L,) allowed leaves that has floor below its middle, or if none has the
+    largest, as a tuple of one; () if none is allowed. The floor is looked for in the (T, 3, 3)
+    structural triangles ``corners``."""
+    leaves = np.flatnonzero(allowed)
+    order = leaves[ranked(np.array([tree.leaves[leaf].volume for leaf in leaves]))].tolist()
+    for leaf in order:
         if np.any(_plumb(tree.leaves[leaf].points.mean(axis=0), corners) < 0):
             return (leaf,)
-    return ()
-
-
-def _by_volume(tree: Tree, allowed: NDArray[np.bool_]) -> list[int]:
-    """The allowed leaves, the largest first."""
-    leaves = np.flatnonzero(allowed)
-    order = ranked(np.array([tree.leaves[leaf].volume for leaf in leaves]))
-    return [int(leaf) for leaf in leaves[order]]
+    return tuple(order[:1])
 
 
 def roofed_share(corners: NDArray[np.float64], floor_area: float) -> float:

@@ -29,12 +29,12 @@ class Reveals:
     def __getstate__(self) -> dict[str, object]:
         return {**vars(self), "_known": {}}  # which another thread may be adding to
 
-    def within(self, body: Polyhedron, planes: list[NDArray[np.float64]]) -> list[WallPlane]:
+    def within(self, body: Polyhedron, walls: list[WallPlane]) -> list[WallPlane]:
         """The reveals of the slab that a body lies in; none if it lies in no wall.
 
-        ``planes`` are those of the BSP nodes that the tags of the body's faces name.
+        ``walls`` are those of the BSP nodes that the tags of the body's faces name.
         """
-        slab = self._slab(_bounds(body, planes))
+        slab = self._slab(_bounds(body, walls))
         if slab is None:
             return []
         key = slab[0].tobytes() + slab[1].tobytes()
@@ -81,9 +81,10 @@ class Reveals:
         return found
 
 
-def _bounds(body: Polyhedron, planes: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+def _bounds(body: Polyhedron, walls: list[WallPlane]) -> list[NDArray[np.float64]]:
     """The planes of a body's faces: those of the BSP, and those of the root box, in which the
     outer faces of a building lie when the box is clipped to it."""
-    bounds = [planes[tag] for tag in sorted({tag for tag in body.tags if tag != BOX_FACE})]
-    outer = [face for face, tag in enumerate(body.tags) if tag == BOX_FACE]
-    return bounds + list(body.planes[outer])
+    bounds = [
+        walls[tag].frame.plane for tag in sorted({tag for tag in body.tags if tag != BOX_FACE})
+    ]
+    return bounds + [p for p, tag in zip(body.planes, body.tags, strict=True) if tag == BOX_FACE]

@@ -13,7 +13,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,8 @@ from ptmtools.cells.model import OUTSIDE, Cells, sunk
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.polyhedron import Polyhedron
-from ptmtools.cells.portals import Portals, find_portals, portals_rejoined
-from ptmtools.cells.reach import Reach, flood, largest_with_floor, roofed_share
+from ptmtools.cells.portals import Portal, find_portals, portals_rejoined
+from ptmtools.cells.reach import Reach, at_box, flood, largest_leaf, roofed_share
 from ptmtools.cells.rejoin import rejoined
 from ptmtools.cells.reveals import Reveals
 from ptmtools.cells.structure import Structure, WallPlane, find_walls, matches
@@ -66,25 +66,12 @@ class _Model:
 
 
 @dataclass(frozen=True)
-class _Box:
-    """A root box, (2, 3) ``bounds``. Its sides run along the rows of ``axes`` (3, 3); without them
-    it is parallel to the coordinate axes, and leaves at it count as inside."""
-
-    bounds: NDArray[np.float64]
-    axes: NDArray[np.float64] | None = None
-
-    @property
-    def inside(self) -> bool:
-        return self.axes is None
-
-
-@dataclass(frozen=True)
 class _Space:
-    """One subdivision of one root box."""
+    """One subdivision of one root box, of which ``box``, (2, 3), is the bounding box."""
 
     box: NDArray[np.float64]
     tree: Tree
-    portals: Portals
+    portals: list[Portal]
     reach: Reach
 
 
@@ -111,16 +98,17 @@ def subdivide(
     corners, tolerance = model.structure.corners, model.structure.tolerance
     low, high = _bounds(scene.corners @ axes.T)
     margin = BOX_MARGIN * tolerance.extent
-    wide = _Box(np.array([low - margin, high + margin]), axes)
-    tight = _Box(_thickened(*_bounds(corners if len(corners) else scene.corners), tolerance))
+    wide = Polyhedron.box(low - margin, high + margin)
+    wide = replace(wide, points=wide.points @ axes)
+    tight = _thickened(*_bounds(corners if len(corners) else scene.corners), tolerance)
     notes: list[str] = []
     executor = executor or Serial()
-    clipped = executor.submit(_divide, model, tight, long=len(scene.triangles) >= LARGE)
+    clipped = executor.submit(_divide_inside, model, tight, long=len(scene.triangles) >= LARGE)
     try:
         space = _divide(model, wide, progress)
         if not space.reach.closed:
             roofed = roofed_share(corners, options.wall_area)
-            notes.append(_open_note(space, roofed, tight.bounds))
+            notes.append(_open_note(space, roofed, tight))
             space = clipped.result()
     finally:
         clipped.cancel()
@@ -151,31 +139,28 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
             )
 
 
-def _divide(model: _Model, root: _Box, progress: Progress = silent) -> _Space:
+def _divide_inside(model: _Model, bounds: NDArray[np.float64]) -> _Space:
+    """Subdivide the box between two corners, (2, 3); leaves at its sides count as inside."""
+    return _divide(model, Polyhedron.box(*bounds), inside=True)
+
+
+def _divide(
+    model: _Model, root: Polyhedron, progress: Progress = silent, inside: bool = False
+) -> _Space:
     """Subdivide a root box and flood it."""
     corners, tolerance = model.structure.corners, model.structure.tolerance
     options = model.options
-    box = root.bounds
-    body = Polyhedron.box(box[0], box[1])
-    if root.axes is not None:
-        body = Polyhedron(body.points @ root.axes, body.faces, body.tags)
-        box = np.stack(_bounds(body.points))
-    tree = build_tree(body, model.walls, model.reveals, model.caps, options, tolerance, progress)
+    box = np.stack(_bounds(root.points))
+    tree = build_tree(root, model.walls, model.reveals, model.caps, options, tolerance, progress)
     portals = find_portals(tree, tolerance)
     start = _viewpoint_leaves(tree, box, options)
-    if not start and root.inside:
-        every = np.ones(len(tree.leaves), dtype=bool)
-        start = largest_with_floor(tree, every, corners) or _largest(tree)
-    reach = flood(tree, portals, corners, start)
-    if tree.capped and (root.inside or reach.closed):  # else it is thrown away
+    start = start or largest_leaf(tree, at_box(tree) <= inside, corners)
+    reach = flood(tree, portals, start)
+    if tree.capped and (inside or reach.closed):  # else it is thrown away
         joint = rejoined(tree, reach.reached)
         portals = portals_rejoined(portals, tree, joint, tolerance)
         tree, reach = joint.tree, reach.renamed(joint.leaf)
     return _Space(box, tree, portals, reach)
-
-
-def _largest(tree: Tree) -> tuple[int, ...]:
-    return (max(range(len(tree.leaves)), key=lambda i: (tree.leaves[i].volume, -i)),)
 
 
 def _viewpoint_leaves(
@@ -225,7 +210,8 @@ def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> 
     keep = space.reach.reached
     rename = np.where(keep, np.cumsum(keep) - 1, -1).astype(np.int32)
     bodies = [tree.leaves[i] for i in np.flatnonzero(keep)]
-    portals = space.portals.among(keep, rename)
+    portals = [portal for portal in space.portals if keep[[*portal.leaves]].all()]
+    ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
     children = tree.children.copy()
     is_leaf = children <= -2
     leaf = rename[-2 - children[is_leaf]]
@@ -254,11 +240,11 @@ def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> 
         face_index=np.concatenate(loops).astype(np.int32),
         face_start=_starts(map(len, loops)),
         leaf_face_start=_starts(len(b.faces) for b in bodies),
-        portal_leaf=portals.leaves,
-        portal_plane=portals.planes,
-        portal_point=np.concatenate([np.zeros((0, 3)), *portals.polygons]),
-        portal_start=_starts(map(len, portals.polygons)),
-        portal_area=portals.areas,
+        portal_leaf=rename[ends],
+        portal_plane=tree.planes[[portal.node for portal in portals]].reshape(-1, 4),
+        portal_point=np.concatenate([np.zeros((0, 3)), *(portal.polygon for portal in portals)]),
+        portal_start=_starts(len(portal.polygon) for portal in portals),
+        portal_area=np.array([portal.area for portal in portals]),
         vertex=vertex,
         vertex_uv=vertex_uv,
         triangle=triangle,
