@@ -18,6 +18,7 @@ from ptmtools.cells.model import Cells
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.rooms import room_of_leaf
 from ptmtools.cells.sight import sampled_sight
+from ptmtools.cells.vectors import areas
 
 #: Shares of a triangle that differ by less are equal, in digits.
 DIGITS = 6
@@ -91,12 +92,11 @@ def _sides(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
     """(n,) leaves and (n,) pieces of geometry that belong to them, of cells that are single leaves;
     what lies in a boundary counts on both sides. And (M,) the areas of the pieces, m²."""
-    a, b, c = np.moveaxis(cells.vertex[cells.triangle], 1, 0)
     front, back = cells.triangle_cell.T
     behind = (back >= 0) & (back != front)
     leaf = np.concatenate([front[front >= 0], back[behind]]).astype(np.int64)
     piece = np.concatenate([np.flatnonzero(front >= 0), np.flatnonzero(behind)])
-    return leaf, piece, np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    return leaf, piece, areas(cells.vertex[cells.triangle])
 
 
 def _joined(cells: Cells, group: NDArray[np.int32]) -> Cells:

@@ -75,3 +75,14 @@ class Groups(ABC):
         while not np.array_equal(found, found[found]):
             found = found[found]
         return found
+
+
+def connected(count: int, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(count,) the least of those that each thing hangs together with through pairs of (n,) ``one``
+    and ``other``, listed both ways."""
+    group = np.arange(count)
+    while np.any(group[one] != group[other]):
+        least = group.copy()
+        np.minimum.at(least, group[one], group[other])
+        group = least[least[group]]  # pointer jumping: long strips need few rounds
+    return group

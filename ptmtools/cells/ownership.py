@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.bsp import Tree
-from ptmtools.cells.vectors import cross
+from ptmtools.cells.vectors import normals
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance
 
@@ -66,7 +66,7 @@ class _Batch:
 def cut_to_leaves(scene: Scene, tree: Tree, tolerance: Tolerance) -> Pieces:
     """Cut all triangles of a scene along the planes of a tree."""
     corners = scene.corners
-    normals = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facing = normals(corners)
     count = len(corners)
     whole = _Batch(
         points=corners,
@@ -75,12 +75,12 @@ def cut_to_leaves(scene: Scene, tree: Tree, tolerance: Tolerance) -> Pieces:
         front=np.full(count, -1),
         lying=np.zeros(count, dtype=bool),
     )
-    batch, front = _sink(tree, whole, normals, tolerance)
+    batch, front = _sink(tree, whole, facing, tolerance)
     within = batch.take(~batch.lying)
     within_leaf = front[~batch.lying]
     boundary = batch.take(batch.lying)
     boundary = _Batch(**{**vars(boundary), "front": front[batch.lying]})
-    boundary, back = _sink(tree, boundary, -normals, tolerance)
+    boundary, back = _sink(tree, boundary, -facing, tolerance)
     pieces = _Batch.join([within, boundary])
     leaf = np.concatenate(
         [np.stack([within_leaf, within_leaf], axis=1), np.stack([boundary.front, back], axis=1)]

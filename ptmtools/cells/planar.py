@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.cells.merging import connected
 from ptmtools.cells.nearby import along_a_curve
 
 #: A shapely geometry, or an array of them.
@@ -77,12 +78,7 @@ def neighbours(polygons: Geometry, gap: float) -> NDArray[np.int64]:
 
     tree = shapely.STRtree(polygons)
     one, other = tree.query(polygons, predicate="dwithin", distance=gap)
-    label = np.arange(len(polygons))
-    while np.any(label[one] != label[other]):
-        least = label.copy()
-        np.minimum.at(least, label[one], label[other])
-        label = least[least[label]]
-    return label
+    return connected(len(polygons), one, other)
 
 
 def without_cracks(opening: Geometry, width: float, grid: float) -> Geometry:

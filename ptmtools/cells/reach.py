@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.polyhedron import BOX_FACE
 from ptmtools.cells.portals import Portal
-from ptmtools.cells.vectors import cross
+from ptmtools.cells.vectors import normals
 from ptmtools.tolerance import ranked
 
 #: A surface whose normal leans less than this from the vertical can be stood on (cosine of 45°).
@@ -86,7 +86,7 @@ def roofed_share(corners: NDArray[np.float64], floor_area: float) -> float:
     Floor is every level triangle of at least a tenth of ``floor_area`` m²; a ceiling is floor that
     nothing covers, so of the triangles over one another at a place only the lowest is floor.
     """
-    normal = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = normals(corners)
     area = np.linalg.norm(normal, axis=1) / 2
     level = np.abs(normal[:, 1]) >= FLOOR_COSINE * 2 * area
     floor = np.flatnonzero(level & (area >= floor_area / 10))
@@ -112,7 +112,7 @@ def _plumb(eye: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np
     side = flat[:, :, 0] * turn[:, :, 1] - flat[:, :, 1] * turn[:, :, 0]
     hit = np.flatnonzero(np.all(side >= 0, axis=1) | np.all(side <= 0, axis=1))
     p = corners[hit]
-    normal = cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    normal = normals(p)
     level = np.abs(normal[:, 1]) >= FLOOR_COSINE * np.linalg.norm(normal, axis=1)
     level &= normal[:, 1] != 0
     p, normal = p[level], normal[level]

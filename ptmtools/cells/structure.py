@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from ptmtools.cells.nearby import Nearby
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
-from ptmtools.cells.vectors import cross
+from ptmtools.cells.vectors import cross, normals
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
 
@@ -177,7 +177,7 @@ def planes_of(
     corners: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(n, 4) planes with one sign for both windings, and (n,) areas, of (n, 3, 3) triangles."""
-    normal = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = normals(corners)
     double = np.linalg.norm(normal, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         normal = np.where(double[:, None] > 0, normal / double[:, None], 0.0)

@@ -1,4 +1,4 @@
-"""Products of a few vectors at a time."""
+"""Products of vectors, and the triangles and tetrahedra that they span."""
 
 from __future__ import annotations
 
@@ -16,3 +16,28 @@ def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]
     found[..., 1] = az * bx - ax * bz
     found[..., 2] = ax * by - ay * bx
     return found
+
+
+def normals(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 3) vectors perpendicular to (n, 3, 3) triangles, twice as long as these are large."""
+    return cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def areas(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) areas of (n, 3, 3) triangles, m²."""
+    return np.asarray(np.linalg.norm(normals(corners), axis=1) / 2)
+
+
+def volumes(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) volumes of (n, 4, 3) tetrahedra, m³."""
+    a, b, c = (corners[:, 1:] - corners[:, :1]).transpose(1, 0, 2)
+    return np.asarray(np.abs(np.einsum("ij,ij->i", a, cross(b, c))) / 6)
+
+
+def fans(start: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """(m, 3) corners, by row, of the triangles that fan out from the first corner of each polygon
+    of the CSR ``start``, and (m,) the polygon of each."""
+    size = np.maximum(np.diff(start) - 2, 0)
+    polygon = np.repeat(np.arange(len(size)), size)
+    second = start[polygon] + 1 + np.arange(len(polygon)) - (np.cumsum(size) - size)[polygon]
+    return np.stack([start[polygon], second, second + 1], axis=1), polygon

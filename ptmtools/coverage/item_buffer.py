@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
+from ptmtools.cells.vectors import normals
 from ptmtools.coverage.sample_points import SamplePoints
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import DEPTH_SHARE
@@ -88,8 +89,7 @@ class Surfaces:
         extent = float((high - low).max())
         scale = 2.0 ** -np.frexp(extent)[1] if extent > 0 else 1.0
         vertex = (cells.vertex - centre) * scale
-        source = scene.corners[cells.triangle_source]
-        normal = np.cross(source[:, 1] - source[:, 0], source[:, 2] - source[:, 0])
+        normal = normals(scene.corners[cells.triangle_source])
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
         offset = -np.einsum("ij,ij->i", normal, vertex[cells.triangle[:, 0]])

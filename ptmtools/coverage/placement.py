@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
+from ptmtools.cells.vectors import volumes
 from ptmtools.coverage.sobol import sobol, uniform
 
 #: Points of the cloud that is divided into parts, for each part: enough that parts of equal count
@@ -43,60 +44,33 @@ FILLED = 1 / 32
 
 @dataclass(frozen=True)
 class Tetrahedra:
-    """Disjoint tetrahedra that fill the leaves.
+    """Disjoint tetrahedra that fill the cells.
 
     Attributes
     ----------
-    corners, volume: (n, 4, 3) metres and (n,) m³; flat ones are left out.
-    leaf_start: (L + 1,) CSR over leaves.
-    leaves, cell_start: (L,) the leaves in the order of their cells, (C + 1,) CSR over cells.
+    corners, volume: (n, 4, 3) metres and (n,) m³, in the order of their cells; flat ones are left
+        out.
+    start: (C + 1,) CSR over cells.
     """
 
     corners: NDArray[np.float64]
     volume: NDArray[np.float64]
-    leaf_start: NDArray[np.int64]
-    leaves: NDArray[np.int64]
-    cell_start: NDArray[np.int64]
+    start: NDArray[np.int64]
 
     @staticmethod
     def of(cells: Cells) -> Tetrahedra:
-        """Fans over the faces of every leaf, from the middle of its vertices."""
-        points = np.diff(cells.leaf_point_start)
-        if not len(points):
-            nothing = np.zeros(0, np.int64)
-            start = np.zeros(1, np.int64)
-            return Tetrahedra(np.zeros((0, 4, 3)), np.zeros(0), start, nothing, start)
-        middle = np.add.reduceat(cells.leaf_point, cells.leaf_point_start[:-1]) / points[:, None]
-        size = np.maximum(np.diff(cells.face_start) - 2, 0)
-        face = np.repeat(np.arange(len(size)), size)
-        first = cells.face_start[:-1][face]
-        second = first + 1 + np.arange(len(face)) - np.repeat(np.cumsum(size) - size, size)
-        leaf = np.searchsorted(cells.leaf_face_start, face, "right") - 1
-        loop = cells.leaf_point[cells.face_index]
-        corners = np.stack([middle[leaf], loop[first], loop[second], loop[second + 1]], axis=1)
-        volume = volumes(corners)
-        solid = volume > 0
-        return Tetrahedra(
-            corners[solid],
-            volume[solid],
-            np.searchsorted(leaf[solid], np.arange(len(points) + 1)),
-            np.argsort(cells.leaf_cell, kind="stable"),
-            np.concatenate([[0], np.cumsum(np.bincount(cells.leaf_cell))]),
-        )
+        """Those of all leaves."""
+        corners, leaf = cells.tetrahedra()
+        volume, cell = volumes(corners), cells.leaf_cell[leaf]
+        order = np.argsort(cell, kind="stable")
+        order = order[volume[order] > 0]
+        start = np.searchsorted(cell[order], np.arange(cells.cell_count + 1))
+        return Tetrahedra(corners[order], volume[order], start)
 
     def of_cell(self, cell: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Those of a cell, and their volumes."""
-        leaves = self.leaves[self.cell_start[cell] : self.cell_start[cell + 1]]
-        first, size = self.leaf_start[leaves], np.diff(self.leaf_start)[leaves]
-        before = np.cumsum(size) - size
-        rows = np.repeat(first - before, size) + np.arange(int(size.sum()))
+        rows = slice(*self.start[cell : cell + 2])
         return self.corners[rows], self.volume[rows]
-
-
-def volumes(tetra: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) volumes of (n, 4, 3) tetrahedra, m³."""
-    a, b, c = (tetra[:, 1:] - tetra[:, :1]).transpose(1, 0, 2)
-    return np.asarray(np.abs(np.einsum("ij,ij->i", a, np.cross(b, c))) / 6, dtype=np.float64)
 
 
 def filling(

@@ -27,8 +27,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.cells.merging import connected
 from ptmtools.cells.model import Cells
 from ptmtools.cells.nearby import Nearby
+from ptmtools.cells.vectors import areas
 from ptmtools.scene.model import Scene
 
 #: Directions of the parity rays. Fixed, in no simple relation to each other or to the axes, so
@@ -120,16 +122,10 @@ def edges(corner: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool
 def edge_groups(edge: NDArray[np.int64]) -> NDArray[np.int64]:
     """(T,) for each triangle, of the (T, 3) ``edges``, the least index of the triangles that it
     hangs together with through shared edges."""
-    count = len(edge)
-    group = np.arange(count)
-    while True:
-        least = np.full(int(edge.max()) + 1, count)
-        np.minimum.at(least, edge, group[:, None])
-        better = np.minimum(group, least[edge].min(axis=1))
-        better = better[better]  # pointer jumping: long strips need few rounds
-        if np.array_equal(better, group):
-            return group
-        group = better
+    order = np.argsort(edge, axis=None, kind="stable")
+    same = np.flatnonzero(np.diff(edge.reshape(-1)[order]) == 0)
+    one, other = order[same] // 3, order[same + 1] // 3
+    return connected(len(edge), np.append(one, other), np.append(other, one))
 
 
 def closed_and_oriented(
@@ -149,12 +145,6 @@ def signed_volume(corners: NDArray[np.float64]) -> float:
     """Volume enclosed by a closed surface of (n, 3, 3) corners, positive if wound outwards."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
-
-
-def areas(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) areas of (n, 3, 3) triangles, m²."""
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(np.linalg.norm(normal, axis=1) / 2)
 
 
 def boundary_area(scene: Scene, cells: Cells) -> NDArray[np.float64]:

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
+from ptmtools.cells.vectors import areas, fans, volumes
 from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
 from ptmtools.visibility.model import Pvs
@@ -159,61 +160,58 @@ class Sampler:
     """Draws segments in and around the cells; the kinds are those of the module's head."""
 
     def __init__(self, cells: Cells) -> None:
-        self.tetrahedra, owner = tetrahedra(cells)
-        edge = self.tetrahedra[:, 1:] - self.tetrahedra[:, :1]
-        volume = np.abs(np.linalg.det(edge))
-        self.by_volume = _cumulated(volume)
-        of_leaf = np.bincount(owner, weights=volume, minlength=cells.leaf_count)
-        self.by_leaf = _cumulated(volume / np.maximum(of_leaf, np.finfo(np.float64).tiny)[owner])
+        corners, leaf = cells.tetrahedra()
+        volume = volumes(corners)
+        self.by_volume = _Inside(corners, volume)
+        self.by_leaf = _Inside(corners, _shared(volume, leaf))
+        rows, portal = fans(cells.portal_start)
+        triangles = cells.portal_point[rows]
+        self.by_portal = _Inside(triangles, _shared(areas(triangles), portal))
         self.extent = float(np.ptp(cells.root_box, axis=0).max())
-        fans = [cells.portal(k) for k in range(cells.portal_count)]
-        rows = [np.stack([f[:1].repeat(len(f) - 2, 0), f[1:-1], f[2:]], axis=1) for f in fans]
-        self.portals = np.concatenate(rows) if rows else np.zeros((0, 3, 3))
-        area = np.linalg.norm(
-            np.cross(
-                self.portals[:, 1] - self.portals[:, 0], self.portals[:, 2] - self.portals[:, 0]
-            ),
-            axis=1,
-        )
-        of_portal = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
-        total = np.bincount(of_portal, weights=area, minlength=len(rows))
-        self.by_portal = _cumulated(area / np.maximum(total, np.finfo(np.float64).tiny)[of_portal])
 
     def segments(
         self, rng: np.random.Generator, count: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(count, 3) starts and ends."""
-        quarter = [count // 4 + (i < count % 4) for i in range(4)]
-        start = [self._inside(rng, self.by_volume, quarter[0])]
-        end = [self._inside(rng, self.by_volume, quarter[0])]
-        start.append(self._inside(rng, self.by_leaf, quarter[1]))
-        end.append(self._inside(rng, self.by_leaf, quarter[1]))
-        start.append(self._inside(rng, self.by_leaf, quarter[2]))
-        end.append(start[2] + self._arm(rng, _direction(rng, quarter[2])))
-        if len(self.portals):
-            middle = self._on_portals(rng, quarter[3])
-            along = _direction(rng, quarter[3])
-            start.append(middle - self._arm(rng, along))
-            end.append(middle + self._arm(rng, along))
-        return np.concatenate(start), np.concatenate(end)
-
-    def _inside(
-        self, rng: np.random.Generator, cumulated: NDArray[np.float64], count: int
-    ) -> NDArray[np.float64]:
-        corner = self.tetrahedra[np.searchsorted(cumulated, rng.random(count), side="right")]
-        weight = rng.exponential(size=(count, 4, 1))
-        mixed: NDArray[np.float64] = (corner * weight).sum(axis=1) / weight.sum(axis=1)
-        return mixed
-
-    def _on_portals(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
-        corner = self.portals[np.searchsorted(self.by_portal, rng.random(count), side="right")]
-        weight = rng.exponential(size=(count, 3, 1))
-        mixed: NDArray[np.float64] = (corner * weight).sum(axis=1) / weight.sum(axis=1)
-        return mixed
+        a, b, c, d = (count // 4 + (i < count % 4) for i in range(4))
+        anywhere, leaf = self.by_volume, self.by_leaf
+        ends = [
+            (anywhere.draw(rng, a), anywhere.draw(rng, a)),
+            (leaf.draw(rng, b), leaf.draw(rng, b)),
+        ]
+        start = leaf.draw(rng, c)
+        ends.append((start, start + self._arm(rng, _direction(rng, c))))
+        if len(self.by_portal.corners):
+            middle, along = self.by_portal.draw(rng, d), _direction(rng, d)
+            ends.append((middle - self._arm(rng, along), middle + self._arm(rng, along)))
+        starts, others = zip(*ends, strict=True)
+        return np.concatenate(starts), np.concatenate(others)
 
     def _arm(self, rng: np.random.Generator, along: NDArray[np.float64]) -> NDArray[np.float64]:
         exponent = rng.uniform(np.log(SHORTEST), np.log(LONGEST), size=(len(along), 1))
         return along * (np.exp(exponent) * self.extent)
+
+
+class _Inside:
+    """Draws points in (n, k, 3) simplices, from each in proportion to its (n,) weight."""
+
+    def __init__(self, corners: NDArray[np.float64], weight: NDArray[np.float64]) -> None:
+        self.corners = corners
+        total = np.cumsum(weight if weight.any() else np.ones(len(corners)))
+        self._until = total / total[-1:]
+
+    def draw(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+        """(count, 3) points."""
+        corner = self.corners[np.searchsorted(self._until, rng.random(count), side="right")]
+        weight = rng.exponential(size=(*corner.shape[:2], 1))
+        mixed: NDArray[np.float64] = (corner * weight).sum(axis=1) / weight.sum(axis=1)
+        return mixed
+
+
+def _shared(size: NDArray[np.float64], owner: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(n,) sizes as shares of those of their owners."""
+    total = np.bincount(owner, size)[owner]
+    return size / np.maximum(total, np.finfo(np.float64).tiny)
 
 
 class Blockers:
@@ -244,28 +242,6 @@ class Blockers:
         reach = np.ones(len(start), dtype=np.float32)
         hit = self._scene.run(origin, along, dists=reach, query="OCCLUDED")
         return np.asarray(hit >= 0, dtype=np.bool_)
-
-
-def tetrahedra(cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """(n, 4, 3) tetrahedra that fill the leaves, and the (n,) leaf of each."""
-    corners, owner = [np.zeros((0, 4, 3))], [np.zeros(0, np.int64)]
-    for leaf in range(cells.leaf_count):
-        apex = cells.leaf_points(leaf).mean(axis=0)
-        for loop in cells.leaf_faces(leaf):
-            face = cells.leaf_point[loop]
-            fan = np.stack(np.broadcast_arrays(apex[None], face[:1], face[1:-1], face[2:]), axis=1)
-            corners.append(fan)
-            owner.append(np.full(len(fan), leaf, np.int64))
-    return np.concatenate(corners), np.concatenate(owner)
-
-
-def _cumulated(weight: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cumulated shares for drawing by `searchsorted`; never quite 1 before the end."""
-    total = np.cumsum(weight)
-    if len(total) == 0 or total[-1] <= 0:
-        return np.arange(1, len(weight) + 1) / max(len(weight), 1)
-    shares: NDArray[np.float64] = total / total[-1]
-    return shares
 
 
 def _direction(rng: np.random.Generator, count: int) -> NDArray[np.float64]:

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ptmtools.coverage.placement import TRIES, Tetrahedra, Volume, filling, strata, volumes
+from ptmtools.cells.vectors import volumes
+from ptmtools.coverage.placement import TRIES, Tetrahedra, Volume, filling, strata
 from ptmtools.coverage.sobol import sobol, uniform
 
 FROZEN_SOBOL = [
