@@ -29,6 +29,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats
 from ptmtools.cells.caps import Caps
 from ptmtools.cells.model import OUTSIDE
 from ptmtools.cells.options import SubdivideOptions
@@ -70,7 +71,7 @@ class Tree:
     capped: Mapping[int, Polyhedron] = field(default_factory=dict)
 
     @cached_property
-    def planes(self) -> NDArray[np.float64]:
+    def planes(self) -> Floats:
         """(N, 4) the nodes' planes."""
         return np.array([wall.frame.plane for wall in self.walls]).reshape(-1, 4)
 
@@ -82,8 +83,8 @@ class _Fragment:
     wall: WallPlane
     shape: Geometry
     area: float
-    points: NDArray[np.float64]
-    outline: NDArray[np.float64]
+    points: Floats
+    outline: Floats
     section_area: float
 
 
@@ -194,7 +195,7 @@ def _sections(
 
 
 def _fragments(
-    shapes: list[tuple[WallPlane, Geometry, NDArray[np.float64]]], tolerance: Tolerance
+    shapes: list[tuple[WallPlane, Geometry, Floats]], tolerance: Tolerance
 ) -> list[_Fragment]:
     """Wall polygons (wall, shape, outline of the node in the wall's plane) clipped to a node; what
     has no more area than the rounding of its outline is none."""
@@ -234,19 +235,17 @@ class _Extents:
         high = np.maximum.reduceat(self._points, self._start[:-1])
         self._middle, self._half = (low + high) / 2, (high - low) / 2
 
-    def ahead(self, plane: NDArray[np.float64], tolerance: Tolerance) -> NDArray[np.bool_]:
+    def ahead(self, plane: Floats, tolerance: Tolerance) -> Bools:
         """(n,) which fragments have a point farther in front than lies in the (4,) plane."""
         if not self._count:
             return np.zeros(0, dtype=bool)
         if self._count <= _FEW:
             distance = self._points @ plane[:3] + plane[3]
-            few: NDArray[np.bool_] = (
-                np.maximum.reduceat(distance, self._start[:-1]) > tolerance.plane
-            )
+            few: Bools = np.maximum.reduceat(distance, self._start[:-1]) > tolerance.plane
             return few
         middle = self._middle @ plane[:3] + (plane[3] - tolerance.plane)
         half = self._half @ np.abs(plane[:3]) + tolerance.rounding
-        found: NDArray[np.bool_] = middle > half
+        found: Bools = middle > half
         unsure = np.flatnonzero(~found & (middle > -half))
         if len(unsure):
             count = self._start[unsure + 1] - self._start[unsure]
@@ -294,10 +293,7 @@ def _best_split(
 
 
 def _closes(
-    body: Polyhedron,
-    fragment: _Fragment,
-    taken: list[WallPlane],
-    tolerance: Tolerance,
+    body: Polyhedron, fragment: _Fragment, taken: list[WallPlane], tolerance: Tolerance
 ) -> float:
     """The area (m²) that a fragment closes of the boundary plane next to it."""
     import shapely

@@ -14,8 +14,8 @@ rooms, with caps of 0.02 m² and more only, all of the 992 leaves stay that 365 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.planar import difference, without_cracks
 from ptmtools.cells.polyhedron import Polyhedron, section
 from ptmtools.cells.structure import Frame, Structure, WallPlane
@@ -63,7 +63,7 @@ class Caps:
                 found += [(int(inside[members[0]]), cap)] if cap else []
         return [cap for _, cap in sorted(found, key=lambda one: one[0])]
 
-    def _reaching_into(self, body: Polyhedron, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _reaching_into(self, body: Polyhedron, triangles: Ints) -> Ints:
         """Those triangles that have a point farther inside each face than lies in its
         plane: all that have a part inside, and few others."""
         found = triangles[self._areas[triangles] > 0]
@@ -72,9 +72,7 @@ class Caps:
             found = found[height.min(axis=1) < -self._tolerance.plane]
         return found
 
-    def _in_plane(
-        self, seeds: NDArray[np.int64], triangles: NDArray[np.int64]
-    ) -> NDArray[np.float64]:
+    def _in_plane(self, seeds: Ints, triangles: Ints) -> Floats:
         """For each seed at least the area of those triangles that lie in its plane."""
         middle, areas = self._corners[triangles].mean(axis=1), self._areas[triangles]
         planes = self._structure.planes[seeds]
@@ -85,9 +83,7 @@ class Caps:
             found.append((np.abs(height) <= self._tolerance.plane) @ areas)
         return np.concatenate(found)
 
-    def _closing(
-        self, body: Polyhedron, plane: NDArray[np.float64], near: NDArray[np.int64]
-    ) -> WallPlane | None:
+    def _closing(self, body: Polyhedron, plane: Floats, near: Ints) -> WallPlane | None:
         """What lies in a plane, if it leaves no opening in a body's section with it."""
         import shapely
 
@@ -104,7 +100,7 @@ class Caps:
         return WallPlane(frame, blocking, blocking) if shapely.is_empty(opening) else None
 
 
-def _section_areas(body: Polyhedron, planes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _section_areas(body: Polyhedron, planes: Floats) -> Floats:
     """(n,) areas (m²) of a body's sections with (n, 4) planes, but for rounding; infinite where a
     plane does not cut it."""
     one, other = body.edges.T
@@ -125,7 +121,7 @@ def _section_areas(body: Polyhedron, planes: NDArray[np.float64]) -> NDArray[np.
     return areas
 
 
-def _around(points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+def _around(points: Floats, normals: Floats) -> Floats:
     """(n,) areas of the convex polygons with corners (n, k, 3), in any order, about 0."""
     axis = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
     u = cross(axis, normals)
@@ -134,5 +130,5 @@ def _around(points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArra
     x, y = np.einsum("nki,ni->nk", points, u), np.einsum("nki,ni->nk", points, v)
     order = np.argsort(np.arctan2(y, x), axis=1)
     x, y = np.take_along_axis(x, order, 1), np.take_along_axis(y, order, 1)
-    twice: NDArray[np.float64] = (x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1)).sum(axis=1)
+    twice: Floats = (x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1)).sum(axis=1)
     return twice / 2

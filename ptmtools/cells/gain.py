@@ -24,6 +24,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.merging import Groups
 
 #: Gains that differ by less are equal, in digits: symmetrical buildings have many, which rounding
@@ -32,12 +33,8 @@ DIGITS = 4
 
 
 def join_by_gain(
-    sees: NDArray[np.bool_],
-    volume: NDArray[np.float64],
-    area: NDArray[np.float64],
-    pairs: NDArray[np.int32],
-    gain: float,
-) -> NDArray[np.int64]:
+    sees: Bools, volume: Floats, area: Floats, pairs: NDArray[np.int32], gain: float
+) -> Ints:
     """(L,) for each leaf the leaf that stands for its group.
 
     Parameters
@@ -53,13 +50,7 @@ def join_by_gain(
 class _Parted(Groups):
     """Groups that cost what parting them gains."""
 
-    def __init__(
-        self,
-        sees: NDArray[np.bool_],
-        volume: NDArray[np.float64],
-        area: NDArray[np.float64],
-        pairs: NDArray[np.int32],
-    ) -> None:
+    def __init__(self, sees: Bools, volume: Floats, area: Floats, pairs: NDArray[np.int32]) -> None:
         super().__init__(len(sees), pairs)
         self._all = np.stack([volume, area], axis=1)
         self._sees = sees.copy()
@@ -78,6 +69,6 @@ class _Parted(Groups):
         super().join(a, b)
         return [(a, c) for c in self.near[a]]
 
-    def _cost(self, seen: NDArray[np.bool_], own: NDArray[np.float64]) -> float:
+    def _cost(self, seen: Bools, own: Floats) -> float:
         volume, area = self._all[seen].sum(axis=0)
         return float(own[0] * area + own[1] * volume)

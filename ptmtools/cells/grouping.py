@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.gain import join_by_gain
 from ptmtools.cells.model import Cells
 from ptmtools.cells.options import SubdivideOptions
@@ -47,7 +48,7 @@ def numbered(group: NDArray[np.integer]) -> NDArray[np.int32]:
     return np.asarray(place[row.reshape(-1)])
 
 
-def rank_in_file(cells: Cells) -> NDArray[np.int64]:
+def rank_in_file(cells: Cells) -> Ints:
     """(L,) the place of each leaf in an order that no transformation of the model changes: leaves
     are compared by the share that they hold of the model's first triangle of which one of them
     holds more, and go by number where they hold the same of all.
@@ -87,9 +88,7 @@ def _groups(cells: Cells, gain: float) -> NDArray[np.integer]:
     return join_by_gain(sees, *weights, rank[inner], gain)[rank]
 
 
-def _sides(
-    cells: Cells,
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+def _sides(cells: Cells) -> tuple[Ints, Ints, Floats]:
     """(n,) leaves and (n,) pieces of geometry that belong to them, of cells that are single leaves;
     what lies in a boundary counts on both sides. And (M,) the areas of the pieces, m²."""
     front, back = cells.triangle_cell.T

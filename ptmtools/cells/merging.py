@@ -13,6 +13,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Ints
+
 
 class Groups(ABC):
     """Groups of leaves, each called by one of its leaves, at first of one leaf each.
@@ -47,7 +49,7 @@ class Groups(ABC):
             self.near[a][c] = self.near[c][a] = both
         return [(a, c) for c in changed]
 
-    def grown(self, joins: Callable[[float], bool]) -> NDArray[np.int64]:
+    def grown(self, joins: Callable[[float], bool]) -> Ints:
         """(L,) the group of each leaf, once all pairs are joined whose cost ``joins``; equally
         cheap ones in the order of their names."""
         waiting: list[tuple[float, int, int]] = []
@@ -77,7 +79,7 @@ class Groups(ABC):
         return found
 
 
-def connected(count: int, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:
+def connected(count: int, one: Ints, other: Ints) -> Ints:
     """(count,) the least of those that each thing hangs together with through pairs of (n,) ``one``
     and ``other``, listed both ways."""
     group = np.arange(count)

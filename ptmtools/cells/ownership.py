@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.vectors import normals
 from ptmtools.scene.model import Scene
@@ -37,10 +38,10 @@ class Pieces:
     leaf: (M, 2) int64 leaf of the tree on the front and on the back.
     """
 
-    points: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    source: NDArray[np.int64]
-    leaf: NDArray[np.int64]
+    points: Floats
+    weights: Floats
+    source: Ints
+    leaf: Ints
 
 
 @dataclass(frozen=True)
@@ -48,13 +49,13 @@ class _Batch:
     """Pieces on their way down: `front` is the leaf on their front, once that is known; `lying`
     whether they lay in some plane on the way."""
 
-    points: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    source: NDArray[np.int64]
-    front: NDArray[np.int64]
-    lying: NDArray[np.bool_]
+    points: Floats
+    weights: Floats
+    source: Ints
+    front: Ints
+    lying: Bools
 
-    def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> _Batch:
+    def take(self, rows: Ints | Bools) -> _Batch:
         return _Batch(*(array[rows] for array in vars(self).values()))
 
     @staticmethod
@@ -89,13 +90,11 @@ def cut_to_leaves(scene: Scene, tree: Tree, tolerance: Tolerance) -> Pieces:
     return Pieces(pieces.points[order], pieces.weights[order], pieces.source[order], leaf[order])
 
 
-def _sink(
-    tree: Tree, batch: _Batch, facing: NDArray[np.float64], tolerance: Tolerance
-) -> tuple[_Batch, NDArray[np.int64]]:
+def _sink(tree: Tree, batch: _Batch, facing: Floats, tolerance: Tolerance) -> tuple[_Batch, Ints]:
     """Let pieces sink to leaves; what lies in a plane goes to the side that ``facing`` (one
     direction per scene triangle) points to. Returns the cut pieces and the leaf of each."""
     arrived: list[_Batch] = []
-    leaves: list[NDArray[np.int64]] = []
+    leaves: list[Ints] = []
     stack = [(0 if len(tree.planes) else -2, batch)]
     while stack:
         node, here = stack.pop()
@@ -129,7 +128,7 @@ def _sink(
 
 
 def _split(
-    batch: _Batch, distance: NDArray[np.float64], sign: NDArray[np.int8]
+    batch: _Batch, distance: Floats, sign: NDArray[np.int8]
 ) -> tuple[list[_Batch], list[_Batch]]:
     """Cut pieces with corners strictly on both sides; returns what is in front and behind."""
     front: list[_Batch] = []
@@ -156,16 +155,12 @@ def _split(
 
 
 #: Positions and barycentric coordinates, (n, 3) each.
-_Corner = tuple[NDArray[np.float64], NDArray[np.float64]]
+_Corner = tuple[Floats, Floats]
 
 
 def _turned(
-    batch: _Batch,
-    distance: NDArray[np.float64],
-    sign: NDArray[np.int8],
-    rows: NDArray[np.int64],
-    first: NDArray[np.int64],
-) -> tuple[_Batch, NDArray[np.float64], NDArray[np.int8]]:
+    batch: _Batch, distance: Floats, sign: NDArray[np.int8], rows: Ints, first: Ints
+) -> tuple[_Batch, Floats, NDArray[np.int8]]:
     """The given rows with their corners turned so that ``first`` comes first."""
     b = batch.take(rows)
     i = np.arange(len(rows))[:, None]
@@ -174,17 +169,17 @@ def _turned(
     return turned, distance[rows][i, j], sign[rows][i, j]
 
 
-def _crossing(batch: _Batch, distance: NDArray[np.float64], i: int, j: int) -> _Corner:
+def _crossing(batch: _Batch, distance: Floats, i: int, j: int) -> _Corner:
     """Where the edges from corner i to corner j cross, always reckoned from the front end."""
     swap = distance[:, i] < distance[:, j]
     d_front = np.where(swap, distance[:, j], distance[:, i])
     d_back = np.where(swap, distance[:, i], distance[:, j])
     t = (d_front / (d_front - d_back))[:, None]
 
-    def between(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def between(values: Floats) -> Floats:
         ahead = np.where(swap[:, None], values[:, j], values[:, i])
         behind = np.where(swap[:, None], values[:, i], values[:, j])
-        mixed: NDArray[np.float64] = ahead + t * (behind - ahead)
+        mixed: Floats = ahead + t * (behind - ahead)
         return mixed
 
     return between(batch.points), between(batch.weights)

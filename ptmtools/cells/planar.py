@@ -13,8 +13,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.merging import connected
 from ptmtools.cells.nearby import along_a_curve
 
@@ -26,7 +26,7 @@ _COLLECTION = 7
 _CHUNK = 256
 
 
-def unite(triangles: NDArray[np.float64], grid: float) -> Geometry:
+def unite(triangles: Floats, grid: float) -> Geometry:
     """Union of (n, 3, 2) triangles of a plane: coplanar overlaps and T-junctions vanish."""
     import shapely
 
@@ -71,7 +71,7 @@ def difference(one: Geometry, other: Geometry, grid: float) -> Geometry:
     return _polygonal(shapely.difference(one, other, grid_size=grid))
 
 
-def neighbours(polygons: Geometry, gap: float) -> NDArray[np.int64]:
+def neighbours(polygons: Geometry, gap: float) -> Ints:
     """(n,) the group of each of n polygons: those less than ``gap`` apart are in one, so that a
     T-junction whose edge misses the corner by a rounding joins what it was meant to join."""
     import shapely

@@ -14,8 +14,8 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.planar import Geometry, difference, intersection, union, without_cracks
 from ptmtools.cells.rejoin import Rejoined
@@ -35,7 +35,7 @@ class Portal(NamedTuple):
 
     node: int
     leaves: tuple[int, int]
-    polygon: NDArray[np.float64]
+    polygon: Floats
     area: float
 
 
@@ -68,7 +68,7 @@ def portals_rejoined(
     return sorted(kept + fresh, key=lambda portal: portal.node)
 
 
-_Face = tuple[int, NDArray[np.float64]]
+_Face = tuple[int, Floats]
 
 
 def _faces_by_node(tree: Tree) -> list[tuple[list[_Face], list[_Face]]]:

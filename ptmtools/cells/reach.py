@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.polyhedron import BOX_FACE
 from ptmtools.cells.portals import Portal
@@ -38,11 +38,11 @@ class Reach:
     start: the leaves from which the flood began; empty if none qualified.
     """
 
-    reached: NDArray[np.bool_]
+    reached: Bools
     closed: bool
     start: tuple[int, ...]
 
-    def renamed(self, leaf: NDArray[np.int64]) -> Reach:
+    def renamed(self, leaf: Ints) -> Reach:
         """The same over leaves of which each of these, (L,), is or is part of ``leaf[i]``; parts
         of one leaf must be reached alike."""
         reached = np.zeros(int(leaf.max(initial=-1)) + 1, dtype=bool)
@@ -61,14 +61,12 @@ def flood(tree: Tree, portals: list[Portal], start: tuple[int, ...]) -> Reach:
     return Reach(reached, bool(start) and not np.any(reached & at_box(tree)), start)
 
 
-def at_box(tree: Tree) -> NDArray[np.bool_]:
+def at_box(tree: Tree) -> Bools:
     """(L,) which leaves touch the root box."""
     return np.array([BOX_FACE in body.tags for body in tree.leaves], dtype=bool)
 
 
-def largest_leaf(
-    tree: Tree, allowed: NDArray[np.bool_], corners: NDArray[np.float64]
-) -> tuple[int, ...]:
+def largest_leaf(tree: Tree, allowed: Bools, corners: Floats) -> tuple[int, ...]:
     """The largest of the (L,) allowed leaves that has floor below its middle, or if none has the
     largest, as a tuple of one; () if none is allowed. The floor is looked for in the (T, 3, 3)
     structural triangles ``corners``."""
@@ -80,7 +78,7 @@ def largest_leaf(
     return tuple(order[:1])
 
 
-def roofed_share(corners: NDArray[np.float64], floor_area: float) -> float:
+def roofed_share(corners: Floats, floor_area: float) -> float:
     """Share of the floor, by area, that has something over it (1 without any floor).
 
     Floor is every level triangle of at least a tenth of ``floor_area`` m²; a ceiling is floor that
@@ -105,7 +103,7 @@ def roofed_share(corners: NDArray[np.float64], floor_area: float) -> float:
     return float(covered / total) if total else 1.0
 
 
-def _plumb(eye: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def _plumb(eye: Floats, corners: Floats) -> Floats:
     """Heights above ``eye`` (metres) at which a plumb line meets triangles that can be stood on."""
     flat = corners[:, :, [0, 2]] - eye[[0, 2]]
     turn = flat[:, [1, 2, 0]]
@@ -116,5 +114,5 @@ def _plumb(eye: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np
     level = np.abs(normal[:, 1]) >= FLOOR_COSINE * np.linalg.norm(normal, axis=1)
     level &= normal[:, 1] != 0
     p, normal = p[level], normal[level]
-    heights: NDArray[np.float64] = np.einsum("ij,ij->i", normal, p[:, 0] - eye) / normal[:, 1]
+    heights: Floats = np.einsum("ij,ij->i", normal, p[:, 0] - eye) / normal[:, 1]
     return heights

@@ -13,8 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Ints
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.polyhedron import Polyhedron
 
@@ -31,11 +31,11 @@ class Rejoined:
     """
 
     tree: Tree
-    leaf: NDArray[np.int64]
-    node: NDArray[np.int64]
+    leaf: Ints
+    node: Ints
 
 
-def rejoined(tree: Tree, reached: NDArray[np.bool_]) -> Rejoined:
+def rejoined(tree: Tree, reached: Bools) -> Rejoined:
     """The tree less the caps that cut nothing off; ``reached``: (L,) what the flood met."""
     bodies, children = list(tree.leaves), tree.children.copy()
     part_of = np.arange(len(bodies))
@@ -64,5 +64,5 @@ def rejoined(tree: Tree, reached: NDArray[np.bool_]) -> Rejoined:
     )
 
 
-def _renamed(body: Polyhedron, renumber: NDArray[np.int64]) -> Polyhedron:
+def _renamed(body: Polyhedron, renumber: Ints) -> Polyhedron:
     return replace(body, tags=tuple(int(renumber[t]) if t >= 0 else t for t in body.tags))

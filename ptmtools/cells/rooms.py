@@ -26,8 +26,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.merging import Groups
 from ptmtools.cells.model import Cells
 
@@ -43,7 +43,7 @@ DIGITS = 4
 AT_ONCE = 2048
 
 
-def room_of_leaf(cells: Cells, rank: NDArray[np.int64]) -> NDArray[np.int64]:
+def room_of_leaf(cells: Cells, rank: Ints) -> Ints:
     """(L,) the room of each leaf, called by the rank of one of its leaves.
 
     Of equally open pairs the one whose leaves come first by (L,) ``rank`` is joined first: a
@@ -55,7 +55,7 @@ def room_of_leaf(cells: Cells, rank: NDArray[np.int64]) -> NDArray[np.int64]:
 class _Regions(Groups):
     """Groups of leaves, by rank, that cost little where the opening between them is large."""
 
-    def __init__(self, cells: Cells, rank: NDArray[np.int64]) -> None:
+    def __init__(self, cells: Cells, rank: Ints) -> None:
         import shapely
 
         super().__init__(cells.leaf_count, rank[cells.portal_leaf])
@@ -150,7 +150,7 @@ def _touching(cells: Cells, near: float) -> list[list[int]]:
     return found
 
 
-def _distance(points: NDArray[np.float64], polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+def _distance(points: Floats, polygon: Floats) -> Floats:
     """(n,) metres between the nearest of (n, m, 3) points and the outline of (n, m, 3) polygons."""
     along = np.roll(polygon, -1, axis=1) - polygon
     square = np.maximum(np.einsum("nek,nek->ne", along, along), np.finfo(np.float64).tiny)

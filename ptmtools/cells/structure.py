@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.nearby import Nearby
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
@@ -50,13 +50,13 @@ class Frame:
     origin, u, v: a point of the plane and an orthonormal basis, u × v = n.
     """
 
-    plane: NDArray[np.float64]
-    origin: NDArray[np.float64]
-    u: NDArray[np.float64]
-    v: NDArray[np.float64]
+    plane: Floats
+    origin: Floats
+    u: Floats
+    v: Floats
 
     @staticmethod
-    def of(plane: NDArray[np.float64]) -> Frame:
+    def of(plane: Floats) -> Frame:
         """A frame for a (4,) plane; the axes depend on nothing but the plane."""
         normal = plane[:3]
         axis = np.zeros(3)
@@ -65,14 +65,14 @@ class Frame:
         u /= np.linalg.norm(u)
         return Frame(plane, -plane[3] * normal, u, cross(normal, u))
 
-    def to_plane(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_plane(self, points: Floats) -> Floats:
         """(…, 2) coordinates of (…, 3) points, projected along the normal."""
         q = points - self.origin
         return np.stack([q @ self.u, q @ self.v], axis=-1)
 
-    def to_space(self, flat: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_space(self, flat: Floats) -> Floats:
         """(…, 3) points of (…, 2) coordinates."""
-        space: NDArray[np.float64] = self.origin + flat[..., :1] * self.u + flat[..., 1:] * self.v
+        space: Floats = self.origin + flat[..., :1] * self.u + flat[..., 1:] * self.v
         return space
 
 
@@ -104,10 +104,10 @@ class Structure:
     nearby: finds them.
     """
 
-    corners: NDArray[np.float64]
-    forced: NDArray[np.bool_]
-    planes: NDArray[np.float64]
-    areas: NDArray[np.float64]
+    corners: Floats
+    forced: Bools
+    planes: Floats
+    areas: Floats
     nearby: Nearby
     tolerance: Tolerance
 
@@ -119,28 +119,28 @@ class Structure:
         nearby = Nearby(corners, tolerance.rounding)
         return Structure(corners, forced, *planes_of(corners), nearby, tolerance)
 
-    def lie_in(self, plane: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def lie_in(self, plane: Floats, triangles: Ints) -> Bools:
         """(n,) which of these triangles, by number, lie in a plane."""
         distance = np.abs(self.corners[triangles] @ plane[:3] + plane[3])
-        lies: NDArray[np.bool_] = np.all(distance <= self.tolerance.plane, axis=1)
+        lies: Bools = np.all(distance <= self.tolerance.plane, axis=1)
         return lies
 
-    def united(self, frame: Frame, triangles: NDArray[np.int64]) -> Geometry:
+    def united(self, frame: Frame, triangles: Ints) -> Geometry:
         """The union of these triangles in a plane."""
         return unite(frame.to_plane(self.corners[triangles]), self.tolerance.grid)
 
 
-def structural_triangles(scene: Scene, options: SubdivideOptions) -> NDArray[np.bool_]:
+def structural_triangles(scene: Scene, options: SubdivideOptions) -> Bools:
     """(T,) which triangles occlude: opaque, and not called detail by name."""
     detail = _named(scene, options.detail) & ~_named(scene, options.structural)
     return scene.opaque & ~detail
 
 
-def _named(scene: Scene, patterns: Sequence[str]) -> NDArray[np.bool_]:
+def _named(scene: Scene, patterns: Sequence[str]) -> Bools:
     """(T,) which triangles have an object or a material of such a name."""
     objects = np.array([matches(name, patterns) for name in scene.objects], dtype=bool)
     materials = np.array([matches(m.name, patterns) for m in scene.materials], dtype=bool)
-    named: NDArray[np.bool_] = objects[scene.triangle_object] | materials[scene.triangle_material]
+    named: Bools = objects[scene.triangle_object] | materials[scene.triangle_material]
     return named
 
 
@@ -173,9 +173,7 @@ def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
     return [found[i][1] for i in ranked(np.array([area for area, _ in found]))]
 
 
-def planes_of(
-    corners: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def planes_of(corners: Floats) -> tuple[Floats, Floats]:
     """(n, 4) planes with one sign for both windings, and (n,) areas, of (n, 3, 3) triangles."""
     normal = normals(corners)
     double = np.linalg.norm(normal, axis=1)
@@ -186,7 +184,7 @@ def planes_of(
     return np.concatenate([normal, offset[:, None]], axis=1), double / 2.0
 
 
-def _layers(structure: Structure, wall_area: float) -> list[NDArray[np.float64]]:
+def _layers(structure: Structure, wall_area: float) -> list[Floats]:
     """Planes that hold enough coplanar area to carry a wall, heaviest first.
 
     Triangles are compared only within bins of similar normal and offset, and a bin is left as soon
@@ -196,7 +194,7 @@ def _layers(structure: Structure, wall_area: float) -> list[NDArray[np.float64]]
     planes, areas, forced = structure.planes, structure.areas, structure.forced
     bins = _Bins(planes, np.where(forced, np.inf, areas), structure.tolerance)
     free = areas > 0
-    layers: list[tuple[float, NDArray[np.float64]]] = []
+    layers: list[tuple[float, Floats]] = []
     for seed in ranked(areas):
         if not free[seed]:
             continue
@@ -222,9 +220,7 @@ class _Bins:
     from the edges of its bin: its neighbours to a tenth of the step are there, wherever it lies.
     """
 
-    def __init__(
-        self, planes: NDArray[np.float64], weights: NDArray[np.float64], tolerance: Tolerance
-    ) -> None:
+    def __init__(self, planes: Floats, weights: Floats, tolerance: Tolerance) -> None:
         """``weights`` of the (n, 4) planes: areas, infinite for planes that a bin is kept for."""
         step = np.array([_NORMAL_STEP] * 3 + [_NORMAL_STEP * tolerance.extent])
         self._kept = np.isinf(weights).astype(np.int64)
@@ -245,9 +241,9 @@ class _Bins:
         self._free = np.bincount(every, np.tile(self._area, _GRIDS), bins)
         self._keep = np.bincount(every, np.tile(self._kept, _GRIDS), bins)
 
-    def near(self, plane: int) -> NDArray[np.int64]:
+    def near(self, plane: int) -> Ints:
         """The planes in the bin of one of them, dropped or not."""
-        rows: NDArray[np.int64] = self._rows[self._label[self._grid[plane], plane]]
+        rows: Ints = self._rows[self._label[self._grid[plane], plane]]
         return rows
 
     def weight(self, plane: int) -> float:
@@ -255,7 +251,7 @@ class _Bins:
         label = self._label[self._grid[plane], plane]
         return float("inf") if self._keep[label] > 0 else float(self._free[label])
 
-    def drop(self, planes: NDArray[np.int64]) -> None:
+    def drop(self, planes: Ints) -> None:
         """Planes weigh no more."""
         for label in self._label[:, planes]:
             np.subtract.at(self._free, label, self._area[planes])
@@ -268,9 +264,7 @@ class _Bins:
         self._keep[label] -= self._kept[plane]
 
 
-def parallel_gap(
-    plane: NDArray[np.float64], other: NDArray[np.float64], tolerance: Tolerance
-) -> float:
+def parallel_gap(plane: Floats, other: Floats, tolerance: Tolerance) -> float:
     """Distance of two parallel (4,) planes in metres, whichever way they face; infinite for planes
     that are not parallel."""
     turn = float(plane[:3] @ other[:3])

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree, build_tree
 from ptmtools.cells.caps import Caps
 from ptmtools.cells.grouping import grouped
@@ -69,7 +70,7 @@ class _Model:
 class _Space:
     """One subdivision of one root box, of which ``box``, (2, 3), is the bounding box."""
 
-    box: NDArray[np.float64]
+    box: Floats
     tree: Tree
     portals: list[Portal]
     reach: Reach
@@ -139,7 +140,7 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
             )
 
 
-def _divide_inside(model: _Model, bounds: NDArray[np.float64]) -> _Space:
+def _divide_inside(model: _Model, bounds: Floats) -> _Space:
     """Subdivide the box between two corners, (2, 3); leaves at its sides count as inside."""
     return _divide(model, Polyhedron.box(*bounds), inside=True)
 
@@ -163,9 +164,7 @@ def _divide(
     return _Space(box, tree, portals, reach)
 
 
-def _viewpoint_leaves(
-    tree: Tree, box: NDArray[np.float64], options: SubdivideOptions
-) -> tuple[int, ...]:
+def _viewpoint_leaves(tree: Tree, box: Floats, options: SubdivideOptions) -> tuple[int, ...]:
     if not options.viewpoints:
         return ()
     places = np.array(options.viewpoints, dtype=np.float64)
@@ -181,20 +180,18 @@ def _viewpoint_leaves(
     return tuple(dict.fromkeys((-2 - sunk(tree.planes, tree.children, places)).tolist()))
 
 
-def _bounds(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _bounds(corners: Floats) -> tuple[Floats, Floats]:
     points = corners.reshape(-1, 3)
     return points.min(axis=0), points.max(axis=0)
 
 
-def _thickened(
-    low: NDArray[np.float64], high: NDArray[np.float64], tolerance: Tolerance
-) -> NDArray[np.float64]:
+def _thickened(low: Floats, high: Floats, tolerance: Tolerance) -> Floats:
     """A box that is flat nowhere: a scene that is only a floor still has one cell above it."""
     flat = high - low < tolerance.thin
     return np.array([low, np.where(flat, low + BOX_MARGIN * tolerance.extent, high)])
 
 
-def _open_note(space: _Space, roofed: float, box: NDArray[np.float64]) -> str:
+def _open_note(space: _Space, roofed: float, box: Floats) -> str:
     if roofed < ROOFED:
         what = f"open above: {1 - roofed:.0%} of the floor has no ceiling"
     elif not space.reach.start:
@@ -256,14 +253,12 @@ def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> 
     )
 
 
-def _starts(lengths: Iterable[int]) -> NDArray[np.int64]:
+def _starts(lengths: Iterable[int]) -> Ints:
     """(n + 1,) where the rows of a CSR begin."""
     return np.cumsum([0, *lengths], dtype=np.int64)
 
 
-def _weld(
-    scene: Scene, pieces: Pieces, owned: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]:
+def _weld(scene: Scene, pieces: Pieces, owned: Bools) -> tuple[Floats, Floats, NDArray[np.int32]]:
     """Vertices (position and texture coordinate) shared by the pieces, and (M, 3) indices."""
     points = pieces.points[owned].reshape(-1, 3)
     uv = np.einsum("mcw,mwk->mck", pieces.weights[owned], scene.uv[pieces.source[owned]])

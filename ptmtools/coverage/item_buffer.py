@@ -25,6 +25,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.model import Cells
 from ptmtools.cells.vectors import normals
 from ptmtools.coverage.sample_points import SamplePoints
@@ -68,14 +69,14 @@ class Surfaces:
     cell_count: cells in all.
     """
 
-    centre: NDArray[np.float64]
+    centre: Floats
     scale: float
-    vertex: NDArray[np.float64]
+    vertex: Floats
     triangle: NDArray[np.int32]
-    plane: NDArray[np.float64]
+    plane: Floats
     cell: NDArray[np.int32]
     image: NDArray[np.int32]
-    opaque: NDArray[np.bool_]
+    opaque: Bools
     cell_count: int
 
     @staticmethod
@@ -106,11 +107,11 @@ class Surfaces:
             cell_count=cells.cell_count,
         )
 
-    def normalised(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def normalised(self, points: Floats) -> Floats:
         """(…, 3) points in world metres, in the coordinates of `vertex`."""
         return np.asarray((points - self.centre) * self.scale)
 
-    def world(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def world(self, points: Floats) -> Floats:
         """The inverse of `normalised`."""
         return np.asarray(points / self.scale + self.centre)
 
@@ -130,17 +131,13 @@ class Renderer(Protocol):
     @property
     def most(self) -> int: ...
 
-    def show(
-        self, points: SamplePoints, needed: NDArray[np.bool_] | None = None
-    ) -> NDArray[np.int32]:
+    def show(self, points: SamplePoints, needed: Bools | None = None) -> NDArray[np.int32]:
         """(L, K, 6, face²) the triangle that each pixel shows, -1 for none, in the order (point,
         view, row, column); opaque surfaces first, then the transparent ones before them, if the
         scene has any. ``needed`` (C,) are the cells whose surfaces may show, if that is known:
         others need not be drawn."""
 
-    def trace(
-        self, points: SamplePoints, pixels: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    def trace(self, points: SamplePoints, pixels: Ints) -> tuple[NDArray[np.int32], Floats]:
         """(L, n) what a ray through each of the (n,) pixels, numbered from 0 in the order of
         `show`, says of its layers, and (L, n, 3) where it hits, in world metres."""
 

@@ -27,8 +27,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.model import Cells
 from ptmtools.cells.vectors import volumes
 from ptmtools.coverage.sobol import sobol, uniform
@@ -53,9 +53,9 @@ class Tetrahedra:
     start: (C + 1,) CSR over cells.
     """
 
-    corners: NDArray[np.float64]
-    volume: NDArray[np.float64]
-    start: NDArray[np.int64]
+    corners: Floats
+    volume: Floats
+    start: Ints
 
     @staticmethod
     def of(cells: Cells) -> Tetrahedra:
@@ -67,15 +67,13 @@ class Tetrahedra:
         start = np.searchsorted(cell[order], np.arange(cells.cell_count + 1))
         return Tetrahedra(corners[order], volume[order], start)
 
-    def of_cell(self, cell: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def of_cell(self, cell: int) -> tuple[Floats, Floats]:
         """Those of a cell, and their volumes."""
         rows = slice(*self.start[cell : cell + 2])
         return self.corners[rows], self.volume[rows]
 
 
-def filling(
-    tetra: NDArray[np.float64], volume: NDArray[np.float64], unit: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def filling(tetra: Floats, volume: Floats, unit: Floats) -> Floats:
     """(m, 3) points, uniform in the union of (n, 4, 3) tetrahedra with (n,) volumes if the (m, 4 or
     more) coordinates in (0, 1) are: the first three tell where in a tetrahedron, the fourth in
     which."""
@@ -103,13 +101,13 @@ class Volume:
             share = float(self._volume.sum()) / float(np.prod(self._size))
             self.boxed = share >= FILLED
 
-    def random(self, first: int, count: int, seed: int) -> NDArray[np.float64]:
+    def random(self, first: int, count: int, seed: int) -> Floats:
         """(count, 5) independent points ``first`` …: positions in metres, and two more coordinates
         in (0, 1)."""
         unit = uniform(first, count, seed)
         return np.hstack([filling(self._tetra, self._volume, unit), unit[:, 4:]])
 
-    def sobol(self, first: int, count: int, seed: int) -> NDArray[np.float64]:
+    def sobol(self, first: int, count: int, seed: int) -> Floats:
         """(at most count, 5) points ``first`` … of a scrambled sequence, those in the cell: their
         positions in metres, and two more coordinates in (0, 1)."""
         unit = sobol(first, count, seed)
@@ -119,21 +117,21 @@ class Volume:
         inside = self._cells.locate(points) == self._cell
         return np.hstack([points[inside], unit[inside, 4:]])
 
-    def parts(self, count: int, seed: int) -> list[NDArray[np.float64]]:
+    def parts(self, count: int, seed: int) -> list[Floats]:
         """For each of ``count`` equal parts of the cell (TRIES, 3) points, from its centroid
         outwards."""
         points = filling(self._tetra, self._volume, sobol(0, CLOUD * count, seed))
         return [points[group[:: CLOUD // TRIES]] for group in strata(points, count)]
 
 
-def strata(points: NDArray[np.float64], parts: int) -> list[NDArray[np.int64]]:
+def strata(points: Floats, parts: int) -> list[Ints]:
     """Indices of the (n, 3) points in ``parts`` groups of equal size, compact in space.
 
     Each group is halved across its longest axis; an odd number of parts is divided as evenly as
     it goes. Within a group the points are in order of their distance from its centroid.
     """
     pending = [(np.arange(len(points), dtype=np.int64), parts)]
-    done: list[NDArray[np.int64]] = []
+    done: list[Ints] = []
     while pending:
         group, share = pending.pop()
         here = points[group]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.backends import Backend
 from ptmtools.coverage.estimate import GROUPS, Row, estimate, grouped, shares, spread
@@ -36,9 +37,9 @@ class TextureShares:
     """Shares of images within the entries of a row: (n,) int64 how many each entry has, and for all
     of them (m,) int32 `image`, -1 for none, and (m,) float64 `share` of the row."""
 
-    count: NDArray[np.int64]
+    count: Ints
     image: NDArray[np.int32]
-    share: NDArray[np.float64]
+    share: Floats
 
 
 @dataclass(frozen=True)
@@ -120,9 +121,9 @@ class Sampler:
         self,
         finder: PointFinder,
         count: Callable[[SamplePoints], Tally],
-        begin: NDArray[np.int64],
+        begin: Ints,
         tolerance: float,
-    ) -> tuple[Tally, NDArray[np.int64]]:
+    ) -> tuple[Tally, Ints]:
         """What is seen, and the (K,) group of each point: of eight independent sequences as many
         points as make the hints certain, doubled until they are."""
         options = self.options

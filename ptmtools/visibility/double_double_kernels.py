@@ -23,8 +23,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ptmtools.arrays import Ints
 from ptmtools.compiled import plain_kernel as kernel
-from ptmtools.visibility.storage import DoubleDoublePortals, DoubleDoubleScratch, Ints
+from ptmtools.visibility.storage import DoubleDoublePortals, DoubleDoubleScratch
 
 #: More than a product of vectors and a vertex newly cut may be wrong by.
 ERROR = 2.0**-99

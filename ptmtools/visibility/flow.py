@@ -38,6 +38,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bits, Bools, Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
@@ -76,9 +77,9 @@ class Portals:
 
     leaf_count: int
     leaf: NDArray[np.int32]
-    normal: NDArray[np.float64]
-    point: NDArray[np.float64]
-    start: NDArray[np.int64]
+    normal: Floats
+    point: Floats
+    start: Ints
     tolerance: Tolerance | None = None
 
 
@@ -98,12 +99,12 @@ class PortalFlow:
     opened: (K,) how many of those let a line pass.
     """
 
-    sees: NDArray[np.uint64]
-    cut: NDArray[np.bool_]
-    work: NDArray[np.int64]
-    ties: NDArray[np.int64]
-    decided: NDArray[np.int64]
-    opened: NDArray[np.int64]
+    sees: Bits
+    cut: Bools
+    work: Ints
+    ties: Ints
+    decided: Ints
+    opened: Ints
 
     @property
     def operations(self) -> int:
@@ -162,7 +163,7 @@ def portal_flow(
     return PortalFlow(searching.known, cut[0::2] | cut[1::2], *(counts[:, 0::2] + counts[:, 1::2]))
 
 
-def _prepass(g: Geometry, executor: Executor) -> NDArray[np.uint64]:
+def _prepass(g: Geometry, executor: Executor) -> Bits:
     """(2K, W) a first upper bound of what each directed portal sees, from planes and floods.
 
     The rounds of bits take a hundredth of the time of the floods: they are not shared out.

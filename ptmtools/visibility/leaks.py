@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools
 from ptmtools.cells.model import Cells
 from ptmtools.visibility.flow import PortalFlow
 
@@ -40,7 +40,7 @@ class Leak:
     through: int
 
 
-def find_leaks(cells: Cells, flow: PortalFlow, matrix: NDArray[np.bool_]) -> tuple[Leak, ...]:
+def find_leaks(cells: Cells, flow: PortalFlow, matrix: Bools) -> tuple[Leak, ...]:
     """The leaks of a PVS, those that show most first.
 
     Parameters

@@ -11,6 +11,7 @@ from dataclasses import astuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools
 from ptmtools.cells.model import Cells
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
@@ -57,7 +58,7 @@ def compute_pvs(
     )
 
 
-def _lifted(cells: Cells, leaves: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _lifted(cells: Cells, leaves: Bools) -> Bools:
     """(C, C) from (L, L): a cell sees what its leaves see."""
     rows, columns = np.nonzero(leaves)
     matrix = np.zeros((cells.cell_count, cells.cell_count), dtype=np.bool_)
@@ -77,9 +78,7 @@ def portals_of(cells: Cells) -> Portals:
     )
 
 
-def leaf_matrix(
-    leaf_count: int, portal_leaf: NDArray[np.int32], flow: PortalFlow
-) -> NDArray[np.bool_]:
+def leaf_matrix(leaf_count: int, portal_leaf: NDArray[np.int32], flow: PortalFlow) -> Bools:
     """(L, L) which leaf may see which: itself, its neighbours, and what its portals see."""
     enters = portal_leaf[:, ::-1].reshape(-1)
     leaves = portal_leaf.reshape(-1)

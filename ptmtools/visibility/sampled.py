@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.sight import LONGEST
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
@@ -37,7 +38,7 @@ def sampled_leaves(
     lines: int,
     executor: Executor = Serial(),  # noqa: B008 - has no state
     seed: int = 0,
-) -> NDArray[np.bool_]:
+) -> Bools:
     """(L, L) which leaf sees which on one of ``lines`` random lines through each portal.
 
     Half of the lines aim at a random point of a random portal, half anywhere. Symmetric; each leaf
@@ -82,14 +83,12 @@ def _shoot(shared: Shooting, span: tuple[int, int]) -> NDArray[np.uint8]:
     return np.packbits(seen, axis=1)
 
 
-def _points(
-    rng: np.random.Generator, g: Geometry, portal: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _points(rng: np.random.Generator, g: Geometry, portal: Ints) -> Floats:
     """(n, 3) a random point of each of (n,) portals, in a random triangle of its fan."""
     first, size = g.start[portal], np.diff(g.start)[portal]
     corner = 1 + rng.integers(np.maximum(size - 2, 1))
     fan = [np.zeros_like(corner), corner, corner + 1]
     a, b, c = (g.point[first + np.minimum(i, size - 1)] for i in fan)
     u, v = np.sqrt(rng.random((len(portal), 1))), rng.random((len(portal), 1))
-    points: NDArray[np.float64] = a + u * (b - a + v * (c - b))
+    points: Floats = a + u * (b - a + v * (c - b))
     return points

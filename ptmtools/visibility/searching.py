@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Bits, Ints
 from ptmtools.visibility.double_double import SequenceTest
 from ptmtools.visibility.near_ties import Searched, searched
 from ptmtools.visibility.storage import Geometry, Scratch
@@ -35,7 +35,7 @@ class Searching:
     known: (2K, W) uint64 rows of bits.
     """
 
-    def __init__(self, geometry: Geometry, known: NDArray[np.uint64], budget: int) -> None:
+    def __init__(self, geometry: Geometry, known: Bits, budget: int) -> None:
         self.geometry, self.known, self.budget = geometry, known, budget
         self._idle: list[Tools] = []
 
@@ -63,11 +63,11 @@ class Searching:
 class Found(NamedTuple):
     """What one search found: a (W,) row of bits, and what it took."""
 
-    seen: NDArray[np.uint64]
+    seen: Bits
     figures: Searched
 
 
-def flood_from(shared: Searching, span: tuple[int, int]) -> NDArray[np.uint64]:
+def flood_from(shared: Searching, span: tuple[int, int]) -> Bits:
     """As a task: (last - first, W) what floods reach from the directed portals ``span`` (first,
     last)."""
     from ptmtools.visibility.prepass_kernels import flood
@@ -88,7 +88,7 @@ def search_from(shared: Searching, source: int) -> Found:
     return Found(seen, figures)
 
 
-def settle(shared: Searching, done: tuple[NDArray[np.int64], NDArray[np.uint64]]) -> None:
+def settle(shared: Searching, done: tuple[Ints, Bits]) -> None:
     """As a change: the (B, W) rows that a batch of (B,) directed portals has found."""
     from ptmtools.visibility.bit_kernels import drop_unreturned
 

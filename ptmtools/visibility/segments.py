@@ -23,8 +23,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.cells.model import Cells
 from ptmtools.cells.vectors import areas, fans, volumes
 from ptmtools.errors import InputError
@@ -85,7 +85,7 @@ class SegmentReport:
 
 
 def check_conservative(
-    structural: NDArray[np.float64],
+    structural: Floats,
     cells: Cells,
     pvs: Pvs,
     segments: int = 1_000_000,
@@ -120,7 +120,7 @@ def check_conservative(
     jitter = JITTER * cells.tolerance.hairline
     tried = unoccluded = hairlines = drawn = batch = 0
     counts: dict[tuple[int, int], int] = {}
-    example: dict[tuple[int, int], tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
+    example: dict[tuple[int, int], tuple[Floats, Floats]] = {}
     while tried < segments and drawn < PATIENCE * segments:
         rng = np.random.default_rng([seed, batch])
         size = min(BATCH, segments - tried)
@@ -169,9 +169,7 @@ class Sampler:
         self.by_portal = _Inside(triangles, _shared(areas(triangles), portal))
         self.extent = float(np.ptp(cells.root_box, axis=0).max())
 
-    def segments(
-        self, rng: np.random.Generator, count: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def segments(self, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:
         """(count, 3) starts and ends."""
         a, b, c, d = (count // 4 + (i < count % 4) for i in range(4))
         anywhere, leaf = self.by_volume, self.by_leaf
@@ -187,7 +185,7 @@ class Sampler:
         starts, others = zip(*ends, strict=True)
         return np.concatenate(starts), np.concatenate(others)
 
-    def _arm(self, rng: np.random.Generator, along: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _arm(self, rng: np.random.Generator, along: Floats) -> Floats:
         exponent = rng.uniform(np.log(SHORTEST), np.log(LONGEST), size=(len(along), 1))
         return along * (np.exp(exponent) * self.extent)
 
@@ -195,20 +193,20 @@ class Sampler:
 class _Inside:
     """Draws points in (n, k, 3) simplices, from each in proportion to its (n,) weight."""
 
-    def __init__(self, corners: NDArray[np.float64], weight: NDArray[np.float64]) -> None:
+    def __init__(self, corners: Floats, weight: Floats) -> None:
         self.corners = corners
         total = np.cumsum(weight if weight.any() else np.ones(len(corners)))
         self._until = total / total[-1:]
 
-    def draw(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+    def draw(self, rng: np.random.Generator, count: int) -> Floats:
         """(count, 3) points."""
         corner = self.corners[np.searchsorted(self._until, rng.random(count), side="right")]
         weight = rng.exponential(size=(*corner.shape[:2], 1))
-        mixed: NDArray[np.float64] = (corner * weight).sum(axis=1) / weight.sum(axis=1)
+        mixed: Floats = (corner * weight).sum(axis=1) / weight.sum(axis=1)
         return mixed
 
 
-def _shared(size: NDArray[np.float64], owner: NDArray[np.int64]) -> NDArray[np.float64]:
+def _shared(size: Floats, owner: Ints) -> Floats:
     """(n,) sizes as shares of those of their owners."""
     total = np.bincount(owner, size)[owner]
     return size / np.maximum(total, np.finfo(np.float64).tiny)
@@ -217,7 +215,7 @@ def _shared(size: NDArray[np.float64], owner: NDArray[np.int64]) -> NDArray[np.f
 class Blockers:
     """The structural triangles in Embree, brought to the unit cube in float64 first."""
 
-    def __init__(self, structural: NDArray[np.float64], box: NDArray[np.float64]) -> None:
+    def __init__(self, structural: Floats, box: Floats) -> None:
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
 
@@ -229,11 +227,11 @@ class Blockers:
             self._scene = EmbreeScene(robust=True)
             TriangleMesh(self._scene, self._local(structural))
 
-    def _local(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
+    def _local(self, points: Floats) -> Singles:
         local = (points - self._middle) * self._scale
         return np.ascontiguousarray(local, dtype=np.float32)
 
-    def between(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def between(self, start: Floats, end: Floats) -> Bools:
         """(n,) whether a triangle blocks the segment between two (n, 3) points."""
         if self._scene is None or len(start) == 0:
             return np.zeros(len(start), dtype=np.bool_)
@@ -244,12 +242,12 @@ class Blockers:
         return np.asarray(hit >= 0, dtype=np.bool_)
 
 
-def _direction(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+def _direction(rng: np.random.Generator, count: int) -> Floats:
     """(count, 3) unit vectors, uniform on the sphere."""
     vector = rng.normal(size=(count, 3))
-    unit: NDArray[np.float64] = vector / np.linalg.norm(vector, axis=1, keepdims=True)
+    unit: Floats = vector / np.linalg.norm(vector, axis=1, keepdims=True)
     return unit
 
 
-def _place(point: NDArray[np.float64]) -> tuple[float, float, float]:
+def _place(point: Floats) -> tuple[float, float, float]:
     return float(point[0]), float(point[1]), float(point[2])

@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from ptmtools.arrays import Bits, Floats, Ints
+
 Doubles = NDArray[np.complex128]
-Bits = NDArray[np.uint64]
 
 
 class Geometry(NamedTuple):
