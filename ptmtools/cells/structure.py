@@ -192,7 +192,8 @@ def _layers(structure: Structure, wall_area: float) -> list[Floats]:
     anything quadratic happens.
     """
     planes, areas, forced = structure.planes, structure.areas, structure.forced
-    bins = _Bins(planes, np.where(forced, np.inf, areas), structure.tolerance)
+    # A bin with a triangle that is forced is never left for want of area.
+    bins = _Bins(planes, areas + 2 * wall_area * forced, structure.tolerance)
     free = areas > 0
     layers: list[tuple[float, Floats]] = []
     for seed in ranked(areas):
@@ -200,7 +201,7 @@ def _layers(structure: Structure, wall_area: float) -> list[Floats]:
             continue
         free[seed] = False
         if bins.weight(seed) < wall_area:
-            bins.drop_one(seed)
+            bins.drop(seed)
             continue
         near = bins.near(seed)
         near = near[free[near]]
@@ -221,10 +222,9 @@ class _Bins:
     """
 
     def __init__(self, planes: Floats, weights: Floats, tolerance: Tolerance) -> None:
-        """``weights`` of the (n, 4) planes: areas, infinite for planes that a bin is kept for."""
+        """``weights``: (n,), of the (n, 4) planes."""
         step = np.array([_NORMAL_STEP] * 3 + [_NORMAL_STEP * tolerance.extent])
-        self._kept = np.isinf(weights).astype(np.int64)
-        self._area = np.where(self._kept, 0.0, weights)
+        self._weights = weights
         labels, inner, bins = [], [], 0
         for grid in range(_GRIDS):
             at = planes / step + grid / _GRIDS
@@ -233,35 +233,26 @@ class _Bins:
             labels.append(label.ravel() + bins)
             bins += int(label.max(initial=-1)) + 1
             inner.append(np.minimum(at - key, 1 - (at - key)).min(axis=1))
-        self._label = np.stack(labels)
+        self._label = np.stack(labels, axis=1)
         self._grid = np.argmax(np.stack(inner), axis=0)
         every = self._label.ravel()
-        order = np.argsort(every, kind="stable") % max(len(planes), 1)
+        order = np.argsort(every, kind="stable") // _GRIDS
         self._rows = np.split(order, np.cumsum(np.bincount(every, minlength=1))[:-1])
-        self._free = np.bincount(every, np.tile(self._area, _GRIDS), bins)
-        self._keep = np.bincount(every, np.tile(self._kept, _GRIDS), bins)
+        self._free = np.bincount(every, np.repeat(weights, _GRIDS), bins)
 
     def near(self, plane: int) -> Ints:
         """The planes in the bin of one of them, dropped or not."""
-        rows: Ints = self._rows[self._label[self._grid[plane], plane]]
+        rows: Ints = self._rows[self._label[plane, self._grid[plane]]]
         return rows
 
     def weight(self, plane: int) -> float:
         """What is not dropped in that bin weighs so much."""
-        label = self._label[self._grid[plane], plane]
-        return float("inf") if self._keep[label] > 0 else float(self._free[label])
+        return float(self._free[self._label[plane, self._grid[plane]]])
 
-    def drop(self, planes: Ints) -> None:
+    def drop(self, planes: Ints | int) -> None:
         """Planes weigh no more."""
-        for label in self._label[:, planes]:
-            np.subtract.at(self._free, label, self._area[planes])
-            np.subtract.at(self._keep, label, self._kept[planes])
-
-    def drop_one(self, plane: int) -> None:
-        """The same for one plane, which is in each bin but once."""
-        label = self._label[:, plane]
-        self._free[label] -= self._area[plane]
-        self._keep[label] -= self._kept[plane]
+        weights = np.repeat(self._weights[planes], _GRIDS)
+        np.subtract.at(self._free, self._label[planes].ravel(), weights)
 
 
 def parallel_gap(plane: Floats, other: Floats, tolerance: Tolerance) -> float:
