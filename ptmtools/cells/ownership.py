@@ -14,7 +14,7 @@ assign: nothing of the model is lost to a clipped box.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,11 +46,11 @@ class Pieces:
 
 @dataclass(frozen=True)
 class _Batch:
-    """Pieces on their way down: `front` is the leaf on their front, once that is known; `lying`
-    whether they lay in some plane on the way."""
+    """Pieces on their way down: `corner` (n, 3, 6) are positions and barycentric coordinates,
+    `front` is the leaf on their front, once that is known; `lying` whether they lay in some plane
+    on the way."""
 
-    points: Floats
-    weights: Floats
+    corner: Floats
     source: Ints
     front: Ints
     lying: Bools
@@ -70,24 +70,22 @@ def cut_to_leaves(scene: Scene, tree: Tree, tolerance: Tolerance) -> Pieces:
     facing = normals(corners)
     count = len(corners)
     whole = _Batch(
-        points=corners,
-        weights=np.tile(np.eye(3), (count, 1, 1)),
+        corner=np.concatenate([corners, np.tile(np.eye(3), (count, 1, 1))], axis=2),
         source=np.arange(count),
         front=np.full(count, -1),
         lying=np.zeros(count, dtype=bool),
     )
     batch, front = _sink(tree, whole, facing, tolerance)
-    within = batch.take(~batch.lying)
-    within_leaf = front[~batch.lying]
-    boundary = batch.take(batch.lying)
-    boundary = _Batch(**{**vars(boundary), "front": front[batch.lying]})
+    boundary = replace(batch, front=front).take(batch.lying)
     boundary, back = _sink(tree, boundary, -facing, tolerance)
-    pieces = _Batch.join([within, boundary])
-    leaf = np.concatenate(
-        [np.stack([within_leaf, within_leaf], axis=1), np.stack([boundary.front, back], axis=1)]
+    within = ~batch.lying
+    pieces = _Batch.join([batch.take(within), boundary])
+    leaf = np.stack(
+        [np.append(front[within], boundary.front), np.append(front[within], back)], axis=1
     )
     order = np.argsort(pieces.source, kind="stable")
-    return Pieces(pieces.points[order], pieces.weights[order], pieces.source[order], leaf[order])
+    corner = pieces.corner[order]
+    return Pieces(corner[..., :3], corner[..., 3:], pieces.source[order], leaf[order])
 
 
 def _sink(tree: Tree, batch: _Batch, facing: Floats, tolerance: Tolerance) -> tuple[_Batch, Ints]:
@@ -103,7 +101,7 @@ def _sink(tree: Tree, batch: _Batch, facing: Floats, tolerance: Tolerance) -> tu
             leaves.append(np.full(len(here.source), -2 - node))
             continue
         plane = tree.planes[node]
-        distance = here.points @ plane[:3] + plane[3]
+        distance = here.corner[..., :3] @ plane[:3] + plane[3]
         ahead = distance > tolerance.plane
         behind = distance < -tolerance.plane
         some_ahead, some_behind = ahead.any(axis=1), behind.any(axis=1)
@@ -112,7 +110,7 @@ def _sink(tree: Tree, batch: _Batch, facing: Floats, tolerance: Tolerance) -> tu
         to_front = some_ahead & ~some_behind | lies & turned
         to_back = some_behind & ~some_ahead | lies & ~turned
         crossing = some_ahead & some_behind
-        here = _Batch(**{**vars(here), "lying": here.lying | lies})
+        here = replace(here, lying=here.lying | lies)
         sides = [[here.take(to_front)], [here.take(to_back)]]
         if crossing.any():
             sign = ahead[crossing].astype(np.int8) - behind[crossing]
@@ -154,10 +152,6 @@ def _split(
     return front, back
 
 
-#: Positions and barycentric coordinates, (n, 3) each.
-_Corner = tuple[Floats, Floats]
-
-
 def _turned(
     batch: _Batch, distance: Floats, sign: NDArray[np.int8], rows: Ints, first: Ints
 ) -> tuple[_Batch, Floats, NDArray[np.int8]]:
@@ -165,29 +159,24 @@ def _turned(
     b = batch.take(rows)
     i = np.arange(len(rows))[:, None]
     j = (first[:, None] + np.arange(3)) % 3
-    turned = _Batch(**{**vars(b), "points": b.points[i, j], "weights": b.weights[i, j]})
+    turned = replace(b, corner=b.corner[i, j])
     return turned, distance[rows][i, j], sign[rows][i, j]
 
 
-def _crossing(batch: _Batch, distance: Floats, i: int, j: int) -> _Corner:
-    """Where the edges from corner i to corner j cross, always reckoned from the front end."""
-    swap = distance[:, i] < distance[:, j]
-    d_front = np.where(swap, distance[:, j], distance[:, i])
-    d_back = np.where(swap, distance[:, i], distance[:, j])
-    t = (d_front / (d_front - d_back))[:, None]
-
-    def between(values: Floats) -> Floats:
-        ahead = np.where(swap[:, None], values[:, j], values[:, i])
-        behind = np.where(swap[:, None], values[:, i], values[:, j])
-        mixed: Floats = ahead + t * (behind - ahead)
-        return mixed
-
-    return between(batch.points), between(batch.weights)
+def _crossing(batch: _Batch, distance: Floats, i: int, j: int) -> Floats:
+    """(n, 6) where edges from corner i to corner j cross, always reckoned from the front end."""
+    swap = (distance[:, i] < distance[:, j])[:, None]
+    d_front, d_back = (
+        np.maximum(distance[:, i], distance[:, j]),
+        np.minimum(distance[:, i], distance[:, j]),
+    )
+    ahead = np.where(swap, batch.corner[:, j], batch.corner[:, i])
+    behind = np.where(swap, batch.corner[:, i], batch.corner[:, j])
+    crossing: Floats = ahead + (d_front / (d_front - d_back))[:, None] * (behind - ahead)
+    return crossing
 
 
-def _triangle(batch: _Batch, *corners: int | _Corner) -> _Batch:
+def _triangle(batch: _Batch, *corners: int | Floats) -> _Batch:
     """The batch with its corners replaced: an old corner by index, or a new one."""
-    each = [(batch.points[:, c], batch.weights[:, c]) if isinstance(c, int) else c for c in corners]
-    points = np.stack([position for position, _ in each], axis=1)
-    weights = np.stack([weight for _, weight in each], axis=1)
-    return _Batch(**{**vars(batch), "points": points, "weights": weights})
+    each = [batch.corner[:, c] if isinstance(c, int) else c for c in corners]
+    return replace(batch, corner=np.stack(each, axis=1))
