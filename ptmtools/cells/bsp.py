@@ -27,16 +27,17 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats
-from ptmtools.cells.caps import Caps
+from ptmtools.cells import caps
 from ptmtools.cells.model import OUTSIDE
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, difference, intersection
 from ptmtools.cells.polyhedron import Polyhedron, clip_polygon, cut, section
 from ptmtools.cells.reveals import Reveals
-from ptmtools.cells.structure import WallPlane
+from ptmtools.cells.structure import Structure, WallPlane
 from ptmtools.progress import Progress
 from ptmtools.tolerance import TIE_SHARE, Tolerance
 
@@ -102,15 +103,15 @@ class _Task(NamedTuple):
 
 def build_tree(
     box: Polyhedron,
+    structure: Structure,
     walls: list[WallPlane],
     reveals: Reveals,
-    caps: Caps,
     options: SubdivideOptions,
-    tolerance: Tolerance,
     progress: Progress,
 ) -> Tree:
-    """Split ``box`` by the planes of ``walls``, then of ``reveals``, then of ``caps``; in
-    the order that the module describes."""
+    """Split ``box`` by the planes of ``walls``, then of ``reveals``, then of the caps that are in
+    the ``structure``; in the order that the module describes."""
+    tolerance = structure.tolerance
     least = (FRAGMENT_SHARE * options.wall_area, 0.0, 0.0)
     taken: list[WallPlane] = []
     children: list[list[int]] = []
@@ -133,8 +134,10 @@ def build_tree(
         best = _best_split(body, fragments, least[source], taken, tolerance)
         while best < 0 and source < _CAPS:
             source += 1
-            more = reveals.within(body, taken) if source == _REVEALS else caps.within(body)
-            fragments = _sections(body, more, tolerance, whole=source == _CAPS)
+            if source == _REVEALS:
+                fragments = _sections(body, reveals.within(body, taken), tolerance)
+            else:
+                fragments = _sections(body, caps.closing(structure, body), tolerance, whole=True)
             best = _best_split(body, fragments, least[source], taken, tolerance)
         if best < 0:
             finish(body, parent)
@@ -199,8 +202,6 @@ def _fragments(
 ) -> list[_Fragment]:
     """Wall polygons (wall, shape, outline of the node in the wall's plane) clipped to a node; what
     has no more area than the rounding of its outline is none."""
-    import shapely
-
     shapes = [(wall, shape, outline) for wall, shape, outline in shapes if len(outline) >= 3]
     if not shapes:
         return []
@@ -296,8 +297,6 @@ def _closes(
     body: Polyhedron, fragment: _Fragment, taken: list[WallPlane], tolerance: Tolerance
 ) -> float:
     """The area (m²) that a fragment closes of the boundary plane next to it."""
-    import shapely
-
     frame = fragment.wall.frame
     for tag in sorted({tag for tag in body.tags if tag >= 0}):
         near = taken[tag].frame

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 
 from ptmtools.arrays import Floats
 from ptmtools.cells.bsp import Tree
@@ -88,8 +89,6 @@ def _openings(
     node: int, ahead: list[_Face], behind: list[_Face], tree: Tree, tolerance: Tolerance
 ) -> Iterator[Portal]:
     """The portals in the plane of one node, between faces ahead of it and behind it."""
-    import shapely
-
     if not ahead or not behind:
         return
     wall = tree.walls[node]
@@ -124,6 +123,4 @@ def _openings(
 
 def _wider_than(part: Geometry, width: float) -> bool:
     """Whether a disc of the given diameter fits into a polygon somewhere."""
-    import shapely
-
     return not shapely.is_empty(shapely.buffer(part, -width / 2, join_style="mitre"))

@@ -26,6 +26,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import shapely
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.merging import Groups
@@ -56,8 +57,6 @@ class _Regions(Groups):
     """Groups of leaves, by rank, that cost little where the opening between them is large."""
 
     def __init__(self, cells: Cells, rank: Ints) -> None:
-        import shapely
-
         super().__init__(cells.leaf_count, rank[cells.portal_leaf])
         order = np.argsort(rank)
         self._volume = cells.leaf_volumes()[order]
@@ -110,8 +109,6 @@ class _Regions(Groups):
 
 def _section(volume: float, plan: Plan) -> float:
     """m²: the mean cross-section along a region, volume over length."""
-    import shapely
-
     corners = shapely.get_coordinates(plan)
     edge = np.diff(corners, axis=0)
     length = np.linalg.norm(edge, axis=1)
@@ -123,8 +120,6 @@ def _section(volume: float, plan: Plan) -> float:
 
 def _touching(cells: Cells, near: float) -> list[list[int]]:
     """For every portal those that it meets, within ``near`` metres, ascending."""
-    import shapely
-
     found: list[list[int]] = [[] for _ in range(cells.portal_count)]
     if not found:
         return found

@@ -16,13 +16,13 @@ triangle there, whatever its size.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 
 import numpy as np
+import shapely
 
 from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.naming import named, structural_triangles
 from ptmtools.cells.nearby import Nearby
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
@@ -115,7 +115,7 @@ class Structure:
     def of(scene: Scene, options: SubdivideOptions, tolerance: Tolerance) -> Structure:
         """The structural triangles of a scene."""
         mask = structural_triangles(scene, options)
-        corners, forced = scene.corners[mask], _named(scene, options.structural)[mask]
+        corners, forced = scene.corners[mask], named(scene, options.structural)[mask]
         nearby = Nearby(corners, tolerance.rounding)
         return Structure(corners, forced, *planes_of(corners), nearby, tolerance)
 
@@ -130,29 +130,8 @@ class Structure:
         return unite(frame.to_plane(self.corners[triangles]), self.tolerance.grid)
 
 
-def structural_triangles(scene: Scene, options: SubdivideOptions) -> Bools:
-    """(T,) which triangles occlude: opaque, and not called detail by name."""
-    detail = _named(scene, options.detail) & ~_named(scene, options.structural)
-    return scene.opaque & ~detail
-
-
-def _named(scene: Scene, patterns: Sequence[str]) -> Bools:
-    """(T,) which triangles have an object or a material of such a name."""
-    objects = np.array([matches(name, patterns) for name in scene.objects], dtype=bool)
-    materials = np.array([matches(m.name, patterns) for m in scene.materials], dtype=bool)
-    named: Bools = objects[scene.triangle_object] | materials[scene.triangle_material]
-    return named
-
-
-def matches(name: str, patterns: Sequence[str]) -> bool:
-    """Whether one of the patterns, with * and ?, is a name's."""
-    return any(fnmatchcase(name, pattern) for pattern in patterns)
-
-
 def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
     """The planes that may split leaves, heaviest first."""
-    import shapely
-
     tolerance, forced = structure.tolerance, structure.forced
     least = (1 - TIE_SHARE) * wall_area
     found: list[tuple[float, WallPlane]] = []

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree, build_tree
-from ptmtools.cells.caps import Caps
 from ptmtools.cells.grouping import grouped
 from ptmtools.cells.model import OUTSIDE, Cells, sunk
+from ptmtools.cells.naming import matches
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.polyhedron import Polyhedron
@@ -30,7 +30,7 @@ from ptmtools.cells.portals import Portal, find_portals, portals_rejoined
 from ptmtools.cells.reach import Reach, at_box, flood, largest_leaf, roofed_share
 from ptmtools.cells.rejoin import rejoined
 from ptmtools.cells.reveals import Reveals
-from ptmtools.cells.structure import Structure, WallPlane, find_walls, matches
+from ptmtools.cells.structure import Structure, WallPlane, find_walls
 from ptmtools.errors import InputError
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
@@ -54,7 +54,6 @@ class _Model:
     structure: Structure
     walls: list[WallPlane]
     reveals: Reveals
-    caps: Caps
     options: SubdivideOptions
 
     @staticmethod
@@ -63,7 +62,7 @@ class _Model:
         structure = Structure.of(scene, options, tolerance)
         walls = find_walls(structure, options.wall_area)
         reveals = Reveals(structure, options.wall_thickness)
-        return _Model(structure, walls, reveals, Caps(structure), options)
+        return _Model(structure, walls, reveals, options)
 
 
 @dataclass(frozen=True)
@@ -149,17 +148,16 @@ def _divide(
     model: _Model, root: Polyhedron, progress: Progress = silent, inside: bool = False
 ) -> _Space:
     """Subdivide a root box and flood it."""
-    corners, tolerance = model.structure.corners, model.structure.tolerance
-    options = model.options
+    structure, options = model.structure, model.options
     box = np.stack(_bounds(root.points))
-    tree = build_tree(root, model.walls, model.reveals, model.caps, options, tolerance, progress)
-    portals = find_portals(tree, tolerance)
+    tree = build_tree(root, structure, model.walls, model.reveals, options, progress)
+    portals = find_portals(tree, structure.tolerance)
     start = _viewpoint_leaves(tree, box, options)
-    start = start or largest_leaf(tree, at_box(tree) <= inside, corners)
+    start = start or largest_leaf(tree, at_box(tree) <= inside, structure.corners)
     reach = flood(tree, portals, start)
     if tree.capped and (inside or reach.closed):  # else it is thrown away
         joint = rejoined(tree, reach.reached)
-        portals = portals_rejoined(portals, tree, joint, tolerance)
+        portals = portals_rejoined(portals, tree, joint, structure.tolerance)
         tree, reach = joint.tree, reach.renamed(joint.leaf)
     return _Space(box, tree, portals, reach)
 
