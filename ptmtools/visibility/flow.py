@@ -111,6 +111,11 @@ class PortalFlow:
         """Chain tests and clips that were done in all."""
         return int(self.work.sum())
 
+    def portals_in(self, row: Bits) -> Ints:
+        """The directed portals whose bits are set in a (W,) row."""
+        bits = np.unpackbits(row.view(np.uint8), count=len(self.sees), bitorder="little")
+        return np.flatnonzero(bits)
+
 
 def portal_flow(
     portals: Portals,
