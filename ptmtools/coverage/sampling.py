@@ -33,24 +33,17 @@ FALL = 2**-0.6
 
 
 @dataclass(frozen=True)
-class TextureShares:
-    """Shares of images within the entries of a row: (n,) int64 how many each entry has, and for all
-    of them (m,) int32 `image`, -1 for none, and (m,) float64 `share` of the row."""
-
-    count: Ints
-    image: NDArray[np.int32]
-    share: Floats
-
-
-@dataclass(frozen=True)
 class CellHints:
-    """What was found out about one cell; see `Ach`."""
+    """What was found out about one cell; see `Ach`. Of the images within the entries of its row,
+    how many each has, (n,), which, (m,), -1 for none, and their (m,) shares of the row."""
 
     row: Row
     missed: float
     samples: int
     rejected: int
-    textures: TextureShares
+    texture_count: Ints
+    texture: NDArray[np.int32]
+    texture_value: Floats
 
 
 class Sampler:
@@ -106,9 +99,9 @@ class Sampler:
             missed=int(tally.missed.sum()) / max(total, 1),
             samples=len(group),
             rejected=finder.rejected,
-            textures=TextureShares(
-                np.bincount(entry, minlength=len(begin)), owners.image[wanted[met]], owned[met]
-            ),
+            texture_count=np.bincount(entry, minlength=len(begin)),
+            texture=owners.image[wanted[met]],
+            texture_value=owned[met],
         )
 
     def _points(self, finder: PointFinder) -> SamplePoints:
