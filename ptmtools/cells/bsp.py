@@ -38,6 +38,7 @@ from ptmtools.cells.planar import Geometry, difference, intersection
 from ptmtools.cells.polyhedron import Polyhedron, clip_polygon, cut, section
 from ptmtools.cells.reveals import Reveals
 from ptmtools.cells.structure import Structure, WallPlane
+from ptmtools.cells.vectors import ranges
 from ptmtools.progress import Progress
 from ptmtools.tolerance import TIE_SHARE, Tolerance
 
@@ -161,16 +162,16 @@ def build_tree(
         if task.source == _CAPS:
             capped[node] = task.body
         place(task.parent, node)
-        rest = [f for i, f in enumerate(task.fragments) if i != task.best]
-        extents = _Extents(rest)
+        extents = _Extents(task.fragments)
         for side, body in enumerate(cut(task.body, plane, node, tolerance.rounding)):
             if body is None:
                 raise AssertionError("a split that was accepted has two sides")
             facing = plane if side == 0 else -plane
+            ahead = extents.ahead(facing, tolerance)
             inherited = [
                 (f.wall, f.shape, clip_polygon(f.outline, facing, tolerance.rounding))
-                for f, ahead in zip(rest, extents.ahead(facing, tolerance), strict=True)
-                if ahead
+                for i, f in enumerate(task.fragments)
+                if ahead[i] and i != task.best
             ]
             # A part of what a cap closed may have other caps, so it is asked again.
             if task.source == _CAPS:
@@ -227,9 +228,6 @@ class _Extents:
     """Which fragments reach in front of planes: boxes decide, corners where boxes do not."""
 
     def __init__(self, fragments: list[_Fragment]) -> None:
-        self._count = len(fragments)
-        if not fragments:
-            return
         self._points = np.concatenate([f.points for f in fragments])
         self._start = np.cumsum([0] + [len(f.points) for f in fragments])
         low = np.minimum.reduceat(self._points, self._start[:-1])
@@ -238,22 +236,19 @@ class _Extents:
 
     def ahead(self, plane: Floats, tolerance: Tolerance) -> Bools:
         """(n,) which fragments have a point farther in front than lies in the (4,) plane."""
-        if not self._count:
-            return np.zeros(0, dtype=bool)
-        if self._count <= _FEW:
+        if len(self._middle) <= _FEW:
             distance = self._points @ plane[:3] + plane[3]
-            few: Bools = np.maximum.reduceat(distance, self._start[:-1]) > tolerance.plane
-            return few
+            return np.asarray(np.maximum.reduceat(distance, self._start[:-1]) > tolerance.plane)
         middle = self._middle @ plane[:3] + (plane[3] - tolerance.plane)
         half = self._half @ np.abs(plane[:3]) + tolerance.rounding
         found: Bools = middle > half
         unsure = np.flatnonzero(~found & (middle > -half))
         if len(unsure):
             count = self._start[unsure + 1] - self._start[unsure]
-            first = np.cumsum(count) - count
-            row = np.repeat(self._start[unsure] - first, count) + np.arange(count.sum())
-            distance = self._points[row] @ plane[:3] + plane[3]
-            found[unsure] = np.maximum.reduceat(distance, first) > tolerance.plane
+            points = self._points[ranges(self._start[unsure], count)]
+            distance = points @ plane[:3] + plane[3]
+            farthest = np.maximum.reduceat(distance, np.cumsum(count) - count)
+            found[unsure] = farthest > tolerance.plane
         return found
 
 

@@ -34,7 +34,9 @@ def grouped(cells: Cells, options: SubdivideOptions) -> Cells:
     leaves of one cell lies inside that cell.
     """
     if options.cells == "room":
-        cells = _joined(cells, numbered(_groups(cells, options.gain)))
+        group, owner = numbered(_groups(cells, options.gain)), cells.triangle_cell
+        owner = np.where(owner >= 0, group[owner], -1).astype(np.int32)
+        cells = replace(cells, leaf_cell=group, triangle_cell=owner)
     if cells.cell_count == 1:
         cells = replace(cells, notes=(*cells.notes, ONE_HALL))
     return cells
@@ -96,12 +98,3 @@ def _sides(cells: Cells) -> tuple[Ints, Ints, Floats]:
     leaf = np.concatenate([front[front >= 0], back[behind]]).astype(np.int64)
     piece = np.concatenate([np.flatnonzero(front >= 0), np.flatnonzero(behind)])
     return leaf, piece, areas(cells.vertex[cells.triangle])
-
-
-def _joined(cells: Cells, group: NDArray[np.int32]) -> Cells:
-    owner = cells.triangle_cell
-    return replace(
-        cells,
-        leaf_cell=group,
-        triangle_cell=np.where(owner >= 0, group[owner], -1).astype(np.int32),
-    )

@@ -40,5 +40,10 @@ def fans(start: Ints) -> tuple[Ints, Ints]:
     of the CSR ``start``, and (m,) the polygon of each."""
     size = np.maximum(np.diff(start) - 2, 0)
     polygon = np.repeat(np.arange(len(size)), size)
-    second = start[polygon] + 1 + np.arange(len(polygon)) - (np.cumsum(size) - size)[polygon]
+    second = ranges(start[:-1] + 1, size)
     return np.stack([start[polygon], second, second + 1], axis=1), polygon
+
+
+def ranges(first: Ints, count: Ints) -> Ints:
+    """(m,) of each of the (n,) rows ``first``, and as many after it as to make ``count``."""
+    return np.repeat(first - (np.cumsum(count) - count), count) + np.arange(int(count.sum()))

@@ -30,18 +30,10 @@ RULE_OF_THREE = 3.0
 
 @dataclass(frozen=True)
 class Row:
-    """The hints of one cell, for each of the n cells of its PVS.
+    """The hints of one cell, for each of the n cells of its PVS: see `Ach`.
 
-    Attributes
-    ----------
-    value: (n,) float64 share of what is seen; sums to 1.
-    pixels: (n,) float64 pixels, weighted.
-    error: (n,) float64 standard error of `value`; NaN where no pixel showed it, or with one point.
-    p95: (n,) float64 the share that is exceeded from 5 % of the points.
-    seen: (n,) float64 share of the points from which it is seen.
-    views: (n, 6) float64 the same share for each of the six views alone; each column sums to 1.
-    uncertain: float64 a bound of the total variation between `value` and the truth, at about 95 %;
-        NaN with fewer than eight points, which would not tell: of two it held in half of the cases.
+    `uncertain` is NaN with fewer than eight points, which would not tell: of two it held in half of
+    the cases.
     """
 
     value: Floats

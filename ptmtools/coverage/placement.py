@@ -24,8 +24,6 @@ not on other cells, the unit, the number of workers or the version of a library.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ptmtools.arrays import Floats, Ints
@@ -40,37 +38,6 @@ CLOUD = 256
 TRIES = 32
 #: A cell that fills less than this share of its bounding box is filled by tetrahedra.
 FILLED = 1 / 32
-
-
-@dataclass(frozen=True)
-class Tetrahedra:
-    """Disjoint tetrahedra that fill the cells.
-
-    Attributes
-    ----------
-    corners, volume: (n, 4, 3) metres and (n,) m³, in the order of their cells; flat ones are left
-        out.
-    start: (C + 1,) CSR over cells.
-    """
-
-    corners: Floats
-    volume: Floats
-    start: Ints
-
-    @staticmethod
-    def of(cells: Cells) -> Tetrahedra:
-        """Those of all leaves."""
-        corners, leaf = cells.tetrahedra()
-        volume, cell = volumes(corners), cells.leaf_cell[leaf]
-        order = np.argsort(cell, kind="stable")
-        order = order[volume[order] > 0]
-        start = np.searchsorted(cell[order], np.arange(cells.cell_count + 1))
-        return Tetrahedra(corners[order], volume[order], start)
-
-    def of_cell(self, cell: int) -> tuple[Floats, Floats]:
-        """Those of a cell, and their volumes."""
-        rows = slice(*self.start[cell : cell + 2])
-        return self.corners[rows], self.volume[rows]
 
 
 def filling(tetra: Floats, volume: Floats, unit: Floats) -> Floats:
@@ -89,30 +56,47 @@ def filling(tetra: Floats, volume: Floats, unit: Floats) -> Floats:
 
 
 class Volume:
-    """A cell as something to put points into."""
+    """A cell as something to put points into.
 
-    def __init__(self, cells: Cells, tetrahedra: Tetrahedra, cell: int) -> None:
+    Attributes
+    ----------
+    tetrahedra, volume: (n, 4, 3) metres and (n,) m³, disjoint, none flat, together the cell.
+    boxed: whether enough of its bounding box is cell.
+    """
+
+    def __init__(self, cells: Cells, cell: int, tetrahedra: Floats, volume: Floats) -> None:
         self._cells, self._cell = cells, cell
-        self._tetra, self._volume = tetrahedra.of_cell(cell)
-        self.empty = len(self._tetra) == 0
+        self.tetrahedra, self.volume = tetrahedra, volume
+        self.empty = len(tetrahedra) == 0
         if not self.empty:
-            points = self._tetra.reshape(-1, 3)
+            points = tetrahedra.reshape(-1, 3)
             self._low, self._size = points.min(axis=0), np.ptp(points, axis=0)
-            share = float(self._volume.sum()) / float(np.prod(self._size))
-            self.boxed = share >= FILLED
+            self.boxed = float(volume.sum()) / float(np.prod(self._size)) >= FILLED
+
+    @staticmethod
+    def of_cells(cells: Cells) -> list[Volume]:
+        """All cells."""
+        tetrahedra, leaf = cells.tetrahedra()
+        volume, cell = volumes(tetrahedra), cells.leaf_cell[leaf]
+        order = np.argsort(cell, kind="stable")
+        order = order[volume[order] > 0]
+        rows = np.split(order, np.searchsorted(cell[order], np.arange(1, cells.cell_count)))
+        return [
+            Volume(cells, c, tetrahedra[rows[c]], volume[rows[c]]) for c in range(cells.cell_count)
+        ]
 
     def random(self, first: int, count: int, seed: int) -> Floats:
         """(count, 5) independent points ``first`` …: positions in metres, and two more coordinates
         in (0, 1)."""
         unit = uniform(first, count, seed)
-        return np.hstack([filling(self._tetra, self._volume, unit), unit[:, 4:]])
+        return np.hstack([filling(self.tetrahedra, self.volume, unit), unit[:, 4:]])
 
     def sobol(self, first: int, count: int, seed: int) -> Floats:
         """(at most count, 5) points ``first`` … of a scrambled sequence, those in the cell: their
         positions in metres, and two more coordinates in (0, 1)."""
         unit = sobol(first, count, seed)
         if not self.boxed:
-            return np.hstack([filling(self._tetra, self._volume, unit), unit[:, 4:]])
+            return np.hstack([filling(self.tetrahedra, self.volume, unit), unit[:, 4:]])
         points = self._low + unit[:, :3] * self._size
         inside = self._cells.locate(points) == self._cell
         return np.hstack([points[inside], unit[inside, 4:]])
@@ -120,7 +104,7 @@ class Volume:
     def parts(self, count: int, seed: int) -> list[Floats]:
         """For each of ``count`` equal parts of the cell (TRIES, 3) points, from its centroid
         outwards."""
-        points = filling(self._tetra, self._volume, sobol(0, CLOUD * count, seed))
+        points = filling(self.tetrahedra, self.volume, sobol(0, CLOUD * count, seed))
         return [points[group[:: CLOUD // TRIES]] for group in strata(points, count)]
 
 

@@ -15,7 +15,7 @@ from ptmtools.coverage.backends import Backend
 from ptmtools.coverage.estimate import GROUPS, Row, estimate, grouped, shares, spread
 from ptmtools.coverage.item_buffer import Surfaces
 from ptmtools.coverage.options import AchOptions
-from ptmtools.coverage.placement import Tetrahedra, Volume
+from ptmtools.coverage.placement import Volume
 from ptmtools.coverage.sample_points import PointFinder, PointSequence, SamplePoints
 from ptmtools.coverage.solids import Obstacles
 from ptmtools.coverage.tally import PixelCounter, Tally
@@ -56,7 +56,7 @@ class Sampler:
         self.scene, self.cells, self.pvs = scene, cells, pvs
         self.options, self.backend = options, backend
         self._obstacles = Obstacles.of(scene, cells)
-        self._tetrahedra = Tetrahedra.of(cells)
+        self._volumes = Volume.of_cells(cells)
         self._clearance = options.clearance or CLEARANCE * scene.tolerance.thin
         surfaces = Surfaces.of(scene, cells)
         self.renderer = backend.open(surfaces, options.side, options.gpu)
@@ -75,8 +75,7 @@ class Sampler:
 
     def of_cell(self, cell: int) -> CellHints:
         """The hints of one cell."""
-        volume = Volume(self.cells, self._tetrahedra, cell)
-        finder = PointFinder(volume, self._obstacles, self._clearance)
+        finder = PointFinder(self._volumes[cell], self._obstacles, self._clearance)
         owners = self._counter.owners
         wanted, begin = owners.in_cells(self.pvs.row(cell))
 

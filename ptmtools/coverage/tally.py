@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Ints
 from ptmtools.cells.model import Cells
+from ptmtools.cells.vectors import ranges
 from ptmtools.coverage.item_buffer import VIEWS, Renderer, Surfaces
 from ptmtools.coverage.sample_points import SamplePoints
 
@@ -69,9 +70,7 @@ class Owners:
     def in_cells(self, cells: NDArray[np.int32]) -> tuple[Ints, Ints]:
         """The owners in each of the (n,) cells, cell after cell, and where each cell's begin."""
         size = self.first[cells + 1] - self.first[cells]
-        begin = np.concatenate([[0], np.cumsum(size)[:-1]]).astype(np.int64)
-        within = np.arange(int(size.sum())) - np.repeat(begin, size)
-        return np.repeat(self.first[cells], size) + within, begin
+        return ranges(self.first[cells], size), np.cumsum(size) - size
 
     def at(self, cell: NDArray[np.int32], image: NDArray[np.int32]) -> Ints:
         """(n,) the owner of each of the (n,) images in each of the (n,) cells; what has no image

@@ -91,12 +91,7 @@ class PortalFlow:
     ----------
     sees: (2K, W) uint64 rows of little-endian bits: directed portal p (2k crosses portal k along
         its normal, 2k + 1 against it) may be followed by directed portal q on one straight line.
-    cut: (K,) whether the budget or the depth cut the search from a portal short.
-    work: (K,) chain tests and clips that the search from each portal took, both ways together.
-    ties: (K,) near ties, sequences of portals that the search from each portal rejected by less
-        than 16 roundings, both ways together: mostly portals that touch a plane and no more.
-    decided: (K,) how many of them mattered and were decided in double-double arithmetic.
-    opened: (K,) how many of those let a line pass.
+    cut, work, ties, decided, opened: (K,) as in `Pvs`, both ways together.
     """
 
     sees: Bits

@@ -25,14 +25,7 @@ COSTLIEST = 3
 
 
 class Searched(NamedTuple):
-    """What one search took, summed up over its repetitions but for ``cut`` and ``ties``.
-
-    Attributes
-    ----------
-    cut: whether it was given up for a looser result. work: operations. ties: sequences rejected by
-        a near tie. decided: how many of them were tested again in double-double. opened: how many
-        of those let a line pass.
-    """
+    """What a search took, all repetitions together but for ``cut`` and ``ties``: see `Pvs`."""
 
     cut: bool
     work: int

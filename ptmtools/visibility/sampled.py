@@ -8,8 +8,6 @@ them evenly; random ones, as many as wanted, show more.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,13 +22,8 @@ from ptmtools.visibility.storage import Geometry
 SPANS = 64
 
 
-class Shooting(NamedTuple):
-    """What the tasks share: lines through each portal, and of which kind."""
-
-    geometry: Geometry
-    leaf_count: int
-    lines: int
-    seed: int
+#: What the tasks share: portals, how many leaves, lines through each portal, and the seed.
+Shooting = tuple[Geometry, int, int, int]
 
 
 def sampled_leaves(
@@ -51,7 +44,7 @@ def sampled_leaves(
     matrix = np.eye(leaves, dtype=np.bool_)
     if count == 0:
         return matrix
-    shooting = Shooting(geometry(portals), leaves, lines, seed)
+    shooting = (geometry(portals), leaves, lines, seed)
     step = -(-count // SPANS)
     spans = [(first, min(first + step, count)) for first in range(0, count, step)]
     for bits in executor.each(_shoot, shooting, spans, releases_lock=True):
@@ -65,17 +58,17 @@ def _shoot(shared: Shooting, span: tuple[int, int]) -> NDArray[np.uint8]:
     """As a task: (L, ⌈L / 8⌉) bits, who sees whom by lines of the portals ``span``."""
     from ptmtools.cells.line_kernels import Openings, sight_lines
 
-    g = shared.geometry
+    g, leaves, lines, seed = shared
     openings = Openings(g.point, g.start, g.leaf, g.out_start, g.out)
     path = np.empty(2 * LONGEST, np.int64)
-    seen = np.zeros((shared.leaf_count, shared.leaf_count), np.bool_)
+    seen = np.zeros((leaves, leaves), np.bool_)
     for k in range(*span):
-        rng = np.random.default_rng([shared.seed, k])
-        portal = np.full(shared.lines, k)
+        rng = np.random.default_rng([seed, k])
+        portal = np.full(lines, k)
         origin = _points(rng, g, portal)
-        aimed = _points(rng, g, rng.integers(len(g.normal), size=shared.lines)) - origin
+        aimed = _points(rng, g, rng.integers(len(g.normal), size=lines)) - origin
         anywhere = rng.normal(size=origin.shape)
-        along = np.where(rng.random((shared.lines, 1)) < 0.5, aimed, anywhere)
+        along = np.where(rng.random((lines, 1)) < 0.5, aimed, anywhere)
         speed = along @ g.normal[k]
         across = np.abs(speed) > g.slack
         along *= np.sign(speed)[:, None]

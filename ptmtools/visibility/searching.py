@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import NamedTuple
 
 import numpy as np
 
@@ -60,13 +59,6 @@ class Searching:
         return vars(self) | {"_idle": []}
 
 
-class Found(NamedTuple):
-    """What one search found: a (W,) row of bits, and what it took."""
-
-    seen: Bits
-    figures: Searched
-
-
 def flood_from(shared: Searching, span: tuple[int, int]) -> Bits:
     """As a task: (last - first, W) what floods reach from the directed portals ``span`` (first,
     last)."""
@@ -79,13 +71,12 @@ def flood_from(shared: Searching, span: tuple[int, int]) -> Bits:
     return rows
 
 
-def search_from(shared: Searching, source: int) -> Found:
-    """As a task: what the directed portal ``source`` sees."""
+def search_from(shared: Searching, source: int) -> tuple[Bits, Searched]:
+    """As a task: a (W,) row of bits, what the directed portal ``source`` sees; and what it took."""
     seen = np.zeros(shared.words, np.uint64)
     with shared.tools() as (storage, test):
         given = shared.geometry, storage, test, shared.known, source, shared.budget
-        figures = searched(*given, seen)
-    return Found(seen, figures)
+        return seen, searched(*given, seen)
 
 
 def settle(shared: Searching, done: tuple[Ints, Bits]) -> None:
