@@ -17,7 +17,7 @@ import numpy as np
 import shapely
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.cells.planar import difference, without_cracks
+from ptmtools.cells.planar import left_open
 from ptmtools.cells.polyhedron import Polyhedron, section
 from ptmtools.cells.structure import Frame, Structure, WallPlane
 from ptmtools.cells.vectors import cross
@@ -85,10 +85,7 @@ def _cap(body: Polyhedron, plane: Floats, structure: Structure, near: Ints) -> W
         return None
     frame = Frame.of(plane)
     blocking = structure.united(frame, near[structure.lie_in(plane, near)])
-    region = shapely.polygons(frame.to_plane(outline))
-    opening = without_cracks(
-        difference(region, blocking, tolerance.grid), tolerance.hairline, tolerance.grid
-    )
+    opening = left_open(shapely.polygons(frame.to_plane(outline)), blocking, tolerance)
     return WallPlane(frame, blocking, blocking) if shapely.is_empty(opening) else None
 
 

@@ -18,6 +18,7 @@ import shapely
 from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.merging import connected
 from ptmtools.cells.nearby import along_a_curve
+from ptmtools.tolerance import Tolerance
 
 #: A shapely geometry, or an array of them.
 Geometry = Any
@@ -72,10 +73,15 @@ def neighbours(polygons: Geometry, gap: float) -> Ints:
     return connected(len(polygons), one, other)
 
 
-def without_cracks(opening: Geometry, width: float, grid: float) -> Geometry:
-    """The opening less what is narrower than ``width``: a morphological opening, grown by twice
-    what was eroded and clipped, so that what stays is not shrunk. A crack under a wall would
-    otherwise stretch the hull of a door along all of it."""
+def left_open(region: Geometry, blocking: Geometry, tolerance: Tolerance) -> Geometry:
+    """What of a region is not blocked, less cracks, what is narrower than a hairline: a crack under
+    a wall would stretch the hull of a door along all of it.
+
+    A morphological opening, grown by twice what was eroded and clipped, so that what stays is not
+    shrunk.
+    """
+    width, grid = tolerance.hairline, tolerance.grid
+    opening = difference(region, blocking, grid)
     core = shapely.buffer(opening, -width / 2, join_style="mitre")
     grown = shapely.buffer(core, width, join_style="mitre")
     return intersection(opening, grown, grid)

@@ -18,7 +18,7 @@ import shapely
 
 from ptmtools.arrays import Floats
 from ptmtools.cells.bsp import Tree
-from ptmtools.cells.planar import Geometry, difference, intersection, union, without_cracks
+from ptmtools.cells.planar import Geometry, intersection, left_open, union
 from ptmtools.cells.rejoin import Rejoined
 from ptmtools.tolerance import Tolerance
 
@@ -104,11 +104,7 @@ def _openings(
     i, j, shared = i[wide], j[wide], shared[wide]
     if len(shared) == 0:
         return
-    opening = without_cracks(
-        difference(union(shared, tolerance.grid), wall.blocking, tolerance.grid),
-        tolerance.hairline,
-        tolerance.grid,
-    )
+    opening = left_open(union(shared, tolerance.grid), wall.blocking, tolerance)
     if shapely.is_empty(opening):
         return
     pieces = intersection(shared, opening, tolerance.grid)
