@@ -55,22 +55,13 @@ _WALLS, _REVEALS, _CAPS = range(3)
 
 @dataclass(frozen=True)
 class Tree:
-    """A BSP tree over the root box, with every leaf, reachable or not.
+    """A BSP tree over the root box, with every leaf, reachable or not."""
 
-    Attributes
-    ----------
-    walls: the nodes' planes, and what lies in them.
-    children: (N, 2) int32 as in `Cells.node_child`.
-    leaves: the convex polyhedra, face tags are node indices.
-    unsplit: how many of them hold walls that the limit left in one piece.
-    capped: for each node that a cap splits, its polyhedron.
-    """
-
-    walls: tuple[WallPlane, ...]
-    children: NDArray[np.int32]
-    leaves: tuple[Polyhedron, ...]
-    unsplit: int = 0
-    capped: Mapping[int, Polyhedron] = field(default_factory=dict)
+    walls: tuple[WallPlane, ...]  # the nodes' planes, and what lies in them
+    children: NDArray[np.int32]  # (N, 2) as in `Cells.node_child`
+    leaves: tuple[Polyhedron, ...]  # face tags are node indices
+    unsplit: int = 0  # leaves that hold walls that the limit left in one piece
+    capped: Mapping[int, Polyhedron] = field(default_factory=dict)  # nodes that caps split
 
     @cached_property
     def planes(self) -> Floats:
@@ -80,13 +71,13 @@ class Tree:
 
 @dataclass(frozen=True)
 class _Fragment:
-    """What a node holds of one wall plane; `outline` is the node's cross-section with it."""
+    """What a node holds of one wall plane."""
 
     wall: WallPlane
     shape: Geometry
     area: float
-    points: Floats
-    outline: Floats
+    points: Floats  # (n, 3) the corners of the shape
+    outline: Floats  # (m, 3) the node's cross-section with the plane
     section_area: float
 
 

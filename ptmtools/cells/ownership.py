@@ -28,32 +28,21 @@ from ptmtools.tolerance import Tolerance
 
 @dataclass(frozen=True)
 class Pieces:
-    """Triangles cut to the leaves.
+    """Triangles cut to the leaves."""
 
-    Attributes
-    ----------
-    points: (M, 3, 3) corner positions.
-    weights: (M, 3, 3) barycentric coordinates of the corners in the source triangle.
-    source: (M,) index of the scene's triangle.
-    leaf: (M, 2) int64 leaf of the tree on the front and on the back.
-    """
-
-    points: Floats
-    weights: Floats
-    source: Ints
-    leaf: Ints
+    corner: Floats  # (M, 3, 6) positions, and barycentric coordinates in the source triangle
+    source: Ints  # (M,) index of the scene's triangle
+    leaf: Ints  # (M, 2) leaf of the tree on the front and on the back
 
 
 @dataclass(frozen=True)
 class _Batch:
-    """Pieces on their way down: `corner` (n, 3, 6) are positions and barycentric coordinates,
-    `front` is the leaf on their front, once that is known; `lying` whether they lay in some plane
-    on the way."""
+    """Pieces on their way down."""
 
-    corner: Floats
+    corner: Floats  # as in `Pieces`
     source: Ints
-    front: Ints
-    lying: Bools
+    front: Ints  # (n,) the leaf on their front, once that is known
+    lying: Bools  # (n,) whether they lay in some plane on the way
 
     def take(self, rows: Ints | Bools) -> _Batch:
         return _Batch(*(array[rows] for array in vars(self).values()))
@@ -84,8 +73,7 @@ def cut_to_leaves(scene: Scene, tree: Tree, tolerance: Tolerance) -> Pieces:
         [np.append(front[within], boundary.front), np.append(front[within], back)], axis=1
     )
     order = np.argsort(pieces.source, kind="stable")
-    corner = pieces.corner[order]
-    return Pieces(corner[..., :3], corner[..., 3:], pieces.source[order], leaf[order])
+    return Pieces(pieces.corner[order], pieces.source[order], leaf[order])
 
 
 def _sink(tree: Tree, batch: _Batch, facing: Floats, tolerance: Tolerance) -> tuple[_Batch, Ints]:

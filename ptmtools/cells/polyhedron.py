@@ -23,18 +23,11 @@ _BOX_LOOPS = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 
 
 @dataclass(frozen=True)
 class Polyhedron:
-    """A convex polyhedron.
+    """A convex polyhedron."""
 
-    Attributes
-    ----------
-    points: (n, 3) vertices.
-    faces: loops of indices into `points`, counter-clockwise seen from outside.
-    tags: for each face the BSP node whose plane it lies in, or `BOX_FACE`.
-    """
-
-    points: Floats
-    faces: tuple[Ints, ...]
-    tags: tuple[int, ...]
+    points: Floats  # (n, 3) vertices
+    faces: tuple[Ints, ...]  # loops of indices into them, counter-clockwise seen from outside
+    tags: tuple[int, ...]  # for each face the BSP node whose plane it lies in, or `BOX_FACE`
 
     @staticmethod
     def box(low: Floats, high: Floats) -> Polyhedron:

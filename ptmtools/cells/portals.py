@@ -24,20 +24,12 @@ from ptmtools.tolerance import Tolerance
 
 
 class Portal(NamedTuple):
-    """An opening between two leaves of a `Tree`.
+    """An opening between two leaves of a `Tree`."""
 
-    Attributes
-    ----------
-    node: the node whose plane it lies in.
-    leaves: the leaf behind and the leaf in front of the plane.
-    polygon: (n, 3), convex, counter-clockwise seen against the normal.
-    area: m² open, before its hull was taken.
-    """
-
-    node: int
-    leaves: tuple[int, int]
-    polygon: Floats
-    area: float
+    node: int  # whose plane it lies in
+    leaves: tuple[int, int]  # behind and in front of the plane
+    polygon: Floats  # (n, 3) convex, counter-clockwise seen against the normal
+    area: float  # m² open, before its hull was taken
 
 
 def find_portals(

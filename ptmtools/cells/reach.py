@@ -29,18 +29,11 @@ FLOOR_SHARE = 0.05
 
 @dataclass(frozen=True)
 class Reach:
-    """The outcome of a flood.
+    """The outcome of a flood."""
 
-    Attributes
-    ----------
-    reached: (L,) bool over the leaves of the tree.
-    closed: whether no reached leaf touches the root box.
-    start: the leaves from which the flood began; empty if none qualified.
-    """
-
-    reached: Bools
-    closed: bool
-    start: tuple[int, ...]
+    reached: Bools  # (L,) over the leaves of the tree
+    closed: bool  # whether no reached leaf touches the root box
+    start: tuple[int, ...]  # leaves from which the flood began; empty if none qualified
 
     def renamed(self, leaf: Ints) -> Reach:
         """The same over leaves of which each of these, (L,), is or is part of ``leaf[i]``; parts

@@ -21,18 +21,11 @@ from ptmtools.cells.polyhedron import Polyhedron
 
 @dataclass(frozen=True)
 class Rejoined:
-    """A tree without caps that cut nothing off.
-
-    Attributes
-    ----------
-    tree: what is left.
-    leaf: (L,) for each leaf of the tree before, which it is or is part of; ascending but for parts.
-    node: (N,) for each node of the tree before, which it is, or -1.
-    """
+    """A tree without caps that cut nothing off, and what became of the leaves and nodes before."""
 
     tree: Tree
-    leaf: Ints
-    node: Ints
+    leaf: Ints  # (L,) which leaf each is or is part of; ascending but for parts
+    node: Ints  # (N,) which node each is, or -1
 
 
 def rejoined(tree: Tree, reached: Bools) -> Rejoined:

@@ -42,17 +42,11 @@ _UPWARD = np.array([0.5772156649, 0.8346268417, 0.2614972128])
 
 @dataclass(frozen=True)
 class Frame:
-    """A plane with two axes in it: ``to_plane`` and ``to_space`` are exact inverses up to rounding.
+    """A plane with two axes in it: `to_plane` and `to_space` are inverses up to rounding."""
 
-    Attributes
-    ----------
-    plane: (4,) unit normal and offset, n·x + d = 0.
-    origin, u, v: a point of the plane and an orthonormal basis, u × v = n.
-    """
-
-    plane: Floats
-    origin: Floats
-    u: Floats
+    plane: Floats  # (4,) unit normal n and offset d, n·x + d = 0
+    origin: Floats  # a point of it
+    u: Floats  # an orthonormal basis, u × v = n
     v: Floats
 
     @staticmethod
@@ -78,36 +72,21 @@ class Frame:
 
 @dataclass(frozen=True)
 class WallPlane:
-    """A plane that may split cells, and what lies in it.
-
-    Attributes
-    ----------
-    frame: the plane and its axes.
-    walls: shapely geometry in plane coordinates, the polygons that may split.
-    blocking: shapely geometry, everything opaque and structural in the plane.
-    """
+    """A plane that may split cells, and what lies in it, in its coordinates."""
 
     frame: Frame
-    walls: Geometry
-    blocking: Geometry
+    walls: Geometry  # the polygons that may split
+    blocking: Geometry  # everything opaque and structural
 
 
 @dataclass(frozen=True)
 class Structure:
-    """The triangles that may bound a leaf, and what is asked of them again and again.
+    """The triangles that may bound a leaf, and what is asked of them again and again."""
 
-    Attributes
-    ----------
-    corners: (T, 3, 3) their corners, metres.
-    forced: (T,) whether `SubdivideOptions.structural` names them.
-    planes, areas: see `planes_of`.
-    nearby: finds them.
-    """
-
-    corners: Floats
-    forced: Bools
-    planes: Floats
-    areas: Floats
+    corners: Floats  # (T, 3, 3) metres
+    forced: Bools  # (T,) whether `SubdivideOptions.structural` names them
+    planes: Floats  # (T, 4) and
+    areas: Floats  # (T,), see `planes_of`
     nearby: Nearby
     tolerance: Tolerance
 

@@ -258,8 +258,8 @@ def _starts(lengths: Iterable[int]) -> Ints:
 
 def _weld(scene: Scene, pieces: Pieces, owned: Bools) -> tuple[Floats, Floats, NDArray[np.int32]]:
     """Vertices (position and texture coordinate) shared by the pieces, and (M, 3) indices."""
-    points = pieces.points[owned].reshape(-1, 3)
-    uv = np.einsum("mcw,mwk->mck", pieces.weights[owned], scene.uv[pieces.source[owned]])
-    both = np.concatenate([points, uv.reshape(-1, 2)], axis=1) + 0.0
+    points, weights = np.split(pieces.corner[owned], 2, axis=2)
+    uv = np.einsum("mcw,mwk->mck", weights, scene.uv[pieces.source[owned]])
+    both = np.concatenate([points, uv], axis=2).reshape(-1, 5) + 0.0
     distinct, index = np.unique(both, axis=0, return_inverse=True)
     return distinct[:, :3].copy(), distinct[:, 3:].copy(), index.reshape(-1, 3).astype(np.int32)

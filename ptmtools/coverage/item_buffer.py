@@ -55,28 +55,18 @@ BEFORE = 1.0 - DEPTH_SHARE
 class Surfaces:
     """The geometry cut to the cells, as the backends take it.
 
-    Attributes
-    ----------
-    centre, scale: ``(world - centre) * scale`` lies within about 1 of the origin; scale is a
-        power of two.
-    vertex: (W, 3) float64 normalised vertices.
-    triangle: (M, 3) int32 into `vertex`.
-    plane: (M, 4) float64 of the scene's triangle that each is a piece of, which is better known
-        than that of a sliver: unit normal and offset in normalised coordinates.
-    cell: (M, 2) int32 the cell on the front and on the back, -1 for none.
-    image: (M,) int32 the image that each shows, -1 for none.
-    opaque: (M,) bool.
-    cell_count: cells in all.
+    ``(world - centre) * scale`` lies within about 1 of the origin; scale is a power of two. Planes
+    are those of the scene's triangles, better known than those of slivers.
     """
 
     centre: Floats
     scale: float
-    vertex: Floats
-    triangle: NDArray[np.int32]
-    plane: Floats
-    cell: NDArray[np.int32]
-    image: NDArray[np.int32]
-    opaque: Bools
+    vertex: Floats  # (W, 3) normalised
+    triangle: NDArray[np.int32]  # (M, 3) into `vertex`
+    plane: Floats  # (M, 4) unit normal and offset, in normalised coordinates
+    cell: NDArray[np.int32]  # (M, 2) the cell on the front and on the back, -1 for none
+    image: NDArray[np.int32]  # (M,) the image that each shows, -1 for none
+    opaque: Bools  # (M,)
     cell_count: int
 
     @staticmethod

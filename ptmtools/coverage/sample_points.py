@@ -21,19 +21,11 @@ BATCH = 64
 
 @dataclass(frozen=True)
 class SamplePoints:
-    """K sample points.
+    """K sample points."""
 
-    Attributes
-    ----------
-    position: (K, 3) float64, metres, world coordinates.
-    near: (K,) float64 metres within which each has no surface.
-    shift: (K, 2) float64 in (-1, 1): how far right and up of the pixel centres its views are
-        drawn, in halves of a pixel.
-    """
-
-    position: Floats
-    near: Floats
-    shift: Floats
+    position: Floats  # (K, 3) metres, world coordinates
+    near: Floats  # (K,) metres within which each has no surface
+    shift: Floats  # (K, 2) in (-1, 1): halves of a pixel, how far right and up its views are drawn
 
     def __len__(self) -> int:
         return len(self.position)

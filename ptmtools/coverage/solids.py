@@ -156,20 +156,12 @@ def boundary_area(scene: Scene, cells: Cells) -> Floats:
 
 @dataclass(frozen=True)
 class Obstacles:
-    """What a sample point has to keep clear of.
+    """What a sample point has to keep clear of."""
 
-    Attributes
-    ----------
-    corners: (T, 3, 3) all surfaces, metres.
-    nearby: finds those near a box.
-    solids: the closed ones with an inside.
-    boxes: (B, 2, 3) the bounding boxes of the solids.
-    """
-
-    corners: Floats
+    corners: Floats  # (T, 3, 3) all surfaces, metres
     nearby: Nearby
-    solids: tuple[Solid, ...]
-    boxes: Floats
+    solids: tuple[Solid, ...]  # the closed ones with an inside
+    boxes: Floats  # (B, 2, 3) their bounding boxes
 
     @staticmethod
     def of(scene: Scene, cells: Cells) -> Obstacles:

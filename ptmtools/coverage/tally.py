@@ -33,22 +33,14 @@ TOWARDS = 4.0
 
 @dataclass(frozen=True)
 class Owners:
-    """For whom a pixel can count: each cell, or each image within each cell.
+    """For whom a pixel can count: each cell, or each image within each cell, where -1 is
+    what has none; every cell has that owner."""
 
-    Attributes
-    ----------
-    cell, image: (S,) int32 of each owner, in order of cell, then image; image -1 is what has none,
-        and every cell has that owner.
-    first: (C + 1,) where the owners of each cell begin.
-    of_side: (M, 2) int32 the owner of each triangle's front and back, -1 for none.
-    images: more than any image of the scene, plus 1.
-    """
-
-    cell: NDArray[np.int32]
-    image: NDArray[np.int32]
-    first: Ints
-    of_side: NDArray[np.int32]
-    images: int
+    cell: NDArray[np.int32]  # (S,) of each owner, ascending, and
+    image: NDArray[np.int32]  # (S,) ascending within a cell
+    first: Ints  # (C + 1,) where the owners of each cell begin
+    of_side: NDArray[np.int32]  # (M, 2) of each triangle's front and back, -1 for none
+    images: int  # more than any image of the scene, plus 1
 
     @staticmethod
     def of(surfaces: Surfaces, by_image: bool) -> Owners:
@@ -84,18 +76,11 @@ class Owners:
 
 @dataclass(frozen=True)
 class Tally:
-    """Weighted pixels seen from K points.
+    """Weighted pixels seen from K points."""
 
-    Attributes
-    ----------
-    at_points: (K, m) int64 of each of the owners asked for, at each point.
-    in_views: (6, m) int64 of the same in each view, over all points.
-    missed: (K,) int64 of what belongs to none of them.
-    """
-
-    at_points: Ints
-    in_views: Ints
-    missed: Ints
+    at_points: Ints  # (K, m) of each of the owners asked for, at each point
+    in_views: Ints  # (6, m) of the same in each view, over all points
+    missed: Ints  # (K,) of what belongs to none of them
 
     @staticmethod
     def join(parts: list[Tally]) -> Tally:

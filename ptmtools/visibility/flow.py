@@ -63,24 +63,14 @@ BITS_OF_BYTE = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1).su
 
 @dataclass(frozen=True)
 class Portals:
-    """Convex openings between leaves; the input of `portal_flow`.
-
-    Attributes
-    ----------
-    leaf_count: number of leaves.
-    leaf: (K, 2) the leaves that each portal joins.
-    normal: (K, 3) normals pointing from ``leaf[:, 0]`` into ``leaf[:, 1]``.
-    point: (Q, 3) float64 convex polygons, either orientation.
-    start: (K + 1,) CSR over portals into `point`.
-    tolerance: that of the cells; if not given, it is derived from the points.
-    """
+    """Convex openings between leaves; the input of `portal_flow`."""
 
     leaf_count: int
-    leaf: NDArray[np.int32]
-    normal: Floats
-    point: Floats
-    start: Ints
-    tolerance: Tolerance | None = None
+    leaf: NDArray[np.int32]  # (K, 2) the leaves that each portal joins
+    normal: Floats  # (K, 3) pointing from ``leaf[:, 0]`` into ``leaf[:, 1]``
+    point: Floats  # (Q, 3) polygons, either orientation
+    start: Ints  # (K + 1,) CSR over portals into `point`
+    tolerance: Tolerance | None = None  # that of the cells, or derived from the points
 
 
 @dataclass(frozen=True)

@@ -26,13 +26,8 @@ Tools = tuple[Scratch, SequenceTest]
 
 
 class Searching:
-    """The portals, and what each may see by all that is known.
-
-    Attributes
-    ----------
-    geometry: the portals. budget: see `portal_flow`.
-    known: (2K, W) uint64 rows of bits.
-    """
+    """The portals; what each may see by all that is known, (2K, W) bits; and the budget of each
+    search, see `portal_flow`."""
 
     def __init__(self, geometry: Geometry, known: Bits, budget: int) -> None:
         self.geometry, self.known, self.budget = geometry, known, budget
