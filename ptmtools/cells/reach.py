@@ -8,11 +8,9 @@ root box; what it does not reach is a solid, a sealed void or the outside (desig
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.arrays import Bools, Floats
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.polyhedron import BOX_FACE
 from ptmtools.cells.portals import Portal
@@ -27,31 +25,14 @@ FLOOR_SAMPLES = 400
 FLOOR_SHARE = 0.05
 
 
-@dataclass(frozen=True)
-class Reach:
-    """The outcome of a flood."""
-
-    reached: Bools  # (L,) over the leaves of the tree
-    closed: bool  # whether no reached leaf touches the root box
-    start: tuple[int, ...]  # leaves from which the flood began; empty if none qualified
-
-    def renamed(self, leaf: Ints) -> Reach:
-        """The same over leaves of which each of these, (L,), is or is part of ``leaf[i]``; parts
-        of one leaf must be reached alike."""
-        reached = np.zeros(int(leaf.max(initial=-1)) + 1, dtype=bool)
-        reached[leaf] = self.reached
-        start = tuple(dict.fromkeys(leaf[list(self.start)].tolist()))
-        return Reach(reached, self.closed, start)
-
-
-def flood(tree: Tree, portals: list[Portal], start: tuple[int, ...]) -> Reach:
-    """Flood through the portals from the leaves ``start``."""
+def flood(leaves: int, portals: list[Portal], start: tuple[int, ...]) -> Bools:
+    """(L,) which of so many leaves are reached through the portals from the leaves ``start``."""
     ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
-    reached, count = np.zeros(len(tree.leaves), dtype=bool), 0
+    reached, count = np.zeros(leaves, dtype=bool), 0
     reached[list(start)] = True
     while count < (count := int(reached.sum())):
         reached[ends[reached[ends].any(axis=1)]] = True
-    return Reach(reached, bool(start) and not np.any(reached & at_box(tree)), start)
+    return reached
 
 
 def at_box(tree: Tree) -> Bools:

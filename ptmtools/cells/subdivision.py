@@ -27,7 +27,7 @@ from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import Portal, find_portals, portals_rejoined
-from ptmtools.cells.reach import Reach, at_box, flood, largest_leaf, roofed_share
+from ptmtools.cells.reach import at_box, flood, largest_leaf, roofed_share
 from ptmtools.cells.rejoin import rejoined
 from ptmtools.cells.reveals import Reveals
 from ptmtools.cells.structure import Structure, WallPlane, find_walls
@@ -72,7 +72,8 @@ class _Space:
     box: Floats
     tree: Tree
     portals: list[Portal]
-    reach: Reach
+    reached: Bools  # (L,) which leaves somebody can reach
+    closed: bool  # whether they do not touch the root box
 
 
 def subdivide(
@@ -106,7 +107,7 @@ def subdivide(
     clipped = executor.submit(_divide_inside, model, tight, long=len(scene.triangles) >= LARGE)
     try:
         space = _divide(model, wide, progress)
-        if not space.reach.closed:
+        if not space.closed:
             roofed = roofed_share(corners, options.wall_area)
             notes.append(_open_note(space, roofed, tight))
             space = clipped.result()
@@ -152,14 +153,16 @@ def _divide(
     box = np.stack(_bounds(root.points))
     tree = build_tree(root, structure, model.walls, model.reveals, options, progress)
     portals = find_portals(tree, structure.tolerance)
+    outer = at_box(tree)
     start = _viewpoint_leaves(tree, box, options)
-    start = start or largest_leaf(tree, at_box(tree) <= inside, structure.corners)
-    reach = flood(tree, portals, start)
-    if tree.capped and (inside or reach.closed):  # else it is thrown away
-        joint = rejoined(tree, reach.reached)
+    start = start or largest_leaf(tree, outer <= inside, structure.corners)
+    reached = flood(len(tree.leaves), portals, start)
+    closed = bool(start) and not bool(np.any(reached & outer))
+    if tree.capped and (inside or closed):  # else it is thrown away
+        joint = rejoined(tree, reached)
         portals = portals_rejoined(portals, tree, joint, structure.tolerance)
-        tree, reach = joint.tree, reach.renamed(joint.leaf)
-    return _Space(box, tree, portals, reach)
+        tree, reached = joint.tree, np.bincount(joint.leaf, reached) > 0
+    return _Space(box, tree, portals, reached, closed)
 
 
 def _viewpoint_leaves(tree: Tree, box: Floats, options: SubdivideOptions) -> tuple[int, ...]:
@@ -192,7 +195,7 @@ def _thickened(low: Floats, high: Floats, tolerance: Tolerance) -> Floats:
 def _open_note(space: _Space, roofed: float, box: Floats) -> str:
     if roofed < ROOFED:
         what = f"open above: {1 - roofed:.0%} of the floor has no ceiling"
-    elif not space.reach.start:
+    elif not space.reached.any():
         what = "open: no room is closed off from the outside"
     else:
         what = "open: the outside can be reached from the rooms (windows, doors or gaps)"
@@ -202,7 +205,7 @@ def _open_note(space: _Space, roofed: float, box: Floats) -> str:
 
 def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> Cells:
     tree = space.tree
-    keep = space.reach.reached
+    keep = space.reached
     rename = np.where(keep, np.cumsum(keep) - 1, -1).astype(np.int32)
     bodies = [tree.leaves[i] for i in np.flatnonzero(keep)]
     portals = [portal for portal in space.portals if keep[[*portal.leaves]].all()]
@@ -246,7 +249,7 @@ def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> 
         triangle_source=pieces.source[owned].astype(np.int32),
         triangle_cell=owner[owned].astype(np.int32),
         tolerance=scene.tolerance,
-        closed=space.reach.closed,
+        closed=space.closed,
         notes=tuple(notes),
     )
 
