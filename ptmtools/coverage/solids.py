@@ -149,9 +149,7 @@ def boundary_area(scene: Scene, cells: Cells) -> Floats:
     """(T,) the area of each of the scene's triangles that lies in boundaries of cells, m²."""
     lying = cells.triangle_cell[:, 0] != cells.triangle_cell[:, 1]
     piece = areas(cells.vertex[cells.triangle[lying]])
-    total = np.zeros(len(scene.triangles))
-    np.add.at(total, cells.triangle_source[lying], piece)
-    return total
+    return np.bincount(cells.triangle_source[lying], piece, len(scene.triangles)).astype(float)
 
 
 @dataclass(frozen=True)

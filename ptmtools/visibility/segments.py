@@ -19,7 +19,7 @@ for all copies would let a narrow opening that is truly missing pass as a hairli
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -119,8 +119,7 @@ def check_conservative(
     blockers = Blockers(structural, cells.root_box)
     jitter = JITTER * cells.tolerance.hairline
     tried = unoccluded = hairlines = drawn = batch = 0
-    counts: dict[tuple[int, int], int] = {}
-    example: dict[tuple[int, int], tuple[Floats, Floats]] = {}
+    found: dict[tuple[int, int], MissedPair] = {}
     while tried < segments and drawn < PATIENCE * segments:
         rng = np.random.default_rng([seed, batch])
         size = min(BATCH, segments - tried)
@@ -144,16 +143,13 @@ def check_conservative(
             share += counts_as_miss / COPIES
         hairlines += int((share < 0.5).sum())
         for m in missed[share >= 0.5]:
-            pair = (int(min(a[m], b[m])), int(max(a[m], b[m])))
-            counts[pair] = counts.get(pair, 0) + 1
-            ends = (start[m], end[m]) if a[m] <= b[m] else (end[m], start[m])
-            example.setdefault(pair, ends)
+            ends = (int(a[m]), _place(start[m])), (int(b[m]), _place(end[m]))
+            (one, here), (other, there) = sorted(ends)
+            pair = found.get((one, other)) or MissedPair((one, other), here, there, 0)
+            found[one, other] = replace(pair, segments=pair.segments + 1)
         progress(tried, segments, "segments")
-    found = tuple(
-        MissedPair(pair, _place(example[pair][0]), _place(example[pair][1]), counts[pair])
-        for pair in sorted(counts)
-    )
-    return SegmentReport(tried, unoccluded, found, hairlines)
+    missing = tuple(found[pair] for pair in sorted(found))
+    return SegmentReport(tried, unoccluded, missing, hairlines)
 
 
 class Sampler:
