@@ -100,11 +100,6 @@ class Cells:
         """(n, 3) vertices of a leaf."""
         return self.leaf_point[self.leaf_point_start[leaf] : self.leaf_point_start[leaf + 1]]
 
-    def leaf_faces(self, leaf: int) -> list[NDArray[np.int32]]:
-        """The face loops of a leaf, as indices into `leaf_point`."""
-        rows = range(int(self.leaf_face_start[leaf]), int(self.leaf_face_start[leaf + 1]))
-        return [self.face_index[self.face_start[f] : self.face_start[f + 1]] for f in rows]
-
     def tetrahedra(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """(n, 4, 3) tetrahedra that fill the leaves, from the middle of each one's vertices to fans
         over its faces, and (n,) the leaf of each, ascending."""
