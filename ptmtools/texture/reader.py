@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, LimitError, naming
-from ptmtools.texture.coders.damage import damaged
+from ptmtools.texture.coders.reading import damaged
 from ptmtools.texture.container import (
     EXACT,
     HEAD_MAX,

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError
 from ptmtools.texture.coders.rans import kernels, tables
 from ptmtools.texture.coders.rans.reference import Symbols, built_in, normalised, read_tables
+from ptmtools.texture.coders.rans.sizes import Sink
 from ptmtools.texture.coders.rans.stream import Stream, encode_symbols, read_stream
+from ptmtools.texture.coders.reading import Reader
 
 TABLES = 29
 
@@ -44,12 +46,12 @@ def test_tables_survive_their_serialised_form(rows: list[list[int]]) -> None:
     for t, row in enumerate(rows):
         counts[7 * t] = row
     frequency, packed = tables.choose(counts, TABLES - 1)
-    parsed, used = tables.parse(packed + b"more", TABLES)
-    np.testing.assert_array_equal(parsed, frequency)
-    assert used == len(packed)
+    reader = Reader(packed + b"more")
+    np.testing.assert_array_equal(tables.parse(reader, TABLES), frequency)
+    assert reader.rest() == b"more"
     expected, end = read_tables(packed, 0, TABLES)
     assert expected == frequency.tolist()
-    assert end == used
+    assert end == len(packed)
 
 
 def test_the_length_table_is_a_logarithm() -> None:
@@ -68,11 +70,11 @@ def coded() -> tuple[Stream, tables.Frequencies, NDArray[np.uint16], NDArray[np.
     symbols[7] = 40_000
     counts = np.zeros((4, 256), np.int64)
     np.add.at(counts, (contexts, np.minimum(symbols, tables.ESCAPE)), 1)
-    frequency, _ = tables.choose(counts, 4)
-    data = encode_symbols(symbols, contexts, frequency, 4)
+    packed, data = encode_symbols(Sink(symbols, contexts, counts), 4)
+    frequency = tables.parse(Reader(packed), 4)
     plain = Symbols(data, 0, frequency.tolist())
     assert [plain.next(int(t)) for t in contexts] == symbols.tolist()
-    return read_stream(data, 301), frequency, symbols, contexts
+    return read_stream(Reader(data), 301), frequency, symbols, contexts
 
 
 def test_symbols_come_back_row_by_row(coded: Any) -> None:
@@ -117,4 +119,4 @@ def test_symbols_come_back_one_by_one(coded: Any) -> None:
 )
 def test_impossible_tables_are_refused(data: bytes) -> None:
     with pytest.raises(InputError, match="PTM-I112"):
-        tables.parse(data, TABLES)
+        tables.parse(Reader(data), TABLES)

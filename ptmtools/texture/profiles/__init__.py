@@ -123,7 +123,7 @@ class Coder(Protocol):
     def encode_base(self, level: Samples) -> bytes:
         """The coarsest level, which has nothing below it; without error."""
 
-    def decode_base(self, data: bytes, shape: Shape, dtype: np.dtype[Any]) -> Samples:
+    def decode_base(self, data: bytes | memoryview, shape: Shape, dtype: np.dtype[Any]) -> Samples:
         """The inverse of `encode_base`."""
 
     def encode_tile(
@@ -138,7 +138,7 @@ class Coder(Protocol):
 
     def decode_tile(
         self,
-        data: bytes,
+        data: bytes | memoryview,
         below: Samples,
         shape: Shape,
         max_error: int = 0,

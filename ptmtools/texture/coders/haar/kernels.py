@@ -37,13 +37,12 @@ from ptmtools.texture.coders.rans.kernels import (
     rotate_states,
     start_states,
 )
-from ptmtools.texture.coders.rans.sizes import ESCAPE
+from ptmtools.texture.coders.rans.sizes import ESCAPE, IMPOSSIBLE, OK, TRUNCATED
 
 i32, u16 = np.int32, np.uint16
 
 #: A component with more distinct values than this is not coded by rank.
 MANY_VALUES = 225
-OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2
 
 
 class Workspace(NamedTuple):
@@ -78,14 +77,6 @@ class Source(NamedTuple):
     zeros: Any  # int32, likewise
     pairs: Any  # (2, c, blocks) uint16
     mixed: Any  # (c * blocks,) uint16
-
-
-class Sink(NamedTuple):
-    """Where an encoder's symbols go."""
-
-    symbols: Any  # (n,) uint16
-    contexts: Any  # (n,) uint8
-    counts: Any  # (tables, 256) int64, zeros before
 
 
 def workspace(blocks: int, components: int) -> Workspace:

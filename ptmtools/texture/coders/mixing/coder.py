@@ -12,15 +12,13 @@ from __future__ import annotations
 
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from functools import cache
-from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.damage import damaged
 from ptmtools.texture.coders.mixing.memory import Memory, fresh_memory, level_tables
-from ptmtools.texture.coders.varints import pack_varints, read_varints
+from ptmtools.texture.coders.reading import Reader, damaged, pack_varints
 
 if TYPE_CHECKING:
     from ptmtools.texture.coders.mixing.kernels import Canvas, Place
@@ -43,7 +41,7 @@ def encode_mixing(
 
 
 def decode_mixing(
-    data: bytes,
+    data: bytes | memoryview,
     below: Level,
     shape: tuple[int, int, int],
     max_error: int = 0,
@@ -64,7 +62,7 @@ def encode_even(level: Level, below: Level) -> bytes:
     return _closed(coder, buffer)
 
 
-def decode_even(data: bytes, below: Level, shape: tuple[int, int, int]) -> Level:
+def decode_even(data: bytes | memoryview, below: Level, shape: tuple[int, int, int]) -> Level:
     """The inverse of `encode_even`. Raises InputError PTM-I112 for what no encoder writes."""
     buffer = np.frombuffer(bytearray(data), np.uint8)
     coder = _coder(buffer)
@@ -115,7 +113,7 @@ class _Pass:
         shape: tuple[int, ...],
         max_error: int,
         memory: Memory | None,
-        data: bytes | None,
+        data: bytes | memoryview | None,
     ) -> None:
         height, width, components = shape
         self.shape = height, width, components
@@ -268,10 +266,8 @@ def _check(coder: NDArray[np.int64], buffer: NDArray[np.uint8]) -> None:
         raise damaged("its stream does not end with its last texel")
 
 
-def _split(data: bytes, streams: int) -> list[bytes]:
+def _split(data: bytes | memoryview, streams: int) -> list[memoryview]:
     """Lengths of all streams but the last, then the streams."""
-    lengths, at = read_varints(data, 0, streams - 1)
-    ends = [*accumulate(lengths, initial=at), len(data)]
-    if ends[-2] > ends[-1]:
-        raise damaged("its streams are cut short")
-    return [data[begin:end] for begin, end in pairwise(ends)]
+    reader = Reader(data)
+    lengths = [reader.varint() for _ in range(streams - 1)]
+    return [*(reader.take(length) for length in lengths), reader.rest()]

@@ -15,8 +15,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.damage import damaged
 from ptmtools.texture.coders.rans.sizes import ESCAPE, TABLE_BITS, TABLE_SIZE
+from ptmtools.texture.coders.reading import Reader, damaged
 
 #: Mean magnitudes, in sixteenths, of the built-in distributions 1, 2, …
 BUILT_IN_MEANS = (
@@ -134,38 +134,24 @@ def _most_bytes(tables: int, sent: int) -> int:
 
 
 def parse(
-    data: bytes | memoryview, tables: int, family: Frequencies | None = None
-) -> tuple[Frequencies, int]:
-    """The inverse of `choose`: frequencies (tables, 256), and how many bytes they took.
+    reader: Reader, tables: int, family: Frequencies | None = None, version_1: bool = False
+) -> Frequencies:
+    """The inverse of `choose`: frequencies (tables, 256).
+
+    Files of version 1 have a byte for each table first, which names its kind.
 
     Raises InputError PTM-I112 for tables that no encoder writes.
     """
-    end = 2 + int.from_bytes(data[:2], "little")
-    if len(data) < end:
-        raise damaged("its tables are cut short")
-    kinds = np.zeros(tables, np.int64)
-    return _read(data[2:end], False, kinds, built_in() if family is None else family), end
-
-
-def parse_version_1(data: bytes | memoryview, tables: int) -> tuple[Frequencies, int]:
-    """As `parse`, of files of version 1: a byte for each table names its kind."""
-    end = tables + 2 + int.from_bytes(data[tables : tables + 2], "little")
-    if len(data) < end:
-        raise damaged("its tables are cut short")
-    kinds = np.frombuffer(data, np.uint8, tables).astype(np.int64)
-    return _read(data[tables + 2 : end], True, kinds, built_in()), end
-
-
-def _read(
-    packed: bytes | memoryview, named: bool, kinds: NDArray[np.int64], family: Frequencies
-) -> Frequencies:
     from ptmtools.texture.coders.rans import frequencies
 
-    frequency = np.zeros((len(kinds), 256), np.int64)
-    numbers = np.frombuffer(packed, np.uint8).copy()
-    state = np.zeros(2, np.int64)
+    kinds = np.zeros(tables, np.int64)
+    if version_1:
+        kinds[:] = reader.numbers("u1", tables)
+    packed = reader.numbers("u1", reader.number(2))
+    family = built_in() if family is None else family
+    frequency = np.zeros((tables, 256), np.int64)
     error = frequencies.read_tables(
-        numbers, named, kinds, _FIRST_KIND, SENT, family, frequency, state
+        packed, version_1, kinds, _FIRST_KIND, SENT, family, frequency, np.zeros(2, np.int64)
     )
     if error:
         raise damaged(_ERRORS[error])

@@ -23,6 +23,7 @@ import numpy as np
 
 from ptmtools.compiled import plain_kernel as kernel
 from ptmtools.texture.coders.rans.kernels import STATE_LOW
+from ptmtools.texture.coders.rans.sizes import IMPOSSIBLE, OK, TRUNCATED
 from ptmtools.texture.coders.repeats.seen import (
     K0,
     K1,
@@ -53,8 +54,6 @@ from ptmtools.texture.coders.repeats.symbols import (
     symbol,
 )
 from ptmtools.texture.coders.repeats.unseen import differences, edge_texel, remainders, texel
-
-OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2
 
 #: Answers to "which guess": after those that name one, `TEXELS`, one by one, and `DIFFERENCES`.
 GUESSES, TEXELS, DIFFERENCES = 3, 3, 4

@@ -1,7 +1,7 @@
 """What encoder and decoder of the texel coder agree on without sending it.
 
-Which neighbours a texel is predicted from, the planes in coding order and which of them refer to
-which, and the built-in weights. The numbers are part of the format.
+Which neighbours a texel is predicted from, the built-in weights and the built-in tables. The
+numbers are part of the format.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.texture.coders.planes import references
 from ptmtools.texture.coders.rans import tables
 
 #: Rows and columns, from p, of the ten neighbours of p, q, r and s; the first three are those to
@@ -30,16 +31,6 @@ WEIGHT_TOP = 32767
 #: … as do the magnitudes of all weights of a texel together, so that a prediction of 16-bit samples
 #: fits in 32 bits.
 WEIGHT_SUM = 32767
-
-
-def plane_order(components: int) -> list[int]:
-    """Components in coding order: green, red, blue, alpha; their own for fewer than three."""
-    return [1, 0, 2, 3][:components] if components >= 3 else list(range(components))
-
-
-def reference_count(components: int, c: int) -> int:
-    """How many of the planes coded first plane c, in coding order, refers to: alpha to none."""
-    return c if components >= 3 and c < 3 else 0
 
 
 def offsets(stride: int) -> NDArray[np.uint64]:
@@ -85,16 +76,11 @@ def token_span(token: int) -> tuple[int, int]:
     return (4 + (token & 3)) << bits, 1 << bits
 
 
-def references(components: int) -> NDArray[np.int64]:
-    """`reference_count` of every plane, in coding order."""
-    return np.array([reference_count(components, c) for c in range(components)], np.int64)
-
-
 def sent_mask(components: int) -> NDArray[np.bool_]:
     """Which weights (c, 4, 12) are sent, in this order."""
     mask = np.zeros((components, 4, 12), np.bool_)
-    for c in range(components):
-        mask[c, :, : 10 + reference_count(components, c)] = True
+    for c, others in enumerate(references(components)):
+        mask[c, :, : 10 + others] = True
     return mask
 
 
