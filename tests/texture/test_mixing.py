@@ -60,7 +60,7 @@ def test_threads_change_no_byte(components, size, max_error):
         assert again == data
         assert all(
             np.array_equal(a, b)
-            for one, two in zip(memory.planes, same.planes, strict=True)
+            for one, two in zip(memory, same, strict=True)
             for a, b in zip(one, two, strict=True)
         )
         back, _ = decode_mixing(data, below, level.shape, max_error, threads=threads)
@@ -83,7 +83,7 @@ def test_reading_leaves_the_memory_that_writing_left():
         tile = small.encode_tile(level, seen, memory=written)
         back = small.decode_tile(tile.data, seen, level.shape, memory=read)
         seen, written, read = back.texels, tile.memory, back.memory
-    for one, two in zip(written.planes, read.planes, strict=True):
+    for one, two in zip(written, read, strict=True):
         assert all(np.array_equal(a, b) for a, b in zip(one, two, strict=True))
 
 
@@ -144,7 +144,7 @@ def test_the_reference_decoder_agrees(height, width, components, max_error):
         back = decode_reference(list(streams), seen, level.shape, max_error, states)
         assert np.array_equal(back, texels)
         seen = texels
-    for plane, state in zip(memory.planes, states, strict=True):
+    for plane, state in zip(memory, states, strict=True):
         assert plane.weights.tolist() == state.weights
         assert plane.bias.tolist() == state.bias
 

@@ -48,14 +48,15 @@ def fit_weights(
     for c, (plane, others) in enumerate(zip(plane_order(nc), references(nc), strict=True)):
         means, texels = (ranks[plane].take(one[..., plane]) for one in rows)
         for k, (coefficient, found) in enumerate(_coefficients(means, texels)):
-            features = np.stack([*found, *residuals[:others, k]])
-            f = features.reshape(len(features), -1).astype(np.float64)
-            target = np.concatenate([f, coefficient.reshape(1, -1)])
-            # All are whole numbers, and below 2^50.
-            sums = f * _SLOPE_WEIGHTS.take(np.abs(features[0]).reshape(-1)) @ target.T
-            own = fitted(sums, 8, WEIGHT_TOP, ridge=4096, share=16).astype(np.int32)
+            samples = np.stack([*found, *residuals[:others, k], coefficient], dtype=np.float64)
+            samples = samples.reshape(-1, coefficient.size)
+            features = samples[:-1]
+            # Whole numbers, the sums of their products below 2^50.
+            weighted = features * _SLOPE_WEIGHTS.take(np.abs(found[0])).reshape(-1)
+            own = fitted(weighted @ samples.T, 8, WEIGHT_TOP, ridge=4096, share=16)
             weights[c, k, sent[c, k]] = own
-            residuals[c, k] = coefficient - ((np.tensordot(own, features, 1) + 128) >> 8)
+            predicted = np.floor((own @ features + 128) / 256)
+            residuals[c, k] = coefficient - predicted.reshape(coefficient.shape)
     return weights
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,22 +16,16 @@ SLOT_BITS = (8, 16)
 VALUE_BITS = (8, 18)
 
 
-@dataclass(frozen=True)
-class Memory:
-    """The state of all planes behind a level. Coding changes it in place: give it a copy."""
-
-    planes: tuple[State, ...]
-
-    def copied(self) -> Memory:
-        return Memory(tuple(type(s)(*(array.copy() for array in s)) for s in self.planes))
+#: The state of all planes behind a level. Coding changes it in place: give it a copy.
+Memory = tuple["State", ...]
 
 
-def fresh_memory(planes: int) -> Memory:
-    """The state before anything was coded."""
-    return Memory(tuple(_fresh_state() for _ in range(planes)))
+def copied(memory: Memory) -> Memory:
+    return tuple(type(state)(*(array.copy() for array in state)) for state in memory)
 
 
-def _fresh_state() -> State:
+def fresh_state() -> State:
+    """Of a plane, before anything was coded."""
     from ptmtools.texture.coders.mixing import decisions
     from ptmtools.texture.coders.mixing.kernels import POSITIONS, SECOND, State
     from ptmtools.texture.coders.mixing.squares import BATCH, FEATURES, SAMPLE

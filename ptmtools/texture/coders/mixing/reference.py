@@ -1,7 +1,8 @@
 """A decoder of the context mixing coder in plain Python, written from ``docs/profile-small.md``.
 
-It shares nothing with the compiled decoder but the numeric tables. The tests compare the two;
-whoever ports the format can step through it. Thousands of times slower; no damage is looked for.
+It shares nothing with the compiled decoder but the numbers of the format. The tests compare the
+two; whoever ports the format can step through it. Thousands of times slower; no damage is looked
+for.
 """
 
 from __future__ import annotations
@@ -13,34 +14,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.mixing import tables
+from ptmtools.texture.coders.mixing import kernels, tables
+from ptmtools.texture.coders.mixing.kernels import COLOUR_AT, PARENTS_AT, TEXELS_AT
+from ptmtools.texture.coders.planes import plane_order
 
 SQUASH = [int(p) for p in tables.squash()]
 STRETCH = [int(x) for x in tables.stretch(tables.squash())]
 SOFT_PLUS = [int(x) for x in tables.soft_plus()]
 SURVIVAL = [int(x) for x in tables.survival()]
 LEVEL = [int(x) for x in tables.magnitude()]
-RATE = [655360 // (10 * n + 16) for n in range(1024)]
-BUCKETS = [1, 2, 3, 5, 9, 17, 33, 65, 129, 257, 513]
-WITHIN = [0, 0, 0, 1, 4, 11, 14, 17, 20, 20]
-W, N, NW, NE = (0, -1), (-1, 0), (-1, -1), (-1, 1)
-TEXELS = [
-    [W, N, NW, NE, (1, -1), (0, -2), (-2, 0), (-1, 2)],
-    [W, N, NW, NE, (0, -2), (-1, 2), (-2, 0), (1, -2)],
-    [W, N, NW, NE, (-2, 0), (0, -2), (1, -1), (-2, 1)],
-    [N, NW, NE, (0, -2), (-2, 0)],
-    [W, N, NW, NE, (0, -2), (-2, 0)],
-]
-PARENTS = [
-    [(0, 1), (1, 0), (1, 1), (1, -1), (-1, 1)],
-    [(0, 1), (1, 0), (1, 1), (-1, 1), (1, -1)],
-    [(0, 1), (1, 0), (1, 1), (1, -1)],
-    [(0, 1), (1, 0), (1, 1)],
-    [],
-]
-COLOUR = [[(0, 0), W, N, (0, 1), (1, 0)]] * 3 + [[(0, 0), (1, 0), N, (0, 1)], [(0, 0), W, N]]
-
-Grid = Callable[[int, int], int]
+RATE = [int(x) for x in tables.rates()]
+BUCKETS, WITHIN = kernels.BUCKETS.tolist(), kernels.WITHIN.tolist()
 
 
 def clamp(a: int, low: int, high: int) -> int:
@@ -195,11 +179,10 @@ def decode_reference(
 ) -> NDArray[np.uint8]:
     """The level (h, w, c); one state for each plane, changed in place."""
     height, width, components = shape
-    order = [1, 0, 2, 3][:components] if components > 2 else list(range(components))
     bits = [_Bits(stream) for stream in streams]
     planes: list[_Plane] = []
     level = np.zeros(shape, np.uint8)
-    for c, component in enumerate(order):
+    for c, component in enumerate(plane_order(components)):
         coder = bits[min(c, len(bits) - 1)]
         plane = _Plane(below[:, :, component], height, width, states[c], coder)
         _decode_plane(plane, planes[: min(c, 2)], height, width, 2 * max_error + 1)
@@ -263,13 +246,13 @@ def _texel(
 
     mean, w, n, nw, ne = P(0, 0), T(0, -1), T(-1, 0), T(-1, -1), T(-1, 1)
     base = mean if k < 3 else w
-    sample = [T(*d) - base for d in TEXELS[k]] + [P(*d) - base for d in PARENTS[k]]
+    sample = [T(*d) - base for d in TEXELS_AT[k]] + [P(*d) - base for d in PARENTS_AT[k]]
     for ref in refs:
         if k < 3:
             here = sum(ref.texel[2 * by + i, 2 * bx + j] for i in (0, 1) for j in (0, 1)) >> 2
         else:
             here = ref.texel[y, x - 1]
-        sample += [ref.texel[y + dy, x + dx] - here for dy, dx in COLOUR[k]]
+        sample += [ref.texel[y + dy, x + dx] - here for dy, dx in COLOUR_AT[k]]
     features = len(sample)
     sample += [0] * (24 - features)
 

@@ -1,7 +1,8 @@
 """A decoder of the texel coder in plain Python, written line by line from ``docs/format-kinds.md``.
 
-It shares nothing with the compiled decoder but the numbers of `layout`. The tests compare the two;
-whoever ports the format can step through it. Thousands of times slower; no damage is looked for.
+It shares nothing with the compiled decoder but the numbers of `layout`, the order of planes and how
+bytes are read. The tests compare the two; whoever ports the format can step through it. Thousands
+of times slower; no damage is looked for.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.texture.coders.planes import plane_order, references
 from ptmtools.texture.coders.rans.reference import Symbols, normalised, read_tables
+from ptmtools.texture.coders.reading import Reader
 from ptmtools.texture.coders.texel import layout
 
 CLASSES, NARROW, GRID, TABLES = 18, 216, 232, 236
@@ -29,27 +32,6 @@ def decode_texels(
     return _Decoder(group, below, shape, max_error).level()
 
 
-class _Bytes:
-    """Bytes from the front."""
-
-    def __init__(self, data: bytes) -> None:
-        self.data = data
-        self.at = 0
-
-    def take(self, n: int) -> int:
-        self.at += n
-        return int.from_bytes(self.data[self.at - n : self.at], "little")
-
-    def varint(self) -> int:
-        number, shift = 0, 0
-        while True:
-            byte = self.take(1)
-            number |= (byte & 127) << shift
-            shift += 7
-            if byte < 128:
-                return number
-
-
 class _Decoder:
     def __init__(
         self, group: bytes, below: NDArray[Any], shape: tuple[int, int, int], max_error: int
@@ -57,10 +39,10 @@ class _Decoder:
         self.shape, self.max_error, self.dtype = shape, max_error, below.dtype
         self.letter = {"float16": "e", "float32": "f"}.get(below.dtype.name, "")
         self.bits = 8 * below.dtype.itemsize
-        read = _Bytes(group)
-        sent = read.take(1) == 3
+        read = Reader(group)
+        sent = read.number(1) == 3
         components = shape[2]
-        kinds = read.take(1)
+        kinds = read.number(1)
         self.grids = [0] * components
         self.values: list[Sequence[int]] = [range(1 << self.bits)] * components
         for c in range(components):
@@ -73,20 +55,17 @@ class _Decoder:
                 self.values[c] = np.cumsum(gaps).tolist()
             elif kind == 3:
                 self.grids[c] = read.varint()
-        self.window = read.take(1)
-        self.order = [1, 0, 2, 3][:components] if components > 2 else list(range(components))
-        self.references = [c if components > 2 and c < 3 else 0 for c in range(components)]
+        self.window = read.number(1)
+        self.order = plane_order(components).tolist()
+        self.references = references(components).tolist()
         self.weights = [layout.BUILT_IN_WEIGHTS[n].tolist() for n in self.references]
         if sent:
             for c, n in enumerate(self.references):
                 for k in range(4):
-                    for i in range(10 + n):
-                        w = read.take(2)
-                        self.weights[c][k][i] = w - 65536 if w > 32767 else w
-        tables, read.at = read_tables(group, read.at, TABLES, family=built_in)
-        size = read.take(4)
-        self.plain = read.take(size)
-        self.symbols = Symbols(group[read.at :], 0, tables)
+                    self.weights[c][k][: 10 + n] = read.numbers("<i2", 10 + n).tolist()
+        tables = read_tables(read, TABLES, family=built_in)
+        self.plain = read.number(read.number(4))
+        self.symbols = Symbols(read, tables)
         self.means = [[[self._ordered(v) for v in texel] for texel in row] for row in below]
 
     def level(self) -> NDArray[Any]:
