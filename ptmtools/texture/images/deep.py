@@ -27,6 +27,7 @@ from ptmtools.texture.images.picture import (
     check_size,
     damaged_image,
     oriented,
+    raster,
     unsupported,
 )
 from ptmtools.texture.model import Description, Limits
@@ -179,23 +180,11 @@ def read_ppm(file: BinaryIO, path: str | None, limits: Limits) -> Picture | None
     check_size(width, height, 2 * components, limits if plain or path is None else None)
     if 0 in (width, height):
         raise damaged_image("no texels")
+    file.seek(head.end())
     if plain:
-        file.seek(head.end())
         samples = _plain_samples(file, width * height * components)
         return Picture(samples.reshape(height, width, components))
-    texels: np.ndarray[Any, Any]
-    if path is not None:
-        file.seek(0, 2)
-        if file.tell() < head.end() + 2 * width * height * components:
-            raise damaged_image(f"after {file.tell()} bytes")
-        texels = np.memmap(path, ">u2", "r", head.end(), (height, width, components))
-    else:
-        file.seek(head.end())
-        data = file.read(2 * width * height * components)
-        if len(data) < 2 * width * height * components:
-            raise damaged_image(f"after {head.end() + len(data)} bytes")
-        texels = np.frombuffer(data, ">u2").reshape(height, width, components)
-    return Picture(texels)
+    return Picture(raster(file, path, np.dtype(">u2"), (height, width, components)))
 
 
 def _plain_samples(file: BinaryIO, count: int) -> NDArray[np.uint16]:

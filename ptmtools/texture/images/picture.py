@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -85,6 +86,23 @@ class Strips:
             end = min(y + step, stop)
             found[y - start : end - start] = self._make(y, end)
         return found
+
+
+def raster(
+    file: BinaryIO, path: str | None, dtype: np.dtype[Any], shape: tuple[int, ...], order: Any = "C"
+) -> Samples:
+    """Samples from where ``file`` stands on, mapped if it is the file at ``path``.
+
+    Raises InputError PTM-I125.
+    """
+    start, end = file.tell(), file.seek(0, 2)
+    size = math.prod(shape) * dtype.itemsize
+    if end - start < size:
+        raise damaged_image(f"after {end} of {start + size} bytes")
+    if path is not None:
+        return np.memmap(path, dtype, "r", start, shape, order)
+    file.seek(start)
+    return np.ndarray(shape, dtype, file.read(size), order=order)
 
 
 def check_size(width: int, height: int, texel_bytes: int, limits: Limits | None) -> None:

@@ -68,36 +68,32 @@ class _Sample:
     def __init__(
         self, work: NDArray[np.uint32], level: NDArray[np.uint32], y: Array, max_error: int
     ) -> None:
-        self.width = 2 * (level.shape[1] >> 1)
-        self.exact = level.astype(np.int64)[:, : self.width]
-        self.y = y
-        # Rows and columns -2 … 3 of every block: so far, all of them are those of the level below.
-        self.rows = work[2 * y[:, None] + np.arange(6)].astype(np.int64)
-        self.base = self.rows[:, 2, 2 : 2 + self.width : 2].copy()
-        known = _rounded(self.exact, max_error)
+        width = 2 * (level.shape[1] >> 1)
+        self._exact = level.astype(np.int64)[:, :width]
+        self._y = y
+        # Rows and columns -2 … 3 of every block, with all texels of the blocks unknown, and known.
+        self._unknown = work[2 * y[:, None] + np.arange(6)].astype(np.int64)
+        known = _rounded(self._exact, max_error)
         above = y > 0
         for row in (0, 1):
-            self.rows[above, row, 2 : 2 + self.width] = known[2 * y[above] - 2 + row]
-        self.known = np.stack([known[2 * y], known[2 * y + 1]], axis=1)
+            self._unknown[above, row, 2 : 2 + width] = known[2 * y[above] - 2 + row]
+        self._known = self._unknown.copy()
+        self._known[:, 2:4, 2 : 2 + width] = known[2 * y[:, None] + np.arange(2)]
 
     def of(self, k: int) -> tuple[list[Array], Array]:
         """The ten neighbours of texel k of each block and itself, less the block's mean."""
-        neighbours = [self._neighbour(k, dy, dx) - self.base for dy, dx in NEIGHBOURS[k]]
-        own = self.exact[2 * self.y + (k >> 1), k & 1 :: 2]
-        return neighbours, own - self.base
+        base = self._at(self._unknown, 0, 0)
+        own = self._exact[2 * self._y + (k >> 1), k & 1 :: 2]
+        return [self._neighbour(k, *place) - base for place in NEIGHBOURS[k]], own - base
 
     def _neighbour(self, k: int, dy: int, dx: int) -> Array:
-        column = 2 + dx
-        below: Array = self.rows[:, dy + 2, column : column + self.width : 2]
-        if not 0 <= dy <= 1 or dx > 1 or (dx >= 0 and 2 * dy + dx >= k):
-            return below
         # To the left in the rows of the block, or in the block itself: known by now.
-        found = below.copy()
-        inside = -(dx >> 1) if dx < 0 else 0
-        found[:, inside:] = self.known[:, dy, dx + 2 * inside : self.width : 2][
-            :, : found.shape[1] - inside
-        ]
-        return found
+        known = 0 <= dy <= 1 and (dx < 0 or (dx <= 1 and 2 * dy + dx < k))
+        return self._at(self._known if known else self._unknown, dy, dx)
+
+    def _at(self, rows: Array, dy: int, dx: int) -> Array:
+        end = 2 + dx + self._exact.shape[1]
+        return rows[:, dy + 2, 2 + dx : end : 2]
 
 
 def _rounded(values: Array, max_error: int) -> Array:
