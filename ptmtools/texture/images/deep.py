@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError
 from ptmtools.lazy import component
 from ptmtools.texture.images.declared import check_tile
-from ptmtools.texture.images.eight_bit import one_frame, with_key
-from ptmtools.texture.images.opening import ORIENTATION, described, load, opened
+from ptmtools.texture.images.eight_bit import one_frame, stripped
+from ptmtools.texture.images.opening import ORIENTATION, load, opened
 from ptmtools.texture.images.picture import (
     Picture,
-    Strips,
     check_size,
     damaged_image,
     oriented,
@@ -33,6 +32,7 @@ from ptmtools.texture.images.picture import (
 from ptmtools.texture.model import Description, Limits
 
 if TYPE_CHECKING:
+    from PIL.Image import Image
     from PIL.ImageFile import ImageFile
 
 #: Pillow's unpackers that keep the upper and the lower byte of each sample, by mode.
@@ -68,23 +68,17 @@ def read_png(file: BinaryIO, image: ImageFile, colour: int, limits: Limits) -> P
         upper, lower = _HALVES[image.mode]
         halves = [_unpacked(image, image.mode, upper)]
         halves.append(_unpacked(opened(file, limits), image.mode, lower))
-    keyed = key is not None and components in (1, 3)
 
-    def strip(y0: int, y1: int) -> NDArray[Any]:
-        parts: list[NDArray[Any]] = [
-            np.asarray(half.crop((0, y0, half.width, y1))) for half in halves
-        ]
-        if len(parts) == 2:
-            texels = parts[0].astype(np.uint16) << np.uint16(8)
-            texels |= parts[1]
-        elif colour == _GREY_ALPHA:
-            texels = parts[0].view(">u2").astype(np.uint16)
-        else:
-            texels = parts[0].astype(np.uint16)[:, :, None]
-        return with_key(texels, key) if keyed else texels
+    def texels(upper: Image, lower: Image | None = None) -> NDArray[Any]:
+        samples: NDArray[Any] = np.asarray(upper)
+        if colour == _GREY_ALPHA:
+            samples = samples.view(">u2")
+        samples = samples.astype(np.uint16)
+        if lower is not None:
+            samples = samples << 8 | np.asarray(lower)
+        return samples.reshape(*samples.shape[:2], components)
 
-    shape = (image.height, image.width, components + keyed)
-    return Picture(Strips(shape, np.dtype(np.uint16), strip), described(image))
+    return stripped(halves, components, "uint16", texels, key)
 
 
 def _unpacked(image: ImageFile, mode: str, raw: str) -> ImageFile:
@@ -138,12 +132,7 @@ def read_tiff(file: BinaryIO, tags: Tags, limits: Limits) -> Picture:
         image = opened(file, limits)
         one_frame(image)
         load(image)
-
-        def strip(y0: int, y1: int) -> NDArray[Any]:
-            return np.asarray(image.crop((0, y0, image.width, y1)))[:, :, None]
-
-        shape = (image.height, image.width, 1)
-        return Picture(Strips(shape, np.dtype(dtype), strip), described(image))
+        return stripped([image], 1, dtype, lambda strip: np.asarray(strip)[:, :, None])
     codecs = component(
         "imagecodecs",
         "PTM-M100",

@@ -83,8 +83,10 @@ def decode(data: bytes | memoryview, below: Bytes, shape: tuple[int, int, int]) 
     words = np.concatenate([stream.escapes, stream.words])
     source = Source(tables.single_tables(frequency), words, escaped + stream.limit)
     check_end(_pass(level, _packed(below), shape, None, source, state))
+    if shape[2] != 3:
+        return level.astype(f"<u{shape[2]}").view(np.uint8).reshape(shape)
     texels = np.empty(shape, np.uint8)
-    kernels.move_texels(False, texels, level)
+    kernels.move_rgb(False, texels, level)
     return texels
 
 
@@ -124,6 +126,9 @@ def _packed(level: Bytes) -> NDArray[np.uint32]:
     """Texels (h, w, c) as one number each."""
     from ptmtools.texture.coders.repeats import kernels
 
+    level = np.ascontiguousarray(level)
+    if level.shape[2] != 3:
+        return level.view(f"<u{level.shape[2]}")[:, :, 0].astype(np.uint32)
     texels = np.empty(level.shape[:2], np.uint32)
-    kernels.move_texels(True, np.ascontiguousarray(level), texels)
+    kernels.move_rgb(True, level, texels)
     return texels

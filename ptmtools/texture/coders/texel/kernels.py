@@ -127,11 +127,9 @@ def ordered(value: Any, kind: int) -> Any:
 @kernel
 def _unit(value: Any, kind: int) -> Any:
     """The unit in the last place of a float of that kind, finite, given as float64."""
-    if kind == SINGLE:
-        power = np.uint32(np.float32(value).view(np.uint32) & np.uint32(0x7F800000))
-        return max(np.float64(power.view(np.float32)), 2.0**-126) * 2.0**-23
-    size = _bit_length(np.int64(abs(value) * 16777216.0))
-    return np.float64(np.int64(1) << max(size - 11, np.int64(0))) / 16777216.0
+    least, mantissa = (-126, 23) if kind == SINGLE else (-14, 10)
+    exponent: Any = ((np.float64(value).view(np.int64) >> 52) & 2047) - 1023
+    return np.int64((max(exponent, least) - mantissa + 1023) << 52).view(np.float64)
 
 
 @kernel
