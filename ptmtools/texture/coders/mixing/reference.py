@@ -19,9 +19,12 @@ from ptmtools.texture.coders.mixing import kernels, tables
 from ptmtools.texture.coders.mixing.kernels import COLOUR_AT, PARENTS_AT, TEXELS_AT
 from ptmtools.texture.coders.planes import plane_order
 
-SQUASH, STRETCH = tables.squash().tolist(), tables.stretch(tables.squash()).tolist()
-SOFT_PLUS, SURVIVAL = tables.soft_plus().tolist(), tables.survival().tolist()
-LEVEL, RATE = tables.magnitude().tolist(), tables.rates().tolist()
+SQUASH: list[int] = tables.squash().tolist()
+STRETCH: list[int] = tables.stretch(tables.squash()).tolist()
+SOFT_PLUS: list[int] = tables.soft_plus().tolist()
+SURVIVAL: list[int] = tables.survival().tolist()
+LEVEL: list[int] = tables.magnitude().tolist()
+RATE: list[int] = tables.rates().tolist()
 BUCKETS, WITHIN = kernels.BUCKETS.tolist(), kernels.WITHIN.tolist()
 
 Grid = dict[tuple[int, int], int]
