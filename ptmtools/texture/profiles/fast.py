@@ -59,8 +59,9 @@ Bytes = NDArray[np.uint8]
 def compile_ahead() -> None:
     """Compiles what `encode_tile` of bytes needs but for `repeats`, with which that begins."""
     from ptmtools.texture.coders.rans.stream import empty_sink, encode_symbols
+    from ptmtools.texture.coders.rans.tables import built_in
 
-    encode_symbols(empty_sink(0, 1), 1)
+    encode_symbols(empty_sink(0, 1), 1, built_in())
     # So large that weights are fitted.
     haar.encode(np.zeros((192, 192, 1), np.uint8), np.zeros((96, 96, 1), np.uint8))
 

@@ -47,7 +47,7 @@ def encode(level: Bytes, below: Bytes) -> bytes:
             bytes([flags]),
             *(np.packbits(bitmap, bitorder="little").tobytes() for bitmap in bitmaps),
             b"" if sent is None else sent[layout.sent_mask(components)].astype("<i2").tobytes(),
-            *encode_symbols(sink, layout.EDGE_TABLE),
+            *encode_symbols(sink, layout.EDGE_TABLE, tables.built_in()),
         ]
     )
 
@@ -79,7 +79,7 @@ def decode(
         sent[mask] = reader.numbers("<i2", int(mask.sum()))
         if int(np.abs(sent).max()) > layout.WEIGHT_TOP:
             raise damaged("a weight is out of range")
-    frequency = tables.parse(reader, layout.TABLES, version_1=version_1)
+    frequency = tables.parse(reader, layout.TABLES, tables.built_in(), version_1)
     level = np.empty(shape, np.uint8)
     edge = level.size - 4 * below.size
     stream = read_stream(reader, max(below.shape[1], edge))

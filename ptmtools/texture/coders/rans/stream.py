@@ -38,9 +38,7 @@ def empty_sink(n: int, count: int) -> Sink:
     return Sink(np.empty(n, np.uint16), np.empty(n, np.uint8), counts)
 
 
-def encode_symbols(
-    sink: Sink, plain: int, family: tables.Frequencies | None = None
-) -> tuple[bytes, bytes]:
+def encode_symbols(sink: Sink, plain: int, family: tables.Family) -> tuple[bytes, bytes]:
     """The tables, as `tables.choose` finds them, and the stream of a full sink."""
     from ptmtools.texture.coders.rans import kernels
 

@@ -65,7 +65,7 @@ def new_texels(found: Sink) -> int:
 
 def write(found: Sink) -> bytes:
     """The group of these symbols."""
-    return b"".join(encode_symbols(found, len(found.counts)))
+    return b"".join(encode_symbols(found, len(found.counts), tables.built_in()))
 
 
 def decode(data: bytes | memoryview, below: Bytes, shape: tuple[int, int, int]) -> Bytes:
@@ -74,7 +74,7 @@ def decode(data: bytes | memoryview, below: Bytes, shape: tuple[int, int, int]) 
     from ptmtools.texture.coders.repeats.symbols import ESCAPES_END, TABLES, Source
 
     reader = Reader(data)
-    frequency = tables.parse(reader, TABLES)
+    frequency = tables.parse(reader, TABLES, tables.built_in())
     stream = read_stream(reader, kernels.MOST_SYMBOLS)
     escaped = len(stream.escapes)
     state = np.zeros(9, np.int64)

@@ -43,29 +43,23 @@ EVEN = (2, 3, 4, 5, 6, 9, 16)
 
 
 @cache
-def table_family() -> NDArray[np.int64]:
-    """The built-in frequency tables (1 + n, 256); row 0 is empty. In exact integers.
+def table_family() -> tables.Family:
+    """The built-in frequency tables.
 
     First even ones, for the fourth texels of few possible values. Then, of mean magnitude M = 1, 2,
     3, 4, 6, 8, 12 … sixteenths, weights that fall as (M / (M + 16·m))^POWER with the magnitude m.
     """
-    means = [1, *(m << i for i in range(35) for m in (2, 3))]
-    weights = [[1 << 24] * n for n in EVEN]
+    rows = [[1 << 24] * n for n in EVEN]
     spans = [token_span(token) for token in range(TOKENS)]
-    for mean in means:
-        row = []
-        for first, count in spans:
-            magnitude = 8 * (2 * first + count)
-            row.append((count * mean**POWER << 40) // (mean + magnitude) ** POWER)
-        weights.append(row)
-    rows = np.zeros((1 + len(weights), 256), np.int64)
-    for number, row in enumerate(weights, start=1):
-        total = sum(row)
-        scaled = [(w << 24) // total for w in row]
-        kept = [0 if w < 1 << 12 else w for w in scaled]
-        rows[number, : len(row)] = kept
-        rows[number, 255] = sum(kept) >> 10
-    return tables.normalise(rows)
+    for mean in (1, *(m << i for i in range(35) for m in (2, 3))):
+        magnitudes = [8 * (2 * first + count) for first, count in spans]
+        rows.append(
+            [
+                (count * mean**POWER << 40) // (mean + magnitude) ** POWER
+                for (_, count), magnitude in zip(spans, magnitudes, strict=True)
+            ]
+        )
+    return tables.family(rows)
 
 
 def token_span(token: int) -> tuple[int, int]:
