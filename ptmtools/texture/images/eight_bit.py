@@ -60,14 +60,19 @@ def stripped(
 ) -> Picture:
     """Loaded images of the same size as one, a strip at a time.
 
-    ``make`` gets the same rows of each and gives (n, w, components).
+    ``make`` gets the same rows of each and gives (n, w, components). A colour key becomes an alpha
+    of 0 where the texels are the key, of all bits elsewhere.
     """
     width, height = images[0].size
     keyed = key is not None and components in (1, 3)
 
     def strip(y0: int, y1: int) -> NDArray[Any]:
         texels = make(*(image.crop((0, y0, width, y1)) for image in images))
-        return with_key(texels, key) if keyed else texels
+        if not keyed:
+            return texels
+        opaque = (texels != np.array(key)).any(axis=2)
+        alpha = np.where(opaque, np.iinfo(texels.dtype).max, 0).astype(texels.dtype)
+        return np.concatenate([texels, alpha[:, :, None]], axis=2)
 
     shape = (height, width, components + keyed)
     return Picture(Strips(shape, np.dtype(dtype), strip), described(images[0]), lossy)
@@ -82,13 +87,6 @@ def one_frame(image: ImageFile) -> None:
             "holds several frames or pages; a texture is one image",
             remedy="export the one you want as PNG",
         )
-
-
-def with_key(texels: NDArray[Any], key: object) -> NDArray[Any]:
-    """An alpha of 0 where the texels are the key, of all bits elsewhere."""
-    opaque = (texels != np.array(key)).any(axis=2)
-    alpha = np.where(opaque, np.iinfo(texels.dtype).max, 0).astype(texels.dtype)
-    return np.concatenate([texels, alpha[:, :, None]], axis=2)
 
 
 def _texels(components: int, strip: Image) -> NDArray[Any]:

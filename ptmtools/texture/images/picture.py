@@ -58,24 +58,19 @@ def oriented(texels: Samples, orientation: int) -> Samples:
     return texels
 
 
+@dataclass(frozen=True)
 class Strips:
     """Rows that are made when they are asked for, a strip at a time.
 
-    Parameters
+    Attributes
     ----------
     shape, dtype: of the whole.
     make: ``make(y0, y1)`` gives those rows, (y1 - y0, w, c).
     """
 
-    def __init__(
-        self,
-        shape: tuple[int, int, int],
-        dtype: np.dtype[Any],
-        make: Callable[[int, int], Samples],
-    ) -> None:
-        self.shape = shape
-        self.dtype = dtype
-        self._make = make
+    shape: tuple[int, int, int]
+    dtype: np.dtype[Any]
+    make: Callable[[int, int], Samples]
 
     def __getitem__(self, rows: slice) -> Samples:
         height, width, components = self.shape
@@ -84,7 +79,7 @@ class Strips:
         step = max(1, _STRIP_TEXELS // width)
         for y in range(start, stop, step):
             end = min(y + step, stop)
-            found[y - start : end - start] = self._make(y, end)
+            found[y - start : end - start] = self.make(y, end)
         return found
 
 

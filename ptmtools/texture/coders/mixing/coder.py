@@ -173,10 +173,8 @@ def _cropped(
 ) -> Level:
     height, width, components = shape
     level = np.empty(shape, np.uint8)
-    size = places[0].errors // components
-    for c, plane in enumerate(order):
-        cells = canvas.cells[c * size : (c + 1) * size].reshape(-1, places[0].stride)
-        level[:, :, plane] = cells[PAD : PAD + height, PAD : PAD + width]
+    cells = canvas.cells[: places[0].errors].reshape(components, -1, places[0].stride)
+    level[:, :, order] = cells[:, PAD : PAD + height, PAD : PAD + width].transpose(1, 2, 0)
     return level
 
 
@@ -188,19 +186,18 @@ def _canvas(
 
     if below.size == 0:
         below = np.full((max(height >> 1, 1), max(width >> 1, 1), len(order)), 128, np.uint8)
-    border = [(PAD // 2, PAD // 2 + 1)] * 2
-    parents = np.stack([np.pad(below[:, :, c], border, mode="edge") for c in order])
+    border = (PAD // 2, PAD // 2 + 1)
+    parents = np.pad(below.transpose(2, 0, 1)[order], [(0, 0), border, border], mode="edge")
     parents = parents.astype(np.int32)
     texels = parents.repeat(2, axis=1).repeat(2, axis=2)
     cells = np.concatenate([texels, np.zeros_like(texels)]).reshape(-1)
     goal = cells
     if level is not None:
         wanted = np.zeros_like(texels)
-        for c, plane in enumerate(order):
-            wanted[c, PAD : PAD + height, PAD : PAD + width] = level[:, :, plane]
+        wanted[:, PAD : PAD + height, PAD : PAD + width] = level.transpose(2, 0, 1)[order]
         goal = wanted.reshape(-1)
     planes, tall, stride = texels.shape
-    across = stride // 2
+    size, across = tall * stride, stride // 2
     lists = (kernels.TEXELS_AT, kernels.PARENTS_AT, kernels.COLOUR_AT)
     offsets = np.zeros((len(lists), kernels.POSITIONS, 8), np.int64)
     for row, positions in enumerate(lists):
@@ -209,15 +206,15 @@ def _canvas(
             offsets[row, k, : len(near)] = [dy * step + dx for dy, dx in near]
     places = [
         kernels.Place(
-            texels=c * tall * stride + PAD * stride + PAD,
-            parents=c * (tall // 2) * across + (PAD // 2) * across + PAD // 2,
+            texels=c * size + PAD * stride + PAD,
+            parents=c * size // 4 + PAD // 2 * across + PAD // 2,
             stride=stride,
             across=across,
-            errors=planes * tall * stride,
+            errors=planes * size,
             # The two planes before; of alpha too, which need not be like green.
-            first=-c * tall * stride,
-            second=(1 - c) * tall * stride if c > 1 else 0,
-            before=-c * (tall // 2) * across,
+            first=-c * size,
+            second=(1 - c) * size if c > 1 else 0,
+            before=-c * size // 4,
         )
         for c in range(planes)
     ]
