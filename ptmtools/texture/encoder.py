@@ -33,7 +33,7 @@ from ptmtools.texture.parallel import ordered
 from ptmtools.texture.profiles import Coder, Tile
 from ptmtools.texture.pyramid import build_pyramid, level_sizes, mean_below
 from ptmtools.texture.rows import ImageRows, Rows, Samples
-from ptmtools.texture.tiling import Box, tile_box, tile_counts
+from ptmtools.texture.tiling import Box, tile_counts, tiles_under
 
 #: A tile below others is coded without error, though one is allowed, if that takes at most so many
 #: times the bytes: it lets those above it be exact, which takes fewer where an image is flat.
@@ -170,10 +170,10 @@ class _Coding:
 
         def boxes() -> Iterator[tuple[Box, Samples]]:
             """Each tile, with the row of tiles that it is cut from."""
-            for row in range(down):
-                strip = level[row * side : height if row == down - 1 else (row + 1) * side]
-                for column in range(across):
-                    yield tile_box(width, height, side, column, row), strip
+            for _, box in tiles_under(width, height, side, Box(0, 0, width, height)):
+                if box.x0 == 0:
+                    strip = level[box.y0 : box.y1]
+                yield box, strip
 
         def coded(job: tuple[Box, Samples]) -> tuple[Box, Tile]:
             box, strip = job

@@ -20,7 +20,7 @@ from ptmtools.texture import EncodeOptions, check, decode, encode, load_image, w
 from ptmtools.texture.coders.reading import Reader
 from ptmtools.texture.profiles import PROFILES, Profile, Tile
 
-TOY = Profile("toy", 200, "for tests", __name__)
+TOY = Profile("toy", 200, "for tests", module=__name__)
 TEXELS = np.random.default_rng(3).integers(0, 256, (40, 70, 3), np.uint8)
 DOCS = Path(__file__).parents[2] / "docs"
 
