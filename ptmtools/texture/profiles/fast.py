@@ -97,7 +97,10 @@ def encode_tile(
 ) -> Tile:
     """One byte that names the coder, then what it wrote."""
     if level.dtype == np.uint8 and max_error == 0:
-        return Tile(_encode_bytes(level, below), level)
+        coded = _encode_best(level, below)
+        if len(coded) > 1 + group_length((level.shape[0], level.shape[1], level.shape[2])):
+            coded = bytes([STORED]) + raw.encode_tile(level, below).data
+        return Tile(coded, level)
     from ptmtools.texture.coders.texel import coder as texel
 
     data, texels = texel.encode(level, below, max_error)
@@ -120,15 +123,8 @@ def decode_tile(
     return Tile(b"", texel.decode(data, below, shape, max_error))
 
 
-def _encode_bytes(level: Bytes, below: Bytes) -> bytes:
-    """Any level, of 8 bits, without error."""
-    coded = _encode_best(level, below)
-    if len(coded) <= 1 + group_length((level.shape[0], level.shape[1], level.shape[2])):
-        return coded
-    return bytes([STORED]) + raw.encode_tile(level, below).data
-
-
 def _encode_best(level: Bytes, below: Bytes) -> bytes:
+    """Any level, of 8 bits, without error, by repeats or Haar."""
     blocks = below.shape[0] * below.shape[1]
     if blocks > TOO_MANY_BLOCKS:
         return bytes([HAAR]) + haar.encode(level, below)

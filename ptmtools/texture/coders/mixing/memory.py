@@ -58,7 +58,9 @@ def level_tables(texels: int) -> Tables:
     from ptmtools.texture.coders.mixing.kernels import Tables
     from ptmtools.texture.coders.mixing.squares import FEATURES
 
-    slots, values = table_bits(texels)
+    bits = max(texels - 1, 0).bit_length()
+    slots = min(max(bits - 1, SLOT_BITS[0]), SLOT_BITS[1])
+    values = min(max(bits, VALUE_BITS[0]), VALUE_BITS[1])
     return Tables(
         slots=np.zeros((decisions.COUNTERS << slots) * decisions.SLOT, np.uint32),
         values=np.zeros(decisions.MATCHES << values, np.int32),
@@ -67,10 +69,3 @@ def level_tables(texels: int) -> Tables:
         left=np.zeros((FEATURES, FEATURES)),
         right=np.zeros((FEATURES, FEATURES)),
     )
-
-
-def table_bits(texels: int) -> tuple[int, int]:
-    """Binary logarithms of the numbers of slots and of values for a level of h · w ``texels``."""
-    bits = max(texels - 1, 0).bit_length()
-    slots = min(max(bits - 1, SLOT_BITS[0]), SLOT_BITS[1])
-    return slots, min(max(bits, VALUE_BITS[0]), VALUE_BITS[1])

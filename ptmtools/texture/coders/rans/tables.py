@@ -132,14 +132,11 @@ def choose(counts: NDArray[np.int64], plain: int, family: Family) -> tuple[Frequ
     frequency = exact.copy()
     named = (kinds != UNUSED) & (kinds != SENT)
     frequency[named] = family.tables[kinds[named]]
-    packed = np.zeros(_most_bytes(len(kinds), int(np.count_nonzero(kinds == SENT))), np.uint8)
+    # Numbers take four nibbles at most.
+    most = 2 * (2 * len(kinds) + 257 * int(np.count_nonzero(kinds == SENT)))
+    packed = np.zeros(most, np.uint8)
     size = frequencies.write_tables(kinds, _FIRST_KIND, SENT, exact, packed)
     return frequency, size.to_bytes(2, "little") + packed[:size].tobytes()
-
-
-def _most_bytes(tables: int, sent: int) -> int:
-    """Of so many tables, so many of them sent: numbers take four nibbles at most."""
-    return 2 * (2 * tables + 257 * sent)
 
 
 def parse(reader: Reader, tables: int, family: Family, version_1: bool = False) -> Frequencies:
