@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import InputError
 from ptmtools.lazy import component
 from ptmtools.texture.images.declared import check_tile
 from ptmtools.texture.images.eight_bit import one_frame, stripped
@@ -27,6 +26,7 @@ from ptmtools.texture.images.picture import (
     damaged_image,
     oriented,
     raster,
+    several,
     unsupported,
 )
 from ptmtools.texture.model import Description, Limits
@@ -140,11 +140,7 @@ def read_tiff(file: BinaryIO, tags: Tags, limits: Limits) -> Picture:
         "codecs",
     )
     if tags[_NEXT] or tags.get(_DEPTH, 1) != 1:
-        raise InputError(
-            "PTM-I127",
-            "holds several pages; a texture is one image",
-            remedy="export the one you want as PNG",
-        )
+        raise several("several pages")
     file.seek(0)
     try:
         texels = codecs.tiff_decode(file.read(), index=0)
@@ -167,8 +163,6 @@ def read_ppm(file: BinaryIO, path: str | None, limits: Limits) -> Picture | None
     plain = head[1] in b"23"
     width, height, components = int(head[2]), int(head[3]), 1 if head[1] in b"25" else 3
     check_size(width, height, 2 * components, limits if plain or path is None else None)
-    if 0 in (width, height):
-        raise damaged_image("no texels")
     file.seek(head.end())
     if plain:
         samples = _plain_samples(file, width * height * components)

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import InputError
 from ptmtools.texture.images.opening import described, load
-from ptmtools.texture.images.picture import Picture, Strips, check_size, unsupported
+from ptmtools.texture.images.picture import Picture, Strips, check_size, several, unsupported
 from ptmtools.texture.model import Limits
 
 if TYPE_CHECKING:
@@ -82,11 +81,7 @@ def one_frame(image: ImageFile) -> None:
     """Raise InputError PTM-I127 for an image of several."""
     # Not how many: the pages of a TIFF may be made to be costly to count.
     if getattr(image, "is_animated", False):
-        raise InputError(
-            "PTM-I127",
-            "holds several frames or pages; a texture is one image",
-            remedy="export the one you want as PNG",
-        )
+        raise several("several frames or pages")
 
 
 def _texels(components: int, strip: Image) -> NDArray[Any]:

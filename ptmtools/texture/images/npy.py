@@ -41,8 +41,6 @@ def read_npy(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
     if dtype.name not in KINDS:
         raise unsupported(f"samples of type {dtype}")
     height, width = shape[:2]
-    if height < 1 or width < 1:
-        raise damaged_image("no texels")
     check_size(width, height, components * dtype.itemsize, None if path is not None else limits)
     return Picture(raster(file, path, dtype, shape, "F" if in_columns else "C"))
 

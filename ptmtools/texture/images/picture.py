@@ -103,8 +103,10 @@ def raster(
 def check_size(width: int, height: int, texel_bytes: int, limits: Limits | None) -> None:
     """Raise LimitError PTM-L104 for what cannot be stored or is more than may be decoded.
 
-    limits: None for what takes no memory.
+    limits: None for what takes no memory. Raises InputError PTM-I125 for no texels at all.
     """
+    if min(width, height) < 1:
+        raise damaged_image("no texels")
     if max(width, height) > MAX_SIDE:
         raise LimitError(
             "PTM-L104",
@@ -126,6 +128,15 @@ def damaged_image(what: object) -> InputError:
         "PTM-I125",
         f"is damaged or cut short ({what})",
         remedy="download or export it again",
+    )
+
+
+def several(what: str) -> InputError:
+    """The error for a file of more than one image."""
+    return InputError(
+        "PTM-I127",
+        f"holds {what}; a texture is one image",
+        remedy="export the one you want as PNG",
     )
 
 

@@ -48,8 +48,6 @@ def read_hdr(file: BinaryIO, limits: Limits) -> Picture:
         raise unsupported("rows that do not go from the top and left")
     height, width = int(size[2]), int(size[4])
     check_size(width, height, 12, limits)
-    if not width or not height:
-        raise damaged_image("in its size")
     # A run codes at most 127 bytes in two.
     if (len(data) - size.end()) * 64 < 4 * width * height:
         raise damaged_image(f"after {len(data)} bytes")
