@@ -136,16 +136,12 @@ def _absorb(decoded: Any, prediction: Any, residual: Any, near: Any, values: Any
 @kernel
 def _edge_prediction(level: Any, y: int, x: int, plane: int) -> Any:
     """Median of left, upper and left + upper - upper left; what lies outside gives way."""
-    left, up, corner = i32(0), i32(0), i32(0)
-    if x > 0:
-        left = i32(level[y, x - 1, plane])
-    if y > 0:
-        up = i32(level[y - 1, x, plane])
     if x == 0:
-        return up
+        return i32(level[y - 1, x, plane]) if y > 0 else i32(0)
+    left = i32(level[y, x - 1, plane])
     if y == 0:
         return left
-    corner = i32(level[y - 1, x - 1, plane])
+    up, corner = i32(level[y - 1, x, plane]), i32(level[y - 1, x - 1, plane])
     return max(min(left, up), min(max(left, up), i32(left + up - corner)))
 
 
