@@ -25,6 +25,7 @@ from ptmtools.errors import DatabaseError
 
 if TYPE_CHECKING:
     from ptmtools.database.content import Content
+    from ptmtools.texture.model import Level
 
 FORMAT = "ptmtools hints"
 SCHEMA = 1
@@ -167,6 +168,17 @@ def _portals(cells: Cells) -> list[list[dict[str, Any]]]:
     return rows
 
 
+def level_row(level: Level) -> dict[str, int]:
+    """What the hints say of a level of a texture."""
+    return {
+        "width": level.width,
+        "height": level.height,
+        "offset": level.offset,
+        "length": level.length,
+        "gpuBytes": level.gpu_bytes,
+    }
+
+
 def _viewpoint(v: Viewpoint) -> dict[str, Any]:
     return {
         "name": v.name,
@@ -190,14 +202,5 @@ def _texture(record: TextureRecord, fallback: bool, up: str) -> Mapping[str, Any
         "height": record.height,
         "components": record.components,
         "sha256": record.sha256,
-        "levels": [
-            {
-                "width": level.width,
-                "height": level.height,
-                "offset": level.offset,
-                "length": level.length,
-                "gpuBytes": level.gpu_bytes,
-            }
-            for level in record.levels
-        ],
+        "levels": [level_row(level) for level in record.levels],
     }

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ptmtools import schemas
-from ptmtools.database.fault import FileError
+from ptmtools.database.fault import FileError, shaped
 from ptmtools.errors import LimitError
 from ptmtools.glb import BINARY, JSON, glb, glb_chunks
 
@@ -46,8 +46,7 @@ def unpack(data: bytes) -> tuple[Any, bytes]:
         chunks = [(kind, body) for kind, _, body in glb_chunks(data)]
         if [kind for kind, _ in chunks[1:]] not in ([], [BINARY]) or glb(chunks) != data:
             raise ValueError("not JSON and BIN alone, each of a multiple of 4 bytes", "byte 12")
-        return schemas.parse(chunks[0][1]), b"".join(body for _, body in chunks[1:])
-    except schemas.ShapeError as fault:
-        raise FileError("PTM-D731", "JSON", fault.message) from None
     except ValueError as fault:
         raise FileError("PTM-D731", fault.args[1], fault.args[0]) from None
+    with shaped("PTM-D731"):
+        return schemas.parse(chunks[0][1]), b"".join(body for _, body in chunks[1:])

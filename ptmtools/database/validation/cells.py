@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.validation.findings import Findings
+from ptmtools.database.validation.findings import Place
 from ptmtools.database.validation.lists import check_list, check_shares
 from ptmtools.database.validation.solids import MOST_CORNERS, SolidError, farthest, solid_planes
 from ptmtools.database.vrml.hull import convex_hull
@@ -55,28 +54,26 @@ class ReadCell:
     textures: tuple[tuple[str, ...], ...]
 
 
-def read_cell(document: Document, file: str, found: Findings) -> ReadCell | None:
+def read_cell(document: Document, at: Place) -> ReadCell | None:
     """The cell of a file, or None, and PTM-D663, if it lacks part of the pattern."""
     nodes = document.of_type("PTMCell")
     if len(nodes) != 1:
-        found.add("PTM-D663", file, "", f"{len(nodes)} PTMCell nodes, not 1")
+        at.add("PTM-D663", f"{len(nodes)} PTMCell nodes, not 1")
         return None
     fields, declared = nodes[0].fields, document.protos["PTMCell"]
     if declared not in (_CELL, _CELL | _LEAVES):
-        found.add("PTM-D663", file, "", "PROTO PTMCell does not declare the pattern's fields")
+        at.add("PTM-D663", "PROTO PTMCell does not declare the pattern's fields")
         return None
     if missing := [f for f in declared if f not in fields]:
-        found.add("PTM-D663", file, f"line {nodes[0].line}", f"PTMCell lacks {missing[0]}")
+        at.add("PTM-D663", f"PTMCell lacks {missing[0]}", f"line {nodes[0].line}")
         return None
-    textures: dict[int, Node] = {}
-    held = [fields["hullPoint"]]
-    for shape in document.of_type("Shape"):
-        texture, coord = shape.child("appearance", "texture"), shape.child("geometry", "coord")
-        if texture is not None:
-            textures[id(texture)] = texture
-        if coord is not None and "point" in coord.fields:
-            held.append(coord.fields["point"])
-    points = np.concatenate(held) if any(map(len, held)) else np.zeros((1, 3))
+    shapes = document.of_type("Shape")
+    held = [fields["hullPoint"], *(s.at("geometry", "coord").get("point", ()) for s in shapes)]
+    points = np.concatenate([some for some in held if len(some)] or [np.zeros((1, 3))])
+    leaves = []
+    if "leafPoint" in fields:
+        leaves = np.split(fields["leafPoint"], fields["leafStart"][1:])
+    textures = [t for s in shapes if (t := s.child("appearance", "texture")) is not None]
     return ReadCell(
         name=fields["cellName"],
         adjacent=fields["adjacentUrl"],
@@ -84,87 +81,72 @@ def read_cell(document: Document, file: str, found: Findings) -> ReadCell | None
         ach=fields["ach"],
         hull=fields["hullPoint"],
         box=np.stack([points.min(axis=0), points.max(axis=0)]),
-        leaves=tuple(np.split(fields["leafPoint"], fields["leafStart"][1:]))
-        if "leafPoint" in fields
-        else (),
-        textures=tuple(dict.fromkeys(t.fields.get("url", ()) for t in textures.values())),
+        leaves=tuple(leaves),
+        textures=tuple(dict.fromkeys(t.fields.get("url", ()) for t in textures)),
     )
 
 
 def check_cell(
-    document: Document,
-    cell: ReadCell,
-    file: str,
-    box: NDArray[np.float64],
-    tolerance: Tolerance,
-    found: Findings,
+    document: Document, cell: ReadCell, box: NDArray[np.float64], tolerance: Tolerance, at: Place
 ) -> None:
     """Checks all that needs no other cell.
 
-    ``file`` is relative to the database; ``box`` (2, 3) holds the hulls of all cells. Geometry
-    beyond a face of that box is in order: a model that is open is subdivided within its walls,
-    and what lies farther out belongs to the cells at the rim. There the hull of several leaves may
-    lean inwards, and what lies before one of the leaves is in order too.
+    ``box`` (2, 3) holds the hulls of all cells. Geometry beyond a face of that box is in order: a
+    model that is open is subdivided within its walls, and what lies farther out belongs to the
+    cells at the rim. There the hull of several leaves may lean inwards, and what lies before one of
+    the leaves is in order too.
     """
-    node = document.of_type("PTMCell")[0]
-    place = f"line {node.line}"
-    body = _Body(node, box, tolerance)
-    for code, fault in body.faults:
-        found.add(code, file, place, fault)
+    (node,) = document.of_type("PTMCell")
+    own, here = at.file.rpartition("/")[2], at.at(f"line {node.line}")
+    body = _Body(node, cell, box, tolerance, here)
     for shape in document.of_type("Shape"):
-        where = f"line {shape.line}" + (f", {shape.name}" if shape.name else "")
-        _check_shape(shape, file, where, found)
-        coord = shape.child("geometry", "coord")
-        if coord is not None and "point" in coord.fields:
-            far = body.outside(coord.fields["point"])
-            if far > tolerance.cluster:
-                found.add("PTM-D684", file, where, f"geometry lies {far:.3g} m outside of the hull")
-    own = file.rpartition("/")[2]
+        there = at.at(f"line {shape.line}" + (f", {shape.name}" if shape.name else ""))
+        _check_shape(shape, there)
+        far = body.outside(shape.at("geometry", "coord").get("point", np.zeros((0, 3))))
+        if far > tolerance.cluster:
+            there.add("PTM-D684", f"geometry lies {far:.3g} m outside of the hull")
     if f"{cell.name}.wrl" != own:
-        found.add("PTM-D698", file, place, f"cellName is {cell.name!r}")
-    check_list("adjacentUrl", own, cell.adjacent, file, place, found)
-    check_list("visibleUrl", own, cell.visible, file, place, found)
+        here.add("PTM-D698", f"cellName is {cell.name!r}")
+    check_list("adjacentUrl", own, cell.adjacent, here)
+    check_list("visibleUrl", own, cell.visible, here)
     if len(cell.ach) != len(cell.visible):
-        message = f"{len(cell.ach)} ach values for {len(cell.visible)} visible cells"
-        found.add("PTM-D691", file, place, message)
-    check_shares(cell.ach, ACH_SLACK, file, place, ("PTM-D692", "PTM-D693"), found)
+        here.add("PTM-D691", f"{len(cell.ach)} ach values for {len(cell.visible)} visible cells")
+    check_shares(cell.ach, ACH_SLACK, ("PTM-D692", "PTM-D693"), here)
 
 
 class _Body:
-    """The convex body of a cell, and if it has several, its leaves.
+    """The convex body of a cell, and if it has several, its leaves."""
 
-    Attributes
-    ----------
-    faults: codes and what is wrong.
-    """
-
-    def __init__(self, node: Node, box: NDArray[np.float64], tolerance: Tolerance) -> None:
-        self.faults: list[tuple[str, str]] = []
+    def __init__(
+        self,
+        node: Node,
+        cell: ReadCell,
+        box: NDArray[np.float64],
+        tolerance: Tolerance,
+        at: Place,
+    ) -> None:
+        """Says what is wrong with them."""
         self._box, self._tolerance = box, tolerance
-        self._leaves: list[NDArray[np.float64]] = []
+        self._leaves = cell.leaves
         hull = np.zeros((0, 4))
-        points, fields = node.fields["hullPoint"], node.fields
-        triangles = _loops(fields["hullIndex"], len(points))
+        triangles = _loops(node.fields["hullIndex"], len(cell.hull))
         if triangles is None or len(triangles) < 4:
-            self.faults.append(("PTM-D683", "hullIndex is not a list of triangles over hullPoint"))
+            at.add("PTM-D683", "hullIndex is not a list of triangles over hullPoint")
         else:
             try:
-                hull = solid_planes(points, triangles.tolist(), tolerance)
+                hull = solid_planes(cell.hull, triangles.tolist(), tolerance)
             except SolidError as fault:
-                self.faults.append(("PTM-D683", f"the hull {fault}"))
+                at.add("PTM-D683", f"the hull {fault}")
         self._hull = self._without_rim(hull)
-        if "leafPoint" in fields and "leafStart" in fields:
-            leaves = np.split(fields["leafPoint"], fields["leafStart"][1:])
-            sizes = [len(leaf) for leaf in leaves]
-            start = np.cumsum([0, *sizes[:-1]])
-            cut = len(fields["leafStart"]) > 1 and np.array_equal(fields["leafStart"], start)
+        if cell.leaves:
+            sizes, given = [len(leaf) for leaf in cell.leaves], node.fields["leafStart"]
+            cut = len(given) > 1 and np.array_equal(given, np.cumsum([0, *sizes[:-1]]))
             if not cut or min(sizes) < 4 or max(sizes) > MOST_CORNERS:
-                self.faults.append(("PTM-D685", "leafStart does not cut leafPoint into leaves"))
-            else:
-                self._leaves = leaves
-            far = farthest(hull, fields["leafPoint"]).max(initial=0.0)
+                at.add("PTM-D685", "leafStart does not cut leafPoint into leaves")
+                self._leaves = ()
+            far = farthest(hull, node.fields["leafPoint"]).max(initial=0.0)
             if far > tolerance.cluster:
-                self.faults.append(("PTM-D684", f"a leaf lies {far:.3g} m outside of the hull"))
+                at.add("PTM-D684", f"a leaf lies {far:.3g} m outside of the hull")
 
     def outside(self, points: NDArray[np.float64]) -> float:
         """How far the farthest of (n, 3) points lies outside, metres; 0 if none does."""
@@ -209,73 +191,53 @@ def _loops(index: NDArray[np.int64], points: int) -> NDArray[np.int64] | None:
     return corners if whole else None
 
 
-def _check_shape(shape: Node, file: str, place: str, found: Findings) -> None:
+def _check_shape(shape: Node, at: Place) -> None:
     geometry, appearance = shape.child("geometry"), shape.child("appearance")
     if geometry is None or appearance is None:
-        found.add("PTM-D663", file, place, "a Shape without appearance or geometry")
+        at.add("PTM-D663", "a Shape without appearance or geometry")
         return
-    coord, fields = geometry.child("coord"), list(geometry.fields)
-    if coord is None or "coordIndex" not in fields or "point" not in coord.fields:
-        found.add("PTM-D663", file, place, "an IndexedFaceSet without coord or coordIndex")
+    points, fields = geometry.at("coord").get("point"), list(geometry.fields)
+    if points is None or "coordIndex" not in fields:
+        at.add("PTM-D663", "an IndexedFaceSet without coord or coordIndex")
         return
     if fields.index("coord") > fields.index("coordIndex"):
-        found.add("PTM-D661", file, place, "coordIndex stands before coord")
-    points = len(coord.fields["point"])
-    triangles = _loops(geometry.fields["coordIndex"], points)
+        at.add("PTM-D661", "coordIndex stands before coord")
+    triangles = _loops(geometry.fields["coordIndex"], len(points))
     if triangles is None:
-        found.add(
-            "PTM-D680", file, place, f"coordIndex is not a list of triangles over {points} points"
-        )
+        at.add("PTM-D680", f"coordIndex is not a list of triangles over {len(points)} points")
     elif len(triangles) == 0 or (triangles == np.roll(triangles, 1, axis=1)).any():
-        found.add("PTM-D680", file, place, "coordIndex has a triangle with two equal corners")
+        at.add("PTM-D680", "coordIndex has a triangle with two equal corners")
     count = len(geometry.fields["coordIndex"]) // 4
-    _check_texture(geometry, appearance, count, file, place, found)
-    _check_colours(geometry, appearance, count, file, place, found)
+    _check_texture(geometry, appearance, count, at)
+    _check_colours(geometry, appearance, count, at)
 
 
-def _check_texture(
-    geometry: Node, appearance: Node, count: int, file: str, place: str, found: Findings
-) -> None:
+def _check_texture(geometry: Node, appearance: Node, count: int, at: Place) -> None:
     texture, coord = appearance.child("texture"), geometry.child("texCoord")
     index = geometry.fields.get("texCoordIndex")
     if texture is None and coord is None and index is None:
         return
     if texture is None or not texture.fields.get("url"):
-        found.add("PTM-D663", file, place, "texture coordinates without a texture")
+        at.add("PTM-D663", "texture coordinates without a texture")
     if coord is None or index is None or "point" not in coord.fields:
-        found.add("PTM-D663", file, place, "a texture without texCoord or texCoordIndex")
+        at.add("PTM-D663", "a texture without texCoord or texCoordIndex")
         return
     points = len(coord.fields["point"])
     triangles = _loops(index, points)
     if triangles is None:
-        found.add(
-            "PTM-D681",
-            file,
-            place,
-            f"texCoordIndex is not a list of triangles over {points} points",
-        )
+        at.add("PTM-D681", f"texCoordIndex is not a list of triangles over {points} points")
     elif len(triangles) != count:
-        found.add("PTM-D681", file, place, f"texCoordIndex has {len(triangles)} faces of {count}")
+        at.add("PTM-D681", f"texCoordIndex has {len(triangles)} faces of {count}")
 
 
-def _check_colours(
-    geometry: Node, appearance: Node, count: int, file: str, place: str, found: Findings
-) -> None:
-    values: list[Any] = []
-    material, color = appearance.child("material"), geometry.child("color")
-    if material is not None:
-        values += list(material.fields.values())
+def _check_colours(geometry: Node, appearance: Node, count: int, at: Place) -> None:
+    color = geometry.child("color")
     if color is not None:
-        values += list(color.fields.values())
         colours = len(color.fields.get("color", ()))
         index = geometry.fields.get("colorIndex", np.zeros(0, np.int64))
         in_range = ((index >= 0) & (index < colours)).all()
         if geometry.fields.get("colorPerVertex", True) or len(index) != count or not in_range:
-            found.add(
-                "PTM-D682",
-                file,
-                place,
-                f"colorIndex does not give a colour to each of {count} faces",
-            )
+            at.add("PTM-D682", f"colorIndex does not give a colour to each of {count} faces")
+    values = [*appearance.at("material").values(), *geometry.at("color").values()]
     if any(((v < 0) | (v > 1)).any() for v in values):
-        found.add("PTM-D682", file, place, "a colour or transparency is outside 0 to 1")
+        at.add("PTM-D682", "a colour or transparency is outside 0 to 1")
