@@ -18,15 +18,6 @@ from ptmtools.tolerance import Tolerance
 
 #: How far the ach values as written, single precision, may sum up beside 1.
 ACH_SLACK = 1e-5
-_CELL = {
-    "cellName": "SFString",
-    "hullPoint": "MFVec3f",
-    "hullIndex": "MFInt32",
-    "adjacentUrl": "MFString",
-    "visibleUrl": "MFString",
-    "ach": "MFFloat",
-}
-_LEAVES = {"leafPoint": "MFVec3f", "leafStart": "MFInt32"}
 
 
 @dataclass(frozen=True)
@@ -55,25 +46,18 @@ class ReadCell:
 
 
 def read_cell(document: Document, at: Place) -> ReadCell | None:
-    """The cell of a file, or None, and PTM-D663, if it lacks part of the pattern."""
+    """The cell of a file, or None, and PTM-D663, if there is not one."""
     nodes = document.of_type("PTMCell")
     if len(nodes) != 1:
         at.add("PTM-D663", f"{len(nodes)} PTMCell nodes, not 1")
         return None
-    fields, declared = nodes[0].fields, document.protos["PTMCell"]
-    if declared not in (_CELL, _CELL | _LEAVES):
-        at.add("PTM-D663", "PROTO PTMCell does not declare the pattern's fields")
-        return None
-    if missing := [f for f in declared if f not in fields]:
-        at.add("PTM-D663", f"PTMCell lacks {missing[0]}", f"line {nodes[0].line}")
-        return None
-    shapes = document.of_type("Shape")
-    held = [fields["hullPoint"], *(s.at("geometry", "coord").get("point", ()) for s in shapes)]
+    fields, shapes = nodes[0].fields, document.of_type("Shape")
+    held = [fields["hullPoint"], *(s.at("geometry", "coord")["point"] for s in shapes)]
     points = np.concatenate([some for some in held if len(some)] or [np.zeros((1, 3))])
     leaves = []
     if "leafPoint" in fields:
         leaves = np.split(fields["leafPoint"], fields["leafStart"][1:])
-    textures = [t for s in shapes if (t := s.child("appearance", "texture")) is not None]
+    textures = [s.at("appearance", "texture") for s in shapes]
     return ReadCell(
         name=fields["cellName"],
         adjacent=fields["adjacentUrl"],
@@ -82,7 +66,7 @@ def read_cell(document: Document, at: Place) -> ReadCell | None:
         hull=fields["hullPoint"],
         box=np.stack([points.min(axis=0), points.max(axis=0)]),
         leaves=tuple(leaves),
-        textures=tuple(dict.fromkeys(t.fields.get("url", ()) for t in textures)),
+        textures=tuple(dict.fromkeys(texture["url"] for texture in textures if texture)),
     )
 
 
@@ -102,7 +86,7 @@ def check_cell(
     for shape in document.of_type("Shape"):
         there = at.at(f"line {shape.line}" + (f", {shape.name}" if shape.name else ""))
         _check_shape(shape, there)
-        far = body.outside(shape.at("geometry", "coord").get("point", np.zeros((0, 3))))
+        far = body.outside(shape.at("geometry", "coord")["point"])
         if far > tolerance.cluster:
             there.add("PTM-D684", f"geometry lies {far:.3g} m outside of the hull")
     if f"{cell.name}.wrl" != own:
@@ -192,37 +176,30 @@ def _loops(index: NDArray[np.int64], points: int) -> NDArray[np.int64] | None:
 
 
 def _check_shape(shape: Node, at: Place) -> None:
-    geometry, appearance = shape.child("geometry"), shape.child("appearance")
-    if geometry is None or appearance is None:
-        at.add("PTM-D663", "a Shape without appearance or geometry")
-        return
-    points, fields = geometry.at("coord").get("point"), list(geometry.fields)
-    if points is None or "coordIndex" not in fields:
-        at.add("PTM-D663", "an IndexedFaceSet without coord or coordIndex")
-        return
-    if fields.index("coord") > fields.index("coordIndex"):
+    geometry, points = shape.at("geometry"), shape.at("geometry", "coord")["point"]
+    if list(geometry).index("coord") > list(geometry).index("coordIndex"):
         at.add("PTM-D661", "coordIndex stands before coord")
-    triangles = _loops(geometry.fields["coordIndex"], len(points))
+    triangles = _loops(geometry["coordIndex"], len(points))
     if triangles is None:
         at.add("PTM-D680", f"coordIndex is not a list of triangles over {len(points)} points")
     elif len(triangles) == 0 or (triangles == np.roll(triangles, 1, axis=1)).any():
         at.add("PTM-D680", "coordIndex has a triangle with two equal corners")
-    count = len(geometry.fields["coordIndex"]) // 4
-    _check_texture(geometry, appearance, count, at)
-    _check_colours(geometry, appearance, count, at)
+    count = len(geometry["coordIndex"]) // 4
+    _check_texture(shape, count, at)
+    _check_colours(shape, count, at)
 
 
-def _check_texture(geometry: Node, appearance: Node, count: int, at: Place) -> None:
-    texture, coord = appearance.child("texture"), geometry.child("texCoord")
-    index = geometry.fields.get("texCoordIndex")
-    if texture is None and coord is None and index is None:
+def _check_texture(shape: Node, count: int, at: Place) -> None:
+    texture, index = shape.at("appearance", "texture"), shape.at("geometry").get("texCoordIndex")
+    coord = shape.at("geometry", "texCoord")
+    if not texture and not coord and index is None:
         return
-    if texture is None or not texture.fields.get("url"):
+    if not texture.get("url"):
         at.add("PTM-D663", "texture coordinates without a texture")
-    if coord is None or index is None or "point" not in coord.fields:
+    if not coord or index is None:
         at.add("PTM-D663", "a texture without texCoord or texCoordIndex")
         return
-    points = len(coord.fields["point"])
+    points = len(coord["point"])
     triangles = _loops(index, points)
     if triangles is None:
         at.add("PTM-D681", f"texCoordIndex is not a list of triangles over {points} points")
@@ -230,14 +207,13 @@ def _check_texture(geometry: Node, appearance: Node, count: int, at: Place) -> N
         at.add("PTM-D681", f"texCoordIndex has {len(triangles)} faces of {count}")
 
 
-def _check_colours(geometry: Node, appearance: Node, count: int, at: Place) -> None:
-    color = geometry.child("color")
-    if color is not None:
-        colours = len(color.fields.get("color", ()))
-        index = geometry.fields.get("colorIndex", np.zeros(0, np.int64))
-        in_range = ((index >= 0) & (index < colours)).all()
-        if geometry.fields.get("colorPerVertex", True) or len(index) != count or not in_range:
+def _check_colours(shape: Node, count: int, at: Place) -> None:
+    geometry, color = shape.at("geometry"), shape.at("geometry", "color")
+    if color:
+        index = geometry.get("colorIndex", np.zeros(0, np.int64))
+        in_range = ((index >= 0) & (index < len(color["color"]))).all()
+        if geometry.get("colorPerVertex", True) or len(index) != count or not in_range:
             at.add("PTM-D682", f"colorIndex does not give a colour to each of {count} faces")
-    values = [*appearance.at("material").values(), *geometry.at("color").values()]
+    values = [*shape.at("appearance", "material").values(), *color.values()]
     if any(((v < 0) | (v > 1)).any() for v in values):
         at.add("PTM-D682", "a colour or transparency is outside 0 to 1")

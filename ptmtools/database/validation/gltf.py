@@ -132,8 +132,8 @@ def _other_look(material: ReadMaterial, shape: Node) -> str:
     texture, surface = shape.at("appearance", "texture"), shape.at("appearance", "material")
     if material.two_sided == geometry.get("solid", True):
         return "not the sides of"
-    urls = [url for url in texture.get("url", ()) if isinstance(url, str)]
-    if sorted(urls) != sorted(url for url in (material.image, material.ptm) if url is not None):
+    urls = sorted(url for url in (material.image, material.ptm) if url is not None)
+    if sorted(texture.get("url", ())) != urls:
         return "not the images of"
     wrap = tuple(
         WRAPS["repeat" if texture.get(name, True) else "clamp"] for name in ("repeatS", "repeatT")
@@ -142,10 +142,9 @@ def _other_look(material: ReadMaterial, shape: Node) -> str:
         return "does not wrap as"
     faces = shape.at("geometry", "color").get("color", np.ones((1, 3)))
     color = surface.get("diffuseColor", faces)
-    alpha = 1 - np.ravel(surface.get("transparency", 0.0))[:1]
+    alpha = 1 - surface.get("transparency", np.zeros(1))
     wanted = np.array([*(linear(float(c)) for c in np.ravel(color)[:3]), *alpha])
-    factor = np.array(material.factor, dtype=np.float64)
-    if wanted.shape != factor.shape or np.abs(wanted - factor).max() > _SLACK:
+    if len(wanted) != 4 or np.abs(wanted - material.factor).max() > _SLACK:
         return "not the colour of"
     if material.factor[3] < 1 and not material.blends:
         return "opaque, unlike"
@@ -155,12 +154,12 @@ def _other_look(material: ReadMaterial, shape: Node) -> str:
 def _corners(shape: Node, values: str, index: str) -> NDArray[np.float64] | None:
     """(m, 3, k) the points of a shape's triangles; None without, or if the indices are wrong,
     which the check of the VRML file reports."""
-    points = shape.at("geometry", values).get("point")
     try:
-        rows = np.asarray(shape.at("geometry")[index]).reshape(-1, 4)[:, :3]
-        return None if points is None else np.asarray(points)[rows]
+        rows = shape.at("geometry")[index].reshape(-1, 4)[:, :3]
+        corners: NDArray[np.float64] = shape.at("geometry", values)["point"][rows]
     except (KeyError, ValueError, IndexError):
         return None
+    return corners
 
 
 def _difference(own: object, other: dict[str, Any]) -> str:

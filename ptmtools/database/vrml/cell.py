@@ -36,21 +36,12 @@ from ptmtools.database.floats import decimal, row_texts, single
 from ptmtools.database.model import TextureRecord
 from ptmtools.database.names import DefNames, cell_file, cell_name
 from ptmtools.database.vrml.hull import convex_hull
+from ptmtools.database.vrml.pattern import CELL, CELL_OF_LEAVES, HEADER, declaration
 from ptmtools.database.vrml.text import chosen, field, listed, loops, quoted
 from ptmtools.scene.model import Material
 
-HEADER = "#VRML V2.0 utf8\n"
 #: How bright an untextured surface is without light, as a share of its colour.
 _GLOW = 0.25
-_FIELDS = (
-    '  field SFString cellName    ""\n'
-    "  field MFVec3f  hullPoint   [ ]\n"
-    "  field MFInt32  hullIndex   [ ]\n"
-    "  field MFString adjacentUrl [ ]\n"
-    "  field MFString visibleUrl  [ ]\n"
-    "  field MFFloat  ach         [ ]\n"
-)
-_LEAF_FIELDS = "  field MFVec3f  leafPoint   [ ]\n  field MFInt32  leafStart   [ ]\n"
 
 
 @dataclass(frozen=True)
@@ -107,8 +98,11 @@ class CellWriter:
             start = np.cumsum([0, *map(len, leaves[:-1])])
             lists["leafPoint"] = _points(np.concatenate(leaves))
             lists["leafStart"] = listed([str(i) for i in start.tolist()], 16)
-        parts = [HEADER, "PROTO PTMCell [\n", _FIELDS, _LEAF_FIELDS if len(leaves) > 1 else ""]
-        parts.append("] {\n  WorldInfo { }\n}\nPTMCell {\n")
+        parts = [
+            HEADER,
+            declaration(*(CELL if len(leaves) == 1 else CELL_OF_LEAVES)),
+            "PTMCell {\n",
+        ]
         parts += [f"  {name:<11} {text}\n" for name, text in lists.items()]
         parts.append("}\n")
 

@@ -10,17 +10,8 @@ from numpy.typing import NDArray
 from ptmtools.database.floats import decimal, row_texts, single
 from ptmtools.database.model import EmitOptions, Viewpoint
 from ptmtools.database.names import cell_path
-from ptmtools.database.vrml.cell import HEADER
+from ptmtools.database.vrml.pattern import HEADER, PATTERN, VIEWPOINT_CELL, declaration
 from ptmtools.database.vrml.text import listed, quoted
-
-#: The version of the emission pattern, in WorldInfo's first info string.
-PATTERN = 1
-_PROTO = (
-    "PROTO PTMViewpointCell [\n"
-    '  field SFString viewpoint ""\n'
-    "  field MFString cellUrl   [ ]\n"
-    "] {\n  WorldInfo { }\n}\n"
-)
 
 
 def root_text(
@@ -37,7 +28,7 @@ def root_text(
     avatar = ", ".join(decimal(x) for x in options.avatar_size)
     parts = [
         HEADER,
-        _PROTO,
+        declaration(*VIEWPOINT_CELL),
         f"WorldInfo {{\n  title {quoted(options.title)}\n  info {listed(info, 1)}\n}}\n",
         f'NavigationInfo {{ type [ "WALK", "ANY" ] avatarSize [ {avatar} ] headlight TRUE }}\n',
     ]
