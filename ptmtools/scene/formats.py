@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
 from ptmtools.scene.meshlab import convert
@@ -121,21 +122,19 @@ def _joined(path: Path, parts: list[Source]) -> Source:
     """One source of several, in order. Raises InputError PTM-I247 if they have no face."""
     if not any(len(part.triangles) for part in parts):
         raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with faces")
-    points = np.cumsum([0] + [len(part.points) for part in parts])
-    objects = np.cumsum([0] + [len(part.objects) for part in parts])
-    materials = np.cumsum([0] + [len(part.materials) for part in parts])
+
+    def counted_on(name: str, counted: str) -> NDArray[np.int64]:
+        """An array of indices of all of them, behind what the parts before have."""
+        first = np.cumsum([0] + [len(getattr(part, counted)) for part in parts])
+        rows = [getattr(part, name) + n for part, n in zip(parts, first, strict=False)]
+        return np.concatenate(rows)
+
     return Source(
         points=np.concatenate([part.points for part in parts]),
-        triangles=np.concatenate(
-            [part.triangles + n for part, n in zip(parts, points, strict=False)]
-        ),
+        triangles=counted_on("triangles", "points"),
         uv=np.concatenate([part.uv for part in parts]),
-        triangle_object=np.concatenate(
-            [part.triangle_object + n for part, n in zip(parts, objects, strict=False)]
-        ),
-        triangle_material=np.concatenate(
-            [part.triangle_material + n for part, n in zip(parts, materials, strict=False)]
-        ),
+        triangle_object=counted_on("triangle_object", "objects"),
+        triangle_material=counted_on("triangle_material", "materials"),
         objects=tuple(name for part in parts for name in part.objects),
         materials=tuple(material for part in parts for material in part.materials),
     )

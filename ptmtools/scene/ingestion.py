@@ -300,9 +300,9 @@ def _material(
     if texture is not None:
         decoded = store.add(texture)
         if decoded is not None:
-            image = decoded.index
-            if decoded.holes is not None and not transparent:
-                transparent = uses_holes(decoded.holes, uv[faces], texture.wrap_s, texture.wrap_t)
+            image, holes = decoded
+            if holes is not None and not transparent:
+                transparent = uses_holes(holes, uv[faces], texture.wrap_s, texture.wrap_t)
     if given.mask is not None:
         mask = given.mask
         holes = store.mask_holes(mask)

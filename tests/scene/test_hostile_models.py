@@ -238,11 +238,13 @@ def test_masks_are_kept_in_bits(textured: Callable[..., Path]) -> None:
     store = ImageStore(Findings(path), Folder(path.parent), 1 << 30)
     decoded = store.add(texture)
     assert decoded is not None
-    assert decoded.holes is not None
-    assert np.array_equal(decoded.holes, pixels[..., 3] < 255)
+    index, holes = decoded
+    assert index == 0
+    assert holes is not None
+    assert np.array_equal(holes, pixels[..., 3] < 255)
     (examined,) = store._examined.values()
-    assert examined.holes is not None
-    assert examined.holes.bits.nbytes == 1024 * 1023 // 8
+    assert examined.bits is not None
+    assert examined.bits.nbytes == 1024 * 1024 // 8
 
 
 def test_an_image_that_many_materials_name_is_read_once(
