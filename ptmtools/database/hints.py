@@ -47,10 +47,6 @@ def hints_text(content: Content, cell_url: Callable[[int], str], up: str) -> str
     space, cells, pvs, ach = content.scene.space, content.cells, content.pvs, content.ach
     place = {image: i for image, (i, _) in content.records.items()}
     adjacent, painted = cells.adjacent(), content.painted
-    leaves = np.split(
-        np.argsort(cells.leaf_cell, kind="stable"),
-        np.cumsum(np.bincount(cells.leaf_cell, minlength=cells.cell_count))[:-1],
-    )
     statistics: Any = {name: _rounded(getattr(ach, name)) for name in STATISTICS}
     rounded = replace(ach, **statistics)
     portals = _portals(cells)
@@ -68,7 +64,7 @@ def hints_text(content: Content, cell_url: Callable[[int], str], up: str) -> str
         {
             "name": cell_name(c),
             "url": cell_url(c),
-            "leaves": [_leaf(cells, leaf) for leaf in leaves[c].tolist()],
+            "leaves": [_leaf(cells, leaf) for leaf in content.leaves[c]],
             "textures": painted[c].tolist(),
             "adjacent": adjacent[c].tolist(),
             "visible": pvs.row(c).tolist(),

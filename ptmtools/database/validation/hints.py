@@ -94,7 +94,7 @@ def check_against_cells(
             "adjacent": tuple(known[c] for c in row["adjacent"]) == cell.adjacent,
             "visible": tuple(known[c] for c in row["visible"]) == cell.visible,
             "ach": _equal_single(row["ach"], cell.ach),
-            "leaves": _same_box(row["leaves"], cell.hull) and _same_leaves(row["leaves"], cell),
+            "leaves": _same_leaves(row["leaves"], cell),
             "textures": listed == shown or not complete,
         }
         for field in (f for f, equal in same.items() if not equal):
@@ -144,23 +144,16 @@ def _misfit(coverage: Row, ach: NDArray[np.float64]) -> str:
     return ""
 
 
-def _equal_single(full: Sequence[Any], written: Any) -> bool:
-    return np.array_equal(np.array(full, np.float32), np.asarray(written).astype(np.float32))
-
-
-def _same_box(leaves: Sequence[Row], hull: Any) -> bool:
-    points = np.array([p for leaf in leaves for p in leaf["points"]], np.float64).reshape(-1, 3)
-    if len(points) == 0 or len(hull) == 0:
-        return False
-    single, other = points.astype(np.float32), np.asarray(hull).astype(np.float32)
-    return bool(
-        (single.min(axis=0) == other.min(axis=0)).all()
-        and (single.max(axis=0) == other.max(axis=0)).all()
-    )
+def _equal_single(full: Sequence[Any], written: NDArray[np.float64]) -> bool:
+    return np.array_equal(np.array(full, np.float32), written.astype(np.float32))
 
 
 def _same_leaves(leaves: Sequence[Row], cell: ReadCell) -> bool:
-    if len(leaves) != max(len(cell.leaves), 1):
+    """Whether the leaves are those of the file, if it has some, and reach as far as its hull."""
+    if len(leaves) != max(len(cell.leaves), 1) or not len(cell.hull):
         return False
+    points = [point for leaf in leaves for point in leaf["points"]]
     pairs = zip(leaves, cell.leaves, strict=False)
-    return all(_equal_single(leaf["points"], points) for leaf, points in pairs)
+    return all(_equal_single(leaf["points"], written) for leaf, written in pairs) and all(
+        _equal_single(end(points, axis=0), end(cell.hull, axis=0)) for end in (np.min, np.max)
+    )

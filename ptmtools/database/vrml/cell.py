@@ -72,11 +72,9 @@ class CellWriter:
         self._cell_url = [quoted(cell_file(c)) for c in range(cells.cell_count)]
         self._ach = row_texts(single(content.ach.value, "ach")[:, None])
         self._point, self._uv = row_texts(g.point), row_texts(g.uv)
-        order = np.argsort(cells.leaf_cell, kind="stable")
-        cut = np.searchsorted(cells.leaf_cell[order], np.arange(1, cells.cell_count))
         self._leaves = [
-            [single(cells.leaf_points(leaf), "leaf points") for leaf in leaves.tolist()]
-            for leaves in np.split(order, cut)
+            [single(cells.leaf_points(leaf), "leaf points") for leaf in leaves]
+            for leaves in content.leaves
         ]
         self._hulls = [convex_hull(np.concatenate(leaves)) for leaves in self._leaves]
 
