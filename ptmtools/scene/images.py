@@ -264,7 +264,7 @@ def _decode(data: bytes, limit: int) -> Image.Image:
     from ptmtools.texture.images.opening import load, opened, pillow_faults
 
     if not data:
-        raise InputError("PTM-I206", "empty file")
+        raise InputError("PTM-I124", "empty file")
     limits = Limits(limit)
     with pillow_faults():
         image = opened(cast("BinaryIO", io.BytesIO(data)), limits)

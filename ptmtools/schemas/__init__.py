@@ -26,7 +26,7 @@ from importlib.resources import files
 from typing import Any
 
 #: Names of the schemas.
-HINTS, MANIFEST, VALIDATION, GLB = "hints", "manifest", "validation", "glb"
+HINTS, MANIFEST, VALIDATION, GLB, SCENE = "hints", "manifest", "validation", "glb", "scene"
 #: So many lists and objects lie in each other at most, where anything may stand.
 DEEPEST = 16
 #: How the message of a number ends that is beyond float64.
@@ -61,7 +61,7 @@ _BOUNDS: dict[str, tuple[set[type], Callable[[Any, Any], bool], str]] = {
 }
 
 
-class ShapeError(Exception):
+class ShapeError(ValueError):
     """The first thing in a document that is not as its schema says.
 
     `path` leads to it: names and indices, from the outside in.
@@ -115,6 +115,8 @@ def parse(data: bytes) -> Any:
         return json.loads(
             data.decode("utf-8"), parse_constant=_not_finite, object_pairs_hook=_object
         )
+    except ShapeError:
+        raise
     except UnicodeDecodeError as fault:
         raise ShapeError(f"byte {fault.start} is not UTF-8") from None
     except (ValueError, RecursionError) as fault:
