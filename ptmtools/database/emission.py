@@ -15,8 +15,8 @@ from ptmtools.database.emitters import chosen_emitters
 from ptmtools.database.model import EmitOptions, EmitReport, TextureRecord
 from ptmtools.database.served import write_files
 from ptmtools.database.viewpoints.placement import place_viewpoints
-from ptmtools.errors import DatabaseError, OutputError
-from ptmtools.files import real_folder
+from ptmtools.errors import DatabaseError
+from ptmtools.files import real_folder, refuse_existing
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
@@ -56,13 +56,8 @@ def emit(
     emitters = chosen_emitters(options.format)
     owned = [name for emitter in emitters for name in emitter.owns]
     for name in owned:
-        if not force and os.path.lexists(folder / name):
-            raise OutputError(
-                "PTM-O001",
-                "already exists",
-                file=folder / name,
-                remedy="name another folder, or give --force to overwrite it",
-            )
+        if not force:
+            refuse_existing(folder / name)
     viewpoints, notes = place_viewpoints(scene, cells, options)
     content = Content(scene, cells, pvs, ach, textures, viewpoints, options, progress)
     written = [emitter.files(content) for emitter in emitters]

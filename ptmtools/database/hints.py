@@ -40,9 +40,7 @@ def hints_text(content: Content, cell_url: Callable[[int], str], up: str) -> str
     """The contents of `hints.json`: ``cell_url`` and ``up``, the way to the served folder, as seen
     from where it lies.
 
-    Raises
-    ------
-    DatabaseError: PTM-D601 a number is not finite.
+    Raises DatabaseError: PTM-D601 a number is not finite.
     """
     space, cells, pvs, ach = content.scene.space, content.cells, content.pvs, content.ach
     place = {image: i for image, (i, _) in content.records.items()}

@@ -48,9 +48,7 @@ def write_files(
     force: overwrite files; a gzip copy that is not written again goes.
     gzip: write copies of VRML and JSON files.
 
-    Raises
-    ------
-    OutputError: PTM-O001 to PTM-O003, of the first file that cannot be written.
+    Raises OutputError: PTM-O001 to PTM-O003, of the first file that cannot be written.
     """
     names: list[str] = []
     size = 0

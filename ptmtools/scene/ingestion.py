@@ -19,6 +19,7 @@ through another library, N231 material that cannot be seen.
 
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
 from typing import Literal
@@ -27,6 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, LimitError
+from ptmtools.files import open_regular
 from ptmtools.progress import Progress, silent
 from ptmtools.scene import space as spaces
 from ptmtools.scene.faces import KeptFaces, keep_faces
@@ -141,21 +143,17 @@ def ingest(
 def check_file(model: Path) -> None:
     """Raises InputError if there is no file that could be a model."""
     try:
-        if model.is_dir():
-            raise InputError(
-                "PTM-I241", "is a directory", file=model, remedy="name the model file in it"
-            )
-        if not model.exists():
-            raise InputError("PTM-I240", "no such file", file=model)
-        if not model.is_file():
-            raise InputError("PTM-I240", "not a regular file", file=model)
-        with open(model, "rb") as stream:
+        with open_regular(model) as stream:
             if not stream.read(1):
                 raise InputError("PTM-I242", "empty file", file=model)
+    except IsADirectoryError:
+        remedy = "name the model file in it"
+        raise InputError("PTM-I241", "is a directory", file=model, remedy=remedy) from None
+    except (FileNotFoundError, NotADirectoryError, ValueError):  # also a NUL byte in the name
+        raise InputError("PTM-I240", "no such file", file=model) from None
     except OSError as error:
-        raise InputError("PTM-I256", error.strerror or str(error), file=model) from None
-    except ValueError as error:  # a NUL byte in the name
-        raise InputError("PTM-I240", f"no such file ({error})", file=model) from None
+        code = "PTM-I240" if error.errno == errno.EINVAL else "PTM-I256"  # EINVAL: no file
+        raise InputError(code, error.strerror or str(error), file=model) from None
 
 
 def _read(

@@ -56,7 +56,8 @@ _MARK = "\u00ef\u00bb\u00bf"
 
 @dataclass
 class _Statements:
-    """The statements of a file: flat arrays, and for names the line where each first stands."""
+    """The statements of a file: flat arrays, and of materials the number and the line where each
+    first stands."""
 
     points: array[float] = field(default_factory=lambda: array("d"))
     coords: array[float] = field(default_factory=lambda: array("d"))
@@ -67,8 +68,7 @@ class _Statements:
     face_object: array[int] = field(default_factory=lambda: array("q"))
     face_material: array[int] = field(default_factory=lambda: array("q"))
     objects: dict[str, int] = field(default_factory=dict)
-    materials: dict[str, int] = field(default_factory=dict)
-    material_line: list[int] = field(default_factory=list)
+    materials: dict[str, tuple[int, int]] = field(default_factory=dict)
     libraries: list[tuple[str, int]] = field(default_factory=list)
     unknown: dict[str, list[int]] = field(default_factory=dict)
 
@@ -237,7 +237,8 @@ def _read_statements(
                         name = "/".join(part for part in (object_name, group_name) if part)
                         object_index = said.objects.setdefault(name or path.stem, len(said.objects))
                     if material_index < 0:
-                        material_index = _material(said, "", number)
+                        unnamed = len(said.materials), number
+                        material_index, _ = said.materials.setdefault("", unnamed)
                     _face(said, words)
                     said.face_line.append(number)
                     said.face_object.append(object_index)
@@ -245,7 +246,8 @@ def _read_statements(
                     if len(said.corner_point) - 2 * len(said.face_line) > max_triangles:
                         raise too_many_triangles(max_triangles, path)
                 elif key == "usemtl":
-                    material_index = _material(said, _rest(line, "usemtl"), number)
+                    name, new = _rest(line, "usemtl"), (len(said.materials), number)
+                    material_index, _ = said.materials.setdefault(name, new)
                 elif key == "o":
                     object_name, group_name, object_index = _rest(line, "o"), "", -1
                 elif key == "g":
@@ -270,13 +272,6 @@ def _read_statements(
         )
     progress(size, size, "reading")
     return said
-
-
-def _material(said: _Statements, name: str, line: int) -> int:
-    index = said.materials.setdefault(name, len(said.materials))
-    if index == len(said.material_line):
-        said.material_line.append(line)
-    return index
 
 
 def _face(said: _Statements, words: list[str]) -> None:
@@ -332,7 +327,7 @@ def _materials(
     materials: list[SourceMaterial] = []
     maps: dict[int, MapStatement] = {}
     wanted = set(used.tolist())
-    for index, (name, line) in enumerate(zip(said.materials, said.material_line, strict=True)):
+    for name, (index, line) in said.materials.items():
         known = defined.get(name)
         if known is None:
             if name and index in wanted:

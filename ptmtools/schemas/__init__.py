@@ -95,9 +95,7 @@ def schema_text(name: str) -> str:
 def read(data: bytes, name: str) -> Any:
     """The document in ``data``, whose schema is ``name``.
 
-    Raises
-    ------
-    ShapeError: as `parse`, or it is not as the schema says.
+    Raises ShapeError: as `parse`, or it is not as the schema says.
     """
     document = parse(data)
     check(document, name)
@@ -107,9 +105,7 @@ def read(data: bytes, name: str) -> Any:
 def parse(data: bytes) -> Any:
     """The document in ``data``.
 
-    Raises
-    ------
-    ShapeError: not UTF-8, not JSON, or a name twice in an object.
+    Raises ShapeError: not UTF-8, not JSON, or a name twice in an object.
     """
     try:
         return json.loads(

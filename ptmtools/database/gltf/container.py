@@ -19,9 +19,7 @@ _AROUND = 34
 def pack(document: Mapping[str, Any], binary: bytes) -> bytes:
     """A GLB of a JSON document and the bytes of its only buffer, which may be empty.
 
-    Raises
-    ------
-    LimitError: PTM-L600 it is longer than a GLB can be, 4 GiB.
+    Raises LimitError: PTM-L600 it is longer than a GLB can be, 4 GiB.
     """
     text = json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode(
         "utf-8", "replace"
@@ -38,9 +36,7 @@ def pack(document: Mapping[str, Any], binary: bytes) -> bytes:
 def unpack(data: bytes) -> tuple[Any, bytes]:
     """The JSON document of a GLB and its bytes, padding included.
 
-    Raises
-    ------
-    FileError: PTM-D731 if it is not what `pack` writes.
+    Raises FileError: PTM-D731 if it is not what `pack` writes.
     """
     try:
         chunks = [(kind, body) for kind, _, body in glb_chunks(data)]

@@ -75,10 +75,8 @@ class ReadGlb:
 def read_glb(data: bytes) -> ReadGlb:
     """The cell of a GLB.
 
-    Raises
-    ------
-    FileError: PTM-D731 no GLB; PTM-D732 not in the emission pattern; PTM-D733 an accessor out of
-        its bytes; PTM-D734 indices; PTM-D735 numbers.
+    Raises FileError: PTM-D731 no GLB; PTM-D732 not in the emission pattern; PTM-D733 an accessor
+    out of its bytes; PTM-D734 indices; PTM-D735 numbers.
     """
     document, binary = unpack(data)
     try:

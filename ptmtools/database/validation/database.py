@@ -55,9 +55,7 @@ def validate_database(
     limits: files and textures that take more memory are not looked into (PTM-D713).
     workers: threads; 0 is one for each processor. The report is the same.
 
-    Raises
-    ------
-    DatabaseError: PTM-D605 if there is no such folder. All else stands in the report.
+    Raises DatabaseError: PTM-D605 if there is no such folder. All else stands in the report.
     """
     folder = Path(db)
     if not folder.is_dir():
@@ -74,9 +72,7 @@ def validate_database(
 def validate_ptm(path: str | os.PathLike[str], *, limits: Limits = _LIMITS) -> ValidationReport:
     """Checks a single `.ptm`.
 
-    Raises
-    ------
-    InputError: PTM-I602 if it cannot be read. All else stands in the report.
+    Raises InputError: PTM-I602 if it cannot be read. All else stands in the report.
     """
     file, found = Path(path), Findings()
     at = found.at(os.fspath(path))

@@ -48,9 +48,7 @@ def place_viewpoints(
     """The viewpoints of a database, the first the one to begin at, and notes on those that were
     left out.
 
-    Raises
-    ------
-    InputError: PTM-I600 if a viewpoint that the user gave lies in no cell.
+    Raises InputError: PTM-I600 if a viewpoint that the user gave lies in no cell.
     """
     ground = Ground(scene)
     walls = cache(partial(triangle_section, scene.corners[scene.opaque]))

@@ -25,7 +25,6 @@ light in the root file instead of a glow: X_ITE shows none.)
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from urllib.parse import quote
 
 import numpy as np
@@ -44,20 +43,10 @@ from ptmtools.scene.model import Material
 _GLOW = 0.25
 
 
-@dataclass(frozen=True)
-class CellText:
-    """A cell's file, and the (2, 3) float32 least and greatest corner of all that it holds."""
-
-    text: str
-    box: NDArray[np.float32]
-
-
 class CellWriter:
     """Writes the cells of one scene; what they share is prepared once.
 
-    Raises
-    ------
-    DatabaseError: PTM-D601 a number is not finite in float32; PTM-D603 a cell is flat.
+    Raises DatabaseError: PTM-D601 a number is not finite in float32; PTM-D603 a cell is flat.
     """
 
     def __init__(self, content: Content) -> None:
@@ -78,8 +67,8 @@ class CellWriter:
         ]
         self._hulls = [convex_hull(np.concatenate(leaves)) for leaves in self._leaves]
 
-    def cell(self, cell: int) -> CellText:
-        """The file of one cell."""
+    def cell(self, cell: int) -> tuple[str, NDArray[np.float32]]:
+        """The file of one cell, and the (2, 3) least and greatest corner of all that it holds."""
         g = self._geometry
         hull, triangles = self._hulls[cell]
         seen = np.arange(self._pvs.start[cell], self._pvs.start[cell + 1])
@@ -112,7 +101,7 @@ class CellWriter:
             parts.append(self._shape(shape, name, textures))
         used = g.point[g.shape_point[g.point_start[first] : g.point_start[last]]]
         held = np.concatenate([hull, used])
-        return CellText("".join(parts), np.stack([held.min(axis=0), held.max(axis=0)]))
+        return "".join(parts), np.stack([held.min(axis=0), held.max(axis=0)])
 
     def _cells(self, cells: NDArray[np.int32]) -> str:
         return listed([self._cell_url[c] for c in cells.tolist()], 8)

@@ -73,11 +73,9 @@ class Document:
 def parse(data: bytes) -> Document:
     """Reads a file.
 
-    Raises
-    ------
-    FileError: at the first thing that is not as in the emission pattern: PTM-D660 for bytes that
-        are not UTF-8, PTM-D662 for a number that is not finite, PTM-D663 for a node that lacks a
-        field, PTM-D661 for all else.
+    Raises FileError: at the first thing that is not as in the emission pattern: PTM-D660 for bytes
+    that are not UTF-8, PTM-D662 for a number that is not finite, PTM-D663 for a node that lacks a
+    field, PTM-D661 for all else.
     """
     try:
         text = data.decode("utf-8")
