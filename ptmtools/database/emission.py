@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -64,14 +65,17 @@ def emit(
     for name in owned:
         if name.endswith("/"):
             real_folder(folder, name[:-1])
-    files = (  # what leads to others comes when those are there
-        (name, data, name == emitter.entry)
-        for emitter, given in zip(emitters, written, strict=True)
-        for name, data in given
-    )
-    names, size = write_files(folder, files, force=force, gzip=options.gzip)
+    names: list[str] = []
+    size = 0
+    entries = {emitter.entry for emitter in emitters}
+    for given in written:
+        # What leads to others comes when those are there.
+        for _, files in groupby(given, lambda file: file[0] in entries):
+            for some, length in write_files(folder, files, force=force, gzip=options.gzip):
+                names += some
+                size += length
     return EmitReport(
-        files=names,
+        files=tuple(names),
         viewpoints=viewpoints,
         shapes=len(content.geometry.object),
         triangles=len(content.geometry.triangle),

@@ -106,18 +106,21 @@ def ingest(
         )
         uv = np.where(finite_uv[:, None, None], uv, 0.0)
 
-    used_material, triangle_material = _in_use(source.triangle_material[kept.source])
-    used_object, triangle_object = _in_use(source.triangle_object[kept.source])
+    used_material, triangle_material = np.unique(
+        source.triangle_material[kept.source], return_inverse=True
+    )
+    used_object, triangle_object = np.unique(
+        source.triangle_object[kept.source], return_inverse=True
+    )
     store = ImageStore(findings, folder, options.limit << 20)
     given = [source.materials[index].texture for index in used_material.tolist()]
     store.examine((texture for texture in given if texture is not None), workers, progress)
     materials = []
     grouped = np.argsort(triangle_material, kind="stable")
-    ends = np.cumsum(np.bincount(triangle_material))
+    faces = np.split(grouped, np.cumsum(np.bincount(triangle_material))[:-1])
     for done, index in enumerate(used_material.tolist()):
         progress(done, len(used_material), "materials")
-        faces = grouped[ends[done - 1] if done else 0 : ends[done]]
-        materials.append(_material(source, index, uv, faces, store, findings))
+        materials.append(_material(source, index, uv, faces[done], store, findings))
     progress(len(used_material), len(used_material), "materials")
     if options.strict:
         findings.enforce()
@@ -179,27 +182,20 @@ def _read(
 
 
 def _note_faces(kept: KeptFaces, source: Source, findings: Findings) -> None:
-    if kept.degenerate:
-        findings.miss("PTM-N209", "degenerate faces dropped", "", kept.degenerate)
-    if kept.not_finite:
-        findings.miss("PTM-N210", "faces with coordinates not finite dropped", "", kept.not_finite)
     dropped = np.flatnonzero((kept.also >= 0) & (kept.also != np.arange(len(kept.also))))
     material = source.triangle_material
     other = int((material[dropped] != material[kept.also[dropped]]).sum())
-    if len(dropped) - other:
-        findings.say("PTM-N211", "duplicate faces dropped", "", len(dropped) - other)
-    if other:
-        findings.say(
-            "PTM-N212", "duplicate faces of another material dropped, the first kept", "", other
-        )
-    pairs = int(kept.paired.sum()) // 2
-    if pairs:
-        findings.say(
-            "PTM-N213",
-            "pairs of coincident faces with opposite winding; each shows on its own side",
-            "",
-            pairs,
-        )
+    others = "duplicate faces of another material dropped, the first kept"
+    pairs = "pairs of coincident faces with opposite winding; each shows on its own side"
+    for tell, code, message, count in (
+        (findings.miss, "PTM-N209", "degenerate faces dropped", kept.degenerate),
+        (findings.miss, "PTM-N210", "faces with coordinates not finite dropped", kept.not_finite),
+        (findings.say, "PTM-N211", "duplicate faces dropped", len(dropped) - other),
+        (findings.say, "PTM-N212", others, other),
+        (findings.say, "PTM-N213", pairs, int(kept.paired.sum()) // 2),
+    ):
+        if count:
+            tell(code, message, "", count)
 
 
 def _two_sided(kept: KeptFaces, source: Source) -> NDArray[np.bool_]:
@@ -274,12 +270,6 @@ def _camera(camera: Camera, space: Space) -> Camera:
     position = _to_world(np.array([camera.position]), space)[0].tolist()
     direction = spaces.turned(np.array([camera.direction]), space.up)[0].tolist()
     return Camera(camera.name, tuple(position), tuple(direction), camera.field_of_view)
-
-
-def _in_use(index: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The distinct values in use, ascending, and for each entry its place among them."""
-    used, place = np.unique(index, return_inverse=True)
-    return used, place.reshape(-1)
 
 
 def _material(
