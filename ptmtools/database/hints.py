@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
@@ -62,7 +61,7 @@ def hints_text(content: Content, cell_url: Callable[[int], str], up: str) -> str
         {
             "name": cell_name(c),
             "url": cell_url(c),
-            "leaves": [_leaf(cells, leaf) for leaf in content.leaves[c]],
+            "leaves": [_leaf(cells, leaf) for leaf in cells.cell_leaves(c)],
             "textures": painted[c].tolist(),
             "adjacent": adjacent[c].tolist(),
             "visible": pvs.row(c).tolist(),
@@ -108,11 +107,10 @@ def _rows(rows: Sequence[object]) -> str:
 
 
 def _leaf(cells: Cells, leaf: int) -> dict[str, Any]:
-    faces = cells.face_start[cells.leaf_face_start[leaf] : cells.leaf_face_start[leaf + 1] + 1]
-    index = (cells.face_index[faces[0] : faces[-1]] - cells.leaf_point_start[leaf]).tolist()
+    first = cells.leaf_point_start[leaf]
     return {
         "points": cells.leaf_points(leaf).tolist(),
-        "faces": [index[a:b] for a, b in pairwise((faces - faces[0]).tolist())],
+        "faces": [(loop - first).tolist() for loop in cells.leaf_faces(leaf)],
     }
 
 
@@ -173,16 +171,9 @@ def level_row(level: Level) -> dict[str, int]:
     }
 
 
-def _viewpoint(v: Viewpoint) -> dict[str, Any]:
-    return {
-        "name": v.name,
-        "description": v.description,
-        "position": v.position,
-        "direction": v.direction,
-        "orientation": v.orientation,
-        "fieldOfView": v.field_of_view,
-        "cell": v.cell,
-    }
+def _viewpoint(viewpoint: Viewpoint) -> dict[str, Any]:
+    fields = vars(viewpoint).items()
+    return {"fieldOfView" if k == "field_of_view" else k: value for k, value in fields}
 
 
 def _texture(record: TextureRecord, fallback: bool, up: str) -> Mapping[str, Any]:

@@ -64,22 +64,16 @@ class VerifiedBytes:
     label: str
 
     def __call__(self) -> bytes:
+        data, fault = b"", ""
         try:
             data = self.read()
         except OSError as error:
-            raise InputError(
-                "PTM-I252",
-                f"cannot be read again ({error.strerror or error})",
-                file=self.label,
-                remedy="restore it, or build again",
-            ) from None
-        if hashlib.sha256(data).hexdigest() != self.sha256:
-            raise InputError(
-                "PTM-I252",
-                "has changed since the model was read",
-                file=self.label,
-                remedy="build again",
-            )
+            fault = f"cannot be read again ({error.strerror or error})"
+        if not fault and hashlib.sha256(data).hexdigest() != self.sha256:
+            fault = "has changed since the model was read"
+        if fault:
+            remedy = "restore it, or build again"
+            raise InputError("PTM-I252", fault, file=self.label, remedy=remedy)
         return data
 
 

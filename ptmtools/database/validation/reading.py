@@ -42,22 +42,22 @@ class FileReading:
     held: object | None = None
 
 
+@dataclass(frozen=True)
 class FileReader:
     """Reads the files of a database; from several threads, if need be.
 
-    Parameters
+    Attributes
     ----------
+    folder: of the database.
     outputs: what the stages wrote, relative to the database, with the hashes.
     served: what is served, relative to the served folder.
+    limits: larger files are only hashed.
     """
 
-    def __init__(
-        self, folder: Path, outputs: Mapping[str, str], served: Collection[str], limits: Limits
-    ) -> None:
-        self._folder = folder
-        self._outputs = outputs
-        self._served = served
-        self._limits = limits
+    folder: Path
+    outputs: Mapping[str, str]
+    served: Collection[str]
+    limits: Limits
 
     def read(self, name: str) -> FileReading:
         """A file, named relative to the database."""
@@ -66,7 +66,7 @@ class FileReader:
         served = name.startswith(f"{SERVED}/")
         if served and not self._is_served(name):
             # What is there and is no file has been found already.
-            if not os.path.lexists(self._folder / name):
+            if not os.path.lexists(self.folder / name):
                 at.add("PTM-D651", "missing")
             return reading
         try:
@@ -78,10 +78,10 @@ class FileReader:
             at.add("PTM-D654", f"cannot be read ({fault.strerror or fault})")
             return reading
         reading.size = size
-        reading.intact = self._outputs.get(name) == digest
-        if self._outputs and name not in self._outputs:
+        reading.intact = self.outputs.get(name) == digest
+        if self.outputs and name not in self.outputs:
             at.add("PTM-D653", "lies among our files, but no stage wrote it")
-        elif self._outputs.get(name, digest) != digest:
+        elif self.outputs.get(name, digest) != digest:
             at.add("PTM-D652", "not what its stage wrote: the hash differs")
         if data is None:
             reading.intact = False
@@ -93,9 +93,9 @@ class FileReader:
 
     def _content(self, name: str) -> tuple[int, bytes | None, str]:
         """Size, bytes if that is no more than the limit, and SHA-256 of a file."""
-        with open_regular(self._folder / name) as file:
+        with open_regular(self.folder / name) as file:
             size = os.fstat(file.fileno()).st_size
-            if size <= self._limits.decoded_bytes:
+            if size <= self.limits.decoded_bytes:
                 data = file.read(size)
                 return len(data), data, hashlib.sha256(data).hexdigest()
             digest = hashlib.sha256()
@@ -111,10 +111,10 @@ class FileReader:
         if suffix == GZIP:
             check_gzip(data, self._neighbour(stem), at)
         elif suffix == ".png" and not self._is_served(f"{stem}.ptm"):
-            read_png(data, self._limits, at)
+            read_png(data, self.limits, at)
         elif suffix == ".ptm":
             fallback = self._neighbour(f"{stem}.png")
-            reading.held = read_texture(data, digest, fallback, self._limits, at)
+            reading.held = read_texture(data, digest, fallback, self.limits, at)
             reading.intact &= reading.held is not None
         elif emitter := owner_of(path):
             try:
@@ -124,7 +124,7 @@ class FileReader:
             reading.intact &= reading.held is not None
 
     def _is_served(self, name: str) -> bool:
-        return name.removeprefix(f"{SERVED}/") in self._served
+        return name.removeprefix(f"{SERVED}/") in self.served
 
     def _neighbour(self, name: str) -> bytes | None:
         """The bytes of another served file, if it can be had."""
