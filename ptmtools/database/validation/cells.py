@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.database.validation.findings import Place
 from ptmtools.database.validation.lists import check_list, check_shares
-from ptmtools.database.validation.solids import MOST_CORNERS, SolidError, farthest, solid_planes
+from ptmtools.database.validation.solids import (
+    MOST_CORNERS,
+    Planes,
+    Points,
+    SolidError,
+    farthest,
+    solid_planes,
+)
 from ptmtools.database.vrml.hull import convex_hull
 from ptmtools.database.vrml.reader import Document, Node
 from ptmtools.errors import DatabaseError
@@ -82,13 +90,19 @@ def check_cell(
     """
     (node,) = document.of_type("PTMCell")
     own, here = at.file.rpartition("/")[2], at.at(f"line {node.line}")
-    body = _Body(node, cell, box, tolerance, here)
+    hull = _check_hull(node, cell, tolerance, here)
+    leaves = _check_leaves(node, cell, hull, tolerance, here)
+    body, bodies = _without_rim(hull, box, tolerance), None
     for shape in document.of_type("Shape"):
         there = at.at(f"line {shape.line}" + (f", {shape.name}" if shape.name else ""))
         _check_shape(shape, there)
-        far = body.outside(shape.at("geometry", "coord")["point"])
-        if far > tolerance.cluster:
-            there.add("PTM-D684", f"geometry lies {far:.3g} m outside of the hull")
+        points = shape.at("geometry", "coord")["point"]
+        far = farthest(body, points)
+        if (far > tolerance.cluster).any():  # seldom
+            bodies = _leaf_bodies(leaves, box, tolerance) if bodies is None else bodies
+            far = np.min([far, *(farthest(planes, points) for planes in bodies)], axis=0)
+        if (most := far.max(initial=0.0)) > tolerance.cluster:
+            there.add("PTM-D684", f"geometry lies {most:.3g} m outside of the hull")
     if f"{cell.name}.wrl" != own:
         here.add("PTM-D698", f"cellName is {cell.name!r}")
     check_list("adjacentUrl", own, cell.adjacent, here)
@@ -98,71 +112,54 @@ def check_cell(
     check_shares(cell.ach, ACH_SLACK, ("PTM-D692", "PTM-D693"), here)
 
 
-class _Body:
-    """The convex body of a cell, and if it has several, its leaves."""
+def _check_hull(node: Node, cell: ReadCell, tolerance: Tolerance, at: Place) -> Planes:
+    """The planes of the hull, none if it is not sound."""
+    triangles = _loops(node.fields["hullIndex"], len(cell.hull))
+    if triangles is None or len(triangles) < 4:
+        at.add("PTM-D683", "hullIndex is not a list of triangles over hullPoint")
+    else:
+        try:
+            return solid_planes(cell.hull, triangles.tolist(), tolerance)
+        except SolidError as fault:
+            at.add("PTM-D683", f"the hull {fault}")
+    return np.zeros((0, 4))
 
-    def __init__(
-        self,
-        node: Node,
-        cell: ReadCell,
-        box: NDArray[np.float64],
-        tolerance: Tolerance,
-        at: Place,
-    ) -> None:
-        """Says what is wrong with them."""
-        self._box, self._tolerance = box, tolerance
-        self._leaves = cell.leaves
-        hull = np.zeros((0, 4))
-        triangles = _loops(node.fields["hullIndex"], len(cell.hull))
-        if triangles is None or len(triangles) < 4:
-            at.add("PTM-D683", "hullIndex is not a list of triangles over hullPoint")
-        else:
-            try:
-                hull = solid_planes(cell.hull, triangles.tolist(), tolerance)
-            except SolidError as fault:
-                at.add("PTM-D683", f"the hull {fault}")
-        self._hull = self._without_rim(hull)
-        if cell.leaves:
-            sizes, given = [len(leaf) for leaf in cell.leaves], node.fields["leafStart"]
-            cut = len(given) > 1 and np.array_equal(given, np.cumsum([0, *sizes[:-1]]))
-            if not cut or min(sizes) < 4 or max(sizes) > MOST_CORNERS:
-                at.add("PTM-D685", "leafStart does not cut leafPoint into leaves")
-                self._leaves = ()
-            far = farthest(hull, node.fields["leafPoint"]).max(initial=0.0)
-            if far > tolerance.cluster:
-                at.add("PTM-D684", f"a leaf lies {far:.3g} m outside of the hull")
 
-    def outside(self, points: NDArray[np.float64]) -> float:
-        """How far the farthest of (n, 3) points lies outside, metres; 0 if none does."""
-        far = farthest(self._hull, points)
-        if not (far > self._tolerance.cluster).any():
-            return 0.0
-        for planes in self._leaf_planes:
-            far = np.minimum(far, farthest(planes, points))
-        return float(far.max(initial=0.0))
+def _check_leaves(
+    node: Node, cell: ReadCell, hull: Planes, tolerance: Tolerance, at: Place
+) -> tuple[Points, ...]:
+    """The points of the leaves, if the cell has several that are sound."""
+    if not cell.leaves:
+        return ()
+    far = farthest(hull, node.fields["leafPoint"]).max(initial=0.0)
+    if far > tolerance.cluster:
+        at.add("PTM-D684", f"a leaf lies {far:.3g} m outside of the hull")
+    sizes, start = [len(leaf) for leaf in cell.leaves], node.fields["leafStart"]
+    cut = len(start) > 1 and np.array_equal(start, np.cumsum([0, *sizes[:-1]]))
+    if cut and min(sizes) >= 4 and max(sizes) <= MOST_CORNERS:
+        return cell.leaves
+    at.add("PTM-D685", "leafStart does not cut leafPoint into leaves")
+    return ()
 
-    @cached_property
-    def _leaf_planes(self) -> list[NDArray[np.float64]]:
-        """Of each leaf that is not flat. Most cells have nothing outside of their hulls, and never
-        ask."""
-        bodies = []
-        for leaf in self._leaves:
-            try:
-                points, triangles = convex_hull(leaf.astype(np.float32))
-                planes = solid_planes(
-                    points.astype(np.float64), triangles.tolist(), self._tolerance
-                )
-            except (DatabaseError, SolidError):
-                continue
-            bodies.append(self._without_rim(planes))
-        return bodies
 
-    def _without_rim(self, planes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Planes, but for those of the faces of the box."""
-        box, tolerance = self._box, self._tolerance
-        faces = np.concatenate([-planes[:, 3:] - box[1], -planes[:, 3:] + box[0]], axis=1)
-        outwards = np.concatenate([planes[:, :3], -planes[:, :3]], axis=1) >= tolerance.cosine
-        return planes[~(outwards & (abs(faces) <= tolerance.plane)).any(axis=1)]
+def _leaf_bodies(
+    leaves: Iterable[Points], box: NDArray[np.float64], tolerance: Tolerance
+) -> list[Planes]:
+    """The planes of each leaf that is not flat."""
+    bodies = []
+    for leaf in leaves:
+        with suppress(DatabaseError, SolidError):
+            points, triangles = convex_hull(leaf.astype(np.float32))
+            planes = solid_planes(points.astype(np.float64), triangles.tolist(), tolerance)
+            bodies.append(_without_rim(planes, box, tolerance))
+    return bodies
+
+
+def _without_rim(planes: Planes, box: NDArray[np.float64], tolerance: Tolerance) -> Planes:
+    """Planes, but for those of the faces of the box."""
+    faces = np.concatenate([-planes[:, 3:] - box[1], -planes[:, 3:] + box[0]], axis=1)
+    outwards = np.concatenate([planes[:, :3], -planes[:, :3]], axis=1) >= tolerance.cosine
+    return planes[~(outwards & (abs(faces) <= tolerance.plane)).any(axis=1)]
 
 
 def _loops(index: NDArray[np.int64], points: int) -> NDArray[np.int64] | None:
