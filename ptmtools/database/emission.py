@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
 
@@ -53,7 +53,7 @@ def emit(
     LimitError: PTM-L600 a cell is longer than a GLB can be.
     """
     folder = Path(out)
-    _check(scene, cells, pvs, ach, {t.image: t for t in textures})
+    _check(scene, cells, pvs, ach, textures)
     emitters = chosen_emitters(options.format)
     owned = [name for emitter in emitters for name in emitter.owns]
     for name in owned:
@@ -86,33 +86,31 @@ def emit(
 
 
 def _check(
-    scene: Scene, cells: Cells, pvs: Pvs, ach: Ach, textures: Mapping[int, TextureRecord]
+    scene: Scene, cells: Cells, pvs: Pvs, ach: Ach, textures: Iterable[TextureRecord]
 ) -> None:
     if cells.cell_count == 0:
         raise DatabaseError(
             "PTM-D600", "there are no cells", remedy="subdivide a model that has rooms"
         )
-    rows = {"pvs": pvs.start, "ach": ach.start}
-    for stage, start in rows.items():
-        if len(start) != cells.cell_count + 1:
-            raise _strangers(f"{stage} has {len(start) - 1} cells, not {cells.cell_count}")
-    if not np.array_equal(pvs.start, ach.start) or len(ach.value) != len(pvs.cell):
-        raise _strangers("pvs and ach have rows of different lengths")
-    source = np.unique(cells.triangle_source)
+    count, source = cells.cell_count, np.unique(cells.triangle_source)
+    fault = ""
     if len(source) and source[-1] >= len(scene.triangles):
-        raise _strangers("the cells hold pieces of triangles that the scene lacks")
+        fault = "the cells hold pieces of triangles that the scene lacks"
+    elif not len(pvs.start) == len(ach.start) == count + 1:
+        rows = f"{len(pvs.start) - 1} and {len(ach.start) - 1}"
+        fault = f"pvs and ach have {rows} cells, not {count}"
+    elif not np.array_equal(pvs.start, ach.start) or len(ach.value) != len(pvs.cell):
+        fault = "pvs and ach have rows of different lengths"
+    if fault:
+        raise DatabaseError(
+            "PTM-D604",
+            f"the stages do not belong together: {fault}",
+            remedy="run the stages again, from `cells` on",
+        )
     used = {scene.materials[m].image for m in np.unique(scene.triangle_material[source]).tolist()}
-    for image in sorted(used - {-1} - set(textures)):
+    for image in sorted(used - {-1} - {texture.image for texture in textures}):
         raise DatabaseError(
             "PTM-D602",
             f"the texture {scene.images[image].name!r} was not encoded",
             remedy="run the stage `textures` again",
         )
-
-
-def _strangers(what: str) -> DatabaseError:
-    return DatabaseError(
-        "PTM-D604",
-        f"the stages do not belong together: {what}",
-        remedy="run the stages again, from `cells` on",
-    )

@@ -2,19 +2,8 @@
 
 A reader turns the file into triangles as the model has them (`obj`, `gltf`, `formats`); faces are
 then cleaned, the space is settled, and of the materials and images those are kept that some
-remaining face uses. What was guessed, dropped or missed stands in the notes.
-
-Notes: N201 unit guessed, N202 up axis guessed, N203 library of materials missing, N204 texture
-missing, N205 a file outside the model's folder, N206 image unreadable, N207 unknown material,
-N208 file found in another folder than named, N209 degenerate faces dropped, N210 faces with
-coordinates that are not finite dropped, N211 and N212 duplicates dropped (of the same material,
-of another), N213 coincident faces of opposite winding, N214 statement not understood, N215
-texture option ignored, N216 scale and offset baked, N217 mask not carried over, N218 material
-defined twice, N219 statements skipped, N220 faces of fewer than three corners, N221 polygons
-that cross themselves, N222 mirrored wrap, N223 vertex colours, N224 glTF feature not carried
-over, N225 camera skipped, N226 colour factor converted to sRGB, N227 size implausible, N228
-texture coordinates not finite, N229 textured faces without texture coordinates, N230 read
-through another library, N231 material that cannot be seen.
+remaining face uses. What was guessed, dropped or missed stands in the notes, whose codes are in
+docs/cli.md.
 """
 
 from __future__ import annotations

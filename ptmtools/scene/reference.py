@@ -28,11 +28,6 @@ def _fold(name: str) -> str:
     return unicodedata.normalize("NFC", name).casefold()
 
 
-def _unwritable(name: str) -> bool:
-    """Whether it is no text: half a character of UTF-16, which JSON may hold."""
-    return any("\ud800" <= letter <= "\udfff" for letter in name)
-
-
 @dataclass(frozen=True)
 class Reference:
     """The result of a search: a path unless it is "outside" or "missing"; "elsewhere" means that
@@ -75,7 +70,8 @@ class Folder:
         return self._known[reference, base]
 
     def _find(self, reference: str, base: Path) -> Reference:
-        if len(reference) > _LONGEST or _unwritable(reference):
+        halves = any("\ud800" <= letter <= "\udfff" for letter in reference)  # of UTF-16, in JSON
+        if len(reference) > _LONGEST or halves:
             return Reference("missing")
         bases = [base, *(folder for folder in self._roots if folder != base)]
         name = reference.strip(" \t\r\n")
