@@ -32,6 +32,8 @@ _HARMLESS = {
     "KHR_mesh_quantization",
     "KHR_texture_transform",
 }
+#: What is raised where a document is malformed: one this deep has no end of ways to be that.
+_FAULTS = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
 _TRIANGLES, _STRIP = 4, 5
 #: So many vertices may there be for each triangle that is allowed.
 _VERTICES_A_TRIANGLE = 10
@@ -58,16 +60,7 @@ def read_gltf(
     """
     try:
         return _read(path, open_document(path, folder), folder, findings, max_triangles)
-    except (
-        RecursionError,
-        LookupError,
-        TypeError,
-        ValueError,
-        AttributeError,
-        ArithmeticError,
-        AssertionError,
-    ) as error:
-        # A document this deep has no end of ways to be malformed.
+    except _FAULTS as error:
         what = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) else str(error)
         raise damaged(path, what.splitlines()[0] if what else type(error).__name__) from None
 

@@ -215,28 +215,25 @@ def _settle_space(
         side = high - low
     if not np.isfinite(side).all():
         raise LimitError("PTM-L201", "coordinates are too large for float64", file=model)
-    up_guessed = unit_guessed = False
-    if up is None:
-        up = source.up
-    if up is None:
+    known_up = up or source.up
+    if known_up is None:
         up, why = spaces.guess_up(kept.points[kept.triangles])
-        up_guessed = True
         findings.say("PTM-N202", f"up axis guessed: {up} ({why}); give --up to override")
+    else:
+        up = known_up
     width, height = (max(side[0], side[2]), side[1]) if up == "y" else (max(side[:2]), side[2])
     guess, why = spaces.guess_unit(float(width), float(height))
-    if metres is None and source.metres is None:
-        metres, unit_guessed = spaces.UNITS[guess], True
+    known = source.metres if metres is None else metres
+    if known is None:
         findings.say("PTM-N201", f"unit guessed: {guess} ({why}); give --unit to override")
-    elif metres is None:
-        metres = source.metres
-        assert metres is not None
-        if spaces.UNITS[guess] != metres:
-            findings.say(
-                "PTM-N227",
-                f"the format is in metres, but {guess} would be more likely ({why}); "
-                "give --unit to override",
-            )
-    extent = float(side.max()) * metres
+    elif metres is None and spaces.UNITS[guess] != known:
+        findings.say(
+            "PTM-N227",
+            f"the format is in metres, but {guess} would be more likely ({why}); "
+            "give --unit to override",
+        )
+    scale = spaces.UNITS[guess] if known is None else known
+    extent = float(side.max()) * scale
     if not SMALLEST_EXTENT <= extent <= LARGEST_EXTENT:
         raise LimitError(
             "PTM-L201",
@@ -248,7 +245,7 @@ def _settle_space(
     floor = 1 if up == "y" else 2
     origin[floor] = low[floor]
     x, y, z = origin.tolist()
-    return Space((x, y, z), metres, up, unit_guessed, up_guessed)
+    return Space((x, y, z), scale, up, unit_guessed=known is None, up_guessed=known_up is None)
 
 
 def _to_world(points: NDArray[np.float64], space: Space) -> NDArray[np.float64]:
