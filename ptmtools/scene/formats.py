@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
 from ptmtools.scene.meshlab import convert
-from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import (
     MAX_VERTICES,
     Findings,
@@ -32,9 +31,7 @@ SUPPORTED = (".obj", ".glb", ".gltf", *TRIMESH, *MESHLAB)
 _HEADER = 1 << 14
 
 
-def read_other(
-    path: Path, folder: Folder, findings: Findings, max_triangles: int = MAX_VERTICES
-) -> Source:
+def read_other(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) -> Source:
     """Read a file that is neither OBJ nor glTF, by its suffix.
 
     Raises InputError for unknown suffixes and for what no library can read, LimitError PTM-L203 for
@@ -50,7 +47,7 @@ def read_other(
             remedy=f"give one of {' '.join(SUPPORTED)}",
         )
     if suffix not in TRIMESH or (suffix == ".ply" and _textured_ply(path)):
-        return _read_meshlab(path, folder, findings, max_triangles)
+        return _read_meshlab(path, findings, max_triangles)
     try:
         source = _read_trimesh(path, findings)
     except InputError:
@@ -60,7 +57,7 @@ def read_other(
             raise InputError(
                 "PTM-I254", f"is damaged ({error})", file=path, remedy="export it again"
             ) from None
-        source = _read_meshlab(path, folder, findings, max_triangles)
+        source = _read_meshlab(path, findings, max_triangles)
         findings.say(
             "PTM-N230", f"read through pymeshlab, as trimesh gave up ({type(error).__name__})"
         )
@@ -105,15 +102,14 @@ def _read_trimesh(path: Path, findings: Findings) -> Source:
     return replace(joined, materials=joined.materials[:1], triangle_material=material)
 
 
-def _read_meshlab(path: Path, folder: Folder, findings: Findings, max_triangles: int) -> Source:
+def _read_meshlab(path: Path, findings: Findings, max_triangles: int) -> Source:
     from ptmtools.scene.obj import read_obj
 
     parts = []
     with tempfile.TemporaryDirectory() as scratch:
-        near = Folder(folder.root, folder.allow_outside, also=Path(scratch))
-        near.sought = folder.sought
+        findings.folder.admit(Path(scratch))
         for converted, label in convert(path, Path(scratch)):
-            part = read_obj(converted, near, findings, max_triangles=max_triangles)
+            part = read_obj(converted, findings, max_triangles=max_triangles)
             parts.append(replace(part, objects=(label or path.stem,)))
     return _joined(path, parts)
 

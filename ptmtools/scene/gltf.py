@@ -22,7 +22,6 @@ from ptmtools.glb import natural
 from ptmtools.scene.gltf_document import Document, damaged, open_document
 from ptmtools.scene.gltf_material import MaterialReader, Painted
 from ptmtools.scene.model import Camera
-from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import MAX_VERTICES, Findings, Source, too_many_triangles
 
 #: Required extensions that change nothing that is read here, or that are read.
@@ -49,9 +48,7 @@ class _Draw:
     place: str
 
 
-def read_gltf(
-    path: Path, folder: Folder, findings: Findings, max_triangles: int = MAX_VERTICES
-) -> Source:
+def read_gltf(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) -> Source:
     """Read a glTF model.
 
     Raises InputError where it is damaged or needs what is not supported; LimitError for more
@@ -59,15 +56,13 @@ def read_gltf(
     often as a node shows it, before anything is made of them.
     """
     try:
-        return _read(path, open_document(path, folder), folder, findings, max_triangles)
+        return _read(path, open_document(path, findings.folder), findings, max_triangles)
     except _FAULTS as error:
         what = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) else str(error)
         raise damaged(path, what.splitlines()[0] if what else type(error).__name__) from None
 
 
-def _read(
-    path: Path, document: Document, folder: Folder, findings: Findings, max_triangles: int
-) -> Source:
+def _read(path: Path, document: Document, findings: Findings, max_triangles: int) -> Source:
     tree = document.tree
     unsupported = sorted(
         name
@@ -80,7 +75,7 @@ def _read(
     draws = _draws(path, tree, world_of, findings, max_triangles)
     if not draws:
         raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with triangles")
-    painter = MaterialReader(path, document, folder, findings)
+    painter = MaterialReader(path, document, findings)
     painted = [painter.read(draw.primitive.get("material")) for draw in draws]
     points: list[NDArray[np.float64]] = []
     triangles: list[NDArray[np.int64]] = []

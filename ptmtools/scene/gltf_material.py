@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from ptmtools.scene.gltf_document import Document, data_uri
 from ptmtools.scene.model import Wrap
-from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import FileRange, Findings, HeldBytes, SourceMaterial, Texture
 
 _CLAMP, _MIRROR = 33071, 33648
@@ -42,10 +41,9 @@ class Painted:
 class MaterialReader:
     """Reads each material once, when a primitive first asks for it."""
 
-    def __init__(self, path: Path, document: Document, folder: Folder, findings: Findings) -> None:
+    def __init__(self, path: Path, document: Document, findings: Findings) -> None:
         self._path = path
         self._document = document
-        self._folder = folder
         self._findings = findings
         self._painted: dict[int | None, Painted] = {}
         self._materials: list[SourceMaterial] = []
@@ -124,7 +122,7 @@ class MaterialReader:
             read = HeldBytes(data_uri(self._path, uri, f"image {source}"))
         else:
             what = unquote(str(uri))
-            file = self._findings.locate(self._folder, what, what, place)
+            file = self._findings.locate(what, what, place)
             if file is None:
                 return None
             read, label = FileRange(file), file.name

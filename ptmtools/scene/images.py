@@ -29,7 +29,6 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError, LimitError, naming
 from ptmtools.progress import Progress
 from ptmtools.scene.model import SourceImage
-from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import FileRange, Findings, Texture
 from ptmtools.texture.images.declared import check_bytes
 from ptmtools.texture.images.picture import check_size
@@ -101,13 +100,11 @@ class _Examined:
 class ImageStore:
     """Images by digest, in the order in which they were first asked for.
 
-    ``folder`` is the model's, where files may have been found; ``limit`` the most bytes that the
-    texels of an image may take, at four for each.
+    ``limit`` is the most bytes that the texels of an image may take, at four for each.
     """
 
-    def __init__(self, findings: Findings, folder: Folder, limit: int) -> None:
+    def __init__(self, findings: Findings, limit: int) -> None:
         self._findings = findings
-        self._folder = folder
         self._limit = limit
         self._examined: dict[tuple[Callable[[], bytes], str | None], _Examined] = {}
         self._index: dict[str, int] = {}
@@ -155,11 +152,11 @@ class ImageStore:
 
     def _whole_file(self, texture: Texture) -> str | None:
         """The file that an image is all of, relative to the model's folder."""
-        read = texture.read
+        read, folder = texture.read, self._findings.folder
         if not isinstance(read, FileRange) or read.offset or read.length is not None:
             return None
-        name = Path(os.path.relpath(read.path, self._folder.root)).as_posix()
-        return name if name in self._folder.sought else None
+        name = Path(os.path.relpath(read.path, folder.root)).as_posix()
+        return name if name in folder.sought else None
 
     def mask_holes(self, mask: Texture) -> NDArray[np.bool_] | None:
         """(H, W) which texels of a mask (``map_d``) are not opaque; all, if it is unreadable."""

@@ -25,7 +25,6 @@ from ptmtools.scene.images import ImageStore
 from ptmtools.scene.model import Camera, Material, Scene, Space
 from ptmtools.scene.options import IngestOptions
 from ptmtools.scene.orientation import tolerance_of
-from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import MAX_VERTICES, Findings, Source
 from ptmtools.scene.texels import uses_holes
 
@@ -68,9 +67,8 @@ def ingest(
     model = Path(path)
     metres = None if options.unit is None else spaces.parse_unit(options.unit)
     check_file(model)
-    findings = Findings(model)
-    folder = Folder(model.absolute().parent, options.allow_outside)
-    source = _read(model, folder, findings, progress, options.max_triangles)
+    findings = Findings(model, options.allow_outside)
+    source = _read(model, findings, progress, options.max_triangles)
     if len(source.points) > MAX_VERTICES or len(source.triangles) > MAX_VERTICES:
         raise LimitError("PTM-L200", f"more than {MAX_VERTICES} vertices or faces", file=model)
 
@@ -101,7 +99,7 @@ def ingest(
     used_object, triangle_object = np.unique(
         source.triangle_object[kept.source], return_inverse=True
     )
-    store = ImageStore(findings, folder, options.limit << 20)
+    store = ImageStore(findings, options.limit << 20)
     given = [source.materials[index].texture for index in used_material.tolist()]
     store.examine((texture for texture in given if texture is not None), workers, progress)
     materials = []
@@ -128,7 +126,7 @@ def ingest(
         cameras=tuple(_camera(camera, space) for camera in source.cameras),
         space=space,
         notes=findings.notes,
-        files=tuple(folder.sought),
+        files=tuple(findings.folder.sought),
     )
 
 
@@ -148,22 +146,20 @@ def check_file(model: Path) -> None:
         raise InputError(code, error.strerror or str(error), file=model) from None
 
 
-def _read(
-    model: Path, folder: Folder, findings: Findings, progress: Progress, max_triangles: int
-) -> Source:
+def _read(model: Path, findings: Findings, progress: Progress, max_triangles: int) -> Source:
     suffix = model.suffix.lower()
     try:
         if suffix == ".obj":
             from ptmtools.scene.obj import read_obj
 
-            return read_obj(model, folder, findings, progress, max_triangles)
+            return read_obj(model, findings, progress, max_triangles)
         if suffix in (".glb", ".gltf"):
             from ptmtools.scene.gltf import read_gltf
 
-            return read_gltf(model, folder, findings, max_triangles)
+            return read_gltf(model, findings, max_triangles)
         from ptmtools.scene.formats import read_other
 
-        return read_other(model, folder, findings, max_triangles)
+        return read_other(model, findings, max_triangles)
     except OSError as error:
         raise InputError(
             "PTM-I256", error.strerror or str(error), file=error.filename or model

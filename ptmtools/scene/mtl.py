@@ -117,10 +117,10 @@ class MtlMaterial:
     map_d: MapStatement | None = None
 
 
-def read_mtl(path: Path, label: str, findings: Findings) -> dict[str, MtlMaterial]:
+def read_mtl(path: Path, findings: Findings) -> dict[str, MtlMaterial]:
     """Materials by name, in the order of the file; of two with one name the first is kept.
 
-    ``label`` names the file in notes. A line that cannot be understood is a miss. Raises LimitError
+    A line that cannot be understood is a miss. Raises LimitError
     PTM-L204 for a library larger than `LARGEST`, and OSError.
     """
     with open_regular(path) as stream:
@@ -132,6 +132,7 @@ def read_mtl(path: Path, label: str, findings: Findings) -> dict[str, MtlMateria
                 remedy="remove the materials that are not used",
             )
         data = stream.read()
+    label = findings.folder.label(path)
     materials: dict[str, MtlMaterial] = {}
     current: MtlMaterial | None = None
     for index, line in enumerate(re.split(r"\r\n|\n|\r", decode(data)), start=1):

@@ -26,7 +26,6 @@ from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Wrap
 from ptmtools.scene.mtl import MapStatement, MtlMaterial, read_mtl
 from ptmtools.scene.polygon import triangulate
-from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import (
     MAX_VERTICES,
     FileRange,
@@ -75,7 +74,6 @@ class _Statements:
 
 def read_obj(
     path: Path,
-    folder: Folder,
     findings: Findings,
     progress: Progress = silent,
     max_triangles: int = MAX_VERTICES,
@@ -132,7 +130,7 @@ def read_obj(
     uv = np.zeros((len(coord), 3, 2))
     uv[coord >= 0] = coords[coord[coord >= 0]]
     face_material = np.frombuffer(said.face_material, dtype=np.int64)
-    materials, maps = _materials(path, said, folder, findings, np.unique(face_material))
+    materials, maps = _materials(path, said, findings, np.unique(face_material))
     triangle_material = face_material[cut.polygon]
     grouped = np.argsort(triangle_material, kind="stable")
     ends = np.cumsum(np.bincount(triangle_material, minlength=len(materials)))
@@ -305,11 +303,7 @@ def _library_names(text: str) -> list[str]:
 
 
 def _materials(
-    path: Path,
-    said: _Statements,
-    folder: Folder,
-    findings: Findings,
-    used: NDArray[np.int64],
+    path: Path, said: _Statements, findings: Findings, used: NDArray[np.int64]
 ) -> tuple[tuple[SourceMaterial, ...], dict[int, MapStatement]]:
     """All materials, and the map_Kd of those that have one."""
     defined: dict[str, MtlMaterial] = {}
@@ -317,11 +311,11 @@ def _materials(
     for text, line in said.libraries:
         place = f"{path.name}:{line}"
         for name in _library_names(text):
-            file = findings.locate(folder, name, f"mtllib {name}", place, "PTM-N203")
+            file = findings.locate(name, f"mtllib {name}", place, "PTM-N203")
             if file is None or (real := file.resolve()) in read:
                 continue
             read.add(real)
-            for key, material in read_mtl(file, folder.label(file), findings).items():
+            for key, material in read_mtl(file, findings).items():
                 defined.setdefault(key, material)
 
     materials: list[SourceMaterial] = []
@@ -336,8 +330,8 @@ def _materials(
             continue
         texture = mask = None
         if index in wanted:
-            texture = _texture(known, "map_Kd", known.map_kd, folder, findings)
-            mask = _texture(known, "map_d", known.map_d, folder, findings)
+            texture = _texture(known, "map_Kd", known.map_kd, findings)
+            mask = _texture(known, "map_d", known.map_d, findings)
         if texture is not None and known.map_kd is not None:
             maps[index] = known.map_kd
         materials.append(
@@ -355,17 +349,13 @@ def _materials(
 
 
 def _texture(
-    material: MtlMaterial,
-    key: str,
-    statement: MapStatement | None,
-    folder: Folder,
-    findings: Findings,
+    material: MtlMaterial, key: str, statement: MapStatement | None, findings: Findings
 ) -> Texture | None:
     if statement is None:
         return None
-    place = f"{folder.label(material.library)}:{statement.line}"
+    place = f"{findings.folder.label(material.library)}:{statement.line}"
     what = f"{key} {statement.file}"
-    file = findings.locate(folder, statement.file, what, place, base=material.library.parent)
+    file = findings.locate(statement.file, what, place, base=material.library.parent)
     if file is None:
         return None
     if statement.ignored:
