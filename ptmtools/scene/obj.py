@@ -11,6 +11,7 @@ and points are skipped and counted.
 
 from __future__ import annotations
 
+import re
 from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -46,6 +47,8 @@ _SILENT = frozenset({
 # fmt: on
 #: Statements that would draw something that is not a surface of triangles.
 _NOT_DRAWN = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "surf": "surfaces"}
+#: The next file of a mtllib statement, which ends as such files do, or all that is left.
+_LIBRARIES = re.compile(r".*?\.mtl[\"']*(?: |$)|.+", re.IGNORECASE)
 _LINES_A_TICK = 1 << 16
 #: Longest line, with those that a backslash joins to it, in characters.
 LONGEST_LINE = 1 << 24
@@ -132,10 +135,10 @@ def read_obj(
     face_material = np.frombuffer(said.face_material, dtype=np.int64)
     materials, maps = _materials(path, said, findings, np.unique(face_material))
     triangle_material = face_material[cut.polygon]
-    grouped = np.argsort(triangle_material, kind="stable")
     ends = np.cumsum(np.bincount(triangle_material, minlength=len(materials)))
+    grouped = np.split(np.argsort(triangle_material, kind="stable"), ends[:-1])
     for index, statement in maps.items():
-        which = grouped[ends[index - 1] if index else 0 : ends[index]]
+        which = grouped[index]
         uv[which] = uv[which] * statement.scale + statement.offset
         bare = np.unique(cut.polygon[which[(coord[which] < 0).any(axis=1)]])
         if len(bare):
@@ -291,15 +294,7 @@ def _face(said: _Statements, words: list[str]) -> None:
 
 def _library_names(text: str) -> list[str]:
     """The files of a mtllib statement: several, divided by blanks that names may contain too."""
-    names: list[str] = []
-    pending: list[str] = []
-    for word in text.split(" "):
-        pending.append(word)
-        if word.lower().rstrip("\"'").endswith(".mtl"):
-            names.append(" ".join(pending).strip())
-            pending = []
-    rest = " ".join(pending).strip()
-    return [*names, rest] if rest else names
+    return [name.strip() for name in _LIBRARIES.findall(text) if name.strip()]
 
 
 def _materials(
