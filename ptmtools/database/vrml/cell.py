@@ -24,7 +24,6 @@ light in the root file instead of a glow: X_ITE shows none.)
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from urllib.parse import quote
 
 import numpy as np
@@ -85,20 +84,17 @@ class CellWriter:
             start = np.cumsum([0, *map(len, leaves[:-1])])
             lists["leafPoint"] = _points(np.concatenate(leaves))
             lists["leafStart"] = listed([str(i) for i in start.tolist()], 16)
-        parts = [
-            HEADER,
-            declaration(*(CELL if len(leaves) == 1 else CELL_OF_LEAVES)),
-            "PTMCell {\n",
-        ]
+        proto = CELL if len(leaves) == 1 else CELL_OF_LEAVES
+        parts = [HEADER, declaration(*proto), "PTMCell {\n"]
         parts += [f"  {name:<11} {text}\n" for name, text in lists.items()]
         parts.append("}\n")
 
         names = DefNames(f"C{cell}")
         first, last = g.cell_start[cell : cell + 2].tolist()
         taken = [names.take(self._objects[i]) for i in g.object[first:last].tolist()]
-        textures = _Textures(self._urls, names)
+        textures: dict[tuple[int, str, str], str] = {}
         for shape, name in zip(range(first, last), taken, strict=True):
-            parts.append(self._shape(shape, name, textures))
+            parts.append(self._shape(shape, name, names, textures))
         used = g.point[g.shape_point[g.point_start[first] : g.point_start[last]]]
         held = np.concatenate([hull, used])
         return "".join(parts), np.stack([held.min(axis=0), held.max(axis=0)])
@@ -106,13 +102,15 @@ class CellWriter:
     def _cells(self, cells: NDArray[np.int32]) -> str:
         return listed([self._cell_url[c] for c in cells.tolist()], 8)
 
-    def _shape(self, shape: int, name: str, textures: _Textures) -> str:
+    def _shape(
+        self, shape: int, name: str, names: DefNames, textures: dict[tuple[int, str, str], str]
+    ) -> str:
         s = self._geometry.shape(shape)
         material = self._materials[s.material]
         parts = [
             f"DEF {name} Shape {{\n  appearance Appearance {{\n",
             _surface(material),
-            textures.of(material),
+            self._texture(material, names, textures),
             "  }\n  geometry IndexedFaceSet {\n",
             "    solid FALSE\n" if s.two_sided else "",
             f"    coord Coordinate {{ point {chosen(self._point, s.point)} }}\n",
@@ -129,24 +127,17 @@ class CellWriter:
         parts.append("  }\n}\n")
         return "".join(parts)
 
-
-class _Textures:
-    """The ImageTexture nodes of one file, each written once and then named: some browsers make a
-    texture of every node, whatever its file."""
-
-    def __init__(self, urls: Mapping[int, str], names: DefNames) -> None:
-        self._urls = urls
-        self._names = names
-        self._written: dict[tuple[int, str, str], str] = {}
-
-    def of(self, material: Material) -> str:
-        """The field of an Appearance; "" where there is no texture."""
+    def _texture(
+        self, material: Material, names: DefNames, written: dict[tuple[int, str, str], str]
+    ) -> str:
+        """The texture of an Appearance; "" where there is none. Each is ``written`` once in a file
+        and then named: some browsers make a texture of every node, whatever its file."""
         if material.image < 0:
             return ""
         key = material.image, material.wrap_s, material.wrap_t
-        if key in self._written:
-            return f"    texture USE {self._written[key]}\n"
-        name = self._written[key] = self._names.take("texture")
+        if key in written:
+            return f"    texture USE {written[key]}\n"
+        name = written[key] = names.take("texture")
         wrap = " repeatS FALSE" if material.wrap_s == "clamp" else ""
         wrap += " repeatT FALSE" if material.wrap_t == "clamp" else ""
         return f"    texture DEF {name} ImageTexture {{ {self._urls[material.image]}{wrap} }}\n"
