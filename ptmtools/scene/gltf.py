@@ -56,14 +56,14 @@ def read_gltf(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES)
     often as a node shows it, before anything is made of them.
     """
     try:
-        return _read(path, open_document(path, findings.folder), findings, max_triangles)
+        return _read(open_document(path, findings.folder), findings, max_triangles)
     except _FAULTS as error:
         what = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) else str(error)
         raise damaged(path, what.splitlines()[0] if what else type(error).__name__) from None
 
 
-def _read(path: Path, document: Document, findings: Findings, max_triangles: int) -> Source:
-    tree = document.tree
+def _read(document: Document, findings: Findings, max_triangles: int) -> Source:
+    path, tree = document.path, document.tree
     unsupported = sorted(
         name
         for name in tree.get("extensionsRequired", [])
@@ -72,10 +72,10 @@ def _read(path: Path, document: Document, findings: Findings, max_triangles: int
     if unsupported:
         raise _unread(path, f"needs the glTF extension {unsupported[0]}")
     world_of = _world_matrices(tree)
-    draws = _draws(path, tree, world_of, findings, max_triangles)
+    draws = _draws(document, world_of, findings, max_triangles)
     if not draws:
         raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with triangles")
-    painter = MaterialReader(path, document, findings)
+    painter = MaterialReader(document, findings)
     painted = [painter.read(draw.primitive.get("material")) for draw in draws]
     points: list[NDArray[np.float64]] = []
     triangles: list[NDArray[np.int64]] = []
@@ -149,9 +149,9 @@ def _world_matrices(tree: dict[str, Any]) -> dict[int, NDArray[np.float64]]:
 
 
 def _draws(
-    path: Path, tree: dict[str, Any], order: Iterable[int], findings: Findings, max_triangles: int
+    document: Document, order: Iterable[int], findings: Findings, max_triangles: int
 ) -> list[_Draw]:
-    draws = []
+    path, tree, draws = document.path, document.tree, []
     vertices = triangles = 0
     for node in order:
         entry = tree["nodes"][node]

@@ -8,7 +8,6 @@ texel then differs from the linear product for partial tints, and the conversion
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
@@ -41,8 +40,7 @@ class Painted:
 class MaterialReader:
     """Reads each material once, when a primitive first asks for it."""
 
-    def __init__(self, path: Path, document: Document, findings: Findings) -> None:
-        self._path = path
+    def __init__(self, document: Document, findings: Findings) -> None:
         self._document = document
         self._findings = findings
         self._painted: dict[int | None, Painted] = {}
@@ -119,7 +117,7 @@ class MaterialReader:
             buffer, start, length = self._document.view(image["bufferView"])
             read = buffer.part(start, length)
         elif uri is not None and uri.startswith("data:"):
-            read = HeldBytes(data_uri(self._path, uri, f"image {source}"))
+            read = HeldBytes(data_uri(self._document.path, uri, f"image {source}"))
         else:
             what = unquote(str(uri))
             file = self._findings.locate(what, what, place)

@@ -44,17 +44,29 @@ class ReadTexture:
 def read_texture(
     data: bytes, digest: str, fallback: bytes | None, limits: Limits, at: Place
 ) -> ReadTexture | None:
-    """A `.ptm` and its fallback image, if it has one; None, and PTM-D710, without a sound head."""
-    from ptmtools.texture import read_header
+    """A `.ptm` and its fallback image, if it has one; None, and PTM-D710, without a sound head. A
+    PNG that has the size of no level is not decoded."""
+    from ptmtools.texture import decode, read_header
 
     texels = check_ptm(data, limits, at)
     try:
         header = read_header(data)
     except PtmError:
         return None
-    level = None
-    if fallback is not None:
-        level = _check_fallback(fallback, data, header, texels, limits, at)
+    if fallback is None:
+        return ReadTexture(header, digest)
+    png, size = f"{at.file.removesuffix('.ptm')}.png", _png_size(fallback)
+    level = next((n for n, v in enumerate(header.levels) if (v.width, v.height) == size), None)
+    if size is not None and level is None:
+        message = f"{png} is {size[0]} x {size[1]}, which is not the size of any level"
+        at.add("PTM-D711", message)
+        return ReadTexture(header, digest)
+    other = read_png(fallback, limits, at.found.at(png))
+    if level is not None and texels is not None and other is not None:
+        if level < len(header.levels) - 1:
+            texels = decode(data, level, limits)
+        if not _same_image(texels, other):
+            at.add("PTM-D711", f"it differs from {png}", f"level {level}")
     return ReadTexture(header, digest, level)
 
 
@@ -117,35 +129,6 @@ def check_record(record: Mapping[str, Any], texture: ReadTexture, at: Place) -> 
 def _other(row: Mapping[str, Any], true: Mapping[str, Any]) -> list[str]:
     """In what a row differs from what the file says."""
     return [f"{name} is {v} in the file" for name, v in true.items() if row[name] != v]
-
-
-def _check_fallback(
-    fallback: bytes,
-    data: bytes,
-    header: PtmHeader,
-    texels: Samples | None,
-    limits: Limits,
-    at: Place,
-) -> int | None:
-    """The level that the fallback image has the size of; a PNG of the size of none is not
-    decoded."""
-    from ptmtools.texture import decode
-
-    png = f"{at.file.removesuffix('.ptm')}.png"
-    size, levels = _png_size(fallback), header.levels
-    level = next((n for n, v in enumerate(levels) if (v.width, v.height) == size), None)
-    if size is not None and level is None:
-        message = f"{png} is {size[0]} x {size[1]}, which is not the size of any level"
-        at.add("PTM-D711", message)
-        return None
-    other = read_png(fallback, limits, at.found.at(png))
-    if level is None or texels is None or other is None:
-        return level
-    if level < len(levels) - 1:
-        texels = decode(data, level, limits)
-    if not _same_image(texels, other):
-        at.add("PTM-D711", f"it differs from {png}", f"level {level}")
-    return level
 
 
 def _png_size(data: bytes) -> tuple[int, int] | None:
