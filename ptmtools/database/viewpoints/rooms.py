@@ -122,7 +122,8 @@ def _place_in(
     # A wall outside of the section is farther off than the section's own sides.
     least, most = room.section.min(axis=0), room.section.max(axis=0)
     near = ((walls.max(axis=1) >= least) & (walls.min(axis=1) <= most)).all(axis=1)
-    clearance = np.minimum(_distance(grid, walls[near]), _distance(grid, _sides(room.section)))
+    sides = np.stack([room.section, np.roll(room.section, -1, axis=0)], axis=1)
+    clearance = np.minimum(_distance(grid, walls[near]), _distance(grid, sides))
     grid = grid[np.argsort(-clearance, kind="stable")][: int((clearance >= keep_off).sum())]
     position = np.insert(grid, 1, room.floor + eye, axis=1)
     floor = ground.below(position)
@@ -162,10 +163,6 @@ def _grid(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
     inside = np.all(edge[:, 0] * to[..., 1] - edge[:, 1] * to[..., 0] > 0, axis=1)
     kept: NDArray[np.float64] = points[inside]
     return kept if len(kept) else polygon.mean(axis=0)[None]
-
-
-def _sides(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.stack([polygon, np.roll(polygon, -1, axis=0)], axis=1)
 
 
 def _distance(points: NDArray[np.float64], segments: NDArray[np.float64]) -> NDArray[np.float64]:
