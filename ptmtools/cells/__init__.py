@@ -8,8 +8,8 @@ from ptmtools.lazy import names
 
 if TYPE_CHECKING:
     from ptmtools.cells.model import Cells
+    from ptmtools.cells.naming import structural_triangles
     from ptmtools.cells.options import SubdivideOptions
-    from ptmtools.cells.structure import structural_triangles
     from ptmtools.cells.subdivision import subdivide
 
 __all__ = ["Cells", "SubdivideOptions", "structural_triangles", "subdivide"]
@@ -19,7 +19,7 @@ __getattr__ = names(
     {
         "Cells": "model",
         "SubdivideOptions": "options",
-        "structural_triangles": "structure",
+        "structural_triangles": "naming",
         "subdivide": "subdivision",
     },
 )

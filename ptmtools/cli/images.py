@@ -100,7 +100,7 @@ def encode(
     check_options(options)
     ahead = PROFILES[options.profile].ahead
     if ahead and (workers or processors()) > 1:
-        compile_ahead(ahead)
+        compile_ahead(*ahead)
     sources = expanded(images, SUFFIXES)
     jobs = jobs_for(sources, output, images, ".ptm", (".ptm", *SUFFIXES))
     voice.to_stderr = any(job.to_stdout for job in jobs)
