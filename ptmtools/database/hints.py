@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
@@ -61,7 +62,7 @@ def hints_text(content: Content, cell_url: Callable[[int], str], up: str) -> str
         {
             "name": cell_name(c),
             "url": cell_url(c),
-            "leaves": [_leaf(cells, leaf) for leaf in cells.cell_leaves(c)],
+            "leaves": [_leaf(cells, leaf) for leaf in content.leaves[c]],
             "textures": painted[c].tolist(),
             "adjacent": adjacent[c].tolist(),
             "visible": pvs.row(c).tolist(),
@@ -107,10 +108,11 @@ def _rows(rows: Sequence[object]) -> str:
 
 
 def _leaf(cells: Cells, leaf: int) -> dict[str, Any]:
-    first = cells.leaf_point_start[leaf]
+    faces = cells.face_start[cells.leaf_face_start[leaf] : cells.leaf_face_start[leaf + 1] + 1]
+    index = (cells.face_index[faces[0] : faces[-1]] - cells.leaf_point_start[leaf]).tolist()
     return {
         "points": cells.leaf_points(leaf).tolist(),
-        "faces": [(loop - first).tolist() for loop in cells.leaf_faces(leaf)],
+        "faces": [index[a:b] for a, b in pairwise((faces - faces[0]).tolist())],
     }
 
 

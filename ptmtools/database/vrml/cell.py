@@ -61,8 +61,8 @@ class CellWriter:
         self._ach = row_texts(single(content.ach.value, "ach")[:, None])
         self._point, self._uv = row_texts(g.point), row_texts(g.uv)
         self._leaves = [
-            [single(cells.leaf_points(leaf), "leaf points") for leaf in cells.cell_leaves(c)]
-            for c in range(cells.cell_count)
+            [single(cells.leaf_points(leaf), "leaf points") for leaf in leaves]
+            for leaves in content.leaves
         ]
         self._hulls = [convex_hull(np.concatenate(leaves)) for leaves in self._leaves]
 
