@@ -193,7 +193,7 @@ def cell_texts(
     content = Content(scene, cells, pvs, ach, records)
     writer = CellWriter(content)
     images = [used.tolist() for used in content.painted]
-    return [CellText(writer.cell(c).text, images[c]) for c in range(cells.cell_count)]
+    return [CellText(writer.cell(c)[0], images[c]) for c in range(cells.cell_count)]
 
 
 def load(cells: Cells, pvs: Pvs, way: Way, size: NDArray[np.int64]) -> Load:

@@ -176,11 +176,9 @@ class Images:
 
     def _of_a_scene(self, data: bytes) -> str:
         from ptmtools.scene.images import ImageStore
-        from ptmtools.scene.reference import Folder
         from ptmtools.scene.source import Findings, HeldBytes, Texture
 
-        folder = self._file.parent
-        store = ImageStore(Findings(folder), Folder(folder), LIMITS.decoded_bytes)
+        store = ImageStore(Findings(self._file), LIMITS.decoded_bytes)
         texture = Texture(HeldBytes(data), "a/../b.png", "map_Kd", "a.mtl:1")
         decoded = store.add(texture)
         store.mask_holes(texture)

@@ -45,6 +45,13 @@ class Content:
         return Geometry(self.scene, self.cells)
 
     @cached_property
+    def leaves(self) -> list[list[int]]:
+        """The leaves of each cell, ascending."""
+        order, count = np.argsort(self.cells.leaf_cell, kind="stable"), self.cells.cell_count
+        first = np.searchsorted(self.cells.leaf_cell[order], np.arange(1, count))
+        return [leaves.tolist() for leaves in np.split(order, first)]
+
+    @cached_property
     def records(self) -> Mapping[int, tuple[int, TextureRecord]]:
         """Image of the scene → its place in `textures`, and its record there."""
         return {record.image: (place, record) for place, record in enumerate(self.textures)}

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,8 @@ from ptmtools.database.emitters import chosen_emitters
 from ptmtools.database.model import EmitOptions, EmitReport, TextureRecord
 from ptmtools.database.served import write_files
 from ptmtools.database.viewpoints.placement import place_viewpoints
-from ptmtools.errors import DatabaseError, OutputError
-from ptmtools.files import real_folder
+from ptmtools.errors import DatabaseError
+from ptmtools.files import real_folder, refuse_existing
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
@@ -52,31 +53,29 @@ def emit(
     LimitError: PTM-L600 a cell is longer than a GLB can be.
     """
     folder = Path(out)
-    _check(scene, cells, pvs, ach, {t.image: t for t in textures})
+    _check(scene, cells, pvs, ach, textures)
     emitters = chosen_emitters(options.format)
     owned = [name for emitter in emitters for name in emitter.owns]
     for name in owned:
-        if not force and os.path.lexists(folder / name):
-            raise OutputError(
-                "PTM-O001",
-                "already exists",
-                file=folder / name,
-                remedy="name another folder, or give --force to overwrite it",
-            )
+        if not force:
+            refuse_existing(folder / name)
     viewpoints, notes = place_viewpoints(scene, cells, options)
     content = Content(scene, cells, pvs, ach, textures, viewpoints, options, progress)
     written = [emitter.files(content) for emitter in emitters]
     for name in owned:
         if name.endswith("/"):
             real_folder(folder, name[:-1])
-    files = (  # what leads to others comes when those are there
-        (name, data, name == emitter.entry)
-        for emitter, given in zip(emitters, written, strict=True)
-        for name, data in given
-    )
-    names, size = write_files(folder, files, force=force, gzip=options.gzip)
+    names: list[str] = []
+    size = 0
+    entries = {emitter.entry for emitter in emitters}
+    for given in written:
+        # What leads to others comes when those are there.
+        for _, files in groupby(given, lambda file: file[0] in entries):
+            for some, length in write_files(folder, files, force=force, gzip=options.gzip):
+                names += some
+                size += length
     return EmitReport(
-        files=names,
+        files=tuple(names),
         viewpoints=viewpoints,
         shapes=len(content.geometry.object),
         triangles=len(content.geometry.triangle),
@@ -87,33 +86,31 @@ def emit(
 
 
 def _check(
-    scene: Scene, cells: Cells, pvs: Pvs, ach: Ach, textures: Mapping[int, TextureRecord]
+    scene: Scene, cells: Cells, pvs: Pvs, ach: Ach, textures: Iterable[TextureRecord]
 ) -> None:
     if cells.cell_count == 0:
         raise DatabaseError(
             "PTM-D600", "there are no cells", remedy="subdivide a model that has rooms"
         )
-    rows = {"pvs": pvs.start, "ach": ach.start}
-    for stage, start in rows.items():
-        if len(start) != cells.cell_count + 1:
-            raise _strangers(f"{stage} has {len(start) - 1} cells, not {cells.cell_count}")
-    if not np.array_equal(pvs.start, ach.start) or len(ach.value) != len(pvs.cell):
-        raise _strangers("pvs and ach have rows of different lengths")
-    source = np.unique(cells.triangle_source)
+    count, source = cells.cell_count, np.unique(cells.triangle_source)
+    fault = ""
     if len(source) and source[-1] >= len(scene.triangles):
-        raise _strangers("the cells hold pieces of triangles that the scene lacks")
+        fault = "the cells hold pieces of triangles that the scene lacks"
+    elif not len(pvs.start) == len(ach.start) == count + 1:
+        rows = f"{len(pvs.start) - 1} and {len(ach.start) - 1}"
+        fault = f"pvs and ach have {rows} cells, not {count}"
+    elif not np.array_equal(pvs.start, ach.start) or len(ach.value) != len(pvs.cell):
+        fault = "pvs and ach have rows of different lengths"
+    if fault:
+        raise DatabaseError(
+            "PTM-D604",
+            f"the stages do not belong together: {fault}",
+            remedy="run the stages again, from `cells` on",
+        )
     used = {scene.materials[m].image for m in np.unique(scene.triangle_material[source]).tolist()}
-    for image in sorted(used - {-1} - set(textures)):
+    for image in sorted(used - {-1} - {texture.image for texture in textures}):
         raise DatabaseError(
             "PTM-D602",
             f"the texture {scene.images[image].name!r} was not encoded",
             remedy="run the stage `textures` again",
         )
-
-
-def _strangers(what: str) -> DatabaseError:
-    return DatabaseError(
-        "PTM-D604",
-        f"the stages do not belong together: {what}",
-        remedy="run the stages again, from `cells` on",
-    )

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from ptmtools import schemas
+
 
 class FileError(Exception):
     """The first thing in a file that is wrong: a code of `validation`, where, and what."""
@@ -9,3 +14,12 @@ class FileError(Exception):
     def __init__(self, code: str, place: str, message: str) -> None:
         self.code, self.place, self.message = code, place, message
         super().__init__(f"{place}: {message}")
+
+
+@contextmanager
+def shaped(code: str) -> Iterator[None]:
+    """What is not as its schema says becomes a FileError of this code."""
+    try:
+        yield
+    except schemas.ShapeError as fault:
+        raise FileError(code, fault.place, fault.message) from None

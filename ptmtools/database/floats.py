@@ -37,9 +37,7 @@ _PARTS = re.compile(r"(-?)(\d+)(?:\.(\d+))?(?:e([-+]\d+))?")
 def single(values: ArrayLike, what: str) -> NDArray[np.float32]:
     """``values`` rounded to float32, without negative zeros.
 
-    Raises
-    ------
-    DatabaseError: PTM-D601 if one of them is not finite there; ``what`` says whose they are.
+    Raises DatabaseError: PTM-D601 if one of them is not finite there; ``what`` says whose they are.
     """
     with np.errstate(over="ignore"):
         rounded = np.asarray(values, dtype=np.float64).astype(np.float32)

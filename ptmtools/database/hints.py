@@ -25,6 +25,7 @@ from ptmtools.errors import DatabaseError
 
 if TYPE_CHECKING:
     from ptmtools.database.content import Content
+    from ptmtools.texture.model import Level
 
 FORMAT = "ptmtools hints"
 SCHEMA = 1
@@ -39,17 +40,11 @@ def hints_text(content: Content, cell_url: Callable[[int], str], up: str) -> str
     """The contents of `hints.json`: ``cell_url`` and ``up``, the way to the served folder, as seen
     from where it lies.
 
-    Raises
-    ------
-    DatabaseError: PTM-D601 a number is not finite.
+    Raises DatabaseError: PTM-D601 a number is not finite.
     """
     space, cells, pvs, ach = content.scene.space, content.cells, content.pvs, content.ach
     place = {image: i for image, (i, _) in content.records.items()}
     adjacent, painted = cells.adjacent(), content.painted
-    leaves = np.split(
-        np.argsort(cells.leaf_cell, kind="stable"),
-        np.cumsum(np.bincount(cells.leaf_cell, minlength=cells.cell_count))[:-1],
-    )
     statistics: Any = {name: _rounded(getattr(ach, name)) for name in STATISTICS}
     rounded = replace(ach, **statistics)
     portals = _portals(cells)
@@ -67,7 +62,7 @@ def hints_text(content: Content, cell_url: Callable[[int], str], up: str) -> str
         {
             "name": cell_name(c),
             "url": cell_url(c),
-            "leaves": [_leaf(cells, leaf) for leaf in leaves[c].tolist()],
+            "leaves": [_leaf(cells, leaf) for leaf in content.leaves[c]],
             "textures": painted[c].tolist(),
             "adjacent": adjacent[c].tolist(),
             "visible": pvs.row(c).tolist(),
@@ -167,16 +162,20 @@ def _portals(cells: Cells) -> list[list[dict[str, Any]]]:
     return rows
 
 
-def _viewpoint(v: Viewpoint) -> dict[str, Any]:
+def level_row(level: Level) -> dict[str, int]:
+    """What the hints say of a level of a texture."""
     return {
-        "name": v.name,
-        "description": v.description,
-        "position": v.position,
-        "direction": v.direction,
-        "orientation": v.orientation,
-        "fieldOfView": v.field_of_view,
-        "cell": v.cell,
+        "width": level.width,
+        "height": level.height,
+        "offset": level.offset,
+        "length": level.length,
+        "gpuBytes": level.gpu_bytes,
     }
+
+
+def _viewpoint(viewpoint: Viewpoint) -> dict[str, Any]:
+    fields = vars(viewpoint).items()
+    return {"fieldOfView" if k == "field_of_view" else k: value for k, value in fields}
 
 
 def _texture(record: TextureRecord, fallback: bool, up: str) -> Mapping[str, Any]:
@@ -190,14 +189,5 @@ def _texture(record: TextureRecord, fallback: bool, up: str) -> Mapping[str, Any
         "height": record.height,
         "components": record.components,
         "sha256": record.sha256,
-        "levels": [
-            {
-                "width": level.width,
-                "height": level.height,
-                "offset": level.offset,
-                "length": level.length,
-                "gpuBytes": level.gpu_bytes,
-            }
-            for level in record.levels
-        ],
+        "levels": [level_row(level) for level in record.levels],
     }

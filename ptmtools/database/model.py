@@ -9,30 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from ptmtools.database.emitters import EMITTERS, chosen_emitters
 from ptmtools.errors import InputError
 
+if TYPE_CHECKING:
+    from ptmtools.texture.model import Level
+
 Vector = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class TextureLevel:
-    """One level of a `.ptm`, numbered from the coarsest.
-
-    Attributes
-    ----------
-    width, height: texels.
-    offset, length: the bytes of the level's group in the file.
-    gpu_bytes: texture memory of the pyramid up to and including this level.
-    """
-
-    width: int
-    height: int
-    offset: int
-    length: int
-    gpu_bytes: int
 
 
 @dataclass(frozen=True)
@@ -45,7 +30,7 @@ class TextureRecord:
     file: the `.ptm`, relative to the served folder, "textures/NAME.ptm".
     fallback: the fallback image, a PNG, relative to the served folder, or None.
     width, height, components: of the finest level stored.
-    levels: coarsest first.
+    levels: as the header has them, coarsest first.
     sha256: hex digest of the `.ptm`'s bytes.
     fallback_level: index into `levels` of the one that the fallback image holds; None if there is
         no image, or if it is the finest.
@@ -57,7 +42,7 @@ class TextureRecord:
     width: int
     height: int
     components: int
-    levels: tuple[TextureLevel, ...]
+    levels: tuple[Level, ...]
     sha256: str
     fallback_level: int | None = None
 

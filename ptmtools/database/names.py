@@ -44,11 +44,6 @@ def glb_file(cell: int) -> str:
     return f"{cell_name(cell)}.glb"
 
 
-def glb_path(cell: int) -> str:
-    """A cell's GLB relative to the served folder."""
-    return f"{GLTF_FOLDER}/{glb_file(cell)}"
-
-
 class DefNames:
     """Hands out the DEF names of one file."""
 

@@ -11,17 +11,15 @@ file and the version of zlib.
 from __future__ import annotations
 
 import zlib
-from collections import deque
-from collections.abc import Iterable
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from ptmtools.database.emitters import GZIP
 from ptmtools.files import write_bytes, writing
+from ptmtools.texture.parallel import ordered
 
-#: Files that wait for the disk at a time, and files held in memory for it.
-_WRITERS = 4
-_WAITING = 8
+#: Files that wait for the disk at a time.
+_WRITERS = 8
 #: Deflate, no name, no time, best compression, no system (RFC 1952).
 _GZIP = bytes([0x1F, 0x8B, 8, 0, 0, 0, 0, 0, 2, 255])
 #: Suffixes of files that are copied.
@@ -37,46 +35,33 @@ def compressed(data: bytes) -> bytes:
 
 
 def write_files(
-    folder: Path, files: Iterable[tuple[str, str | bytes, bool]], *, force: bool, gzip: bool
-) -> tuple[tuple[str, ...], int]:
-    """The names of what was written, in the order of ``files``, and all their bytes.
+    folder: Path, files: Iterable[tuple[str, str | bytes]], *, force: bool, gzip: bool
+) -> Iterator[tuple[list[str], int]]:
+    """Of each file the names of what was written, its own and that of a copy, and all their bytes;
+    at the end all are on the disk.
 
     Parameters
     ----------
     folder: an existing one.
-    files: name relative to the folder, contents, and whether all before must be on the disk.
+    files: name relative to the folder, and contents.
     force: overwrite files; a gzip copy that is not written again goes.
     gzip: write copies of VRML and JSON files.
 
-    Raises
-    ------
-    OutputError: PTM-O001 to PTM-O003, of the first file that cannot be written.
+    Raises OutputError: PTM-O001 to PTM-O003, of the first file that cannot be written.
     """
-    names: list[str] = []
-    size = 0
-    pending: deque[Future[int]] = deque()
-    pool = ThreadPoolExecutor(_WRITERS, "files")
-    try:
-        for name, content, alone in files:
-            while pending and (alone or len(pending) >= _WAITING):
-                size += pending.popleft().result()
-            data = content.encode() if isinstance(content, str) else content
-            copied = gzip and name.endswith(_TEXT)
-            names += [name, name + GZIP] if copied else [name]
-            pending.append(pool.submit(_write, folder / name, data, copied, force))
-        return tuple(names), size + sum(each.result() for each in pending)
-    finally:
-        pool.shutdown(cancel_futures=True)
 
+    def write(file: tuple[str, str | bytes]) -> tuple[list[str], int]:
+        name, content = file
+        data = content.encode() if isinstance(content, str) else content
+        copy = folder / f"{name}{GZIP}"
+        write_bytes(folder / name, data, force=force)
+        if gzip and name.endswith(_TEXT):
+            packed = compressed(data)
+            write_bytes(copy, packed, force=force)
+            return [name, f"{name}{GZIP}"], len(data) + len(packed)
+        if force:
+            with writing(copy):
+                copy.unlink(missing_ok=True)
+        return [name], len(data)
 
-def _write(path: Path, data: bytes, copied: bool, force: bool) -> int:
-    other = path.with_name(path.name + GZIP)
-    write_bytes(path, data, force=force)
-    if copied:
-        packed = compressed(data)
-        write_bytes(other, packed, force=force)
-        return len(data) + len(packed)
-    if force:
-        with writing(other):
-            other.unlink(missing_ok=True)
-    return len(data)
+    return ordered(write, files, _WRITERS)

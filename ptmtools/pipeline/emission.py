@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from ptmtools.pipeline.encoding import fallback_level
@@ -51,7 +50,7 @@ class EmissionJob(Job):
 
 def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
     """What the emitted files say of the textures of a database."""
-    from ptmtools.database import TextureLevel, TextureRecord
+    from ptmtools.database import TextureRecord
 
     record = run.record(TEXTURES)
     options = run.recorded(TEXTURES)
@@ -60,26 +59,15 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
         fallback = f"{name.removesuffix('ptm')}png"
         has_fallback = f"{SERVED}/{fallback}" in record.outputs
         header = header_of(run.db.path / SERVED / name)
-        texels = accumulate(level.width * level.height for level in header.levels)
-        levels = tuple(
-            TextureLevel(
-                width=level.width,
-                height=level.height,
-                offset=level.offset,
-                length=level.length,
-                gpu_bytes=count * header.texel_bytes,
-            )
-            for level, count in zip(header.levels, texels, strict=True)
-        )
         records.append(
             TextureRecord(
                 image=i,
                 file=name,
                 fallback=fallback if has_fallback else None,
-                width=levels[-1].width,
-                height=levels[-1].height,
+                width=header.levels[-1].width,
+                height=header.levels[-1].height,
                 components=header.components,
-                levels=levels,
+                levels=header.levels,
                 sha256=run.db.output(TEXTURES.name, f"{SERVED}/{name}"),
                 fallback_level=(
                     fallback_level(header, options.fallback_size) if has_fallback else None

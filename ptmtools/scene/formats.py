@@ -12,10 +12,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
 from ptmtools.scene.meshlab import convert
-from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import (
     MAX_VERTICES,
     Findings,
@@ -31,9 +31,7 @@ SUPPORTED = (".obj", ".glb", ".gltf", *TRIMESH, *MESHLAB)
 _HEADER = 1 << 14
 
 
-def read_other(
-    path: Path, folder: Folder, findings: Findings, max_triangles: int = MAX_VERTICES
-) -> Source:
+def read_other(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) -> Source:
     """Read a file that is neither OBJ nor glTF, by its suffix.
 
     Raises InputError for unknown suffixes and for what no library can read, LimitError PTM-L203 for
@@ -49,7 +47,7 @@ def read_other(
             remedy=f"give one of {' '.join(SUPPORTED)}",
         )
     if suffix not in TRIMESH or (suffix == ".ply" and _textured_ply(path)):
-        return _read_meshlab(path, folder, findings, max_triangles)
+        return _read_meshlab(path, findings, max_triangles)
     try:
         source = _read_trimesh(path, findings)
     except InputError:
@@ -59,7 +57,7 @@ def read_other(
             raise InputError(
                 "PTM-I254", f"is damaged ({error})", file=path, remedy="export it again"
             ) from None
-        source = _read_meshlab(path, folder, findings, max_triangles)
+        source = _read_meshlab(path, findings, max_triangles)
         findings.say(
             "PTM-N230", f"read through pymeshlab, as trimesh gave up ({type(error).__name__})"
         )
@@ -104,15 +102,14 @@ def _read_trimesh(path: Path, findings: Findings) -> Source:
     return replace(joined, materials=joined.materials[:1], triangle_material=material)
 
 
-def _read_meshlab(path: Path, folder: Folder, findings: Findings, max_triangles: int) -> Source:
+def _read_meshlab(path: Path, findings: Findings, max_triangles: int) -> Source:
     from ptmtools.scene.obj import read_obj
 
     parts = []
     with tempfile.TemporaryDirectory() as scratch:
-        near = Folder(folder.root, folder.allow_outside, also=Path(scratch))
-        near.sought = folder.sought
+        findings.folder.admit(Path(scratch))
         for converted, label in convert(path, Path(scratch)):
-            part = read_obj(converted, near, findings, max_triangles=max_triangles)
+            part = read_obj(converted, findings, max_triangles=max_triangles)
             parts.append(replace(part, objects=(label or path.stem,)))
     return _joined(path, parts)
 
@@ -121,21 +118,19 @@ def _joined(path: Path, parts: list[Source]) -> Source:
     """One source of several, in order. Raises InputError PTM-I247 if they have no face."""
     if not any(len(part.triangles) for part in parts):
         raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with faces")
-    points = np.cumsum([0] + [len(part.points) for part in parts])
-    objects = np.cumsum([0] + [len(part.objects) for part in parts])
-    materials = np.cumsum([0] + [len(part.materials) for part in parts])
+
+    def counted_on(name: str, counted: str) -> NDArray[np.int64]:
+        """An array of indices of all of them, behind what the parts before have."""
+        first = np.cumsum([0] + [len(getattr(part, counted)) for part in parts])
+        rows = [getattr(part, name) + n for part, n in zip(parts, first, strict=False)]
+        return np.concatenate(rows)
+
     return Source(
         points=np.concatenate([part.points for part in parts]),
-        triangles=np.concatenate(
-            [part.triangles + n for part, n in zip(parts, points, strict=False)]
-        ),
+        triangles=counted_on("triangles", "points"),
         uv=np.concatenate([part.uv for part in parts]),
-        triangle_object=np.concatenate(
-            [part.triangle_object + n for part, n in zip(parts, objects, strict=False)]
-        ),
-        triangle_material=np.concatenate(
-            [part.triangle_material + n for part, n in zip(parts, materials, strict=False)]
-        ),
+        triangle_object=counted_on("triangle_object", "objects"),
+        triangle_material=counted_on("triangle_material", "materials"),
         objects=tuple(name for part in parts for name in part.objects),
         materials=tuple(material for part in parts for material in part.materials),
     )

@@ -3,9 +3,7 @@
 The document is read here and not by trimesh, which (5.2) reads only TEXCOORD_0, leaves normalised
 integers unscaled, drops the mesh and children of a camera's node, keeps neither wrap modes nor the
 images' own bytes, and takes a time that grows with the third power of the graph's depth (six
-minutes for a file of 100 KB). It decoded the accessors alone, from a reduced copy of the document,
-until `ptmtools.glb` did the same in a quarter of the lines. Metres and Y up are fixed by the
-format.
+minutes for a file of 100 KB). Metres and Y up are fixed by the format.
 """
 
 from __future__ import annotations
@@ -24,7 +22,6 @@ from ptmtools.glb import natural
 from ptmtools.scene.gltf_document import Document, damaged, open_document
 from ptmtools.scene.gltf_material import MaterialReader, Painted
 from ptmtools.scene.model import Camera
-from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import MAX_VERTICES, Findings, Source, too_many_triangles
 
 #: Required extensions that change nothing that is read here, or that are read.
@@ -34,6 +31,8 @@ _HARMLESS = {
     "KHR_mesh_quantization",
     "KHR_texture_transform",
 }
+#: What is raised where a document is malformed: one this deep has no end of ways to be that.
+_FAULTS = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
 _TRIANGLES, _STRIP = 4, 5
 #: So many vertices may there be for each triangle that is allowed.
 _VERTICES_A_TRIANGLE = 10
@@ -49,9 +48,7 @@ class _Draw:
     place: str
 
 
-def read_gltf(
-    path: Path, folder: Folder, findings: Findings, max_triangles: int = MAX_VERTICES
-) -> Source:
+def read_gltf(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) -> Source:
     """Read a glTF model.
 
     Raises InputError where it is damaged or needs what is not supported; LimitError for more
@@ -59,25 +56,14 @@ def read_gltf(
     often as a node shows it, before anything is made of them.
     """
     try:
-        return _read(path, open_document(path, folder), folder, findings, max_triangles)
-    except (
-        RecursionError,
-        LookupError,
-        TypeError,
-        ValueError,
-        AttributeError,
-        ArithmeticError,
-        AssertionError,
-    ) as error:
-        # A document this deep has no end of ways to be malformed.
+        return _read(open_document(path, findings.folder), findings, max_triangles)
+    except _FAULTS as error:
         what = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) else str(error)
         raise damaged(path, what.splitlines()[0] if what else type(error).__name__) from None
 
 
-def _read(
-    path: Path, document: Document, folder: Folder, findings: Findings, max_triangles: int
-) -> Source:
-    tree = document.tree
+def _read(document: Document, findings: Findings, max_triangles: int) -> Source:
+    path, tree = document.path, document.tree
     unsupported = sorted(
         name
         for name in tree.get("extensionsRequired", [])
@@ -86,10 +72,10 @@ def _read(
     if unsupported:
         raise _unread(path, f"needs the glTF extension {unsupported[0]}")
     world_of = _world_matrices(tree)
-    draws = _draws(path, tree, world_of, findings, max_triangles)
+    draws = _draws(document, world_of, findings, max_triangles)
     if not draws:
         raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with triangles")
-    painter = MaterialReader(path, document, folder, findings)
+    painter = MaterialReader(document, findings)
     painted = [painter.read(draw.primitive.get("material")) for draw in draws]
     points: list[NDArray[np.float64]] = []
     triangles: list[NDArray[np.int64]] = []
@@ -163,9 +149,9 @@ def _world_matrices(tree: dict[str, Any]) -> dict[int, NDArray[np.float64]]:
 
 
 def _draws(
-    path: Path, tree: dict[str, Any], order: Iterable[int], findings: Findings, max_triangles: int
+    document: Document, order: Iterable[int], findings: Findings, max_triangles: int
 ) -> list[_Draw]:
-    draws = []
+    path, tree, draws = document.path, document.tree, []
     vertices = triangles = 0
     for node in order:
         entry = tree["nodes"][node]

@@ -48,8 +48,9 @@ class Buffer:
 
 @dataclass(frozen=True)
 class Document:
-    """A glTF model: the parsed JSON and its buffers in order."""
+    """A glTF model: its file, the parsed JSON and its buffers in order."""
 
+    path: Path
     tree: dict[str, Any]
     buffers: tuple[Buffer, ...]
 
@@ -113,7 +114,7 @@ def open_document(path: Path, folder: Folder) -> Document:
     if not version.startswith("2."):
         raise damaged(path, f"version {version!r}")
 
-    return Document(tree, tuple(_buffers(path, tree, folder, binary)))
+    return Document(path, tree, tuple(_buffers(path, tree, folder, binary)))
 
 
 def _parsed(text: str) -> Any:

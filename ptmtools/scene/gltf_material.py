@@ -8,7 +8,6 @@ texel then differs from the linear product for partial tints, and the conversion
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
@@ -17,7 +16,6 @@ from numpy.typing import NDArray
 
 from ptmtools.scene.gltf_document import Document, data_uri
 from ptmtools.scene.model import Wrap
-from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import FileRange, Findings, HeldBytes, SourceMaterial, Texture
 
 _CLAMP, _MIRROR = 33071, 33648
@@ -42,10 +40,8 @@ class Painted:
 class MaterialReader:
     """Reads each material once, when a primitive first asks for it."""
 
-    def __init__(self, path: Path, document: Document, folder: Folder, findings: Findings) -> None:
-        self._path = path
+    def __init__(self, document: Document, findings: Findings) -> None:
         self._document = document
-        self._folder = folder
         self._findings = findings
         self._painted: dict[int | None, Painted] = {}
         self._materials: list[SourceMaterial] = []
@@ -121,10 +117,10 @@ class MaterialReader:
             buffer, start, length = self._document.view(image["bufferView"])
             read = buffer.part(start, length)
         elif uri is not None and uri.startswith("data:"):
-            read = HeldBytes(data_uri(self._path, uri, f"image {source}"))
+            read = HeldBytes(data_uri(self._document.path, uri, f"image {source}"))
         else:
             what = unquote(str(uri))
-            file = self._findings.locate(self._folder, what, what, place)
+            file = self._findings.locate(what, what, place)
             if file is None:
                 return None
             read, label = FileRange(file), file.name

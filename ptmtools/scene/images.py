@@ -29,7 +29,6 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError, LimitError, naming
 from ptmtools.progress import Progress
 from ptmtools.scene.model import SourceImage
-from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import FileRange, Findings, Texture
 from ptmtools.texture.images.declared import check_bytes
 from ptmtools.texture.images.picture import check_size
@@ -49,6 +48,8 @@ _SUFFIX = {"JPEG": "jpg", "TIFF": "tif", "MPO": "jpg", "JPEG2000": "jp2"}
 _STRIP_TEXELS = 1 << 20
 _MASK_BANDS = {"r": "R", "g": "G", "b": "B"}
 
+_Bits = NDArray[np.uint8]
+
 
 @dataclass(frozen=True)
 class VerifiedBytes:
@@ -62,84 +63,60 @@ class VerifiedBytes:
     label: str
 
     def __call__(self) -> bytes:
+        data, fault = b"", ""
         try:
             data = self.read()
         except OSError as error:
-            raise InputError(
-                "PTM-I252",
-                f"cannot be read again ({error.strerror or error})",
-                file=self.label,
-                remedy="restore it, or build again",
-            ) from None
-        if hashlib.sha256(data).hexdigest() != self.sha256:
-            raise InputError(
-                "PTM-I252",
-                "has changed since the model was read",
-                file=self.label,
-                remedy="build again",
-            )
+            fault = f"cannot be read again ({error.strerror or error})"
+        if not fault and hashlib.sha256(data).hexdigest() != self.sha256:
+            fault = "has changed since the model was read"
+        if fault:
+            remedy = "restore it, or build again"
+            raise InputError("PTM-I252", fault, file=self.label, remedy=remedy)
         return data
-
-
-@dataclass(frozen=True)
-class Decoded:
-    """What ingest needs of an image: its number, and (H, W) bool, rows from the top, which
-    texels are not opaque; None where all are."""
-
-    index: int
-    holes: NDArray[np.bool_] | None
-
-
-@dataclass(frozen=True)
-class _Mask:
-    """(H, W) bool in eighths of its bytes: a scene may have many, and its images unfold."""
-
-    bits: NDArray[np.uint8]
-    shape: tuple[int, int]
-
-    @property
-    def unfolded(self) -> NDArray[np.bool_]:
-        height, width = self.shape
-        flat = np.unpackbits(self.bits, count=height * width)
-        return flat.view(np.bool_).reshape(height, width)
 
 
 @dataclass(frozen=True)
 class _Examined:
     """What was found out about an image: digest, Pillow's name for its format, whether it can be
-    other than opaque, which texels are not; or the fault that keeps it from being an image."""
+    other than opaque, which texels are not, in bits along its rows, since a scene may have many and
+    its images unfold; or the fault that keeps it from being an image."""
 
     sha256: str = ""
     format: str = ""
     alpha: bool = False
-    holes: _Mask | None = None
+    width: int = 0
+    bits: _Bits | None = None
     fault: str = ""
+
+    @property
+    def holes(self) -> NDArray[np.bool_] | None:
+        """(H, W) bool, rows from the top, which texels are not opaque; None if all are."""
+        if self.bits is None:
+            return None
+        return np.unpackbits(self.bits, axis=1, count=self.width).view(np.bool_)
 
 
 class ImageStore:
     """Images by digest, in the order in which they were first asked for.
 
-    ``folder`` is the model's, where files may have been found; ``limit`` the most bytes that the
-    texels of an image may take, at four for each.
+    ``limit`` is the most bytes that the texels of an image may take, at four for each.
     """
 
-    def __init__(self, findings: Findings, folder: Folder, limit: int) -> None:
+    def __init__(self, findings: Findings, limit: int) -> None:
         self._findings = findings
-        self._folder = folder
         self._limit = limit
         self._examined: dict[tuple[Callable[[], bytes], str | None], _Examined] = {}
         self._index: dict[str, int] = {}
         self._images: list[SourceImage] = []
-        self._files: list[set[str]] = []
-        self._opaque: list[bool] = []
         self._masks: set[str] = set()
         self._stems: set[str] = set()
 
     @property
     def images(self) -> tuple[SourceImage, ...]:
         return tuple(
-            replace(image, files=tuple(sorted(files)), plain=opaque and not files & self._masks)
-            for image, files, opaque in zip(self._images, self._files, self._opaque, strict=True)
+            replace(image, plain=image.plain and self._masks.isdisjoint(image.files))
+            for image in self._images
         )
 
     def examine(self, textures: Iterable[Texture], workers: int, progress: Progress) -> None:
@@ -156,30 +133,30 @@ class ImageStore:
                 self._examined[read, None] = found
         progress(len(wanted), len(wanted), "images")
 
-    def add(self, texture: Texture) -> Decoded | None:
-        """The image of a texture, or None (and a miss is recorded) if it cannot be decoded."""
+    def add(self, texture: Texture) -> tuple[int, NDArray[np.bool_] | None] | None:
+        """The number of a texture's image, and (H, W), rows from the top, which of its texels are
+        not opaque, None if all are; or None (and a miss is recorded) if it cannot be decoded."""
         found = self._sound(texture)
         if found is None:
             return None
-        if found.sha256 not in self._index:
-            self._index[found.sha256] = len(self._images)
+        index = self._index.setdefault(found.sha256, len(self._images))
+        if index == len(self._images):
             name = self._name(texture.label, found.format)
             load = VerifiedBytes(texture.read, found.sha256, texture.label)
-            self._images.append(SourceImage(name, found.sha256, load))
-            self._files.append(set())
-            self._opaque.append(not found.alpha)
-        index = self._index[found.sha256]
+            self._images.append(SourceImage(name, found.sha256, load, plain=not found.alpha))
         if file := self._whole_file(texture):
-            self._files[index].add(file)
-        return Decoded(index, None if found.holes is None else found.holes.unfolded)
+            image = self._images[index]
+            files = tuple(sorted({*image.files, file}))
+            self._images[index] = replace(image, files=files)
+        return index, found.holes
 
     def _whole_file(self, texture: Texture) -> str | None:
         """The file that an image is all of, relative to the model's folder."""
-        read = texture.read
+        read, folder = texture.read, self._findings.folder
         if not isinstance(read, FileRange) or read.offset or read.length is not None:
             return None
-        name = Path(os.path.relpath(read.path, self._folder.root)).as_posix()
-        return name if name in self._folder.sought else None
+        name = Path(os.path.relpath(read.path, folder.root)).as_posix()
+        return name if name in folder.sought else None
 
     def mask_holes(self, mask: Texture) -> NDArray[np.bool_] | None:
         """(H, W) which texels of a mask (``map_d``) are not opaque; all, if it is unreadable."""
@@ -188,7 +165,7 @@ class ImageStore:
         found = self._sound(mask, mask.channel)
         if found is None:
             return np.ones((1, 1), dtype=bool)
-        return None if found.holes is None else found.holes.unfolded
+        return found.holes
 
     def _sound(self, texture: Texture, channel: str | None = None) -> _Examined | None:
         """What `_examine` finds, once; None (and a miss is recorded) if that is a fault."""
@@ -218,15 +195,13 @@ class ImageStore:
         return f"{unique}.{_suffix(kind)}"
 
 
-class _FaultError(Exception):
-    """What keeps a file from being an image."""
-
-
 def _examine(texture: Texture, limit: int, channel: str | None = None) -> _Examined:
     """Reads and decodes an image; ``channel`` is that of a mask, see `Texture`.
 
     Raises LimitError PTM-L104, PTM-L106.
     """
+    from ptmtools.texture.images.opening import pillow_faults
+
     read = texture.read
     try:
         with naming(texture.label, place=texture.place):
@@ -234,17 +209,20 @@ def _examine(texture: Texture, limit: int, channel: str | None = None) -> _Exami
                 check_bytes(read.size(), Limits(limit))
             data = read()
             opened = _decode(data, limit)
-        with _pillow_faults():
-            holes = _holes(opened) if channel is None else _mask_holes(opened, channel)
-    except _FaultError as fault:
-        return _Examined(fault=str(fault))
+            with pillow_faults():
+                bits = _holes(opened, channel)
+    except LimitError:
+        raise
+    except InputError as error:
+        return _Examined(fault=error.message)
     except OSError as error:
         return _Examined(fault=error.strerror or str(error))
     return _Examined(
         hashlib.sha256(data).hexdigest(),
         opened.format or "",
         opened.has_transparency_data,
-        holes,
+        opened.width,
+        bits,
     )
 
 
@@ -257,7 +235,9 @@ def is_plain(data: bytes, name: str, limit: int) -> bool:
     try:
         with _unwarned():
             opened = _decode(data, limit)
-    except _FaultError:
+    except LimitError:
+        raise
+    except InputError:
         return False
     return not opened.has_transparency_data and name.endswith(f".{_suffix(opened.format or '')}")
 
@@ -271,67 +251,42 @@ def _unwarned() -> Iterator[None]:
 
 
 def _decode(data: bytes, limit: int) -> Image.Image:
-    """Raises _FaultError if that cannot be, LimitError PTM-L104, PTM-L106."""
-    from ptmtools.texture.images.opening import load, opened
+    """Raises InputError if that cannot be, LimitError PTM-L104, PTM-L106."""
+    from ptmtools.texture.images.opening import load, opened, pillow_faults
 
     if not data:
-        raise _FaultError("empty file")
+        raise InputError("PTM-I124", "empty file")
     limits = Limits(limit)
-    with _pillow_faults():
+    with pillow_faults():
         image = opened(cast("BinaryIO", io.BytesIO(data)), limits)
         check_size(*image.size, 4, limits)
         load(image)
     return image
 
 
-@contextmanager
-def _pillow_faults() -> Iterator[None]:
-    """As that of textures, but a fault of the image is a _FaultError."""
-    from ptmtools.texture.images.opening import pillow_faults
-
-    try:
-        with pillow_faults():
-            yield
-    except LimitError:
-        raise
-    except InputError as error:
-        raise _FaultError(error.message) from None
-
-
 def _suffix(kind: str) -> str:
     return _SUFFIX.get(kind, kind.lower())
 
 
-def _holes(opened: Image.Image) -> _Mask | None:
-    """Which texels have an alpha below 255, None if none has."""
-    if not opened.has_transparency_data:
+def _holes(opened: Image.Image, channel: str | None) -> _Bits | None:
+    """Which texels are not opaque, a strip of rows at a time; None if all are. ``channel`` is that
+    of a mask, and None for an image, of which its alpha tells."""
+    mode, band = ("RGB", _MASK_BANDS[channel]) if channel in _MASK_BANDS else ("L", "L")
+    if opened.has_transparency_data and channel in (None, "", "m"):
+        mode, band = "RGBA", "A"
+    elif channel is None:
         return None
-    if opened.mode.startswith("I"):  # 16 bits, with a colour that stands for none
-        key = opened.info["transparency"]
-        return _mask(opened, lambda strip: np.asarray(strip) == key)
-    return _mask(opened, lambda strip: np.asarray(strip.convert("RGBA").getchannel("A")) < 255)
 
+    def clear(strip: Image.Image) -> NDArray[np.bool_]:
+        if opened.mode.startswith("I"):  # 16 bits, which convert() would clip
+            texels = np.asarray(strip)
+            # Of an alpha there is but a colour that stands for none.
+            return texels == opened.info["transparency"] if band == "A" else texels < 65535
+        return np.asarray(strip.convert(mode).getchannel(band)) < 255
 
-def _mask_holes(opened: Image.Image, channel: str) -> _Mask | None:
-    """Which texels of a mask are not opaque, None if all are."""
-    if channel in ("", "m") and opened.has_transparency_data:
-        return _holes(opened)
-    band = _MASK_BANDS.get(channel)
-    if opened.mode.startswith("I"):  # 16 bits, which convert() would clip
-        return _mask(opened, lambda strip: np.asarray(strip) < 65535)
-    if band:
-        return _mask(opened, lambda strip: np.asarray(strip.convert("RGB").getchannel(band)) < 255)
-    return _mask(opened, lambda strip: np.asarray(strip.convert("L")) < 255)
-
-
-def _mask(opened: Image.Image, test: Callable[[Image.Image], NDArray[np.bool_]]) -> _Mask | None:
-    """What ``test`` says of the texels of an image, a strip of rows at a time; None if nothing."""
     width, height = opened.size
-    step = 8 * max(1, _STRIP_TEXELS // (8 * width))  # so that strips end with a byte
-    parts = [
-        np.packbits(test(opened.crop((0, y, width, min(y + step, height)))))
-        for y in range(0, height, step)
-    ]
-    if not any(part.any() for part in parts):
-        return None
-    return _Mask(np.concatenate(parts), (height, width))
+    step = max(1, _STRIP_TEXELS // width)
+    tops = range(0, height, step)
+    strips = (opened.crop((0, y, width, min(y + step, height))) for y in tops)
+    bits = np.concatenate([np.packbits(clear(strip), axis=1) for strip in strips])
+    return bits if bits.any() else None

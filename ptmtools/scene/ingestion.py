@@ -2,23 +2,13 @@
 
 A reader turns the file into triangles as the model has them (`obj`, `gltf`, `formats`); faces are
 then cleaned, the space is settled, and of the materials and images those are kept that some
-remaining face uses. What was guessed, dropped or missed stands in the notes.
-
-Notes: N201 unit guessed, N202 up axis guessed, N203 library of materials missing, N204 texture
-missing, N205 a file outside the model's folder, N206 image unreadable, N207 unknown material,
-N208 file found in another folder than named, N209 degenerate faces dropped, N210 faces with
-coordinates that are not finite dropped, N211 and N212 duplicates dropped (of the same material,
-of another), N213 coincident faces of opposite winding, N214 statement not understood, N215
-texture option ignored, N216 scale and offset baked, N217 mask not carried over, N218 material
-defined twice, N219 statements skipped, N220 faces of fewer than three corners, N221 polygons
-that cross themselves, N222 mirrored wrap, N223 vertex colours, N224 glTF feature not carried
-over, N225 camera skipped, N226 colour factor converted to sRGB, N227 size implausible, N228
-texture coordinates not finite, N229 textured faces without texture coordinates, N230 read
-through another library, N231 material that cannot be seen.
+remaining face uses. What was guessed, dropped or missed stands in the notes, whose codes are in
+docs/cli.md.
 """
 
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
 from typing import Literal
@@ -27,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, LimitError
+from ptmtools.files import open_regular
 from ptmtools.progress import Progress, silent
 from ptmtools.scene import space as spaces
 from ptmtools.scene.faces import KeptFaces, keep_faces
@@ -34,7 +25,6 @@ from ptmtools.scene.images import ImageStore
 from ptmtools.scene.model import Camera, Material, Scene, Space
 from ptmtools.scene.options import IngestOptions
 from ptmtools.scene.orientation import tolerance_of
-from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import MAX_VERTICES, Findings, Source
 from ptmtools.scene.texels import uses_holes
 
@@ -77,9 +67,8 @@ def ingest(
     model = Path(path)
     metres = None if options.unit is None else spaces.parse_unit(options.unit)
     check_file(model)
-    findings = Findings(model)
-    folder = Folder(model.absolute().parent, options.allow_outside)
-    source = _read(model, folder, findings, progress, options.max_triangles)
+    findings = Findings(model, options.allow_outside)
+    source = _read(model, findings, progress, options.max_triangles)
     if len(source.points) > MAX_VERTICES or len(source.triangles) > MAX_VERTICES:
         raise LimitError("PTM-L200", f"more than {MAX_VERTICES} vertices or faces", file=model)
 
@@ -104,18 +93,21 @@ def ingest(
         )
         uv = np.where(finite_uv[:, None, None], uv, 0.0)
 
-    used_material, triangle_material = _in_use(source.triangle_material[kept.source])
-    used_object, triangle_object = _in_use(source.triangle_object[kept.source])
-    store = ImageStore(findings, folder, options.limit << 20)
+    used_material, triangle_material = np.unique(
+        source.triangle_material[kept.source], return_inverse=True
+    )
+    used_object, triangle_object = np.unique(
+        source.triangle_object[kept.source], return_inverse=True
+    )
+    store = ImageStore(findings, options.limit << 20)
     given = [source.materials[index].texture for index in used_material.tolist()]
     store.examine((texture for texture in given if texture is not None), workers, progress)
     materials = []
     grouped = np.argsort(triangle_material, kind="stable")
-    ends = np.cumsum(np.bincount(triangle_material))
+    faces = np.split(grouped, np.cumsum(np.bincount(triangle_material))[:-1])
     for done, index in enumerate(used_material.tolist()):
         progress(done, len(used_material), "materials")
-        faces = grouped[ends[done - 1] if done else 0 : ends[done]]
-        materials.append(_material(source, index, uv, faces, store, findings))
+        materials.append(_material(source, index, uv, faces[done], store, findings))
     progress(len(used_material), len(used_material), "materials")
     if options.strict:
         findings.enforce()
@@ -134,46 +126,40 @@ def ingest(
         cameras=tuple(_camera(camera, space) for camera in source.cameras),
         space=space,
         notes=findings.notes,
-        files=tuple(folder.sought),
+        files=tuple(findings.folder.sought),
     )
 
 
 def check_file(model: Path) -> None:
     """Raises InputError if there is no file that could be a model."""
     try:
-        if model.is_dir():
-            raise InputError(
-                "PTM-I241", "is a directory", file=model, remedy="name the model file in it"
-            )
-        if not model.exists():
-            raise InputError("PTM-I240", "no such file", file=model)
-        if not model.is_file():
-            raise InputError("PTM-I240", "not a regular file", file=model)
-        with open(model, "rb") as stream:
+        with open_regular(model) as stream:
             if not stream.read(1):
                 raise InputError("PTM-I242", "empty file", file=model)
+    except IsADirectoryError:
+        remedy = "name the model file in it"
+        raise InputError("PTM-I241", "is a directory", file=model, remedy=remedy) from None
+    except (FileNotFoundError, NotADirectoryError, ValueError):  # also a NUL byte in the name
+        raise InputError("PTM-I240", "no such file", file=model) from None
     except OSError as error:
-        raise InputError("PTM-I256", error.strerror or str(error), file=model) from None
-    except ValueError as error:  # a NUL byte in the name
-        raise InputError("PTM-I240", f"no such file ({error})", file=model) from None
+        code = "PTM-I240" if error.errno == errno.EINVAL else "PTM-I256"  # EINVAL: no file
+        raise InputError(code, error.strerror or str(error), file=model) from None
 
 
-def _read(
-    model: Path, folder: Folder, findings: Findings, progress: Progress, max_triangles: int
-) -> Source:
+def _read(model: Path, findings: Findings, progress: Progress, max_triangles: int) -> Source:
     suffix = model.suffix.lower()
     try:
         if suffix == ".obj":
             from ptmtools.scene.obj import read_obj
 
-            return read_obj(model, folder, findings, progress, max_triangles)
+            return read_obj(model, findings, progress, max_triangles)
         if suffix in (".glb", ".gltf"):
             from ptmtools.scene.gltf import read_gltf
 
-            return read_gltf(model, folder, findings, max_triangles)
+            return read_gltf(model, findings, max_triangles)
         from ptmtools.scene.formats import read_other
 
-        return read_other(model, folder, findings, max_triangles)
+        return read_other(model, findings, max_triangles)
     except OSError as error:
         raise InputError(
             "PTM-I256", error.strerror or str(error), file=error.filename or model
@@ -181,27 +167,20 @@ def _read(
 
 
 def _note_faces(kept: KeptFaces, source: Source, findings: Findings) -> None:
-    if kept.degenerate:
-        findings.miss("PTM-N209", "degenerate faces dropped", "", kept.degenerate)
-    if kept.not_finite:
-        findings.miss("PTM-N210", "faces with coordinates not finite dropped", "", kept.not_finite)
     dropped = np.flatnonzero((kept.also >= 0) & (kept.also != np.arange(len(kept.also))))
     material = source.triangle_material
     other = int((material[dropped] != material[kept.also[dropped]]).sum())
-    if len(dropped) - other:
-        findings.say("PTM-N211", "duplicate faces dropped", "", len(dropped) - other)
-    if other:
-        findings.say(
-            "PTM-N212", "duplicate faces of another material dropped, the first kept", "", other
-        )
-    pairs = int(kept.paired.sum()) // 2
-    if pairs:
-        findings.say(
-            "PTM-N213",
-            "pairs of coincident faces with opposite winding; each shows on its own side",
-            "",
-            pairs,
-        )
+    others = "duplicate faces of another material dropped, the first kept"
+    pairs = "pairs of coincident faces with opposite winding; each shows on its own side"
+    for tell, code, message, count in (
+        (findings.miss, "PTM-N209", "degenerate faces dropped", kept.degenerate),
+        (findings.miss, "PTM-N210", "faces with coordinates not finite dropped", kept.not_finite),
+        (findings.say, "PTM-N211", "duplicate faces dropped", len(dropped) - other),
+        (findings.say, "PTM-N212", others, other),
+        (findings.say, "PTM-N213", pairs, int(kept.paired.sum()) // 2),
+    ):
+        if count:
+            tell(code, message, "", count)
 
 
 def _two_sided(kept: KeptFaces, source: Source) -> NDArray[np.bool_]:
@@ -232,28 +211,25 @@ def _settle_space(
         side = high - low
     if not np.isfinite(side).all():
         raise LimitError("PTM-L201", "coordinates are too large for float64", file=model)
-    up_guessed = unit_guessed = False
-    if up is None:
-        up = source.up
-    if up is None:
+    known_up = up or source.up
+    if known_up is None:
         up, why = spaces.guess_up(kept.points[kept.triangles])
-        up_guessed = True
         findings.say("PTM-N202", f"up axis guessed: {up} ({why}); give --up to override")
+    else:
+        up = known_up
     width, height = (max(side[0], side[2]), side[1]) if up == "y" else (max(side[:2]), side[2])
     guess, why = spaces.guess_unit(float(width), float(height))
-    if metres is None and source.metres is None:
-        metres, unit_guessed = spaces.UNITS[guess], True
+    known = source.metres if metres is None else metres
+    if known is None:
         findings.say("PTM-N201", f"unit guessed: {guess} ({why}); give --unit to override")
-    elif metres is None:
-        metres = source.metres
-        assert metres is not None
-        if spaces.UNITS[guess] != metres:
-            findings.say(
-                "PTM-N227",
-                f"the format is in metres, but {guess} would be more likely ({why}); "
-                "give --unit to override",
-            )
-    extent = float(side.max()) * metres
+    elif metres is None and spaces.UNITS[guess] != known:
+        findings.say(
+            "PTM-N227",
+            f"the format is in metres, but {guess} would be more likely ({why}); "
+            "give --unit to override",
+        )
+    scale = spaces.UNITS[guess] if known is None else known
+    extent = float(side.max()) * scale
     if not SMALLEST_EXTENT <= extent <= LARGEST_EXTENT:
         raise LimitError(
             "PTM-L201",
@@ -265,7 +241,7 @@ def _settle_space(
     floor = 1 if up == "y" else 2
     origin[floor] = low[floor]
     x, y, z = origin.tolist()
-    return Space((x, y, z), metres, up, unit_guessed, up_guessed)
+    return Space((x, y, z), scale, up, unit_guessed=known is None, up_guessed=known_up is None)
 
 
 def _to_world(points: NDArray[np.float64], space: Space) -> NDArray[np.float64]:
@@ -276,12 +252,6 @@ def _camera(camera: Camera, space: Space) -> Camera:
     position = _to_world(np.array([camera.position]), space)[0].tolist()
     direction = spaces.turned(np.array([camera.direction]), space.up)[0].tolist()
     return Camera(camera.name, tuple(position), tuple(direction), camera.field_of_view)
-
-
-def _in_use(index: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The distinct values in use, ascending, and for each entry its place among them."""
-    used, place = np.unique(index, return_inverse=True)
-    return used, place.reshape(-1)
 
 
 def _material(
@@ -300,9 +270,9 @@ def _material(
     if texture is not None:
         decoded = store.add(texture)
         if decoded is not None:
-            image = decoded.index
-            if decoded.holes is not None and not transparent:
-                transparent = uses_holes(decoded.holes, uv[faces], texture.wrap_s, texture.wrap_t)
+            image, holes = decoded
+            if holes is not None and not transparent:
+                transparent = uses_holes(holes, uv[faces], texture.wrap_s, texture.wrap_t)
     if given.mask is not None:
         mask = given.mask
         holes = store.mask_holes(mask)

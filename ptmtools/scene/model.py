@@ -9,13 +9,14 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools import schemas
 from ptmtools.scene.orientation import tolerance_of
-from ptmtools.store.checked import Stored, numbers, texts, whole
+from ptmtools.store.checked import Stored
 from ptmtools.tolerance import Tolerance
 
 Wrap = Literal["repeat", "clamp"]
@@ -187,12 +188,15 @@ class Scene:
     ) -> Scene:
         """Inverse of `to_arrays`; ``images`` in the order in which materials count them.
 
-        Raises KeyError, TypeError or ValueError for what no scene has.
+        Raises KeyError or ValueError for what no scene has.
         """
         stored = Stored(arrays)
-        about = json.loads(stored.array("about", np.uint8, None).tobytes().decode())
-        objects = texts(about["objects"], "objects")
-        materials = tuple(_material(row, len(images)) for row in about["materials"])
+        text = stored.array("about", np.uint8, None).tobytes()
+        about = schemas.read(text, schemas.SCENE)
+        objects, images = tuple(about["objects"]), tuple(images)
+        materials = tuple(Material(**_fields(row)) for row in about["materials"])
+        if any(material.image >= len(images) for material in materials):
+            raise ValueError("a material has an image that is not there")
         points = stored.array("points", np.float64, None, 3, finite=True)
         triangles = stored.indices("triangles", np.int32, None, 3, high=len(points))
         n = len(triangles)
@@ -206,43 +210,13 @@ class Scene:
             objects=objects,
             materials=materials,
             tolerance=Tolerance.for_extent(stored.array("extent", np.float64, finite=True).item()),
-            images=tuple(images),
-            cameras=tuple(_camera(row) for row in about["cameras"]),
-            space=_space(about["space"]),
-            notes=tuple(_note(row) for row in about["notes"]),
+            images=images,
+            cameras=tuple(Camera(**_fields(row)) for row in about["cameras"]),
+            space=Space(**_fields(about["space"])),
+            notes=tuple(Note(**row) for row in about["notes"]),
         )
 
 
-def _material(row: Mapping[str, Any], images: int) -> Material:
-    r, g, b = numbers(row["color"], 3, "colours")
-    (opacity,) = numbers([row["opacity"]], 1, "opacities")
-    name, wrap_s, wrap_t = texts([row["name"], row["wrap_s"], row["wrap_t"]], "names")
-    if not all(0 <= share <= 1 for share in (r, g, b, opacity)):
-        raise ValueError("a colour or an opacity is not a share")
-    if not {wrap_s, wrap_t} <= {"repeat", "clamp"} or not isinstance(row["transparent"], bool):
-        raise ValueError("a material is malformed")
-    image = whole(row["image"], -1, images, "an image")
-    s, t = cast("tuple[Wrap, Wrap]", (wrap_s, wrap_t))
-    return Material(name, (r, g, b), opacity, image, s, t, row["transparent"])
-
-
-def _camera(row: Mapping[str, Any]) -> Camera:
-    (name,) = texts([row["name"]], "names")
-    (angle,) = numbers([row["field_of_view"]], 1, "fields of view")
-    x, y, z = numbers(row["position"], 3, "positions")
-    dx, dy, dz = numbers(row["direction"], 3, "directions")
-    return Camera(name, (x, y, z), (dx, dy, dz), angle)
-
-
-def _space(row: Mapping[str, Any]) -> Space:
-    x, y, z = numbers(row["origin"], 3, "origins")
-    (metres,) = numbers([row["metres"]], 1, "metres")
-    up: Any = row["up"]
-    if up not in ("y", "z") or metres <= 0:
-        raise ValueError("an impossible space")
-    return Space((x, y, z), metres, up, bool(row["unit_guessed"]), bool(row["up_guessed"]))
-
-
-def _note(row: Mapping[str, Any]) -> Note:
-    code, message, place = texts([row["code"], row["message"], row["place"]], "notes")
-    return Note(code, message, place, whole(row["count"], 0, 1 << 63, "a count"))
+def _fields(row: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields of a dataclass, of which JSON has made tuples lists."""
+    return {name: tuple(v) if isinstance(v, list) else v for name, v in row.items()}

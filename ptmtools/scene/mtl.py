@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 import os
 import re
-from dataclasses import dataclass, field, replace
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from ptmtools.errors import LimitError
@@ -19,25 +20,12 @@ from ptmtools.scene.source import Findings, decode
 
 #: Largest library that is read, MiB; those of whole cities have a few.
 LARGEST = 64
-#: Options of a texture statement with the least and the greatest number of their arguments.
-OPTIONS = {
-    "-blendu": (1, 1),
-    "-blendv": (1, 1),
-    "-bm": (1, 1),
-    "-boost": (1, 1),
-    "-cc": (1, 1),
-    "-clamp": (1, 1),
-    "-imfchan": (1, 1),
-    "-mm": (2, 2),
-    "-o": (1, 3),
-    "-s": (1, 3),
-    "-t": (1, 3),
-    "-texres": (1, 1),
-    "-type": (1, 1),
-}
-_NUMERIC = {"-bm", "-boost", "-mm", "-o", "-s", "-t", "-texres"}
-#: Options that change colours or positions and are not carried over.
-_IGNORED = ("-cc", "-mm", "-t")
+#: Options of a texture statement with the least and the greatest number of their arguments: words,
+#: and numbers.
+_WORDS = dict.fromkeys(("-blendu", "-blendv", "-cc", "-clamp", "-imfchan", "-type"), (1, 1))
+_NUMBERS = {"-mm": (2, 2), **dict.fromkeys(("-o", "-s", "-t"), (1, 3))}
+_NUMBERS |= dict.fromkeys(("-bm", "-boost", "-texres"), (1, 1))
+OPTIONS = _WORDS | _NUMBERS
 
 
 def number(text: str) -> float:
@@ -77,63 +65,51 @@ def parse_map(text: str, line: int = 0) -> MapStatement:
     Raises ValueError where an option lacks its arguments or no file is named.
     """
     words = [(m.group(), m.start()) for m in re.finditer(r"[^ \t]+", text.strip(" \t\r\n"))]
-    given: dict[str, list[str]] = {}
+    word: dict[str, str] = {}
+    numbers: dict[str, list[float]] = {}
     at = 0
-    while at < len(words) and words[at][0].lower() in OPTIONS:
-        name = words[at][0].lower()
+    while at < len(words) and (name := words[at][0].lower()) in OPTIONS:
         least, most = OPTIONS[name]
-        arguments = [word for word, _ in words[at + 1 : at + 1 + least]]
+        arguments = [argument for argument, _ in words[at + 1 : at + 1 + least]]
         if len(arguments) < least:
             raise ValueError(f"{name} lacks an argument")
-        if name in _NUMERIC:
-            for word in arguments:
-                number(word)
         at += 1 + least
+        if name in _WORDS:
+            word[name] = arguments[0].lower()
+            continue
+        numbers[name] = [number(argument) for argument in arguments]
         # Further arguments only if they are numbers, and the last word is always the file's.
-        while len(arguments) < most and at < len(words) - 1:
-            try:
-                number(words[at][0])
-            except ValueError:
-                break
-            arguments.append(words[at][0])
-            at += 1
-        given[name] = arguments
+        with suppress(ValueError):
+            while len(numbers[name]) < most and at < len(words) - 1:
+                numbers[name].append(number(words[at][0]))
+                at += 1
     if at >= len(words):
         raise ValueError("no file is named")
-    file = text.strip(" \t\r\n")[words[at][1] :]
-
-    scale = [float(x) for x in given.get("-s", [])] + [1.0, 1.0]
-    offset = [float(x) for x in given.get("-o", [])] + [0.0, 0.0]
-    identity = {"-mm": [0.0, 1.0], "-t": [0.0, 0.0, 0.0]}
-    ignored = []
-    for name in _IGNORED:
-        if name not in given:
-            continue
-        if name == "-cc":
-            changes = given[name][0].lower() == "on"
-        else:
-            values = [float(x) for x in given[name]]
-            changes = values != identity[name][: len(values)]
-        if changes:
-            ignored.append(name)
+    scale = [*numbers.get("-s", ()), 1.0, 1.0]
+    offset = [*numbers.get("-o", ()), 0.0, 0.0]
+    # What changes colours or positions and is not carried over.
+    changes = {
+        "-cc": word.get("-cc") == "on",
+        "-mm": numbers.get("-mm", [0.0, 1.0]) != [0.0, 1.0],
+        "-t": any(numbers.get("-t", ())),
+    }
     return MapStatement(
-        file=file,
+        file=text.strip(" \t\r\n")[words[at][1] :],
         scale=(scale[0], scale[1]),
         offset=(offset[0], offset[1]),
-        clamp=given.get("-clamp", ["off"])[0].lower() == "on",
-        channel=given.get("-imfchan", [""])[0].lower(),
-        ignored=tuple(ignored),
+        clamp=word.get("-clamp") == "on",
+        channel=word.get("-imfchan", ""),
+        ignored=tuple(name for name, changed in changes.items() if changed),
         line=line,
     )
 
 
-@dataclass(frozen=True)
+@dataclass
 class MtlMaterial:
-    """A ``newmtl`` block; ``dissolve`` is ``d``, or 1 - ``Tr`` where only that is given."""
+    """A ``newmtl`` block of a library; ``dissolve`` is ``d``, or 1 - ``Tr`` where only that is
+    given."""
 
-    name: str
-    library: Path = field(repr=False)
-    line: int
+    library: Path
     color: tuple[float, float, float] | None = None
     dissolve: float = 1.0
     dissolve_given: bool = False
@@ -141,10 +117,10 @@ class MtlMaterial:
     map_d: MapStatement | None = None
 
 
-def read_mtl(path: Path, label: str, findings: Findings) -> dict[str, MtlMaterial]:
+def read_mtl(path: Path, findings: Findings) -> dict[str, MtlMaterial]:
     """Materials by name, in the order of the file; of two with one name the first is kept.
 
-    ``label`` names the file in notes. A line that cannot be understood is a miss. Raises LimitError
+    A line that cannot be understood is a miss. Raises LimitError
     PTM-L204 for a library larger than `LARGEST`, and OSError.
     """
     with open_regular(path) as stream:
@@ -156,6 +132,7 @@ def read_mtl(path: Path, label: str, findings: Findings) -> dict[str, MtlMateria
                 remedy="remove the materials that are not used",
             )
         data = stream.read()
+    label = findings.folder.label(path)
     materials: dict[str, MtlMaterial] = {}
     current: MtlMaterial | None = None
     for index, line in enumerate(re.split(r"\r\n|\n|\r", decode(data)), start=1):
@@ -165,24 +142,17 @@ def read_mtl(path: Path, label: str, findings: Findings) -> dict[str, MtlMateria
         key, rest = words[0].lower(), words[1].strip(" \t") if len(words) > 1 else ""
         place = f"{label}:{index}"
         if key == "newmtl":
-            current = MtlMaterial(rest, path, index)
-            if rest in materials:
+            current = MtlMaterial(path)
+            if materials.setdefault(rest, current) is not current:
                 findings.say(
                     "PTM-N218", f"material {rest} is defined again; the first counts", place
                 )
-            else:
-                materials[rest] = current
-            continue
-        if current is None:
-            continue
-        try:
-            changed = _statement(current, key, rest, index)
-        except ValueError as error:
-            findings.miss("PTM-N214", f"{line.strip()[:80]}: not understood ({error})", place)
-            continue
-        if materials[current.name] is current:
-            materials[current.name] = changed
-        current = changed
+        elif current is not None:
+            try:
+                _statement(current, key, rest, index)
+            except ValueError as error:
+                what = f"{line.strip()[:80]}: not understood ({error})"
+                findings.miss("PTM-N214", what, place)
     return materials
 
 
@@ -193,24 +163,20 @@ def _share(words: list[str]) -> float:
     return min(max(number(words[0]), 0.0), 1.0)
 
 
-def _statement(material: MtlMaterial, key: str, rest: str, line: int) -> MtlMaterial:
+def _statement(material: MtlMaterial, key: str, rest: str, line: int) -> None:
     words = rest.split()
     if key == "kd":
         if words and words[0].lower() in ("spectral", "xyz"):
             raise ValueError("only Kd r g b is read")
         red = _share(words)
-        grey = len(words) < 3
-        return replace(
-            material,
-            color=(red, red if grey else _share(words[1:]), red if grey else _share(words[2:])),
-        )
-    if key == "d":
-        dissolve = _share([word for word in words if word.lower() != "-halo"])
-        return replace(material, dissolve=dissolve, dissolve_given=True)
-    if key == "tr" and not material.dissolve_given:
-        return replace(material, dissolve=1.0 - _share(words))
-    if key == "map_kd":
-        return replace(material, map_kd=parse_map(rest, line))
-    if key == "map_d":
-        return replace(material, map_d=parse_map(rest, line))
-    return material
+        green, blue = (_share(words[k:]) if len(words) > 2 else red for k in (1, 2))
+        material.color = (red, green, blue)
+    elif key == "d":
+        material.dissolve = _share([word for word in words if word.lower() != "-halo"])
+        material.dissolve_given = True
+    elif key == "tr" and not material.dissolve_given:
+        material.dissolve = 1.0 - _share(words)
+    elif key == "map_kd":
+        material.map_kd = parse_map(rest, line)
+    elif key == "map_d":
+        material.map_d = parse_map(rest, line)

@@ -11,6 +11,7 @@ and points are skipped and counted.
 
 from __future__ import annotations
 
+import re
 from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -26,7 +27,6 @@ from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Wrap
 from ptmtools.scene.mtl import MapStatement, MtlMaterial, read_mtl
 from ptmtools.scene.polygon import triangulate
-from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import (
     MAX_VERTICES,
     FileRange,
@@ -47,6 +47,8 @@ _SILENT = frozenset({
 # fmt: on
 #: Statements that would draw something that is not a surface of triangles.
 _NOT_DRAWN = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "surf": "surfaces"}
+#: The next file of a mtllib statement, which ends as such files do, or all that is left.
+_LIBRARIES = re.compile(r".*?\.mtl[\"']*(?: |$)|.+", re.IGNORECASE)
 _LINES_A_TICK = 1 << 16
 #: Longest line, with those that a backslash joins to it, in characters.
 LONGEST_LINE = 1 << 24
@@ -56,7 +58,8 @@ _MARK = "\u00ef\u00bb\u00bf"
 
 @dataclass
 class _Statements:
-    """The statements of a file: flat arrays, and for names the line where each first stands."""
+    """The statements of a file: flat arrays, and of materials the number and the line where each
+    first stands."""
 
     points: array[float] = field(default_factory=lambda: array("d"))
     coords: array[float] = field(default_factory=lambda: array("d"))
@@ -67,15 +70,13 @@ class _Statements:
     face_object: array[int] = field(default_factory=lambda: array("q"))
     face_material: array[int] = field(default_factory=lambda: array("q"))
     objects: dict[str, int] = field(default_factory=dict)
-    materials: dict[str, int] = field(default_factory=dict)
-    material_line: list[int] = field(default_factory=list)
+    materials: dict[str, tuple[int, int]] = field(default_factory=dict)
     libraries: list[tuple[str, int]] = field(default_factory=list)
     unknown: dict[str, list[int]] = field(default_factory=dict)
 
 
 def read_obj(
     path: Path,
-    folder: Folder,
     findings: Findings,
     progress: Progress = silent,
     max_triangles: int = MAX_VERTICES,
@@ -83,9 +84,8 @@ def read_obj(
     """Read an OBJ file with its materials.
 
     Raises InputError with the line for what cannot be read, and where there is no face at all;
-    LimitError for more vertices than int32 can number (PTM-L200), a line longer than `LONGEST_LINE`
-    (PTM-L202), more than ``max_triangles`` (PTM-L203, before polygons are cut), and what `read_mtl`
-    raises.
+    LimitError for a line longer than `LONGEST_LINE` (PTM-L202), more than ``max_triangles``
+    (PTM-L203, before polygons are cut), and what `read_mtl` raises.
     """
     said = _read_statements(path, findings, progress, max_triangles)
     for key, lines in said.unknown.items():
@@ -133,12 +133,12 @@ def read_obj(
     uv = np.zeros((len(coord), 3, 2))
     uv[coord >= 0] = coords[coord[coord >= 0]]
     face_material = np.frombuffer(said.face_material, dtype=np.int64)
-    materials, maps = _materials(path, said, folder, findings, np.unique(face_material))
+    materials, maps = _materials(path, said, findings, np.unique(face_material))
     triangle_material = face_material[cut.polygon]
-    grouped = np.argsort(triangle_material, kind="stable")
     ends = np.cumsum(np.bincount(triangle_material, minlength=len(materials)))
+    grouped = np.split(np.argsort(triangle_material, kind="stable"), ends[:-1])
     for index, statement in maps.items():
-        which = grouped[ends[index - 1] if index else 0 : ends[index]]
+        which = grouped[index]
         uv[which] = uv[which] * statement.scale + statement.offset
         bare = np.unique(cut.polygon[which[(coord[which] < 0).any(axis=1)]])
         if len(bare):
@@ -238,7 +238,8 @@ def _read_statements(
                         name = "/".join(part for part in (object_name, group_name) if part)
                         object_index = said.objects.setdefault(name or path.stem, len(said.objects))
                     if material_index < 0:
-                        material_index = _material(said, "", number)
+                        unnamed = len(said.materials), number
+                        material_index, _ = said.materials.setdefault("", unnamed)
                     _face(said, words)
                     said.face_line.append(number)
                     said.face_object.append(object_index)
@@ -246,7 +247,8 @@ def _read_statements(
                     if len(said.corner_point) - 2 * len(said.face_line) > max_triangles:
                         raise too_many_triangles(max_triangles, path)
                 elif key == "usemtl":
-                    material_index = _material(said, _rest(line, "usemtl"), number)
+                    name, new = _rest(line, "usemtl"), (len(said.materials), number)
+                    material_index, _ = said.materials.setdefault(name, new)
                 elif key == "o":
                     object_name, group_name, object_index = _rest(line, "o"), "", -1
                 elif key == "g":
@@ -265,23 +267,12 @@ def _read_statements(
                     file=path,
                     place=f"line {number}",
                 ) from None
-    if len(points) // 3 > MAX_VERTICES:
-        raise LimitError(
-            "PTM-L200", f"more than {MAX_VERTICES} vertices", file=path, remedy="split the model"
-        )
     if short:
         findings.miss(
             "PTM-N220", "faces of fewer than three corners", f"{path.name}:{short[0]}", len(short)
         )
     progress(size, size, "reading")
     return said
-
-
-def _material(said: _Statements, name: str, line: int) -> int:
-    index = said.materials.setdefault(name, len(said.materials))
-    if index == len(said.material_line):
-        said.material_line.append(line)
-    return index
 
 
 def _face(said: _Statements, words: list[str]) -> None:
@@ -303,23 +294,11 @@ def _face(said: _Statements, words: list[str]) -> None:
 
 def _library_names(text: str) -> list[str]:
     """The files of a mtllib statement: several, divided by blanks that names may contain too."""
-    names: list[str] = []
-    pending: list[str] = []
-    for word in text.split(" "):
-        pending.append(word)
-        if word.lower().rstrip("\"'").endswith(".mtl"):
-            names.append(" ".join(pending).strip())
-            pending = []
-    rest = " ".join(pending).strip()
-    return [*names, rest] if rest else names
+    return [name.strip() for name in _LIBRARIES.findall(text) if name.strip()]
 
 
 def _materials(
-    path: Path,
-    said: _Statements,
-    folder: Folder,
-    findings: Findings,
-    used: NDArray[np.int64],
+    path: Path, said: _Statements, findings: Findings, used: NDArray[np.int64]
 ) -> tuple[tuple[SourceMaterial, ...], dict[int, MapStatement]]:
     """All materials, and the map_Kd of those that have one."""
     defined: dict[str, MtlMaterial] = {}
@@ -327,17 +306,17 @@ def _materials(
     for text, line in said.libraries:
         place = f"{path.name}:{line}"
         for name in _library_names(text):
-            file = findings.locate(folder, name, f"mtllib {name}", place, "PTM-N203")
+            file = findings.locate(name, f"mtllib {name}", place, "PTM-N203")
             if file is None or (real := file.resolve()) in read:
                 continue
             read.add(real)
-            for key, material in read_mtl(file, folder.label(file), findings).items():
+            for key, material in read_mtl(file, findings).items():
                 defined.setdefault(key, material)
 
     materials: list[SourceMaterial] = []
     maps: dict[int, MapStatement] = {}
     wanted = set(used.tolist())
-    for index, (name, line) in enumerate(zip(said.materials, said.material_line, strict=True)):
+    for name, (index, line) in said.materials.items():
         known = defined.get(name)
         if known is None:
             if name and index in wanted:
@@ -346,8 +325,8 @@ def _materials(
             continue
         texture = mask = None
         if index in wanted:
-            texture = _texture(known, "map_Kd", known.map_kd, folder, findings)
-            mask = _texture(known, "map_d", known.map_d, folder, findings)
+            texture = _texture(known, "map_Kd", known.map_kd, findings)
+            mask = _texture(known, "map_d", known.map_d, findings)
         if texture is not None and known.map_kd is not None:
             maps[index] = known.map_kd
         materials.append(
@@ -365,17 +344,13 @@ def _materials(
 
 
 def _texture(
-    material: MtlMaterial,
-    key: str,
-    statement: MapStatement | None,
-    folder: Folder,
-    findings: Findings,
+    material: MtlMaterial, key: str, statement: MapStatement | None, findings: Findings
 ) -> Texture | None:
     if statement is None:
         return None
-    place = f"{folder.label(material.library)}:{statement.line}"
+    place = f"{findings.folder.label(material.library)}:{statement.line}"
     what = f"{key} {statement.file}"
-    file = findings.locate(folder, statement.file, what, place, base=material.library.parent)
+    file = findings.locate(statement.file, what, place, base=material.library.parent)
     if file is None:
         return None
     if statement.ignored:

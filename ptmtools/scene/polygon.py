@@ -65,7 +65,10 @@ def triangulate(corners: NDArray[np.float64], start: NDArray[np.int64]) -> Trian
             corner.append(index)
             polygon.append(which)
             continue
-        shape = _normalised(corners[index])
+        with np.errstate(all="ignore"):  # moved to the first vertex, scaled to a size of 1
+            shape = corners[index] - corners[index[:, :1]]
+            scale = np.abs(shape).max(axis=(1, 2), keepdims=True)
+            shape /= np.where(scale > 0, scale, 1.0)
         cut, done = _fans(shape)
         corner.append(np.take_along_axis(index[done], cut[done].reshape(-1, 3 * (n - 2)), axis=1))
         corner[-1] = corner[-1].reshape(-1, 3)
@@ -81,15 +84,6 @@ def triangulate(corners: NDArray[np.float64], start: NDArray[np.int64]) -> Trian
     owner = np.concatenate(polygon)
     order = np.argsort(owner, kind="stable")
     return Triangulation(np.concatenate(corner)[order], owner[order], tangled)
-
-
-def _normalised(shape: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(m, n, 3) polygons moved to their first vertex and scaled to a size of 1."""
-    with np.errstate(all="ignore"):
-        moved = shape - shape[:, :1]
-        scale = np.abs(moved).max(axis=(1, 2), keepdims=True)
-        scaled: NDArray[np.float64] = moved / np.where(scale > 0, scale, 1.0)
-    return scaled
 
 
 def _fans(shape: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

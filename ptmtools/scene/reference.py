@@ -28,11 +28,6 @@ def _fold(name: str) -> str:
     return unicodedata.normalize("NFC", name).casefold()
 
 
-def _unwritable(name: str) -> bool:
-    """Whether it is no text: half a character of UTF-16, which JSON may hold."""
-    return any("\ud800" <= letter <= "\udfff" for letter in name)
-
-
 @dataclass(frozen=True)
 class Reference:
     """The result of a search: a path unless it is "outside" or "missing"; "elsewhere" means that
@@ -45,22 +40,25 @@ class Reference:
 class Folder:
     """The folder of a model, searched without regard to case where nothing else is found.
 
-    ``also`` is a second folder that may be read, for files made on the way.
-
     Attributes
     ----------
     sought: the files found, relative to the root, and the names of those not found, as keys in
         the order in which they were asked for.
     """
 
-    def __init__(self, root: Path, allow_outside: bool = False, also: Path | None = None) -> None:
+    def __init__(self, root: Path, allow_outside: bool = False) -> None:
         self.root = root
         self.allow_outside = allow_outside
         self.sought: dict[str, None] = {}
-        self._roots = [root] if also is None else [root, also]
-        self._real = [folder.resolve() for folder in self._roots]
+        self._roots = [root]
+        self._real = [root.resolve()]
         self._listing: dict[Path, dict[str, str]] = {}
         self._known: dict[tuple[str, Path], Reference] = {}
+
+    def admit(self, folder: Path) -> None:
+        """Another folder may be read, too, for files made on the way."""
+        self._roots.append(folder)
+        self._real.append(folder.resolve())
 
     def find(self, reference: str, base: Path | None = None) -> Reference:
         """Find the file called ``reference`` in a file that lies in ``base`` (default: root).
@@ -75,7 +73,8 @@ class Folder:
         return self._known[reference, base]
 
     def _find(self, reference: str, base: Path) -> Reference:
-        if len(reference) > _LONGEST or _unwritable(reference):
+        halves = any("\ud800" <= letter <= "\udfff" for letter in reference)  # of UTF-16, in JSON
+        if len(reference) > _LONGEST or halves:
             return Reference("missing")
         bases = [base, *(folder for folder in self._roots if folder != base)]
         name = reference.strip(" \t\r\n")

@@ -145,14 +145,16 @@ class Source:
 
 
 class Findings:
-    """Collects the notes of one ingest; under ``strict`` a miss becomes an error at the end.
+    """Collects the notes of one ingest, in whose folder the model's files are looked for; under
+    ``strict`` a miss becomes an error at the end.
 
     Misses are what the model asks for and does not get: files, materials, faces. Error and note
     share their number: note PTM-N203 is error PTM-I203.
     """
 
-    def __init__(self, model: Path) -> None:
+    def __init__(self, model: Path, allow_outside: bool = False) -> None:
         self.model = model
+        self.folder = Folder(model.absolute().parent, allow_outside)
         self._notes: dict[tuple[str, str, str], int] = {}
         self._misses: list[tuple[str, str, str]] = []
 
@@ -169,7 +171,6 @@ class Findings:
 
     def locate(
         self,
-        folder: Folder,
         name: str,
         what: str,
         place: str,
@@ -177,14 +178,14 @@ class Findings:
         base: Path | None = None,
     ) -> Path | None:
         """`Folder.find` with a note of where the file is or why there is none."""
-        found = folder.find(name, base)
+        found = self.folder.find(name, base)
         if found.path is None:
             if found.outcome == "outside":
                 self.miss("PTM-N205", f"{what}: lies outside the model's folder", place)
             else:
                 self.miss(missing, f"{what}: not found", place)
         elif found.outcome == "elsewhere":
-            self.say("PTM-N208", f"{what}: found as {folder.label(found.path)}", place)
+            self.say("PTM-N208", f"{what}: found as {self.folder.label(found.path)}", place)
         return found.path
 
     @property

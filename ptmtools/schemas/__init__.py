@@ -26,7 +26,7 @@ from importlib.resources import files
 from typing import Any
 
 #: Names of the schemas.
-HINTS, MANIFEST, VALIDATION, GLB = "hints", "manifest", "validation", "glb"
+HINTS, MANIFEST, VALIDATION, GLB, SCENE = "hints", "manifest", "validation", "glb", "scene"
 #: So many lists and objects lie in each other at most, where anything may stand.
 DEEPEST = 16
 #: How the message of a number ends that is beyond float64.
@@ -61,7 +61,7 @@ _BOUNDS: dict[str, tuple[set[type], Callable[[Any, Any], bool], str]] = {
 }
 
 
-class ShapeError(Exception):
+class ShapeError(ValueError):
     """The first thing in a document that is not as its schema says.
 
     `path` leads to it: names and indices, from the outside in.
@@ -95,9 +95,7 @@ def schema_text(name: str) -> str:
 def read(data: bytes, name: str) -> Any:
     """The document in ``data``, whose schema is ``name``.
 
-    Raises
-    ------
-    ShapeError: as `parse`, or it is not as the schema says.
+    Raises ShapeError: as `parse`, or it is not as the schema says.
     """
     document = parse(data)
     check(document, name)
@@ -107,14 +105,14 @@ def read(data: bytes, name: str) -> Any:
 def parse(data: bytes) -> Any:
     """The document in ``data``.
 
-    Raises
-    ------
-    ShapeError: not UTF-8, not JSON, or a name twice in an object.
+    Raises ShapeError: not UTF-8, not JSON, or a name twice in an object.
     """
     try:
         return json.loads(
             data.decode("utf-8"), parse_constant=_not_finite, object_pairs_hook=_object
         )
+    except ShapeError:
+        raise
     except UnicodeDecodeError as fault:
         raise ShapeError(f"byte {fault.start} is not UTF-8") from None
     except (ValueError, RecursionError) as fault:

@@ -66,18 +66,3 @@ def texts(values: Any, name: str) -> tuple[str, ...]:
     if not isinstance(values, list) or not all(isinstance(value, str) for value in values):
         raise ValueError(f"{name} are not texts")
     return tuple(values)
-
-
-def numbers(values: Any, count: int, name: str) -> tuple[float, ...]:
-    """A list of so many finite numbers."""
-    plain = isinstance(values, list) and len(values) == count
-    if not plain or not all(type(v) in (int, float) and abs(v) < 1e300 for v in values):
-        raise ValueError(f"{name} are not {count} numbers")
-    return tuple(float(value) for value in values)
-
-
-def whole(value: Any, low: int, high: int, name: str) -> int:
-    """An integer from ``low`` to below ``high``."""
-    if type(value) is not int or not low <= value < high:
-        raise ValueError(f"{name} is not a number from {low} to {high}")
-    return value

@@ -15,7 +15,7 @@ from PIL import Image
 
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
-from ptmtools.database import TextureLevel, TextureRecord, emit
+from ptmtools.database import TextureRecord, emit
 from ptmtools.scene.model import Material, Scene, SourceImage
 from ptmtools.texture import encode, read_header
 from ptmtools.visibility.model import Pvs
@@ -98,9 +98,6 @@ def write_textures(www: Path) -> tuple[TextureRecord, ...]:
         header = read_header(data)
         (www / f"textures/{name}.ptm").write_bytes(data)
         Image.fromarray(pixels).save(www / f"textures/{name}.png")
-        levels = tuple(
-            TextureLevel(v.width, v.height, v.offset, v.length, v.gpu_bytes) for v in header.levels
-        )
         digest = hashlib.sha256(data).hexdigest()
         height, width, components = shape
         records.append(
@@ -111,7 +108,7 @@ def write_textures(www: Path) -> tuple[TextureRecord, ...]:
                 width,
                 height,
                 components,
-                levels,
+                header.levels,
                 digest,
             )
         )

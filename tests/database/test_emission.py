@@ -17,7 +17,6 @@ import pytest
 from ptmtools.database import (
     EmitOptions,
     GivenViewpoint,
-    TextureLevel,
     TextureRecord,
     emit,
     validate_database,
@@ -27,10 +26,11 @@ from ptmtools.database.served import compressed
 from ptmtools.database.vrml.reader import Node, parse
 from ptmtools.errors import DatabaseError, InputError, OutputError
 from ptmtools.scene.model import Material
+from ptmtools.texture.model import Level
 from ptmtools.visibility.model import Pvs
 from tests.e2e.browsers import view3dscene
 
-ONE_LEVEL = (TextureLevel(1, 1, 0, 100, 3),)
+ONE_LEVEL = (Level(1, 1, 0, 100, 0, (1, 1), 3),)
 
 
 def records() -> tuple[TextureRecord, ...]:
@@ -193,8 +193,7 @@ def test_compressing_nothing_and_much() -> None:
 
 def test_the_level_of_the_fallback_image(artifacts, tmp_path: Path) -> None:
     first, second = records()
-    level = TextureLevel(1, 1, 64, 5, 3)
-    given = (replace(first, levels=(level,) * 3), replace(second, levels=(level,) * 4))
+    given = (replace(first, levels=ONE_LEVEL * 3), replace(second, levels=ONE_LEVEL * 4))
     lower = (replace(given[0], fallback_level=1), replace(given[1], fallback=None))
     for some, fallback, levels in (
         (given, True, [2, 3]),

@@ -32,7 +32,7 @@ def write_toy(content: Content) -> Iterator[tuple[str, str]]:
     yield "toy.txt", f"{content.cells.cell_count} cells\n"
 
 
-def read_toy(name: str, data: bytes, found: object) -> int | None:
+def read_toy(path: str, data: bytes) -> int | None:
     number, _, what = data.decode().partition(" ")
     return int(number) if what in ("shapes\n", "cells\n") else None
 
@@ -40,7 +40,7 @@ def read_toy(name: str, data: bytes, found: object) -> int | None:
 def check_toy(database: ServedDatabase) -> Mapping[str, int]:
     cells = [path for path in database.held if path.startswith("toys/")]
     if database.held.get("toy.txt") != len(cells):
-        database.add("PTM-D730", "toy.txt", "", "counts other cells than there are")
+        database.at("toy.txt").add("PTM-D730", "counts other cells than there are")
     return {"shapes": sum(database.held[path] for path in cells)}
 
 

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from ptmtools.database.fault import FileError
 from ptmtools.database.floats import decimal, row_texts, single
-from ptmtools.database.vrml.reader import HEADER, parse
+from ptmtools.database.vrml.pattern import HEADER
+from ptmtools.database.vrml.reader import parse
 from ptmtools.database.vrml.text import chosen, field, listed, loops, quoted
 from ptmtools.errors import DatabaseError
 
@@ -159,7 +160,7 @@ def test_lists() -> None:
 
 
 def document(body: str) -> bytes:
-    return f"{HEADER}\n{body}\n".encode()
+    return f"{HEADER}{body}\n".encode()
 
 
 @given(st.text())
@@ -177,10 +178,11 @@ def test_points_read_back(points: list[tuple[float, float, float]]) -> None:
     array = np.array(points, np.float32).reshape(-1, 3)
     text = field(row_texts(array + np.float32(0)))
     data = document(
-        f"Shape {{ geometry IndexedFaceSet {{ coord Coordinate {{ point {text} }} }} }}"
+        f"Shape {{ appearance Appearance {{ }} geometry IndexedFaceSet {{"
+        f" coord Coordinate {{ point {text} }} coordIndex [ ] }} }}"
     )
     (shape,) = parse(data).nodes
-    read = shape.fields["geometry"].fields["coord"].fields["point"]
+    read = shape.at("geometry", "coord")["point"]
     np.testing.assert_array_equal(read.reshape(-1, 3).astype(np.float32), array)
 
 
@@ -201,7 +203,8 @@ def test_points_read_back(points: list[tuple[float, float, float]]) -> None:
         ("Shape { geometry IndexedFaceSet { solid TRUE solid TRUE } }", "PTM-D661", "line 2"),
         ("Shape { geometry Material { } }", "PTM-D661", "line 2"),
         ("DEF a.b Shape { }", "PTM-D661", "line 2"),
-        ("DEF a Shape { }\nDEF a Shape { }", "PTM-D661", "line 3"),
+        ("DEF a WorldInfo { }\nDEF a WorldInfo { }", "PTM-D661", "line 3"),
+        ("\nShape { appearance Appearance { } }", "PTM-D663", "line 3"),
         ("USE a", "PTM-D661", "line 2"),
         ("PTMCell { }", "PTM-D661", "line 2"),
         ("PROTO P [ field SFFoo a 1 ] { WorldInfo { } }", "PTM-D661", "line 2"),

@@ -13,7 +13,6 @@ import pytest
 from ptmtools.errors import InputError, LimitError, MissingComponentError
 from ptmtools.scene import ingest, meshlab
 from ptmtools.scene.formats import read_other
-from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import Findings
 
 from .conftest import Put, noise, png
@@ -167,7 +166,6 @@ def test_nothing_is_imported_from_the_present_folder(
 @pytest.mark.parametrize("name", ["wall.stl", "mixed.off"])
 def test_triangles_are_counted(put: Put, pymeshlab: None, name: str) -> None:
     path = put(name, MODELS[name])
-    folder = Folder(path.parent)
-    assert len(read_other(path, folder, Findings(path), 3).triangles) in (2, 3)
+    assert len(read_other(path, Findings(path), 3).triangles) in (2, 3)
     with pytest.raises(LimitError, match="PTM-L203"):
-        read_other(path, folder, Findings(path), 1)
+        read_other(path, Findings(path), 1)

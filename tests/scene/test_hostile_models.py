@@ -26,7 +26,6 @@ from ptmtools.scene import mtl as mtl_module
 from ptmtools.scene import obj as obj_module
 from ptmtools.scene.images import ImageStore
 from ptmtools.scene.obj import read_obj
-from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import FileRange, Findings
 from tests.memory import little_memory
 
@@ -233,16 +232,18 @@ def test_masks_are_kept_in_bits(textured: Callable[..., Path]) -> None:
     pixels = np.full((1024, 1023, 4), 255, np.uint8)
     pixels[700, 1000:, 3] = 0
     path = textured("map_Kd wall.png", {"wall.png": png(pixels)})
-    texture = read_obj(path, Folder(path.parent), Findings(path)).materials[0].texture
+    texture = read_obj(path, Findings(path)).materials[0].texture
     assert texture is not None
-    store = ImageStore(Findings(path), Folder(path.parent), 1 << 30)
+    store = ImageStore(Findings(path), 1 << 30)
     decoded = store.add(texture)
     assert decoded is not None
-    assert decoded.holes is not None
-    assert np.array_equal(decoded.holes, pixels[..., 3] < 255)
+    index, holes = decoded
+    assert index == 0
+    assert holes is not None
+    assert np.array_equal(holes, pixels[..., 3] < 255)
     (examined,) = store._examined.values()
-    assert examined.holes is not None
-    assert examined.holes.bits.nbytes == 1024 * 1023 // 8
+    assert examined.bits is not None
+    assert examined.bits.nbytes == 1024 * 1024 // 8
 
 
 def test_an_image_that_many_materials_name_is_read_once(
@@ -263,7 +264,7 @@ def test_an_image_that_many_materials_name_is_read_once(
 
 
 def read(path: Path, max_triangles: int = 1 << 31) -> int:
-    source = read_obj(path, Folder(path.parent), Findings(path), max_triangles=max_triangles)
+    source = read_obj(path, Findings(path), max_triangles=max_triangles)
     return len(source.triangles)
 
 

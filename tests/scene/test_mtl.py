@@ -115,7 +115,7 @@ def test_tint_and_opacity(
 ) -> None:
     path = put("a.mtl", "# made by hand\n\nnewmtl m\n" + lines + "\n")
     findings = Findings(path)
-    material = read_mtl(path, "a.mtl", findings)["m"]
+    material = read_mtl(path, findings)["m"]
     assert (material.color, material.dissolve) == (color, dissolve)
     assert findings.notes == ()
 
@@ -123,7 +123,7 @@ def test_tint_and_opacity(
 def test_lines_not_understood_and_names_defined_twice(put: Callable[..., Path]) -> None:
     path = put("a.mtl", "newmtl m\r\nKd red\r\nd\r\nmap_Kd -s\r\nnewmtl m\r\nKd 1 1 1\r\n")
     findings = Findings(path)
-    assert read_mtl(path, "a.mtl", findings)["m"].color is None
+    assert read_mtl(path, findings)["m"].color is None
     said = [(n.code, n.place) for n in findings.notes]
     assert said == [
         ("PTM-N214", "a.mtl:2"),

@@ -12,19 +12,18 @@ from hypothesis import strategies as st
 
 from ptmtools.errors import InputError
 from ptmtools.scene.obj import read_obj
-from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import Findings, Source
 
 from .conftest import QUAD
 
 
 def read(path: Path) -> Source:
-    return read_obj(path, Folder(path.parent), Findings(path))
+    return read_obj(path, Findings(path))
 
 
 def codes(path: Path) -> dict[str, int]:
     findings = Findings(path)
-    read_obj(path, Folder(path.parent), findings)
+    read_obj(path, findings)
     return {note.code: note.count for note in findings.notes}
 
 
@@ -103,7 +102,7 @@ def test_several_libraries_and_names_with_blanks(
 def test_what_is_skipped_is_counted(put: Callable[..., Path]) -> None:
     path = put("a.obj", QUAD + "vn 0 0 1\ns off\nl 1 2\nl 2 3\nblah 1\nf 1 2\nf 1 2 3\n")
     findings = Findings(path)
-    read_obj(path, Folder(path.parent), findings)
+    read_obj(path, findings)
     said = {(n.code, n.place): n.count for n in findings.notes}
     assert said == {
         ("PTM-N219", "a.obj:11"): 2,

@@ -10,7 +10,6 @@ from ptmtools.lazy import Lazy
 
 if TYPE_CHECKING:
     from ptmtools.database.content import Content
-    from ptmtools.database.validation.findings import Findings
     from ptmtools.database.validation.served import ServedDatabase
 
 #: Suffix of a gzip copy.
@@ -30,8 +29,9 @@ class Emitter:
     entry: the one of its files that leads to the others; written when those are on the disk.
     writer: function from a `Content` to the files, as (path in the served folder, str or bytes);
         what it can refuse, it refuses before it gives the first.
-    reader: function from (name, bytes, `Findings`) of one of its files to what the check needs of
-        it, None if that cannot be had; called from several threads. Without one nothing is read.
+    reader: function from (path in the served folder, bytes) of one of its files to what the check
+        needs of it, None if that cannot be had; called from several threads. Raises FileError, see
+        `ptmtools.database.fault`. Without one nothing is read.
     check: function from a `ServedDatabase` to the counts of the manifest that it can tell, by name.
         Without one there is nothing to check.
     before: what the name alone meant in the release before, if that was something else.
@@ -42,7 +42,7 @@ class Emitter:
     owns: tuple[str, ...]
     entry: str
     writer: Lazy[Callable[[Content], Iterator[tuple[str, str | bytes]]]]
-    reader: Lazy[Callable[[str, bytes, Findings], object | None]] | None = None
+    reader: Lazy[Callable[[str, bytes], object | None]] | None = None
     check: Lazy[Callable[[ServedDatabase], Mapping[str, int]]] | None = None
     before: str = ""
 
@@ -55,9 +55,9 @@ class Emitter:
         """Path in the served folder and contents of each of its files, in the order of writing."""
         return self.writer.load()(content)
 
-    def read(self, name: str, data: bytes, found: Findings) -> object | None:
-        """What the check needs of a file, named relative to the database."""
-        return self.reader.load()(name, data, found) if self.reader else data
+    def read(self, path: str, data: bytes) -> object | None:
+        """What the check needs of a file."""
+        return self.reader.load()(path, data) if self.reader else data
 
     def validate(self, database: ServedDatabase) -> Mapping[str, int]:
         """Holds its files against each other and against those of others; returns counts."""

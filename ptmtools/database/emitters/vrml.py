@@ -11,7 +11,7 @@ VRML = Emitter(
     about="VRML97 files and hints.json",
     owns=(ROOT, HINTS, f"{CELL_FOLDER}/"),
     entry=ROOT,
-    writer=Lazy("ptmtools.database.vrml.files:vrml_files"),
+    writer=Lazy("ptmtools.database.vrml.root:vrml_files"),
     reader=Lazy("ptmtools.database.validation.vrml:read_file"),
     check=Lazy("ptmtools.database.validation.vrml:check_files"),
 )

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ptmtools import schemas
-from ptmtools.database.fault import FileError
+from ptmtools.database.fault import FileError, shaped
 from ptmtools.errors import LimitError
 from ptmtools.glb import BINARY, JSON, glb, glb_chunks
 
@@ -19,9 +19,7 @@ _AROUND = 34
 def pack(document: Mapping[str, Any], binary: bytes) -> bytes:
     """A GLB of a JSON document and the bytes of its only buffer, which may be empty.
 
-    Raises
-    ------
-    LimitError: PTM-L600 it is longer than a GLB can be, 4 GiB.
+    Raises LimitError: PTM-L600 it is longer than a GLB can be, 4 GiB.
     """
     text = json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode(
         "utf-8", "replace"
@@ -38,16 +36,13 @@ def pack(document: Mapping[str, Any], binary: bytes) -> bytes:
 def unpack(data: bytes) -> tuple[Any, bytes]:
     """The JSON document of a GLB and its bytes, padding included.
 
-    Raises
-    ------
-    FileError: PTM-D731 if it is not what `pack` writes.
+    Raises FileError: PTM-D731 if it is not what `pack` writes.
     """
     try:
         chunks = [(kind, body) for kind, _, body in glb_chunks(data)]
         if [kind for kind, _ in chunks[1:]] not in ([], [BINARY]) or glb(chunks) != data:
             raise ValueError("not JSON and BIN alone, each of a multiple of 4 bytes", "byte 12")
-        return schemas.parse(chunks[0][1]), b"".join(body for _, body in chunks[1:])
-    except schemas.ShapeError as fault:
-        raise FileError("PTM-D731", "JSON", fault.message) from None
     except ValueError as fault:
         raise FileError("PTM-D731", fault.args[1], fault.args[0]) from None
+    with shaped("PTM-D731"):
+        return schemas.parse(chunks[0][1]), b"".join(body for _, body in chunks[1:])

@@ -20,7 +20,6 @@ from ptmtools.database.gltf.material import WHITE, WRAPS
 from ptmtools.glb import COMPONENTS, ITEMS, elements
 
 _VERTICES, _INDICES, _FLOAT = 34962, 34963, 5126
-_LARGEST = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ class ReadMaterial:
     wrap: numbers of the sampler for s and t.
     """
 
-    factor: tuple[float, float, float, float]
+    factor: tuple[float, ...]
     two_sided: bool
     blends: bool
     image: str | None
@@ -76,10 +75,8 @@ class ReadGlb:
 def read_glb(data: bytes) -> ReadGlb:
     """The cell of a GLB.
 
-    Raises
-    ------
-    FileError: PTM-D731 no GLB; PTM-D732 not in the emission pattern; PTM-D733 an accessor out of
-        its bytes; PTM-D734 indices; PTM-D735 numbers.
+    Raises FileError: PTM-D731 no GLB; PTM-D732 not in the emission pattern; PTM-D733 an accessor
+    out of its bytes; PTM-D734 indices; PTM-D735 numbers.
     """
     document, binary = unpack(data)
     try:
@@ -151,10 +148,8 @@ class _Reader:
     ) -> NDArray[Any]:
         """(count, items) of an accessor that has such elements and a view for such data."""
         place, accessor = f"accessors[{index}]", self._row("accessors", index)
-        view, component = (
-            self._row("bufferViews", accessor["bufferView"]),
-            accessor["componentType"],
-        )
+        view = self._row("bufferViews", accessor["bufferView"])
+        component = accessor["componentType"]
         self._row("buffers", view["buffer"])
         if accessor["type"] != form or component not in components:
             _foreign(place, f"{accessor['type']} of component type {component}")
@@ -172,16 +167,14 @@ class _Reader:
         return found
 
     def _check_bounds(self, index: int, point: NDArray[np.float32]) -> None:
-        place, accessor = f"accessors[{index}]", self._tree["accessors"][index]
         for name, held in (("min", point.min(axis=0)), ("max", point.max(axis=0))):
-            if name not in accessor:
-                _foreign(place, f"has no {name}")
+            written = np.array(self._tree["accessors"][index].get(name, ()), np.float64)
             # In single precision, as they are written.
-            bounds = zip(accessor[name], held, strict=True)
-            if any(abs(v) > _LARGEST or np.float32(v) != h for v, h in bounds):
-                raise FileError(
-                    "PTM-D735", place, f"{name} is not that of the data, {held.tolist()}"
-                )
+            with np.errstate(over="ignore"):
+                same = np.array_equal(written.astype(np.float32), held)
+            if not same:
+                message = f"{name} is not that of the data, {held.tolist()}"
+                raise FileError("PTM-D735", f"accessors[{index}]", message)
 
     def _material(self, index: int) -> ReadMaterial:
         material = self._row("materials", index)
@@ -195,7 +188,7 @@ class _Reader:
             if _wrap(sampler) != wrap:
                 _foreign(f"materials[{index}]", "its sampler wraps otherwise than its extras say")
         return ReadMaterial(
-            factor=(factor[0], factor[1], factor[2], factor[3]),
+            factor=tuple(factor),
             two_sided=material.get("doubleSided", False),
             blends=material.get("alphaMode") == "BLEND",
             image=image,

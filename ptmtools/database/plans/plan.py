@@ -20,8 +20,9 @@ from ptmtools.database.model import PlotOptions, PlotReport
 from ptmtools.database.plans.leaks import LEAK, draw_leaks, leaks_by_portal
 from ptmtools.database.plans.storeys import cut_height, storeys
 from ptmtools.database.section import area, leaf_section, polygon_section, triangle_section
-from ptmtools.errors import DatabaseError, InputError, MissingComponentError
+from ptmtools.errors import DatabaseError, InputError
 from ptmtools.files import write_bytes
+from ptmtools.lazy import component
 from ptmtools.quantities import count
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
@@ -82,19 +83,16 @@ def plot_plan(
         raise InputError(
             "PTM-I601", "what the cell sees has not been computed yet", remedy="run `ptm pvs` first"
         )
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-    except ImportError as fault:
-        raise MissingComponentError(
-            "PTM-M600", "a plan needs matplotlib", remedy="pip install 'ptmtools[plot]'"
-        ) from fault
+    agg = component(
+        "matplotlib.backends.backend_agg", "PTM-M600", "a plan needs matplotlib", "plot"
+    )
     if cells.cell_count == 0:
         raise DatabaseError(
             "PTM-D600", "there are no cells", remedy="subdivide a model that has rooms"
         )
     floors = storeys(cells, options.height, options.storey_gap)
     figure = _Plan(scene, cells, pvs, ach, options, floors).draw()
-    FigureCanvasAgg(figure)
+    agg.FigureCanvasAgg(figure)
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None}, facecolor=_PAPER)
     data = buffer.getvalue()

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.validation.findings import Findings
+from ptmtools.database.validation.findings import Place
 from ptmtools.database.validation.lists import check_list, check_shares
-from ptmtools.database.validation.solids import MOST_CORNERS, SolidError, farthest, solid_planes
+from ptmtools.database.validation.solids import (
+    MOST_CORNERS,
+    Planes,
+    Points,
+    SolidError,
+    farthest,
+    solid_planes,
+)
 from ptmtools.database.vrml.hull import convex_hull
 from ptmtools.database.vrml.reader import Document, Node
 from ptmtools.errors import DatabaseError
@@ -19,15 +26,6 @@ from ptmtools.tolerance import Tolerance
 
 #: How far the ach values as written, single precision, may sum up beside 1.
 ACH_SLACK = 1e-5
-_CELL = {
-    "cellName": "SFString",
-    "hullPoint": "MFVec3f",
-    "hullIndex": "MFInt32",
-    "adjacentUrl": "MFString",
-    "visibleUrl": "MFString",
-    "ach": "MFFloat",
-}
-_LEAVES = {"leafPoint": "MFVec3f", "leafStart": "MFInt32"}
 
 
 @dataclass(frozen=True)
@@ -55,28 +53,19 @@ class ReadCell:
     textures: tuple[tuple[str, ...], ...]
 
 
-def read_cell(document: Document, file: str, found: Findings) -> ReadCell | None:
-    """The cell of a file, or None, and PTM-D663, if it lacks part of the pattern."""
+def read_cell(document: Document, at: Place) -> ReadCell | None:
+    """The cell of a file, or None, and PTM-D663, if there is not one."""
     nodes = document.of_type("PTMCell")
     if len(nodes) != 1:
-        found.add("PTM-D663", file, "", f"{len(nodes)} PTMCell nodes, not 1")
+        at.add("PTM-D663", f"{len(nodes)} PTMCell nodes, not 1")
         return None
-    fields, declared = nodes[0].fields, document.protos["PTMCell"]
-    if declared not in (_CELL, _CELL | _LEAVES):
-        found.add("PTM-D663", file, "", "PROTO PTMCell does not declare the pattern's fields")
-        return None
-    if missing := [f for f in declared if f not in fields]:
-        found.add("PTM-D663", file, f"line {nodes[0].line}", f"PTMCell lacks {missing[0]}")
-        return None
-    textures: dict[int, Node] = {}
-    held = [fields["hullPoint"]]
-    for shape in document.of_type("Shape"):
-        texture, coord = shape.child("appearance", "texture"), shape.child("geometry", "coord")
-        if texture is not None:
-            textures[id(texture)] = texture
-        if coord is not None and "point" in coord.fields:
-            held.append(coord.fields["point"])
-    points = np.concatenate(held) if any(map(len, held)) else np.zeros((1, 3))
+    fields, shapes = nodes[0].fields, document.of_type("Shape")
+    held = [fields["hullPoint"], *(s.at("geometry", "coord")["point"] for s in shapes)]
+    points = np.concatenate([some for some in held if len(some)] or [np.zeros((1, 3))])
+    leaves = []
+    if "leafPoint" in fields:
+        leaves = np.split(fields["leafPoint"], fields["leafStart"][1:])
+    textures = [s.at("appearance", "texture") for s in shapes]
     return ReadCell(
         name=fields["cellName"],
         adjacent=fields["adjacentUrl"],
@@ -84,119 +73,93 @@ def read_cell(document: Document, file: str, found: Findings) -> ReadCell | None
         ach=fields["ach"],
         hull=fields["hullPoint"],
         box=np.stack([points.min(axis=0), points.max(axis=0)]),
-        leaves=tuple(np.split(fields["leafPoint"], fields["leafStart"][1:]))
-        if "leafPoint" in fields
-        else (),
-        textures=tuple(dict.fromkeys(t.fields.get("url", ()) for t in textures.values())),
+        leaves=tuple(leaves),
+        textures=tuple(dict.fromkeys(texture["url"] for texture in textures if texture)),
     )
 
 
 def check_cell(
-    document: Document,
-    cell: ReadCell,
-    file: str,
-    box: NDArray[np.float64],
-    tolerance: Tolerance,
-    found: Findings,
+    document: Document, cell: ReadCell, box: NDArray[np.float64], tolerance: Tolerance, at: Place
 ) -> None:
     """Checks all that needs no other cell.
 
-    ``file`` is relative to the database; ``box`` (2, 3) holds the hulls of all cells. Geometry
-    beyond a face of that box is in order: a model that is open is subdivided within its walls,
-    and what lies farther out belongs to the cells at the rim. There the hull of several leaves may
-    lean inwards, and what lies before one of the leaves is in order too.
+    ``box`` (2, 3) holds the hulls of all cells. Geometry beyond a face of that box is in order: a
+    model that is open is subdivided within its walls, and what lies farther out belongs to the
+    cells at the rim. There the hull of several leaves may lean inwards, and what lies before one of
+    the leaves is in order too.
     """
-    node = document.of_type("PTMCell")[0]
-    place = f"line {node.line}"
-    body = _Body(node, box, tolerance)
-    for code, fault in body.faults:
-        found.add(code, file, place, fault)
+    (node,) = document.of_type("PTMCell")
+    own, here = at.file.rpartition("/")[2], at.at(f"line {node.line}")
+    hull = _check_hull(node, cell, tolerance, here)
+    leaves = _check_leaves(node, cell, hull, tolerance, here)
+    body, bodies = _without_rim(hull, box, tolerance), None
     for shape in document.of_type("Shape"):
-        where = f"line {shape.line}" + (f", {shape.name}" if shape.name else "")
-        _check_shape(shape, file, where, found)
-        coord = shape.child("geometry", "coord")
-        if coord is not None and "point" in coord.fields:
-            far = body.outside(coord.fields["point"])
-            if far > tolerance.cluster:
-                found.add("PTM-D684", file, where, f"geometry lies {far:.3g} m outside of the hull")
-    own = file.rpartition("/")[2]
+        there = at.at(f"line {shape.line}" + (f", {shape.name}" if shape.name else ""))
+        _check_shape(shape, there)
+        points = shape.at("geometry", "coord")["point"]
+        far = farthest(body, points)
+        if (far > tolerance.cluster).any():  # seldom
+            bodies = _leaf_bodies(leaves, box, tolerance) if bodies is None else bodies
+            far = np.min([far, *(farthest(planes, points) for planes in bodies)], axis=0)
+        if (most := far.max(initial=0.0)) > tolerance.cluster:
+            there.add("PTM-D684", f"geometry lies {most:.3g} m outside of the hull")
     if f"{cell.name}.wrl" != own:
-        found.add("PTM-D698", file, place, f"cellName is {cell.name!r}")
-    check_list("adjacentUrl", own, cell.adjacent, file, place, found)
-    check_list("visibleUrl", own, cell.visible, file, place, found)
+        here.add("PTM-D698", f"cellName is {cell.name!r}")
+    check_list("adjacentUrl", own, cell.adjacent, here)
+    check_list("visibleUrl", own, cell.visible, here)
     if len(cell.ach) != len(cell.visible):
-        message = f"{len(cell.ach)} ach values for {len(cell.visible)} visible cells"
-        found.add("PTM-D691", file, place, message)
-    check_shares(cell.ach, ACH_SLACK, file, place, ("PTM-D692", "PTM-D693"), found)
+        here.add("PTM-D691", f"{len(cell.ach)} ach values for {len(cell.visible)} visible cells")
+    check_shares(cell.ach, ACH_SLACK, ("PTM-D692", "PTM-D693"), here)
 
 
-class _Body:
-    """The convex body of a cell, and if it has several, its leaves.
+def _check_hull(node: Node, cell: ReadCell, tolerance: Tolerance, at: Place) -> Planes:
+    """The planes of the hull, none if it is not sound."""
+    triangles = _loops(node.fields["hullIndex"], len(cell.hull))
+    if triangles is None or len(triangles) < 4:
+        at.add("PTM-D683", "hullIndex is not a list of triangles over hullPoint")
+    else:
+        try:
+            return solid_planes(cell.hull, triangles.tolist(), tolerance)
+        except SolidError as fault:
+            at.add("PTM-D683", f"the hull {fault}")
+    return np.zeros((0, 4))
 
-    Attributes
-    ----------
-    faults: codes and what is wrong.
-    """
 
-    def __init__(self, node: Node, box: NDArray[np.float64], tolerance: Tolerance) -> None:
-        self.faults: list[tuple[str, str]] = []
-        self._box, self._tolerance = box, tolerance
-        self._leaves: list[NDArray[np.float64]] = []
-        hull = np.zeros((0, 4))
-        points, fields = node.fields["hullPoint"], node.fields
-        triangles = _loops(fields["hullIndex"], len(points))
-        if triangles is None or len(triangles) < 4:
-            self.faults.append(("PTM-D683", "hullIndex is not a list of triangles over hullPoint"))
-        else:
-            try:
-                hull = solid_planes(points, triangles.tolist(), tolerance)
-            except SolidError as fault:
-                self.faults.append(("PTM-D683", f"the hull {fault}"))
-        self._hull = self._without_rim(hull)
-        if "leafPoint" in fields and "leafStart" in fields:
-            leaves = np.split(fields["leafPoint"], fields["leafStart"][1:])
-            sizes = [len(leaf) for leaf in leaves]
-            start = np.cumsum([0, *sizes[:-1]])
-            cut = len(fields["leafStart"]) > 1 and np.array_equal(fields["leafStart"], start)
-            if not cut or min(sizes) < 4 or max(sizes) > MOST_CORNERS:
-                self.faults.append(("PTM-D685", "leafStart does not cut leafPoint into leaves"))
-            else:
-                self._leaves = leaves
-            far = farthest(hull, fields["leafPoint"]).max(initial=0.0)
-            if far > tolerance.cluster:
-                self.faults.append(("PTM-D684", f"a leaf lies {far:.3g} m outside of the hull"))
+def _check_leaves(
+    node: Node, cell: ReadCell, hull: Planes, tolerance: Tolerance, at: Place
+) -> tuple[Points, ...]:
+    """The points of the leaves, if the cell has several that are sound."""
+    if not cell.leaves:
+        return ()
+    far = farthest(hull, node.fields["leafPoint"]).max(initial=0.0)
+    if far > tolerance.cluster:
+        at.add("PTM-D684", f"a leaf lies {far:.3g} m outside of the hull")
+    sizes, start = [len(leaf) for leaf in cell.leaves], node.fields["leafStart"]
+    cut = len(start) > 1 and np.array_equal(start, np.cumsum([0, *sizes[:-1]]))
+    if cut and min(sizes) >= 4 and max(sizes) <= MOST_CORNERS:
+        return cell.leaves
+    at.add("PTM-D685", "leafStart does not cut leafPoint into leaves")
+    return ()
 
-    def outside(self, points: NDArray[np.float64]) -> float:
-        """How far the farthest of (n, 3) points lies outside, metres; 0 if none does."""
-        far = farthest(self._hull, points)
-        if not (far > self._tolerance.cluster).any():
-            return 0.0
-        for planes in self._leaf_planes:
-            far = np.minimum(far, farthest(planes, points))
-        return float(far.max(initial=0.0))
 
-    @cached_property
-    def _leaf_planes(self) -> list[NDArray[np.float64]]:
-        """Of each leaf that is not flat. Most cells have nothing outside of their hulls, and never
-        ask."""
-        bodies = []
-        for leaf in self._leaves:
-            try:
-                points, triangles = convex_hull(leaf.astype(np.float32))
-                planes = solid_planes(
-                    points.astype(np.float64), triangles.tolist(), self._tolerance
-                )
-            except (DatabaseError, SolidError):
-                continue
-            bodies.append(self._without_rim(planes))
-        return bodies
+def _leaf_bodies(
+    leaves: Iterable[Points], box: NDArray[np.float64], tolerance: Tolerance
+) -> list[Planes]:
+    """The planes of each leaf that is not flat."""
+    bodies = []
+    for leaf in leaves:
+        with suppress(DatabaseError, SolidError):
+            points, triangles = convex_hull(leaf.astype(np.float32))
+            planes = solid_planes(points.astype(np.float64), triangles.tolist(), tolerance)
+            bodies.append(_without_rim(planes, box, tolerance))
+    return bodies
 
-    def _without_rim(self, planes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Planes, but for those of the faces of the box."""
-        box, tolerance = self._box, self._tolerance
-        faces = np.concatenate([-planes[:, 3:] - box[1], -planes[:, 3:] + box[0]], axis=1)
-        outwards = np.concatenate([planes[:, :3], -planes[:, :3]], axis=1) >= tolerance.cosine
-        return planes[~(outwards & (abs(faces) <= tolerance.plane)).any(axis=1)]
+
+def _without_rim(planes: Planes, box: NDArray[np.float64], tolerance: Tolerance) -> Planes:
+    """Planes, but for those of the faces of the box."""
+    faces = np.concatenate([-planes[:, 3:] - box[1], -planes[:, 3:] + box[0]], axis=1)
+    outwards = np.concatenate([planes[:, :3], -planes[:, :3]], axis=1) >= tolerance.cosine
+    return planes[~(outwards & (abs(faces) <= tolerance.plane)).any(axis=1)]
 
 
 def _loops(index: NDArray[np.int64], points: int) -> NDArray[np.int64] | None:
@@ -209,73 +172,45 @@ def _loops(index: NDArray[np.int64], points: int) -> NDArray[np.int64] | None:
     return corners if whole else None
 
 
-def _check_shape(shape: Node, file: str, place: str, found: Findings) -> None:
-    geometry, appearance = shape.child("geometry"), shape.child("appearance")
-    if geometry is None or appearance is None:
-        found.add("PTM-D663", file, place, "a Shape without appearance or geometry")
-        return
-    coord, fields = geometry.child("coord"), list(geometry.fields)
-    if coord is None or "coordIndex" not in fields or "point" not in coord.fields:
-        found.add("PTM-D663", file, place, "an IndexedFaceSet without coord or coordIndex")
-        return
-    if fields.index("coord") > fields.index("coordIndex"):
-        found.add("PTM-D661", file, place, "coordIndex stands before coord")
-    points = len(coord.fields["point"])
-    triangles = _loops(geometry.fields["coordIndex"], points)
+def _check_shape(shape: Node, at: Place) -> None:
+    geometry, points = shape.at("geometry"), shape.at("geometry", "coord")["point"]
+    if list(geometry).index("coord") > list(geometry).index("coordIndex"):
+        at.add("PTM-D661", "coordIndex stands before coord")
+    triangles = _loops(geometry["coordIndex"], len(points))
     if triangles is None:
-        found.add(
-            "PTM-D680", file, place, f"coordIndex is not a list of triangles over {points} points"
-        )
+        at.add("PTM-D680", f"coordIndex is not a list of triangles over {len(points)} points")
     elif len(triangles) == 0 or (triangles == np.roll(triangles, 1, axis=1)).any():
-        found.add("PTM-D680", file, place, "coordIndex has a triangle with two equal corners")
-    count = len(geometry.fields["coordIndex"]) // 4
-    _check_texture(geometry, appearance, count, file, place, found)
-    _check_colours(geometry, appearance, count, file, place, found)
+        at.add("PTM-D680", "coordIndex has a triangle with two equal corners")
+    count = len(geometry["coordIndex"]) // 4
+    _check_texture(shape, count, at)
+    _check_colours(shape, count, at)
 
 
-def _check_texture(
-    geometry: Node, appearance: Node, count: int, file: str, place: str, found: Findings
-) -> None:
-    texture, coord = appearance.child("texture"), geometry.child("texCoord")
-    index = geometry.fields.get("texCoordIndex")
-    if texture is None and coord is None and index is None:
+def _check_texture(shape: Node, count: int, at: Place) -> None:
+    texture, index = shape.at("appearance", "texture"), shape.at("geometry").get("texCoordIndex")
+    coord = shape.at("geometry", "texCoord")
+    if not texture and not coord and index is None:
         return
-    if texture is None or not texture.fields.get("url"):
-        found.add("PTM-D663", file, place, "texture coordinates without a texture")
-    if coord is None or index is None or "point" not in coord.fields:
-        found.add("PTM-D663", file, place, "a texture without texCoord or texCoordIndex")
+    if not texture.get("url"):
+        at.add("PTM-D663", "texture coordinates without a texture")
+    if not coord or index is None:
+        at.add("PTM-D663", "a texture without texCoord or texCoordIndex")
         return
-    points = len(coord.fields["point"])
+    points = len(coord["point"])
     triangles = _loops(index, points)
     if triangles is None:
-        found.add(
-            "PTM-D681",
-            file,
-            place,
-            f"texCoordIndex is not a list of triangles over {points} points",
-        )
+        at.add("PTM-D681", f"texCoordIndex is not a list of triangles over {points} points")
     elif len(triangles) != count:
-        found.add("PTM-D681", file, place, f"texCoordIndex has {len(triangles)} faces of {count}")
+        at.add("PTM-D681", f"texCoordIndex has {len(triangles)} faces of {count}")
 
 
-def _check_colours(
-    geometry: Node, appearance: Node, count: int, file: str, place: str, found: Findings
-) -> None:
-    values: list[Any] = []
-    material, color = appearance.child("material"), geometry.child("color")
-    if material is not None:
-        values += list(material.fields.values())
-    if color is not None:
-        values += list(color.fields.values())
-        colours = len(color.fields.get("color", ()))
-        index = geometry.fields.get("colorIndex", np.zeros(0, np.int64))
-        in_range = ((index >= 0) & (index < colours)).all()
-        if geometry.fields.get("colorPerVertex", True) or len(index) != count or not in_range:
-            found.add(
-                "PTM-D682",
-                file,
-                place,
-                f"colorIndex does not give a colour to each of {count} faces",
-            )
+def _check_colours(shape: Node, count: int, at: Place) -> None:
+    geometry, color = shape.at("geometry"), shape.at("geometry", "color")
+    if color:
+        index = geometry.get("colorIndex", np.zeros(0, np.int64))
+        in_range = ((index >= 0) & (index < len(color["color"]))).all()
+        if geometry.get("colorPerVertex", True) or len(index) != count or not in_range:
+            at.add("PTM-D682", f"colorIndex does not give a colour to each of {count} faces")
+    values = [*shape.at("appearance", "material").values(), *color.values()]
     if any(((v < 0) | (v > 1)).any() for v in values):
-        found.add("PTM-D682", file, place, "a colour or transparency is outside 0 to 1")
+        at.add("PTM-D682", "a colour or transparency is outside 0 to 1")

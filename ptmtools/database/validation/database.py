@@ -25,16 +25,19 @@ from ptmtools.database.validation.files import check_names, served_files
 from ptmtools.database.validation.findings import Findings, one_line
 from ptmtools.database.validation.reading import FileReader
 from ptmtools.database.validation.served import ServedDatabase
-from ptmtools.database.validation.textures import check_ptm
-from ptmtools.database.validation.urls import Urls
+from ptmtools.database.validation.textures import ReadTexture, check_ptm
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.files import open_regular
 from ptmtools.progress import Progress, silent
+from ptmtools.quantities import count
 from ptmtools.store.layout import MANIFEST, SERVED
 from ptmtools.texture.model import Limits
 
 #: Files of others that are named.
 _NAMED = 3
+#: The stages that write served files, and the record of one that has not run.
+_TEXTURES, _EMIT = "textures", "emit"
+_NEVER: dict[str, dict[str, Any]] = {"parameters": {}, "outputs": {}, "counts": {}}
 _LIMITS = Limits()
 
 
@@ -52,9 +55,7 @@ def validate_database(
     limits: files and textures that take more memory are not looked into (PTM-D713).
     workers: threads; 0 is one for each processor. The report is the same.
 
-    Raises
-    ------
-    DatabaseError: PTM-D605 if there is no such folder. All else stands in the report.
+    Raises DatabaseError: PTM-D605 if there is no such folder. All else stands in the report.
     """
     folder = Path(db)
     if not folder.is_dir():
@@ -71,16 +72,14 @@ def validate_database(
 def validate_ptm(path: str | os.PathLike[str], *, limits: Limits = _LIMITS) -> ValidationReport:
     """Checks a single `.ptm`.
 
-    Raises
-    ------
-    InputError: PTM-I602 if it cannot be read. All else stands in the report.
+    Raises InputError: PTM-I602 if it cannot be read. All else stands in the report.
     """
-    file = Path(path)
-    found = Findings()
+    file, found = Path(path), Findings()
+    at = found.at(os.fspath(path))
     try:
         size = os.stat(file).st_size
         if size > limits.decoded_bytes:  # a pipe has none
-            found.add("PTM-D713", os.fspath(path), "", f"{size} bytes")
+            at.add("PTM-D713", f"{size} bytes")
             return ValidationReport(found.issues(), 1, size)
         data = file.read_bytes()
     except OSError as fault:
@@ -90,7 +89,7 @@ def validate_ptm(path: str | os.PathLike[str], *, limits: Limits = _LIMITS) -> V
             file=file,
             remedy="check the name and the permissions",
         ) from fault
-    check_ptm(data, os.fspath(path), limits, found)
+    check_ptm(data, limits, at)
     return ValidationReport(found.issues(), 1, len(data))
 
 
@@ -104,6 +103,7 @@ class _Check:
         self.bytes = 0
         self._folder = folder
         self._limits = limits
+        self._manifest = self.found.at(MANIFEST)
         self._stages: dict[str, dict[str, Any]] = {}
         #: Name relative to the database → hash in the manifest.
         self._outputs: dict[str, str] = {}
@@ -115,29 +115,29 @@ class _Check:
         self._read_manifest()
         there = served_files(self._folder / SERVED, self.found)
         check_names(there, self.found)
-        database = ServedDatabase(self.found, Urls(there, self.found))
+        database = ServedDatabase(there, self.found)
         ours = {path for path in there if self._is_ours(path)}
         self._note_others([path for path in there if path not in ours])
         self._strays = any(f"{SERVED}/{path}" not in self._outputs for path in ours)
         self._read_files(ours, database, progress, workers)
         first, *_ = EMITTERS.values()
-        if "emit" not in self._stages and not any(e.entry in ours for e in EMITTERS.values()):
-            database.add("PTM-D655", first.entry, "", "the stage `emit` has not run")
+        if _EMIT not in self._stages and not any(e.entry in ours for e in EMITTERS.values()):
+            database.at(first.entry).add("PTM-D655", f"the stage `{_EMIT}` has not run")
             return
         listed = {path for path in ours if f"{SERVED}/{path}" in self._outputs} or ours
         present = [e for e in EMITTERS.values() if any(map(e.is_owner, listed))]
         for emitter in {*present, *self._asked_for(present)}:
             for name in emitter.owns:
                 if not (name.endswith("/") or name in ours or f"{SERVED}/{name}" in self._outputs):
-                    database.add("PTM-D651", name, "", "missing")
+                    database.at(name).add("PTM-D651", "missing")
         counts: dict[str, int] = {}
         for emitter in present:
             counts |= emitter.validate(database)
-        self._check_counts("textures", _texture_counts(self._sizes, database))
-        self._check_counts("emit", counts)
-        for path in sorted(ours - database.urls.named):
+        self._check_counts(_TEXTURES, _texture_counts(self._sizes, database))
+        self._check_counts(_EMIT, counts)
+        for path in sorted(ours - database.named):
             if path.startswith(f"{TEXTURE_FOLDER}/"):
-                database.add("PTM-D677", path, "", "no other file names it")
+                database.at(path).add("PTM-D677", "no other file names it")
 
     def _read_manifest(self) -> None:
         """Fills in what the stages wrote."""
@@ -147,19 +147,19 @@ class _Check:
         except OSError as fault:
             gone = isinstance(fault, FileNotFoundError)
             message = "missing" if gone else f"cannot be read ({fault.strerror or fault})"
-            self.found.add("PTM-D650", MANIFEST, "", message)
+            self._manifest.add("PTM-D650", message)
         except schemas.ShapeError as fault:
-            self.found.add("PTM-D650", MANIFEST, fault.place, fault.message)
+            self._manifest.add("PTM-D650", fault.message, fault.place)
         for stage, record in self._stages.items():
+            at = self._manifest.at(f"stages.{stage}")
             for name in sorted(self._outputs.keys() & record["outputs"].keys()):
-                message = f"another stage has written {name}, too"
-                self.found.add("PTM-D650", MANIFEST, f"stages.{stage}", message)
+                at.add("PTM-D650", f"another stage has written {name}, too")
             self._outputs |= record["outputs"]
         for stage, record in self._stages.items():
             for name, digest in record["inputs"].items():
                 if self._outputs.get(name, digest) != digest:
-                    message = f"made from an earlier {name}"
-                    self.found.add("PTM-D656", MANIFEST, f"stages.{stage}", message)
+                    at = self._manifest.at(f"stages.{stage}")
+                    at.add("PTM-D656", f"made from an earlier {name}")
 
     def _is_ours(self, path: str) -> bool:
         """Whether a served file is one that was written, or lies where such files do."""
@@ -170,17 +170,14 @@ class _Check:
         """Other files that users add are theirs."""
         if paths:
             named = ", ".join([*map(one_line, paths[:_NAMED]), *(["…"] if paths[_NAMED:] else [])])
-            what, was = (
-                ("1 file in www/ is", "was")
-                if len(paths) == 1
-                else (f"{len(paths):,} files in www/ are", "were")
-            )
-            self.notes = (f"{what} not from ptmtools, and {was} not checked: {named}",)
+            are, were = ("is", "was") if len(paths) == 1 else ("are", "were")
+            what = f"{count(len(paths), 'file')} in {SERVED}/ {are} not from ptmtools"
+            self.notes = (f"{what}, and {were} not checked: {named}",)
 
     def _asked_for(self, present: Sequence[Emitter]) -> Sequence[Emitter]:
         """The emitters that the manifest names; if it names none, those that there are, or the
         default."""
-        asked = self._stages.get("emit", {"parameters": {}})["parameters"].get("format")
+        asked = self._stages.get(_EMIT, _NEVER)["parameters"].get("format")
         try:
             return chosen_emitters(str(asked))
         except ValueError:
@@ -201,25 +198,25 @@ class _Check:
             self.files += 1
             self.bytes += reading.size
             path = names[i].removeprefix(f"{SERVED}/")
-            if reading.intact and not reading.unreadable:
+            if reading.intact:
                 self._sizes[names[i]] = reading.size
-            if reading.texture is not None:
-                database.textures[path] = reading.texture
-            if reading.held is not None:
+            if isinstance(reading.held, ReadTexture):
+                database.textures[path] = reading.held
+            elif reading.held is not None:
                 database.held[path] = reading.held
         progress(len(names), len(names), "files")
 
     def _check_counts(self, stage: str, counts: Mapping[str, int]) -> None:
         """Holds a stage's counts in the manifest against those of its files; not if one of them is
         not as it was written or could not be read, or if there are more."""
-        record = self._stages.get(stage, {"outputs": {}, "counts": {}})
+        record = self._stages.get(stage, _NEVER)
         if self._strays or record["outputs"].keys() - self._sizes.keys():
             return
         sizes = [self._sizes[name] for name in record["outputs"]]
         for name, true in {"files": len(sizes), "bytes": sum(sizes), **counts}.items():
-            if name in record["counts"] and record["counts"][name] != true:
+            if record["counts"].get(name, true) != true:
                 message = f"is {record['counts'][name]!r}, but the files have {true}"
-                self.found.add("PTM-D659", MANIFEST, f"stages.{stage}.counts.{name}", message)
+                self._manifest.at(f"stages.{stage}.counts.{name}").add("PTM-D659", message)
 
 
 def _texture_counts(sizes: Mapping[str, int], database: ServedDatabase) -> dict[str, int]:

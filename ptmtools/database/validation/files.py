@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Iterable
 from pathlib import Path
 
-from ptmtools.database.validation.findings import Findings
+from ptmtools.database.validation.findings import Findings, Place
 from ptmtools.store.layout import SERVED
 
 #: What zlib calls a stream with the header and the checksum of gzip.
@@ -23,7 +23,7 @@ def served_files(folder: Path, found: Findings) -> list[str]:
     """
     top = os.path.realpath(folder)
     if folder.is_symlink():
-        found.add("PTM-D657", SERVED, "", f"is a link to {top}")
+        found.at(SERVED).add("PTM-D657", f"is a link to {top}")
     files: list[str] = []
     folders = [""]
     while folders:
@@ -34,18 +34,20 @@ def served_files(folder: Path, found: Findings) -> list[str]:
         except FileNotFoundError:
             continue
         except OSError as fault:
-            found.add("PTM-D654", f"{SERVED}/{below}", "", f"cannot be read ({_reason(fault)})")
+            message = f"cannot be read ({fault.strerror or fault})"
+            found.at(f"{SERVED}/{below}").add("PTM-D654", message)
             continue
         for entry in there:
             path = f"{below}{entry.name}"
-            if entry.is_symlink() and not _within(os.path.realpath(entry.path), top):
-                found.add("PTM-D657", f"{SERVED}/{path}", "", f"is a link to {_target(entry)}")
+            target = os.path.realpath(entry.path) if entry.is_symlink() else top
+            if not Path(target).is_relative_to(top):
+                found.at(f"{SERVED}/{path}").add("PTM-D657", f"is a link to {target}")
             elif entry.is_dir(follow_symlinks=False):
                 folders.append(f"{path}/")
-            elif _is_file(entry):
+            elif os.path.isfile(entry):
                 files.append(path)
             else:
-                found.add("PTM-D658", f"{SERVED}/{path}", "", f"is {_kind(entry)}")
+                found.at(f"{SERVED}/{path}").add("PTM-D658", f"is {_kind(entry)}")
     return sorted(files)
 
 
@@ -59,38 +61,27 @@ def check_names(files: Iterable[str], found: Findings) -> None:
             other = known.setdefault(path.casefold(), path)
             if other != path:
                 known[path.casefold()] = path
-                found.add("PTM-D675", f"{SERVED}/{path}", "", f"there is {other} too")
+                found.at(f"{SERVED}/{path}").add("PTM-D675", f"there is {other} too")
 
 
-def check_gzip(copy: bytes, original: bytes | None, file: str, found: Findings) -> None:
+def check_gzip(copy: bytes, original: bytes | None, at: Place) -> None:
     """A gzip copy beside the bytes of what it is the copy of, None if that is not there. It is
     inflated to one byte more than those at most."""
     if original is None:
-        found.add("PTM-D676", file, "", "there is no such file without .gz")
+        at.add("PTM-D676", "there is no such file without .gz")
         return
     inflater = zlib.decompressobj(_GZIP)
     try:
         plain = inflater.decompress(copy, len(original) + 1)
     except zlib.error as fault:
-        found.add("PTM-D676", file, "", f"damaged ({fault})")
+        at.add("PTM-D676", f"damaged ({fault})")
         return
     if plain != original:
-        found.add("PTM-D676", file, "", "does not hold what the file without .gz holds")
+        at.add("PTM-D676", "does not hold what the file without .gz holds")
     elif not inflater.eof:
-        found.add("PTM-D676", file, "", "is cut short")
+        at.add("PTM-D676", "is cut short")
     elif inflater.unused_data:
-        found.add("PTM-D676", file, "", "goes on behind its end")
-
-
-def _within(path: str, folder: str) -> bool:
-    return path == folder or path.startswith(folder.rstrip(os.sep) + os.sep)
-
-
-def _is_file(entry: os.DirEntry[str]) -> bool:
-    try:
-        return entry.is_file()
-    except OSError:  # a link in a circle
-        return False
+        at.add("PTM-D676", "goes on behind its end")
 
 
 def _kind(entry: os.DirEntry[str]) -> str:
@@ -100,14 +91,3 @@ def _kind(entry: os.DirEntry[str]) -> str:
         return "a link to nothing"
     kinds = ((stat.S_ISDIR, "a link to a folder"), (stat.S_ISFIFO, "a pipe"))
     return next((kind for holds, kind in kinds if holds(mode)), "a device")
-
-
-def _target(entry: os.DirEntry[str]) -> str:
-    try:
-        return os.readlink(entry.path)
-    except OSError:
-        return "elsewhere"
-
-
-def _reason(fault: OSError) -> str:
-    return fault.strerror or str(fault)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 from ptmtools.database.model import Issue, Severity
 
@@ -107,6 +108,10 @@ class Findings:
         severity, _ = CODES[code]
         self.take([Issue(code, severity, one_line(file), one_line(place), one_line(message))])
 
+    def at(self, file: str, place: str = "") -> Place:
+        """Who adds what is found there."""
+        return Place(self, file, place)
+
     def take(self, issues: Iterable[Issue]) -> None:
         """Issues that others found."""
         for issue in issues:
@@ -124,6 +129,23 @@ class Findings:
             message = f"{more} more of these"
             found.append(Issue(code, CODES[code][0], file, "", message, more))
         return worst_first(found)
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place in a file, relative to the database, or all of the file; and who is told of it."""
+
+    found: Findings
+    file: str
+    place: str = ""
+
+    def add(self, code: str, message: str, place: str = "") -> None:
+        """One issue, here or at another place in the file."""
+        self.found.add(code, self.file, place or self.place, message)
+
+    def at(self, place: str) -> Place:
+        """Another place in the file."""
+        return Place(self.found, self.file, place)
 
 
 def worst_first(issues: Iterable[Issue]) -> tuple[Issue, ...]:

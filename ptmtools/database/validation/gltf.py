@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools import schemas
-from ptmtools.database.fault import FileError
+from ptmtools.database.fault import shaped
 from ptmtools.database.gltf.cell import flipped
 from ptmtools.database.gltf.material import WRAPS, linear
 from ptmtools.database.gltf.reader import ReadGlb, ReadMaterial, read_glb
@@ -29,44 +29,37 @@ from ptmtools.database.names import (
     cell_name,
     glb_file,
 )
-from ptmtools.database.validation.findings import Findings
+from ptmtools.database.validation.findings import Place
 from ptmtools.database.validation.served import ServedDatabase
 from ptmtools.database.vrml.reader import Document, Node
-from ptmtools.store.layout import SERVED
 
 #: How far a colour may be off that went through the decimals of VRML.
 _SLACK = 1e-5
 
 
-def read_file(name: str, data: bytes, found: Findings) -> Any:
+def read_file(path: str, data: bytes) -> Any:
     """A GLB as `ReadGlb`, or the hints beside them as JSON has them."""
-    try:
-        if name.endswith(".glb"):
-            return read_glb(data)
-        return schemas.parse(data) if name == f"{SERVED}/{GLTF_HINTS}" else None
-    except FileError as fault:
-        found.add(fault.code, name, fault.place, fault.message)
-    except schemas.ShapeError as fault:
-        found.add("PTM-D737", name, "", fault.message)
-    return None
+    if path.endswith(".glb"):
+        return read_glb(data)
+    with shaped("PTM-D737"):
+        return schemas.parse(data) if path == GLTF_HINTS else None
 
 
 def check_files(database: ServedDatabase) -> Mapping[str, int]:
     """Holds them against each other, the hints and the VRML files; counts nothing."""
-    files, held = database.urls.files, database.held
+    files, held = database.files, database.held
     wanted, there = _stems(files, CELL_FOLDER, ".wrl"), _stems(files, GLTF_FOLDER, ".glb")
     for stem in sorted(wanted ^ there):
         what = "is missing" if stem in wanted else "belongs to no cell"
-        database.add("PTM-D730", f"{GLTF_FOLDER}/{stem}.glb", "", what)
+        database.at(f"{GLTF_FOLDER}/{stem}.glb").add("PTM-D730", what)
     if GLTF_HINTS not in files:
-        database.add("PTM-D730", GLTF_HINTS, "", "is missing")
-    hints = held.get(HINTS)
-    wanted_hints = None if hints is None else _moved(hints.document)
+        database.at(GLTF_HINTS).add("PTM-D730", "is missing")
     textures = None
-    if wanted_hints is not None:
-        textures = wanted_hints["textures"]
-        if place := _difference(held.get(GLTF_HINTS, wanted_hints), wanted_hints):
-            database.add("PTM-D737", GLTF_HINTS, place, f"not as in {HINTS}")
+    if HINTS in held:
+        hints = _moved(held[HINTS])
+        textures = hints["textures"]
+        if place := _difference(held.get(GLTF_HINTS, hints), hints):
+            database.at(GLTF_HINTS, place).add("PTM-D737", f"not as in {HINTS}")
     for stem in sorted(there):
         path = f"{GLTF_FOLDER}/{stem}.glb"
         cell: ReadGlb | None = held.get(path)
@@ -74,11 +67,16 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
             continue
         if not cell.name == stem == cell_name(cell.cell):
             message = f"says that it is {cell.name!r}, cell {cell.cell}"
-            database.add("PTM-D732", path, "scene", message)
-        _check_textures(cell, path, textures, database)
+            database.at(path, "scene").add("PTM-D732", message)
+        for material in dict.fromkeys(primitive.material for primitive in cell.primitives):
+            for url in (material.image, material.ptm):
+                if url is not None:
+                    database.resolve(path, url)
+            if textures is not None and material.texture is not None:
+                _check_texture(material, textures, database.at(path, "materials"))
         document: Document | None = held.get(f"{CELL_FOLDER}/{stem}.wrl")
         if document is not None:
-            _compare_shapes(cell, path, document.of_type("Shape"), database)
+            _compare_shapes(cell, document.of_type("Shape"), database.at(path))
     return {}
 
 
@@ -86,56 +84,46 @@ def _moved(hints: Mapping[str, Any]) -> dict[str, Any]:
     """Hints with the URLs that they have beside the GLBs."""
     cells = [cell | {"url": glb_file(i)} for i, cell in enumerate(hints["cells"])]
     textures = [
-        row | {url: UP + row[url] for url in (("file", "fallback")) if row[url] is not None}
+        row | {url: UP + row[url] for url in ("file", "fallback") if row[url] is not None}
         for row in hints["textures"]
     ]
     return {**hints, "cells": cells, "textures": textures}
 
 
-def _check_textures(
-    cell: ReadGlb, path: str, textures: list[Any] | None, database: ServedDatabase
-) -> None:
-    for material in dict.fromkeys(primitive.material for primitive in cell.primitives):
-        for url in (material.image, material.ptm):
-            if url is not None:
-                database.urls.resolve(f"{SERVED}/{path}", url)
-        if textures is None or material.texture is None:
-            continue
-        if not 0 <= material.texture < len(textures):
-            message = f"the hints have no texture {material.texture}"
-            database.add("PTM-D736", path, "materials", message)
-            continue
-        record = textures[material.texture]
-        if (material.ptm, material.image) != (record["file"], record["fallback"]):
-            message = f"{material.ptm} and {material.image} are not texture {material.texture}"
-            database.add("PTM-D736", path, "materials", message)
-        elif material.blends and material.factor[3] == 1 and record["components"] in (1, 3):
-            message = f"blends, but texture {material.texture} is opaque"
-            database.add("PTM-D739", path, "materials", message)
+def _check_texture(material: ReadMaterial, textures: list[Any], at: Place) -> None:
+    """A material that says which texture of the hints it has."""
+    place = material.texture
+    assert place is not None
+    if not 0 <= place < len(textures):
+        at.add("PTM-D736", f"the hints have no texture {place}")
+        return
+    record = textures[place]
+    if (material.ptm, material.image) != (record["file"], record["fallback"]):
+        at.add("PTM-D736", f"{material.ptm} and {material.image} are not texture {place}")
+    elif material.blends and material.factor[3] == 1 and record["components"] in (1, 3):
+        at.add("PTM-D739", f"blends, but texture {place} is opaque")
 
 
-def _compare_shapes(cell: ReadGlb, path: str, shapes: list[Node], database: ServedDatabase) -> None:
+def _compare_shapes(cell: ReadGlb, shapes: list[Node], at: Place) -> None:
     if len(shapes) != len(cell.primitives):
-        message = f"{len(cell.primitives)} primitives for {len(shapes)} shapes"
-        database.add("PTM-D738", path, "", message)
+        at.add("PTM-D738", f"{len(cell.primitives)} primitives for {len(shapes)} shapes")
         return
     for primitive, shape in zip(cell.primitives, shapes, strict=True):
-        geometry = shape.at("geometry")
+        here = at.at(primitive.place)
         corners = _corners(shape, "coord", "coordIndex")
         held = primitive.point[primitive.triangle]
         if corners is not None and not np.array_equal(corners.astype(np.float32), held):
-            database.add("PTM-D738", path, primitive.place, f"not the triangles of {shape.name}")
+            here.add("PTM-D738", f"not the triangles of {shape.name}")
         uv = None if primitive.uv is None else primitive.uv[primitive.triangle]
         mapped = _corners(shape, "texCoord", "texCoordIndex")
         if mapped is None:
-            same = uv is None or "texCoord" in geometry
+            same = uv is None or "texCoord" in shape.at("geometry")
         else:
             same = uv is not None and np.array_equal(flipped(mapped.astype(np.float32)), uv)
         if not same:
-            message = f"not the texture coordinates of {shape.name}"
-            database.add("PTM-D738", path, primitive.place, message)
+            here.add("PTM-D738", f"not the texture coordinates of {shape.name}")
         if fault := _other_look(primitive.material, shape):
-            database.add("PTM-D739", path, primitive.place, f"{fault} {shape.name}")
+            here.add("PTM-D739", f"{fault} {shape.name}")
 
 
 def _other_look(material: ReadMaterial, shape: Node) -> str:
@@ -144,42 +132,34 @@ def _other_look(material: ReadMaterial, shape: Node) -> str:
     texture, surface = shape.at("appearance", "texture"), shape.at("appearance", "material")
     if material.two_sided == geometry.get("solid", True):
         return "not the sides of"
-    urls = [url for url in texture.get("url", ()) if isinstance(url, str)]
-    if sorted(urls) != sorted(url for url in (material.image, material.ptm) if url is not None):
+    urls = sorted(url for url in (material.image, material.ptm) if url is not None)
+    if sorted(texture.get("url", ())) != urls:
         return "not the images of"
     wrap = tuple(
         WRAPS["repeat" if texture.get(name, True) else "clamp"] for name in ("repeatS", "repeatT")
     )
     if material.wrap != wrap:
         return "does not wrap as"
-    color = surface.get("diffuseColor")
-    if color is None:
-        color = shape.at("geometry", "color").get("color", np.ones((1, 3)))
-    wanted = np.array(
-        [*(linear(float(c)) for c in np.ravel(color)[:3]), 1 - _scalar(surface, "transparency")]
-    )
-    factor = np.array(material.factor, dtype=np.float64)
-    if wanted.shape != factor.shape or np.abs(wanted - factor).max() > _SLACK:
+    faces = shape.at("geometry", "color").get("color", np.ones((1, 3)))
+    color = surface.get("diffuseColor", faces)
+    alpha = 1 - surface.get("transparency", np.zeros(1))
+    wanted = np.array([*(linear(float(c)) for c in np.ravel(color)[:3]), *alpha])
+    if len(wanted) != 4 or np.abs(wanted - material.factor).max() > _SLACK:
         return "not the colour of"
     if material.factor[3] < 1 and not material.blends:
         return "opaque, unlike"
     return ""
 
 
-def _scalar(fields: Mapping[str, Any], name: str) -> float:
-    values = np.ravel(fields.get(name, 0.0))
-    return float(values[0]) if len(values) else 0.0
-
-
 def _corners(shape: Node, values: str, index: str) -> NDArray[np.float64] | None:
     """(m, 3, k) the points of a shape's triangles; None without, or if the indices are wrong,
     which the check of the VRML file reports."""
-    points = shape.at("geometry", values).get("point")
     try:
-        rows = np.asarray(shape.at("geometry")[index]).reshape(-1, 4)[:, :3]
-        return None if points is None else np.asarray(points)[rows]
+        rows = shape.at("geometry")[index].reshape(-1, 4)[:, :3]
+        corners: NDArray[np.float64] = shape.at("geometry", values)["point"][rows]
     except (KeyError, ValueError, IndexError):
         return None
+    return corners
 
 
 def _difference(own: object, other: dict[str, Any]) -> str:
@@ -203,9 +183,5 @@ def _same(one: object, other: object) -> bool:
 
 def _stems(files: Collection[str], folder: str, suffix: str) -> set[str]:
     """The names, without suffix, of the files of one kind in a folder."""
-    kept = (f for f in files if posixpath.dirname(f) == folder and f.endswith(suffix))
-    return {_stem(file) for file in kept}
-
-
-def _stem(path: str) -> str:
-    return posixpath.splitext(posixpath.basename(path))[0]
+    plain = (posixpath.splitext(file) for file in files if posixpath.dirname(file) == folder)
+    return {posixpath.basename(stem) for stem, end in plain if end == suffix}

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools import schemas
+from ptmtools.database.fault import FileError, shaped
 from ptmtools.database.validation.cells import ReadCell
-from ptmtools.database.validation.findings import Findings
+from ptmtools.database.validation.findings import Place
 from ptmtools.database.validation.lists import check_graph, check_list, check_shares
 from ptmtools.database.validation.space import check_space
 
@@ -22,70 +22,55 @@ ACH_SLACK = 1e-9
 #: Missed mass above this is worth a warning.
 MISSED = 1e-4
 
+#: Hints, or an object in them, as JSON has them: as the schema says, and every index in range.
 Row = Mapping[str, Any]
 #: The files of a texture in the served folder, the fallback image first; None is not there.
 Images = tuple[str | None, ...]
 
 
-@dataclass(frozen=True)
-class ReadHints:
-    """The parts of `hints.json` that other files are compared with, as JSON has them: as the schema
-    says, and every index in range; and all of the `document`."""
-
-    document: Row
-    viewpoints: list[Row]
-    textures: list[Row]
-    cells: list[Row]
-
-
-def read_hints(data: bytes, file: str, found: Findings) -> ReadHints | None:
-    """The hints, or None, and PTM-D700, if they are not what their schema says."""
-    try:
-        document = schemas.read(data, schemas.HINTS)
-        lists = (document[name] for name in ("viewpoints", "textures", "cells"))
-        hints = ReadHints(document, *lists)
-        _check_indices(hints)
-    except schemas.ShapeError as fault:
-        found.add("PTM-D700", file, fault.place, fault.message)
-        return None
+def read_hints(data: bytes) -> Row:
+    """The hints. Raises FileError PTM-D700 if they are not what their schema says."""
+    with shaped("PTM-D700"):
+        hints: Row = schemas.read(data, schemas.HINTS)
+    _check_indices(hints)
     return hints
 
 
-def check_hints(hints: ReadHints, file: str, found: Findings) -> None:
+def check_hints(hints: Row, at: Place) -> None:
     """Checks all that needs no other file."""
-    for i, cell in enumerate(hints.cells):
-        place = f"cells[{i}]"
-        check_list("adjacent", i, cell["adjacent"], file, place, found)
-        check_list("visible", i, cell["visible"], file, place, found)
-        check_list("textures", None, cell["textures"], file, place, found)
+    cells = hints["cells"]
+    places = [at.at(f"cells[{i}]") for i in range(len(cells))]
+    for i, (cell, here) in enumerate(zip(cells, places, strict=True)):
+        check_list("adjacent", i, cell["adjacent"], here)
+        check_list("visible", i, cell["visible"], here)
+        check_list("textures", None, cell["textures"], here)
         ach = np.array(cell["ach"], dtype=np.float64)
-        check_shares(ach, ACH_SLACK, file, place, ("PTM-D702", "PTM-D702"), found)
+        check_shares(ach, ACH_SLACK, ("PTM-D702", "PTM-D702"), here)
         if len(ach) != len(cell["visible"]):
-            message = f"{len(ach)} ach values for {len(cell['visible'])} visible cells"
-            found.add("PTM-D702", file, place, message)
+            here.add("PTM-D702", f"{len(ach)} ach values for {len(cell['visible'])} visible cells")
         elif wrong := _misfit(cell["coverage"], ach):
-            found.add("PTM-D707", file, place, wrong)
+            here.add("PTM-D707", wrong)
         if cell["missed"] > MISSED:
             share = f"{cell['missed']:.3g} of the pixels"
-            found.add("PTM-D703", file, place, f"{share} fell on cells outside the PVS")
-    names = {i: f"cells[{i}]" for i in range(len(hints.cells))}
-    adjacent = {i: cell["adjacent"] for i, cell in enumerate(hints.cells)}
-    visible = {i: cell["visible"] for i, cell in enumerate(hints.cells)}
-    check_graph(adjacent, visible, lambda cell: (file, names[cell]), found)
-    used = {texture for cell in hints.cells for texture in cell["textures"]}
-    for i in sorted(set(range(len(hints.textures))) - used):
-        found.add("PTM-D708", file, f"textures[{i}]", f"no cell uses {hints.textures[i]['file']}")
-    check_space(hints.cells, hints.viewpoints, file, found)
+            here.add("PTM-D703", f"{share} fell on cells outside the PVS")
+    adjacent, visible = (
+        {i: cell[name] for i, cell in enumerate(cells)} for name in ("adjacent", "visible")
+    )
+    check_graph(adjacent, visible, places.__getitem__)
+    used = {texture for cell in cells for texture in cell["textures"]}
+    for i, texture in enumerate(hints["textures"]):
+        if i not in used:
+            at.add("PTM-D708", f"no cell uses {texture['file']}", f"textures[{i}]")
+    check_space(cells, hints["viewpoints"], at)
 
 
 def check_against_cells(
-    hints: ReadHints,
+    hints: Row,
     known: Sequence[str],
     images: Sequence[Images],
     cells: Mapping[str, ReadCell],
     cell_images: Mapping[str, set[Images]],
-    file: str,
-    found: Findings,
+    at: Place,
 ) -> None:
     """Compares with the cell files.
 
@@ -97,8 +82,8 @@ def check_against_cells(
     cell_images: the files of each of their image textures.
     """
     for absent in sorted(set(cells) - set(known)):
-        found.add("PTM-D701", file, "", f"{absent} is missing")
-    for i, (name, row) in enumerate(zip(known, hints.cells, strict=True)):
+        at.add("PTM-D701", f"{absent} is missing")
+    for i, (name, row) in enumerate(zip(known, hints["cells"], strict=True)):
         cell = cells.get(name)
         if cell is None:
             continue
@@ -109,18 +94,18 @@ def check_against_cells(
             "adjacent": tuple(known[c] for c in row["adjacent"]) == cell.adjacent,
             "visible": tuple(known[c] for c in row["visible"]) == cell.visible,
             "ach": _equal_single(row["ach"], cell.ach),
-            "leaves": _same_box(row["leaves"], cell.hull) and _same_leaves(row["leaves"], cell),
+            "leaves": _same_leaves(row["leaves"], cell),
             "textures": listed == shown or not complete,
         }
         for field in (f for f, equal in same.items() if not equal):
-            found.add("PTM-D701", file, f"cells[{i}].{field}", f"differs from {name}")
+            at.add("PTM-D701", f"differs from {name}", f"cells[{i}].{field}")
 
 
-def _check_indices(hints: ReadHints) -> None:
-    cells, textures = len(hints.cells), len(hints.textures)
-    for i, view in enumerate(hints.viewpoints):
+def _check_indices(hints: Row) -> None:
+    cells, textures = len(hints["cells"]), len(hints["textures"])
+    for i, view in enumerate(hints["viewpoints"]):
         _in_range([view["cell"]], cells, f"viewpoints[{i}].cell")
-    for i, cell in enumerate(hints.cells):
+    for i, cell in enumerate(hints["cells"]):
         place = f"cells[{i}]"
         _in_range(cell["adjacent"], cells, f"{place}.adjacent")
         _in_range(cell["visible"], cells, f"{place}.visible")
@@ -135,7 +120,7 @@ def _check_indices(hints: ReadHints) -> None:
 
 def _in_range(indices: Sequence[int], count: int, place: str) -> None:
     if indices and max(indices) >= count:
-        raise schemas.ShapeError(f"the index {max(indices)} is out of range").under(place)
+        raise FileError("PTM-D700", place, f"the index {max(indices)} is out of range")
 
 
 def _misfit(coverage: Row, ach: NDArray[np.float64]) -> str:
@@ -159,23 +144,16 @@ def _misfit(coverage: Row, ach: NDArray[np.float64]) -> str:
     return ""
 
 
-def _equal_single(full: Sequence[Any], written: Any) -> bool:
-    return np.array_equal(np.array(full, np.float32), np.asarray(written).astype(np.float32))
-
-
-def _same_box(leaves: Sequence[Row], hull: Any) -> bool:
-    points = np.array([p for leaf in leaves for p in leaf["points"]], np.float64).reshape(-1, 3)
-    if len(points) == 0 or len(hull) == 0:
-        return False
-    single, other = points.astype(np.float32), np.asarray(hull).astype(np.float32)
-    return bool(
-        (single.min(axis=0) == other.min(axis=0)).all()
-        and (single.max(axis=0) == other.max(axis=0)).all()
-    )
+def _equal_single(full: Sequence[Any], written: NDArray[np.float64]) -> bool:
+    return np.array_equal(np.array(full, np.float32), written.astype(np.float32))
 
 
 def _same_leaves(leaves: Sequence[Row], cell: ReadCell) -> bool:
-    if len(leaves) != max(len(cell.leaves), 1):
+    """Whether the leaves are those of the file, if it has some, and reach as far as its hull."""
+    if len(leaves) != max(len(cell.leaves), 1) or not len(cell.hull):
         return False
+    points = [point for leaf in leaves for point in leaf["points"]]
     pairs = zip(leaves, cell.leaves, strict=False)
-    return all(_equal_single(leaf["points"], points) for leaf, points in pairs)
+    return all(_equal_single(leaf["points"], written) for leaf, written in pairs) and all(
+        _equal_single(end(points, axis=0), end(cell.hull, axis=0)) for end in (np.min, np.max)
+    )

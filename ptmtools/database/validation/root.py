@@ -9,14 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.validation.findings import Findings
-from ptmtools.database.vrml.reader import Document, Node
-from ptmtools.database.vrml.root import PATTERN
+from ptmtools.database.validation.findings import Place
+from ptmtools.database.vrml.pattern import PATTERN
+from ptmtools.database.vrml.reader import Document
 from ptmtools.tolerance import PARALLEL_COSINE
-
-_PROTO = {"viewpoint": "SFString", "cellUrl": "MFString"}
-#: What a Viewpoint and a viewpoint of the hints both have, under the same names.
-_POSE = ("position", "orientation", "fieldOfView", "description")
 
 
 @dataclass(frozen=True)
@@ -26,96 +22,75 @@ class ReadRoot:
     Attributes
     ----------
     viewpoints: DEF name of each viewpoint → URL of its cell.
-    poses: DEF name → the viewpoint.
-    inlines: URL → (2, 3) centre and size of its bounding box, as written, if it has one.
+    poses: DEF name → the viewpoint's fields, which are named as in the hints.
+    inlines: URL → (2, 3) centre and size of its bounding box, as written.
     """
 
     viewpoints: dict[str, str]
-    poses: dict[str, Node]
-    inlines: dict[str, NDArray[np.float64] | None]
+    poses: dict[str, dict[str, Any]]
+    inlines: dict[str, NDArray[np.float64]]
 
 
-def read_root(document: Document, file: str, found: Findings) -> ReadRoot:
+def read_root(document: Document, at: Place) -> ReadRoot:
     """The root of a file; parts that are missing are left out, with PTM-D663."""
     for type in ("WorldInfo", "NavigationInfo"):
         if len(document.of_type(type)) != 1:
-            found.add("PTM-D663", file, "", f"not one {type}")
-    poses = {v.name: v for v in document.of_type("Viewpoint")}
-    for name, pose in poses.items():
-        if missing := [field for field in _POSE if field not in pose.fields]:
-            found.add("PTM-D663", file, f"line {pose.line}", f"{name} lacks {missing[0]}")
+            at.add("PTM-D663", f"not one {type}")
+    poses = {v.name: v.fields for v in document.of_type("Viewpoint")}
     viewpoints: dict[str, str] = {}
-    if document.protos.get("PTMViewpointCell") == _PROTO:
-        for node in document.of_type("PTMViewpointCell"):
-            name, urls = node.fields.get("viewpoint", ""), node.fields.get("cellUrl", ())
-            if name not in poses or name in viewpoints or len(urls) != 1:
-                found.add("PTM-D699", file, f"line {node.line}", f"{name!r} names no one viewpoint")
-            else:
-                viewpoints[name] = urls[0]
-    else:
-        found.add("PTM-D663", file, "", "PROTO PTMViewpointCell is not the pattern's")
+    for node in document.of_type("PTMViewpointCell"):
+        name, urls = node.fields["viewpoint"], node.fields["cellUrl"]
+        if name not in poses or name in viewpoints or len(urls) != 1:
+            at.add("PTM-D699", f"{name!r} names no one viewpoint", f"line {node.line}")
+        else:
+            viewpoints[name] = urls[0]
     if not poses or set(viewpoints) != set(poses):
-        found.add("PTM-D699", file, "", "not every viewpoint has a cell, or there is none")
+        at.add("PTM-D699", "not every viewpoint has a cell, or there is none")
     wanted = {f"ptm:viewpoint {name} {url}" for name, url in viewpoints.items()}
     for node in document.of_type("WorldInfo"):
-        info = node.fields.get("info", ())
+        here, info = at.at(f"line {node.line}"), node.fields.get("info", ())
         if info[:1] != (f"ptm:database {PATTERN}",):
-            found.add("PTM-D663", file, f"line {node.line}", "info does not begin with the pattern")
+            here.add("PTM-D663", "info does not begin with the pattern")
         if {line for line in info if line.startswith("ptm:viewpoint ")} != wanted:
-            message = "info does not say the same of the viewpoints as PTMViewpointCell"
-            found.add("PTM-D699", file, f"line {node.line}", message)
-    inlines: dict[str, NDArray[np.float64] | None] = {}
+            here.add("PTM-D699", "info does not say the same of the viewpoints as PTMViewpointCell")
+    inlines: dict[str, NDArray[np.float64]] = {}
     for node in document.of_type("Inline"):
-        fields, place = node.fields, f"line {node.line}"
-        url = fields.get("url", ())
-        boxed = {"bboxCenter", "bboxSize"} <= set(fields)
-        if len(url) != 1 or not boxed:
-            found.add("PTM-D663", file, place, "an Inline without a URL or a bounding box")
-        if len(url) == 1 and url[0] in inlines:
-            found.add("PTM-D699", file, place, f"{url[0]} is listed twice")
-        elif len(url) == 1:
-            box = np.stack([fields["bboxCenter"], fields["bboxSize"]]) if boxed else None
-            inlines[url[0]] = box
+        here, urls = at.at(f"line {node.line}"), node.fields["url"]
+        if len(urls) != 1:
+            here.add("PTM-D663", "an Inline without a URL")
+        elif urls[0] in inlines:
+            here.add("PTM-D699", f"{urls[0]} is listed twice")
+        else:
+            inlines[urls[0]] = np.stack([node.fields["bboxCenter"], node.fields["bboxSize"]])
     return ReadRoot(viewpoints, poses, inlines)
 
 
-def check_root(
-    root: ReadRoot, boxes: Mapping[str, NDArray[np.float64]], file: str, found: Findings
-) -> None:
+def check_root(root: ReadRoot, boxes: Mapping[str, NDArray[np.float64]], at: Place) -> None:
     """Compares with the cells, given as URL → (2, 3) bounds of all that they hold."""
     for url, box in boxes.items():
         if url not in root.inlines:
-            found.add("PTM-D699", file, "", f"{url} is not inlined")
-        written = root.inlines.get(url)
-        if written is None:
+            at.add("PTM-D699", f"{url} is not inlined")
             continue
-        centre, size = written.astype(np.float32).astype(np.float64)
+        centre, size = root.inlines[url].astype(np.float32).astype(np.float64)
         slack = np.spacing(np.abs(box).max(axis=0).astype(np.float32))
         if not (np.abs(box - centre) <= size / 2 + slack).all():
-            found.add("PTM-D699", file, url, "the bounding box does not hold the cell")
+            at.add("PTM-D699", "the bounding box does not hold the cell", url)
 
 
 def check_viewpoints(
-    root: ReadRoot,
-    viewpoints: Sequence[Mapping[str, Any]],
-    urls: Sequence[str],
-    file: str,
-    found: Findings,
+    root: ReadRoot, viewpoints: Sequence[Mapping[str, Any]], urls: Sequence[str], at: Place
 ) -> None:
     """Compares with the viewpoints of the hints and the URLs of their cells."""
     wanted = {view["name"]: url for view, url in zip(viewpoints, urls, strict=True)}
     if wanted != root.viewpoints or len(wanted) < len(viewpoints):
-        found.add("PTM-D706", file, "viewpoints", "not those of the root file")
+        at.add("PTM-D706", "not those of the root file", "viewpoints")
     for i, view in enumerate(viewpoints):
-        pose = root.poses.get(view["name"])
-        written = {} if pose is None else pose.fields
-        for name in _POSE:
-            if name in written and not _same(written[name], view[name]):
-                message = "is not that of the root file"
-                found.add("PTM-D706", file, f"viewpoints[{i}].{name}", message)
+        for name, written in root.poses.get(view["name"], {}).items():
+            if not _same(written, view[name]):
+                at.add("PTM-D706", "is not that of the root file", f"viewpoints[{i}].{name}")
         if not _turns(view["orientation"], view["direction"]):
             message = "does not turn -Z to the direction"
-            found.add("PTM-D706", file, f"viewpoints[{i}].orientation", message)
+            at.add("PTM-D706", message, f"viewpoints[{i}].orientation")
 
 
 def _same(written: Any, full: Any) -> bool:

@@ -35,9 +35,7 @@ def solid_planes(points: Points, loops: Sequence[Sequence[int]], tolerance: Tole
     points: (n, 3).
     loops: its faces, indices into ``points``, counter-clockwise seen from outside.
 
-    Raises
-    ------
-    SolidError: it is none, within the tolerance's on-plane distance.
+    Raises SolidError: it is none, within the tolerance's on-plane distance.
     """
     if len(points) > MOST_CORNERS:
         raise SolidError(f"has {len(points)} corners, more than any cell")
@@ -67,9 +65,7 @@ def polygon_plane(polygon: Points, tolerance: Tolerance) -> Planes | None:
     """(4,) the plane of a convex polygon, its normal towards whom it is counter-clockwise for;
     None for a sliver, whose normal says nothing.
 
-    Raises
-    ------
-    SolidError: it is not flat, or not convex.
+    Raises SolidError: it is not flat, or not convex.
     """
     following = np.roll(polygon, -1, axis=0)
     planes, sound = _newell(polygon, following, np.zeros(1, np.int64), tolerance)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.validation.findings import Findings
+from ptmtools.database.validation.findings import Place
 from ptmtools.database.validation.solids import (
     Planes,
     Points,
@@ -35,9 +35,7 @@ class _Leaf:
     planes: Planes | None
 
 
-def check_space(
-    cells: Sequence[Row], viewpoints: Sequence[Row], file: str, found: Findings
-) -> None:
+def check_space(cells: Sequence[Row], viewpoints: Sequence[Row], at: Place) -> None:
     """Checks `cells` and `viewpoints` of the hints, whose indices are in range."""
     read = [
         (i, f"cells[{i}].leaves[{k}]", leaf, np.array(leaf["points"], np.float64))
@@ -50,23 +48,23 @@ def check_space(
         try:
             planes = solid_planes(points, leaf["faces"], tolerance)
         except SolidError as fault:
-            found.add("PTM-D709", file, place, str(fault))
+            at.add("PTM-D709", str(fault), place)
             planes = None
         leaves.append(_Leaf(cell, place, points, planes))
-    _check_apart(leaves, tolerance, file, found)
+    _check_apart(leaves, tolerance, at)
     bodies: list[list[Planes]] = [[] for _ in cells]
     for each in leaves:
         if each.planes is not None:
             bodies[each.cell].append(each.planes)
-    _check_portals(cells, bodies, tolerance, file, found)
+    _check_portals(cells, bodies, tolerance, at)
     for i, view in enumerate(viewpoints):
         inside = _inside(bodies[view["cell"]], np.array([view["position"]], np.float64), tolerance)
         if bodies[view["cell"]] and not inside:
             message = f"does not lie in cell {view['cell']}"
-            found.add("PTM-D706", file, f"viewpoints[{i}].position", message)
+            at.add("PTM-D706", message, f"viewpoints[{i}].position")
 
 
-def _check_apart(leaves: Sequence[_Leaf], tolerance: Tolerance, file: str, found: Findings) -> None:
+def _check_apart(leaves: Sequence[_Leaf], tolerance: Tolerance, at: Place) -> None:
     """The middle of a leaf lies in no other leaf."""
     middles = np.array([leaf.points.mean(axis=0) for leaf in leaves])
     order = np.argsort(middles[:, 0], kind="stable")
@@ -79,36 +77,31 @@ def _check_apart(leaves: Sequence[_Leaf], tolerance: Tolerance, file: str, found
         near = near[((middles[near] >= low) & (middles[near] <= high)).all(axis=1)]
         within = near[farthest(leaf.planes, middles[near]) < -tolerance.rounding]
         for other in within[within != k].tolist():
-            found.add("PTM-D709", file, leaves[other].place, f"lies in {leaf.place}")
+            at.add("PTM-D709", f"lies in {leaf.place}", leaves[other].place)
 
 
 def _check_portals(
-    cells: Sequence[Row],
-    bodies: Sequence[Sequence[Planes]],
-    tolerance: Tolerance,
-    file: str,
-    found: Findings,
+    cells: Sequence[Row], bodies: Sequence[Sequence[Planes]], tolerance: Tolerance, at: Place
 ) -> None:
     openings: list[Counter[tuple[Any, ...]]] = [Counter() for _ in cells]
     for i, cell in enumerate(cells):
+        place = f"cells[{i}].portals"
         to = {portal["neighbour"] for portal in cell["portals"]}
         if to != set(cell["adjacent"]):
-            message = "they lead to other cells than the adjacent"
-            found.add("PTM-D705", file, f"cells[{i}].portals", message)
+            at.add("PTM-D705", "they lead to other cells than the adjacent", place)
         for k, portal in enumerate(cell["portals"]):
             polygon = tuple(map(tuple, portal["polygon"]))
             openings[i][(portal["neighbour"], polygon, portal["area"])] += 1
-            place = f"cells[{i}].portals[{k}]"
             # The other half of the portals is the same turned round.
             if i < portal["neighbour"] and (
                 fault := _misplaced(portal, bodies[i], bodies[portal["neighbour"]], tolerance)
             ):
-                found.add("PTM-D705", file, place, fault)
+                at.add("PTM-D705", fault, f"{place}[{k}]")
     for i, of_cell in enumerate(openings):
         for (neighbour, polygon, area), count in of_cell.items():
             if openings[neighbour][(i, polygon[::-1], area)] != count:
                 message = f"a portal to cell {neighbour} does not stand there, turned round"
-                found.add("PTM-D705", file, f"cells[{i}].portals", message)
+                at.add("PTM-D705", message, f"cells[{i}].portals")
 
 
 def _misplaced(

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.validation.findings import Findings
+from ptmtools.database.hints import level_row
+from ptmtools.database.validation.findings import Place
 from ptmtools.errors import LimitError, PtmError
 
 if TYPE_CHECKING:
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 _PNG = b"\x89PNG\r\n\x1a\n"
 #: Of the first chunk of a PNG: its length and kind, width and height.
 _IHDR = struct.Struct(">I4sII")
-#: What the hints say of a level, in the order of the header.
-_LEVEL = ("width", "height", "offset", "length", "gpuBytes")
 
 
 @dataclass(frozen=True)
@@ -43,23 +42,35 @@ class ReadTexture:
 
 
 def read_texture(
-    data: bytes, digest: str, fallback: bytes | None, file: str, limits: Limits, found: Findings
+    data: bytes, digest: str, fallback: bytes | None, limits: Limits, at: Place
 ) -> ReadTexture | None:
-    """A `.ptm` and its fallback image, if it has one; None, and PTM-D710, without a sound head."""
-    from ptmtools.texture import read_header
+    """A `.ptm` and its fallback image, if it has one; None, and PTM-D710, without a sound head. A
+    PNG that has the size of no level is not decoded."""
+    from ptmtools.texture import decode, read_header
 
-    texels = check_ptm(data, file, limits, found)
+    texels = check_ptm(data, limits, at)
     try:
         header = read_header(data)
     except PtmError:
         return None
-    level = None
-    if fallback is not None:
-        level = _check_fallback(fallback, data, header, texels, file, limits, found)
+    if fallback is None:
+        return ReadTexture(header, digest)
+    png, size = f"{at.file.removesuffix('.ptm')}.png", _png_size(fallback)
+    level = next((n for n, v in enumerate(header.levels) if (v.width, v.height) == size), None)
+    if size is not None and level is None:
+        message = f"{png} is {size[0]} x {size[1]}, which is not the size of any level"
+        at.add("PTM-D711", message)
+        return ReadTexture(header, digest)
+    other = read_png(fallback, limits, at.found.at(png))
+    if level is not None and texels is not None and other is not None:
+        if level < len(header.levels) - 1:
+            texels = decode(data, level, limits)
+        if not _same_image(texels, other):
+            at.add("PTM-D711", f"it differs from {png}", f"level {level}")
     return ReadTexture(header, digest, level)
 
 
-def check_ptm(data: bytes, file: str, limits: Limits, found: Findings) -> Samples | None:
+def check_ptm(data: bytes, limits: Limits, at: Place) -> Samples | None:
     """A `.ptm` by itself, every group of it. Returns its finest level, if nothing is wrong."""
     from ptmtools.texture.codec import examine
 
@@ -67,94 +78,57 @@ def check_ptm(data: bytes, file: str, limits: Limits, found: Findings) -> Sample
         faults, texels = examine(data, limits)
     except LimitError as limit:
         # More than is allowed here is no damage; more than the format allows is.
-        found.add("PTM-D713" if limit.code == "PTM-L103" else "PTM-D710", file, "", limit.message)
+        at.add("PTM-D713" if limit.code == "PTM-L103" else "PTM-D710", limit.message)
         return None
     for fault in faults:
-        found.add("PTM-D710", file, "", fault.partition(" [PTM-")[0])
+        at.add("PTM-D710", fault.partition(" [PTM-")[0])
     return texels
 
 
-def read_png(data: bytes, file: str, limits: Limits, found: Findings) -> Samples | None:
+def read_png(data: bytes, limits: Limits, at: Place) -> Samples | None:
     """The texels of a PNG, (h, w, c); None, and PTM-D712 or PTM-D713, if it is none."""
     from ptmtools.texture import load_image
 
     if _png_size(data) is None:
-        found.add("PTM-D712", file, "", "is no PNG")
+        at.add("PTM-D712", "is no PNG")
         return None
     try:
         return load_image(data, limits).array()
     except PtmError as fault:
         code = "PTM-D713" if isinstance(fault, LimitError) else "PTM-D712"
-        found.add(code, file, "", f"cannot be read ({fault.message})")
+        at.add(code, f"cannot be read ({fault.message})")
         return None
 
 
-def check_record(
-    record: Mapping[str, Any],
-    texture: ReadTexture,
-    file: str,
-    place: str,
-    found: Findings,
-) -> None:
+def check_record(record: Mapping[str, Any], texture: ReadTexture, at: Place) -> None:
     """A row of `textures` in `hints.json` beside its `.ptm`."""
     header, levels = texture.header, record["levels"]
-    finest = len(header.levels) - 1
-    size = (header.levels[-1].width, header.levels[-1].height)
-    faults = []
-    if record["sha256"] != texture.sha256:
-        faults.append("sha256 is not the file's")
-    if record["components"] != header.components:
-        faults.append(f"the file has {header.components} components")
-    if (record["width"], record["height"]) != size:
-        faults.append(f"the finest level is {size[0]} x {size[1]}")
-    if len(levels) != finest + 1:
-        faults.append(f"the file has {finest + 1} levels")
-    for n, (row, true) in enumerate(zip(levels, header.levels, strict=False)):
-        wanted = (true.width, true.height, true.offset, true.length, true.gpu_bytes)
-        for name, value in zip(_LEVEL, wanted, strict=True):
-            if row[name] != value:
-                faults.append(f"level {n}: {name} is {value} in the file")
-    fallback, level = record["fallback"], record["fallbackLevel"]
-    if (fallback is None) != (level is None):
+    finest = header.levels[-1]
+    faults = _other(
+        record,
+        {
+            "sha256": texture.sha256,
+            "components": header.components,
+            "width": finest.width,
+            "height": finest.height,
+        },
+    )
+    if len(levels) != len(header.levels):
+        faults.append(f"the file has {len(header.levels)} levels")
+    for n, (row, level) in enumerate(zip(levels, header.levels, strict=False)):
+        faults += [f"level {n}: {fault}" for fault in _other(row, level_row(level))]
+    fallback, held = record["fallback"], record["fallbackLevel"]
+    if (fallback is None) != (held is None):
         faults.append("fallback and fallbackLevel do not go together")
-    elif fallback is not None and texture.fallback_level not in (None, level):
-        faults.append(f"the fallback holds level {texture.fallback_level}, not {level}")
+    elif fallback is not None and texture.fallback_level not in (None, held):
+        faults.append(f"the fallback holds level {texture.fallback_level}, not {held}")
     for fault in faults:
-        found.add("PTM-D704", file, place, fault)
+        at.add("PTM-D704", fault)
 
 
-def _check_fallback(
-    fallback: bytes,
-    data: bytes,
-    header: PtmHeader,
-    texels: Samples | None,
-    file: str,
-    limits: Limits,
-    found: Findings,
-) -> int | None:
-    """The level that the fallback image has the size of; a PNG of the size of none is not
-    decoded."""
-    from ptmtools.texture import decode
-
-    png = f"{file.removesuffix('.ptm')}.png"
-    size, levels = _png_size(fallback), header.levels
-    level = next((n for n, v in enumerate(levels) if (v.width, v.height) == size), None)
-    if size is not None and level is None:
-        found.add(
-            "PTM-D711",
-            file,
-            "",
-            f"{png} is {size[0]} x {size[1]}, which is not the size of any level",
-        )
-        return None
-    other = read_png(fallback, png, limits, found)
-    if level is None or texels is None or other is None:
-        return level
-    if level < len(levels) - 1:
-        texels = decode(data, level, limits)
-    if not _same_image(texels, other):
-        found.add("PTM-D711", file, f"level {level}", f"it differs from {png}")
-    return level
+def _other(row: Mapping[str, Any], true: Mapping[str, Any]) -> list[str]:
+    """In what a row differs from what the file says."""
+    return [f"{name} is {v} in the file" for name, v in true.items() if row[name] != v]
 
 
 def _png_size(data: bytes) -> tuple[int, int] | None:

@@ -6,13 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ptmtools.database.fault import FileError
 from ptmtools.database.names import CELL_FOLDER, HINTS, ROOT
 from ptmtools.database.validation.cells import ReadCell, check_cell, read_cell
-from ptmtools.database.validation.findings import Findings
 from ptmtools.database.validation.hints import (
     Images,
-    ReadHints,
+    Row,
     check_against_cells,
     check_hints,
     read_hints,
@@ -22,19 +20,14 @@ from ptmtools.database.validation.root import ReadRoot, check_root, check_viewpo
 from ptmtools.database.validation.served import ServedDatabase
 from ptmtools.database.validation.textures import check_record
 from ptmtools.database.vrml.reader import Document, parse
-from ptmtools.store.layout import SERVED
 from ptmtools.tolerance import Tolerance
 
 
-def read_file(name: str, data: bytes, found: Findings) -> Document | ReadHints | None:
+def read_file(path: str, data: bytes) -> Document | Row | None:
     """A VRML file or the hints; nothing of other files."""
-    if name == f"{SERVED}/{HINTS}":
-        return read_hints(data, name, found)
-    try:
-        return parse(data) if name.endswith(".wrl") else None
-    except FileError as fault:
-        found.add(fault.code, name, fault.place, fault.message)
-        return None
+    if path == HINTS:
+        return read_hints(data)
+    return parse(data) if path.endswith(".wrl") else None
 
 
 def check_files(database: ServedDatabase) -> Mapping[str, int]:
@@ -56,25 +49,24 @@ def _check_cells(
     documents: Mapping[str, Document], database: ServedDatabase
 ) -> dict[str, ReadCell]:
     """The cells by the names of their files."""
-    found, folder = database.found, f"{CELL_FOLDER}/"
+    folder = f"{CELL_FOLDER}/"
     cells: dict[str, ReadCell] = {}
     for path, document in documents.items():
-        if path.startswith(folder) and (cell := read_cell(document, f"{SERVED}/{path}", found)):
+        if path.startswith(folder) and (cell := read_cell(document, database.at(path))):
             cells[path.removeprefix(folder)] = cell
     hulls = [c.hull for c in cells.values() if len(c.hull)]
     points = np.concatenate(hulls) if hulls else np.zeros((1, 3))
     box = np.stack([points.min(axis=0), points.max(axis=0)])
     tolerance = Tolerance.for_points(points)
     for own, cell in cells.items():
-        name = f"{SERVED}/{folder}{own}"
-        check_cell(documents[folder + own], cell, name, box, tolerance, found)
+        path = folder + own
+        check_cell(documents[path], cell, box, tolerance, database.at(path))
         for url in (*cell.adjacent, *cell.visible):
-            database.urls.resolve(name, url)
+            database.resolve(path, url)
     check_graph(
         {own: cell.adjacent for own, cell in cells.items()},
         {own: cell.visible for own, cell in cells.items()},
-        lambda own: (f"{SERVED}/{folder}{own}", ""),
-        found,
+        lambda own: database.at(folder + own),
     )
     return cells
 
@@ -84,40 +76,38 @@ def _check_root(
 ) -> ReadRoot | None:
     if document is None:
         return None
-    name = f"{SERVED}/{ROOT}"
-    root = read_root(document, name, database.found)
+    root = read_root(document, database.at(ROOT))
     for url in (*root.inlines, *root.viewpoints.values()):
-        database.urls.resolve(name, url)
+        database.resolve(ROOT, url)
     boxes = {f"{CELL_FOLDER}/{own}": cell.box for own, cell in cells.items()}
-    check_root(root, boxes, name, database.found)
+    check_root(root, boxes, database.at(ROOT))
     return root
 
 
 def _check_hints(
     root: ReadRoot | None, cells: Mapping[str, ReadCell], database: ServedDatabase
 ) -> None:
-    name, found, urls = f"{SERVED}/{HINTS}", database.found, database.urls
+    at, folder = database.at(HINTS), f"{CELL_FOLDER}/"
     cell_images = {
-        own: {
-            tuple(urls.resolve_each(f"{SERVED}/{CELL_FOLDER}/{own}", "url", u))
-            for u in cell.textures
-        }
+        own: {tuple(database.resolve_each(folder + own, "url", u)) for u in cell.textures}
         for own, cell in cells.items()
     }
-    hints: ReadHints | None = database.held.get(HINTS)
+    hints: Row | None = database.held.get(HINTS)
     if hints is None:
         return
-    check_hints(hints, name, found)
-    urls.resolve_each(name, "cells", [row["url"] for row in hints.cells])
-    known = [row["url"].removeprefix(f"{CELL_FOLDER}/") for row in hints.cells]
-    files = urls.resolve_each(name, "textures", [row["file"] for row in hints.textures])
+    check_hints(hints, at)
+    urls = [row["url"] for row in hints["cells"]]
+    database.resolve_each(HINTS, "cells", urls)
+    files = database.resolve_each(HINTS, "textures", [row["file"] for row in hints["textures"]])
     images: list[Images] = []
-    for i, (record, path) in enumerate(zip(hints.textures, files, strict=True)):
+    for i, (record, path) in enumerate(zip(hints["textures"], files, strict=True)):
         fallback = record["fallback"]
-        images.append((path,) if fallback is None else (urls.resolve(name, fallback), path))
+        images.append((path,) if fallback is None else (database.resolve(HINTS, fallback), path))
         if path in database.textures:
-            check_record(record, database.textures[path], name, f"textures[{i}]", found)
-    check_against_cells(hints, known, images, cells, cell_images, name, found)
+            check_record(record, database.textures[path], at.at(f"textures[{i}]"))
+    known = [url.removeprefix(folder) for url in urls]
+    check_against_cells(hints, known, images, cells, cell_images, at)
     if root is not None:
-        cell_urls = [hints.cells[view["cell"]]["url"] for view in hints.viewpoints]
-        check_viewpoints(root, hints.viewpoints, cell_urls, name, found)
+        check_viewpoints(
+            root, hints["viewpoints"], [urls[view["cell"]] for view in hints["viewpoints"]], at
+        )

@@ -17,12 +17,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
-from ptmtools.database.model import EmitOptions, Vector, Viewpoint
+from ptmtools.database.model import EmitOptions, Viewpoint
+from ptmtools.database.section import triangle_section
 from ptmtools.database.viewpoints.ground import Ground
 from ptmtools.database.viewpoints.outlook import longest_views
 from ptmtools.database.viewpoints.rooms import Walls, largest_leaves, places
@@ -45,11 +48,10 @@ def place_viewpoints(
     """The viewpoints of a database, the first the one to begin at, and notes on those that were
     left out.
 
-    Raises
-    ------
-    InputError: PTM-I600 if a viewpoint that the user gave lies in no cell.
+    Raises InputError: PTM-I600 if a viewpoint that the user gave lies in no cell.
     """
-    ground, walls = Ground(scene), Walls(scene.corners[scene.opaque])
+    ground = Ground(scene)
+    walls = cache(partial(triangle_section, scene.corners[scene.opaque]))
     notes: list[str] = []
     if options.viewpoints:
         begun = _given(cells, ground, walls, options)
@@ -57,7 +59,7 @@ def place_viewpoints(
         begun = _cameras(scene, cells, ground, options, notes)
     if options.viewpoint_count or not begun:
         begun = [*begun, *_touring(cells, ground, walls, options, begun)]
-    return tuple(begun), tuple(notes)
+    return tuple(replace(v, name=f"VP_{i}") for i, v in enumerate(begun)), tuple(notes)
 
 
 def orientation(direction: NDArray[np.float64]) -> tuple[float, float, float, float]:
@@ -87,31 +89,23 @@ def orientation(direction: NDArray[np.float64]) -> tuple[float, float, float, fl
     axis, angle = axis / size + 0.0, float(2 * np.arctan2(most * size, w))
     if angle > np.pi:
         angle -= 2 * np.pi
-    return (float(axis[0]), float(axis[1]), float(axis[2]), angle)
+    x, y, z = axis.tolist()
+    return (x, y, z, angle)
 
 
 def _viewpoint(
-    index: int,
     description: str,
     position: NDArray[np.float64],
     direction: NDArray[np.float64],
     field_of_view: float,
     cell: int,
 ) -> Viewpoint:
+    """Without a name so far."""
     unit = direction / np.linalg.norm(direction) + 0.0
-    return Viewpoint(
-        name=f"VP_{index}",
-        description=description,
-        position=_vector(position),
-        direction=_vector(unit),
-        orientation=orientation(unit),
-        field_of_view=field_of_view,
-        cell=cell,
-    )
-
-
-def _vector(v: NDArray[np.float64]) -> Vector:
-    return (float(v[0]), float(v[1]), float(v[2]))
+    x, y, z = position.tolist()
+    dx, dy, dz = unit.tolist()
+    turn = orientation(unit)
+    return Viewpoint("", description, (x, y, z), (dx, dy, dz), turn, field_of_view, cell)
 
 
 def _heading(yaw: float) -> NDArray[np.float64]:
@@ -144,9 +138,7 @@ def _cameras(
             continue
         field = min(max(camera.field_of_view, _NARROWEST), _WIDEST)
         name = camera.name or f"Camera {len(placed) + 1}"
-        placed.append(
-            _viewpoint(len(placed), name, position, np.array(camera.direction), field, cell)
-        )
+        placed.append(_viewpoint(name, position, np.array(camera.direction), field, cell))
     return placed
 
 
@@ -165,11 +157,8 @@ def _given(cells: Cells, ground: Ground, walls: Walls, options: EmitOptions) -> 
             yaw = _along_the_longest_view(position, walls)
         else:
             yaw = float(np.radians(wanted.yaw))
-        placed.append(
-            _viewpoint(
-                i, f"Viewpoint {i + 1}", position, _heading(yaw), options.field_of_view, cell
-            )
-        )
+        name, field = f"Viewpoint {i + 1}", options.field_of_view
+        placed.append(_viewpoint(name, position, _heading(yaw), field, cell))
     return placed
 
 
@@ -197,10 +186,8 @@ def _touring(
         name = f"Room {number[storey[i]]}"
         if len(first) > 1:
             name = f"Storey {storey[i] + 1}, {name.lower()}"
-        place = found[i]
-        direction = _heading(place.yaw)
-        index, field = len(begun) + len(views), options.field_of_view
-        views.append(_viewpoint(index, name, place.position, direction, field, place.cell))
+        place, field = found[i], options.field_of_view
+        views.append(_viewpoint(name, place.position, _heading(place.yaw), field, place.cell))
     return views
 
 
@@ -209,9 +196,9 @@ def _anywhere(cells: Cells, walls: Walls, options: EmitOptions) -> Viewpoint:
     (leaf,) = largest_leaves(cells, 1)
     middle = cells.leaf_points(leaf).mean(axis=0)
     yaw, cell = _along_the_longest_view(middle, walls), int(cells.leaf_cell[leaf])
-    return _viewpoint(0, "Room 1", middle, _heading(yaw), options.field_of_view, cell)
+    return _viewpoint("Room 1", middle, _heading(yaw), options.field_of_view, cell)
 
 
 def _along_the_longest_view(position: NDArray[np.float64], walls: Walls) -> float:
-    yaw, _ = longest_views(position[None, [0, 2]], walls.at(float(position[1])))
+    yaw, _ = longest_views(position[None, [0, 2]], walls(float(position[1])))
     return float(yaw[0])

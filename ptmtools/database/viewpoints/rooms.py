@@ -3,6 +3,7 @@ eye height, as far from the walls as the cell allows, with the longest view."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
 from ptmtools.database.model import Vector
-from ptmtools.database.section import area, leaf_section, triangle_section
+from ptmtools.database.section import area, leaf_section
 from ptmtools.database.viewpoints.ground import Ground
 from ptmtools.database.viewpoints.outlook import longest_views
 
@@ -54,6 +55,11 @@ class Place:
     floor: float
 
 
+#: (m, 2, 2) segments in plan, the section of a scene's opaque triangles at a height; made once for
+#: each: rooms of a storey share one.
+Walls = Callable[[float], NDArray[np.float64]]
+
+
 @dataclass(frozen=True)
 class _Room:
     """A leaf in which one can stand: its floor's height, and its section at the eye's."""
@@ -61,20 +67,6 @@ class _Room:
     leaf: int
     floor: float
     section: NDArray[np.float64]
-
-
-class Walls:
-    """The sections of a scene's opaque triangles, each made once: rooms of a storey share one."""
-
-    def __init__(self, opaque: NDArray[np.float64]) -> None:
-        self._opaque = opaque
-        self._held: dict[float, NDArray[np.float64]] = {}
-
-    def at(self, height: float) -> NDArray[np.float64]:
-        """(m, 2, 2) segments in plan."""
-        if height not in self._held:
-            self._held[height] = triangle_section(self._opaque, height)
-        return self._held[height]
 
 
 def places(
@@ -96,7 +88,7 @@ def places(
             break
         if cell not in found:
             tries = _TRIES if found else _TRIES_FIRST
-            place = _place_in(room, cells, ground, walls.at(room.floor + eye), avatar_size, tries)
+            place = _place_in(room, cells, ground, walls(room.floor + eye), avatar_size, tries)
             if place is not None:
                 found[cell] = place
     return list(found.values())
@@ -130,7 +122,8 @@ def _place_in(
     # A wall outside of the section is farther off than the section's own sides.
     least, most = room.section.min(axis=0), room.section.max(axis=0)
     near = ((walls.max(axis=1) >= least) & (walls.min(axis=1) <= most)).all(axis=1)
-    clearance = np.minimum(_distance(grid, walls[near]), _distance(grid, _sides(room.section)))
+    sides = np.stack([room.section, np.roll(room.section, -1, axis=0)], axis=1)
+    clearance = np.minimum(_distance(grid, walls[near]), _distance(grid, sides))
     grid = grid[np.argsort(-clearance, kind="stable")][: int((clearance >= keep_off).sum())]
     position = np.insert(grid, 1, room.floor + eye, axis=1)
     floor = ground.below(position)
@@ -170,10 +163,6 @@ def _grid(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
     inside = np.all(edge[:, 0] * to[..., 1] - edge[:, 1] * to[..., 0] > 0, axis=1)
     kept: NDArray[np.float64] = points[inside]
     return kept if len(kept) else polygon.mean(axis=0)[None]
-
-
-def _sides(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.stack([polygon, np.roll(polygon, -1, axis=0)], axis=1)
 
 
 def _distance(points: NDArray[np.float64], segments: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -24,8 +24,6 @@ light in the root file instead of a glow: X_ITE shows none.)
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from urllib.parse import quote
 
 import numpy as np
@@ -36,37 +34,18 @@ from ptmtools.database.floats import decimal, row_texts, single
 from ptmtools.database.model import TextureRecord
 from ptmtools.database.names import DefNames, cell_file, cell_name
 from ptmtools.database.vrml.hull import convex_hull
+from ptmtools.database.vrml.pattern import CELL, CELL_OF_LEAVES, HEADER, declaration
 from ptmtools.database.vrml.text import chosen, field, listed, loops, quoted
 from ptmtools.scene.model import Material
 
-HEADER = "#VRML V2.0 utf8\n"
 #: How bright an untextured surface is without light, as a share of its colour.
 _GLOW = 0.25
-_FIELDS = (
-    '  field SFString cellName    ""\n'
-    "  field MFVec3f  hullPoint   [ ]\n"
-    "  field MFInt32  hullIndex   [ ]\n"
-    "  field MFString adjacentUrl [ ]\n"
-    "  field MFString visibleUrl  [ ]\n"
-    "  field MFFloat  ach         [ ]\n"
-)
-_LEAF_FIELDS = "  field MFVec3f  leafPoint   [ ]\n  field MFInt32  leafStart   [ ]\n"
-
-
-@dataclass(frozen=True)
-class CellText:
-    """A cell's file, and the (2, 3) float32 least and greatest corner of all that it holds."""
-
-    text: str
-    box: NDArray[np.float32]
 
 
 class CellWriter:
     """Writes the cells of one scene; what they share is prepared once.
 
-    Raises
-    ------
-    DatabaseError: PTM-D601 a number is not finite in float32; PTM-D603 a cell is flat.
+    Raises DatabaseError: PTM-D601 a number is not finite in float32; PTM-D603 a cell is flat.
     """
 
     def __init__(self, content: Content) -> None:
@@ -81,16 +60,14 @@ class CellWriter:
         self._cell_url = [quoted(cell_file(c)) for c in range(cells.cell_count)]
         self._ach = row_texts(single(content.ach.value, "ach")[:, None])
         self._point, self._uv = row_texts(g.point), row_texts(g.uv)
-        order = np.argsort(cells.leaf_cell, kind="stable")
-        cut = np.searchsorted(cells.leaf_cell[order], np.arange(1, cells.cell_count))
         self._leaves = [
-            [single(cells.leaf_points(leaf), "leaf points") for leaf in leaves.tolist()]
-            for leaves in np.split(order, cut)
+            [single(cells.leaf_points(leaf), "leaf points") for leaf in leaves]
+            for leaves in content.leaves
         ]
         self._hulls = [convex_hull(np.concatenate(leaves)) for leaves in self._leaves]
 
-    def cell(self, cell: int) -> CellText:
-        """The file of one cell."""
+    def cell(self, cell: int) -> tuple[str, NDArray[np.float32]]:
+        """The file of one cell, and the (2, 3) least and greatest corner of all that it holds."""
         g = self._geometry
         hull, triangles = self._hulls[cell]
         seen = np.arange(self._pvs.start[cell], self._pvs.start[cell + 1])
@@ -107,31 +84,33 @@ class CellWriter:
             start = np.cumsum([0, *map(len, leaves[:-1])])
             lists["leafPoint"] = _points(np.concatenate(leaves))
             lists["leafStart"] = listed([str(i) for i in start.tolist()], 16)
-        parts = [HEADER, "PROTO PTMCell [\n", _FIELDS, _LEAF_FIELDS if len(leaves) > 1 else ""]
-        parts.append("] {\n  WorldInfo { }\n}\nPTMCell {\n")
+        proto = CELL if len(leaves) == 1 else CELL_OF_LEAVES
+        parts = [HEADER, declaration(*proto), "PTMCell {\n"]
         parts += [f"  {name:<11} {text}\n" for name, text in lists.items()]
         parts.append("}\n")
 
         names = DefNames(f"C{cell}")
         first, last = g.cell_start[cell : cell + 2].tolist()
         taken = [names.take(self._objects[i]) for i in g.object[first:last].tolist()]
-        textures = _Textures(self._urls, names)
+        textures: dict[tuple[int, str, str], str] = {}
         for shape, name in zip(range(first, last), taken, strict=True):
-            parts.append(self._shape(shape, name, textures))
+            parts.append(self._shape(shape, name, names, textures))
         used = g.point[g.shape_point[g.point_start[first] : g.point_start[last]]]
         held = np.concatenate([hull, used])
-        return CellText("".join(parts), np.stack([held.min(axis=0), held.max(axis=0)]))
+        return "".join(parts), np.stack([held.min(axis=0), held.max(axis=0)])
 
     def _cells(self, cells: NDArray[np.int32]) -> str:
         return listed([self._cell_url[c] for c in cells.tolist()], 8)
 
-    def _shape(self, shape: int, name: str, textures: _Textures) -> str:
+    def _shape(
+        self, shape: int, name: str, names: DefNames, textures: dict[tuple[int, str, str], str]
+    ) -> str:
         s = self._geometry.shape(shape)
         material = self._materials[s.material]
         parts = [
             f"DEF {name} Shape {{\n  appearance Appearance {{\n",
             _surface(material),
-            textures.of(material),
+            self._texture(material, names, textures),
             "  }\n  geometry IndexedFaceSet {\n",
             "    solid FALSE\n" if s.two_sided else "",
             f"    coord Coordinate {{ point {chosen(self._point, s.point)} }}\n",
@@ -148,24 +127,17 @@ class CellWriter:
         parts.append("  }\n}\n")
         return "".join(parts)
 
-
-class _Textures:
-    """The ImageTexture nodes of one file, each written once and then named: some browsers make a
-    texture of every node, whatever its file."""
-
-    def __init__(self, urls: Mapping[int, str], names: DefNames) -> None:
-        self._urls = urls
-        self._names = names
-        self._written: dict[tuple[int, str, str], str] = {}
-
-    def of(self, material: Material) -> str:
-        """The field of an Appearance; "" where there is no texture."""
+    def _texture(
+        self, material: Material, names: DefNames, written: dict[tuple[int, str, str], str]
+    ) -> str:
+        """The texture of an Appearance; "" where there is none. Each is ``written`` once in a file
+        and then named: some browsers make a texture of every node, whatever its file."""
         if material.image < 0:
             return ""
         key = material.image, material.wrap_s, material.wrap_t
-        if key in self._written:
-            return f"    texture USE {self._written[key]}\n"
-        name = self._written[key] = self._names.take("texture")
+        if key in written:
+            return f"    texture USE {written[key]}\n"
+        name = written[key] = names.take("texture")
         wrap = " repeatS FALSE" if material.wrap_s == "clamp" else ""
         wrap += " repeatT FALSE" if material.wrap_t == "clamp" else ""
         return f"    texture DEF {name} ImageTexture {{ {self._urls[material.image]}{wrap} }}\n"

@@ -42,9 +42,7 @@ def convex_hull(points: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArr
     Returns (points, triangles): the (h, 3) vertices of the hull in lexical order, and (f, 3)
     indices into them, counter-clockwise seen from outside, in lexical order.
 
-    Raises
-    ------
-    DatabaseError: PTM-D603 if the points lie in one plane.
+    Raises DatabaseError: PTM-D603 if the points lie in one plane.
     """
     distinct = np.unique(points, axis=0)
     if len(distinct) >= _MANY:

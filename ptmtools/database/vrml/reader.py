@@ -21,47 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.database.fault import FileError
+from ptmtools.database.vrml.pattern import HEADER, NODES, PROTOS, declaration
 
-HEADER = "#VRML V2.0 utf8"
-
-#: Node → field → type; for SFNode the node that must stand there.
-NODES: dict[str, dict[str, str]] = {
-    "WorldInfo": {"title": "SFString", "info": "MFString"},
-    "NavigationInfo": {"type": "MFString", "avatarSize": "MFFloat", "headlight": "SFBool"},
-    "Viewpoint": {
-        "position": "SFVec3f",
-        "orientation": "SFRotation",
-        "fieldOfView": "SFFloat",
-        "description": "SFString",
-    },
-    "Inline": {"url": "MFString", "bboxCenter": "SFVec3f", "bboxSize": "SFVec3f"},
-    "Shape": {"appearance": "Appearance", "geometry": "IndexedFaceSet"},
-    "Appearance": {"material": "Material", "texture": "ImageTexture"},
-    "Material": {
-        "diffuseColor": "SFColor",
-        "emissiveColor": "SFColor",
-        "transparency": "SFFloat",
-    },
-    "ImageTexture": {"url": "MFString", "repeatS": "SFBool", "repeatT": "SFBool"},
-    "IndexedFaceSet": {
-        "solid": "SFBool",
-        "coord": "Coordinate",
-        "coordIndex": "MFInt32",
-        "texCoord": "TextureCoordinate",
-        "texCoordIndex": "MFInt32",
-        "color": "Color",
-        "colorIndex": "MFInt32",
-        "colorPerVertex": "SFBool",
-    },
-    "Coordinate": {"point": "MFVec3f"},
-    "TextureCoordinate": {"point": "MFVec2f"},
-    "Color": {"color": "MFColor"},
-}
 #: Nodes that may stand for themselves again: what they hold does not grow with the file.
 USED = ("ImageTexture",)
 #: Numbers in one value of a numeric type.
 _WIDTH = {"Float": 1, "Int32": 1, "Vec2f": 2, "Vec3f": 3, "Color": 3, "Rotation": 4}
-_PLAIN = {"SFBool", "SFString", "MFString", *(n + t for n in ("SF", "MF") for t in _WIDTH)}
 
 _SPACE = re.compile(r"(?:[ \t\n,]++|#[^\r\n]*+)*+")
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*+(?=[ \t\n{}\[\],]|\Z)")
@@ -71,6 +36,10 @@ _STRING = re.compile(r'"((?:[^"\\\r\n]++|\\["\\])*+)"')
 _STRINGS = re.compile(rf"(?:[ \t\n,]++|{_STRING.pattern})*+")
 _ESCAPED = re.compile(r"\\(.)")
 _NOT_FINITE = re.compile(r"[+-]?(?:nan|inf|infinity)\b", re.IGNORECASE)
+_PROTOS = [
+    (re.compile(r"[ \t\n,]++".join(map(re.escape, declaration(*proto).split()))), proto)
+    for proto in PROTOS
+]
 
 
 @dataclass(frozen=True)
@@ -83,27 +52,18 @@ class Node:
     fields: dict[str, Any]
     line: int
 
-    def child(self, *path: str) -> Node | None:
-        """The node in a field, or in a field of that; None if there is none."""
-        node: Node = self
-        for name in path:
-            inner = node.fields.get(name)
-            if not isinstance(inner, Node):
-                return None
-            node = inner
-        return node
-
     def at(self, *path: str) -> dict[str, Any]:
-        """The fields of that node; empty if there is none."""
-        node = self.child(*path)
-        return {} if node is None else node.fields
+        """The fields of the node in a field, or in a field of that; empty if there is none."""
+        fields = self.fields
+        for name in path:
+            fields = fields[name].fields if name in fields else {}
+        return fields
 
 
 @dataclass(frozen=True)
 class Document:
-    """A file: its PROTOs as name → field → type, and its nodes, in order."""
+    """A file: its nodes, in order."""
 
-    protos: dict[str, dict[str, str]]
     nodes: tuple[Node, ...]
 
     def of_type(self, type: str) -> list[Node]:
@@ -113,10 +73,9 @@ class Document:
 def parse(data: bytes) -> Document:
     """Reads a file.
 
-    Raises
-    ------
-    FileError: at the first thing that the emission pattern does not have: PTM-D660 for bytes that
-        are not UTF-8, PTM-D662 for a number that is not finite, PTM-D661 for all else.
+    Raises FileError: at the first thing that is not as in the emission pattern: PTM-D660 for bytes
+    that are not UTF-8, PTM-D662 for a number that is not finite, PTM-D663 for a node that lacks a
+    field, PTM-D661 for all else.
     """
     try:
         text = data.decode("utf-8")
@@ -134,42 +93,23 @@ class _Reader:
         self._names: dict[str, Node | None] = {}
 
     def document(self) -> Document:
-        if self._text.partition("\n")[0] != HEADER:
-            self._fail(f"the first line is not {HEADER!r}")
-        protos: dict[str, dict[str, str]] = {}
+        if not self._text.startswith(HEADER):
+            self._fail(f"the first line is not {HEADER.strip()!r}")
         nodes: list[Node] = []
         while self._skip() < len(self._text):
             if self._peek("PROTO"):
-                self._proto(protos)
+                self._proto()
             else:
                 nodes.append(self._node(self._word("a node")))
-        return Document(protos, tuple(nodes))
+        return Document(tuple(nodes))
 
-    def _proto(self, protos: dict[str, dict[str, str]]) -> None:
-        self._word("PROTO")
-        name = self._word("a PROTO's name")
-        if name in self._types:
-            self._fail(f"PROTO {name} is declared twice")
-        fields: dict[str, str] = {}
-        self._take("[")
-        while not self._peek("]"):
-            if self._word("field") != "field":
-                self._fail("only fields are declared in a PROTO")
-            type = self._word("a field's type")
-            if type not in _PLAIN:
-                self._fail(f"unknown field type {type!r}")
-            field = self._word("a field's name")
-            if field in fields:
-                self._fail(f"field {field} is declared twice")
-            self._value(type)
-            fields[field] = type
-        self._take("]")
-        self._take("{")
-        body = self._node(self._word("a node"))
-        if body.type != "WorldInfo":
-            self._fail("a PROTO's body is a WorldInfo, it draws nothing")
-        self._take("}")
-        self._types[name] = protos[name] = fields
+    def _proto(self) -> None:
+        for pattern, (name, fields) in _PROTOS:
+            if name not in self._types and (found := pattern.match(self._text, self._at)):
+                self._types[name] = fields
+                self._at = found.end()
+                return
+        self._fail("a PROTO that the emission pattern does not have, or has once")
 
     def _node(self, type: str) -> Node:
         name = ""
@@ -191,8 +131,11 @@ class _Reader:
                 self._fail(f"{type} has no field {field!r} in the emission pattern")
             if field in fields:
                 self._fail(f"{type} has two fields {field!r}")
-            fields[field] = self._value(known[field])
+            fields[field] = self._value(known[field].removesuffix("?"))
         self._take("}")
+        for field, wanted in known.items():
+            if field not in fields and not wanted.endswith("?"):
+                raise FileError("PTM-D663", f"line {line}", f"{type} lacks {field}")
         node = Node(type, name, fields, line)
         if name:
             self._names[name] = node

@@ -1,43 +1,54 @@
-"""The text of `root.wrl`: where a walk can begin, and all cells for browsers that want them."""
+"""All VRML files of a database, and the hints beside them, in the order in which they refer to each
+other: cells, hints, and `root.wrl`, where a walk can begin.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.database.content import Content
 from ptmtools.database.floats import decimal, row_texts, single
 from ptmtools.database.model import EmitOptions, Viewpoint
-from ptmtools.database.names import cell_path
-from ptmtools.database.vrml.cell import HEADER
+from ptmtools.database.names import HINTS, ROOT, cell_path
+from ptmtools.database.vrml.cell import CellWriter
+from ptmtools.database.vrml.pattern import HEADER, PATTERN, VIEWPOINT_CELL, declaration
 from ptmtools.database.vrml.text import listed, quoted
 
-#: The version of the emission pattern, in WorldInfo's first info string.
-PATTERN = 1
-_PROTO = (
-    "PROTO PTMViewpointCell [\n"
-    '  field SFString viewpoint ""\n'
-    "  field MFString cellUrl   [ ]\n"
-    "] {\n  WorldInfo { }\n}\n"
-)
+
+def vrml_files(content: Content) -> Iterator[tuple[str, str]]:
+    """Path, relative to the served folder, and text of each file.
+
+    Raises DatabaseError: PTM-D601 a number is not finite in float32; PTM-D603 a cell is flat: at
+    once.
+    """
+    return _files(content, CellWriter(content))
 
 
-def root_text(
+def _files(content: Content, writer: CellWriter) -> Iterator[tuple[str, str]]:
+    boxes, count = [], content.cells.cell_count
+    for c in range(count):
+        content.progress(c, count, "cells")
+        text, box = writer.cell(c)
+        boxes.append(box)
+        yield cell_path(c), text
+    content.progress(count, count, "cells")
+    yield HINTS, content.hints(cell_path)
+    yield ROOT, _root_text(content.viewpoints, boxes, content.options)
+
+
+def _root_text(
     viewpoints: Sequence[Viewpoint], boxes: Sequence[NDArray[np.float32]], options: EmitOptions
 ) -> str:
-    """The root file; ``boxes`` are the (2, 3) bounds of every cell's contents.
-
-    Raises
-    ------
-    DatabaseError: PTM-D601 a number is not finite in float32.
-    """
+    """The root file; ``boxes`` are the (2, 3) bounds of every cell's contents."""
     info = [quoted(f"ptm:database {PATTERN}")]
     info += [quoted(f"ptm:viewpoint {v.name} {cell_path(v.cell)}") for v in viewpoints]
     avatar = ", ".join(decimal(x) for x in options.avatar_size)
     parts = [
         HEADER,
-        _PROTO,
+        declaration(*VIEWPOINT_CELL),
         f"WorldInfo {{\n  title {quoted(options.title)}\n  info {listed(info, 1)}\n}}\n",
         f'NavigationInfo {{ type [ "WALK", "ANY" ] avatarSize [ {avatar} ] headlight TRUE }}\n',
     ]
