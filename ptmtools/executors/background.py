@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
-from ptmtools.executors.outcome import outcome
-
-if TYPE_CHECKING:
-    from multiprocessing.connection import Connection
-    from multiprocessing.process import BaseProcess
+from ptmtools.executors.processes import Worker
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -22,13 +18,10 @@ class BackgroundTask(Generic[R]):
 
     Whoever begins one must ask for its result or cancel it. What travels must be picklable, and a
     script needs ``if __name__ == "__main__"``.
-
-    Not a pool of one: that waits forever for the rest of a result whose sender was killed.
     """
 
     def __init__(self, function: Callable[[S, T], R], shared: S, task: T) -> None:
-        self._process: BaseProcess | None = None
-        self._cancelled = False
+        self._worker = Worker()
         waiting = ThreadPoolExecutor(1, "background")
         self._done: Future[R] = waiting.submit(self._wait, function, shared, task)
         waiting.shutdown(wait=False)
@@ -39,47 +32,20 @@ class BackgroundTask(Generic[R]):
 
     def cancel(self) -> None:
         """Ends the process, in the middle of the task if need be."""
-        self._cancelled = True
-        if self._process:
-            self._process.kill()
+        self._worker.close()
 
     def add_done_callback(self, callback: Callable[[Any], object]) -> None:
         """``callback`` is called, by another thread, once the process has ended."""
         self._done.add_done_callback(callback)
 
     def _wait(self, function: Callable[[S, T], R], shared: S, task: T) -> R:
-        from multiprocessing import get_context, resource_tracker
-
-        from ptmtools.executors.processes import ctrl_c_blocked, lost
-
-        context = get_context("spawn")
-        ours, theirs = context.Pipe()
-        follows, lifeline = context.Pipe(duplex=False)
-        process = context.Process(target=_do, args=(follows, theirs), daemon=True)
-        resource_tracker.ensure_running()  # which lets Ctrl-C through again when it starts
-        with ours, lifeline:
-            with follows, theirs, ctrl_c_blocked():
-                process.start()
-            self._process = process
-            if self._cancelled:
-                process.kill()
-            try:
-                ours.send((function, shared, task))
-                (result,) = ours.recv()
-            except (EOFError, OSError) as fault:
-                raise lost() from fault
-            finally:
-                process.kill()
-                process.join()
-        found: R = result
-        return found
+        try:
+            (found,) = self._worker.call(_result, function, shared, task)
+        finally:
+            self._worker.close()
+        result: R = found
+        return result
 
 
-def _do(lifeline: Connection, parent: Connection) -> None:
-    """In the process: the task comes, and its result goes, through a pipe of which the parent
-    holds one end alone, so that neither waits for one that has ended."""
-    from ptmtools.executors.processes import begin
-
-    begin(lifeline)
-    function, shared, task = parent.recv()
-    parent.send(outcome(function, shared, [task]))
+def _result(function: Callable[[S, T], R], shared: S, task: T) -> Iterator[R]:
+    yield function(shared, task)

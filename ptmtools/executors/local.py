@@ -10,15 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, nullcontext
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from ptmtools.executors.background import BackgroundTask
 from ptmtools.executors.model import AHEAD, Executor, Pending, Sharing, processors
 from ptmtools.executors.order import in_order
+from ptmtools.executors.processes import InProcesses, Processes
 from ptmtools.executors.serial import SerialSharing
-
-if TYPE_CHECKING:
-    from ptmtools.executors.processes import Processes
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -36,8 +34,9 @@ class Local(Executor):
     def __init__(self, workers: int = 0, *, threads: bool = True) -> None:
         self._workers = workers or processors()
         self._by_threads = threads
-        self._threads: ThreadPoolExecutor | None = None
-        self._processes: Processes | None = None
+        # Both start what they consist of when there is first something to do.
+        self._threads = ThreadPoolExecutor(self._workers, "ptmtools")
+        self._processes = Processes(self._workers)
 
     @property
     def workers(self) -> int:
@@ -46,8 +45,7 @@ class Local(Executor):
 
     @property
     def remote(self) -> bool:
-        """See `Executor.remote`. What is on the disk need not go through a pipe: in Python 3.11.2
-        a pool whose worker ends waits for ever to be rid of a task that is too long for one."""
+        """See `Executor.remote`. What is on the disk need not go through a pipe."""
         return not self._by_threads
 
     def sharing(
@@ -57,14 +55,8 @@ class Local(Executor):
         if self._by_threads and self._workers == 1:
             return nullcontext(SerialSharing(shared))
         if self._by_threads and releases_lock:
-            if self._threads is None:
-                self._threads = ThreadPoolExecutor(self._workers, "ptmtools")
             return nullcontext(_InThreads(shared, self._threads, self._workers))
-        from ptmtools.executors.processes import Processes
-
-        if self._processes is None:
-            self._processes = Processes(self._workers)
-        return self._processes.sharing(shared)
+        return InProcesses(shared, self._processes, self._threads, self._workers)
 
     def submit(
         self, function: Callable[[S, T], R], shared: S, task: T, *, long: bool = True
@@ -75,12 +67,10 @@ class Local(Executor):
         return BackgroundTask(function, shared, task)
 
     def close(self) -> None:
-        """See `Executor.close`."""
-        if self._threads:
-            self._threads.shutdown(cancel_futures=True)
-            self._threads = None
-        if self._processes:
-            self._processes.close()
+        """See `Executor.close`. Any thread may; no more is begun then."""
+        self._threads.shutdown(wait=False, cancel_futures=True)
+        self._processes.close()
+        self._threads.shutdown()
 
 
 class _InThreads(SerialSharing[S]):
