@@ -201,21 +201,23 @@ def real_file(root: str | os.PathLike[str], relative: str | os.PathLike[str]) ->
 def _steps(root: Path, relative: str | os.PathLike[str]) -> list[str]:
     """The components of a relative name, none of which leads out on any system."""
     name = Path(relative).as_posix() if isinstance(relative, os.PathLike) else relative
-    steps = [] if name in ("", ".") else name.split("/")
-    if (
-        "\\" in name
-        or "\0" in name
-        or ":" in name
-        or {"", ".", ".."} & set(steps)
-        or len(steps) > _DEEPEST
-    ):
+    if name in ("", "."):
+        return []
+    if not leads_inside(name):
         raise OutputError(
             "PTM-O002",
             f"{name[:80]!r} would lead out of the folder, or is nested too deep",
             file=root,
             remedy="nothing was written; the name comes from a damaged file",
         )
-    return steps
+    return name.split("/")
+
+
+def leads_inside(name: str) -> bool:
+    """Whether a relative name, with slashes, is that of something below its root on any system."""
+    steps = name.split("/")
+    strange = any(letter in name for letter in "\\\0:") or {"", ".", ".."}.intersection(steps)
+    return not strange and len(steps) <= _DEEPEST
 
 
 def _mode(path: Path) -> int:

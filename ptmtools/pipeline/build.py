@@ -123,7 +123,6 @@ def _run(
                     if finished.issuperset(later.stage.read_with(later.options)):
                         later.begin()
             job.do()
-            run.end_of_turn(job.stage)
             finished.add(job.stage)
     except BaseException:
         with ExitStack() as abandoned:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from ptmtools.pipeline.encoding import fallback_level
 from ptmtools.pipeline.images import image_digests
-from ptmtools.pipeline.run import Artifacts, Job, Made
+from ptmtools.pipeline.run import Artifacts, Job
 from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE, TEXTURES
 from ptmtools.pipeline.textures import header_of, texture_files
 from ptmtools.store.layout import SERVED
+from ptmtools.store.manifest import StageRecord
 from ptmtools.store.transaction import Transaction
 
 if TYPE_CHECKING:
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
 class EmissionJob(Job):
     """Writes the served files; raises what `ptmtools.database.emit` raises."""
 
-    def make(self, transaction: Transaction) -> Made:
+    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
         """See `Job.make`."""
         from ptmtools.database import emit
 
@@ -31,13 +33,13 @@ class EmissionJob(Job):
             run[PVS],
             run[ACH],
             texture_records(run),
-            transaction.made(SERVED),
+            transaction.subfolder(SERVED),
             self.options,
             run.progress,
             force=True,
         )
         for name in report.files:
-            transaction.adopt(f"{SERVED}/{name}")
+            transaction.take(f"{SERVED}/{name}", transaction.folder / SERVED / name)
         counts = {
             "files": len(report.files),
             "bytes": report.bytes,
@@ -46,7 +48,7 @@ class EmissionJob(Job):
             "collapsed": report.collapsed,
             "viewpoints": len(report.viewpoints),
         }
-        return Made(transaction.pending(), counts, report.notes)
+        return replace(work, counts=counts, notes=report.notes)
 
 
 def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:

@@ -8,12 +8,13 @@ neither the cells nor what follows from them. If nothing but the contents of pla
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ptmtools.errors import DatabaseError, naming
 from ptmtools.pipeline.images import image_rows_of, images_of, keep_images
-from ptmtools.pipeline.run import Artifacts, Job, Made
+from ptmtools.pipeline.run import Artifacts, Job
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.store.digests import Digests
 from ptmtools.store.layout import IMAGE_LIST, IMAGES, sha256
@@ -93,12 +94,13 @@ class ReadingJob(Job):
         assert self.run.model
         return self.run.model
 
-    def make(self, transaction: Transaction) -> Made:
+    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
         """Raises what `ingest` and `check_image` raise."""
         before = self.run.before(SCENE)
-        return (before and self._repainted(transaction, before)) or self._read(transaction)
+        again = before and self._repainted(transaction, before, work)
+        return again or self._read(transaction, work)
 
-    def _read(self, transaction: Transaction) -> Made:
+    def _read(self, transaction: Transaction, work: StageRecord) -> StageRecord:
         from ptmtools.scene import ingest
 
         run = self.run
@@ -107,20 +109,21 @@ class ReadingJob(Job):
         transaction.put_arrays(SCENE.name, scene.to_arrays())
         self._put_images(transaction, scene.images, scene.images)
         assert SCENE.counts
-        return Made(
-            transaction.pending(),
-            SCENE.counts(scene),
-            tuple(_line(note) for note in scene.notes),
-            files_of(self._model, scene.files, run.db.digests),
+        return replace(
+            work,
+            inputs=files_of(self._model, scene.files, run.db.digests),
+            counts=SCENE.counts(scene),
+            notes=tuple(_line(note) for note in scene.notes),
         )
 
-    def _repainted(self, transaction: Transaction, before: StageRecord) -> Made | None:
+    def _repainted(
+        self, transaction: Transaction, before: StageRecord, work: StageRecord
+    ) -> StageRecord | None:
         """The scene, if nothing but plain images has changed; None if more has."""
         from ptmtools.scene.images import is_plain
         from ptmtools.scene.model import SourceImage
         from ptmtools.scene.source import FileRange, HeldBytes
 
-        work, _ = self.planned()
         try:
             rows = image_rows_of(self.run)
         except DatabaseError:
@@ -145,7 +148,7 @@ class ReadingJob(Job):
             return None
         images = [fresh.get(i, image) for i, image in enumerate(images_of(self.run))]
         self._put_images(transaction, images, fresh.values())
-        return Made(transaction.pending(), before.counts, tuple(before.notes))
+        return replace(work, counts=before.counts, notes=before.notes)
 
     def _put_images(
         self,

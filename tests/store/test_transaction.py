@@ -129,7 +129,7 @@ def test_what_stands_is_not_written_again(tmp_path: Path) -> None:
         staged = writer.begin("some")
         (staged.folder / "www").mkdir(parents=True)
         (staged.folder / "www/adopted").write_bytes(b"3")
-        staged.adopt("www/adopted")
+        staged.take("www/adopted", staged.folder / "www/adopted")
         staged.commit({"cells": StageRecord(3, {}, {}, staged.pending())})
     assert stamp(tmp_path / "www/adopted") == before
 
