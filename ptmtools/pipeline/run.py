@@ -157,7 +157,7 @@ class Run(Artifacts):
     ) -> None:
         super().__init__(db, model)
         self.writer, self.workers, self.progress, self.rebuild = db, workers, progress, rebuild
-        self.reports: dict[Stage[Any], StageReport] = {}
+        self.reports: list[StageReport] = []
         self._joint: Transaction | None = None
         self._uncommitted: dict[str, StageRecord] = {}
 
@@ -213,9 +213,9 @@ class Run(Artifacts):
         tasks: tuple[int, int, int] | None = None,
     ) -> None:
         """Notes that a stage has been dealt with."""
-        record = self.record(stage)
-        self.reports[stage] = StageReport(
-            stage.name, bool(why), seconds, record.counts, tuple(record.notes), why, tasks
+        done, notes = self.record(stage), tuple(self.record(stage).notes)
+        self.reports.append(
+            StageReport(stage.name, bool(why), seconds, done.counts, notes, why, tasks)
         )
 
 
