@@ -22,13 +22,14 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import MissingComponentError, WorkerError
+from ptmtools.errors import WorkerError
 from ptmtools.executors.cluster_worker import Behind, Work, check_in, forget, perform, receive
 from ptmtools.executors.model import AHEAD, Executor
 from ptmtools.executors.order import chunks, in_order
 from ptmtools.executors.outcome import Outcome
 from ptmtools.executors.packing import packed
 from ptmtools.executors.software import software
+from ptmtools.lazy import component
 from ptmtools.progress import announce
 
 if TYPE_CHECKING:
@@ -302,13 +303,10 @@ def _name() -> str:
 
 def _connected(address: str) -> Client:
     """Raises MissingComponentError PTM-M700, WorkerError PTM-W001."""
-    try:
-        from distributed import Client
-        from distributed.comm import get_address_host_port
-    except ImportError as fault:
-        raise MissingComponentError(
-            "PTM-M700", "a cluster needs Dask", remedy="pip install 'ptmtools[cluster]'"
-        ) from fault
+    component("distributed", "PTM-M700", "a cluster needs Dask", "cluster")
+    from distributed import Client
+    from distributed.comm import get_address_host_port
+
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # it is raised below
     try:
         host, port = get_address_host_port(address)
