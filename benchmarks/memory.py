@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-from ptmtools.pipeline.run import peak_memory
+from ptmtools.pipeline.report import peak_memory
 
 T = TypeVar("T")
 

@@ -161,10 +161,7 @@ def recover(folder: Path) -> None:
                 entry.unlink()
             elif real_file(entry, MANIFEST):
                 _complete(folder, f"{STAGING}/{entry.name}")
-            elif not _read_journal(entry):
-                shutil.rmtree(entry)
-        with suppress(OSError):
-            staging.rmdir()
+    discard(folder, also_finished=False)
 
 
 def finished_tasks(folder: Path) -> int:
