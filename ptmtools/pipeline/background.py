@@ -35,12 +35,10 @@ class Workers:
         self.here = processors() if scheduler else workers or processors()
         #: The executor for a stage of one thread.
         self.alone = _Alone(self.here, shared=bool(scheduler))
-        self._used = False
 
     @cached_property
     def executor(self) -> Executor:
         """All workers, for the stage whose turn it is."""
-        self._used = True
         return open_executor(*self._asked)
 
     def background(self, tasks: int) -> Executor | None:
@@ -57,7 +55,7 @@ class Workers:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._used:
+        if "executor" in vars(self):  # it was asked for
             self.executor.close()
 
 

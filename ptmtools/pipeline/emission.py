@@ -59,33 +59,25 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
     options = run.recorded(TEXTURES)
     records = []
     for i, name in enumerate(texture_files(image_digests(run))):
-        fallback = f"{name.removesuffix('ptm')}png"
-        has_fallback = f"{SERVED}/{fallback}" in record.outputs
+        png = f"{name.removesuffix('ptm')}png"
+        fallback = png if f"{SERVED}/{png}" in record.outputs else None
         header = header_of(run.db.path / SERVED / name)
-        texels = accumulate(level.width * level.height for level in header.levels)
+        sizes = accumulate(level.width * level.height for level in header.levels)
         levels = tuple(
-            TextureLevel(
-                width=level.width,
-                height=level.height,
-                offset=level.offset,
-                length=level.length,
-                gpu_bytes=count * header.texel_bytes,
-            )
-            for level, count in zip(header.levels, texels, strict=True)
+            TextureLevel(one.width, one.height, one.offset, one.length, texels * header.texel_bytes)
+            for one, texels in zip(header.levels, sizes, strict=True)
         )
         records.append(
             TextureRecord(
                 image=i,
                 file=name,
-                fallback=fallback if has_fallback else None,
+                fallback=fallback,
                 width=levels[-1].width,
                 height=levels[-1].height,
                 components=header.components,
                 levels=levels,
                 sha256=run.db.output(TEXTURES.name, f"{SERVED}/{name}"),
-                fallback_level=(
-                    fallback_level(header, options.fallback_size) if has_fallback else None
-                ),
+                fallback_level=fallback_level(header, options.fallback_size) if fallback else None,
             )
         )
     return tuple(records)
