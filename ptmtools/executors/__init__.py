@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING
 from ptmtools.lazy import names
 
 if TYPE_CHECKING:
-    from ptmtools.executors.background import BackgroundTask as BackgroundTask
     from ptmtools.executors.local import Local as Local
+    from ptmtools.executors.local import open_executor as open_executor
     from ptmtools.executors.model import Executor as Executor
     from ptmtools.executors.model import Sharing as Sharing
-    from ptmtools.executors.opening import open_executor as open_executor
     from ptmtools.executors.serial import Serial as Serial
+    from ptmtools.executors.worker import BackgroundTask as BackgroundTask
 
 __getattr__ = names(__name__)

@@ -12,11 +12,11 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any, TypeVar
 
-from ptmtools.executors.background import BackgroundTask
 from ptmtools.executors.model import AHEAD, Executor, Pending, Sharing, processors
 from ptmtools.executors.order import in_order
 from ptmtools.executors.processes import InProcesses, Processes
-from ptmtools.executors.serial import SerialSharing
+from ptmtools.executors.serial import Serial, SerialSharing
+from ptmtools.executors.worker import BackgroundTask
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -90,3 +90,26 @@ class _InThreads(SerialSharing[S]):
 
         # Whoever is told of an error may change what the threads are still reading.
         return in_order(submit, tasks, lambda: AHEAD * self._workers, wait)
+
+
+def open_executor(workers: int = 0, scheduler: str | None = None) -> Executor:
+    """The executor for ``workers`` tasks at a time, or a cluster's; to be closed after use.
+
+    Parameters
+    ----------
+    workers: 0 is one for each processor that this process may use, or each thread of the cluster.
+        Changes nothing in the result.
+    scheduler: address of a Dask scheduler, such as ``tcp://10.0.0.1:8786``.
+
+    Raises
+    ------
+    MissingComponentError: PTM-M700 Dask is not installed.
+    WorkerError: PTM-W001 the scheduler cannot be reached, PTM-W002 it has no workers, PTM-W003
+        they have other software than this process.
+    """
+    if scheduler is not None:
+        from ptmtools.executors.cluster import Cluster
+
+        return Cluster(scheduler, workers)
+    workers = workers or processors()
+    return Serial() if workers == 1 else Local(workers)

@@ -12,11 +12,10 @@ from functools import cached_property
 from threading import Event
 from typing import Any, TypeVar
 
-from ptmtools.executors.background import BackgroundTask
-from ptmtools.executors.local import Local
+from ptmtools.executors.local import Local, open_executor
 from ptmtools.executors.model import Executor, Pending, processors
-from ptmtools.executors.opening import open_executor
 from ptmtools.executors.serial import Serial
+from ptmtools.executors.worker import BackgroundTask
 
 S = TypeVar("S")
 T = TypeVar("T")
