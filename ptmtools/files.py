@@ -109,7 +109,7 @@ def writing(path: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise _output_error(Path(path), error) from error
+        raise output_error(path, error) from error
 
 
 def refuse_existing(path: str | os.PathLike[str]) -> None:
@@ -237,7 +237,8 @@ def _link(path: Path) -> OutputError:
     )
 
 
-def _output_error(target: Path, error: OSError) -> OutputError:
+def output_error(target: str | os.PathLike[str], error: OSError) -> OutputError:
+    """What `writing` makes of an error of the system."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return OutputError(
             "PTM-O003",
@@ -247,6 +248,6 @@ def _output_error(target: Path, error: OSError) -> OutputError:
         )
     remedy = "check that the folder exists and may be written to"
     if error.errno == errno.ENOENT:
-        remedy = f"create the folder {target.parent} first"
+        remedy = f"create the folder {Path(target).parent} first"
     reason = error.strerror or str(error)
     return OutputError("PTM-O002", f"cannot be written ({reason})", file=target, remedy=remedy)

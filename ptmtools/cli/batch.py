@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import glob
 import os
 import stat
@@ -19,7 +18,7 @@ from ptmtools.cli.common import as_json, forced, limited, voiced, workers
 from ptmtools.cli.failures import report
 from ptmtools.cli.output import Voice, abandon_stdout
 from ptmtools.errors import InputError, OutputError, PtmError, naming
-from ptmtools.files import refuse_existing, write_with, writing
+from ptmtools.files import output_error, refuse_existing, write_with, writing
 
 if TYPE_CHECKING:
     from ptmtools.texture.model import Limits
@@ -324,10 +323,6 @@ def to_standard_output(write: Callable[[IO[bytes]], object]) -> None:
             raise
         except OSError as error:
             abandon_stdout()
-            full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-            raise OutputError(
-                "PTM-O003" if full else "PTM-O002",
-                "the disk is full" if full else f"cannot be written ({error.strerror})",
-                file="standard output",
-                remedy="the output is incomplete",
-            ) from error
+            fault = output_error("standard output", error)
+            fault.remedy = "the output is incomplete"
+            raise fault from error

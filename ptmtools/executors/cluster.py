@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ptmtools.errors import WorkerError
 from ptmtools.executors.cluster_worker import Behind, Work, check_in, forget, perform, receive
 from ptmtools.executors.model import AHEAD, Executor
-from ptmtools.executors.order import chunks, in_order
+from ptmtools.executors.order import in_chunks
 from ptmtools.executors.outcome import Outcome
 from ptmtools.executors.packing import packed
 from ptmtools.executors.software import software
@@ -188,8 +188,7 @@ class _OnCluster(Generic[S]):
             work = Work(self._name, len(self._changes), self._alone, software(), call)
             return _Pending(self, work)
 
-        for found in in_order(submit, chunks(tasks, chunk), lambda: AHEAD * self._cluster.workers):
-            yield from found
+        return in_chunks(submit, tasks, chunk, lambda: AHEAD * self._cluster.workers)
 
     def change(self, function: Callable[[S, T], object], change: T) -> None:
         """See `Sharing.change`."""

@@ -20,7 +20,7 @@ from queue import LifoQueue
 from typing import IO, Any, NamedTuple, TypeVar
 
 from ptmtools.executors.model import AHEAD
-from ptmtools.executors.order import chunks, in_order
+from ptmtools.executors.order import in_chunks
 from ptmtools.executors.outcome import Outcome
 from ptmtools.executors.packing import packed, size, unpacked
 from ptmtools.executors.serial import SerialSharing
@@ -75,8 +75,7 @@ class InProcesses(SerialSharing[S]):
         def submit(some: list[T]) -> Future[Outcome]:
             return self._threads.submit(self._processes.call, _results, place, function, some)
 
-        for found in in_order(submit, chunks(tasks, chunk), lambda: self._ahead):
-            yield from found
+        return in_chunks(submit, tasks, chunk, lambda: self._ahead)
 
     def change(self, function: Callable[[S, T], object], change: T) -> None:
         """See `Sharing.change`."""

@@ -90,7 +90,7 @@ class Manifest:
             document = json.loads(data)
         except (ValueError, RecursionError) as fault:
             raise damaged_manifest(file, f"not JSON ({fault})") from fault
-        if _nested(document):
+        if _nested(document, _DEEPEST):
             raise damaged_manifest(file, f"nested more than {_DEEPEST} deep")
         if not isinstance(document, dict) or document.get("format") != FORMAT:
             raise DatabaseError(
@@ -135,20 +135,13 @@ def listed_before(data: bytes) -> tuple[str, set[str]] | None:
         return None
 
 
-def _nested(document: object) -> bool:
-    """Whether something lies deeper in it than any option or figure does. It would be written a
-    line for each, indented."""
-    level = [document] if isinstance(document, dict | list) else []
-    for _ in range(_DEEPEST):
-        level = [
-            inner
-            for value in level
-            for inner in (value.values() if isinstance(value, dict) else value)
-            if isinstance(inner, dict | list)
-        ]
-        if not level:
-            return False
-    return True
+def _nested(value: object, deepest: int) -> bool:
+    """Whether lists and objects lie deeper in it than any option or figure does. They would be
+    written a line for each, indented."""
+    if not isinstance(value, dict | list):
+        return False
+    inner = value.values() if isinstance(value, dict) else value
+    return deepest == 0 or any(_nested(each, deepest - 1) for each in inner)
 
 
 def _is_output(path: str) -> bool:
