@@ -60,6 +60,8 @@ class Cluster(Executor):
         they have other software than this process.
     """
 
+    remote = True
+
     def __init__(self, address: str, workers: int = 0) -> None:
         self.address, self._limit = address, workers
         self._client = _connected(address)
@@ -71,11 +73,6 @@ class Cluster(Executor):
         except BaseException:
             self.close()
             raise
-
-    @property
-    def remote(self) -> bool:
-        """See `Executor.remote`."""
-        return True
 
     @property
     def workers(self) -> int:

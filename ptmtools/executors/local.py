@@ -33,7 +33,7 @@ class Local(Executor):
 
     def __init__(self, workers: int = 0, *, threads: bool = True) -> None:
         self._workers = workers or processors()
-        self._by_threads = threads
+        self.remote = not threads
         # Both start what they consist of when there is first something to do.
         self._threads = ThreadPoolExecutor(self._workers, "ptmtools")
         self._processes = Processes(self._workers)
@@ -43,18 +43,13 @@ class Local(Executor):
         """How many threads, or processes."""
         return self._workers
 
-    @property
-    def remote(self) -> bool:
-        """See `Executor.remote`. What is on the disk need not go through a pipe."""
-        return not self._by_threads
-
     def sharing(
         self, shared: S, *, releases_lock: bool = False
     ) -> AbstractContextManager[Sharing[S]]:
         """See `Executor.sharing`."""
-        if self._by_threads and self._workers == 1:
+        if self._workers == 1 and not self.remote:
             return nullcontext(SerialSharing(shared))
-        if self._by_threads and releases_lock:
+        if releases_lock and not self.remote:
             return nullcontext(_InThreads(shared, self._threads, self._workers))
         return InProcesses(shared, self._processes, self._threads, self._workers)
 

@@ -87,15 +87,13 @@ class Sharing(Protocol[S_co]):
 class Executor(ABC):
     """Does tasks, several at a time. Not to be used by two threads at once."""
 
+    #: Whether all tasks are done elsewhere, by who may see the disks of this machine.
+    remote = False
+
     @property
     @abstractmethod
     def workers(self) -> int:
         """How many tasks are done at a time."""
-
-    @property
-    def remote(self) -> bool:
-        """Whether all tasks are done elsewhere, by who may see the disks of this machine."""
-        return False
 
     def each(
         self,

@@ -100,11 +100,11 @@ class Artifacts:
             return dict(stage.inputs.load()(self))
         found: dict[str, str] = {}
         for read in stage.read_with(options):
-            outputs = self.record(read).outputs
-            name = arrays_of(read.name)
-            if read.artifact and name not in outputs:
-                self.db.output(read.name, name)  # says what is wrong
-            found |= {name: outputs[name]} if read.artifact else outputs
+            outputs, name = self.record(read).outputs, arrays_of(read.name)
+            if read.artifact:
+                found[name] = outputs.get(name) or self.db.output(read.name, name)  # which raises
+            else:
+                found |= outputs
         return found
 
     def outdated(self, stage: Stage[Any]) -> str:

@@ -51,7 +51,7 @@ class Transaction:
         self._turn = turn
         self._relative = f"{STAGING}/{name}"
         self._pending: dict[str, str] = {}
-        self._standing = dict(db.manifest.outputs())
+        self._standing = db.manifest.outputs()
         self._done = _read_journal(self.folder)
 
     @property
@@ -142,7 +142,7 @@ class Transaction:
         for name, digest in self._pending.items():
             self._db.digests.note(self._db.path / name, digest)
         self._pending, self._done = {}, {}
-        self._standing = dict(manifest.outputs())
+        self._standing = manifest.outputs()
 
     def _place(self, name: str) -> Path:
         """Where an output waits, in a folder that is there."""
