@@ -213,9 +213,9 @@ class Run(Artifacts):
         tasks: tuple[int, int, int] | None = None,
     ) -> None:
         """Notes that a stage has been dealt with."""
-        done, notes = self.record(stage), tuple(self.record(stage).notes)
+        made = self.record(stage)
         self.reports.append(
-            StageReport(stage.name, bool(why), seconds, done.counts, notes, why, tasks)
+            StageReport(stage.name, bool(why), seconds, made.counts, tuple(made.notes), why, tasks)
         )
 
 
