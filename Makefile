@@ -8,7 +8,8 @@
 # make fuzz    100,000 damaged and hostile files for every reader (half an hour)
 # make sample  only the sample museum
 # make setup   only the virtual environment
-# make docs-tables     print the tables of the docs into their pages (ten minutes)
+# make docs-tables     print the exact tables of the docs into their pages (ten minutes)
+# make docs-timings    print the timed ones, on a machine that does nothing else (an hour)
 # make docs-pictures   draw the pictures of the docs
 # make clean   remove what was built, except the virtual environment
 
@@ -26,7 +27,7 @@ JOBS ?= 2
 PYTEST_ARGS ?=
 export PTM_SHARED ?= $(abspath ../shared)
 
-.PHONY: help setup demo test lint bench bench-codec bench-pvs bench-ach fuzz sample docs-tables docs-pictures clean
+.PHONY: help setup demo test lint bench bench-codec bench-pvs bench-ach fuzz sample docs-tables docs-timings docs-pictures clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -61,7 +62,9 @@ sample: build/museum/.made
 # The cell of the first viewpoint.
 FIRST_CELL = $(BIN)/python -c 'import json; hints = json.load(open("build/museum.db/www/hints.json")); print(hints["viewpoints"][0]["cell"])'
 
-demo: build/museum/.made
+# While the museum is painted, the other processor compiles what the build needs.
+demo: $(VENV)/.installed
+	$(BIN)/ptm warm-up & $(MAKE) --no-print-directory sample && wait
 	$(BIN)/ptm build-scene build/museum/museum.obj -o build/museum.db
 	$(BIN)/ptm plot build/museum.db --cell "$$($(FIRST_CELL))" -o build/museum.png --force
 	@echo
@@ -76,6 +79,7 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/mypy --config-file benchmarks/mypy.ini
 	@large=$$(git ls-files -z | xargs -0 stat -c '%s %n' | awk '$$1 > 1048576 { print $$2 }'); \
 	  [ -z "$$large" ] || { echo "Tracked files over 1 MiB: $$large" >&2; exit 1; }
 	$(BIN)/python benchmarks/docs_tables.py --check
@@ -114,6 +118,9 @@ fuzz: $(VENV)/.installed-dev
 
 docs-tables: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/docs_tables.py
+
+docs-timings: build/museum/.made $(VENV)/.installed-dev
+	$(BIN)/python benchmarks/docs_tables.py --timed
 
 docs-pictures: build/museum/.made
 	$(BIN)/ptm build-scene build/museum/museum.obj -o build/museum.db

@@ -26,15 +26,14 @@ headings, into `build/bench/ach.md`.
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
+from at_hand import MODELS, ROOT, model_file
 from numpy.typing import NDArray
 
 from ptmtools.cells import subdivide
@@ -57,13 +56,7 @@ from ptmtools.tradeoff.report import as_csv
 from ptmtools.visibility.model import Pvs
 from ptmtools.visibility.pvs import compute_pvs
 
-ROOT = Path(__file__).resolve().parent.parent
-SHARED = Path(os.environ.get("PTM_SHARED", ROOT.parent / "shared"))
 OUTPUT = ROOT / "build/bench"
-MODELS = (
-    ROOT / "build/museum/museum.obj",
-    *(SHARED / f"scenes/{n}/{n}.obj" for n in ("hospital", "willowgarage", "gallery", "office")),
-)
 PARTS = ("presets", "rates", "tolerance", "agreement", "speed", "processes")
 REFERENCE = 16384
 #: Student's t for seven degrees of freedom, two-sided 95 %.
@@ -295,7 +288,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    parser.add_argument("models", nargs="*", type=Path, default=[m for m in MODELS if m.exists()])
+    parser.add_argument("models", nargs="*", type=model_file, help="names or files")
     parser.add_argument("--cells", type=int, default=24, help="cells that stand for all")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS)
     given = parser.parse_args()
@@ -303,7 +296,7 @@ def main() -> None:
     report.say(f"OpenGL: {has_gl() or 'none'}")
     subjects: dict[str, Subject] = {}
     trials: dict[str, CoverageTrade] = {}
-    for model in given.models:
+    for model in [m for m in given.models or MODELS.values() if m.exists()]:
         scene = ingest(model)
         cells = subdivide(scene)
         pvs = compute_pvs(cells)

@@ -15,19 +15,17 @@ import argparse
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
+from at_hand import TWO_ROOMS, model_file
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.cells.grouping import grouped
 from ptmtools.scene import ingest
-from ptmtools.tolerance import Tolerance
 from ptmtools.visibility import Pvs, PvsOptions, compute_pvs, searching
 from ptmtools.visibility.near_ties import Searched
 
-WARM_UP = Path(__file__).resolve().parent.parent / "sample_data/two_rooms/two_rooms.obj"
 BUDGETS = (0, 2_000, 20_000, PvsOptions().budget, 1_000_000)
 
 
@@ -61,28 +59,27 @@ def pairs(pvs: Pvs, leaf_cell: np.ndarray) -> str:
 
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("models", nargs="+", type=Path)
+    parser.add_argument("models", nargs="+", type=model_file)
     parser.add_argument("--wall-area", type=float, default=SubdivideOptions().wall_area)
     parser.add_argument("--budgets", nargs="*", type=int, default=BUDGETS)
     given = parser.parse_args(arguments)
 
     options = SubdivideOptions(cells="leaf", wall_area=given.wall_area)
-    compute_pvs(subdivide(ingest(WARM_UP)))
+    compute_pvs(subdivide(ingest(TWO_ROOMS)))
     ties = []
     head = f"walls ≥ {given.wall_area:g} m²"
-    columns = " | ".join(f"{budget:,}" for budget in given.budgets)
-    print(f"| {head} | leaves / portals | {columns} |\n|{'---|' * (2 + len(given.budgets))}")
+    columns = "".join(f" {budget:,} |" for budget in given.budgets)
+    print(f"| {head} | leaves / portals |{columns}\n|{'---|' * (2 + len(given.budgets))}")
     for model in given.models:
         scene = ingest(model)
         cells = subdivide(scene, options)
         shown = []
         for budget in given.budgets:
             pvs, seconds = timed(cells, budget)
-            shown.append(f"{pvs.average_share:.1%}, {seconds:.1f} s, {pvs.fallbacks:,} cut")
+            shown.append(f" {pvs.average_share:.1%}, {seconds:.1f} s, {pvs.fallbacks:,} cut |")
         size = f"{cells.leaf_count:,} / {cells.portal_count:,}"
-        print(f"| {model.stem} | {size} | {' | '.join(shown)} |", flush=True)
-        tolerance = Tolerance.for_points(scene.points)
-        rooms = grouped(cells, SubdivideOptions(wall_area=given.wall_area), tolerance)
+        print(f"| {model.stem} | {size} |{''.join(shown)}", flush=True)
+        rooms = grouped(cells, SubdivideOptions(wall_area=given.wall_area))
         pvs, seconds = timed(cells)
         row = [f"{int(n.sum()):,}" for n in (pvs.ties, pvs.decided, pvs.opened)]
         row.append(f"{pairs(pvs, rooms.leaf_cell)}, {seconds:.1f} s")

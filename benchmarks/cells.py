@@ -10,32 +10,24 @@ with textures of 16 texels, which change none of this.
 from __future__ import annotations
 
 import argparse
-import os
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
+from at_hand import MODELS, MUSEUM, ROOT
+
 from ptmtools.cells import SubdivideOptions, subdivide
 from ptmtools.scene import Scene, ingest
 from ptmtools.visibility import compute_pvs
 
-ROOT = Path(__file__).resolve().parent.parent
-SHARED = Path(os.environ.get("PTM_SHARED", ROOT.parent / "shared"))
-MUSEUM = "museum"
-MODELS = (MUSEUM, "hospital", "willowgarage", "office", "gallery")
 AREA = SubdivideOptions().wall_area
-
-
-def shared(name: str) -> Path:
-    """Where one of the `MODELS` but the museum is, if it is at hand."""
-    return SHARED / f"scenes/{name}/{name}.obj"
 
 
 def opened(name: str) -> Scene:
     """One of the `MODELS`."""
     if name != MUSEUM:
-        return ingest(shared(name))
+        return ingest(MODELS[name])
     with tempfile.TemporaryDirectory() as folder:
         maker = ROOT / "sample_data/make_museum.py"
         command = [sys.executable, maker, "-o", f"{folder}/{name}", "--size", "16"]
@@ -62,7 +54,7 @@ def area_row(name: str, scene: Scene, area: float) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    at_hand = [name for name in MODELS if name == MUSEUM or shared(name).is_file()]
+    at_hand = [name for name in MODELS if name == MUSEUM or MODELS[name].is_file()]
     parser.add_argument("models", nargs="*", default=at_hand, help=f"of {' '.join(MODELS)}")
     parser.add_argument("--wall-area", nargs="+", type=float, metavar="M2")
     given = parser.parse_args()

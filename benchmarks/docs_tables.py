@@ -1,7 +1,9 @@
 """Prints the tables of the docs into their pages. ``python benchmarks/docs_tables.py [NAME…]``
 
 A page holds a table between two lines, ``<!-- table: NAME -->`` and ``<!-- /table -->``. `TABLES`
-says which command prints it; what it prints as Markdown replaces what stood there.
+says which command prints it; what it prints as Markdown replaces what stood there. Without names
+these are the exact tables, which are the same on every machine; with ``--timed`` the others, which
+want a quiet one.
 
 ``--check`` writes nothing. It runs the quick form of each exact table, the rows that take a few
 seconds, and fails where a row that is printed does not stand in the page. `make lint` does this.
@@ -16,6 +18,8 @@ import re
 import subprocess
 import sys
 from dataclasses import dataclass
+from functools import cache
+from itertools import groupby
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -32,32 +36,46 @@ class Table:
     command: a script of this project and its arguments; prints the whole table.
     quick: the same for some rows of it; empty for timings, which are not compared.
     needs: the folder below the shared data without which it cannot be made.
+    part: which of the tables that the command prints, counted from 0.
     """
 
     command: str
-    quick: str
-    needs: str
+    quick: str = ""
+    needs: str = "scenes"
+    part: int = 0
 
 
+ALL = "museum hospital willowgarage gallery office"
 BY_AREA = "benchmarks/cells.py {} --wall-area {}"
 TABLES = {
-    "scenes": Table("benchmarks/cells.py", "benchmarks/cells.py museum hospital gallery", "scenes"),
+    "scenes": Table("benchmarks/cells.py", "benchmarks/cells.py museum hospital gallery"),
     "wall-area": Table(
         BY_AREA.format("museum hospital willowgarage gallery", "8 4 2 1"),
         BY_AREA.format("gallery", "8 4 2"),
-        "scenes",
     ),
     "ptm-bytes": Table(
         "benchmarks/codec/bytes.py", "benchmarks/codec/bytes.py raw fast", "textures"
     ),
+    "rooms": Table("benchmarks/rooms.py museum hospital willowgarage"),
+    "sizes-of-cells": Table("benchmarks/pvs_trade.py"),
+    "methods": Table("benchmarks/pvs_trade.py", part=1),
+    "near-ties": Table(f"benchmarks/budget.py {ALL} --budgets", part=1),
+    "near-ties-fine": Table(
+        "benchmarks/budget.py museum hospital gallery --wall-area 0.25", part=1
+    ),
+    "budgets": Table("benchmarks/budget.py museum hospital willowgarage gallery"),
+    "budgets-fine": Table("benchmarks/budget.py museum hospital gallery --wall-area 0.25"),
+    "starting": Table("benchmarks/codec/startup.py --only encode build", needs="textures"),
 }
 
 
-def printed(command: str) -> list[str]:
-    """The lines that a command prints."""
+@cache
+def printed(command: str) -> list[list[str]]:
+    """The tables that a command prints, as lines."""
     arguments = [sys.executable, *command.split()]
     done = subprocess.run(arguments, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
-    return done.stdout.strip().splitlines()
+    lines = done.stdout.splitlines()
+    return [list(rows) for table, rows in groupby(lines, lambda s: s.startswith("|")) if table]
 
 
 def tables_of(page: Path) -> dict[str, list[str]]:
@@ -67,14 +85,13 @@ def tables_of(page: Path) -> dict[str, list[str]]:
 
 def changed(name: str, page: Path) -> list[str]:
     """Rows that the quick command prints and the page lacks."""
-    quick = TABLES[name].quick
-    standing = tables_of(page)[name]
-    return [line for line in printed(quick) if line not in standing] if quick else []
+    table, standing = TABLES[name], tables_of(page)[name]
+    return [line for line in printed(table.quick)[table.part] if line not in standing]
 
 
 def write(name: str, page: Path) -> None:
     """Puts what the command prints into the page."""
-    lines = "\n".join(printed(TABLES[name].command))
+    lines = "\n".join(printed(TABLES[name].command)[TABLES[name].part])
 
     def put(found: re.Match[str]) -> str:
         if found[2] != name:
@@ -86,13 +103,15 @@ def write(name: str, page: Path) -> None:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("names", nargs="*", help=f"default: all of {', '.join(TABLES)}")
+    parser.add_argument("names", nargs="*", help=f"of {', '.join(TABLES)}")
+    parser.add_argument("--timed", action="store_true", help="those that have timings")
     parser.add_argument("--check", action="store_true", help="write nothing; compare exact rows")
     given = parser.parse_args()
     failed = False
     for page in sorted(ROOT.glob("docs/*.md")):
         for name in tables_of(page):
-            if given.names and name not in given.names:
+            timed = not TABLES[name].quick
+            if name not in given.names if given.names else timed != given.timed:
                 continue
             where = f"docs/{page.name}: table {name}"
             data = SHARED / TABLES[name].needs

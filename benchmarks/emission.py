@@ -16,7 +16,6 @@ Seconds are of the processor, the best of three; waiting for the disk is not amo
 from __future__ import annotations
 
 import argparse
-import os
 import tempfile
 import time
 from collections.abc import Callable
@@ -26,6 +25,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from at_hand import MODELS, MUSEUM, model_file
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -42,12 +42,6 @@ from ptmtools.database.vrml.text import field
 from ptmtools.scene import Scene, ingest
 from ptmtools.visibility import Pvs, compute_pvs
 
-ROOT = Path(__file__).resolve().parent.parent
-SHARED = Path(os.environ.get("PTM_SHARED", ROOT.parent / "shared"))
-MODELS = (
-    ROOT / "build/museum/museum.obj",
-    *(SHARED / f"scenes/{name}/{name}.obj" for name in ("hospital", "gallery")),
-)
 #: Each thing is timed so many times, and the best counts.
 TIMES = 3
 #: The large scene has at least so many triangles.
@@ -170,7 +164,7 @@ def emitted_gltf(scene: Scene, cells: Cells, pvs: Pvs, ach: Ach) -> Written:
 
 def by_trimesh(model: Path) -> Written:
     """Its GLB of the model, every image a single texel."""
-    loaded = trimesh.load(model, force="scene")
+    loaded = trimesh.load_scene(model)
     for shape in loaded.geometry.values():
         material = getattr(shape.visual, "material", None)
         if getattr(material, "image", None) is not None:
@@ -210,7 +204,7 @@ def compare(model: Path, folder: Path) -> None:
     glb = emitted_gltf(scene, cells, pvs, ach)
     glb.row("GLBs")
     by_trimesh(model).row("trimesh GLB", glb)
-    if len(cells.triangle) < MANY and model.stem == MODELS[0].stem:
+    if len(cells.triangle) < MANY and model.stem == MUSEUM:
         while len(cells.triangle) < MANY:
             cells = quartered(cells)
         heading(f"\n{model.stem}, quartered")
@@ -220,8 +214,9 @@ def compare(model: Path, folder: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("models", nargs="*", type=Path, help="default: museum, hospital, gallery")
-    models = [model for model in parser.parse_args().models or MODELS if model.is_file()]
+    usual = [MODELS[name] for name in (MUSEUM, "hospital", "gallery")]
+    parser.add_argument("models", nargs="*", type=model_file, default=usual, help="names or files")
+    models = [model for model in parser.parse_args().models if model.is_file()]
     numbers()
     with tempfile.TemporaryDirectory(prefix="emission-") as folder:
         for model in models:

@@ -35,7 +35,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import os
 import pickle
 import sys
 import tempfile
@@ -48,21 +47,20 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+from at_hand import MODELS, ROOT, TWO_ROOMS, model_file
+
 # Nothing large is imported here: a child starts with what its parent has of memory on its record.
 
-ROOT = Path(__file__).resolve().parent.parent
-SHARED = Path(os.environ.get("PTM_SHARED", ROOT.parent / "shared"))
 OUTPUT = ROOT / "build/bench/pvs.csv"
 #: Models, and the wall areas at which something changes in them.
-MODELS = {
-    ROOT / "build/museum/museum.obj": (2.0, 1.0, 0.5),
-    SHARED / "scenes/hospital/hospital.obj": (2.0, 0.5, 0.25),
-    SHARED / "scenes/willowgarage/willowgarage.obj": (4.0, 2.0, 1.0),
-    SHARED / "scenes/gallery/gallery.obj": (2.0, 0.5, 0.25),
-    SHARED / "scenes/office/office.obj": (8.0, 4.0, 2.0),
+AREAS = {
+    MODELS["museum"]: (2.0, 1.0, 0.5),
+    MODELS["hospital"]: (2.0, 0.5, 0.25),
+    MODELS["willowgarage"]: (4.0, 2.0, 1.0),
+    MODELS["gallery"]: (2.0, 0.5, 0.25),
+    MODELS["office"]: (8.0, 4.0, 2.0),
 }
 OTHERS = (4.0, 2.0, 1.0)
-WARM_UP = ROOT / "sample_data/two_rooms/two_rooms.obj"
 KINDS, METHODS = ("leaf", "room"), ("full", "fast", "sampled")
 #: Segments tried on sampled sets, at most.
 SHOWING = 1_000_000
@@ -129,7 +127,7 @@ def warm_up(folder: Path) -> None:
     from ptmtools.scene import ingest
     from ptmtools.visibility import PvsOptions, compute_pvs
 
-    scene = ingest(WARM_UP)
+    scene = ingest(TWO_ROOMS)
     subdivide(scene)
     cells = stored(folder, "small", subdivide(scene, SubdivideOptions(cells="leaf", max_leaves=4)))
     for method in METHODS:
@@ -153,7 +151,7 @@ def cut(folder: Path, model: Path, area: float) -> dict[str, tuple[float, float]
     from ptmtools.cells.grouping import grouped
     from ptmtools.scene import ingest
 
-    subdivide(ingest(WARM_UP))
+    subdivide(ingest(TWO_ROOMS))
     scene = ingest(model)
     options = SubdivideOptions(cells="leaf", wall_area=area)
     leaves, cpu, wall = timed(subdivide, scene, options)
@@ -448,7 +446,7 @@ def plot(rows: Sequence[Row], path: Path) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("models", nargs="*", type=Path, help="default: museum and shared scenes")
+    parser.add_argument("models", nargs="*", type=model_file, help="names or files")
     parser.add_argument("--wall-areas", nargs="+", type=float, metavar="M2")
     parser.add_argument("--segments", type=int, default=1_000_000)
     parser.add_argument("-o", "--output", type=Path, default=OUTPUT, metavar="CSV")
@@ -459,7 +457,7 @@ def main(arguments: list[str] | None = None) -> int:
     else:
         output = given.output
         output.parent.mkdir(parents=True, exist_ok=True)
-        models = [m for m in given.models or MODELS if m.is_file()]
+        models = [m for m in given.models or AREAS if m.is_file()]
         if not models:
             parser.exit(message="no model at hand\n")
         rows = []
@@ -468,7 +466,7 @@ def main(arguments: list[str] | None = None) -> int:
             in_child(warm_up, folder)
             for model in models:
                 in_child(walk_of, folder, model)
-                for area in given.wall_areas or MODELS.get(model, OTHERS):
+                for area in given.wall_areas or AREAS.get(model, OTHERS):
                     begun = time.perf_counter()
                     rows += measure(folder, model, area, given.segments)
                     write_csv(rows, output)

@@ -21,12 +21,11 @@ cell sees something else, so even exact averages have one; fewer cells have a la
 from __future__ import annotations
 
 import argparse
-import os
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
+from at_hand import MODELS, model_file
 from numpy.typing import NDArray
 from walk import cell_texts, load, passed, standard_walk, texels_at_hand
 
@@ -44,12 +43,6 @@ from ptmtools.coverage.tally import PixelCounter
 from ptmtools.scene import Scene, ingest
 from ptmtools.visibility import Pvs, compute_pvs
 
-ROOT = Path(__file__).resolve().parent.parent
-SHARED = Path(os.environ.get("PTM_SHARED", ROOT.parent / "shared"))
-MODELS = (
-    ROOT / "build/museum/museum.obj",
-    *(SHARED / f"scenes/{n}/{n}.obj" for n in ("hospital", "willowgarage", "office", "gallery")),
-)
 LEAF = SubdivideOptions(cells="leaf")
 WHOLE = SubdivideOptions(cells="room", gain=1.0)
 GAINS = (0.02, 0.05, 0.1, 0.2)
@@ -102,7 +95,7 @@ def hint_error(
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("models", nargs="*", type=Path, help="default: museum and shared scenes")
+    parser.add_argument("models", nargs="*", type=model_file, help="names or files")
     given = parser.parse_args()
     kinds = {
         "leaf": LEAF,
@@ -114,8 +107,8 @@ def main() -> None:
         "| ACH error | CPU s |"
     )
     print("|---|---|---|---|---|---|---|---|---|---|")
-    for model in [m for m in given.models or MODELS if m.is_file()]:
-        scene = ingest(model)
+    for file in [m for m in given.models or MODELS.values() if m.is_file()]:
+        scene = ingest(file)
         leaves = subdivide(scene, LEAF)
         rooms = grouped(leaves, WHOLE)
         way = passed(leaves, standard_walk(rooms).corner)
@@ -132,7 +125,7 @@ def main() -> None:
             texels = texels_at_hand(scene, cells, pvs, way, texts)
             error, spread = hint_error(cells, pvs, ach, rooms, seen)
             print(
-                f"| {model.stem} | {name} | {cells.cell_count} | {pvs.average_share:.1%} "
+                f"| {file.stem} | {name} | {cells.cell_count} | {pvs.average_share:.1%} "
                 f"| {walked.files} | {walked.megabytes:.2f} | {walked.at_hand:.2f} | {texels:.0%} "
                 f"| {error:.3f} ± {spread:.3f} | {seconds:.1f} |",
                 flush=True,

@@ -484,8 +484,9 @@ def simulate_textures(known: dict[str, Any], gigabits: float) -> None:
         for workers in WORKERS:
             cells = []
             for count in TEXTURES:
-                columns = (a[:count].tolist() for a in (work, send, receive))
-                last = schedule(*columns, workers, start=count * before) + count * after
+                durations, sent, received = (a[:count].tolist() for a in (work, send, receive))
+                last = schedule(durations, sent, received, workers, count * before)
+                last += count * after
                 busy = encode[:count].sum() / workers / last
                 cells.append(f"{last / 3600:.3f} {busy:4.0%}")
             row(f"{workers} workers", *cells)

@@ -1,4 +1,4 @@
-"""What another process compiles while this one compiles something else.
+"""What another process compiles while this one is busy with other things.
 
 Numba compiles one thing at a time in a process. Machine code is shared on the disk, and a process
 waits for what another is compiling (`ptmtools.compiled`), so the two need not agree on anything.
@@ -12,28 +12,23 @@ import sys
 from collections.abc import Callable
 
 from ptmtools.lazy import Lazy
+from ptmtools.machine_code import announce_compilation, is_kept
 
-_tasks: list[str] = []
 
+def compile_ahead(task: Lazy[Callable[[], object]], kernels: str) -> None:
+    """Another process calls ``task``, which calls kernels, unless machine code of the module
+    ``kernels``, one of theirs, is at hand.
 
-def compile_ahead(task: Lazy[Callable[[], object]]) -> None:
-    """As soon as this process compiles anything, another one calls ``task``, which calls kernels.
-
-    Nothing happens where all machine code is at hand. The other process ends with this one, and
-    whether it fails does not matter. Tasks are called in order.
+    The other process ends with this one, and whether it fails does not matter.
     """
-    _tasks.append(task.place)
-
-
-def start_ahead() -> None:
-    """Starts the other process, if there is something for it."""
-    if not _tasks:
+    if is_kept(kernels):
         return
-    # With the modules of this process, wherever they come from.
+    announce_compilation()
+    # With the modules of this process, wherever they come from; ends tidily when told to.
     program = (
-        f"import sys; sys.path[:] = {sys.path!r}\n"
-        "from ptmtools.lazy import Lazy\n"
-        f"for place in {_tasks!r}: Lazy(place).load()()"
+        f"import signal, sys; sys.path[:] = {sys.path!r}\n"
+        "signal.signal(signal.SIGTERM, lambda *_: sys.exit())\n"
+        f"from ptmtools.lazy import Lazy; Lazy({task.place!r}).load()()"
     )
     nothing = subprocess.DEVNULL
     try:
@@ -42,4 +37,4 @@ def start_ahead() -> None:
         )
     except OSError:
         return
-    atexit.register(other.kill)
+    atexit.register(other.terminate)

@@ -1,27 +1,10 @@
-"""Loops compiled by numba, and where their machine code is kept between runs.
-
-Machine code holds whatever its function could see as it was compiled: the functions that it calls
-and the constants of its module, imported ones among them. Numba looks at a function's own file
-only. So machine code is kept in a folder named after the contents of the function's module and of
-all modules of the package that this one imports, directly or not: a kernel may stand in any file
-and use what it likes, and a change elsewhere leaves its machine code in use. What an import brings
-is read off the source text (`_imports`), so a kernel's constants must not come from modules that
-are found at run time only.
-
-The folder lies in the package's ``__pycache__`` where that can be written, else in the user's
-cache folder, or in ``NUMBA_CACHE_DIR``. Imports of what a kernel's module does not need make it
-stale more often, so kernels stand in modules of their own or beside code that imports little.
-"""
+"""Loops compiled by numba. Their machine code is kept between runs (`ptmtools.machine_code`)."""
 
 from __future__ import annotations
 
-import os
-import re
 import sys
-import tempfile
 from collections.abc import Callable
-from functools import cache, cached_property, update_wrapper
-from hashlib import sha256
+from functools import cached_property, update_wrapper
 from importlib import import_module
 from pathlib import Path
 from threading import Lock
@@ -32,18 +15,9 @@ import numba
 import numba.core.event
 import numba.extending
 
-from ptmtools.ahead import start_ahead
-from ptmtools.progress import announce
+from ptmtools.machine_code import announce_compilation, folder_of
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-
-_PACKAGE = Path(__file__).parent
-#: An import of the package's, wherever it stands: a module, and the names taken from it.
-_IMPORT = re.compile(
-    rf"^ *(?:from +({_PACKAGE.name}[\w.]*) +import +(\([^)]*\)|[^\n]*)"
-    rf"|import +({_PACKAGE.name}[\w.]*))",
-    re.MULTILINE,
-)
 
 
 def kernel(function: Function) -> Function:
@@ -111,23 +85,29 @@ class _Kernel:
     @cached_property
     def _entry(self) -> Any:
         settings: Any = numba.config
+        code = self.py_func.__code__
+        folder = folder_of(Path(code.co_filename))
         with _setting:
             before = settings.CACHE_DIR
-            folder = _folder(before, self.py_func.__code__.co_filename)
             settings.CACHE_DIR = folder
             try:
                 entry = self._compiler(cache=bool(folder))
             finally:
                 settings.CACHE_DIR = before
         if folder and hasattr(entry, "_cache"):
-            code = self.py_func.__code__
             lock = Path(folder, f"{Path(code.co_filename).stem}-{code.co_firstlineno}.lock")
             entry._cache = _Kept(entry._cache, lock, allocates=self._options.get("_nrt", True))
         return entry
 
     @cached_property
     def _part(self) -> Any:
-        return self._compiler(no_cpython_wrapper=True)
+        part = self._compiler(no_cpython_wrapper=True)
+        # Numba would compile it anew for every number that stands in a call of it.
+        general, compile_for = cast(Any, numba.types).unliteral, part.get_call_template
+        part.get_call_template = lambda arguments, named: compile_for(
+            tuple(map(general, arguments)), {name: general(kind) for name, kind in named.items()}
+        )
+        return part
 
     @property
     def _numba_type_(self) -> Any:
@@ -223,76 +203,18 @@ def _load_without_scipy() -> None:
 
 
 class _FirstCompilation(numba.core.event.Listener):
-    """Announces, once, that machine code is being made and not merely loaded."""
+    """Prepares for making machine code, where it is not merely loaded."""
 
-    _announced = False
+    _prepared = False
 
     def on_start(self, event: Any) -> None:
-        if not self._announced:
-            self._announced = True
-            start_ahead()
+        if not self._prepared:
+            self._prepared = True
             _load_without_scipy()
-            announce("compiling for this machine (first run only, up to a minute)")
+            announce_compilation()
 
     def on_end(self, event: Any) -> None:
         pass
 
 
 numba.core.event.register("numba:compile", _FirstCompilation())  # type: ignore[no-untyped-call]
-
-
-def _folder(chosen: str, file: str) -> str:
-    """Where machine code of functions in that file is kept; "" if there is no place."""
-    place = chosen or _place()
-    return place and os.path.join(place, _digest(Path(file)))
-
-
-@cache
-def _place() -> str:
-    # Not Path.expanduser, which raises for a user without a home.
-    caches = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
-    for place in (_PACKAGE / "__pycache__" / "kernels", caches / "ptmtools" / "kernels"):
-        try:
-            place.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=place):
-                return str(place)
-        except OSError:
-            continue
-    return ""
-
-
-@cache
-def _digest(file: Path) -> str:
-    """Of a module and all that it imports from the package."""
-    files, waiting = {file}, [file]
-    while waiting:
-        found = _imports(waiting.pop()) - files
-        files |= found
-        waiting += found
-    digest = sha256()
-    for one in sorted(files):
-        digest.update(sha256(_source(one)).digest())
-    return digest.hexdigest()[:12]
-
-
-@cache
-def _source(file: Path) -> bytes:
-    return file.read_bytes()
-
-
-@cache
-def _imports(file: Path) -> frozenset[Path]:
-    """The modules of the package that are named in this one's imports."""
-    found = set()
-    for module, names, whole in _IMPORT.findall(_source(file).decode()):
-        # A name may be a module in a package, or something within the module.
-        for name in re.findall(r"\w+", re.sub(r"#.*| as \w+", "", names)) or [""]:
-            found.add(_module(f"{module}.{name}") or _module(module or whole))
-    return frozenset(found - {None})  # type: ignore[arg-type]
-
-
-@cache
-def _module(name: str) -> Path | None:
-    path = _PACKAGE.parent.joinpath(*name.split("."))
-    files = (path.with_suffix(".py"), path / "__init__.py")
-    return next((file for file in files if file.is_file()), None)

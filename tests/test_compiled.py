@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import ptmtools
-from ptmtools import compiled
+from ptmtools import compiled, machine_code
 
 ROOT = Path(ptmtools.__file__).parent
 PROGRAM = """
@@ -69,8 +69,8 @@ def package(tmp_path: Path) -> Path:
     package.mkdir()
     for name, source in SOURCES.items():
         (package / f"{name}.py").write_text(source)
-    for name in ("ahead.py", "compiled.py", "lazy.py", "progress.py"):
-        shutil.copy(ROOT / name, package)
+    for name in ("ahead", "compiled", "errors", "lazy", "machine_code", "progress"):
+        shutil.copy(ROOT / f"{name}.py", package)
     return package
 
 
@@ -101,25 +101,36 @@ def test_one_of_two_processes_compiles(package: Path) -> None:
 
 
 def test_another_process_compiles_ahead(package: Path) -> None:
-    """It begins when something is to be compiled; one that fails is not noticed."""
+    """Unless that was done before; one that fails is not noticed."""
     (package / "task.py").write_text(
         "from pathlib import Path; from ptmtools.two import inner\n"
         "def begin():\n    inner(1.0)\n    Path('done').touch()\n    raise ValueError"
     )
-    program = f"""
+    program = """
 import os, time
 from ptmtools.ahead import compile_ahead
 from ptmtools.lazy import Lazy
-compile_ahead(Lazy("ptmtools.task:begin"))
-{PROGRAM}
-while {{0}} and not os.path.exists("done"):
+from ptmtools.progress import listen
+listen(print)
+compile_ahead(Lazy("ptmtools.task:begin"), "ptmtools.two")
+while {0} and not os.path.exists("done"):
     time.sleep(0.01)
 from ptmtools.two import inner
 print(inner(1.0))
 """
-    for wait, announced in ((1, 1), (0, 0)):
-        lines = run(program.format(wait), package.parent, NUMBA_CACHE_DIR="")
-        assert lines[announced:] == ["12", "11.0"]
+    announced = "compiling for this machine (first run only, up to a minute)"
+    for wait, lines in ((1, [announced, "11.0"]), (0, ["11.0"])):
+        assert run(program.format(wait), package.parent, NUMBA_CACHE_DIR="") == lines
+
+
+def test_literals_are_not_types_of_their_own(package: Path) -> None:
+    """Numba alone would compile inner kernels anew for every literal."""
+    (package / "one.py").write_text(
+        SOURCES["one"].replace("called(x)", "called(x) + called(2) + called(3)")
+    )
+    program = f"{PROGRAM}\nfrom ptmtools.two import inner\nprint(len(inner._part.signatures))"
+    lines = run(program, package.parent, NUMBA_CACHE_DIR="")
+    assert lines[1:] == [str(11 + 21 + 31 + 1), "1"]
 
 
 def test_a_numba_that_loads_machine_code_in_another_way(tmp_path: Path) -> None:
@@ -178,9 +189,9 @@ def test_without_a_place_to_keep_it_code_still_runs(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     program = (
         "import os; os.environ.pop('HOME', None)\n"
-        "from pathlib import Path; from ptmtools import compiled\n"
-        f"compiled._PACKAGE = Path({str(tmp_path / 'file')!r})\n"
-        "assert compiled._place() == ''\n"
+        "from pathlib import Path; from ptmtools import compiled, machine_code\n"
+        f"machine_code._PACKAGE = Path({str(tmp_path / 'file')!r})\n"
+        "assert machine_code._place() == ''\n"
         "print(compiled.kernel(lambda x: x + 1)(41))"
     )
     place = str(tmp_path / "file")
@@ -199,6 +210,6 @@ def test_no_import_is_overlooked() -> None:
                 names = [f"{node.module}.{name.name}" for name in node.names]
             for name in names:
                 if name.split(".")[0] == ROOT.name:
-                    own = compiled._module(name) or compiled._module(name.rpartition(".")[0])
-                    found.add(own)
-        assert found <= compiled._imports(file), file
+                    own = machine_code._module(name)
+                    found.add(own or machine_code._module(name.rpartition(".")[0]))
+        assert found <= machine_code._imports(file), file

@@ -61,7 +61,7 @@ def encode(
     check_options(options)
     ahead = PROFILES[options.profile].ahead
     if ahead and (batch.workers or processors()) > 1:
-        compile_ahead(ahead)
+        compile_ahead(*ahead)
     jobs = jobs_for(images, SUFFIXES, output, ".ptm", (".ptm", *SUFFIXES))
     if output and any(job.target and not job.folder for job in jobs):
         _refuse_image_suffix(output)

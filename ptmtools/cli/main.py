@@ -34,6 +34,7 @@ COMMANDS = {
     "tradeoff": ("tradeoff", "tradeoff", "Measure what settings cost, and how accurate they are."),
     "encode": ("images", "encode", "Encode images as .ptm files."),
     "decode": ("images", "decode", "Decode .ptm files to images."),
+    "warm-up": ("warm_up", "warm_up", "Compile for this machine, before the first run."),
     "compare": ("comparing", "compare", "Compare .ptm with other image formats: size and speed."),
 }
 

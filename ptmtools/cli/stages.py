@@ -13,6 +13,7 @@ from typing import Any
 
 import click
 
+from ptmtools.ahead import compile_ahead
 from ptmtools.cli.common import (
     as_json,
     database,
@@ -24,6 +25,8 @@ from ptmtools.cli.common import (
 )
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
+from ptmtools.cli.warm_up import WARM_UP
+from ptmtools.executors.model import processors
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.build import build_scene as build
 from ptmtools.pipeline.build import run_stage
@@ -106,6 +109,8 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
             plans = plan_build(model, db, *options, force=force)
             print_plan(voice, plans[: len(stages)], as_json)
             return
+        if (workers or processors()) > 1:
+            compile_ahead(*WARM_UP)
         with voice.progress() as progress:
             report = build(
                 model,

@@ -36,7 +36,8 @@ class Profile:
     module: the `Coder`, by name: it is imported when it is first used.
     lossy: whether it can make use of an allowed error.
     since: the first version of the container that may hold it.
-    ahead: what another process may compile while the coder compiles the first of its loops.
+    ahead: what another process may compile meanwhile, and a module of its kernels
+        (`ptmtools.ahead.compile_ahead`).
     """
 
     name: str
@@ -45,7 +46,7 @@ class Profile:
     module: str
     lossy: bool = False
     since: int = 2
-    ahead: Lazy[Callable[[], object]] | None = None
+    ahead: tuple[Lazy[Callable[[], object]], str] | None = None
 
     @property
     def coder(self) -> Coder:
@@ -64,7 +65,10 @@ PROFILES = {
             f"{__name__}.fast",
             lossy=True,
             since=1,
-            ahead=Lazy(f"{__name__}.fast:compile_ahead"),
+            ahead=(
+                Lazy(f"{__name__}.fast:compile_ahead"),
+                "ptmtools.texture.coders.haar.kernels",
+            ),
         ),
         Profile(
             "small",
