@@ -109,7 +109,7 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
             plans = plan_build(model, db, *options, force=force)
             print_plan(voice, plans[: len(stages)], as_json)
             return
-        if (workers or processors()) > 1:
+        if last is None and (workers or processors()) > 1:
             compile_ahead(*WARM_UP)
         with voice.progress() as progress:
             report = build(
