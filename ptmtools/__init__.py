@@ -18,47 +18,55 @@ from ptmtools.lazy import names
 from ptmtools.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from ptmtools.cells import Cells as Cells
-    from ptmtools.cells import SubdivideOptions as SubdivideOptions
-    from ptmtools.cells import subdivide as subdivide
+    from ptmtools.cells import (
+        Cells as Cells,
+        SubdivideOptions as SubdivideOptions,
+        subdivide as subdivide,
+    )
     from ptmtools.coverage.ach import compute_ach as compute_ach
     from ptmtools.coverage.model import Ach as Ach
     from ptmtools.coverage.options import AchOptions as AchOptions
-    from ptmtools.database import EmitOptions as EmitOptions
-    from ptmtools.database import PlotOptions as PlotOptions
-    from ptmtools.database import ValidationReport as ValidationReport
-    from ptmtools.database import emit as emit
-    from ptmtools.database import plot_plan as plot_plan
-    from ptmtools.errors import CheckError as CheckError
-    from ptmtools.errors import DatabaseError as DatabaseError
-    from ptmtools.errors import InputError as InputError
-    from ptmtools.errors import LimitError as LimitError
-    from ptmtools.errors import MissingComponentError as MissingComponentError
-    from ptmtools.errors import OutputError as OutputError
-    from ptmtools.errors import PtmError as PtmError
-    from ptmtools.pipeline import Artifacts as Artifacts
-    from ptmtools.pipeline import BuildReport as BuildReport
-    from ptmtools.pipeline import TextureOptions as TextureOptions
-    from ptmtools.pipeline import build_scene as build_scene
-    from ptmtools.pipeline import run_stage as run_stage
-    from ptmtools.pipeline import validate as validate
-    from ptmtools.scene import IngestOptions as IngestOptions
-    from ptmtools.scene import Scene as Scene
-    from ptmtools.scene import ingest as ingest
+    from ptmtools.database import (
+        EmitOptions as EmitOptions,
+        PlotOptions as PlotOptions,
+        ValidationReport as ValidationReport,
+        emit as emit,
+        plot_plan as plot_plan,
+    )
+    from ptmtools.errors import (
+        CheckError as CheckError,
+        DatabaseError as DatabaseError,
+        InputError as InputError,
+        LimitError as LimitError,
+        MissingComponentError as MissingComponentError,
+        OutputError as OutputError,
+        PtmError as PtmError,
+    )
+    from ptmtools.pipeline import (
+        Artifacts as Artifacts,
+        BuildReport as BuildReport,
+        TextureOptions as TextureOptions,
+        build_scene as build_scene,
+        run_stage as run_stage,
+        validate as validate,
+    )
+    from ptmtools.scene import IngestOptions as IngestOptions, Scene as Scene, ingest as ingest
     from ptmtools.store.folder import DatabaseFolder as DatabaseFolder
-    from ptmtools.texture import Description as Description
-    from ptmtools.texture import EncodeOptions as EncodeOptions
-    from ptmtools.texture import Limits as Limits
-    from ptmtools.texture import Picture as Picture
-    from ptmtools.texture import PtmHeader as PtmHeader
-    from ptmtools.texture import PtmReader as PtmReader
-    from ptmtools.texture import decode as decode
-    from ptmtools.texture import encode as encode
-    from ptmtools.texture import encode_to as encode_to
-    from ptmtools.texture import load_image as load_image
-    from ptmtools.texture import read_header as read_header
-    from ptmtools.texture import read_image as read_image
-    from ptmtools.texture import write_image as write_image
+    from ptmtools.texture import (
+        Description as Description,
+        EncodeOptions as EncodeOptions,
+        Limits as Limits,
+        Picture as Picture,
+        PtmHeader as PtmHeader,
+        PtmReader as PtmReader,
+        decode as decode,
+        encode as encode,
+        encode_to as encode_to,
+        load_image as load_image,
+        read_header as read_header,
+        read_image as read_image,
+        write_image as write_image,
+    )
     from ptmtools.texture.reader import open as open
     from ptmtools.visibility.model import Pvs as Pvs
     from ptmtools.visibility.options import PvsOptions as PvsOptions

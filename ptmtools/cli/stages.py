@@ -28,8 +28,7 @@ from ptmtools.cli.parameters import options_of, take
 from ptmtools.cli.warm_up import WARM_UP
 from ptmtools.executors.model import processors
 from ptmtools.lazy import Lazy
-from ptmtools.pipeline.build import build_scene as build
-from ptmtools.pipeline.build import run_stage
+from ptmtools.pipeline.build import build_scene as build, run_stage
 from ptmtools.pipeline.changes import NEVER_RUN
 from ptmtools.pipeline.report import BuildReport, StageReport
 from ptmtools.pipeline.run import Artifacts

@@ -17,10 +17,8 @@ from typing import TYPE_CHECKING
 from ptmtools.lazy import names
 
 if TYPE_CHECKING:
-    from ptmtools.executors.local import Local as Local
-    from ptmtools.executors.local import open_executor as open_executor
-    from ptmtools.executors.model import Executor as Executor
-    from ptmtools.executors.model import Sharing as Sharing
+    from ptmtools.executors.local import Local as Local, open_executor as open_executor
+    from ptmtools.executors.model import Executor as Executor, Sharing as Sharing
     from ptmtools.executors.serial import Serial as Serial
     from ptmtools.executors.worker import BackgroundTask as BackgroundTask
 

@@ -13,8 +13,7 @@ import os
 import pickle
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor as Threads
-from concurrent.futures import Future
+from concurrent.futures import Executor as Threads, Future
 from itertools import count
 from queue import LifoQueue
 from typing import IO, Any, NamedTuple, TypeVar

@@ -12,12 +12,14 @@ from ptmtools.lazy import names
 
 if TYPE_CHECKING:
     from ptmtools.scene.ingestion import ingest as ingest
-    from ptmtools.scene.model import Camera as Camera
-    from ptmtools.scene.model import Material as Material
-    from ptmtools.scene.model import Note as Note
-    from ptmtools.scene.model import Scene as Scene
-    from ptmtools.scene.model import SourceImage as SourceImage
-    from ptmtools.scene.model import Space as Space
+    from ptmtools.scene.model import (
+        Camera as Camera,
+        Material as Material,
+        Note as Note,
+        Scene as Scene,
+        SourceImage as SourceImage,
+        Space as Space,
+    )
     from ptmtools.scene.options import IngestOptions as IngestOptions
 
 __getattr__ = names(__name__)

@@ -13,8 +13,10 @@ if TYPE_CHECKING:
     from ptmtools.visibility.model import Pvs as Pvs
     from ptmtools.visibility.options import PvsOptions as PvsOptions
     from ptmtools.visibility.pvs import compute_pvs as compute_pvs
-    from ptmtools.visibility.segments import MissedPair as MissedPair
-    from ptmtools.visibility.segments import SegmentReport as SegmentReport
-    from ptmtools.visibility.segments import check_conservative as check_conservative
+    from ptmtools.visibility.segments import (
+        MissedPair as MissedPair,
+        SegmentReport as SegmentReport,
+        check_conservative as check_conservative,
+    )
 
 __getattr__ = names(__name__)
