@@ -61,10 +61,17 @@ TABLES = {
     "methods": Table("benchmarks/pvs_trade.py", part=1),
     "near-ties": Table(f"benchmarks/budget.py {ALL} --budgets", part=1),
     "near-ties-fine": Table(
-        "benchmarks/budget.py museum hospital gallery --wall-area 0.25", part=1
+        "benchmarks/budget.py museum hospital willowgarage gallery --wall-area 0.25 --budgets",
+        part=1,
     ),
     "budgets": Table("benchmarks/budget.py museum hospital willowgarage gallery"),
     "budgets-fine": Table("benchmarks/budget.py museum hospital gallery --wall-area 0.25"),
+    **{
+        f"hints-{part}": Table("benchmarks/ach.py", part=k)
+        for k, part in enumerate(
+            ("presets", "rates", "tolerance", "agreement", "speed", "processes")
+        )
+    },
     "starting": Table("benchmarks/codec/startup.py --only encode build", needs="textures"),
 }
 
