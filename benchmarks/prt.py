@@ -57,7 +57,7 @@ def read_prt(path: Path) -> tuple[Portals, NDArray[np.int64]]:
 
 def visible_leafs(portals: Portals, flow: PortalFlow, cluster: NDArray[np.int64]) -> NDArray:
     """(leafs, leafs) bool from the flow over clusters; a leaf outside all clusters sees nothing."""
-    seen = leaf_matrix(portals.leaf_count, portals.leaf, flow)
+    seen = leaf_matrix(portals, flow)
     inside = cluster >= 0
     return seen[cluster][:, cluster] & inside[:, None] & inside
 
@@ -234,7 +234,7 @@ def main(arguments: list[str] | None = None) -> int:
             f"theirs only: {len(lost)} pairs of clusters, {given.lines} lines each, "
             f"{int((arrived > 0).sum())} pairs really see each other"
         )
-        seen = leaf_matrix(portals.leaf_count, portals.leaf, flow)
+        seen = leaf_matrix(portals, flow)
         for one, other in np.argwhere(both):
             seen[cluster[one], cluster[other]] = True
         sequences = Sequences(portals, seen)

@@ -25,10 +25,11 @@ from numpy.typing import NDArray
 from prt import arriving
 
 from ptmtools.cells.model import Cells
+from ptmtools.cells.vectors import volumes
 from ptmtools.pipeline.validation import structure_of
 from ptmtools.visibility.pvs import portals_of
 from ptmtools.visibility.sampled import sampled_leaves
-from ptmtools.visibility.segments import Blockers, tetrahedra
+from ptmtools.visibility.segments import Blockers
 
 #: Segments shot at once, and at each open pair in a round.
 BATCH, EACH = 1 << 18, 64
@@ -49,9 +50,8 @@ class Ends:
     @staticmethod
     def inside(cells: Cells) -> Ends:
         """Uniform in the volume of the cell."""
-        corners, leaf = tetrahedra(cells)
-        volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
-        return Ends._ordered(cells, corners, volume, cells.leaf_cell[leaf])
+        corners, leaf = cells.tetrahedra()
+        return Ends._ordered(cells, corners, volumes(corners), cells.leaf_cell[leaf])
 
     @staticmethod
     def at_portals(cells: Cells) -> Ends:

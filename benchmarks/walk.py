@@ -71,7 +71,10 @@ def standard_walk(cells: Cells) -> Walk:
     middle = np.array([cells.leaf_points(i).mean(axis=0) for i in range(cells.leaf_count)])
     volume = cells.leaf_volumes()
     rooms = np.argsort(-np.bincount(cells.leaf_cell, volume), kind="stable")[:STOPS]
-    stops = {int(max(cells.cell_leaves(r), key=lambda leaf: (volume[leaf], -leaf))) for r in rooms}
+    stops = {
+        int(max(np.flatnonzero(cells.leaf_cell == r), key=lambda leaf: (volume[leaf], -leaf)))
+        for r in rooms
+    }
     doors: list[list[tuple[int, float]]] = [[] for _ in range(cells.leaf_count)]
     portal: dict[tuple[int, int], tuple[float, int]] = {}
     for k in np.flatnonzero(cells.portal_area >= DOOR).tolist():

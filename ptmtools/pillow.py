@@ -43,11 +43,11 @@ from PIL import Image, ImageFile
 
 from ptmtools.errors import InputError, PtmError
 from ptmtools.texture.container import MAGIC
-from ptmtools.texture.images.eight_bit import with_key
+from ptmtools.texture.images.eight_bit import stripped
 from ptmtools.texture.images.opening import ORIENTATION, described, orientation_of
-from ptmtools.texture.images.picture import Strips
 from ptmtools.texture.model import Description, EncodeOptions, Limits, PtmHeader
 from ptmtools.texture.reader import PtmReader
+from ptmtools.texture.rows import Rows
 from ptmtools.texture.sources import ranges_of
 
 FORMAT = "PTM"
@@ -266,7 +266,7 @@ def _exif(given: Image.Exif | bytes | None) -> Image.Exif:
     return exif
 
 
-def _rows(im: Image.Image) -> Strips:
+def _rows(im: Image.Image) -> Rows:
     if im.mode == "1":
         im = im.convert("L")
     elif im.mode in ("P", "PA"):
@@ -274,15 +274,12 @@ def _rows(im: Image.Image) -> Strips:
         transparent |= im.palette is not None and im.palette.mode == "RGBA"
         im = im.convert("RGBA" if transparent else "RGB")
     components = len(im.getbands())
-    key = _colour_key(im)
-    keyed = key is not None
 
-    def strip(y0: int, y1: int) -> NDArray[Any]:
-        texels = np.asarray(im.crop((0, y0, im.width, y1))).reshape(-1, im.width, components)
-        return with_key(texels, key) if keyed else texels
+    def texels(strip: Image.Image) -> NDArray[Any]:
+        return np.asarray(strip).reshape(-1, im.width, components)
 
     dtype = {"F": "float32", "I": "uint16"}.get(im.mode[0], "uint8")
-    return Strips((im.height, im.width, components + keyed), np.dtype(dtype), strip)
+    return stripped([im], components, dtype, texels, _colour_key(im)).texels
 
 
 def _colour_key(im: Image.Image) -> tuple[int, ...] | None:

@@ -23,17 +23,22 @@ from __future__ import annotations
 import heapq
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
-from ptmtools.cells.caps import Caps
+from ptmtools.arrays import Bools, Floats
+from ptmtools.cells import caps
 from ptmtools.cells.model import OUTSIDE
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, difference, intersection
 from ptmtools.cells.polyhedron import Polyhedron, clip_polygon, cut, section
 from ptmtools.cells.reveals import Reveals
-from ptmtools.cells.structure import WallPlane
+from ptmtools.cells.structure import Structure, WallPlane
+from ptmtools.cells.vectors import ranges
 from ptmtools.progress import Progress
 from ptmtools.tolerance import TIE_SHARE, Tolerance
 
@@ -50,62 +55,56 @@ _WALLS, _REVEALS, _CAPS = range(3)
 
 @dataclass(frozen=True)
 class Tree:
-    """A BSP tree over the root box, with every leaf, reachable or not.
+    """A BSP tree over the root box, with every leaf, reachable or not."""
 
-    Attributes
-    ----------
-    planes: (N, 4) the nodes' planes; walls: what lies in them.
-    children: (N, 2) int32 as in `Cells.node_child`.
-    leaves: the convex polyhedra, face tags are node indices.
-    unsplit: how many of them hold walls that the limit left in one piece.
-    capped: for each node that a cap splits, its polyhedron.
-    """
+    walls: tuple[WallPlane, ...]  # the nodes' planes, and what lies in them
+    children: NDArray[np.int32]  # (N, 2) as in `Cells.node_child`
+    leaves: tuple[Polyhedron, ...]  # face tags are node indices
+    unsplit: int = 0  # leaves that hold walls that the limit left in one piece
+    capped: Mapping[int, Polyhedron] = field(default_factory=dict)  # nodes that caps split
 
-    planes: NDArray[np.float64]
-    walls: tuple[WallPlane, ...]
-    children: NDArray[np.int32]
-    leaves: tuple[Polyhedron, ...]
-    unsplit: int = 0
-    capped: Mapping[int, Polyhedron] = field(default_factory=dict)
+    @cached_property
+    def planes(self) -> Floats:
+        """(N, 4) the nodes' planes."""
+        return np.array([wall.frame.plane for wall in self.walls]).reshape(-1, 4)
 
 
 @dataclass(frozen=True)
 class _Fragment:
-    """What a node holds of one wall plane; `outline` is the node's cross-section with it."""
+    """What a node holds of one wall plane."""
 
     wall: WallPlane
     shape: Geometry
     area: float
-    points: NDArray[np.float64]
-    outline: NDArray[np.float64]
+    points: Floats  # (n, 3) the corners of the shape
+    outline: Floats  # (m, 3) the node's cross-section with the plane
     section_area: float
 
 
-@dataclass(order=True)
-class _Task:
-    """A node that waits for its split, and what its fragments are of: walls, reveals or caps."""
+class _Task(NamedTuple):
+    """A node that waits for its split, and what its fragments are of: walls, reveals or caps. No
+    two have one ``priority``."""
 
     priority: tuple[bool, int, int, int]
-    body: Polyhedron = field(compare=False)
-    fragments: list[_Fragment] = field(compare=False)
-    best: int = field(compare=False)
-    parent: tuple[int, int] = field(compare=False)
-    source: int = field(compare=False)
+    body: Polyhedron
+    fragments: list[_Fragment]
+    best: int
+    parent: tuple[int, int]
+    source: int
 
 
 def build_tree(
     box: Polyhedron,
+    structure: Structure,
     walls: list[WallPlane],
     reveals: Reveals,
-    caps: Caps,
     options: SubdivideOptions,
-    tolerance: Tolerance,
     progress: Progress,
 ) -> Tree:
-    """Split ``box`` by the planes of ``walls``, then of ``reveals``, then of ``caps``; in
-    the order that the module describes."""
+    """Split ``box`` by the planes of ``walls``, then of ``reveals``, then of the caps that are in
+    the ``structure``; in the order that the module describes."""
+    tolerance = structure.tolerance
     least = (FRAGMENT_SHARE * options.wall_area, 0.0, 0.0)
-    planes: list[NDArray[np.float64]] = []
     taken: list[WallPlane] = []
     children: list[list[int]] = []
     leaves: list[Polyhedron] = []
@@ -124,17 +123,19 @@ def build_tree(
     def push(
         body: Polyhedron, fragments: list[_Fragment], parent: tuple[int, int], source: int
     ) -> None:
-        best = _best_split(body, fragments, least[source], planes, taken, tolerance)
+        best = _best_split(body, fragments, least[source], taken, tolerance)
         while best < 0 and source < _CAPS:
             source += 1
-            more = reveals.within(body, planes) if source == _REVEALS else caps.within(body)
-            fragments = _sections(body, more, tolerance, whole=source == _CAPS)
-            best = _best_split(body, fragments, least[source], planes, taken, tolerance)
+            if source == _REVEALS:
+                fragments = _sections(body, reveals.within(body, taken), tolerance)
+            else:
+                fragments = _sections(body, caps.closing(structure, body), tolerance, whole=True)
+            best = _best_split(body, fragments, least[source], taken, tolerance)
         if best < 0:
             finish(body, parent)
             return
         share = fragments[best].area / tolerance.extent**2
-        priority = (source == _CAPS, -round(share / TIE_SHARE), len(planes), parent[1])
+        priority = (source == _CAPS, -round(share / TIE_SHARE), len(taken), parent[1])
         heapq.heappush(queue, _Task(priority, body, fragments, best, parent, source))
 
     push(box, _sections(box, walls, tolerance), (-1, 0), _WALLS)
@@ -146,23 +147,22 @@ def build_tree(
             continue
         wall = task.fragments[task.best].wall
         plane = wall.frame.plane
-        node = len(planes)
-        planes.append(plane)
+        node = len(taken)
         taken.append(wall)
         children.append([OUTSIDE, OUTSIDE])
         if task.source == _CAPS:
             capped[node] = task.body
         place(task.parent, node)
-        rest = [f for i, f in enumerate(task.fragments) if i != task.best]
-        extents = _Extents(rest)
+        extents = _Extents(task.fragments)
         for side, body in enumerate(cut(task.body, plane, node, tolerance.rounding)):
             if body is None:
                 raise AssertionError("a split that was accepted has two sides")
             facing = plane if side == 0 else -plane
+            ahead = extents.ahead(facing, tolerance)
             inherited = [
                 (f.wall, f.shape, clip_polygon(f.outline, facing, tolerance.rounding))
-                for f, ahead in zip(rest, extents.ahead(facing, tolerance), strict=True)
-                if ahead
+                for i, f in enumerate(task.fragments)
+                if ahead[i] and i != task.best
             ]
             # A part of what a cap closed may have other caps, so it is asked again.
             if task.source == _CAPS:
@@ -171,7 +171,6 @@ def build_tree(
                 push(body, _fragments(inherited, tolerance), (node, side), task.source)
         progress(len(leaves), len(leaves) + len(queue), "splitting")
     return Tree(
-        np.array(planes).reshape(-1, 4),
         tuple(taken),
         np.array(children, dtype=np.int32).reshape(-1, 2),
         tuple(leaves),
@@ -191,12 +190,10 @@ def _sections(
 
 
 def _fragments(
-    shapes: list[tuple[WallPlane, Geometry, NDArray[np.float64]]], tolerance: Tolerance
+    shapes: list[tuple[WallPlane, Geometry, Floats]], tolerance: Tolerance
 ) -> list[_Fragment]:
     """Wall polygons (wall, shape, outline of the node in the wall's plane) clipped to a node; what
     has no more area than the rounding of its outline is none."""
-    import shapely
-
     shapes = [(wall, shape, outline) for wall, shape, outline in shapes if len(outline) >= 3]
     if not shapes:
         return []
@@ -222,35 +219,27 @@ class _Extents:
     """Which fragments reach in front of planes: boxes decide, corners where boxes do not."""
 
     def __init__(self, fragments: list[_Fragment]) -> None:
-        self._count = len(fragments)
-        if not fragments:
-            return
         self._points = np.concatenate([f.points for f in fragments])
         self._start = np.cumsum([0] + [len(f.points) for f in fragments])
         low = np.minimum.reduceat(self._points, self._start[:-1])
         high = np.maximum.reduceat(self._points, self._start[:-1])
         self._middle, self._half = (low + high) / 2, (high - low) / 2
 
-    def ahead(self, plane: NDArray[np.float64], tolerance: Tolerance) -> NDArray[np.bool_]:
+    def ahead(self, plane: Floats, tolerance: Tolerance) -> Bools:
         """(n,) which fragments have a point farther in front than lies in the (4,) plane."""
-        if not self._count:
-            return np.zeros(0, dtype=bool)
-        if self._count <= _FEW:
+        if len(self._middle) <= _FEW:
             distance = self._points @ plane[:3] + plane[3]
-            few: NDArray[np.bool_] = (
-                np.maximum.reduceat(distance, self._start[:-1]) > tolerance.plane
-            )
-            return few
+            return np.asarray(np.maximum.reduceat(distance, self._start[:-1]) > tolerance.plane)
         middle = self._middle @ plane[:3] + (plane[3] - tolerance.plane)
         half = self._half @ np.abs(plane[:3]) + tolerance.rounding
-        found: NDArray[np.bool_] = middle > half
+        found: Bools = middle > half
         unsure = np.flatnonzero(~found & (middle > -half))
         if len(unsure):
             count = self._start[unsure + 1] - self._start[unsure]
-            first = np.cumsum(count) - count
-            row = np.repeat(self._start[unsure] - first, count) + np.arange(count.sum())
-            distance = self._points[row] @ plane[:3] + plane[3]
-            found[unsure] = np.maximum.reduceat(distance, first) > tolerance.plane
+            points = self._points[ranges(self._start[unsure], count)]
+            distance = points @ plane[:3] + plane[3]
+            farthest = np.maximum.reduceat(distance, np.cumsum(count) - count)
+            found[unsure] = farthest > tolerance.plane
         return found
 
 
@@ -258,7 +247,6 @@ def _best_split(
     body: Polyhedron,
     fragments: list[_Fragment],
     least: float,
-    planes: list[NDArray[np.float64]],
     taken: list[WallPlane],
     tolerance: Tolerance,
 ) -> int:
@@ -275,7 +263,7 @@ def _best_split(
         depth = min(reach.max(), -reach.min())
         if depth < tolerance.thin:
             continue
-        if depth < tolerance.cluster and _closes(body, f, planes, taken, tolerance) < max(
+        if depth < tolerance.cluster and _closes(body, f, taken, tolerance) < max(
             least, tolerance.hairline**2
         ):
             continue
@@ -292,19 +280,14 @@ def _best_split(
 
 
 def _closes(
-    body: Polyhedron,
-    fragment: _Fragment,
-    planes: list[NDArray[np.float64]],
-    taken: list[WallPlane],
-    tolerance: Tolerance,
+    body: Polyhedron, fragment: _Fragment, taken: list[WallPlane], tolerance: Tolerance
 ) -> float:
     """The area (m²) that a fragment closes of the boundary plane next to it."""
-    import shapely
-
     frame = fragment.wall.frame
     for tag in sorted({tag for tag in body.tags if tag >= 0}):
         near = taken[tag].frame
-        if np.max(np.abs(fragment.points @ planes[tag][:3] + planes[tag][3])) < tolerance.cluster:
+        plane = near.plane
+        if np.max(np.abs(fragment.points @ plane[:3] + plane[3])) < tolerance.cluster:
             moved = shapely.transform(
                 fragment.shape,
                 lambda flat, near=near: near.to_plane(frame.to_space(flat)),

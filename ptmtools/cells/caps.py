@@ -14,9 +14,10 @@ rooms, with caps of 0.02 m² and more only, all of the 992 leaves stay that 365 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+import shapely
 
-from ptmtools.cells.planar import difference, without_cracks
+from ptmtools.arrays import Floats, Ints
+from ptmtools.cells.planar import left_open
 from ptmtools.cells.polyhedron import Polyhedron, section
 from ptmtools.cells.structure import Frame, Structure, WallPlane
 from ptmtools.cells.vectors import cross
@@ -28,83 +29,67 @@ _SPARE = 1e-3
 _CHUNK, _ROWS = 4096, 256
 
 
-class Caps:
-    """The structural triangles of a scene, to ask which of them close a leaf."""
-
-    def __init__(self, structure: Structure) -> None:
-        self._structure = structure
-        self._corners = structure.corners
-        self._areas = structure.areas
-        self._tolerance = structure.tolerance
-
-    def within(self, body: Polyhedron) -> list[WallPlane]:
-        """The planes in which what lies there leaves no opening between two parts of a body, in the
-        order of the model's triangles: many are equally good, and areas of strips some centimetres
-        wide keep few digits far from the origin."""
-        low, high = body.points.min(axis=0), body.points.max(axis=0)
-        near = self._structure.nearby.meeting(low, high)
-        slack, corners = self._tolerance.plane, self._corners[near]
-        apart = (corners.min(axis=1) > high + slack) | (corners.max(axis=1) < low - slack)
-        near = near[~apart.any(axis=1)]
-        inside = self._reaching_into(body, near)
-        areas, planes = self._areas[inside], self._structure.planes[inside]
-        needed = _section_areas(body, planes) * (1 - _SPARE)
-        free = needed <= areas.sum()
-        free[free] = needed[free] <= self._in_plane(inside[free], inside)
-        found: list[tuple[int, WallPlane]] = []
-        for seed in ranked(areas):
-            if not free[seed]:
-                continue
-            members = np.flatnonzero(self._structure.lie_in(planes[seed], inside))
-            free[members] = False
-            free[seed] = False
-            if areas[members].sum() >= needed[seed]:
-                cap = self._closing(body, planes[seed], near)
-                found += [(int(inside[members[0]]), cap)] if cap else []
-        return [cap for _, cap in sorted(found, key=lambda one: one[0])]
-
-    def _reaching_into(self, body: Polyhedron, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Those triangles that have a point farther inside each face than lies in its
-        plane: all that have a part inside, and few others."""
-        found = triangles[self._areas[triangles] > 0]
-        for plane in body.planes:
-            height = self._corners[found] @ plane[:3] + plane[3]
-            found = found[height.min(axis=1) < -self._tolerance.plane]
-        return found
-
-    def _in_plane(
-        self, seeds: NDArray[np.int64], triangles: NDArray[np.int64]
-    ) -> NDArray[np.float64]:
-        """For each seed at least the area of those triangles that lie in its plane."""
-        middle, areas = self._corners[triangles].mean(axis=1), self._areas[triangles]
-        planes = self._structure.planes[seeds]
-        found = [np.zeros(0)]
-        for first in range(0, len(planes), _ROWS):
-            plane = planes[first : first + _ROWS]
-            height = plane[:, :3] @ middle.T + plane[:, 3:]
-            found.append((np.abs(height) <= self._tolerance.plane) @ areas)
-        return np.concatenate(found)
-
-    def _closing(
-        self, body: Polyhedron, plane: NDArray[np.float64], near: NDArray[np.int64]
-    ) -> WallPlane | None:
-        """What lies in a plane, if it leaves no opening in a body's section with it."""
-        import shapely
-
-        tolerance = self._tolerance
-        outline = section(body, plane, tolerance.rounding)
-        if len(outline) < 3:
-            return None
-        frame = Frame.of(plane)
-        blocking = self._structure.united(frame, near[self._structure.lie_in(plane, near)])
-        region = shapely.polygons(frame.to_plane(outline))
-        opening = without_cracks(
-            difference(region, blocking, tolerance.grid), tolerance.hairline, tolerance.grid
-        )
-        return WallPlane(frame, blocking, blocking) if shapely.is_empty(opening) else None
+def closing(structure: Structure, body: Polyhedron) -> list[WallPlane]:
+    """The planes in which what lies there leaves no opening between two parts of a body, in the
+    order of the model's triangles: many are equally good, and areas of strips some centimetres
+    wide keep few digits far from the origin."""
+    low, high = body.points.min(axis=0), body.points.max(axis=0)
+    near = structure.nearby.meeting(low, high)
+    slack, corners = structure.tolerance.plane, structure.corners[near]
+    apart = (corners.min(axis=1) > high + slack) | (corners.max(axis=1) < low - slack)
+    near = near[~apart.any(axis=1)]
+    inside = _reaching_into(body, structure, near)
+    areas, planes = structure.areas[inside], structure.planes[inside]
+    needed = _section_areas(body, planes) * (1 - _SPARE)
+    free = needed <= areas.sum()
+    free[free] = needed[free] <= _in_planes(planes[free], structure, inside)
+    found: list[tuple[int, WallPlane]] = []
+    for seed in ranked(areas):
+        if not free[seed]:
+            continue
+        members = np.flatnonzero(structure.lie_in(planes[seed], inside))
+        free[members] = False
+        free[seed] = False
+        if areas[members].sum() >= needed[seed]:
+            cap = _cap(body, planes[seed], structure, near)
+            found += [(int(inside[members[0]]), cap)] if cap else []
+    return [cap for _, cap in sorted(found, key=lambda one: one[0])]
 
 
-def _section_areas(body: Polyhedron, planes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _reaching_into(body: Polyhedron, structure: Structure, triangles: Ints) -> Ints:
+    """Those triangles that have a point farther inside each face than lies in its plane: all that
+    have a part inside, and few others."""
+    found = triangles[structure.areas[triangles] > 0]
+    for plane in body.planes:
+        height = structure.corners[found] @ plane[:3] + plane[3]
+        found = found[height.min(axis=1) < -structure.tolerance.plane]
+    return found
+
+
+def _in_planes(planes: Floats, structure: Structure, triangles: Ints) -> Floats:
+    """(n,) for each of (n, 4) planes at least the area of those triangles that lie in it."""
+    middle, areas = structure.corners[triangles].mean(axis=1), structure.areas[triangles]
+    found = [np.zeros(0)]
+    for first in range(0, len(planes), _ROWS):
+        plane = planes[first : first + _ROWS]
+        height = plane[:, :3] @ middle.T + plane[:, 3:]
+        found.append((np.abs(height) <= structure.tolerance.plane) @ areas)
+    return np.concatenate(found)
+
+
+def _cap(body: Polyhedron, plane: Floats, structure: Structure, near: Ints) -> WallPlane | None:
+    """What lies in a plane, if it leaves no opening in a body's section with it."""
+    tolerance = structure.tolerance
+    outline = section(body, plane, tolerance.rounding)
+    if len(outline) < 3:
+        return None
+    frame = Frame.of(plane)
+    blocking = structure.united(frame, near[structure.lie_in(plane, near)])
+    opening = left_open(shapely.polygons(frame.to_plane(outline)), blocking, tolerance)
+    return WallPlane(frame, blocking, blocking) if shapely.is_empty(opening) else None
+
+
+def _section_areas(body: Polyhedron, planes: Floats) -> Floats:
     """(n,) areas (m²) of a body's sections with (n, 4) planes, but for rounding; infinite where a
     plane does not cut it."""
     one, other = body.edges.T
@@ -125,7 +110,7 @@ def _section_areas(body: Polyhedron, planes: NDArray[np.float64]) -> NDArray[np.
     return areas
 
 
-def _around(points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+def _around(points: Floats, normals: Floats) -> Floats:
     """(n,) areas of the convex polygons with corners (n, k, 3), in any order, about 0."""
     axis = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
     u = cross(axis, normals)
@@ -134,5 +119,5 @@ def _around(points: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArra
     x, y = np.einsum("nki,ni->nk", points, u), np.einsum("nki,ni->nk", points, v)
     order = np.argsort(np.arctan2(y, x), axis=1)
     x, y = np.take_along_axis(x, order, 1), np.take_along_axis(y, order, 1)
-    twice: NDArray[np.float64] = (x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1)).sum(axis=1)
+    twice: Floats = (x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1)).sum(axis=1)
     return twice / 2

@@ -21,10 +21,11 @@ Once a cell sees nearly everything, anything may join it, and little by little i
 
 from __future__ import annotations
 
-import heapq
-
 import numpy as np
 from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.merging import Groups
 
 #: Gains that differ by less are equal, in digits: symmetrical buildings have many, which rounding
 #: must not put in order.
@@ -32,12 +33,8 @@ DIGITS = 4
 
 
 def join_by_gain(
-    sees: NDArray[np.bool_],
-    volume: NDArray[np.float64],
-    area: NDArray[np.float64],
-    pairs: NDArray[np.int32],
-    gain: float,
-) -> NDArray[np.int64]:
+    sees: Bools, volume: Floats, area: Floats, pairs: NDArray[np.int32], gain: float
+) -> Ints:
     """(L,) for each leaf the leaf that stands for its group.
 
     Parameters
@@ -47,77 +44,31 @@ def join_by_gain(
     pairs: (n, 2) leaves through whose portals groups may grow.
     gain: no group of which parting gains as much is made; 0 to 1.
     """
-    groups = _Groups(sees, volume, area, pairs)
-    waiting = [groups.entry(a, b) for a, b in groups.pairs()]
-    heapq.heapify(waiting)
-    while waiting and waiting[0][0] < gain:
-        entry = heapq.heappop(waiting)
-        a, b = entry[1:3]
-        if groups.is_current(entry):
-            for c in groups.join(a, b):
-                heapq.heappush(waiting, groups.entry(a, c))
-    return groups.of_leaf()
+    return _Parted(sees, volume, area, pairs).grown(lambda gained: gained < gain)
 
 
-_Entry = tuple[float, int, int, int, int]
+class _Parted(Groups):
+    """Groups that cost what parting them gains."""
 
-
-class _Groups:
-    def __init__(
-        self,
-        sees: NDArray[np.bool_],
-        volume: NDArray[np.float64],
-        area: NDArray[np.float64],
-        pairs: NDArray[np.int32],
-    ) -> None:
+    def __init__(self, sees: Bools, volume: Floats, area: Floats, pairs: NDArray[np.int32]) -> None:
+        super().__init__(len(sees), pairs)
         self._all = np.stack([volume, area], axis=1)
         self._sees = sees.copy()
         self._own = self._all.copy()
         self._apart = [self._cost(row, own) for row, own in zip(sees, self._own, strict=True)]
-        self._parent = np.arange(len(sees))
-        self._version = [0] * len(sees)
-        self._near: list[set[int]] = [set() for _ in sees]
-        for a, b in pairs.tolist():
-            if a != b:
-                self._near[a].add(b)
-                self._near[b].add(a)
 
-    def pairs(self) -> list[tuple[int, int]]:
-        return [(a, b) for a, near in enumerate(self._near) for b in sorted(near) if a < b]
-
-    def entry(self, a: int, b: int) -> _Entry:
-        """(gain of parting the two, the lower, the higher, the versions of both)."""
-        a, b = min(a, b), max(a, b)
+    def cost(self, a: int, b: int) -> float:
         together = self._cost(self._sees[a] | self._sees[b], self._own[a] + self._own[b])
         gain = 1 - (self._apart[a] + self._apart[b]) / together if together > 0 else 0.0
-        return round(gain, DIGITS), a, b, self._version[a], self._version[b]
+        return round(gain, DIGITS)
 
-    def is_current(self, entry: _Entry) -> bool:
-        """Whether both groups are what they were."""
-        _, a, b, *versions = entry
-        return b in self._near[a] and versions == [self._version[a], self._version[b]]
-
-    def join(self, a: int, b: int) -> list[int]:
-        """Adds b to a; returns what a then is beside, in order."""
-        self._parent[b] = a
-        self._version[a] += 1
+    def join(self, a: int, b: int) -> list[tuple[int, int]]:
         self._sees[a] |= self._sees[b]
         self._own[a] += self._own[b]
         self._apart[a] += self._apart[b]
-        for c in self._near[b]:
-            self._near[c].discard(b)
-            if c != a:
-                self._near[c].add(a)
-                self._near[a].add(c)
-        self._near[b] = set()
-        return sorted(self._near[a])
+        super().join(a, b)
+        return [(a, c) for c in self.near[a]]
 
-    def of_leaf(self) -> NDArray[np.int64]:
-        found = self._parent
-        while not np.array_equal(found, found[found]):
-            found = found[found]
-        return found
-
-    def _cost(self, seen: NDArray[np.bool_], own: NDArray[np.float64]) -> float:
+    def _cost(self, seen: Bools, own: Floats) -> float:
         volume, area = self._all[seen].sum(axis=0)
         return float(own[0] * area + own[1] * volume)

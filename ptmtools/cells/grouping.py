@@ -13,11 +13,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.gain import join_by_gain
 from ptmtools.cells.model import Cells
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.rooms import room_of_leaf
 from ptmtools.cells.sight import sampled_sight
+from ptmtools.cells.vectors import areas
 
 #: Shares of a triangle that differ by less are equal, in digits.
 DIGITS = 6
@@ -32,7 +34,9 @@ def grouped(cells: Cells, options: SubdivideOptions) -> Cells:
     leaves of one cell lies inside that cell.
     """
     if options.cells == "room":
-        cells = _joined(cells, numbered(_groups(cells, options.gain)))
+        group, owner = numbered(_groups(cells, options.gain)), cells.triangle_cell
+        owner = np.where(owner >= 0, group[owner], -1).astype(np.int32)
+        cells = replace(cells, leaf_cell=group, triangle_cell=owner)
     if cells.cell_count == 1:
         cells = replace(cells, notes=(*cells.notes, ONE_HALL))
     return cells
@@ -46,7 +50,7 @@ def numbered(group: NDArray[np.integer]) -> NDArray[np.int32]:
     return np.asarray(place[row.reshape(-1)])
 
 
-def rank_in_file(cells: Cells) -> NDArray[np.int64]:
+def rank_in_file(cells: Cells) -> Ints:
     """(L,) the place of each leaf in an order that no transformation of the model changes: leaves
     are compared by the share that they hold of the model's first triangle of which one of them
     holds more, and go by number where they hold the same of all.
@@ -86,23 +90,11 @@ def _groups(cells: Cells, gain: float) -> NDArray[np.integer]:
     return join_by_gain(sees, *weights, rank[inner], gain)[rank]
 
 
-def _sides(
-    cells: Cells,
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+def _sides(cells: Cells) -> tuple[Ints, Ints, Floats]:
     """(n,) leaves and (n,) pieces of geometry that belong to them, of cells that are single leaves;
     what lies in a boundary counts on both sides. And (M,) the areas of the pieces, m²."""
-    a, b, c = np.moveaxis(cells.vertex[cells.triangle], 1, 0)
     front, back = cells.triangle_cell.T
     behind = (back >= 0) & (back != front)
     leaf = np.concatenate([front[front >= 0], back[behind]]).astype(np.int64)
     piece = np.concatenate([np.flatnonzero(front >= 0), np.flatnonzero(behind)])
-    return leaf, piece, np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-
-
-def _joined(cells: Cells, group: NDArray[np.int32]) -> Cells:
-    owner = cells.triangle_cell
-    return replace(
-        cells,
-        leaf_cell=group,
-        triangle_cell=np.where(owner >= 0, group[owner], -1).astype(np.int32),
-    )
+    return leaf, piece, areas(cells.vertex[cells.triangle])

@@ -8,13 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.compiled import plain_kernel as kernel
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class Openings(NamedTuple):
@@ -30,12 +25,7 @@ class Openings(NamedTuple):
 
 @kernel
 def sight_lines(
-    openings: Openings,
-    origin: Floats,
-    along: Floats,
-    portal: Ints,
-    path: Ints,
-    seen: NDArray[np.bool_],
+    openings: Openings, origin: Floats, along: Floats, portal: Ints, path: Ints, seen: Bools
 ) -> None:
     """Marks in ``seen`` (L, L) the leaves that lie on one straight line, for (n,) lines.
 

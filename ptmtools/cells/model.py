@@ -16,7 +16,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.cells.vectors import cross
+from ptmtools.cells.vectors import fans, volumes
 from ptmtools.store.checked import Stored, texts
 from ptmtools.tolerance import Tolerance
 
@@ -100,26 +100,22 @@ class Cells:
         """(n, 3) vertices of a leaf."""
         return self.leaf_point[self.leaf_point_start[leaf] : self.leaf_point_start[leaf + 1]]
 
-    def leaf_faces(self, leaf: int) -> list[NDArray[np.int32]]:
-        """The face loops of a leaf, as indices into `leaf_point`."""
-        rows = range(int(self.leaf_face_start[leaf]), int(self.leaf_face_start[leaf + 1]))
-        return [self.face_index[self.face_start[f] : self.face_start[f + 1]] for f in rows]
-
-    def cell_leaves(self, cell: int) -> NDArray[np.int64]:
-        """The leaves of a cell."""
-        return np.flatnonzero(self.leaf_cell == cell)
+    def tetrahedra(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """(n, 4, 3) tetrahedra that fill the leaves, from the middle of each one's vertices to fans
+        over its faces, and (n,) the leaf of each, ascending."""
+        points = np.diff(self.leaf_point_start)
+        if not len(points):
+            return np.zeros((0, 4, 3)), np.zeros(0, np.int64)
+        middle = np.add.reduceat(self.leaf_point, self.leaf_point_start[:-1]) / points[:, None]
+        corners, face = fans(self.face_start)
+        leaf = np.searchsorted(self.leaf_face_start, face, "right") - 1
+        triangles = self.leaf_point[self.face_index[corners]]
+        return np.concatenate([middle[leaf, None], triangles], axis=1), leaf
 
     def leaf_volumes(self) -> NDArray[np.float64]:
-        """(L,) m³, by tetrahedra from the middle of each leaf's vertices."""
-        total = np.zeros(self.leaf_count)
-        for leaf in range(self.leaf_count):
-            loops = self.leaf_faces(leaf)
-            fan = np.concatenate(
-                [[(r[0], r[i], r[i + 1]) for i in range(1, len(r) - 1)] for r in loops]
-            )
-            a, b, c = np.moveaxis(self.leaf_point[fan] - self.leaf_points(leaf).mean(axis=0), 1, 0)
-            total[leaf] = np.einsum("ij,ij->", cross(a, b), c) / 6
-        return total
+        """(L,) m³."""
+        corners, leaf = self.tetrahedra()
+        return np.bincount(leaf, volumes(corners), self.leaf_count).astype(np.float64)
 
     def adjacent(self) -> list[NDArray[np.int32]]:
         """For every cell the other cells with which it shares a portal, ascending."""

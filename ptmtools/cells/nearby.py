@@ -9,7 +9,8 @@ plane are looked into.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ptmtools.arrays import Floats, Ints
 
 #: Triangles in a block.
 _BLOCK = 64
@@ -20,7 +21,7 @@ _BITS = 15
 class Nearby:
     """Blocks of the (n, 3, 3) triangles ``corners``; ``margin`` metres cover their rounding."""
 
-    def __init__(self, corners: NDArray[np.float64], margin: float) -> None:
+    def __init__(self, corners: Floats, margin: float) -> None:
         self._margin = margin
         self._order = along_a_curve(corners.mean(axis=1)) if len(corners) else np.zeros(0, int)
         first = np.arange(0, len(corners), _BLOCK)
@@ -32,24 +33,24 @@ class Nearby:
             low = high = np.zeros((0, 3))
         self._middle, self._half = (low + high) / 2, (high - low) / 2
 
-    def between(self, plane: NDArray[np.float64], low: float, high: float) -> NDArray[np.int64]:
+    def between(self, plane: Floats, low: float, high: float) -> Ints:
         """Triangles, ascending, among which are all with a point whose distance from the (4,)
         plane, along its normal, is in [low, high]."""
         distance = self._middle @ plane[:3] + plane[3]
         reach = self._half @ np.abs(plane[:3]) + self._margin
         return self._members(np.flatnonzero((distance + reach >= low) & (distance - reach <= high)))
 
-    def meeting(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.int64]:
+    def meeting(self, low: Floats, high: Floats) -> Ints:
         """Triangles, ascending, among which are all that meet the box between two corners."""
         apart = np.maximum(low - self._middle, self._middle - high) - self._half
         return self._members(np.flatnonzero(np.all(apart <= self._margin, axis=1)))
 
-    def _members(self, block: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _members(self, block: Ints) -> Ints:
         row = (block[:, None] * _BLOCK + np.arange(_BLOCK)).ravel()
         return np.sort(self._order[row[row < len(self._order)]])
 
 
-def along_a_curve(points: NDArray[np.float64]) -> NDArray[np.int64]:
+def along_a_curve(points: Floats) -> Ints:
     """An order of (n, k) points in which neighbours mostly follow one another (Morton's)."""
     low, size = points.min(axis=0), np.ptp(points, axis=0)
     share = np.divide(points - low, size, out=np.zeros(points.shape), where=size > 0)

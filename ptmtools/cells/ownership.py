@@ -14,47 +14,37 @@ assign: nothing of the model is lost to a clipped box.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree
-from ptmtools.cells.vectors import cross
+from ptmtools.cells.vectors import normals
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance
 
 
 @dataclass(frozen=True)
 class Pieces:
-    """Triangles cut to the leaves.
+    """Triangles cut to the leaves."""
 
-    Attributes
-    ----------
-    points: (M, 3, 3) corner positions.
-    weights: (M, 3, 3) barycentric coordinates of the corners in the source triangle.
-    source: (M,) index of the scene's triangle.
-    leaf: (M, 2) int64 leaf of the tree on the front and on the back.
-    """
-
-    points: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    source: NDArray[np.int64]
-    leaf: NDArray[np.int64]
+    corner: Floats  # (M, 3, 6) positions, and barycentric coordinates in the source triangle
+    source: Ints  # (M,) index of the scene's triangle
+    leaf: Ints  # (M, 2) leaf of the tree on the front and on the back
 
 
 @dataclass(frozen=True)
 class _Batch:
-    """Pieces on their way down: `front` is the leaf on their front, once that is known; `lying`
-    whether they lay in some plane on the way."""
+    """Pieces on their way down."""
 
-    points: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    source: NDArray[np.int64]
-    front: NDArray[np.int64]
-    lying: NDArray[np.bool_]
+    corner: Floats  # as in `Pieces`
+    source: Ints
+    front: Ints  # (n,) the leaf on their front, once that is known
+    lying: Bools  # (n,) whether they lay in some plane on the way
 
-    def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> _Batch:
+    def take(self, rows: Ints | Bools) -> _Batch:
         return _Batch(*(array[rows] for array in vars(self).values()))
 
     @staticmethod
@@ -66,36 +56,31 @@ class _Batch:
 def cut_to_leaves(scene: Scene, tree: Tree, tolerance: Tolerance) -> Pieces:
     """Cut all triangles of a scene along the planes of a tree."""
     corners = scene.corners
-    normals = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facing = normals(corners)
     count = len(corners)
     whole = _Batch(
-        points=corners,
-        weights=np.tile(np.eye(3), (count, 1, 1)),
+        corner=np.concatenate([corners, np.tile(np.eye(3), (count, 1, 1))], axis=2),
         source=np.arange(count),
         front=np.full(count, -1),
         lying=np.zeros(count, dtype=bool),
     )
-    batch, front = _sink(tree, whole, normals, tolerance)
-    within = batch.take(~batch.lying)
-    within_leaf = front[~batch.lying]
-    boundary = batch.take(batch.lying)
-    boundary = _Batch(**{**vars(boundary), "front": front[batch.lying]})
-    boundary, back = _sink(tree, boundary, -normals, tolerance)
-    pieces = _Batch.join([within, boundary])
-    leaf = np.concatenate(
-        [np.stack([within_leaf, within_leaf], axis=1), np.stack([boundary.front, back], axis=1)]
+    batch, front = _sink(tree, whole, facing, tolerance)
+    boundary = replace(batch, front=front).take(batch.lying)
+    boundary, back = _sink(tree, boundary, -facing, tolerance)
+    within = ~batch.lying
+    pieces = _Batch.join([batch.take(within), boundary])
+    leaf = np.stack(
+        [np.append(front[within], boundary.front), np.append(front[within], back)], axis=1
     )
     order = np.argsort(pieces.source, kind="stable")
-    return Pieces(pieces.points[order], pieces.weights[order], pieces.source[order], leaf[order])
+    return Pieces(pieces.corner[order], pieces.source[order], leaf[order])
 
 
-def _sink(
-    tree: Tree, batch: _Batch, facing: NDArray[np.float64], tolerance: Tolerance
-) -> tuple[_Batch, NDArray[np.int64]]:
+def _sink(tree: Tree, batch: _Batch, facing: Floats, tolerance: Tolerance) -> tuple[_Batch, Ints]:
     """Let pieces sink to leaves; what lies in a plane goes to the side that ``facing`` (one
     direction per scene triangle) points to. Returns the cut pieces and the leaf of each."""
     arrived: list[_Batch] = []
-    leaves: list[NDArray[np.int64]] = []
+    leaves: list[Ints] = []
     stack = [(0 if len(tree.planes) else -2, batch)]
     while stack:
         node, here = stack.pop()
@@ -104,7 +89,7 @@ def _sink(
             leaves.append(np.full(len(here.source), -2 - node))
             continue
         plane = tree.planes[node]
-        distance = here.points @ plane[:3] + plane[3]
+        distance = here.corner[..., :3] @ plane[:3] + plane[3]
         ahead = distance > tolerance.plane
         behind = distance < -tolerance.plane
         some_ahead, some_behind = ahead.any(axis=1), behind.any(axis=1)
@@ -113,7 +98,7 @@ def _sink(
         to_front = some_ahead & ~some_behind | lies & turned
         to_back = some_behind & ~some_ahead | lies & ~turned
         crossing = some_ahead & some_behind
-        here = _Batch(**{**vars(here), "lying": here.lying | lies})
+        here = replace(here, lying=here.lying | lies)
         sides = [[here.take(to_front)], [here.take(to_back)]]
         if crossing.any():
             sign = ahead[crossing].astype(np.int8) - behind[crossing]
@@ -129,7 +114,7 @@ def _sink(
 
 
 def _split(
-    batch: _Batch, distance: NDArray[np.float64], sign: NDArray[np.int8]
+    batch: _Batch, distance: Floats, sign: NDArray[np.int8]
 ) -> tuple[list[_Batch], list[_Batch]]:
     """Cut pieces with corners strictly on both sides; returns what is in front and behind."""
     front: list[_Batch] = []
@@ -155,44 +140,31 @@ def _split(
     return front, back
 
 
-#: Positions and barycentric coordinates, (n, 3) each.
-_Corner = tuple[NDArray[np.float64], NDArray[np.float64]]
-
-
 def _turned(
-    batch: _Batch,
-    distance: NDArray[np.float64],
-    sign: NDArray[np.int8],
-    rows: NDArray[np.int64],
-    first: NDArray[np.int64],
-) -> tuple[_Batch, NDArray[np.float64], NDArray[np.int8]]:
+    batch: _Batch, distance: Floats, sign: NDArray[np.int8], rows: Ints, first: Ints
+) -> tuple[_Batch, Floats, NDArray[np.int8]]:
     """The given rows with their corners turned so that ``first`` comes first."""
     b = batch.take(rows)
     i = np.arange(len(rows))[:, None]
     j = (first[:, None] + np.arange(3)) % 3
-    turned = _Batch(**{**vars(b), "points": b.points[i, j], "weights": b.weights[i, j]})
+    turned = replace(b, corner=b.corner[i, j])
     return turned, distance[rows][i, j], sign[rows][i, j]
 
 
-def _crossing(batch: _Batch, distance: NDArray[np.float64], i: int, j: int) -> _Corner:
-    """Where the edges from corner i to corner j cross, always reckoned from the front end."""
-    swap = distance[:, i] < distance[:, j]
-    d_front = np.where(swap, distance[:, j], distance[:, i])
-    d_back = np.where(swap, distance[:, i], distance[:, j])
-    t = (d_front / (d_front - d_back))[:, None]
-
-    def between(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        ahead = np.where(swap[:, None], values[:, j], values[:, i])
-        behind = np.where(swap[:, None], values[:, i], values[:, j])
-        mixed: NDArray[np.float64] = ahead + t * (behind - ahead)
-        return mixed
-
-    return between(batch.points), between(batch.weights)
+def _crossing(batch: _Batch, distance: Floats, i: int, j: int) -> Floats:
+    """(n, 6) where edges from corner i to corner j cross, always reckoned from the front end."""
+    swap = (distance[:, i] < distance[:, j])[:, None]
+    d_front, d_back = (
+        np.maximum(distance[:, i], distance[:, j]),
+        np.minimum(distance[:, i], distance[:, j]),
+    )
+    ahead = np.where(swap, batch.corner[:, j], batch.corner[:, i])
+    behind = np.where(swap, batch.corner[:, i], batch.corner[:, j])
+    crossing: Floats = ahead + (d_front / (d_front - d_back))[:, None] * (behind - ahead)
+    return crossing
 
 
-def _triangle(batch: _Batch, *corners: int | _Corner) -> _Batch:
+def _triangle(batch: _Batch, *corners: int | Floats) -> _Batch:
     """The batch with its corners replaced: an old corner by index, or a new one."""
-    each = [(batch.points[:, c], batch.weights[:, c]) if isinstance(c, int) else c for c in corners]
-    points = np.stack([position for position, _ in each], axis=1)
-    weights = np.stack([weight for _, weight in each], axis=1)
-    return _Batch(**{**vars(batch), "points": points, "weights": weights})
+    each = [batch.corner[:, c] if isinstance(c, int) else c for c in corners]
+    return replace(batch, corner=np.stack(each, axis=1))

@@ -13,9 +13,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+import shapely
 
+from ptmtools.arrays import Floats, Ints
+from ptmtools.cells.merging import connected
 from ptmtools.cells.nearby import along_a_curve
+from ptmtools.tolerance import Tolerance
 
 #: A shapely geometry, or an array of them.
 Geometry = Any
@@ -25,10 +28,8 @@ _COLLECTION = 7
 _CHUNK = 256
 
 
-def unite(triangles: NDArray[np.float64], grid: float) -> Geometry:
+def unite(triangles: Floats, grid: float) -> Geometry:
     """Union of (n, 3, 2) triangles of a plane: coplanar overlaps and T-junctions vanish."""
-    import shapely
-
     polygons = shapely.polygons(np.concatenate([triangles, triangles[:, :1]], axis=1))
     return union(shapely.make_valid(polygons), grid)
 
@@ -41,8 +42,6 @@ def union(shapes: Geometry, grid: float) -> Geometry:
     slivers across a wall: 34 s instead of 6 s). For the same reason many polygons are united by
     neighbourhoods, each rid of corners on straight edges, and these in turn.
     """
-    import shapely
-
     polygons = _polygons_in(shapely.set_precision(shapes, grid))
     before = 2 * len(polygons) + 1
     while _CHUNK < len(polygons) < before / 2:
@@ -58,39 +57,31 @@ def union(shapes: Geometry, grid: float) -> Geometry:
 
 def intersection(one: Geometry, other: Geometry, grid: float) -> Geometry:
     """Pairwise intersection."""
-    import shapely
-
     return _polygonal(shapely.intersection(one, other, grid_size=grid))
 
 
 def difference(one: Geometry, other: Geometry, grid: float) -> Geometry:
     """Pairwise difference, ``one`` less ``other``."""
-    import shapely
-
     return _polygonal(shapely.difference(one, other, grid_size=grid))
 
 
-def neighbours(polygons: Geometry, gap: float) -> NDArray[np.int64]:
+def neighbours(polygons: Geometry, gap: float) -> Ints:
     """(n,) the group of each of n polygons: those less than ``gap`` apart are in one, so that a
     T-junction whose edge misses the corner by a rounding joins what it was meant to join."""
-    import shapely
-
     tree = shapely.STRtree(polygons)
     one, other = tree.query(polygons, predicate="dwithin", distance=gap)
-    label = np.arange(len(polygons))
-    while np.any(label[one] != label[other]):
-        least = label.copy()
-        np.minimum.at(least, label[one], label[other])
-        label = least[least[label]]
-    return label
+    return connected(len(polygons), one, other)
 
 
-def without_cracks(opening: Geometry, width: float, grid: float) -> Geometry:
-    """The opening less what is narrower than ``width``: a morphological opening, grown by twice
-    what was eroded and clipped, so that what stays is not shrunk. A crack under a wall would
-    otherwise stretch the hull of a door along all of it."""
-    import shapely
+def left_open(region: Geometry, blocking: Geometry, tolerance: Tolerance) -> Geometry:
+    """What of a region is not blocked, less cracks, what is narrower than a hairline: a crack under
+    a wall would stretch the hull of a door along all of it.
 
+    A morphological opening, grown by twice what was eroded and clipped, so that what stays is not
+    shrunk.
+    """
+    width, grid = tolerance.hairline, tolerance.grid
+    opening = difference(region, blocking, grid)
     core = shapely.buffer(opening, -width / 2, join_style="mitre")
     grown = shapely.buffer(core, width, join_style="mitre")
     return intersection(opening, grown, grid)
@@ -98,16 +89,12 @@ def without_cracks(opening: Geometry, width: float, grid: float) -> Geometry:
 
 def _polygons_in(shapes: Geometry) -> Geometry:
     """The polygons among the parts of shapes."""
-    import shapely
-
     parts = shapely.get_parts(shapely.get_parts(shapes))
     return parts[shapely.get_dimensions(parts) == 2]
 
 
 def _polygonal(shapes: Geometry) -> Geometry:
     """The same without points and lines."""
-    import shapely
-
     every = np.array(shapes, dtype=object).reshape(-1)
     flat = shapely.get_dimensions(every) < 2
     if flat.any():

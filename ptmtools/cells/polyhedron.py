@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.vectors import cross
 
 #: Tag of a face that lies in the root box.
@@ -23,21 +23,14 @@ _BOX_LOOPS = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 
 
 @dataclass(frozen=True)
 class Polyhedron:
-    """A convex polyhedron.
+    """A convex polyhedron."""
 
-    Attributes
-    ----------
-    points: (n, 3) vertices.
-    faces: loops of indices into `points`, counter-clockwise seen from outside.
-    tags: for each face the BSP node whose plane it lies in, or `BOX_FACE`.
-    """
-
-    points: NDArray[np.float64]
-    faces: tuple[NDArray[np.int64], ...]
-    tags: tuple[int, ...]
+    points: Floats  # (n, 3) vertices
+    faces: tuple[Ints, ...]  # loops of indices into them, counter-clockwise seen from outside
+    tags: tuple[int, ...]  # for each face the BSP node whose plane it lies in, or `BOX_FACE`
 
     @staticmethod
-    def box(low: NDArray[np.float64], high: NDArray[np.float64]) -> Polyhedron:
+    def box(low: Floats, high: Floats) -> Polyhedron:
         """The axis-parallel box between two corners."""
         k = np.arange(8)
         bits = np.stack([k >> 2 & 1, k >> 1 & 1, k & 1], axis=1)
@@ -46,7 +39,7 @@ class Polyhedron:
         return Polyhedron(points, loops, (BOX_FACE,) * 6)
 
     @cached_property
-    def edges(self) -> NDArray[np.int64]:
+    def edges(self) -> Ints:
         """(e, 2) the ends of each edge, the lower first, in the order in which faces have them."""
         loops = [loop.tolist() for loop in self.faces]
         pairs = (pair for r in loops for pair in zip(r, r[1:] + r[:1], strict=True))
@@ -59,7 +52,7 @@ class Polyhedron:
         return float(np.einsum("ij,ij->", cross(a, b), c)) / 6.0
 
     @property
-    def planes(self) -> NDArray[np.float64]:
+    def planes(self) -> Floats:
         """(f, 4) the planes of the faces, unit normals pointing outwards."""
         a, b, c = self._fan(self.points)
         start = np.cumsum([0] + [len(loop) - 2 for loop in self.faces[:-1]])
@@ -67,7 +60,7 @@ class Polyhedron:
         normals /= np.sqrt(np.einsum("ij,ij->i", normals, normals))[:, None]
         return np.column_stack([normals, -np.einsum("ij,ij->i", normals, a[start])])
 
-    def _fan(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    def _fan(self, points: Floats) -> tuple[Floats, ...]:
         """The (m, 3) corners of the faces' triangles, face by face, taken from ``points``."""
         loops = [loop.tolist() for loop in self.faces]
         fan = [(r[0], r[i], r[i + 1]) for r in loops for i in range(1, len(r) - 1)]
@@ -75,7 +68,7 @@ class Polyhedron:
 
 
 def cut(
-    body: Polyhedron, plane: NDArray[np.float64], tag: int, rounding: float
+    body: Polyhedron, plane: Floats, tag: int, rounding: float
 ) -> tuple[Polyhedron | None, Polyhedron | None]:
     """Cut by a (4,) plane; returns (front, back), None where nothing lies on that side.
 
@@ -121,7 +114,7 @@ def cut(
     return _compact(every, front), _compact(every, back)
 
 
-def section(body: Polyhedron, plane: NDArray[np.float64], rounding: float) -> NDArray[np.float64]:
+def section(body: Polyhedron, plane: Floats, rounding: float) -> Floats:
     """(n, 3) convex polygon in which a plane cuts the body, counter-clockwise against the normal;
     (0, 3) where it does not cut the interior. The rim of the face that `cut` would make."""
     distance = body.points @ plane[:3] + plane[3]
@@ -135,9 +128,7 @@ def section(body: Polyhedron, plane: NDArray[np.float64], rounding: float) -> ND
     return rim[_around(rim, list(range(len(rim))), plane[:3])]
 
 
-def clip_polygon(
-    polygon: NDArray[np.float64], plane: NDArray[np.float64], rounding: float
-) -> NDArray[np.float64]:
+def clip_polygon(polygon: Floats, plane: Floats, rounding: float) -> Floats:
     """The part of a convex (n, 3) polygon in front of a plane; (0, 3) where nothing is left."""
     distance = polygon @ plane[:3] + plane[3]
     if np.all(distance >= -rounding):
@@ -151,11 +142,11 @@ def clip_polygon(
         t = np.where(crosses, distance / (distance - following), 0.0)[:, None]
     cuts = polygon + t * (np.concatenate([polygon[1:], polygon[:1]]) - polygon)
     both = np.stack([polygon, cuts], axis=1).reshape(-1, 3)
-    kept: NDArray[np.float64] = both[np.stack([ahead, crosses], axis=1).ravel()]
+    kept: Floats = both[np.stack([ahead, crosses], axis=1).ravel()]
     return kept
 
 
-def _around(points: NDArray[np.float64], loop: list[int], normal: NDArray[np.float64]) -> list[int]:
+def _around(points: Floats, loop: list[int], normal: Floats) -> list[int]:
     """The vertices of a convex polygon in counter-clockwise order about ``normal``."""
     p = points[loop]
     p = p - p.mean(axis=0)
@@ -164,7 +155,7 @@ def _around(points: NDArray[np.float64], loop: list[int], normal: NDArray[np.flo
     return [loop[i] for i in sorted(range(len(loop)), key=angle.__getitem__)]
 
 
-def _compact(points: NDArray[np.float64], faces: list[tuple[list[int], int]]) -> Polyhedron:
+def _compact(points: Floats, faces: list[tuple[list[int], int]]) -> Polyhedron:
     used = sorted({i for loop, _ in faces for i in loop})
     rename = {old: new for new, old in enumerate(used)}
     return Polyhedron(

@@ -10,104 +10,58 @@ shrunk: what is missing from a PVS is a bug, what is too much is a cost.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+import shapely
 
+from ptmtools.arrays import Floats
 from ptmtools.cells.bsp import Tree
-from ptmtools.cells.planar import Geometry, difference, intersection, union, without_cracks
+from ptmtools.cells.planar import Geometry, intersection, left_open, union
 from ptmtools.cells.rejoin import Rejoined
-from ptmtools.cells.structure import WallPlane
 from ptmtools.tolerance import Tolerance
 
 
-@dataclass(frozen=True)
-class Portals:
-    """Openings between leaves of a `Tree`.
+class Portal(NamedTuple):
+    """An opening between two leaves of a `Tree`."""
 
-    Attributes
-    ----------
-    nodes: (K,) the node whose plane it lies in, ascending.
-    leaves: (K, 2) the leaf behind and the leaf in front of the plane.
-    planes: (K, 4), normals pointing into ``leaves[:, 1]``.
-    polygons: (n, 3) each, convex, counter-clockwise seen against the normal.
-    areas: (K,) m² open, before hulls.
-    """
-
-    nodes: NDArray[np.int64]
-    leaves: NDArray[np.int32]
-    planes: NDArray[np.float64]
-    polygons: tuple[NDArray[np.float64], ...]
-    areas: NDArray[np.float64]
-
-    def among(self, keep: NDArray[np.bool_], rename: NDArray[np.int32]) -> Portals:
-        """Only the portals between kept leaves, with leaves renamed."""
-        kept = np.flatnonzero(keep[self.leaves[:, 0]] & keep[self.leaves[:, 1]])
-        return Portals(
-            self.nodes[kept],
-            rename[self.leaves[kept]].astype(np.int32).reshape(-1, 2),
-            self.planes[kept].reshape(-1, 4),
-            tuple(self.polygons[k] for k in kept),
-            self.areas[kept],
-        )
+    node: int  # whose plane it lies in
+    leaves: tuple[int, int]  # behind and in front of the plane
+    polygon: Floats  # (n, 3) convex, counter-clockwise seen against the normal
+    area: float  # m² open, before its hull was taken
 
 
 def find_portals(
-    tree: Tree, tolerance: Tolerance, within: NDArray[np.bool_] | None = None
-) -> Portals:
-    """All openings between the leaves of a tree, in the order of its nodes; only those in nodes of
-    which ``within``, (N,), is true if it is given."""
+    tree: Tree, tolerance: Tolerance, nodes: Iterable[int] | None = None
+) -> list[Portal]:
+    """All openings between the leaves of a tree, in the order of its nodes, or of these ``nodes``
+    if they are given."""
     faces = _faces_by_node(tree)
-    nodes: list[int] = []
-    leaves: list[tuple[int, int]] = []
-    planes: list[NDArray[np.float64]] = []
-    polygons: list[NDArray[np.float64]] = []
-    areas: list[float] = []
-    for node, wall in enumerate(tree.walls):
-        if within is not None and not within[node]:
-            continue
-        for back, front, flat, area in _open_pieces(faces[node], wall, tolerance):
-            nodes.append(node)
-            leaves.append((back, front))
-            planes.append(tree.planes[node])
-            polygons.append(wall.frame.to_space(flat))
-            areas.append(area)
-    return Portals(
-        np.array(nodes, dtype=np.int64),
-        np.array(leaves, dtype=np.int32).reshape(-1, 2),
-        np.array(planes).reshape(-1, 4),
-        tuple(polygons),
-        np.array(areas),
-    )
+    nodes = range(len(faces)) if nodes is None else nodes
+    return [portal for node in nodes for portal in _openings(node, *faces[node], tree, tolerance)]
 
 
 def portals_rejoined(
-    portals: Portals, before: Tree, joint: Rejoined, tolerance: Tolerance
-) -> Portals:
+    portals: list[Portal], before: Tree, joint: Rejoined, tolerance: Tolerance
+) -> list[Portal]:
     """`find_portals` of a rejoined tree, with the ``portals`` of the tree ``before`` in every plane
     in which no leaf has changed."""
-    changed = np.bincount(joint.leaf)[joint.leaf] > 1
-    stale = joint.node < 0
-    for leaf in np.flatnonzero(changed).tolist():
-        stale[[tag for tag in before.leaves[leaf].tags if tag >= 0]] = True
-    again = np.zeros(len(joint.tree.planes), dtype=bool)
-    again[joint.node[stale & (joint.node >= 0)]] = True
-    fresh = find_portals(joint.tree, tolerance, again)
-    kept = np.flatnonzero(~stale[portals.nodes])
-    nodes = np.concatenate([joint.node[portals.nodes[kept]], fresh.nodes])
-    order = np.argsort(nodes, kind="stable")
-    polygons = [portals.polygons[k] for k in kept] + list(fresh.polygons)
-    return Portals(
-        nodes[order],
-        np.concatenate([joint.leaf[portals.leaves[kept]], fresh.leaves])[order].astype(np.int32),
-        np.concatenate([portals.planes[kept], fresh.planes])[order],
-        tuple(polygons[k] for k in order),
-        np.concatenate([portals.areas[kept], fresh.areas])[order],
-    )
+    leaf, node = joint.leaf.tolist(), joint.node.tolist()
+    changed = np.flatnonzero(np.bincount(joint.leaf)[joint.leaf] > 1)
+    stale = {tag for whole in changed for tag in before.leaves[whole].tags if tag >= 0}
+    kept = [
+        portal._replace(
+            node=node[portal.node], leaves=(leaf[portal.leaves[0]], leaf[portal.leaves[1]])
+        )
+        for portal in portals
+        if portal.node not in stale and node[portal.node] >= 0
+    ]
+    fresh = find_portals(joint.tree, tolerance, sorted({node[one] for one in stale} - {-1}))
+    return sorted(kept + fresh, key=lambda portal: portal.node)
 
 
-_Face = tuple[int, NDArray[np.float64]]
+_Face = tuple[int, Floats]
 
 
 def _faces_by_node(tree: Tree) -> list[tuple[list[_Face], list[_Face]]]:
@@ -123,46 +77,38 @@ def _faces_by_node(tree: Tree) -> list[tuple[list[_Face], list[_Face]]]:
     return found
 
 
-def _open_pieces(
-    faces: tuple[list[_Face], list[_Face]], wall: WallPlane, tolerance: Tolerance
-) -> list[tuple[int, int, NDArray[np.float64], float]]:
-    """(back leaf, front leaf, hull polygon in the plane, open area) of one node's openings."""
-    import shapely
-
-    if not faces[0] or not faces[1]:
-        return []
-    ahead = shapely.polygons([shapely.linearrings(wall.frame.to_plane(p)) for _, p in faces[0]])
-    behind = shapely.polygons([shapely.linearrings(wall.frame.to_plane(p)) for _, p in faces[1]])
-    tree = shapely.STRtree(ahead)
-    j, i = tree.query(behind, predicate="intersects")
+def _openings(
+    node: int, ahead: list[_Face], behind: list[_Face], tree: Tree, tolerance: Tolerance
+) -> Iterator[Portal]:
+    """The portals in the plane of one node, between faces ahead of it and behind it."""
+    if not ahead or not behind:
+        return
+    wall = tree.walls[node]
+    one, other = (
+        shapely.polygons([shapely.linearrings(wall.frame.to_plane(points)) for _, points in faces])
+        for faces in (ahead, behind)
+    )
+    j, i = shapely.STRtree(one).query(other, predicate="intersects")
     order = np.lexsort((i, j))
     j, i = j[order], i[order]
-    shared = intersection(ahead[i], behind[j], tolerance.grid)
+    shared = intersection(one[i], other[j], tolerance.grid)
     wide = shapely.area(shared) > 0
     i, j, shared = i[wide], j[wide], shared[wide]
     if len(shared) == 0:
-        return []
-    opening = without_cracks(
-        difference(union(shared, tolerance.grid), wall.blocking, tolerance.grid),
-        tolerance.hairline,
-        tolerance.grid,
-    )
+        return
+    opening = left_open(union(shared, tolerance.grid), wall.blocking, tolerance)
     if shapely.is_empty(opening):
-        return []
+        return
     pieces = intersection(shared, opening, tolerance.grid)
-    found = []
     for a, b, piece in zip(i.tolist(), j.tolist(), pieces, strict=True):
         for part in shapely.get_parts(piece):
-            if not _wider_than(part, tolerance.plane):
-                continue
-            hull = shapely.orient_polygons(shapely.convex_hull(part))
-            hull = shapely.get_coordinates(hull)[:-1]
-            found.append((faces[1][b][0], faces[0][a][0], hull, float(shapely.area(part))))
-    return found
+            if _wider_than(part, tolerance.plane):
+                hull = shapely.orient_polygons(shapely.convex_hull(part))
+                polygon = wall.frame.to_space(shapely.get_coordinates(hull)[:-1])
+                leaves = behind[b][0], ahead[a][0]
+                yield Portal(node, leaves, polygon, float(shapely.area(part)))
 
 
 def _wider_than(part: Geometry, width: float) -> bool:
     """Whether a disc of the given diameter fits into a polygon somewhere."""
-    import shapely
-
     return not shapely.is_empty(shapely.buffer(part, -width / 2, join_style="mitre"))

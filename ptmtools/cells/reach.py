@@ -8,15 +8,13 @@ root box; what it does not reach is a solid, a sealed void or the outside (desig
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.polyhedron import BOX_FACE
-from ptmtools.cells.portals import Portals
-from ptmtools.cells.vectors import cross
+from ptmtools.cells.portals import Portal
+from ptmtools.cells.vectors import normals
 from ptmtools.tolerance import ranked
 
 #: A surface whose normal leans less than this from the vertical can be stood on (cosine of 45°).
@@ -27,76 +25,40 @@ FLOOR_SAMPLES = 400
 FLOOR_SHARE = 0.05
 
 
-@dataclass(frozen=True)
-class Reach:
-    """The outcome of a flood.
-
-    Attributes
-    ----------
-    reached: (L,) bool over the leaves of the tree.
-    closed: whether no reached leaf touches the root box.
-    start: the leaves from which the flood began; empty if none qualified.
-    """
-
-    reached: NDArray[np.bool_]
-    closed: bool
-    start: tuple[int, ...]
-
-    def renamed(self, leaf: NDArray[np.int64]) -> Reach:
-        """The same over leaves of which each of these, (L,), is or is part of ``leaf[i]``; parts
-        of one leaf must be reached alike."""
-        reached = np.zeros(int(leaf.max(initial=-1)) + 1, dtype=bool)
-        reached[leaf] = self.reached
-        start = tuple(dict.fromkeys(leaf[list(self.start)].tolist()))
-        return Reach(reached, self.closed, start)
-
-
-def flood(
-    tree: Tree, portals: Portals, corners: NDArray[np.float64], start: tuple[int, ...]
-) -> Reach:
-    """Flood through the portals from ``start``, or from the leaf that the module describes.
-
-    Parameters
-    ----------
-    corners: (T, 3, 3) structural triangles, in which the floor is looked for.
-    """
-    outer = np.array([BOX_FACE in body.tags for body in tree.leaves], dtype=bool)
-    if not start:
-        start = largest_with_floor(tree, ~outer, corners)
-    if not start and not outer.all():
-        start = (_by_volume(tree, ~outer)[0],)
-    reached, count = np.zeros(len(tree.leaves), dtype=bool), 0
+def flood(leaves: int, portals: list[Portal], start: tuple[int, ...]) -> Bools:
+    """(L,) which of so many leaves are reached through the portals from the leaves ``start``."""
+    ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
+    reached, count = np.zeros(leaves, dtype=bool), 0
     reached[list(start)] = True
     while count < (count := int(reached.sum())):
-        reached[portals.leaves[reached[portals.leaves].any(axis=1)]] = True
-    closed = bool(start) and not bool(np.any(reached & outer))
-    return Reach(reached, closed, start)
+        reached[ends[reached[ends].any(axis=1)]] = True
+    return reached
 
 
-def largest_with_floor(
-    tree: Tree, allowed: NDArray[np.bool_], corners: NDArray[np.float64]
-) -> tuple[int, ...]:
-    """The largest allowed leaf with floor below its middle, as a tuple of one, or ()."""
-    for leaf in _by_volume(tree, allowed):
+def at_box(tree: Tree) -> Bools:
+    """(L,) which leaves touch the root box."""
+    return np.array([BOX_FACE in body.tags for body in tree.leaves], dtype=bool)
+
+
+def largest_leaf(tree: Tree, allowed: Bools, corners: Floats) -> tuple[int, ...]:
+    """The largest of the (L,) allowed leaves that has floor below its middle, or if none has the
+    largest, as a tuple of one; () if none is allowed. The floor is looked for in the (T, 3, 3)
+    structural triangles ``corners``."""
+    leaves = np.flatnonzero(allowed)
+    order = leaves[ranked(np.array([tree.leaves[leaf].volume for leaf in leaves]))].tolist()
+    for leaf in order:
         if np.any(_plumb(tree.leaves[leaf].points.mean(axis=0), corners) < 0):
             return (leaf,)
-    return ()
+    return tuple(order[:1])
 
 
-def _by_volume(tree: Tree, allowed: NDArray[np.bool_]) -> list[int]:
-    """The allowed leaves, the largest first."""
-    leaves = np.flatnonzero(allowed)
-    order = ranked(np.array([tree.leaves[leaf].volume for leaf in leaves]))
-    return [int(leaf) for leaf in leaves[order]]
-
-
-def roofed_share(corners: NDArray[np.float64], floor_area: float) -> float:
+def roofed_share(corners: Floats, floor_area: float) -> float:
     """Share of the floor, by area, that has something over it (1 without any floor).
 
     Floor is every level triangle of at least a tenth of ``floor_area`` m²; a ceiling is floor that
     nothing covers, so of the triangles over one another at a place only the lowest is floor.
     """
-    normal = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = normals(corners)
     area = np.linalg.norm(normal, axis=1) / 2
     level = np.abs(normal[:, 1]) >= FLOOR_COSINE * 2 * area
     floor = np.flatnonzero(level & (area >= floor_area / 10))
@@ -115,16 +77,16 @@ def roofed_share(corners: NDArray[np.float64], floor_area: float) -> float:
     return float(covered / total) if total else 1.0
 
 
-def _plumb(eye: NDArray[np.float64], corners: NDArray[np.float64]) -> NDArray[np.float64]:
+def _plumb(eye: Floats, corners: Floats) -> Floats:
     """Heights above ``eye`` (metres) at which a plumb line meets triangles that can be stood on."""
     flat = corners[:, :, [0, 2]] - eye[[0, 2]]
     turn = flat[:, [1, 2, 0]]
     side = flat[:, :, 0] * turn[:, :, 1] - flat[:, :, 1] * turn[:, :, 0]
     hit = np.flatnonzero(np.all(side >= 0, axis=1) | np.all(side <= 0, axis=1))
     p = corners[hit]
-    normal = cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    normal = normals(p)
     level = np.abs(normal[:, 1]) >= FLOOR_COSINE * np.linalg.norm(normal, axis=1)
     level &= normal[:, 1] != 0
     p, normal = p[level], normal[level]
-    heights: NDArray[np.float64] = np.einsum("ij,ij->i", normal, p[:, 0] - eye) / normal[:, 1]
+    heights: Floats = np.einsum("ij,ij->i", normal, p[:, 0] - eye) / normal[:, 1]
     return heights

@@ -13,77 +13,49 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Ints
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.polyhedron import Polyhedron
-
-_MIXED = -1
 
 
 @dataclass(frozen=True)
 class Rejoined:
-    """A tree without caps that cut nothing off.
-
-    Attributes
-    ----------
-    tree: what is left.
-    leaf: (L,) for each leaf of the tree before, which it is or is part of; ascending but for parts.
-    node: (N,) for each node of the tree before, which it is, or -1.
-    """
+    """A tree without caps that cut nothing off, and what became of the leaves and nodes before."""
 
     tree: Tree
-    leaf: NDArray[np.int64]
-    node: NDArray[np.int64]
+    leaf: Ints  # (L,) which leaf each is or is part of; ascending but for parts
+    node: Ints  # (N,) which node each is, or -1
 
 
-def rejoined(tree: Tree, reached: NDArray[np.bool_]) -> Rejoined:
+def rejoined(tree: Tree, reached: Bools) -> Rejoined:
     """The tree less the caps that cut nothing off; ``reached``: (L,) what the flood met."""
-    nodes = len(tree.planes)
-    status = np.zeros(nodes, dtype=np.int64)
-    first = np.zeros(nodes, dtype=np.int64)
-    for node in range(nodes - 1, -1, -1):  # children come after their parents
-        below = [
-            (int(reached[-2 - c]), -2 - c) if c <= -2 else (int(status[c]), int(first[c]))
-            for c in tree.children[node].tolist()
-        ]
-        status[node] = below[0][0] if below[0][0] == below[1][0] else _MIXED
-        first[node] = min(leaf for _, leaf in below)
-    gone = np.zeros(nodes, dtype=bool)
-    target = np.arange(len(tree.leaves))
-    bodies = dict(enumerate(tree.leaves))
-    for node in range(nodes):
-        if gone[node] or (node in tree.capped and status[node] != _MIXED):
-            if not gone[node]:
-                bodies[int(first[node])] = tree.capped[node]
-            for child in tree.children[node].tolist():
-                if child >= 0:
-                    gone[child] = True
-                    first[child] = first[node]
-                else:
-                    target[-2 - child] = first[node]
-            gone[node] = True
-    kept = np.unique(target)
-    renumber = np.where(gone, -1, np.cumsum(~gone) - 1)
-    index = np.searchsorted(kept, target)
-    children = tree.children[~gone]
-    below_node = children >= 0
-    child = np.where(below_node, children, 0)
-    leaf = np.where(below_node, first[child], -2 - children)
-    inner = below_node & ~gone[child]
+    bodies, children = list(tree.leaves), tree.children.copy()
+    part_of = np.arange(len(bodies))
+    kept = np.ones(len(children), dtype=bool)
+    for node in sorted(tree.capped, reverse=True):  # parts before wholes
+        first, second = sorted(-2 - children[node])
+        if first >= 0 and reached[first] == reached[second]:
+            bodies[first] = tree.capped[node]
+            part_of[part_of == second] = first
+            children[children == node] = -2 - first
+            kept[node] = False
+    wholes, leaf = np.unique(part_of, return_inverse=True)
+    renumber = np.where(kept, np.cumsum(kept) - 1, -1)
+    children = children[kept]
+    inner, outer = np.maximum(children, 0), -2 - np.minimum(children, -2)
     return Rejoined(
         replace(
             tree,
-            planes=tree.planes[~gone],
-            walls=tuple(w for w, g in zip(tree.walls, gone, strict=True) if not g),
-            children=np.where(inner, renumber[child], -2 - index[leaf]).astype(np.int32),
-            leaves=tuple(_renamed(bodies[int(i)], renumber) for i in kept),
-            capped={int(renumber[n]): b for n, b in tree.capped.items() if not gone[n]},
+            walls=tuple(wall for wall, keeps in zip(tree.walls, kept, strict=True) if keeps),
+            children=np.where(children >= 0, renumber[inner], -2 - leaf[outer]).astype(np.int32),
+            leaves=tuple(_renamed(bodies[whole], renumber) for whole in wholes),
+            capped={int(renumber[n]): body for n, body in tree.capped.items() if kept[n]},
         ),
-        index,
+        leaf,
         renumber,
     )
 
 
-def _renamed(body: Polyhedron, renumber: NDArray[np.int64]) -> Polyhedron:
+def _renamed(body: Polyhedron, renumber: Ints) -> Polyhedron:
     return replace(body, tags=tuple(int(renumber[t]) if t >= 0 else t for t in body.tags))

@@ -10,8 +10,8 @@ outside, and every door in a wall to every other.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats
 from ptmtools.cells.polyhedron import BOX_FACE, Polyhedron
 from ptmtools.cells.structure import Frame, Structure, WallPlane, parallel_gap
 from ptmtools.tolerance import TIE_SHARE, ranked
@@ -29,12 +29,12 @@ class Reveals:
     def __getstate__(self) -> dict[str, object]:
         return {**vars(self), "_known": {}}  # which another thread may be adding to
 
-    def within(self, body: Polyhedron, planes: list[NDArray[np.float64]]) -> list[WallPlane]:
+    def within(self, body: Polyhedron, walls: list[WallPlane]) -> list[WallPlane]:
         """The reveals of the slab that a body lies in; none if it lies in no wall.
 
-        ``planes`` are those of the BSP nodes that the tags of the body's faces name.
+        ``walls`` are those of the BSP nodes that the tags of the body's faces name.
         """
-        slab = self._slab(_bounds(body, planes))
+        slab = self._slab(_bounds(body, walls))
         if slab is None:
             return []
         key = slab[0].tobytes() + slab[1].tobytes()
@@ -42,9 +42,7 @@ class Reveals:
             self._known[key] = self._bridges(*slab)
         return self._known[key]
 
-    def _slab(
-        self, bounds: list[NDArray[np.float64]]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    def _slab(self, bounds: list[Floats]) -> tuple[Floats, Floats] | None:
         """The nearest pair of parallel planes within the wall thickness."""
         nearest, pair = (1 + TIE_SHARE) * self._limit, None
         for i, a in enumerate(bounds):
@@ -54,7 +52,7 @@ class Reveals:
                     nearest, pair = gap - self._tolerance.rounding, (a, b)
         return pair
 
-    def _bridges(self, first: NDArray[np.float64], second: NDArray[np.float64]) -> list[WallPlane]:
+    def _bridges(self, first: Floats, second: Floats) -> list[WallPlane]:
         slack = self._tolerance.hairline
         turn = float(np.sign(first[:3] @ second[:3]))
         width = abs(float(first[3]) - turn * float(second[3]))
@@ -81,9 +79,10 @@ class Reveals:
         return found
 
 
-def _bounds(body: Polyhedron, planes: list[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+def _bounds(body: Polyhedron, walls: list[WallPlane]) -> list[Floats]:
     """The planes of a body's faces: those of the BSP, and those of the root box, in which the
     outer faces of a building lie when the box is clipped to it."""
-    bounds = [planes[tag] for tag in sorted({tag for tag in body.tags if tag != BOX_FACE})]
-    outer = [face for face, tag in enumerate(body.tags) if tag == BOX_FACE]
-    return bounds + list(body.planes[outer])
+    bounds = [
+        walls[tag].frame.plane for tag in sorted({tag for tag in body.tags if tag != BOX_FACE})
+    ]
+    return bounds + [p for p, tag in zip(body.planes, body.tags, strict=True) if tag == BOX_FACE]

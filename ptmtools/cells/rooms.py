@@ -23,12 +23,13 @@ the same).
 
 from __future__ import annotations
 
-import heapq
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+import shapely
 
+from ptmtools.arrays import Floats, Ints
+from ptmtools.cells.merging import Groups
 from ptmtools.cells.model import Cells
 
 if TYPE_CHECKING:
@@ -43,40 +44,20 @@ DIGITS = 4
 AT_ONCE = 2048
 
 
-def room_of_leaf(
-    cells: Cells,
-    rank: NDArray[np.int64] | None = None,
-    least: float = OPEN,
-) -> NDArray[np.int64]:
-    """(L,) the room of each leaf, called by one of its leaves.
+def room_of_leaf(cells: Cells, rank: Ints) -> Ints:
+    """(L,) the room of each leaf, called by the rank of one of its leaves.
 
-    Of equally open pairs the one whose leaves come first is joined first, by (L,) ``rank`` or else
-    by number: a doorway between two equal rooms.
+    Of equally open pairs the one whose leaves come first by (L,) ``rank`` is joined first: a
+    doorway between two equal rooms.
     """
-    rank = np.arange(cells.leaf_count) if rank is None else rank
-    regions = _Regions(cells, rank)
-    waiting = [(-regions.openness(a, b), a, b) for a, b in regions.pairs()]
-    heapq.heapify(waiting)
-    while waiting:
-        known, a, b = heapq.heappop(waiting)
-        if not regions.are_neighbours(a, b):
-            continue
-        share = regions.openness(a, b)
-        if -known > share:  # one of them has grown meanwhile
-            heapq.heappush(waiting, (-share, a, b))
-        elif share >= least:
-            for c, d in regions.join(a, b):
-                heapq.heappush(waiting, (-regions.openness(c, d), c, d))
-    return np.argsort(rank)[regions.of_leaf()[rank]]
+    return _Regions(cells, rank).grown(lambda closed: -closed >= OPEN)[rank]
 
 
-class _Regions:
-    """Connected groups of leaves, each called by the rank of one of them, and the openings between
-    them."""
+class _Regions(Groups):
+    """Groups of leaves, by rank, that cost little where the opening between them is large."""
 
-    def __init__(self, cells: Cells, rank: NDArray[np.int64]) -> None:
-        import shapely
-
+    def __init__(self, cells: Cells, rank: Ints) -> None:
+        super().__init__(cells.leaf_count, rank[cells.portal_leaf])
         order = np.argsort(rank)
         self._volume = cells.leaf_volumes()[order]
         plan = cells.leaf_point[:, [0, 2]]
@@ -84,62 +65,30 @@ class _Regions:
         hulls = shapely.convex_hull(shapely.multipoints(plan, indices=rows))
         self._plan: list[Plan] = list(hulls[order].tolist())
         self._section = [_section(v, p) for v, p in zip(self._volume, self._plan, strict=True)]
-        self._parent = list(range(cells.leaf_count))
         self._area = cells.portal_area.tolist()
         self._touching = _touching(cells, cells.tolerance.plane)
-        self._between: list[dict[int, list[int]]] = [{} for _ in range(cells.leaf_count)]
-        for k, (a, b) in enumerate(rank[cells.portal_leaf].tolist()):
-            doors = self._between[a].setdefault(b, [])
-            self._between[b][a] = doors
-            doors.append(k)
         self._opening: dict[tuple[int, int], float] = {}
 
-    def pairs(self) -> list[tuple[int, int]]:
-        """Regions with a portal between them, the lower first."""
-        return [(a, b) for a, near in enumerate(self._between) for b in sorted(near) if a < b]
-
-    def are_neighbours(self, a: int, b: int) -> bool:
-        return b in self._between[a]
-
-    def openness(self, a: int, b: int) -> float:
-        """The opening between two neighbours as a share of the narrower one's cross-section."""
-        pair = (min(a, b), max(a, b))
-        if pair not in self._opening:
-            self._opening[pair] = self._largest_opening(self._between[a][b])
-        share = self._opening[pair] / min(self._section[a], self._section[b])
-        return float(f"{share:.{DIGITS}g}")
+    def cost(self, a: int, b: int) -> float:
+        """Less the opening between them, as a share of the narrower one's cross-section."""
+        if (a, b) not in self._opening:
+            self._opening[a, b] = self._largest_opening(self.near[a][b])
+        share = self._opening[a, b] / min(self._section[a], self._section[b])
+        return -float(f"{share:.{DIGITS}g}")
 
     def join(self, a: int, b: int) -> list[tuple[int, int]]:
-        """Makes two neighbours one region, called by the one with more neighbours; returns the
-        pairs that are new or have a larger opening."""
-        if len(self._between[a]) < len(self._between[b]):
+        """Called by the one with more neighbours."""
+        if len(self.near[a]) < len(self.near[b]):
             a, b = b, a
-        self._parent[b] = a
         self._volume[a] += self._volume[b]
         self._plan[a] = self._plan[a].union(self._plan[b]).convex_hull
         self._section[a] = max(
             self._section[a], self._section[b], _section(self._volume[a], self._plan[a])
         )
-        del self._between[a][b]
-        found = []
-        for c, doors in sorted(self._between[b].items()):
-            if c == a:
-                continue
-            del self._between[c][b]
-            both = [*self._between[a].get(c, ()), *doors]
-            self._between[a][c] = self._between[c][a] = both
-            pair = (min(a, c), max(a, c))
-            self._opening.pop(pair, None)
-            found.append(pair)
-        self._between[b] = {}
-        return found
-
-    def of_leaf(self) -> NDArray[np.int64]:
-        """(L,) by which leaf the region of each leaf is called, both by rank."""
-        found = np.array(self._parent, dtype=np.int64)
-        while len(found) and not np.array_equal(found, found[found]):
-            found = found[found]
-        return found
+        changed = super().join(a, b)
+        for a, c in changed:
+            self._opening.pop((min(a, c), max(a, c)), None)
+        return changed
 
     def _largest_opening(self, doors: list[int]) -> float:
         left, largest = set(doors), 0.0
@@ -160,8 +109,6 @@ class _Regions:
 
 def _section(volume: float, plan: Plan) -> float:
     """m²: the mean cross-section along a region, volume over length."""
-    import shapely
-
     corners = shapely.get_coordinates(plan)
     edge = np.diff(corners, axis=0)
     length = np.linalg.norm(edge, axis=1)
@@ -173,8 +120,6 @@ def _section(volume: float, plan: Plan) -> float:
 
 def _touching(cells: Cells, near: float) -> list[list[int]]:
     """For every portal those that it meets, within ``near`` metres, ascending."""
-    import shapely
-
     found: list[list[int]] = [[] for _ in range(cells.portal_count)]
     if not found:
         return found
@@ -200,7 +145,7 @@ def _touching(cells: Cells, near: float) -> list[list[int]]:
     return found
 
 
-def _distance(points: NDArray[np.float64], polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+def _distance(points: Floats, polygon: Floats) -> Floats:
     """(n,) metres between the nearest of (n, m, 3) points and the outline of (n, m, 3) polygons."""
     along = np.roll(polygon, -1, axis=1) - polygon
     square = np.maximum(np.einsum("nek,nek->ne", along, along), np.finfo(np.float64).tiny)

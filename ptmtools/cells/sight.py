@@ -13,8 +13,8 @@ corners nor on where the building stands and how it is turned, be it on its head
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats
 from ptmtools.cells.model import Cells
 from ptmtools.cells.vectors import cross
 
@@ -33,7 +33,7 @@ STEPS = np.array(
 )
 
 
-def sampled_sight(cells: Cells) -> NDArray[np.bool_]:
+def sampled_sight(cells: Cells) -> Bools:
     """(L, L) symmetric: leaves that some straight line through portals joins. A leaf sees itself
     and those with which it shares a portal."""
     ends = cells.portal_leaf.reshape(-1, 2).astype(np.int64)
@@ -63,7 +63,7 @@ def sampled_sight(cells: Cells) -> NDArray[np.bool_]:
     return seen
 
 
-def _even(count: int) -> NDArray[np.float64]:
+def _even(count: int) -> Floats:
     """(count, 4) points of the unit cube, evenly spread; integer arithmetic, the same anywhere.
     They come in eights: the quarter turns of the frame, and those seen from behind (`_lines`)."""
     fixed = np.arange(1, count // 8 + 1, dtype=np.uint64)[:, None] * STEPS
@@ -75,9 +75,7 @@ def _even(count: int) -> NDArray[np.float64]:
     return np.concatenate([front, [0, 1, 0, 1] + front * [1, -1, 1, -1]])
 
 
-def _lines(
-    polygon: NDArray[np.float64], normal: NDArray[np.float64], share: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _lines(polygon: Floats, normal: Floats, share: Floats) -> tuple[Floats, Floats]:
     """(n, 3) points uniform in a convex polygon, and (n, 3) unit directions ahead of it with a
     density by the cosine, as light would pass.
 
@@ -113,9 +111,7 @@ def _lines(
     return origin, along.T @ frame
 
 
-def _chords(
-    flat: NDArray[np.float64], height: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _chords(flat: Floats, height: Floats) -> tuple[Floats, Floats]:
     """(n,) least and greatest x of a convex (m, 2) polygon at each height y."""
     a, b = flat, np.roll(flat, -1, axis=0)
     low, high = np.minimum(a[:, 1], b[:, 1]), np.maximum(a[:, 1], b[:, 1])

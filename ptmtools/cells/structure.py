@@ -16,17 +16,17 @@ triangle there, whatever its size.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 
 import numpy as np
-from numpy.typing import NDArray
+import shapely
 
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.naming import named, structural_triangles
 from ptmtools.cells.nearby import Nearby
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
-from ptmtools.cells.vectors import cross
+from ptmtools.cells.vectors import cross, normals
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
 
@@ -42,21 +42,15 @@ _UPWARD = np.array([0.5772156649, 0.8346268417, 0.2614972128])
 
 @dataclass(frozen=True)
 class Frame:
-    """A plane with two axes in it: ``to_plane`` and ``to_space`` are exact inverses up to rounding.
+    """A plane with two axes in it: `to_plane` and `to_space` are inverses up to rounding."""
 
-    Attributes
-    ----------
-    plane: (4,) unit normal and offset, n·x + d = 0.
-    origin, u, v: a point of the plane and an orthonormal basis, u × v = n.
-    """
-
-    plane: NDArray[np.float64]
-    origin: NDArray[np.float64]
-    u: NDArray[np.float64]
-    v: NDArray[np.float64]
+    plane: Floats  # (4,) unit normal n and offset d, n·x + d = 0
+    origin: Floats  # a point of it
+    u: Floats  # an orthonormal basis, u × v = n
+    v: Floats
 
     @staticmethod
-    def of(plane: NDArray[np.float64]) -> Frame:
+    def of(plane: Floats) -> Frame:
         """A frame for a (4,) plane; the axes depend on nothing but the plane."""
         normal = plane[:3]
         axis = np.zeros(3)
@@ -65,49 +59,34 @@ class Frame:
         u /= np.linalg.norm(u)
         return Frame(plane, -plane[3] * normal, u, cross(normal, u))
 
-    def to_plane(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_plane(self, points: Floats) -> Floats:
         """(…, 2) coordinates of (…, 3) points, projected along the normal."""
         q = points - self.origin
         return np.stack([q @ self.u, q @ self.v], axis=-1)
 
-    def to_space(self, flat: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_space(self, flat: Floats) -> Floats:
         """(…, 3) points of (…, 2) coordinates."""
-        space: NDArray[np.float64] = self.origin + flat[..., :1] * self.u + flat[..., 1:] * self.v
+        space: Floats = self.origin + flat[..., :1] * self.u + flat[..., 1:] * self.v
         return space
 
 
 @dataclass(frozen=True)
 class WallPlane:
-    """A plane that may split cells, and what lies in it.
-
-    Attributes
-    ----------
-    frame: the plane and its axes.
-    walls: shapely geometry in plane coordinates, the polygons that may split.
-    blocking: shapely geometry, everything opaque and structural in the plane.
-    """
+    """A plane that may split cells, and what lies in it, in its coordinates."""
 
     frame: Frame
-    walls: Geometry
-    blocking: Geometry
+    walls: Geometry  # the polygons that may split
+    blocking: Geometry  # everything opaque and structural
 
 
 @dataclass(frozen=True)
 class Structure:
-    """The triangles that may bound a leaf, and what is asked of them again and again.
+    """The triangles that may bound a leaf, and what is asked of them again and again."""
 
-    Attributes
-    ----------
-    corners: (T, 3, 3) their corners, metres.
-    forced: (T,) whether `SubdivideOptions.structural` names them.
-    planes, areas: see `planes_of`.
-    nearby: finds them.
-    """
-
-    corners: NDArray[np.float64]
-    forced: NDArray[np.bool_]
-    planes: NDArray[np.float64]
-    areas: NDArray[np.float64]
+    corners: Floats  # (T, 3, 3) metres
+    forced: Bools  # (T,) whether `SubdivideOptions.structural` names them
+    planes: Floats  # (T, 4) and
+    areas: Floats  # (T,), see `planes_of`
     nearby: Nearby
     tolerance: Tolerance
 
@@ -115,44 +94,23 @@ class Structure:
     def of(scene: Scene, options: SubdivideOptions, tolerance: Tolerance) -> Structure:
         """The structural triangles of a scene."""
         mask = structural_triangles(scene, options)
-        corners, forced = scene.corners[mask], _named(scene, options.structural)[mask]
+        corners, forced = scene.corners[mask], named(scene, options.structural)[mask]
         nearby = Nearby(corners, tolerance.rounding)
         return Structure(corners, forced, *planes_of(corners), nearby, tolerance)
 
-    def lie_in(self, plane: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def lie_in(self, plane: Floats, triangles: Ints) -> Bools:
         """(n,) which of these triangles, by number, lie in a plane."""
         distance = np.abs(self.corners[triangles] @ plane[:3] + plane[3])
-        lies: NDArray[np.bool_] = np.all(distance <= self.tolerance.plane, axis=1)
+        lies: Bools = np.all(distance <= self.tolerance.plane, axis=1)
         return lies
 
-    def united(self, frame: Frame, triangles: NDArray[np.int64]) -> Geometry:
+    def united(self, frame: Frame, triangles: Ints) -> Geometry:
         """The union of these triangles in a plane."""
         return unite(frame.to_plane(self.corners[triangles]), self.tolerance.grid)
 
 
-def structural_triangles(scene: Scene, options: SubdivideOptions) -> NDArray[np.bool_]:
-    """(T,) which triangles occlude: opaque, and not called detail by name."""
-    detail = _named(scene, options.detail) & ~_named(scene, options.structural)
-    return scene.opaque & ~detail
-
-
-def _named(scene: Scene, patterns: Sequence[str]) -> NDArray[np.bool_]:
-    """(T,) which triangles have an object or a material of such a name."""
-    objects = np.array([matches(name, patterns) for name in scene.objects], dtype=bool)
-    materials = np.array([matches(m.name, patterns) for m in scene.materials], dtype=bool)
-    named: NDArray[np.bool_] = objects[scene.triangle_object] | materials[scene.triangle_material]
-    return named
-
-
-def matches(name: str, patterns: Sequence[str]) -> bool:
-    """Whether one of the patterns, with * and ?, is a name's."""
-    return any(fnmatchcase(name, pattern) for pattern in patterns)
-
-
 def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
     """The planes that may split leaves, heaviest first."""
-    import shapely
-
     tolerance, forced = structure.tolerance, structure.forced
     least = (1 - TIE_SHARE) * wall_area
     found: list[tuple[float, WallPlane]] = []
@@ -173,11 +131,9 @@ def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
     return [found[i][1] for i in ranked(np.array([area for area, _ in found]))]
 
 
-def planes_of(
-    corners: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def planes_of(corners: Floats) -> tuple[Floats, Floats]:
     """(n, 4) planes with one sign for both windings, and (n,) areas, of (n, 3, 3) triangles."""
-    normal = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = normals(corners)
     double = np.linalg.norm(normal, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         normal = np.where(double[:, None] > 0, normal / double[:, None], 0.0)
@@ -186,7 +142,7 @@ def planes_of(
     return np.concatenate([normal, offset[:, None]], axis=1), double / 2.0
 
 
-def _layers(structure: Structure, wall_area: float) -> list[NDArray[np.float64]]:
+def _layers(structure: Structure, wall_area: float) -> list[Floats]:
     """Planes that hold enough coplanar area to carry a wall, heaviest first.
 
     Triangles are compared only within bins of similar normal and offset, and a bin is left as soon
@@ -194,15 +150,16 @@ def _layers(structure: Structure, wall_area: float) -> list[NDArray[np.float64]]
     anything quadratic happens.
     """
     planes, areas, forced = structure.planes, structure.areas, structure.forced
-    bins = _Bins(planes, np.where(forced, np.inf, areas), structure.tolerance)
+    # A bin with a triangle that is forced is never left for want of area.
+    bins = _Bins(planes, areas + 2 * wall_area * forced, structure.tolerance)
     free = areas > 0
-    layers: list[tuple[float, NDArray[np.float64]]] = []
+    layers: list[tuple[float, Floats]] = []
     for seed in ranked(areas):
         if not free[seed]:
             continue
         free[seed] = False
         if bins.weight(seed) < wall_area:
-            bins.drop_one(seed)
+            bins.drop(seed)
             continue
         near = bins.near(seed)
         near = near[free[near]]
@@ -222,13 +179,10 @@ class _Bins:
     from the edges of its bin: its neighbours to a tenth of the step are there, wherever it lies.
     """
 
-    def __init__(
-        self, planes: NDArray[np.float64], weights: NDArray[np.float64], tolerance: Tolerance
-    ) -> None:
-        """``weights`` of the (n, 4) planes: areas, infinite for planes that a bin is kept for."""
+    def __init__(self, planes: Floats, weights: Floats, tolerance: Tolerance) -> None:
+        """``weights``: (n,), of the (n, 4) planes."""
         step = np.array([_NORMAL_STEP] * 3 + [_NORMAL_STEP * tolerance.extent])
-        self._kept = np.isinf(weights).astype(np.int64)
-        self._area = np.where(self._kept, 0.0, weights)
+        self._weights = weights
         labels, inner, bins = [], [], 0
         for grid in range(_GRIDS):
             at = planes / step + grid / _GRIDS
@@ -237,40 +191,29 @@ class _Bins:
             labels.append(label.ravel() + bins)
             bins += int(label.max(initial=-1)) + 1
             inner.append(np.minimum(at - key, 1 - (at - key)).min(axis=1))
-        self._label = np.stack(labels)
+        self._label = np.stack(labels, axis=1)
         self._grid = np.argmax(np.stack(inner), axis=0)
         every = self._label.ravel()
-        order = np.argsort(every, kind="stable") % max(len(planes), 1)
+        order = np.argsort(every, kind="stable") // _GRIDS
         self._rows = np.split(order, np.cumsum(np.bincount(every, minlength=1))[:-1])
-        self._free = np.bincount(every, np.tile(self._area, _GRIDS), bins)
-        self._keep = np.bincount(every, np.tile(self._kept, _GRIDS), bins)
+        self._free = np.bincount(every, np.repeat(weights, _GRIDS), bins)
 
-    def near(self, plane: int) -> NDArray[np.int64]:
+    def near(self, plane: int) -> Ints:
         """The planes in the bin of one of them, dropped or not."""
-        rows: NDArray[np.int64] = self._rows[self._label[self._grid[plane], plane]]
+        rows: Ints = self._rows[self._label[plane, self._grid[plane]]]
         return rows
 
     def weight(self, plane: int) -> float:
         """What is not dropped in that bin weighs so much."""
-        label = self._label[self._grid[plane], plane]
-        return float("inf") if self._keep[label] > 0 else float(self._free[label])
+        return float(self._free[self._label[plane, self._grid[plane]]])
 
-    def drop(self, planes: NDArray[np.int64]) -> None:
+    def drop(self, planes: Ints | int) -> None:
         """Planes weigh no more."""
-        for label in self._label[:, planes]:
-            np.subtract.at(self._free, label, self._area[planes])
-            np.subtract.at(self._keep, label, self._kept[planes])
-
-    def drop_one(self, plane: int) -> None:
-        """The same for one plane, which is in each bin but once."""
-        label = self._label[:, plane]
-        self._free[label] -= self._area[plane]
-        self._keep[label] -= self._kept[plane]
+        weights = np.repeat(self._weights[planes], _GRIDS)
+        np.subtract.at(self._free, self._label[planes].ravel(), weights)
 
 
-def parallel_gap(
-    plane: NDArray[np.float64], other: NDArray[np.float64], tolerance: Tolerance
-) -> float:
+def parallel_gap(plane: Floats, other: Floats, tolerance: Tolerance) -> float:
     """Distance of two parallel (4,) planes in metres, whichever way they face; infinite for planes
     that are not parallel."""
     turn = float(plane[:3] @ other[:3])

@@ -13,23 +13,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree, build_tree
-from ptmtools.cells.caps import Caps
 from ptmtools.cells.grouping import grouped
 from ptmtools.cells.model import OUTSIDE, Cells, sunk
+from ptmtools.cells.naming import matches
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.polyhedron import Polyhedron
-from ptmtools.cells.portals import Portals, find_portals, portals_rejoined
-from ptmtools.cells.reach import Reach, flood, largest_with_floor, roofed_share
+from ptmtools.cells.portals import Portal, find_portals, portals_rejoined
+from ptmtools.cells.reach import at_box, flood, largest_leaf, roofed_share
 from ptmtools.cells.rejoin import rejoined
 from ptmtools.cells.reveals import Reveals
-from ptmtools.cells.structure import Structure, WallPlane, find_walls, matches
+from ptmtools.cells.structure import Structure, WallPlane, find_walls
 from ptmtools.errors import InputError
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
@@ -53,7 +54,6 @@ class _Model:
     structure: Structure
     walls: list[WallPlane]
     reveals: Reveals
-    caps: Caps
     options: SubdivideOptions
 
     @staticmethod
@@ -62,30 +62,18 @@ class _Model:
         structure = Structure.of(scene, options, tolerance)
         walls = find_walls(structure, options.wall_area)
         reveals = Reveals(structure, options.wall_thickness)
-        return _Model(structure, walls, reveals, Caps(structure), options)
-
-
-@dataclass(frozen=True)
-class _Box:
-    """A root box, (2, 3) ``bounds``. Its sides run along the rows of ``axes`` (3, 3); without them
-    it is parallel to the coordinate axes, and leaves at it count as inside."""
-
-    bounds: NDArray[np.float64]
-    axes: NDArray[np.float64] | None = None
-
-    @property
-    def inside(self) -> bool:
-        return self.axes is None
+        return _Model(structure, walls, reveals, options)
 
 
 @dataclass(frozen=True)
 class _Space:
-    """One subdivision of one root box."""
+    """One subdivision of one root box, of which ``box``, (2, 3), is the bounding box."""
 
-    box: NDArray[np.float64]
+    box: Floats
     tree: Tree
-    portals: Portals
-    reach: Reach
+    portals: list[Portal]
+    reached: Bools  # (L,) which leaves somebody can reach
+    closed: bool  # whether they do not touch the root box
 
 
 def subdivide(
@@ -111,16 +99,17 @@ def subdivide(
     corners, tolerance = model.structure.corners, model.structure.tolerance
     low, high = _bounds(scene.corners @ axes.T)
     margin = BOX_MARGIN * tolerance.extent
-    wide = _Box(np.array([low - margin, high + margin]), axes)
-    tight = _Box(_thickened(*_bounds(corners if len(corners) else scene.corners), tolerance))
+    wide = Polyhedron.box(low - margin, high + margin)
+    wide = replace(wide, points=wide.points @ axes)
+    tight = _thickened(*_bounds(corners if len(corners) else scene.corners), tolerance)
     notes: list[str] = []
     executor = executor or Serial()
-    clipped = executor.submit(_divide, model, tight, long=len(scene.triangles) >= LARGE)
+    clipped = executor.submit(_divide_inside, model, tight, long=len(scene.triangles) >= LARGE)
     try:
         space = _divide(model, wide, progress)
-        if not space.reach.closed:
+        if not space.closed:
             roofed = roofed_share(corners, options.wall_area)
-            notes.append(_open_note(space, roofed, tight.bounds))
+            notes.append(_open_note(space, roofed, tight))
             space = clipped.result()
     finally:
         clipped.cancel()
@@ -151,36 +140,32 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
             )
 
 
-def _divide(model: _Model, root: _Box, progress: Progress = silent) -> _Space:
+def _divide_inside(model: _Model, bounds: Floats) -> _Space:
+    """Subdivide the box between two corners, (2, 3); leaves at its sides count as inside."""
+    return _divide(model, Polyhedron.box(*bounds), inside=True)
+
+
+def _divide(
+    model: _Model, root: Polyhedron, progress: Progress = silent, inside: bool = False
+) -> _Space:
     """Subdivide a root box and flood it."""
-    corners, tolerance = model.structure.corners, model.structure.tolerance
-    options = model.options
-    box = root.bounds
-    body = Polyhedron.box(box[0], box[1])
-    if root.axes is not None:
-        body = Polyhedron(body.points @ root.axes, body.faces, body.tags)
-        box = np.stack(_bounds(body.points))
-    tree = build_tree(body, model.walls, model.reveals, model.caps, options, tolerance, progress)
-    portals = find_portals(tree, tolerance)
+    structure, options = model.structure, model.options
+    box = np.stack(_bounds(root.points))
+    tree = build_tree(root, structure, model.walls, model.reveals, options, progress)
+    portals = find_portals(tree, structure.tolerance)
+    outer = at_box(tree)
     start = _viewpoint_leaves(tree, box, options)
-    if not start and root.inside:
-        every = np.ones(len(tree.leaves), dtype=bool)
-        start = largest_with_floor(tree, every, corners) or _largest(tree)
-    reach = flood(tree, portals, corners, start)
-    if tree.capped and (root.inside or reach.closed):  # else it is thrown away
-        joint = rejoined(tree, reach.reached)
-        portals = portals_rejoined(portals, tree, joint, tolerance)
-        tree, reach = joint.tree, reach.renamed(joint.leaf)
-    return _Space(box, tree, portals, reach)
+    start = start or largest_leaf(tree, outer <= inside, structure.corners)
+    reached = flood(len(tree.leaves), portals, start)
+    closed = bool(start) and not bool(np.any(reached & outer))
+    if tree.capped and (inside or closed):  # else it is thrown away
+        joint = rejoined(tree, reached)
+        portals = portals_rejoined(portals, tree, joint, structure.tolerance)
+        tree, reached = joint.tree, np.bincount(joint.leaf, reached) > 0
+    return _Space(box, tree, portals, reached, closed)
 
 
-def _largest(tree: Tree) -> tuple[int, ...]:
-    return (max(range(len(tree.leaves)), key=lambda i: (tree.leaves[i].volume, -i)),)
-
-
-def _viewpoint_leaves(
-    tree: Tree, box: NDArray[np.float64], options: SubdivideOptions
-) -> tuple[int, ...]:
+def _viewpoint_leaves(tree: Tree, box: Floats, options: SubdivideOptions) -> tuple[int, ...]:
     if not options.viewpoints:
         return ()
     places = np.array(options.viewpoints, dtype=np.float64)
@@ -196,23 +181,21 @@ def _viewpoint_leaves(
     return tuple(dict.fromkeys((-2 - sunk(tree.planes, tree.children, places)).tolist()))
 
 
-def _bounds(corners: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _bounds(corners: Floats) -> tuple[Floats, Floats]:
     points = corners.reshape(-1, 3)
     return points.min(axis=0), points.max(axis=0)
 
 
-def _thickened(
-    low: NDArray[np.float64], high: NDArray[np.float64], tolerance: Tolerance
-) -> NDArray[np.float64]:
+def _thickened(low: Floats, high: Floats, tolerance: Tolerance) -> Floats:
     """A box that is flat nowhere: a scene that is only a floor still has one cell above it."""
     flat = high - low < tolerance.thin
     return np.array([low, np.where(flat, low + BOX_MARGIN * tolerance.extent, high)])
 
 
-def _open_note(space: _Space, roofed: float, box: NDArray[np.float64]) -> str:
+def _open_note(space: _Space, roofed: float, box: Floats) -> str:
     if roofed < ROOFED:
         what = f"open above: {1 - roofed:.0%} of the floor has no ceiling"
-    elif not space.reach.start:
+    elif not space.reached.any():
         what = "open: no room is closed off from the outside"
     else:
         what = "open: the outside can be reached from the rooms (windows, doors or gaps)"
@@ -222,10 +205,11 @@ def _open_note(space: _Space, roofed: float, box: NDArray[np.float64]) -> str:
 
 def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> Cells:
     tree = space.tree
-    keep = space.reach.reached
+    keep = space.reached
     rename = np.where(keep, np.cumsum(keep) - 1, -1).astype(np.int32)
     bodies = [tree.leaves[i] for i in np.flatnonzero(keep)]
-    portals = space.portals.among(keep, rename)
+    portals = [portal for portal in space.portals if keep[[*portal.leaves]].all()]
+    ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
     children = tree.children.copy()
     is_leaf = children <= -2
     leaf = rename[-2 - children[is_leaf]]
@@ -254,33 +238,31 @@ def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> 
         face_index=np.concatenate(loops).astype(np.int32),
         face_start=_starts(map(len, loops)),
         leaf_face_start=_starts(len(b.faces) for b in bodies),
-        portal_leaf=portals.leaves,
-        portal_plane=portals.planes,
-        portal_point=np.concatenate([np.zeros((0, 3)), *portals.polygons]),
-        portal_start=_starts(map(len, portals.polygons)),
-        portal_area=portals.areas,
+        portal_leaf=rename[ends],
+        portal_plane=tree.planes[[portal.node for portal in portals]].reshape(-1, 4),
+        portal_point=np.concatenate([np.zeros((0, 3)), *(portal.polygon for portal in portals)]),
+        portal_start=_starts(len(portal.polygon) for portal in portals),
+        portal_area=np.array([portal.area for portal in portals]),
         vertex=vertex,
         vertex_uv=vertex_uv,
         triangle=triangle,
         triangle_source=pieces.source[owned].astype(np.int32),
         triangle_cell=owner[owned].astype(np.int32),
         tolerance=scene.tolerance,
-        closed=space.reach.closed,
+        closed=space.closed,
         notes=tuple(notes),
     )
 
 
-def _starts(lengths: Iterable[int]) -> NDArray[np.int64]:
+def _starts(lengths: Iterable[int]) -> Ints:
     """(n + 1,) where the rows of a CSR begin."""
     return np.cumsum([0, *lengths], dtype=np.int64)
 
 
-def _weld(
-    scene: Scene, pieces: Pieces, owned: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]:
+def _weld(scene: Scene, pieces: Pieces, owned: Bools) -> tuple[Floats, Floats, NDArray[np.int32]]:
     """Vertices (position and texture coordinate) shared by the pieces, and (M, 3) indices."""
-    points = pieces.points[owned].reshape(-1, 3)
-    uv = np.einsum("mcw,mwk->mck", pieces.weights[owned], scene.uv[pieces.source[owned]])
-    both = np.concatenate([points, uv.reshape(-1, 2)], axis=1) + 0.0
+    points, weights = np.split(pieces.corner[owned], 2, axis=2)
+    uv = np.einsum("mcw,mwk->mck", weights, scene.uv[pieces.source[owned]])
+    both = np.concatenate([points, uv], axis=2).reshape(-1, 5) + 0.0
     distinct, index = np.unique(both, axis=0, return_inverse=True)
     return distinct[:, :3].copy(), distinct[:, 3:].copy(), index.reshape(-1, 3).astype(np.int32)

@@ -1,12 +1,13 @@
-"""Products of a few vectors at a time."""
+"""Products of vectors, and the triangles and tetrahedra that they span."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ptmtools.arrays import Floats, Ints
 
 
-def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def cross(a: Floats, b: Floats) -> Floats:
     """The cross product of (…, 3) vectors: `numpy.cross`, which for a few of them spends four
     fifths of its time on the axes that it allows for."""
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
@@ -16,3 +17,33 @@ def cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]
     found[..., 1] = az * bx - ax * bz
     found[..., 2] = ax * by - ay * bx
     return found
+
+
+def normals(corners: Floats) -> Floats:
+    """(n, 3) vectors perpendicular to (n, 3, 3) triangles, twice as long as these are large."""
+    return cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def areas(corners: Floats) -> Floats:
+    """(n,) areas of (n, 3, 3) triangles, m²."""
+    return np.asarray(np.linalg.norm(normals(corners), axis=1) / 2)
+
+
+def volumes(corners: Floats) -> Floats:
+    """(n,) volumes of (n, 4, 3) tetrahedra, m³."""
+    a, b, c = (corners[:, 1:] - corners[:, :1]).transpose(1, 0, 2)
+    return np.asarray(np.abs(np.einsum("ij,ij->i", a, cross(b, c))) / 6)
+
+
+def fans(start: Ints) -> tuple[Ints, Ints]:
+    """(m, 3) corners, by row, of the triangles that fan out from the first corner of each polygon
+    of the CSR ``start``, and (m,) the polygon of each."""
+    size = np.maximum(np.diff(start) - 2, 0)
+    polygon = np.repeat(np.arange(len(size)), size)
+    second = ranges(start[:-1] + 1, size)
+    return np.stack([start[polygon], second, second + 1], axis=1), polygon
+
+
+def ranges(first: Ints, count: Ints) -> Ints:
+    """(m,) of each of the (n,) rows ``first``, and as many after it as to make ``count``."""
+    return np.repeat(first - (np.cumsum(count) - count), count) + np.arange(int(count.sum()))

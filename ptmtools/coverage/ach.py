@@ -14,15 +14,11 @@ Such pixels are looked up again, left out of the hints and reported as missed ma
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.backends.choice import choose
-from ptmtools.coverage.estimate import RULE_OF_THREE
+from ptmtools.coverage.estimate import RULE_OF_THREE, estimate
 from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
@@ -81,32 +77,29 @@ def compute_ach(
 
 
 def _gathered(found: list[CellHints], sampler: Sampler) -> Ach:
-    rows = [hints.row for hints in found]
-    textures = [hints.textures for hints in found] if sampler.options.per_texture else []
-
-    def joined(parts: Iterable[NDArray[Any]], *shape: int, kind: Any = np.float64) -> NDArray[Any]:
-        return np.concatenate([np.zeros((0, *shape), kind), *parts])
-
+    none = np.zeros((len(VIEWS), 0), dtype=np.int64)
+    nothing = estimate(none[:0], none, none[0], 1)  # has the types of what is joined
+    rows = [nothing, *(hints.row for hints in found)]
+    entries = {
+        name: np.concatenate([getattr(row, name) for row in rows])
+        for name in ("value", "pixels", "error", "p95", "seen", "views")
+    }
+    total = np.array([float(hints.row.pixels.sum()) for hints in found])
     samples = np.array([hints.samples for hints in found], dtype=np.int32)
-    total = np.array([float(row.pixels.sum()) for row in rows])
-    size = joined((t.count for t in textures), kind=np.int64)
+    textures = found if sampler.options.per_texture else []
+    size = np.concatenate([np.zeros(0, np.int64), *(hints.texture_count for hints in textures)])
     return Ach(
         start=sampler.pvs.start.copy(),
-        value=joined(row.value for row in rows),
-        pixels=joined(row.pixels for row in rows),
-        error=joined(row.error for row in rows),
-        p95=joined(row.p95 for row in rows),
-        seen=joined(row.seen for row in rows),
-        views=joined((row.views for row in rows), 6),
+        **entries,
         missed=np.array([hints.missed for hints in found], dtype=np.float64),
         samples=samples,
         rejected=np.array([hints.rejected for hints in found], dtype=np.int32),
-        uncertain=np.array([row.uncertain for row in rows], dtype=np.float64),
+        uncertain=np.array([hints.row.uncertain for hints in found], dtype=np.float64),
         unseen_below=np.minimum(1.0, RULE_OF_THREE / np.maximum(samples, 1)),
         floor=np.divide(0.5, total, out=np.zeros_like(total), where=total > 0),
-        texture_start=np.cumsum(np.append(0, size)) if textures else np.zeros(0, np.int64),
-        texture=joined((t.image for t in textures), kind=np.int32),
-        texture_value=joined(t.share for t in textures),
+        texture_start=np.cumsum(np.append(0, size)) if textures else size,
+        texture=np.concatenate([np.zeros(0, np.int32), *(hints.texture for hints in textures)]),
+        texture_value=np.concatenate([np.zeros(0), *(hints.texture_value for hints in textures)]),
         backend=sampler.backend.name,
         renderer=sampler.renderer.name,
     )

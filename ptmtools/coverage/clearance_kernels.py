@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats, Ints
 from ptmtools.compiled import plain_kernel
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @plain_kernel

@@ -16,7 +16,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ptmtools.arrays import Floats, Ints
 
 #: Groups of sample points that the standard error is taken from.
 GROUPS = 8
@@ -29,30 +30,22 @@ RULE_OF_THREE = 3.0
 
 @dataclass(frozen=True)
 class Row:
-    """The hints of one cell, for each of the n cells of its PVS.
+    """The hints of one cell, for each of the n cells of its PVS: see `Ach`.
 
-    Attributes
-    ----------
-    value: (n,) float64 share of what is seen; sums to 1.
-    pixels: (n,) float64 pixels, weighted.
-    error: (n,) float64 standard error of `value`; NaN where no pixel showed it, or with one point.
-    p95: (n,) float64 the share that is exceeded from 5 % of the points.
-    seen: (n,) float64 share of the points from which it is seen.
-    views: (n, 6) float64 the same share for each of the six views alone; each column sums to 1.
-    uncertain: float64 a bound of the total variation between `value` and the truth, at about 95 %;
-        NaN with fewer than eight points, which would not tell: of two it held in half of the cases.
+    `uncertain` is NaN with fewer than eight points, which would not tell: of two it held in half of
+    the cases.
     """
 
-    value: NDArray[np.float64]
-    pixels: NDArray[np.float64]
-    error: NDArray[np.float64]
-    p95: NDArray[np.float64]
-    seen: NDArray[np.float64]
-    views: NDArray[np.float64]
+    value: Floats
+    pixels: Floats
+    error: Floats
+    p95: Floats
+    seen: Floats
+    views: Floats
     uncertain: float
 
 
-def shares(counts: NDArray[np.int64]) -> NDArray[np.float64]:
+def shares(counts: Ints) -> Floats:
     """(…, n) counts over their sums; where that is 0, 1 for the first of the n.
 
     Each quotient is off by half a unit in its last place at most, so the exact sum of a row is
@@ -65,12 +58,7 @@ def shares(counts: NDArray[np.int64]) -> NDArray[np.float64]:
     return np.asarray(found)
 
 
-def estimate(
-    at_points: NDArray[np.int64],
-    in_views: NDArray[np.int64],
-    group: NDArray[np.int64],
-    unit: int,
-) -> Row:
+def estimate(at_points: Ints, in_views: Ints, group: Ints, unit: int) -> Row:
     """The hints from (K, n) weighted pixels at K points, each of the (K,) ``group``, and (6, n) of
     the same in each view; a pixel in the middle of a view weighs ``unit``."""
     total = in_views.sum(axis=0)
@@ -87,9 +75,7 @@ def estimate(
     )
 
 
-def spread(
-    counts: NDArray[np.int64], group: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], float]:
+def spread(counts: Ints, group: Ints) -> tuple[Floats, float]:
     """(n,) standard errors of the shares of (K, n) counts, and a bound, at about 95 %, of the total
     variation between them and the truth; NaN where there is one group only, or for the bound fewer
     than `GROUPS`."""
@@ -109,7 +95,7 @@ def spread(
     return error, float(likely / np.sqrt(groups - 1))
 
 
-def ninety_fifth(counts: NDArray[np.int64]) -> NDArray[np.float64]:
+def ninety_fifth(counts: Ints) -> Floats:
     """(n,) the least share that at least 95 % of the (K, n) points do not exceed."""
     if len(counts) == 0:
         return np.zeros(counts.shape[1])
@@ -118,7 +104,7 @@ def ninety_fifth(counts: NDArray[np.int64]) -> NDArray[np.float64]:
     return np.asarray(np.partition(at_points, rank, axis=0)[rank])
 
 
-def grouped(count: int, in_stretches: bool = True) -> NDArray[np.int64]:
+def grouped(count: int, in_stretches: bool = True) -> Ints:
     """(count,) the group of each of a sequence of points: eight stretches of equal length; or,
     where neighbours follow one another, every eighth point."""
     groups = min(GROUPS, count)

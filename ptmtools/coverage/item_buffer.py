@@ -25,7 +25,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.model import Cells
+from ptmtools.cells.vectors import normals
 from ptmtools.coverage.sample_points import SamplePoints
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import DEPTH_SHARE
@@ -53,28 +55,18 @@ BEFORE = 1.0 - DEPTH_SHARE
 class Surfaces:
     """The geometry cut to the cells, as the backends take it.
 
-    Attributes
-    ----------
-    centre, scale: ``(world - centre) * scale`` lies within about 1 of the origin; scale is a
-        power of two.
-    vertex: (W, 3) float64 normalised vertices.
-    triangle: (M, 3) int32 into `vertex`.
-    plane: (M, 4) float64 of the scene's triangle that each is a piece of, which is better known
-        than that of a sliver: unit normal and offset in normalised coordinates.
-    cell: (M, 2) int32 the cell on the front and on the back, -1 for none.
-    image: (M,) int32 the image that each shows, -1 for none.
-    opaque: (M,) bool.
-    cell_count: cells in all.
+    ``(world - centre) * scale`` lies within about 1 of the origin; scale is a power of two. Planes
+    are those of the scene's triangles, better known than those of slivers.
     """
 
-    centre: NDArray[np.float64]
+    centre: Floats
     scale: float
-    vertex: NDArray[np.float64]
-    triangle: NDArray[np.int32]
-    plane: NDArray[np.float64]
-    cell: NDArray[np.int32]
-    image: NDArray[np.int32]
-    opaque: NDArray[np.bool_]
+    vertex: Floats  # (W, 3) normalised
+    triangle: NDArray[np.int32]  # (M, 3) into `vertex`
+    plane: Floats  # (M, 4) unit normal and offset, in normalised coordinates
+    cell: NDArray[np.int32]  # (M, 2) the cell on the front and on the back, -1 for none
+    image: NDArray[np.int32]  # (M,) the image that each shows, -1 for none
+    opaque: Bools  # (M,)
     cell_count: int
 
     @staticmethod
@@ -88,8 +80,7 @@ class Surfaces:
         extent = float((high - low).max())
         scale = 2.0 ** -np.frexp(extent)[1] if extent > 0 else 1.0
         vertex = (cells.vertex - centre) * scale
-        source = scene.corners[cells.triangle_source]
-        normal = np.cross(source[:, 1] - source[:, 0], source[:, 2] - source[:, 0])
+        normal = normals(scene.corners[cells.triangle_source])
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
         offset = -np.einsum("ij,ij->i", normal, vertex[cells.triangle[:, 0]])
@@ -106,11 +97,11 @@ class Surfaces:
             cell_count=cells.cell_count,
         )
 
-    def normalised(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def normalised(self, points: Floats) -> Floats:
         """(…, 3) points in world metres, in the coordinates of `vertex`."""
         return np.asarray((points - self.centre) * self.scale)
 
-    def world(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def world(self, points: Floats) -> Floats:
         """The inverse of `normalised`."""
         return np.asarray(points / self.scale + self.centre)
 
@@ -130,17 +121,13 @@ class Renderer(Protocol):
     @property
     def most(self) -> int: ...
 
-    def show(
-        self, points: SamplePoints, needed: NDArray[np.bool_] | None = None
-    ) -> NDArray[np.int32]:
+    def show(self, points: SamplePoints, needed: Bools | None = None) -> NDArray[np.int32]:
         """(L, K, 6, face²) the triangle that each pixel shows, -1 for none, in the order (point,
         view, row, column); opaque surfaces first, then the transparent ones before them, if the
         scene has any. ``needed`` (C,) are the cells whose surfaces may show, if that is known:
         others need not be drawn."""
 
-    def trace(
-        self, points: SamplePoints, pixels: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    def trace(self, points: SamplePoints, pixels: Ints) -> tuple[NDArray[np.int32], Floats]:
         """(L, n) what a ray through each of the (n,) pixels, numbered from 0 in the order of
         `show`, says of its layers, and (L, n, 3) where it hits, in world metres."""
 

@@ -24,12 +24,11 @@ not on other cells, the unit, the number of workers or the version of a library.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.model import Cells
+from ptmtools.cells.vectors import volumes
 from ptmtools.coverage.sobol import sobol, uniform
 
 #: Points of the cloud that is divided into parts, for each part: enough that parts of equal count
@@ -41,67 +40,7 @@ TRIES = 32
 FILLED = 1 / 32
 
 
-@dataclass(frozen=True)
-class Tetrahedra:
-    """Disjoint tetrahedra that fill the leaves.
-
-    Attributes
-    ----------
-    corners, volume: (n, 4, 3) metres and (n,) m³; flat ones are left out.
-    leaf_start: (L + 1,) CSR over leaves.
-    leaves, cell_start: (L,) the leaves in the order of their cells, (C + 1,) CSR over cells.
-    """
-
-    corners: NDArray[np.float64]
-    volume: NDArray[np.float64]
-    leaf_start: NDArray[np.int64]
-    leaves: NDArray[np.int64]
-    cell_start: NDArray[np.int64]
-
-    @staticmethod
-    def of(cells: Cells) -> Tetrahedra:
-        """Fans over the faces of every leaf, from the middle of its vertices."""
-        points = np.diff(cells.leaf_point_start)
-        if not len(points):
-            nothing = np.zeros(0, np.int64)
-            start = np.zeros(1, np.int64)
-            return Tetrahedra(np.zeros((0, 4, 3)), np.zeros(0), start, nothing, start)
-        middle = np.add.reduceat(cells.leaf_point, cells.leaf_point_start[:-1]) / points[:, None]
-        size = np.maximum(np.diff(cells.face_start) - 2, 0)
-        face = np.repeat(np.arange(len(size)), size)
-        first = cells.face_start[:-1][face]
-        second = first + 1 + np.arange(len(face)) - np.repeat(np.cumsum(size) - size, size)
-        leaf = np.searchsorted(cells.leaf_face_start, face, "right") - 1
-        loop = cells.leaf_point[cells.face_index]
-        corners = np.stack([middle[leaf], loop[first], loop[second], loop[second + 1]], axis=1)
-        volume = volumes(corners)
-        solid = volume > 0
-        return Tetrahedra(
-            corners[solid],
-            volume[solid],
-            np.searchsorted(leaf[solid], np.arange(len(points) + 1)),
-            np.argsort(cells.leaf_cell, kind="stable"),
-            np.concatenate([[0], np.cumsum(np.bincount(cells.leaf_cell))]),
-        )
-
-    def of_cell(self, cell: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Those of a cell, and their volumes."""
-        leaves = self.leaves[self.cell_start[cell] : self.cell_start[cell + 1]]
-        first, size = self.leaf_start[leaves], np.diff(self.leaf_start)[leaves]
-        before = np.cumsum(size) - size
-        rows = np.repeat(first - before, size) + np.arange(int(size.sum()))
-        return self.corners[rows], self.volume[rows]
-
-
-def volumes(tetra: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) volumes of (n, 4, 3) tetrahedra, m³."""
-    a, b, c = (tetra[:, 1:] - tetra[:, :1]).transpose(1, 0, 2)
-    return np.asarray(np.abs(np.einsum("ij,ij->i", a, np.cross(b, c))) / 6, dtype=np.float64)
-
-
-def filling(
-    tetra: NDArray[np.float64], volume: NDArray[np.float64], unit: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def filling(tetra: Floats, volume: Floats, unit: Floats) -> Floats:
     """(m, 3) points, uniform in the union of (n, 4, 3) tetrahedra with (n,) volumes if the (m, 4 or
     more) coordinates in (0, 1) are: the first three tell where in a tetrahedron, the fourth in
     which."""
@@ -117,49 +56,66 @@ def filling(
 
 
 class Volume:
-    """A cell as something to put points into."""
+    """A cell as something to put points into.
 
-    def __init__(self, cells: Cells, tetrahedra: Tetrahedra, cell: int) -> None:
+    Attributes
+    ----------
+    tetrahedra, volume: (n, 4, 3) metres and (n,) m³, disjoint, none flat, together the cell.
+    boxed: whether enough of its bounding box is cell.
+    """
+
+    def __init__(self, cells: Cells, cell: int, tetrahedra: Floats, volume: Floats) -> None:
         self._cells, self._cell = cells, cell
-        self._tetra, self._volume = tetrahedra.of_cell(cell)
-        self.empty = len(self._tetra) == 0
+        self.tetrahedra, self.volume = tetrahedra, volume
+        self.empty = len(tetrahedra) == 0
         if not self.empty:
-            points = self._tetra.reshape(-1, 3)
+            points = tetrahedra.reshape(-1, 3)
             self._low, self._size = points.min(axis=0), np.ptp(points, axis=0)
-            share = float(self._volume.sum()) / float(np.prod(self._size))
-            self.boxed = share >= FILLED
+            self.boxed = float(volume.sum()) / float(np.prod(self._size)) >= FILLED
 
-    def random(self, first: int, count: int, seed: int) -> NDArray[np.float64]:
+    @staticmethod
+    def of_cells(cells: Cells) -> list[Volume]:
+        """All cells."""
+        tetrahedra, leaf = cells.tetrahedra()
+        volume, cell = volumes(tetrahedra), cells.leaf_cell[leaf]
+        order = np.argsort(cell, kind="stable")
+        order = order[volume[order] > 0]
+        rows = np.split(order, np.searchsorted(cell[order], np.arange(1, cells.cell_count)))
+        return [
+            Volume(cells, c, tetrahedra[rows[c]], volume[rows[c]]) for c in range(cells.cell_count)
+        ]
+
+    def random(self, first: int, count: int, seed: int) -> Floats:
         """(count, 5) independent points ``first`` …: positions in metres, and two more coordinates
         in (0, 1)."""
         unit = uniform(first, count, seed)
-        return np.hstack([filling(self._tetra, self._volume, unit), unit[:, 4:]])
+        return np.hstack([filling(self.tetrahedra, self.volume, unit), unit[:, 4:]])
 
-    def sobol(self, first: int, count: int, seed: int) -> NDArray[np.float64]:
+    def sobol(self, first: int, count: int, seed: int) -> Floats:
         """(at most count, 5) points ``first`` … of a scrambled sequence, those in the cell: their
         positions in metres, and two more coordinates in (0, 1)."""
         unit = sobol(first, count, seed)
         if not self.boxed:
-            return np.hstack([filling(self._tetra, self._volume, unit), unit[:, 4:]])
+            return np.hstack([filling(self.tetrahedra, self.volume, unit), unit[:, 4:]])
         points = self._low + unit[:, :3] * self._size
         inside = self._cells.locate(points) == self._cell
         return np.hstack([points[inside], unit[inside, 4:]])
 
-    def parts(self, count: int, seed: int) -> list[NDArray[np.float64]]:
+    def parts(self, count: int, seed: int) -> list[Floats]:
         """For each of ``count`` equal parts of the cell (TRIES, 3) points, from its centroid
         outwards."""
-        points = filling(self._tetra, self._volume, sobol(0, CLOUD * count, seed))
+        points = filling(self.tetrahedra, self.volume, sobol(0, CLOUD * count, seed))
         return [points[group[:: CLOUD // TRIES]] for group in strata(points, count)]
 
 
-def strata(points: NDArray[np.float64], parts: int) -> list[NDArray[np.int64]]:
+def strata(points: Floats, parts: int) -> list[Ints]:
     """Indices of the (n, 3) points in ``parts`` groups of equal size, compact in space.
 
     Each group is halved across its longest axis; an odd number of parts is divided as evenly as
     it goes. Within a group the points are in order of their distance from its centroid.
     """
     pending = [(np.arange(len(points), dtype=np.int64), parts)]
-    done: list[NDArray[np.int64]] = []
+    done: list[Ints] = []
     while pending:
         group, share = pending.pop()
         here = points[group]

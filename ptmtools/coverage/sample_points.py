@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats
 from ptmtools.coverage.placement import FILLED, TRIES, Volume
 from ptmtools.coverage.sobol import sobol
 from ptmtools.coverage.solids import Obstacles
@@ -21,19 +21,11 @@ BATCH = 64
 
 @dataclass(frozen=True)
 class SamplePoints:
-    """K sample points.
+    """K sample points."""
 
-    Attributes
-    ----------
-    position: (K, 3) float64, metres, world coordinates.
-    near: (K,) float64 metres within which each has no surface.
-    shift: (K, 2) float64 in (-1, 1): how far right and up of the pixel centres its views are
-        drawn, in halves of a pixel.
-    """
-
-    position: NDArray[np.float64]
-    near: NDArray[np.float64]
-    shift: NDArray[np.float64]
+    position: Floats  # (K, 3) metres, world coordinates
+    near: Floats  # (K,) metres within which each has no surface
+    shift: Floats  # (K, 2) in (-1, 1): halves of a pixel, how far right and up its views are drawn
 
     def __len__(self) -> int:
         return len(self.position)
@@ -61,9 +53,9 @@ class PointFinder:
     obstacles: Obstacles
     clearance: float
     rejected: int = 0
-    _best: tuple[bool, float, NDArray[np.float64]] | None = field(default=None, init=False)
+    _best: tuple[bool, float, Floats] | None = field(default=None, init=False)
 
-    def usable(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def usable(self, points: Floats) -> Bools:
         """(n,) which of the (n, 3) points are usable; counts none of them."""
         free = self.obstacles.clearance(points, self.clearance)
         outside = ~self.obstacles.in_solid(points)
@@ -89,7 +81,7 @@ class PointFinder:
         found = np.array(chosen).reshape(-1, 5)
         return self.at(found[:, :3], found[:, 3:])
 
-    def at(self, points: NDArray[np.float64], unit: NDArray[np.float64]) -> SamplePoints:
+    def at(self, points: Floats, unit: Floats) -> SamplePoints:
         """Sample points at usable positions, shifted by two coordinates in (0, 1) each."""
         return SamplePoints(points, np.full(len(points), self.clearance), 2 * unit - 1)
 

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.backends import Backend
 from ptmtools.coverage.estimate import GROUPS, Row, estimate, grouped, shares, spread
 from ptmtools.coverage.item_buffer import Surfaces
 from ptmtools.coverage.options import AchOptions
-from ptmtools.coverage.placement import Tetrahedra, Volume
+from ptmtools.coverage.placement import Volume
 from ptmtools.coverage.sample_points import PointFinder, PointSequence, SamplePoints
 from ptmtools.coverage.solids import Obstacles
 from ptmtools.coverage.tally import PixelCounter, Tally
@@ -32,24 +33,17 @@ FALL = 2**-0.6
 
 
 @dataclass(frozen=True)
-class TextureShares:
-    """Shares of images within the entries of a row: (n,) int64 how many each entry has, and for all
-    of them (m,) int32 `image`, -1 for none, and (m,) float64 `share` of the row."""
-
-    count: NDArray[np.int64]
-    image: NDArray[np.int32]
-    share: NDArray[np.float64]
-
-
-@dataclass(frozen=True)
 class CellHints:
-    """What was found out about one cell; see `Ach`."""
+    """What was found out about one cell; see `Ach`. Of the images within the entries of its row,
+    how many each has, (n,), which, (m,), -1 for none, and their (m,) shares of the row."""
 
     row: Row
     missed: float
     samples: int
     rejected: int
-    textures: TextureShares
+    texture_count: Ints
+    texture: NDArray[np.int32]
+    texture_value: Floats
 
 
 class Sampler:
@@ -62,7 +56,7 @@ class Sampler:
         self.scene, self.cells, self.pvs = scene, cells, pvs
         self.options, self.backend = options, backend
         self._obstacles = Obstacles.of(scene, cells)
-        self._tetrahedra = Tetrahedra.of(cells)
+        self._volumes = Volume.of_cells(cells)
         self._clearance = options.clearance or CLEARANCE * scene.tolerance.thin
         surfaces = Surfaces.of(scene, cells)
         self.renderer = backend.open(surfaces, options.side, options.gpu)
@@ -81,8 +75,7 @@ class Sampler:
 
     def of_cell(self, cell: int) -> CellHints:
         """The hints of one cell."""
-        volume = Volume(self.cells, self._tetrahedra, cell)
-        finder = PointFinder(volume, self._obstacles, self._clearance)
+        finder = PointFinder(self._volumes[cell], self._obstacles, self._clearance)
         owners = self._counter.owners
         wanted, begin = owners.in_cells(self.pvs.row(cell))
 
@@ -105,9 +98,9 @@ class Sampler:
             missed=int(tally.missed.sum()) / max(total, 1),
             samples=len(group),
             rejected=finder.rejected,
-            textures=TextureShares(
-                np.bincount(entry, minlength=len(begin)), owners.image[wanted[met]], owned[met]
-            ),
+            texture_count=np.bincount(entry, minlength=len(begin)),
+            texture=owners.image[wanted[met]],
+            texture_value=owned[met],
         )
 
     def _points(self, finder: PointFinder) -> SamplePoints:
@@ -120,9 +113,9 @@ class Sampler:
         self,
         finder: PointFinder,
         count: Callable[[SamplePoints], Tally],
-        begin: NDArray[np.int64],
+        begin: Ints,
         tolerance: float,
-    ) -> tuple[Tally, NDArray[np.int64]]:
+    ) -> tuple[Tally, Ints]:
         """What is seen, and the (K,) group of each point: of eight independent sequences as many
         points as make the hints certain, doubled until they are."""
         options = self.options

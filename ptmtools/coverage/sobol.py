@@ -14,6 +14,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bits, Floats
+
 #: Binary digits of a coordinate.
 DIGITS = 32
 #: Dimensions: three for the position, a fourth for the choice among parts, two for the shift
@@ -49,7 +51,7 @@ _DIRECTIONS = _directions()
 
 
 @lru_cache(maxsize=256)
-def sobol(first: int, count: int, seed: int) -> NDArray[np.float64]:
+def sobol(first: int, count: int, seed: int) -> Floats:
     """(count, DIMENSIONS) points ``first`` … of the sequence scrambled by ``seed``, in (0, 1); not
     to be written to, since every cell asks for the same ones.
 
@@ -65,7 +67,7 @@ def sobol(first: int, count: int, seed: int) -> NDArray[np.float64]:
     return np.asarray(found)
 
 
-def uniform(first: int, count: int, seed: int) -> NDArray[np.float64]:
+def uniform(first: int, count: int, seed: int) -> Floats:
     """(count, DIMENSIONS) independent random points ``first`` … in (0, 1), by hashing numbers."""
     number = np.arange(DIMENSIONS * first, DIMENSIONS * (first + count), dtype=np.uint64)
     drawn = _hashed(number.reshape(count, DIMENSIONS), _hashed_seed(seed, 1))
@@ -86,14 +88,14 @@ def _scrambled(point: NDArray[np.uint32], seed: int) -> NDArray[np.uint32]:
     return point ^ turned
 
 
-def _hashed_seed(seed: int, stream: int) -> NDArray[np.uint64]:
+def _hashed_seed(seed: int, stream: int) -> Bits:
     return _hashed(np.array([seed], dtype=np.uint64), np.array([stream], dtype=np.uint64))
 
 
-def _hashed(value: NDArray[np.uint64], key: NDArray[np.uint64]) -> NDArray[np.uint64]:
+def _hashed(value: Bits, key: Bits) -> Bits:
     """The finaliser of SplitMix64 (Steele, Lea and Flood 2014), twice, the key between."""
 
-    def mixed(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    def mixed(x: Bits) -> Bits:
         x = x + np.uint64(0x9E3779B97F4A7C15)
         x = (x ^ x >> np.uint64(30)) * np.uint64(0xBF58476D1CE4E5B9)
         x = (x ^ x >> np.uint64(27)) * np.uint64(0x94D049BB133111EB)

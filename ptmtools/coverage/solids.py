@@ -25,10 +25,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.merging import connected
 from ptmtools.cells.model import Cells
 from ptmtools.cells.nearby import Nearby
+from ptmtools.cells.vectors import areas
 from ptmtools.scene.model import Scene
 
 #: Directions of the parity rays. Fixed, in no simple relation to each other or to the axes, so
@@ -36,7 +38,7 @@ from ptmtools.scene.model import Scene
 DIRECTIONS = np.array([[0.683, 0.577, 0.448], [-0.371, 0.819, -0.437], [0.291, -0.463, -0.837]])
 
 
-def _frames() -> NDArray[np.float64]:
+def _frames() -> Floats:
     forward = DIRECTIONS / np.sqrt((DIRECTIONS**2).sum(axis=1, keepdims=True))
     right = np.cross(forward, [1.0, 0.0, 0.0])
     right /= np.sqrt((right**2).sum(axis=1, keepdims=True))
@@ -51,10 +53,10 @@ FRAMES = _frames()
 class Solid:
     """A closed surface with an inside: its (n, 3, 3) corners and (2, 3) bounding box, metres."""
 
-    corners: NDArray[np.float64]
-    box: NDArray[np.float64]
+    corners: Floats
+    box: Floats
 
-    def contains(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def contains(self, points: Floats) -> Bools:
         """(n,) whether each of the (n, 3) points is inside: odd crossings along most rays."""
         first, second = self._odd(0, points), self._odd(1, points)
         unsure = np.flatnonzero(first != second)
@@ -62,7 +64,7 @@ class Solid:
             first[unsure] = self._odd(2, points[unsure])
         return first
 
-    def _odd(self, ray: int, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def _odd(self, ray: int, points: Floats) -> Bools:
         """(n,) whether one of the rays from each of the (n, 3) points crosses an odd number."""
         from ptmtools.coverage.clearance_kernels import crossings
 
@@ -75,7 +77,7 @@ class Solid:
         return odd
 
     @cached_property
-    def _turned(self) -> list[NDArray[np.float64]]:
+    def _turned(self) -> list[Floats]:
         """The corners in each of the frames."""
         return [np.einsum("tij,kj->tik", self.corners, frame) for frame in FRAMES]
 
@@ -108,7 +110,7 @@ def solids(scene: Scene, cells: Cells) -> list[Solid]:
     return found
 
 
-def edges(corner: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def edges(corner: Ints) -> tuple[Ints, Bools]:
     """For each of the (T, 3) triangles (T, 3) the numbers of its edges, equal for those that share
     both ends, and whether it runs along them towards the corner with the higher number."""
     ends = np.stack([corner, np.roll(corner, -1, axis=1)], axis=2)
@@ -117,24 +119,16 @@ def edges(corner: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool
     return edge.reshape(-1, 3), ends[..., 0] < ends[..., 1]
 
 
-def edge_groups(edge: NDArray[np.int64]) -> NDArray[np.int64]:
+def edge_groups(edge: Ints) -> Ints:
     """(T,) for each triangle, of the (T, 3) ``edges``, the least index of the triangles that it
     hangs together with through shared edges."""
-    count = len(edge)
-    group = np.arange(count)
-    while True:
-        least = np.full(int(edge.max()) + 1, count)
-        np.minimum.at(least, edge, group[:, None])
-        better = np.minimum(group, least[edge].min(axis=1))
-        better = better[better]  # pointer jumping: long strips need few rounds
-        if np.array_equal(better, group):
-            return group
-        group = better
+    order = np.argsort(edge, axis=None, kind="stable")
+    same = np.flatnonzero(np.diff(edge.reshape(-1)[order]) == 0)
+    one, other = order[same] // 3, order[same + 1] // 3
+    return connected(len(edge), np.append(one, other), np.append(other, one))
 
 
-def closed_and_oriented(
-    edge: NDArray[np.int64], forward: NDArray[np.bool_], group: NDArray[np.int64]
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def closed_and_oriented(edge: Ints, forward: Bools, group: Ints) -> tuple[Bools, Bools]:
     """(T,) whether the group with each number is closed, and whether it is wound consistently, from
     the (T, 3) ``edges`` and their directions; of numbers that no group has, anything."""
     used = np.bincount(edge.ravel())
@@ -145,43 +139,27 @@ def closed_and_oriented(
     return closed, balanced
 
 
-def signed_volume(corners: NDArray[np.float64]) -> float:
+def signed_volume(corners: Floats) -> float:
     """Volume enclosed by a closed surface of (n, 3, 3) corners, positive if wound outwards."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
 
-def areas(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) areas of (n, 3, 3) triangles, m²."""
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(np.linalg.norm(normal, axis=1) / 2)
-
-
-def boundary_area(scene: Scene, cells: Cells) -> NDArray[np.float64]:
+def boundary_area(scene: Scene, cells: Cells) -> Floats:
     """(T,) the area of each of the scene's triangles that lies in boundaries of cells, m²."""
     lying = cells.triangle_cell[:, 0] != cells.triangle_cell[:, 1]
     piece = areas(cells.vertex[cells.triangle[lying]])
-    total = np.zeros(len(scene.triangles))
-    np.add.at(total, cells.triangle_source[lying], piece)
-    return total
+    return np.bincount(cells.triangle_source[lying], piece, len(scene.triangles)).astype(float)
 
 
 @dataclass(frozen=True)
 class Obstacles:
-    """What a sample point has to keep clear of.
+    """What a sample point has to keep clear of."""
 
-    Attributes
-    ----------
-    corners: (T, 3, 3) all surfaces, metres.
-    nearby: finds those near a box.
-    solids: the closed ones with an inside.
-    boxes: (B, 2, 3) the bounding boxes of the solids.
-    """
-
-    corners: NDArray[np.float64]
+    corners: Floats  # (T, 3, 3) all surfaces, metres
     nearby: Nearby
-    solids: tuple[Solid, ...]
-    boxes: NDArray[np.float64]
+    solids: tuple[Solid, ...]  # the closed ones with an inside
+    boxes: Floats  # (B, 2, 3) their bounding boxes
 
     @staticmethod
     def of(scene: Scene, cells: Cells) -> Obstacles:
@@ -191,7 +169,7 @@ class Obstacles:
         boxes = np.array([solid.box for solid in found]).reshape(-1, 2, 3)
         return Obstacles(corners, Nearby(corners, 0.0), found, boxes)
 
-    def in_solid(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def in_solid(self, points: Floats) -> Bools:
         """(n,) whether each of the (n, 3) points is inside a solid."""
         inside = np.zeros(len(points), dtype=np.bool_)
         if len(points) == 0:
@@ -204,7 +182,7 @@ class Obstacles:
             inside[boxed] = self.solids[solid].contains(points[boxed])
         return inside
 
-    def clearance(self, points: NDArray[np.float64], enough: float) -> NDArray[np.float64]:
+    def clearance(self, points: Floats, enough: float) -> Floats:
         """(n,) distance in metres from each of the (n, 3) points to the nearest surface, at most
         ``enough``."""
         from ptmtools.coverage.clearance_kernels import clearances
@@ -220,9 +198,7 @@ class Obstacles:
         return found
 
 
-def by_x(
-    points: NDArray[np.float64], corners: NDArray[np.float64], margin: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def by_x(points: Floats, corners: Floats, margin: float) -> tuple[Ints, Ints, Ints]:
     """The order of the (n, 3) points by x, and for each of the (m, 3, 3) triangles where those that
     are within ``margin`` of its extent along x begin and end in that order."""
     order = np.argsort(points[:, 0], kind="stable")

@@ -19,7 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Ints
 from ptmtools.cells.model import Cells
+from ptmtools.cells.vectors import ranges
 from ptmtools.coverage.item_buffer import VIEWS, Renderer, Surfaces
 from ptmtools.coverage.sample_points import SamplePoints
 
@@ -31,22 +33,14 @@ TOWARDS = 4.0
 
 @dataclass(frozen=True)
 class Owners:
-    """For whom a pixel can count: each cell, or each image within each cell.
+    """For whom a pixel can count: each cell, or each image within each cell, where -1 is
+    what has none; every cell has that owner."""
 
-    Attributes
-    ----------
-    cell, image: (S,) int32 of each owner, in order of cell, then image; image -1 is what has none,
-        and every cell has that owner.
-    first: (C + 1,) where the owners of each cell begin.
-    of_side: (M, 2) int32 the owner of each triangle's front and back, -1 for none.
-    images: more than any image of the scene, plus 1.
-    """
-
-    cell: NDArray[np.int32]
-    image: NDArray[np.int32]
-    first: NDArray[np.int64]
-    of_side: NDArray[np.int32]
-    images: int
+    cell: NDArray[np.int32]  # (S,) of each owner, ascending, and
+    image: NDArray[np.int32]  # (S,) ascending within a cell
+    first: Ints  # (C + 1,) where the owners of each cell begin
+    of_side: NDArray[np.int32]  # (M, 2) of each triangle's front and back, -1 for none
+    images: int  # more than any image of the scene, plus 1
 
     @staticmethod
     def of(surfaces: Surfaces, by_image: bool) -> Owners:
@@ -65,14 +59,12 @@ class Owners:
             images=images,
         )
 
-    def in_cells(self, cells: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def in_cells(self, cells: NDArray[np.int32]) -> tuple[Ints, Ints]:
         """The owners in each of the (n,) cells, cell after cell, and where each cell's begin."""
         size = self.first[cells + 1] - self.first[cells]
-        begin = np.concatenate([[0], np.cumsum(size)[:-1]]).astype(np.int64)
-        within = np.arange(int(size.sum())) - np.repeat(begin, size)
-        return np.repeat(self.first[cells], size) + within, begin
+        return ranges(self.first[cells], size), np.cumsum(size) - size
 
-    def at(self, cell: NDArray[np.int32], image: NDArray[np.int32]) -> NDArray[np.int64]:
+    def at(self, cell: NDArray[np.int32], image: NDArray[np.int32]) -> Ints:
         """(n,) the owner of each of the (n,) images in each of the (n,) cells; what has no image
         where the cell has nothing with that one; -1 where the cell is -1."""
         every = self.cell.astype(np.int64) * self.images + self.image + 1
@@ -84,18 +76,11 @@ class Owners:
 
 @dataclass(frozen=True)
 class Tally:
-    """Weighted pixels seen from K points.
+    """Weighted pixels seen from K points."""
 
-    Attributes
-    ----------
-    at_points: (K, m) int64 of each of the owners asked for, at each point.
-    in_views: (6, m) int64 of the same in each view, over all points.
-    missed: (K,) int64 of what belongs to none of them.
-    """
-
-    at_points: NDArray[np.int64]
-    in_views: NDArray[np.int64]
-    missed: NDArray[np.int64]
+    at_points: Ints  # (K, m) of each of the owners asked for, at each point
+    in_views: Ints  # (6, m) of the same in each view, over all points
+    missed: Ints  # (K,) of what belongs to none of them
 
     @staticmethod
     def join(parts: list[Tally]) -> Tally:
@@ -106,7 +91,7 @@ class Tally:
             np.concatenate([part.missed for part in parts]),
         )
 
-    def grouped(self, begin: NDArray[np.int64]) -> Tally:
+    def grouped(self, begin: Ints) -> Tally:
         """The owners from each of the (n,) ``begin`` to the next as one."""
         if len(begin) == self.at_points.shape[1]:
             return self
@@ -141,7 +126,7 @@ class PixelCounter:
         self._face = face
         self._towards = TOWARDS * cells.tolerance.plane
 
-    def count(self, points: SamplePoints, wanted: NDArray[np.int64]) -> Tally:
+    def count(self, points: SamplePoints, wanted: Ints) -> Tally:
         """How many pixels show each of the (m,) ``wanted`` owners."""
         column = np.full(len(self.owners.cell) + 1, -1, dtype=np.int32)
         column[wanted] = np.arange(len(wanted))
@@ -160,11 +145,7 @@ class PixelCounter:
         return tally
 
     def _add(
-        self,
-        points: SamplePoints,
-        column: NDArray[np.int32],
-        needed: NDArray[np.bool_],
-        tally: Tally,
+        self, points: SamplePoints, column: NDArray[np.int32], needed: Bools, tally: Tally
     ) -> None:
         """Draws views of the cells ``needed`` and adds their pixels to the ``tally``, whose
         ``column`` of each owner is -1 for one that is not expected."""
@@ -191,12 +172,8 @@ class PixelCounter:
             np.add.at(tally.missed, point[lost], weighs[lost])
 
     def _again(
-        self,
-        points: SamplePoints,
-        pixel: NDArray[np.int64],
-        layer: int,
-        column: NDArray[np.int32],
-    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        self, points: SamplePoints, pixel: Ints, layer: int, column: NDArray[np.int32]
+    ) -> tuple[Ints, Bools]:
         """(n,) the expected owner that each of the (n,) pixels in doubt counts for, or -1; (n,)
         whether it shows anything."""
         shows, hits = (both[layer] for both in self._renderer.trace(points, pixel))
@@ -217,7 +194,7 @@ class PixelCounter:
             owner[lost] = np.where(column[nearer] >= 0, nearer, -1)
         return owner, hit
 
-    def _weight(self, points: SamplePoints) -> NDArray[np.int64]:
+    def _weight(self, points: SamplePoints) -> Ints:
         """(1 or K, face²) weights of the pixels of a view: alike, or by solid angle,
         (1 + x² + y²)^(-3/2) in `unit`-ths."""
         if self.unit == 1:
@@ -225,5 +202,5 @@ class PixelCounter:
         centre = (2.0 * np.arange(self._face) + 1.0) / self._face - 1.0
         x, y = (centre + shift[:, None] for shift in (points.shift / self._face).T)
         weight = self.unit / (1.0 + x[:, None, :] ** 2 + y[:, :, None] ** 2) ** 1.5
-        rounded: NDArray[np.int64] = np.round(weight).astype(np.int64)
+        rounded: Ints = np.round(weight).astype(np.int64)
         return rounded.reshape(len(points), -1)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import io
 import struct
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from ptmtools.errors import PtmError
 from ptmtools.texture.model import EncodeOptions
 from ptmtools.texture.profiles import PROFILES
+from ptmtools.texture.samples import KINDS
 
 Samples = NDArray[Any]
 _PILLOW = "pip install --force-reinstall pillow"
@@ -30,6 +31,8 @@ _CODECS = "pip install 'ptmtools[codecs]'"
 #: plain image of that size, so that no compiling or loading is counted.
 _CORNER = 256
 _LENGTH = struct.Struct("<I")
+_KINDS = tuple(KINDS)
+_INTEGERS = ("uint8", "uint16")
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,7 @@ class Codec:
     ----------
     name: what it is called in a table.
     encode, decode: of (h, w, c) texels. Either may raise anything for what it cannot hold.
+    kinds: of the samples that it can hold.
     pyramid: whether one string holds all levels.
     remedy: how to install it; None if it is installed.
     """
@@ -47,6 +51,7 @@ class Codec:
     name: str
     encode: Callable[[Samples], bytes]
     decode: Callable[[bytes, tuple[int, ...]], Samples]
+    kinds: Collection[str] = _KINDS
     pyramid: bool = False
     remedy: str | None = None
 
@@ -113,6 +118,8 @@ def _measured(levels: list[Samples], codec: Codec, repeat: int) -> Measured:
     if codec.remedy:
         return replace(none, problem=f"not installed: {codec.remedy}")
     try:
+        if image.dtype.name not in codec.kinds:
+            raise ValueError("only " + " and ".join(codec.kinds))
         first = [np.ascontiguousarray(image[:_CORNER, :_CORNER])]
         if codec.pyramid:
             size = (_CORNER, _CORNER, image.shape[2])
@@ -168,18 +175,21 @@ def _profile(name: str) -> Codec:
 def _rivals() -> list[Codec]:
     from PIL import features
 
+    from ptmtools.texture.images import png_bytes
+
     webp = None if features.check("webp") else _PILLOW
     jpeg_xl = [
         _by_imagecodecs(f"JPEG XL effort {effort}", "jpegxl", lossless=True, effort=effort)
         for effort in (1, 3, 7)
     ]
+    jpeg_2000 = _by_imagecodecs("JPEG 2000", "jpeg2k", level=0, reversible=True, codecformat="j2k")
     jpeg_ls = _by_imagecodecs("JPEG-LS, less green", "jpegls")
     return [
-        Codec("PNG", _png, _by_pillow),
-        Codec("WebP lossless", _webp, _by_pillow, remedy=webp),
+        Codec("PNG", png_bytes, _by_pillow, _INTEGERS),
+        Codec("WebP lossless", _webp, _by_pillow, ("uint8",), remedy=webp),
         *jpeg_xl,
-        _by_imagecodecs("JPEG 2000", "jpeg2k", level=0, reversible=True, codecformat="j2k"),
-        replace(jpeg_ls, encode=_jpeg_ls, decode=_from_jpeg_ls),
+        replace(jpeg_2000, kinds=_INTEGERS),
+        replace(jpeg_ls, encode=_jpeg_ls, decode=_from_jpeg_ls, kinds=_INTEGERS),
     ]
 
 
@@ -193,8 +203,6 @@ def _by_imagecodecs(name: str, function: str, **settings: Any) -> Codec:
 
     def encode(image: Samples) -> bytes:
         if function == "jpeg2k":
-            if image.dtype.kind == "f":
-                raise ValueError("it has integers only")
             settings["mct"] = image.shape[2] > 2
         return bytes(getattr(imagecodecs, f"{function}_encode")(_plain(image), **settings))
 
@@ -211,19 +219,9 @@ def _plain(image: Samples) -> Samples:
     return image[:, :, 0] if image.shape[2] == 1 else image
 
 
-def _png(image: Samples) -> bytes:
-    from ptmtools.texture.images import png_bytes
-
-    if image.dtype.kind == "f":
-        raise ValueError("it has integers only")
-    return png_bytes(image)
-
-
 def _webp(image: Samples) -> bytes:
     from PIL import Image
 
-    if image.dtype.name != "uint8":
-        raise ValueError("it has 8 bits only")
     buffer = io.BytesIO()
     Image.fromarray(_plain(image)).save(buffer, "WEBP", lossless=True, method=4, exact=True)
     return buffer.getvalue()
@@ -251,8 +249,6 @@ def _jpeg_ls(image: Samples) -> bytes:
     """Each plane by itself, red and blue less green: JPEG-LS has no colour transform."""
     import imagecodecs
 
-    if image.dtype.kind == "f":
-        raise ValueError("it has integers only")
     planes = [np.ascontiguousarray(image[:, :, c]) for c in range(image.shape[2])]
     if len(planes) > 2:
         planes[0], planes[2] = planes[0] - planes[1], planes[2] - planes[1]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from ptmtools.errors import InputError, LimitError
 from ptmtools.texture.model import (
@@ -17,6 +16,7 @@ from ptmtools.texture.model import (
     MAX_LEVELS,
     MAX_SIDE,
     TILE_SIDES,
+    EncodeOptions,
     Level,
     PtmHeader,
 )
@@ -48,35 +48,30 @@ DESCRIPTION_MAX = 1 << 24
 _ENCODE_AGAIN = "the file is damaged: fetch or encode it again"
 
 
-@dataclass(frozen=True)
-class Head:
-    """What stands before the group table, as `pack_head` writes it."""
-
-    width: int
-    height: int
-    components: int
-    kind: str
-    profile: str
-    trimmed: int
-    tile: int
-    max_error: int
-
-
 def head_size(groups: int) -> int:
     """Bytes of the head of a file with so many groups."""
     return _FIXED.size + _MORE.size + groups * _ENTRY.size + _CRC.size
 
 
-def pack_head(head: Head, description: bytes, groups: Sequence[tuple[int, int]]) -> bytes:
+def pack_head(
+    shape: tuple[int, int, int],
+    kind: str,
+    options: EncodeOptions,
+    trimmed: int,
+    description: bytes,
+    groups: Sequence[tuple[int, int]],
+) -> bytes:
     """The head of a file: the description follows it, then the groups, coarsest first.
 
-    groups: length and CRC-32 of each.
+    shape: (h, w, c) of the original image. kind, trimmed: as in `PtmHeader`. groups: length and
+    CRC-32 of each.
     """
+    height, width, components = shape
     size = head_size(len(groups))
-    counts = (head.components, len(groups), head.trimmed, 0)
-    numbers = (PROFILES[head.profile].number, KINDS[head.kind].number, head.width, head.height)
+    counts = (components, len(groups), trimmed, 0)
+    numbers = (PROFILES[options.profile].number, KINDS[kind].number, width, height)
     packed = bytearray(_FIXED.pack(MAGIC, VERSION, *numbers, *counts, size))
-    packed += _MORE.pack(head.tile, head.max_error, len(description), zlib.crc32(description))
+    packed += _MORE.pack(options.tile, options.max_error, len(description), zlib.crc32(description))
     offset = size + len(description)
     for length, crc32 in groups:
         packed += _ENTRY.pack(offset, length, crc32)

@@ -23,7 +23,6 @@ from ptmtools.texture.container import (
     EXACT,
     TILE_ENTRY,
     WITHIN,
-    Head,
     head_size,
     pack_head,
 )
@@ -34,7 +33,7 @@ from ptmtools.texture.parallel import ordered
 from ptmtools.texture.profiles import Coder, Tile
 from ptmtools.texture.pyramid import build_pyramid, level_sizes, mean_below
 from ptmtools.texture.rows import ImageRows, Rows, Samples
-from ptmtools.texture.tiling import Box, tile_box, tile_counts
+from ptmtools.texture.tiling import Box, tile_counts, tiles_under
 
 #: A tile below others is coded without error, though one is allowed, if that takes at most so many
 #: times the bytes: it lets those above it be exact, which takes fewer where an image is flat.
@@ -103,7 +102,7 @@ def encode_to(
     start = file.tell()
     file.write(bytes(head_size(len(kept))))
     file.write(described)
-    single, tiled = _split(_levels(rows, kept), options.tile)
+    single, tiled = _levels(rows, kept, options.tile)
     tiles = coding.single([_whole(level) for level in single], more=bool(tiled))
     del single
     below, memory = tiles[-1].texels, tiles[-1].memory
@@ -117,18 +116,9 @@ def encode_to(
         group, below = coding.tiled(file, tiled.pop(0), below, memory, finest=not tiled)
         groups.append(group)
     end = file.tell()
-    head = Head(
-        rows.width,
-        rows.height,
-        rows.components,
-        rows.dtype.name,
-        options.profile,
-        len(level_sizes(rows.width, rows.height)) - 1 - kept[-1],
-        options.tile,
-        options.max_error,
-    )
+    trimmed = len(level_sizes(rows.width, rows.height)) - 1 - kept[-1]
     file.seek(start)
-    file.write(pack_head(head, described, groups))
+    file.write(pack_head(rows.shape, rows.dtype.name, options, trimmed, described, groups))
     file.seek(end)
 
 
@@ -180,10 +170,10 @@ class _Coding:
 
         def boxes() -> Iterator[tuple[Box, Samples]]:
             """Each tile, with the row of tiles that it is cut from."""
-            for row in range(down):
-                strip = level[row * side : height if row == down - 1 else (row + 1) * side]
-                for column in range(across):
-                    yield tile_box(width, height, side, column, row), strip
+            for _, box in tiles_under(width, height, side, Box(0, 0, width, height)):
+                if box.x0 == 0:
+                    strip = level[box.y0 : box.y1]
+                yield box, strip
 
         def coded(job: tuple[Box, Samples]) -> tuple[Box, Tile]:
             box, strip = job
@@ -232,24 +222,17 @@ class _Coding:
         return replace(within, data=bytes([WITHIN]) + within.data)
 
 
-def _levels(image: ImageRows, kept: list[int]) -> list[Samples | ImageRows]:
-    """The levels to store, coarsest first; the image itself is not read into memory for it."""
+def _levels(
+    image: ImageRows, kept: list[int], tile: int
+) -> tuple[list[Samples | ImageRows], list[Samples | ImageRows]]:
+    """The levels to store, coarsest first: those of one tile, the coarsest always among them, and
+    those of several. The image itself is not read into memory for it."""
     sizes = level_sizes(image.width, image.height)
     pyramid = build_pyramid(image, min(sizes[kept[0]]))
-    return [pyramid[n - len(sizes)] for n in kept]
-
-
-def _split(
-    levels: list[Samples | ImageRows], tile: int
-) -> tuple[list[Samples | ImageRows], list[Samples | ImageRows]]:
-    """Levels of one tile, the coarsest always among them, and levels of several."""
-    count = 1
-    while count < len(levels):
-        height, width = levels[count].shape[:2]
-        if tile_counts(width, height, tile) != (1, 1):
-            break
-        count += 1
-    return levels[:count], levels[count:]
+    levels: list[Samples | ImageRows] = [pyramid[n - len(sizes)] for n in kept]
+    tiled = [tile_counts(*sizes[n], tile) != (1, 1) for n in kept[1:]]
+    single = len(kept) - sum(tiled)
+    return levels[:single], levels[single:]
 
 
 def _whole(level: Samples | ImageRows) -> Samples:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from ptmtools.texture.profiles import PROFILES
 from ptmtools.texture.samples import KINDS
+from ptmtools.texture.tiling import Box
 
 #: Longest side of an image, texels.
 MAX_SIDE = 1 << 16
@@ -108,6 +109,11 @@ class Level:
     def end(self) -> int:
         """Length of the prefix of the file that holds this level and all below it."""
         return self.offset + self.length
+
+    @property
+    def box(self) -> Box:
+        """All of its texels."""
+        return Box(0, 0, self.width, self.height)
 
     @property
     def tiled(self) -> bool:

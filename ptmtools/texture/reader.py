@@ -9,14 +9,13 @@ from __future__ import annotations
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, LimitError, naming
-from ptmtools.texture.coders.damage import damaged
+from ptmtools.texture.coders.reading import damaged
 from ptmtools.texture.container import (
     EXACT,
     HEAD_MAX,
@@ -80,12 +79,7 @@ class PtmReader:
     def __enter__(self) -> PtmReader:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -127,9 +121,8 @@ class PtmReader:
         with naming(self._ranges.name):
             while True:
                 chosen = self._number(number)
-                level = self.header.levels[chosen]
                 try:
-                    return self._window(chosen, Box(0, 0, level.width, level.height))
+                    return self._window(chosen, self.header.levels[chosen].box)
                 except InputError:
                     # A source of unknown size may have come to its end: there is less.
                     if number is not None or chosen < self.whole:
@@ -150,13 +143,11 @@ class PtmReader:
         with naming(self._ranges.name):
             whole = self.whole
             if whole:
-                finest = self.header.levels[whole - 1]
-                self._check_limit(whole - 1, Box(0, 0, finest.width, finest.height))
+                self._check_limit(whole - 1, self.header.levels[whole - 1].box)
             state = None
             for number in range(whole):
-                level = self.header.levels[number]
                 try:
-                    state = self._step(number, Box(0, 0, level.width, level.height), state)
+                    state = self._step(number, self.header.levels[number].box, state)
                 except InputError:
                     if number >= self.whole:
                         return
@@ -176,7 +167,7 @@ class PtmReader:
                     wrong.append(str(error))
                     continue
                 pieces = [
-                    (*index.piece(i), f"level {number}, tile {i}") for i in range(len(index.ends))
+                    (*piece, f"level {number}, tile {i}") for i, piece in enumerate(index.tolist())
                 ]
             for offset, length, crc32, place in pieces:
                 try:
@@ -200,7 +191,7 @@ class PtmReader:
                 remedy=f"it has levels 0 to {len(header.levels) - 1}",
             )
         level = header.levels[number]
-        box = window or Box(0, 0, level.width, level.height)
+        box = window or level.box
         if not (0 <= box.x0 < box.x1 <= level.width and 0 <= box.y0 < box.y1 <= level.height):
             raise InputError(
                 "PTM-I106",
@@ -216,7 +207,9 @@ class PtmReader:
         """A rectangle of a level, by way of those under it."""
         boxes = [box]
         for n in range(number, -1, -1):
-            covered = self._covering(n, boxes[-1])
+            level = self.header.levels[n]
+            side = self.header.tile if level.tiled else 0
+            covered = covering(level.width, level.height, side, boxes[-1])
             self._check_limit(n, covered)
             boxes.append(covered.below)
         boxes.pop()
@@ -225,13 +218,6 @@ class PtmReader:
             state = self._step(n, part, state)
         assert state is not None
         return state.texels
-
-    def _covering(self, number: int, box: Box) -> Box:
-        """The rectangle of all tiles of a level that share a texel with ``box``."""
-        level = self.header.levels[number]
-        if not level.tiled:
-            return Box(0, 0, level.width, level.height)
-        return covering(level.width, level.height, self.header.tile, box)
 
     def _check_limit(self, number: int, box: Box) -> None:
         """Texels, and what decoding them a tile at a time takes besides."""
@@ -255,15 +241,13 @@ class PtmReader:
         header, level = self.header, self.header.levels[number]
         shape = (level.height, level.width, header.components)
         place = f"level {number}"
-        if below is None:
+        if below is None or not level.tiled:
             data = self._checked(level.offset, level.length, level.crc32, place)
             with naming(place=place):
-                texels = self._coder.decode_base(data, shape, self.dtype)
-            return _State(texels[box.slices], box, None)
-        if not level.tiled:
-            data = self._checked(level.offset, level.length, level.crc32, place)
-            with naming(place=place):
-                tile = self._decode(data, below.texels, shape, below.memory, self._threads)
+                if below is None:
+                    tile = Tile(b"", self._coder.decode_base(data, shape, self.dtype))
+                else:
+                    tile = self._decode(data, below.texels, shape, below.memory, self._threads)
             return _State(tile.texels[box.slices], box, tile.memory)
         index = self._index(level, place)
         texels = np.empty((box.y1 - box.y0, box.x1 - box.x0, header.components), self.dtype)
@@ -272,7 +256,8 @@ class PtmReader:
             tile_number, area = job
             where = f"{place}, tile {tile_number}"
             under = np.ascontiguousarray(below.texels[area.below.within(below.box).slices])
-            data = self._checked(*index.piece(tile_number), where)
+            offset, length, crc32 = index[tile_number].tolist()
+            data = self._checked(offset, length, crc32, where)
             size = (area.y1 - area.y0, area.x1 - area.x0, header.components)
             with naming(place=where):
                 tile = self._decode(data, under, size, below.memory)
@@ -306,15 +291,15 @@ class PtmReader:
             data = data[1:]
         return self._coder.decode_tile(data, below, shape, max_error, memory, threads)
 
-    def _index(self, level: Level, place: str) -> _Index:
-        """Offset, length and CRC-32 of every tile of a level."""
+    def _index(self, level: Level, place: str) -> NDArray[np.int64]:
+        """Offset, length and CRC-32 (n, 3) of every tile of a level."""
         size = level.tiles[0] * level.tiles[1] * TILE_ENTRY.size
         if size <= level.length:
             data = self._checked(level.offset, size, level.crc32, place)
-            entries = np.frombuffer(data, "<u4").reshape(-1, 2)
-            ends = level.offset + size + np.cumsum(entries[:, 0], dtype=np.int64)
+            entries = np.frombuffer(data, "<u4").reshape(-1, 2).astype(np.int64)
+            ends = level.offset + size + np.cumsum(entries[:, 0])
             if ends[-1] == level.end:
-                return _Index(entries, ends)
+                return np.column_stack([ends - entries[:, 0], entries])
         raise InputError(
             "PTM-I112",
             "the index of its tiles contradicts its length",
@@ -346,19 +331,6 @@ class PtmReader:
         return InputError(
             "PTM-I107", f"is cut{of}, inside or before this", place=place, remedy=remedy
         )
-
-
-@dataclass(frozen=True)
-class _Index:
-    """The tiles of a level in the file: (n, 2) length and CRC-32, and where each ends."""
-
-    entries: NDArray[np.uint32]
-    ends: NDArray[np.int64]
-
-    def piece(self, tile: int) -> tuple[int, int, int]:
-        """Offset, length, CRC-32."""
-        length, crc32 = (int(n) for n in self.entries[tile])
-        return int(self.ends[tile]) - length, length, crc32
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import contextlib
 import io
 import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from threading import Lock
@@ -19,25 +20,22 @@ RangeReader = Callable[[int, int], bytes]
 Source = str | os.PathLike[str] | bytes | bytearray | memoryview | BinaryIO | RangeReader
 
 
+@dataclass(frozen=True)
 class Ranges:
     """A file that can be read in pieces, from several threads.
 
     Attributes
     ----------
-    name: of the file, for messages; None if it has none.
     read: that range of it; shorter only where it ends. Raises InputError PTM-I122.
     size: bytes there are, now; None if that is not known before reading them.
     close: nothing is read any more.
+    name: of the file, for messages; None if it has none.
     """
 
-    def __init__(
-        self,
-        read: RangeReader,
-        size: Callable[[], int | None] = lambda: None,
-        close: Callable[[], object] = lambda: None,
-        name: str | None = None,
-    ) -> None:
-        self.read, self.size, self.close, self.name = read, size, close, name
+    read: RangeReader
+    size: Callable[[], int | None] = lambda: None
+    close: Callable[[], object] = lambda: None
+    name: str | None = None
 
 
 def ranges_of(source: Source) -> Ranges:

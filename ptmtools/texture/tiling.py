@@ -55,24 +55,26 @@ def tile_box(width: int, height: int, side: int, column: int, row: int) -> Box:
 
 def covering(width: int, height: int, side: int, box: Box) -> Box:
     """The rectangle of all tiles that share a texel with ``box``."""
-    across, down = tile_counts(width, height, side)
-    if (across, down) == (1, 1):
-        return Box(0, 0, width, height)
-    corners = [
-        tile_box(width, height, side, min(x // side, across - 1), min(y // side, down - 1))
-        for x, y in ((box.x0, box.y0), (box.x1 - 1, box.y1 - 1))
-    ]
-    return Box(corners[0].x0, corners[0].y0, corners[1].x1, corners[1].y1)
+    columns, rows = _tiles(width, height, side, box)
+    first = tile_box(width, height, side, columns[0], rows[0])
+    last = tile_box(width, height, side, columns[-1], rows[-1])
+    return Box(first.x0, first.y0, last.x1, last.y1)
 
 
 def tiles_under(width: int, height: int, side: int, box: Box) -> Iterator[tuple[int, Box]]:
     """Number (row by row) and rectangle of every tile that shares a texel with ``box``."""
-    across, down = tile_counts(width, height, side)
-    if (across, down) == (1, 1):
-        yield 0, Box(0, 0, width, height)
-        return
-    for row in range(min(box.y0 // side, down - 1), min((box.y1 - 1) // side, down - 1) + 1):
-        for column in range(
-            min(box.x0 // side, across - 1), min((box.x1 - 1) // side, across - 1) + 1
-        ):
+    across, _ = tile_counts(width, height, side)
+    columns, rows = _tiles(width, height, side, box)
+    for row in rows:
+        for column in columns:
             yield row * across + column, tile_box(width, height, side, column, row)
+
+
+def _tiles(width: int, height: int, side: int, box: Box) -> tuple[range, range]:
+    """Columns and rows of the tiles that share a texel with ``box``."""
+    across, down = tile_counts(width, height, side)
+    side = side or max(width, height)
+    return (
+        range(min(box.x0 // side, across - 1), min((box.x1 - 1) // side, across - 1) + 1),
+        range(min(box.y0 // side, down - 1), min((box.y1 - 1) // side, down - 1) + 1),
+    )

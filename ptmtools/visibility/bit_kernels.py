@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ptmtools.arrays import Bits
 from ptmtools.compiled import kernel, plain_kernel
-from ptmtools.visibility.storage import Bits
 
 ONE = np.uint64(1)
 ZERO = np.uint64(0)

@@ -8,12 +8,9 @@ is the side in front, n·x + d >= 0.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Floats, Ints
 from ptmtools.compiled import plain_kernel as kernel
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 #: What clipping left. NEAR_TIE is EMPTY, but the polygon ends within `NEAR` slacks of where it
 #: would have been kept.

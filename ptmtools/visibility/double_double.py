@@ -29,19 +29,19 @@ class SequenceTest:
     def __init__(self, geometry: Geometry) -> None:
         self._geometry = geometry
         self._portals = DoubleDoublePortals(
-            np.zeros((*geometry.point.shape, 2)), geometry.start, geometry.normal
+            np.zeros(geometry.point.shape, complex), geometry.start, geometry.normal
         )
         self._loaded = np.zeros(len(geometry.start) - 1, dtype=np.bool_)
         _, self._exponent = math.frexp(float(np.abs(geometry.point).max(initial=0.0)))
         self._noise = Tolerance.for_points(geometry.point).noise
         vertices = int(np.diff(geometry.start).max(initial=0)) + GROWTH
         self._scratch = DoubleDoubleScratch(
-            polygon=np.zeros((4, vertices, 3, 2)),
+            polygon=np.zeros((4, vertices, 3), complex),
             size=np.zeros(4, np.int64),
             cuts=np.zeros(4, np.int64),
-            plane=np.zeros((2, 2 * vertices + 1, 4, 2)),
-            side=np.zeros((vertices, 2)),
-            vector=np.zeros((2, 3, 2)),
+            plane=np.zeros((2, 2 * vertices + 1, 4), complex),
+            side=np.zeros(vertices, complex),
+            vector=np.zeros((2, 3), complex),
         )
 
     def passes(self, sequence: tuple[int, ...]) -> bool:
@@ -72,7 +72,7 @@ class SequenceTest:
                 exact = x - above / normal[axis] if a == axis else x
                 high = float(exact)
                 low = float(exact - Fraction(high))
-                self._portals.point[span.start + i, a] = (
+                self._portals.point[span.start + i, a] = complex(
                     math.ldexp(high, -self._exponent),
                     math.ldexp(low, -self._exponent),
                 )

@@ -1,7 +1,8 @@
 """Sequences of portals in double-double arithmetic, compiled.
 
-A number is the unevaluated sum of two doubles, (high, low), the last axis of arrays; ``high`` is
-the sum, rounded: 106 bits. Sums and products are built from error-free transformations (Dekker,
+A number is the unevaluated sum of two doubles, kept as the parts of a complex number: the real one
+is the sum, rounded, and the imaginary one the rest; 106 bits. Only the sign of such a number is
+changed by complex arithmetic. Sums and products are built from error-free transformations (Dekker,
 Numer. Math. 18, 1971; Knuth, TAOCP 2, 4.2.2). Coordinates are at most 1, so that what is computed
 of them is right to `ERROR`.
 
@@ -22,10 +23,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ptmtools.arrays import Ints
 from ptmtools.compiled import plain_kernel as kernel
-from ptmtools.visibility.storage import DoubleDoublePortals, DoubleDoubleScratch, Ints
-
-Double = tuple[float, float]
+from ptmtools.visibility.storage import DoubleDoublePortals, DoubleDoubleScratch
 
 #: More than a product of vectors and a vertex newly cut may be wrong by.
 ERROR = 2.0**-99
@@ -47,15 +47,15 @@ _SPLITTER = 2.0**27 + 1.0
 
 
 @kernel
-def two_sum(a: float, b: float) -> Double:
+def two_sum(a: float, b: float) -> complex:
     """a + b, exactly."""
     s = a + b
     t = s - a
-    return s, (a - (s - t)) + (b - t)
+    return complex(s, (a - (s - t)) + (b - t))
 
 
 @kernel
-def two_product(a: float, b: float) -> Double:
+def two_product(a: float, b: float) -> complex:
     """a · b, exactly."""
     p = a * b
     t = _SPLITTER * a
@@ -64,56 +64,59 @@ def two_product(a: float, b: float) -> Double:
     t = _SPLITTER * b
     b1 = t - (t - b)
     b2 = b - b1
-    return p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2
+    return complex(p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2)
 
 
 @kernel
-def added(a: Double, b: Double) -> Double:
+def added(a: complex, b: complex) -> complex:
     """a + b, to 2⁻¹⁰⁴ of |a| + |b|."""
-    s, e = two_sum(a[0], b[0])
-    t, f = two_sum(a[1], b[1])
-    s, e = two_sum(s, e + t)
-    return two_sum(s, e + f)
+    s, t = two_sum(a.real, b.real), two_sum(a.imag, b.imag)
+    s = two_sum(s.real, s.imag + t.real)
+    return two_sum(s.real, s.imag + t.imag)
 
 
 @kernel
-def less(a: Double, b: Double) -> Double:
+def less(a: complex, b: complex) -> complex:
     """a - b."""
-    return added(a, (-b[0], -b[1]))
+    return added(a, -b)
 
 
 @kernel
-def times(a: Double, b: Double) -> Double:
+def times(a: complex, b: complex) -> complex:
     """a · b, to 2⁻¹⁰² of it."""
-    p, e = two_product(a[0], b[0])
-    return two_sum(p, e + (a[0] * b[1] + a[1] * b[0]))
+    p = two_product(a.real, b.real)
+    return two_sum(p.real, p.imag + (a.real * b.imag + a.imag * b.real))
 
 
 @kernel
-def over(a: Double, b: Double) -> Double:
+def scaled(a: complex, b: float) -> complex:
+    """a · b, to 2⁻¹⁰² of it."""
+    return times(a, complex(b, 0.0))
+
+
+@kernel
+def over(a: complex, b: complex) -> complex:
     """a / b, to 2⁻¹⁰⁰ of it."""
-    first = a[0] / b[0]
-    rest = less(a, times(b, (first, 0.0)))
-    second = rest[0] / b[0]
-    rest = less(rest, times(b, (second, 0.0)))
-    s, e = two_sum(first, second)
-    return two_sum(s, e + rest[0] / b[0])
+    first = a.real / b.real
+    rest = less(a, scaled(b, first))
+    second = rest.real / b.real
+    rest = less(rest, scaled(b, second))
+    s = two_sum(first, second)
+    return two_sum(s.real, s.imag + rest.real / b.real)
 
 
 @kernel
-def greater(a: Double, b: Double) -> bool:
+def greater(a: complex, b: complex) -> bool:
     """a > b."""
-    return a[0] > b[0] or (a[0] == b[0] and a[1] > b[1])
+    return a.real > b.real or (a.real == b.real and a.imag > b.imag)
 
 
 @kernel
-def side(s: DoubleDoubleScratch, row: int, i: int, slot: int, k: int) -> Double:
+def side(s: DoubleDoubleScratch, row: int, i: int, slot: int, k: int) -> complex:
     """n·x + d of plane i of a row and vertex k of a polygon."""
-    n, x = s.plane, s.polygon
-    total = (n[row, i, 3, 0], n[row, i, 3, 1])
+    total: complex = s.plane[row, i, 3]
     for a in range(3):
-        product = times((n[row, i, a, 0], n[row, i, a, 1]), (x[slot, k, a, 0], x[slot, k, a, 1]))
-        total = added(total, product)
+        total = added(total, times(s.plane[row, i, a], s.polygon[slot, k, a]))
     return total
 
 
@@ -126,9 +129,8 @@ def clip(s: DoubleDoubleScratch, row: int, count: int, slot: int) -> bool:
         size = s.size[slot]
         low, high = np.inf, -np.inf
         for k in range(size):
-            d = side(s, row, i, slot, k)
-            s.side[k, 0], s.side[k, 1] = d
-            low, high = min(low, d[0]), max(high, d[0])
+            d = s.side[k] = side(s, row, i, slot, k)
+            low, high = min(low, d.real), max(high, d.real)
         if high <= 0:
             return False
         if low >= 0 or size + 2 > polygon.shape[1] or s.cuts[slot] == CUTS:
@@ -137,19 +139,16 @@ def clip(s: DoubleDoubleScratch, row: int, count: int, slot: int) -> bool:
         m = 0
         for k in range(size):
             j = k + 1 if k + 1 < size else 0
-            d, e = (s.side[k, 0], s.side[k, 1]), (s.side[j, 0], s.side[j, 1])
-            if d[0] >= 0:
+            d, e = s.side[k], s.side[j]
+            if d.real >= 0:
                 for a in range(3):
-                    polygon[SPARE, m, a, 0] = polygon[slot, k, a, 0]
-                    polygon[SPARE, m, a, 1] = polygon[slot, k, a, 1]
+                    polygon[SPARE, m, a] = polygon[slot, k, a]
                 m += 1
-            if (d[0] > 0 and e[0] < 0) or (d[0] < 0 and e[0] > 0):
+            if (d.real > 0 and e.real < 0) or (d.real < 0 and e.real > 0):
                 share = over(d, less(d, e))
                 for a in range(3):
-                    x = (polygon[slot, k, a, 0], polygon[slot, k, a, 1])
-                    along = less((polygon[slot, j, a, 0], polygon[slot, j, a, 1]), x)
-                    x = added(x, times(share, along))
-                    polygon[SPARE, m, a, 0], polygon[SPARE, m, a, 1] = x
+                    x = polygon[slot, k, a]
+                    polygon[SPARE, m, a] = added(x, times(share, less(polygon[slot, j, a], x)))
                 m += 1
         move(s, SPARE, slot, m)
     return True
@@ -160,8 +159,7 @@ def move(s: DoubleDoubleScratch, source: int, target: int, count: int) -> None:
     """Puts the first vertices of one polygon into the place of another."""
     for i in range(count):
         for a in range(3):
-            s.polygon[target, i, a, 0] = s.polygon[source, i, a, 0]
-            s.polygon[target, i, a, 1] = s.polygon[source, i, a, 1]
+            s.polygon[target, i, a] = s.polygon[source, i, a]
     s.size[target] = count
 
 
@@ -172,8 +170,7 @@ def load(g: DoubleDoublePortals, s: DoubleDoubleScratch, k: int, slot: int) -> N
     s.size[slot], s.cuts[slot] = g.start[k + 1] - first, 0
     for i in range(s.size[slot]):
         for a in range(3):
-            s.polygon[slot, i, a, 0] = g.point[first + i, a, 0]
-            s.polygon[slot, i, a, 1] = g.point[first + i, a, 1]
+            s.polygon[slot, i, a] = g.point[first + i, a]
 
 
 @kernel
@@ -202,50 +199,39 @@ def separators_through(
         j = i + 1 if i + 1 < s.size[a] else 0
         length = 0.0
         for c in range(3):
-            along = less(
-                (polygon[a, j, c, 0], polygon[a, j, c, 1]),
-                (polygon[a, i, c, 0], polygon[a, i, c, 1]),
-            )
-            edge[c, 0], edge[c, 1] = along
-            length += along[0] * along[0]
+            edge[c] = less(polygon[a, j, c], polygon[a, i, c])
+            length += edge[c].real * edge[c].real
         length = np.sqrt(length)
         if length <= ERROR:
             continue
         for c in range(3):
             c1, c2 = (c + 1) % 3, (c + 2) % 3
-            x = times((edge[c1, 0], edge[c1, 1]), (g.normal[k, c2] / length, 0.0))
-            y = times((edge[c2, 0], edge[c2, 1]), (g.normal[k, c1] / length, 0.0))
-            outward[c, 0], outward[c, 1] = less(x, y)
-        turn: Double = (-np.inf, 0.0)
+            x = scaled(edge[c1], g.normal[k, c2] / length)
+            outward[c] = less(x, scaled(edge[c2], g.normal[k, c1] / length))
+        turn = complex(-np.inf, 0.0)
         for m in range(s.size[b]):
-            u: Double = (0.0, 0.0)
-            v: Double = (0.0, 0.0)
+            u = v = complex(0.0, 0.0)
             for c in range(3):
-                r = less(
-                    (polygon[b, m, c, 0], polygon[b, m, c, 1]),
-                    (polygon[a, i, c, 0], polygon[a, i, c, 1]),
-                )
-                u = added(u, times((outward[c, 0], outward[c, 1]), r))
-                v = added(v, times((sign * g.normal[k, c], 0.0), r))
-            if v[0] > ERROR:
-                rough = -u[0] / v[0]
-                if rough + ROUGHLY * (1.0 + abs(rough)) < turn[0]:
+                r = less(polygon[b, m, c], polygon[a, i, c])
+                u = added(u, times(outward[c], r))
+                v = added(v, scaled(r, sign * g.normal[k, c]))
+            if v.real > ERROR:
+                rough = -u.real / v.real
+                if rough + ROUGHLY * (1.0 + abs(rough)) < turn.real:
                     continue
                 # By so much more as has the vertex SLACK beyond the plane.
-                more = SLACK * np.sqrt(1.0 + rough * rough) / v[0]
-                t = added(over((-u[0], -u[1]), v), (more, 0.0))
+                more = SLACK * np.sqrt(1.0 + rough * rough) / v.real
+                t = added(over(-u, v), complex(more, 0.0))
                 if greater(t, turn):
                     turn = t
-        if turn[0] == -np.inf:
+        if turn.real == -np.inf:
             continue
-        scale = 1.0 / np.sqrt(1.0 + turn[0] * turn[0])
+        scale = 1.0 / np.sqrt(1.0 + turn.real * turn.real)
         for c in range(3):
-            x = times(turn, (sign * g.normal[k, c], 0.0))
-            x = times(added((outward[c, 0], outward[c, 1]), x), (scale, 0.0))
-            plane[row, count, c, 0], plane[row, count, c, 1] = x
-        plane[row, count, 3, 0] = plane[row, count, 3, 1] = 0.0
-        before: Double = (-np.inf, 0.0)
-        beyond: Double = (np.inf, 0.0)
+            x = added(outward[c], scaled(turn, sign * g.normal[k, c]))
+            plane[row, count, c] = scaled(x, scale)
+        plane[row, count, 3] = 0.0
+        before, beyond = complex(-np.inf, 0.0), complex(np.inf, 0.0)
         for m in range(s.size[a]):
             d = side(s, row, count, a, m)
             if greater(d, before):
@@ -254,15 +240,14 @@ def separators_through(
             d = side(s, row, count, b, m)
             if greater(beyond, d):
                 beyond = d
-        if less(beyond, before)[0] < SLACK / 2:
+        if less(beyond, before).real < SLACK / 2:
             continue
-        offset = (-beyond[0], -beyond[1])
+        offset = -beyond
         if flip:
             for c in range(3):
-                plane[row, count, c, 0] *= -1.0
-                plane[row, count, c, 1] *= -1.0
+                plane[row, count, c] = -plane[row, count, c]
             offset = before
-        plane[row, count, 3, 0], plane[row, count, 3, 1] = added(offset, (SLACK, 0.0))
+        plane[row, count, 3] = added(offset, complex(SLACK, 0.0))
         count += 1
     return count
 
@@ -272,13 +257,12 @@ def own_plane(g: DoubleDoublePortals, s: DoubleDoubleScratch, q: int, row: int) 
     """The first plane of a row := that of directed portal q; kept is what lies beyond it, and
     SLACK more."""
     k, sign = q >> 1, 1.0 if q & 1 == 0 else -1.0
-    offset: Double = (SLACK, 0.0)
+    offset = complex(SLACK, 0.0)
     for a in range(3):
-        n = (sign * g.normal[k, a], 0.0)
-        x = (g.point[g.start[k], a, 0], g.point[g.start[k], a, 1])
-        s.plane[row, 0, a, 0], s.plane[row, 0, a, 1] = n
-        offset = less(offset, times(n, x))
-    s.plane[row, 0, 3, 0], s.plane[row, 0, 3, 1] = offset
+        n = complex(sign * g.normal[k, a], 0.0)
+        s.plane[row, 0, a] = n
+        offset = less(offset, times(n, g.point[g.start[k], a]))
+    s.plane[row, 0, 3] = offset
 
 
 @kernel

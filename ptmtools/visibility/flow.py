@@ -38,6 +38,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bits, Bools, Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
@@ -62,24 +63,14 @@ BITS_OF_BYTE = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1).su
 
 @dataclass(frozen=True)
 class Portals:
-    """Convex openings between leaves; the input of `portal_flow`.
-
-    Attributes
-    ----------
-    leaf_count: number of leaves.
-    leaf: (K, 2) the leaves that each portal joins.
-    normal: (K, 3) normals pointing from ``leaf[:, 0]`` into ``leaf[:, 1]``.
-    point: (Q, 3) float64 convex polygons, either orientation.
-    start: (K + 1,) CSR over portals into `point`.
-    tolerance: that of the cells; if not given, it is derived from the points.
-    """
+    """Convex openings between leaves; the input of `portal_flow`."""
 
     leaf_count: int
-    leaf: NDArray[np.int32]
-    normal: NDArray[np.float64]
-    point: NDArray[np.float64]
-    start: NDArray[np.int64]
-    tolerance: Tolerance | None = None
+    leaf: NDArray[np.int32]  # (K, 2) the leaves that each portal joins
+    normal: Floats  # (K, 3) pointing from ``leaf[:, 0]`` into ``leaf[:, 1]``
+    point: Floats  # (Q, 3) polygons, either orientation
+    start: Ints  # (K + 1,) CSR over portals into `point`
+    tolerance: Tolerance | None = None  # that of the cells, or derived from the points
 
 
 @dataclass(frozen=True)
@@ -90,25 +81,25 @@ class PortalFlow:
     ----------
     sees: (2K, W) uint64 rows of little-endian bits: directed portal p (2k crosses portal k along
         its normal, 2k + 1 against it) may be followed by directed portal q on one straight line.
-    cut: (K,) whether the budget or the depth cut the search from a portal short.
-    work: (K,) chain tests and clips that the search from each portal took, both ways together.
-    ties: (K,) near ties, sequences of portals that the search from each portal rejected by less
-        than 16 roundings, both ways together: mostly portals that touch a plane and no more.
-    decided: (K,) how many of them mattered and were decided in double-double arithmetic.
-    opened: (K,) how many of those let a line pass.
+    cut, work, ties, decided, opened: (K,) as in `Pvs`, both ways together.
     """
 
-    sees: NDArray[np.uint64]
-    cut: NDArray[np.bool_]
-    work: NDArray[np.int64]
-    ties: NDArray[np.int64]
-    decided: NDArray[np.int64]
-    opened: NDArray[np.int64]
+    sees: Bits
+    cut: Bools
+    work: Ints
+    ties: Ints
+    decided: Ints
+    opened: Ints
 
     @property
     def operations(self) -> int:
         """Chain tests and clips that were done in all."""
         return int(self.work.sum())
+
+    def portals_in(self, row: Bits) -> Ints:
+        """The directed portals whose bits are set in a (W,) row."""
+        bits = np.unpackbits(row.view(np.uint8), count=len(self.sees), bitorder="little")
+        return np.flatnonzero(bits)
 
 
 def portal_flow(
@@ -162,7 +153,7 @@ def portal_flow(
     return PortalFlow(searching.known, cut[0::2] | cut[1::2], *(counts[:, 0::2] + counts[:, 1::2]))
 
 
-def _prepass(g: Geometry, executor: Executor) -> NDArray[np.uint64]:
+def _prepass(g: Geometry, executor: Executor) -> Bits:
     """(2K, W) a first upper bound of what each directed portal sees, from planes and floods.
 
     The rounds of bits take a hundredth of the time of the floods: they are not shared out.

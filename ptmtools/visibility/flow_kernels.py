@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ptmtools.arrays import Bits, Ints
 from ptmtools.compiled import plain_kernel
 from ptmtools.visibility.bit_kernels import ONE, ZERO, has, lowest
 from ptmtools.visibility.clipping_kernels import (
@@ -26,7 +27,7 @@ from ptmtools.visibility.clipping_kernels import (
     separate,
 )
 from ptmtools.visibility.line_kernels import glance
-from ptmtools.visibility.storage import Bits, Geometry, Ints, Scratch
+from ptmtools.visibility.storage import Geometry, Scratch
 
 #: Operations after which a search glances, which costs about as much again.
 GLANCE_AFTER = 12_500

@@ -8,11 +8,10 @@ named.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools
 from ptmtools.cells.model import Cells
 from ptmtools.visibility.flow import PortalFlow
 
@@ -24,51 +23,32 @@ MOST = 20
 SHARE = 0.5
 
 
-@dataclass(frozen=True)
-class Leak:
-    """A cell that sees suspiciously much, and the smallest opening that shows half of it.
-
-    Attributes
-    ----------
-    cell: the cell. sees: how many cells it sees, itself included.
-    portal: the opening. through: how many cells are seen through it.
-    """
-
-    cell: int
-    sees: int
-    portal: int
-    through: int
-
-
-def find_leaks(cells: Cells, flow: PortalFlow, matrix: NDArray[np.bool_]) -> tuple[Leak, ...]:
-    """The leaks of a PVS, those that show most first.
+def find_leaks(cells: Cells, flow: PortalFlow, matrix: Bools) -> NDArray[np.int32]:
+    """(n, 4) the leaks of a PVS, those that show most first: see `Pvs.leak`.
 
     Parameters
     ----------
     flow: of the portals of ``cells``. matrix: (C, C) who sees whom.
     """
-    if cells.portal_count == 0:
-        return ()
-    sees = matrix.sum(axis=1)
-    bound = SUSPICIOUS * float(np.median(sees))
-    order = np.lexsort((np.arange(len(sees)), -sees))[:MOST]
-    found = (_leak(cells, flow, int(c), int(sees[c])) for c in order if sees[c] > bound)
-    return tuple(leak for leak in found if leak is not None)
+    found = []
+    if cells.portal_count:
+        sees = matrix.sum(axis=1)
+        bound = SUSPICIOUS * float(np.median(sees))
+        order = np.lexsort((np.arange(len(sees)), -sees))[:MOST]
+        found = [_leak(cells, flow, int(c), int(sees[c])) for c in order if sees[c] > bound]
+    return np.array([leak for leak in found if leak], np.int32).reshape(-1, 4)
 
 
-def _leak(cells: Cells, flow: PortalFlow, cell: int, sees: int) -> Leak | None:
+def _leak(cells: Cells, flow: PortalFlow, cell: int, sees: int) -> tuple[int, ...]:
     enters = cells.leaf_cell[cells.portal_leaf[:, ::-1]].reshape(-1)
     leaves = cells.leaf_cell[cells.portal_leaf].reshape(-1)
     out = np.flatnonzero(leaves == cell)
     seen = np.bitwise_or.reduce(flow.sees[out], axis=0)
-    reached = np.unpackbits(seen.view(np.uint8), count=len(enters), bitorder="little")
-    reached[out] = 1
-    best: tuple[float, int, int] | None = None
-    for q in np.flatnonzero(reached & (enters != leaves)):
-        onward = (flow.sees[q] & seen).view(np.uint8)
-        behind = enters[np.unpackbits(onward, count=len(enters), bitorder="little").astype(bool)]
+    reached = np.union1d(flow.portals_in(seen), out)
+    found = []
+    for q in reached[enters[reached] != leaves[reached]].tolist():
+        behind = enters[flow.portals_in(flow.sees[q] & seen)]
         through = len(np.unique(np.append(behind, enters[q])))
-        candidate = (float(cells.portal_area[q >> 1]), int(q) >> 1, through)
-        if through >= SHARE * sees and (best is None or candidate < best):
-            best = candidate
-    return None if best is None else Leak(cell, sees, best[1], best[2])
+        if through >= SHARE * sees:
+            found.append((float(cells.portal_area[q >> 1]), q >> 1, through))
+    return (cell, sees, *min(found)[1:]) if found else ()

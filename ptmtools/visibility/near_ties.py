@@ -13,8 +13,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Bits, Ints
 from ptmtools.visibility.double_double import SequenceTest
 from ptmtools.visibility.storage import Geometry, Scratch
 
@@ -25,14 +25,7 @@ COSTLIEST = 3
 
 
 class Searched(NamedTuple):
-    """What one search took, summed up over its repetitions but for ``cut`` and ``ties``.
-
-    Attributes
-    ----------
-    cut: whether it was given up for a looser result. work: operations. ties: sequences rejected by
-        a near tie. decided: how many of them were tested again in double-double. opened: how many
-        of those let a line pass.
-    """
+    """What a search took, all repetitions together but for ``cut`` and ``ties``: see `Pvs`."""
 
     cut: bool
     work: int
@@ -42,13 +35,7 @@ class Searched(NamedTuple):
 
 
 def searched(
-    g: Geometry,
-    s: Scratch,
-    test: SequenceTest,
-    known: NDArray[np.uint64],
-    source: int,
-    budget: int,
-    seen: NDArray[np.uint64],
+    g: Geometry, s: Scratch, test: SequenceTest, known: Bits, source: int, budget: int, seen: Bits
 ) -> Searched:
     """Fills the zeroed row ``seen`` (W,) with what a directed portal sees; the arguments are those
     of `flow_kernels.flow`."""
@@ -88,7 +75,7 @@ def _mark(sequence: tuple[int, ...]) -> np.uint64:
     return np.uint64(kernels.mark(np.array(sequence, np.int64), 0, len(sequence)))
 
 
-def _sequences(words: NDArray[np.int64]) -> list[tuple[int, ...]]:
+def _sequences(words: Ints) -> list[tuple[int, ...]]:
     """The sequences in `Scratch.near_tie`, each after its length."""
     row = words.tolist()
     found = []
@@ -100,9 +87,7 @@ def _sequences(words: NDArray[np.int64]) -> list[tuple[int, ...]]:
     return found
 
 
-def _deciding(
-    known: NDArray[np.uint64], doubtful: NDArray[np.uint64], rejected: set[tuple[int, ...]]
-) -> list[tuple[int, ...]]:
+def _deciding(known: Bits, doubtful: Bits, rejected: set[tuple[int, ...]]) -> list[tuple[int, ...]]:
     """The rejected sequences, in order, whose last portal, or what may lie behind it, is among the
     ``doubtful`` (W,)."""
     lasts = np.array(sorted({sequence[-1] for sequence in rejected}), np.int64)

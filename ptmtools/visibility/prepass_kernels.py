@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ptmtools.arrays import Bits, Floats
 from ptmtools.compiled import kernel, plain_kernel
 from ptmtools.visibility.bit_kernels import ONE, ZERO, has
 from ptmtools.visibility.clipping_kernels import EMPTY, beyond, load, separate
-from ptmtools.visibility.storage import Bits, Floats, Geometry, Scratch
+from ptmtools.visibility.storage import Geometry, Scratch
 
 
 @plain_kernel

@@ -6,11 +6,9 @@ budget are in `flow`.
 
 from __future__ import annotations
 
-from dataclasses import astuple
-
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools
 from ptmtools.cells.model import Cells
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
@@ -44,8 +42,7 @@ def compute_pvs(
         return Pvs.from_matrix(_lifted(cells, leaves), conservative=False)
     budget = options.budget if options.method == "full" else 0
     flow = portal_flow(portals, budget, progress, executor)
-    matrix = _lifted(cells, leaf_matrix(cells.leaf_count, portals.leaf, flow))
-    leaks = [astuple(leak) for leak in find_leaks(cells, flow, matrix)]
+    matrix = _lifted(cells, leaf_matrix(portals, flow))
     return Pvs.from_matrix(
         matrix,
         work=flow.work,
@@ -53,11 +50,11 @@ def compute_pvs(
         ties=flow.ties,
         decided=flow.decided,
         opened=flow.opened,
-        leak=np.array(leaks, np.int32).reshape(-1, 4),
+        leak=find_leaks(cells, flow, matrix),
     )
 
 
-def _lifted(cells: Cells, leaves: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _lifted(cells: Cells, leaves: Bools) -> Bools:
     """(C, C) from (L, L): a cell sees what its leaves see."""
     rows, columns = np.nonzero(leaves)
     matrix = np.zeros((cells.cell_count, cells.cell_count), dtype=np.bool_)
@@ -77,18 +74,11 @@ def portals_of(cells: Cells) -> Portals:
     )
 
 
-def leaf_matrix(
-    leaf_count: int, portal_leaf: NDArray[np.int32], flow: PortalFlow
-) -> NDArray[np.bool_]:
+def leaf_matrix(portals: Portals, flow: PortalFlow) -> Bools:
     """(L, L) which leaf may see which: itself, its neighbours, and what its portals see."""
-    enters = portal_leaf[:, ::-1].reshape(-1)
-    leaves = portal_leaf.reshape(-1)
-    matrix = np.eye(leaf_count, dtype=np.bool_)
+    enters, leaves = portals.leaf[:, ::-1].reshape(-1), portals.leaf.reshape(-1)
+    matrix = np.eye(portals.leaf_count, dtype=np.bool_)
     matrix[leaves, enters] = True
-    if not len(leaves):
-        return matrix
-    bits = flow.sees.view(np.uint8).reshape(len(leaves), -1)
-    for p, row in enumerate(bits):
-        seen = np.unpackbits(row, count=len(leaves), bitorder="little")
-        matrix[leaves[p], enters[np.flatnonzero(seen)]] = True
+    for leaf, row in zip(leaves, flow.sees, strict=True):
+        matrix[leaf, enters[flow.portals_in(row)]] = True
     return matrix

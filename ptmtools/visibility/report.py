@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
 from ptmtools.visibility.model import Pvs
@@ -19,13 +18,8 @@ QUANTILES = (0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
 
 @dataclass(frozen=True)
 class PortalFacts:
-    """One portal.
-
-    Attributes
-    ----------
-    portal: its number. cells: the two cells that it joins. area: m² truly open.
-    centre: (x, y, z) metres, world coordinates, the mean of its vertices.
-    """
+    """One portal: its number, the two cells that it joins, its area in m² truly open, and its
+    centre, (x, y, z) metres, world coordinates, the mean of its vertices."""
 
     portal: int
     cells: tuple[int, int]
@@ -35,12 +29,7 @@ class PortalFacts:
 
 @dataclass(frozen=True)
 class CostlyPortal(PortalFacts):
-    """A portal with the work that its search took.
-
-    Attributes
-    ----------
-    operations: chain tests and clips. cut: whether the budget ended the search.
-    """
+    """A portal with the operations that its search took, and whether the budget ended it."""
 
     operations: int
     cut: bool
@@ -48,13 +37,7 @@ class CostlyPortal(PortalFacts):
 
 @dataclass(frozen=True)
 class LeakingPortal(PortalFacts):
-    """The smallest portal through which a cell sees at least half of what it sees.
-
-    Attributes
-    ----------
-    cell: a cell that sees more than three times the median. sees: how many cells it sees.
-    through: how many of them through this portal.
-    """
+    """A portal with a row of `Pvs.leak`: a cell, how many it sees, and how many through this."""
 
     cell: int
     sees: int
@@ -70,12 +53,9 @@ class PvsReport:
     cells, portals: how many there are. doors: portals between two cells.
     sizes: share of the cells → cells that this share of them sees at most, for `QUANTILES`.
     average: cells that a cell sees, itself included.
-    operations: chain tests and clips in all. fallbacks: portals whose search was cut short.
-    ties: near ties, sequences of portals rejected by less than 16 roundings. decided: those of them
-        that mattered and were decided in double-double arithmetic. opened: those that let a line
-        pass.
+    operations, fallbacks, ties, decided, opened: totals of what `Pvs` counts for each portal.
     costliest: the portals that took most work, most first. leaks: those that see most first.
-    conservative: False where the sets are of what random lines showed.
+    conservative: as in `Pvs`.
     """
 
     cells: int
@@ -115,22 +95,19 @@ def report(cells: Cells, pvs: Pvs) -> PvsReport:
             CostlyPortal(**_facts(cells, int(k)), operations=int(pvs.work[k]), cut=bool(pvs.cut[k]))
             for k in order
         ),
-        leaks=tuple(_leaking(cells, row) for row in pvs.leak),
+        leaks=tuple(
+            LeakingPortal(**_facts(cells, portal), cell=cell, sees=sees, through=through)
+            for cell, sees, portal, through in pvs.leak.tolist()
+        ),
         conservative=pvs.conservative,
     )
 
 
-def _leaking(cells: Cells, row: NDArray[np.int32]) -> LeakingPortal:
-    cell, sees, portal, through = (int(n) for n in row)
-    return LeakingPortal(**_facts(cells, portal), cell=cell, sees=sees, through=through)
-
-
 def _facts(cells: Cells, k: int) -> dict[str, Any]:
     one, other = (int(cells.leaf_cell[leaf]) for leaf in cells.portal_leaf[k])
-    x, y, z = (float(c) for c in cells.portal(k).mean(axis=0))
     return {
         "portal": k,
         "cells": (one, other),
         "area": float(cells.portal_area[k]),
-        "centre": (x, y, z),
+        "centre": tuple(cells.portal(k).mean(axis=0).tolist()),
     }

@@ -8,11 +8,10 @@ them evenly; random ones, as many as wanted, show more.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.sight import LONGEST
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
@@ -23,13 +22,8 @@ from ptmtools.visibility.storage import Geometry
 SPANS = 64
 
 
-class Shooting(NamedTuple):
-    """What the tasks share: lines through each portal, and of which kind."""
-
-    geometry: Geometry
-    leaf_count: int
-    lines: int
-    seed: int
+#: What the tasks share: portals, how many leaves, lines through each portal, and the seed.
+Shooting = tuple[Geometry, int, int, int]
 
 
 def sampled_leaves(
@@ -37,7 +31,7 @@ def sampled_leaves(
     lines: int,
     executor: Executor = Serial(),  # noqa: B008 - has no state
     seed: int = 0,
-) -> NDArray[np.bool_]:
+) -> Bools:
     """(L, L) which leaf sees which on one of ``lines`` random lines through each portal.
 
     Half of the lines aim at a random point of a random portal, half anywhere. Symmetric; each leaf
@@ -50,7 +44,7 @@ def sampled_leaves(
     matrix = np.eye(leaves, dtype=np.bool_)
     if count == 0:
         return matrix
-    shooting = Shooting(geometry(portals), leaves, lines, seed)
+    shooting = (geometry(portals), leaves, lines, seed)
     step = -(-count // SPANS)
     spans = [(first, min(first + step, count)) for first in range(0, count, step)]
     for bits in executor.each(_shoot, shooting, spans, releases_lock=True):
@@ -64,17 +58,17 @@ def _shoot(shared: Shooting, span: tuple[int, int]) -> NDArray[np.uint8]:
     """As a task: (L, ⌈L / 8⌉) bits, who sees whom by lines of the portals ``span``."""
     from ptmtools.cells.line_kernels import Openings, sight_lines
 
-    g = shared.geometry
+    g, leaves, lines, seed = shared
     openings = Openings(g.point, g.start, g.leaf, g.out_start, g.out)
     path = np.empty(2 * LONGEST, np.int64)
-    seen = np.zeros((shared.leaf_count, shared.leaf_count), np.bool_)
+    seen = np.zeros((leaves, leaves), np.bool_)
     for k in range(*span):
-        rng = np.random.default_rng([shared.seed, k])
-        portal = np.full(shared.lines, k)
+        rng = np.random.default_rng([seed, k])
+        portal = np.full(lines, k)
         origin = _points(rng, g, portal)
-        aimed = _points(rng, g, rng.integers(len(g.normal), size=shared.lines)) - origin
+        aimed = _points(rng, g, rng.integers(len(g.normal), size=lines)) - origin
         anywhere = rng.normal(size=origin.shape)
-        along = np.where(rng.random((shared.lines, 1)) < 0.5, aimed, anywhere)
+        along = np.where(rng.random((lines, 1)) < 0.5, aimed, anywhere)
         speed = along @ g.normal[k]
         across = np.abs(speed) > g.slack
         along *= np.sign(speed)[:, None]
@@ -82,14 +76,12 @@ def _shoot(shared: Shooting, span: tuple[int, int]) -> NDArray[np.uint8]:
     return np.packbits(seen, axis=1)
 
 
-def _points(
-    rng: np.random.Generator, g: Geometry, portal: NDArray[np.int64]
-) -> NDArray[np.float64]:
+def _points(rng: np.random.Generator, g: Geometry, portal: Ints) -> Floats:
     """(n, 3) a random point of each of (n,) portals, in a random triangle of its fan."""
     first, size = g.start[portal], np.diff(g.start)[portal]
     corner = 1 + rng.integers(np.maximum(size - 2, 1))
     fan = [np.zeros_like(corner), corner, corner + 1]
     a, b, c = (g.point[first + np.minimum(i, size - 1)] for i in fan)
     u, v = np.sqrt(rng.random((len(portal), 1))), rng.random((len(portal), 1))
-    points: NDArray[np.float64] = a + u * (b - a + v * (c - b))
+    points: Floats = a + u * (b - a + v * (c - b))
     return points

@@ -7,11 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Bits, Ints
 from ptmtools.visibility.double_double import SequenceTest
 from ptmtools.visibility.near_ties import Searched, searched
 from ptmtools.visibility.storage import Geometry, Scratch
@@ -27,15 +26,10 @@ Tools = tuple[Scratch, SequenceTest]
 
 
 class Searching:
-    """The portals, and what each may see by all that is known.
+    """The portals; what each may see by all that is known, (2K, W) bits; and the budget of each
+    search, see `portal_flow`."""
 
-    Attributes
-    ----------
-    geometry: the portals. budget: see `portal_flow`.
-    known: (2K, W) uint64 rows of bits.
-    """
-
-    def __init__(self, geometry: Geometry, known: NDArray[np.uint64], budget: int) -> None:
+    def __init__(self, geometry: Geometry, known: Bits, budget: int) -> None:
         self.geometry, self.known, self.budget = geometry, known, budget
         self._idle: list[Tools] = []
 
@@ -60,14 +54,7 @@ class Searching:
         return vars(self) | {"_idle": []}
 
 
-class Found(NamedTuple):
-    """What one search found: a (W,) row of bits, and what it took."""
-
-    seen: NDArray[np.uint64]
-    figures: Searched
-
-
-def flood_from(shared: Searching, span: tuple[int, int]) -> NDArray[np.uint64]:
+def flood_from(shared: Searching, span: tuple[int, int]) -> Bits:
     """As a task: (last - first, W) what floods reach from the directed portals ``span`` (first,
     last)."""
     from ptmtools.visibility.prepass_kernels import flood
@@ -79,16 +66,15 @@ def flood_from(shared: Searching, span: tuple[int, int]) -> NDArray[np.uint64]:
     return rows
 
 
-def search_from(shared: Searching, source: int) -> Found:
-    """As a task: what the directed portal ``source`` sees."""
+def search_from(shared: Searching, source: int) -> tuple[Bits, Searched]:
+    """As a task: a (W,) row of bits, what the directed portal ``source`` sees; and what it took."""
     seen = np.zeros(shared.words, np.uint64)
     with shared.tools() as (storage, test):
         given = shared.geometry, storage, test, shared.known, source, shared.budget
-        figures = searched(*given, seen)
-    return Found(seen, figures)
+        return seen, searched(*given, seen)
 
 
-def settle(shared: Searching, done: tuple[NDArray[np.int64], NDArray[np.uint64]]) -> None:
+def settle(shared: Searching, done: tuple[Ints, Bits]) -> None:
     """As a change: the (B, W) rows that a batch of (B,) directed portals has found."""
     from ptmtools.visibility.bit_kernels import drop_unreturned
 

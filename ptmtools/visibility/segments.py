@@ -19,13 +19,14 @@ for all copies would let a narrow opening that is truly missing pass as a hairli
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.cells.model import Cells
+from ptmtools.cells.vectors import areas, fans, volumes
 from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
 from ptmtools.visibility.model import Pvs
@@ -84,7 +85,7 @@ class SegmentReport:
 
 
 def check_conservative(
-    structural: NDArray[np.float64],
+    structural: Floats,
     cells: Cells,
     pvs: Pvs,
     segments: int = 1_000_000,
@@ -118,8 +119,7 @@ def check_conservative(
     blockers = Blockers(structural, cells.root_box)
     jitter = JITTER * cells.tolerance.hairline
     tried = unoccluded = hairlines = drawn = batch = 0
-    counts: dict[tuple[int, int], int] = {}
-    example: dict[tuple[int, int], tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
+    found: dict[tuple[int, int], MissedPair] = {}
     while tried < segments and drawn < PATIENCE * segments:
         rng = np.random.default_rng([seed, batch])
         size = min(BATCH, segments - tried)
@@ -143,83 +143,75 @@ def check_conservative(
             share += counts_as_miss / COPIES
         hairlines += int((share < 0.5).sum())
         for m in missed[share >= 0.5]:
-            pair = (int(min(a[m], b[m])), int(max(a[m], b[m])))
-            counts[pair] = counts.get(pair, 0) + 1
-            ends = (start[m], end[m]) if a[m] <= b[m] else (end[m], start[m])
-            example.setdefault(pair, ends)
+            ends = (int(a[m]), _place(start[m])), (int(b[m]), _place(end[m]))
+            (one, here), (other, there) = sorted(ends)
+            pair = found.get((one, other)) or MissedPair((one, other), here, there, 0)
+            found[one, other] = replace(pair, segments=pair.segments + 1)
         progress(tried, segments, "segments")
-    found = tuple(
-        MissedPair(pair, _place(example[pair][0]), _place(example[pair][1]), counts[pair])
-        for pair in sorted(counts)
-    )
-    return SegmentReport(tried, unoccluded, found, hairlines)
+    missing = tuple(found[pair] for pair in sorted(found))
+    return SegmentReport(tried, unoccluded, missing, hairlines)
 
 
 class Sampler:
     """Draws segments in and around the cells; the kinds are those of the module's head."""
 
     def __init__(self, cells: Cells) -> None:
-        self.tetrahedra, owner = tetrahedra(cells)
-        edge = self.tetrahedra[:, 1:] - self.tetrahedra[:, :1]
-        volume = np.abs(np.linalg.det(edge))
-        self.by_volume = _cumulated(volume)
-        of_leaf = np.bincount(owner, weights=volume, minlength=cells.leaf_count)
-        self.by_leaf = _cumulated(volume / np.maximum(of_leaf, np.finfo(np.float64).tiny)[owner])
+        corners, leaf = cells.tetrahedra()
+        volume = volumes(corners)
+        self.by_volume = _Inside(corners, volume)
+        self.by_leaf = _Inside(corners, _shared(volume, leaf))
+        rows, portal = fans(cells.portal_start)
+        triangles = cells.portal_point[rows]
+        self.by_portal = _Inside(triangles, _shared(areas(triangles), portal))
         self.extent = float(np.ptp(cells.root_box, axis=0).max())
-        fans = [cells.portal(k) for k in range(cells.portal_count)]
-        rows = [np.stack([f[:1].repeat(len(f) - 2, 0), f[1:-1], f[2:]], axis=1) for f in fans]
-        self.portals = np.concatenate(rows) if rows else np.zeros((0, 3, 3))
-        area = np.linalg.norm(
-            np.cross(
-                self.portals[:, 1] - self.portals[:, 0], self.portals[:, 2] - self.portals[:, 0]
-            ),
-            axis=1,
-        )
-        of_portal = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
-        total = np.bincount(of_portal, weights=area, minlength=len(rows))
-        self.by_portal = _cumulated(area / np.maximum(total, np.finfo(np.float64).tiny)[of_portal])
 
-    def segments(
-        self, rng: np.random.Generator, count: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def segments(self, rng: np.random.Generator, count: int) -> tuple[Floats, Floats]:
         """(count, 3) starts and ends."""
-        quarter = [count // 4 + (i < count % 4) for i in range(4)]
-        start = [self._inside(rng, self.by_volume, quarter[0])]
-        end = [self._inside(rng, self.by_volume, quarter[0])]
-        start.append(self._inside(rng, self.by_leaf, quarter[1]))
-        end.append(self._inside(rng, self.by_leaf, quarter[1]))
-        start.append(self._inside(rng, self.by_leaf, quarter[2]))
-        end.append(start[2] + self._arm(rng, _direction(rng, quarter[2])))
-        if len(self.portals):
-            middle = self._on_portals(rng, quarter[3])
-            along = _direction(rng, quarter[3])
-            start.append(middle - self._arm(rng, along))
-            end.append(middle + self._arm(rng, along))
-        return np.concatenate(start), np.concatenate(end)
+        a, b, c, d = (count // 4 + (i < count % 4) for i in range(4))
+        anywhere, leaf = self.by_volume, self.by_leaf
+        ends = [
+            (anywhere.draw(rng, a), anywhere.draw(rng, a)),
+            (leaf.draw(rng, b), leaf.draw(rng, b)),
+        ]
+        start = leaf.draw(rng, c)
+        ends.append((start, start + self._arm(rng, _direction(rng, c))))
+        if len(self.by_portal.corners):
+            middle, along = self.by_portal.draw(rng, d), _direction(rng, d)
+            ends.append((middle - self._arm(rng, along), middle + self._arm(rng, along)))
+        starts, others = zip(*ends, strict=True)
+        return np.concatenate(starts), np.concatenate(others)
 
-    def _inside(
-        self, rng: np.random.Generator, cumulated: NDArray[np.float64], count: int
-    ) -> NDArray[np.float64]:
-        corner = self.tetrahedra[np.searchsorted(cumulated, rng.random(count), side="right")]
-        weight = rng.exponential(size=(count, 4, 1))
-        mixed: NDArray[np.float64] = (corner * weight).sum(axis=1) / weight.sum(axis=1)
-        return mixed
-
-    def _on_portals(self, rng: np.random.Generator, count: int) -> NDArray[np.float64]:
-        corner = self.portals[np.searchsorted(self.by_portal, rng.random(count), side="right")]
-        weight = rng.exponential(size=(count, 3, 1))
-        mixed: NDArray[np.float64] = (corner * weight).sum(axis=1) / weight.sum(axis=1)
-        return mixed
-
-    def _arm(self, rng: np.random.Generator, along: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _arm(self, rng: np.random.Generator, along: Floats) -> Floats:
         exponent = rng.uniform(np.log(SHORTEST), np.log(LONGEST), size=(len(along), 1))
         return along * (np.exp(exponent) * self.extent)
+
+
+class _Inside:
+    """Draws points in (n, k, 3) simplices, from each in proportion to its (n,) weight."""
+
+    def __init__(self, corners: Floats, weight: Floats) -> None:
+        self.corners = corners
+        total = np.cumsum(weight if weight.any() else np.ones(len(corners)))
+        self._until = total / total[-1:]
+
+    def draw(self, rng: np.random.Generator, count: int) -> Floats:
+        """(count, 3) points."""
+        corner = self.corners[np.searchsorted(self._until, rng.random(count), side="right")]
+        weight = rng.exponential(size=(*corner.shape[:2], 1))
+        mixed: Floats = (corner * weight).sum(axis=1) / weight.sum(axis=1)
+        return mixed
+
+
+def _shared(size: Floats, owner: Ints) -> Floats:
+    """(n,) sizes as shares of those of their owners."""
+    total = np.bincount(owner, size)[owner]
+    return size / np.maximum(total, np.finfo(np.float64).tiny)
 
 
 class Blockers:
     """The structural triangles in Embree, brought to the unit cube in float64 first."""
 
-    def __init__(self, structural: NDArray[np.float64], box: NDArray[np.float64]) -> None:
+    def __init__(self, structural: Floats, box: Floats) -> None:
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
 
@@ -231,11 +223,11 @@ class Blockers:
             self._scene = EmbreeScene(robust=True)
             TriangleMesh(self._scene, self._local(structural))
 
-    def _local(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
+    def _local(self, points: Floats) -> Singles:
         local = (points - self._middle) * self._scale
         return np.ascontiguousarray(local, dtype=np.float32)
 
-    def between(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def between(self, start: Floats, end: Floats) -> Bools:
         """(n,) whether a triangle blocks the segment between two (n, 3) points."""
         if self._scene is None or len(start) == 0:
             return np.zeros(len(start), dtype=np.bool_)
@@ -246,34 +238,12 @@ class Blockers:
         return np.asarray(hit >= 0, dtype=np.bool_)
 
 
-def tetrahedra(cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """(n, 4, 3) tetrahedra that fill the leaves, and the (n,) leaf of each."""
-    corners, owner = [np.zeros((0, 4, 3))], [np.zeros(0, np.int64)]
-    for leaf in range(cells.leaf_count):
-        apex = cells.leaf_points(leaf).mean(axis=0)
-        for loop in cells.leaf_faces(leaf):
-            face = cells.leaf_point[loop]
-            fan = np.stack(np.broadcast_arrays(apex[None], face[:1], face[1:-1], face[2:]), axis=1)
-            corners.append(fan)
-            owner.append(np.full(len(fan), leaf, np.int64))
-    return np.concatenate(corners), np.concatenate(owner)
-
-
-def _cumulated(weight: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cumulated shares for drawing by `searchsorted`; never quite 1 before the end."""
-    total = np.cumsum(weight)
-    if len(total) == 0 or total[-1] <= 0:
-        return np.arange(1, len(weight) + 1) / max(len(weight), 1)
-    shares: NDArray[np.float64] = total / total[-1]
-    return shares
-
-
-def _direction(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+def _direction(rng: np.random.Generator, count: int) -> Floats:
     """(count, 3) unit vectors, uniform on the sphere."""
     vector = rng.normal(size=(count, 3))
-    unit: NDArray[np.float64] = vector / np.linalg.norm(vector, axis=1, keepdims=True)
+    unit: Floats = vector / np.linalg.norm(vector, axis=1, keepdims=True)
     return unit
 
 
-def _place(point: NDArray[np.float64]) -> tuple[float, float, float]:
+def _place(point: Floats) -> tuple[float, float, float]:
     return float(point[0]), float(point[1]), float(point[2])

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bits = NDArray[np.uint64]
+from ptmtools.arrays import Bits, Floats, Ints
+
+Doubles = NDArray[np.complex128]
 
 
 class Geometry(NamedTuple):
@@ -43,10 +43,9 @@ class Scratch(NamedTuple):
 
 
 class DoubleDoublePortals(NamedTuple):
-    """Portals in double-double numbers, (high, low) along the last axis; `double_double` fills
-    it."""
+    """Portals in double-double numbers (`double_double_kernels`); `double_double` fills it."""
 
-    point: Floats  # (Q, 3, 2) at most 1
+    point: Doubles  # (Q, 3) at most 1
     start: Ints  # (K + 1,)
     normal: Floats  # (K, 3)
 
@@ -54,9 +53,9 @@ class DoubleDoublePortals(NamedTuple):
 class DoubleDoubleScratch(NamedTuple):
     """Working storage of one worker for these."""
 
-    polygon: Floats  # (4, V, 3, 2)
+    polygon: Doubles  # (4, V, 3)
     size: Ints  # (4,)
     cuts: Ints  # (4,) how often each polygon was cut
-    plane: Floats  # (2, 2V + 1, 4, 2) unit normal n and offset d: kept is where n·x + d >= 0
-    side: Floats  # (V, 2)
-    vector: Floats  # (2, 3, 2)
+    plane: Doubles  # (2, 2V + 1, 4) unit normal n and offset d: kept is where n·x + d >= 0
+    side: Doubles  # (V,)
+    vector: Doubles  # (2, 3)

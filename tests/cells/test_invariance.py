@@ -81,17 +81,11 @@ def models(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Model]:
 
 def measures(cells: Cells) -> tuple[np.ndarray, np.ndarray]:
     """(L, 3) centroids and (L,) volumes of the leaves."""
-    centre, volume = np.zeros((cells.leaf_count, 3)), np.zeros(cells.leaf_count)
-    for leaf in range(cells.leaf_count):
-        middle = cells.leaf_points(leaf).mean(axis=0)
-        fans = [
-            [(r[0], *r[i : i + 2]) for i in range(1, len(r) - 1)] for r in cells.leaf_faces(leaf)
-        ]
-        corners = cells.leaf_point[np.concatenate(fans)] - middle
-        part = np.linalg.det(corners) / 6
-        volume[leaf] = part.sum()
-        centre[leaf] = middle + part @ corners.sum(axis=1) / (4 * volume[leaf])
-    return centre, volume
+    corners, leaf = cells.tetrahedra()
+    part = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6
+    volume = np.bincount(leaf, part)
+    centre = [np.bincount(leaf, part * places) for places in corners.mean(axis=1).T] / volume
+    return centre.T, volume
 
 
 def assert_same(

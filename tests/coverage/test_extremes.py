@@ -14,7 +14,7 @@ from ptmtools.coverage.backends import BACKENDS
 from ptmtools.coverage.backends.embree import EmbreeRenderer
 from ptmtools.coverage.item_buffer import VIEWS, Surfaces
 from ptmtools.coverage.options import AchOptions
-from ptmtools.coverage.placement import Tetrahedra, Volume
+from ptmtools.coverage.placement import Volume
 from ptmtools.coverage.sample_points import PointFinder
 from ptmtools.coverage.sampling import CLEARANCE, Sampler
 from ptmtools.coverage.solids import Obstacles
@@ -396,7 +396,7 @@ def test_seventy_thousand_cells(
 def finder(room_row, points, clearance):
     """Where points are taken in turn from those given, in a room."""
     scene, cells = room_row(1)
-    at = PointFinder(Volume(cells, Tetrahedra.of(cells), 0), Obstacles.of(scene, cells), clearance)
+    at = PointFinder(Volume.of_cells(cells)[0], Obstacles.of(scene, cells), clearance)
     return at, at.usable(np.array(points, dtype=np.float64).reshape(-1, 3))
 
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ptmtools.coverage.placement import TRIES, Tetrahedra, Volume, filling, strata, volumes
+from ptmtools.cells.vectors import volumes
+from ptmtools.coverage.placement import TRIES, Volume, filling, strata
 from ptmtools.coverage.sobol import sobol, uniform
 
 FROZEN_SOBOL = [
@@ -52,7 +53,7 @@ CORNER = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]], dtype=np.float
 
 
 def volume(cells, cell):
-    return Volume(cells, Tetrahedra.of(cells), cell)
+    return Volume.of_cells(cells)[cell]
 
 
 def filled(tetra, unit):
@@ -61,8 +62,8 @@ def filled(tetra, unit):
 
 def test_tetrahedra_fill_the_cell(room_row):
     _, cells = room_row(2)
-    assert Tetrahedra.of(cells).of_cell(1)[1].sum() == pytest.approx(64)
-    assert Tetrahedra.of(cells).of_cell(1)[0][..., 0].min() == 4
+    assert volume(cells, 1).volume.sum() == pytest.approx(64)
+    assert volume(cells, 1).tetrahedra[..., 0].min() == 4
 
 
 def test_a_cell_of_several_leaves_is_filled_whole(room_row):

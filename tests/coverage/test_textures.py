@@ -11,7 +11,7 @@ import pytest
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.item_buffer import Surfaces
 from ptmtools.coverage.options import AchOptions
-from ptmtools.coverage.placement import Tetrahedra, Volume
+from ptmtools.coverage.placement import Volume
 from ptmtools.coverage.sample_points import PointFinder, PointSequence
 from ptmtools.coverage.sampling import CLEARANCE
 from ptmtools.coverage.solids import Obstacles
@@ -94,8 +94,7 @@ def test_textures_are_counted_where_they_are_seen(room_row, backend, drawing):
     surfaces = Surfaces.of(scene, cells)
     clearance = CLEARANCE * scene.tolerance.thin
     for cell in range(2):
-        volume = Volume(cells, Tetrahedra.of(cells), cell)
-        finder = PointFinder(volume, Obstacles.of(scene, cells), clearance)
+        finder = PointFinder(Volume.of_cells(cells)[cell], Obstacles.of(scene, cells), clearance)
         points = PointSequence(finder, "sobol", 0).take(options.points)
         with drawing(backend, surfaces, options.side) as renderer:
             shows = renderer.show(points)[0]

@@ -37,7 +37,7 @@ def numbered(dtype: str) -> Samples:
 def by_texel(max_error: int) -> tuple[Coder, Decoder]:
     return (
         lambda level, below: texel.encode(level, below, max_error)[0],
-        lambda data, below, shape: texel.decode(data, below, shape, below.dtype, max_error),
+        lambda data, below, shape: texel.decode(data, below, shape, max_error),
     )
 
 

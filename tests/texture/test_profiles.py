@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
 from ptmtools.texture import EncodeOptions, check, decode, encode, load_image, write_image
+from ptmtools.texture.coders.reading import Reader
 from ptmtools.texture.profiles import PROFILES, Profile, Tile
-from ptmtools.texture.profiles.raw import expect_length
 
-TOY = Profile("toy", 200, "for tests", __name__)
+TOY = Profile("toy", 200, "for tests", module=__name__)
 TEXELS = np.random.default_rng(3).integers(0, 256, (40, 70, 3), np.uint8)
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -30,8 +30,10 @@ def encode_base(level: NDArray[Any]) -> bytes:
 
 
 def decode_base(data: bytes, shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
-    expect_length(data, int(np.prod(shape)) * dtype.itemsize)
-    return (np.frombuffer(data, np.uint8) ^ 255).view(dtype).reshape(shape)
+    reader = Reader(data)
+    flipped = reader.numbers("u1", int(np.prod(shape)) * dtype.itemsize)
+    reader.end()
+    return (flipped ^ 255).view(dtype).reshape(shape)
 
 
 def encode_tile(level: NDArray[Any], below: NDArray[Any], *rest: Any) -> Tile:

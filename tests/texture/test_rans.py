@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError
 from ptmtools.texture.coders.rans import kernels, tables
 from ptmtools.texture.coders.rans.reference import Symbols, built_in, normalised, read_tables
+from ptmtools.texture.coders.rans.sizes import Sink
 from ptmtools.texture.coders.rans.stream import Stream, encode_symbols, read_stream
+from ptmtools.texture.coders.reading import Reader
 
 TABLES = 29
 
@@ -32,7 +34,7 @@ def test_normalised_frequencies(counts: list[int]) -> None:
 
 
 def test_built_in_tables_are_those_of_the_specification() -> None:
-    for kind, row in enumerate(tables.built_in()[1:], start=1):
+    for kind, row in enumerate(tables.built_in().tables[1:], start=1):
         assert row.tolist() == built_in(kind)
 
 
@@ -42,13 +44,13 @@ def test_tables_survive_their_serialised_form(rows: list[list[int]]) -> None:
     counts = np.zeros((TABLES, 256), np.int64)
     for t, row in enumerate(rows):
         counts[7 * t] = row
-    frequency, packed = tables.choose(counts, TABLES - 1)
-    parsed, used = tables.parse(packed + b"more", TABLES)
-    np.testing.assert_array_equal(parsed, frequency)
-    assert used == len(packed)
-    expected, end = read_tables(packed, 0, TABLES)
-    assert expected == frequency.tolist()
-    assert end == used
+    frequency, packed = tables.choose(counts, TABLES - 1, tables.built_in())
+    reader = Reader(packed + b"more")
+    np.testing.assert_array_equal(tables.parse(reader, TABLES, tables.built_in()), frequency)
+    assert reader.rest() == b"more"
+    reader = Reader(packed)
+    assert read_tables(reader, TABLES) == frequency.tolist()
+    reader.end()
 
 
 def test_the_length_table_is_a_logarithm() -> None:
@@ -67,11 +69,11 @@ def coded() -> tuple[Stream, tables.Frequencies, NDArray[np.uint16], NDArray[np.
     symbols[7] = 40_000
     counts = np.zeros((4, 256), np.int64)
     np.add.at(counts, (contexts, np.minimum(symbols, tables.ESCAPE)), 1)
-    frequency, _ = tables.choose(counts, 4)
-    data = encode_symbols(symbols, contexts, frequency, 4)
-    plain = Symbols(data, 0, frequency.tolist())
+    packed, data = encode_symbols(Sink(symbols, contexts, counts), 4, tables.built_in())
+    frequency = tables.parse(Reader(packed), 4, tables.built_in())
+    plain = Symbols(Reader(data), frequency.tolist())
     assert [plain.next(int(t)) for t in contexts] == symbols.tolist()
-    return read_stream(data, 301), frequency, symbols, contexts
+    return read_stream(Reader(data), 301), frequency, symbols, contexts
 
 
 def test_symbols_come_back_row_by_row(coded: Any) -> None:
@@ -116,4 +118,4 @@ def test_symbols_come_back_one_by_one(coded: Any) -> None:
 )
 def test_impossible_tables_are_refused(data: bytes) -> None:
     with pytest.raises(InputError, match="PTM-I112"):
-        tables.parse(data, TABLES)
+        tables.parse(Reader(data), TABLES, tables.built_in())

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 import ptmtools.texture as texture
 from ptmtools.errors import InputError, LimitError
 from ptmtools.texture import Description, EncodeOptions, Limits, build_pyramid, encode
-from ptmtools.texture.container import Head, pack_head
+from ptmtools.texture.container import pack_head
 from ptmtools.texture.tiling import Box, covering, tiles_under
 from tests.memory import little_memory
 
@@ -174,8 +174,9 @@ def test_what_the_tiles_under_a_window_cover(width: int, height: int, side: int,
 
 
 def test_a_million_tiles_are_not_listed_to_be_refused() -> None:
-    head = Head(65536, 65536, 4, "float32", "fast", 0, 16, 0)
-    data = pack_head(head, b"", [(1, zlib.crc32(b"\0"))] * 17) + bytes(17)
+    groups = [(1, zlib.crc32(b"\0"))] * 17
+    head = pack_head((65536, 65536, 4), "float32", EncodeOptions(tile=16), 0, b"", groups)
+    data = head + bytes(17)
     with (
         little_memory(1 << 22),
         texture.open(data) as ptm,

@@ -41,7 +41,7 @@ def bits(array: NDArray) -> bytes:
 def assert_exact(level: NDArray) -> bytes:
     below = mean_below(level)
     data, texels = coder.encode(level, below)
-    found = coder.decode(data, below, level.shape, level.dtype)
+    found = coder.decode(data, below, level.shape)
     assert bits(texels) == bits(level)
     assert found.dtype == level.dtype
     assert bits(found) == bits(level)
@@ -50,7 +50,7 @@ def assert_exact(level: NDArray) -> bytes:
 
 def assert_within(level: NDArray, below: NDArray, max_error: int) -> tuple[bytes, NDArray]:
     data, texels = coder.encode(level, below, max_error)
-    found = coder.decode(data, below, level.shape, level.dtype, max_error)
+    found = coder.decode(data, below, level.shape, max_error)
     assert bits(found) == bits(texels)
     assert int(np.abs(found.astype(np.int64) - level).max()) <= max_error
     return data, found
@@ -144,7 +144,7 @@ def assert_reference(level: NDArray, max_error: int = 0) -> bytes:
     if data[0] in (coder.CODED, coder.CODED_WITH_WEIGHTS):
         found = reference.decode_texels(data, below, level.shape, max_error)
         assert bits(found) == bits(texels)
-    assert bits(coder.decode(data, below, level.shape, level.dtype, max_error)) == bits(texels)
+    assert bits(coder.decode(data, below, level.shape, max_error)) == bits(texels)
     return data
 
 
@@ -156,7 +156,7 @@ def test_the_reference_sees_sent_weights_and_tables() -> None:
 
 
 def test_built_in_tables_are_those_of_the_specification() -> None:
-    family = layout.table_family()
+    family = layout.table_family().tables
     assert len(family) == 1 + 7 + 71
     for kind, row in enumerate(family[1:], start=1):
         assert row.tolist() == reference.built_in(kind)
@@ -219,7 +219,7 @@ def test_a_level_below_that_is_no_mean_costs_more_and_nothing_else() -> None:
     data, _ = coder.encode(level, below)
     assert data[0] in (coder.RAW, coder.PLAIN)
     if data[0] == coder.PLAIN:
-        assert bits(coder.decode(data, below, level.shape, level.dtype)) == bits(level)
+        assert bits(coder.decode(data, below, level.shape)) == bits(level)
 
 
 @settings(deadline=None, max_examples=200)
@@ -227,9 +227,9 @@ def test_a_level_below_that_is_no_mean_costs_more_and_nothing_else() -> None:
 def test_nonsense_is_refused(body: bytes, form: int, dtype: np.dtype) -> None:
     below = np.zeros((4, 4, 3), dtype)
     with pytest.raises(InputError, match="PTM-I112"):
-        coder.decode(bytes([form]) + body, below, (8, 8, 3), dtype)
+        coder.decode(bytes([form]) + body, below, (8, 8, 3))
 
 
 def test_empty_bytes_are_refused() -> None:
     with pytest.raises(InputError, match="PTM-I112"):
-        coder.decode(b"", np.zeros((1, 1, 1), np.uint16), (2, 2, 1), np.dtype(np.uint16))
+        coder.decode(b"", np.zeros((1, 1, 1), np.uint16), (2, 2, 1))

@@ -85,8 +85,8 @@ def lined_up(
     return Portals(count + 1, leaf, normal, point, 4 * np.arange(count + 1))
 
 
-def fraction(number: tuple[float, float]) -> Fraction:
-    return Fraction(number[0]) + Fraction(number[1])
+def fraction(number: complex) -> Fraction:
+    return Fraction(number.real) + Fraction(number.imag)
 
 
 @given(a=NUMBERS, b=NUMBERS, c=NUMBERS, d=NUMBERS)

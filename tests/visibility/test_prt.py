@@ -52,7 +52,7 @@ def test_dm1_is_at_least_as_tight_as_the_reference(prt, dm1):
 
 def test_dm1_hides_nothing_that_a_line_reaches(prt, dm1):
     portals, cluster, flow, theirs = dm1
-    ours = leaf_matrix(portals.leaf_count, portals.leaf, flow)
+    ours = leaf_matrix(portals, flow)
     lost = np.argwhere(theirs & ~prt.visible_leafs(portals, flow, cluster))
     assert prt.arriving(portals, cluster[lost], 500).sum() == 0
     rng = np.random.default_rng(0)

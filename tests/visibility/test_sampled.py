@@ -37,7 +37,7 @@ def test_lines_see_what_there_is_to_see(build_rooms):
 
 
 def test_lines_never_see_more_than_the_flow(maze):
-    flow = leaf_matrix(maze.leaf_count, maze.leaf, portal_flow(maze, 200_000))
+    flow = leaf_matrix(maze, portal_flow(maze, 200_000))
     seen = sampled_leaves(maze, 3000)
     assert np.array_equal(seen, seen.T)
     assert not np.any(seen & ~flow)

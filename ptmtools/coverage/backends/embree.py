@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.coverage.item_buffer import BEFORE, VIEWS, Surfaces
 from ptmtools.coverage.sample_points import SamplePoints
 
@@ -49,16 +50,12 @@ class EmbreeRenderer:
 
         return f"Embree (embreex {version('embreex')})"
 
-    def show(
-        self, points: SamplePoints, needed: NDArray[np.bool_] | None = None
-    ) -> NDArray[np.int32]:
+    def show(self, points: SamplePoints, needed: Bools | None = None) -> NDArray[np.int32]:
         """See `Renderer.show`."""
         found, _ = self._layers(*self._rays(points))
         return found.reshape(-1, len(points), len(VIEWS), self._face**2)
 
-    def trace(
-        self, points: SamplePoints, pixels: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    def trace(self, points: SamplePoints, pixels: Ints) -> tuple[NDArray[np.int32], Floats]:
         """See `Renderer.trace`."""
         origin, along = (rays[pixels] for rays in self._rays(points))
         found, depth = self._layers(origin, along)
@@ -66,7 +63,7 @@ class EmbreeRenderer:
         exact = self._surfaces.normalised(points.position)[point]
         return found, self._surfaces.world(exact + depth[..., None] * along)
 
-    def _rays(self, points: SamplePoints) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def _rays(self, points: SamplePoints) -> tuple[Singles, Singles]:
         from ptmtools.coverage.tally_kernels import cast_rays
 
         count = len(points) * len(VIEWS) * self._face**2
@@ -75,9 +72,7 @@ class EmbreeRenderer:
         cast_rays(position, points.shift / self._face, self._face, VIEWS, origin, along)
         return origin, along
 
-    def _layers(
-        self, origin: NDArray[np.float32], along: NDArray[np.float32]
-    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    def _layers(self, origin: Singles, along: Singles) -> tuple[NDArray[np.int32], Floats]:
         """(L, n) opaque and transparent triangles that the (n, 3) rays hit, or -1; (L, n) depths,
         0 where there is none."""
         found, depths = [], []
@@ -97,7 +92,7 @@ class EmbreeRenderer:
 class _Tree:
     """A committed Embree scene over some of the surfaces."""
 
-    def __init__(self, surfaces: Surfaces, which: NDArray[np.int64]) -> None:
+    def __init__(self, surfaces: Surfaces, which: Ints) -> None:
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
 
@@ -111,11 +106,8 @@ class _Tree:
             self._tree.run(ray, ray)  # builds the tree now
 
     def hits(
-        self,
-        origin: NDArray[np.float32],
-        along: NDArray[np.float32],
-        limit: NDArray[np.float32] | None,
-    ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        self, origin: Singles, along: Singles, limit: Singles | None
+    ) -> tuple[NDArray[np.int32], Singles]:
         """(n,) the triangle that each of the (n, 3) rays hits first, up to (n,) ``limit`` depths,
         or -1; and their (n,) depths."""
         if self._tree is None:

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.coverage.backends.embree import EmbreeRenderer
 from ptmtools.coverage.item_buffer import BEFORE, VIEWS, Surfaces
 from ptmtools.coverage.sample_points import SamplePoints
@@ -110,9 +111,7 @@ class OpenGLRenderer:
         context.enable_only(context.DEPTH_TEST)
         context.depth_func = "<"
 
-    def show(
-        self, points: SamplePoints, needed: NDArray[np.bool_] | None = None
-    ) -> NDArray[np.int32]:
+    def show(self, points: SamplePoints, needed: Bools | None = None) -> NDArray[np.int32]:
         """See `Renderer.show`."""
         shape = (self._layers, len(points), len(VIEWS), self._face**2)
         if self._vertices is None or not len(points):
@@ -134,16 +133,12 @@ class OpenGLRenderer:
             index.release()
         return np.append(-1, order).astype(np.int32)[np.stack(drawn)].reshape(shape)
 
-    def trace(
-        self, points: SamplePoints, pixels: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+    def trace(self, points: SamplePoints, pixels: Ints) -> tuple[NDArray[np.int32], Floats]:
         """See `Renderer.trace`; by Embree, whose trees are built at the first call."""
         self._rays = self._rays or EmbreeRenderer(self._surfaces, self._face)
         return self._rays.trace(points, pixels)
 
-    def lists(
-        self, points: SamplePoints, needed: NDArray[np.bool_] | None = None
-    ) -> list[list[NDArray[np.int64]]]:
+    def lists(self, points: SamplePoints, needed: Bools | None = None) -> list[list[Ints]]:
         """For each of the six views the opaque and the transparent triangles to be drawn: those
         that reach into the view's pyramid from somewhere in the box around the points, of the cells
         ``needed`` and of none, and of those outside that a few rays meet, so that nothing shows
@@ -176,13 +171,8 @@ class OpenGLRenderer:
         return lists
 
     def _draw(
-        self,
-        drawing: Any,
-        first: NDArray[np.int64],
-        count: NDArray[np.int64],
-        layer: int,
-        points: SamplePoints,
-    ) -> NDArray[np.int64]:
+        self, drawing: Any, first: Ints, count: Ints, layer: int, points: SamplePoints
+    ) -> Ints:
         """One layer of all views, each of so many triangles from its ``first`` on, before the depth
         that is there: (K, 6, face²) triangles in the order of the upload, from 1; 0 for none."""
         target, face, tiles = self._targets[layer], self._face, self._tiles
@@ -231,17 +221,13 @@ class OpenGLRenderer:
         self._rays = self._probe = None
 
 
-def _two_floats(
-    values: NDArray[np.float64],
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def _two_floats(values: Floats) -> tuple[Singles, Singles]:
     """Values rounded to float32, and what that leaves."""
     high = values.astype(np.float32)
     return high, (values - high).astype(np.float32)
 
 
-def _along(
-    axis: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _along(axis: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats]:
     """Least and greatest coordinates of (n, 3) boxes along an axis of the coordinates."""
     i = int(np.argmax(np.abs(axis)))
     return (low[:, i], high[:, i]) if axis[i] > 0 else (-high[:, i], -low[:, i])

@@ -12,10 +12,10 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.damage import damaged
+from ptmtools.texture.coders.reading import damaged
 
 
-def inflate(data: bytes, length: int) -> bytes:
+def inflate(data: bytes | memoryview, length: int) -> bytes:
     """Exactly ``length`` bytes; more are never unpacked. Raises InputError PTM-I112."""
     unpacker = zlib.decompressobj(-15)
     try:
@@ -28,7 +28,7 @@ def inflate(data: bytes, length: int) -> bytes:
 
 
 def decode_differences(
-    data: bytes, below: NDArray[np.uint8], shape: tuple[int, int, int]
+    data: bytes | memoryview, below: NDArray[np.uint8], shape: tuple[int, int, int]
 ) -> NDArray[np.uint8]:
     """The level (h, w, c) that deflated differences refine ``below`` to."""
     height, width, components = shape

@@ -16,22 +16,23 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import InputError
 from ptmtools.lazy import component
 from ptmtools.texture.images.declared import check_tile
-from ptmtools.texture.images.eight_bit import one_frame, with_key
-from ptmtools.texture.images.opening import ORIENTATION, described, load, opened
+from ptmtools.texture.images.eight_bit import one_frame, stripped
+from ptmtools.texture.images.opening import ORIENTATION, load, opened
 from ptmtools.texture.images.picture import (
     Picture,
-    Strips,
     check_size,
     damaged_image,
     oriented,
+    raster,
+    several,
     unsupported,
 )
 from ptmtools.texture.model import Description, Limits
 
 if TYPE_CHECKING:
+    from PIL.Image import Image
     from PIL.ImageFile import ImageFile
 
 #: Pillow's unpackers that keep the upper and the lower byte of each sample, by mode.
@@ -67,23 +68,17 @@ def read_png(file: BinaryIO, image: ImageFile, colour: int, limits: Limits) -> P
         upper, lower = _HALVES[image.mode]
         halves = [_unpacked(image, image.mode, upper)]
         halves.append(_unpacked(opened(file, limits), image.mode, lower))
-    keyed = key is not None and components in (1, 3)
 
-    def strip(y0: int, y1: int) -> NDArray[Any]:
-        parts: list[NDArray[Any]] = [
-            np.asarray(half.crop((0, y0, half.width, y1))) for half in halves
-        ]
-        if len(parts) == 2:
-            texels = parts[0].astype(np.uint16) << np.uint16(8)
-            texels |= parts[1]
-        elif colour == _GREY_ALPHA:
-            texels = parts[0].view(">u2").astype(np.uint16)
-        else:
-            texels = parts[0].astype(np.uint16)[:, :, None]
-        return with_key(texels, key) if keyed else texels
+    def texels(upper: Image, lower: Image | None = None) -> NDArray[Any]:
+        samples: NDArray[Any] = np.asarray(upper)
+        if colour == _GREY_ALPHA:
+            samples = samples.view(">u2")
+        samples = samples.astype(np.uint16)
+        if lower is not None:
+            samples = samples << 8 | np.asarray(lower)
+        return samples.reshape(*samples.shape[:2], components)
 
-    shape = (image.height, image.width, components + keyed)
-    return Picture(Strips(shape, np.dtype(np.uint16), strip), described(image))
+    return stripped(halves, components, "uint16", texels, key)
 
 
 def _unpacked(image: ImageFile, mode: str, raw: str) -> ImageFile:
@@ -137,12 +132,7 @@ def read_tiff(file: BinaryIO, tags: Tags, limits: Limits) -> Picture:
         image = opened(file, limits)
         one_frame(image)
         load(image)
-
-        def strip(y0: int, y1: int) -> NDArray[Any]:
-            return np.asarray(image.crop((0, y0, image.width, y1)))[:, :, None]
-
-        shape = (image.height, image.width, 1)
-        return Picture(Strips(shape, np.dtype(dtype), strip), described(image))
+        return stripped([image], 1, dtype, lambda strip: np.asarray(strip)[:, :, None])
     codecs = component(
         "imagecodecs",
         "PTM-M100",
@@ -150,11 +140,7 @@ def read_tiff(file: BinaryIO, tags: Tags, limits: Limits) -> Picture:
         "codecs",
     )
     if tags[_NEXT] or tags.get(_DEPTH, 1) != 1:
-        raise InputError(
-            "PTM-I127",
-            "holds several pages; a texture is one image",
-            remedy="export the one you want as PNG",
-        )
+        raise several("several pages")
     file.seek(0)
     try:
         texels = codecs.tiff_decode(file.read(), index=0)
@@ -177,25 +163,11 @@ def read_ppm(file: BinaryIO, path: str | None, limits: Limits) -> Picture | None
     plain = head[1] in b"23"
     width, height, components = int(head[2]), int(head[3]), 1 if head[1] in b"25" else 3
     check_size(width, height, 2 * components, limits if plain or path is None else None)
-    if 0 in (width, height):
-        raise damaged_image("no texels")
+    file.seek(head.end())
     if plain:
-        file.seek(head.end())
         samples = _plain_samples(file, width * height * components)
         return Picture(samples.reshape(height, width, components))
-    texels: np.ndarray[Any, Any]
-    if path is not None:
-        file.seek(0, 2)
-        if file.tell() < head.end() + 2 * width * height * components:
-            raise damaged_image(f"after {file.tell()} bytes")
-        texels = np.memmap(path, ">u2", "r", head.end(), (height, width, components))
-    else:
-        file.seek(head.end())
-        data = file.read(2 * width * height * components)
-        if len(data) < 2 * width * height * components:
-            raise damaged_image(f"after {head.end() + len(data)} bytes")
-        texels = np.frombuffer(data, ">u2").reshape(height, width, components)
-    return Picture(texels)
+    return Picture(raster(file, path, np.dtype(">u2"), (height, width, components)))
 
 
 def _plain_samples(file: BinaryIO, count: int) -> NDArray[np.uint16]:

@@ -6,14 +6,15 @@ only, so that an image of 16,384² RGB takes 1.3 times its raw size.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import InputError
 from ptmtools.texture.images.opening import described, load
-from ptmtools.texture.images.picture import Picture, Strips, check_size, unsupported
+from ptmtools.texture.images.picture import Picture, Strips, check_size, several, unsupported
 from ptmtools.texture.model import Limits
 
 if TYPE_CHECKING:
@@ -45,35 +46,45 @@ def read(image: ImageFile, depth: int, lossy: str | None) -> Picture:
         has_alpha |= image.palette is not None and image.palette.mode == "RGBA"
         components += has_alpha
         key = None
+    return stripped([image], components, "uint8", partial(_texels, components), key, lossy)
+
+
+def stripped(
+    images: Sequence[Image],
+    components: int,
+    dtype: str,
+    make: Callable[..., NDArray[Any]],
+    key: object = None,
+    lossy: str | None = None,
+) -> Picture:
+    """Loaded images of the same size as one, a strip at a time.
+
+    ``make`` gets the same rows of each and gives (n, w, components). A colour key becomes an alpha
+    of 0 where the texels are the key, of all bits elsewhere.
+    """
+    width, height = images[0].size
     keyed = key is not None and components in (1, 3)
 
     def strip(y0: int, y1: int) -> NDArray[Any]:
-        texels = _texels(image.crop((0, y0, image.width, y1)), components)
-        return with_key(texels, key) if keyed else texels
+        texels = make(*(image.crop((0, y0, width, y1)) for image in images))
+        if not keyed:
+            return texels
+        opaque = (texels != np.array(key)).any(axis=2)
+        alpha = np.where(opaque, np.iinfo(texels.dtype).max, 0).astype(texels.dtype)
+        return np.concatenate([texels, alpha[:, :, None]], axis=2)
 
-    shape = (image.height, image.width, components + keyed)
-    return Picture(Strips(shape, np.dtype(np.uint8), strip), described(image), lossy)
+    shape = (height, width, components + keyed)
+    return Picture(Strips(shape, np.dtype(dtype), strip), described(images[0]), lossy)
 
 
 def one_frame(image: ImageFile) -> None:
     """Raise InputError PTM-I127 for an image of several."""
     # Not how many: the pages of a TIFF may be made to be costly to count.
     if getattr(image, "is_animated", False):
-        raise InputError(
-            "PTM-I127",
-            "holds several frames or pages; a texture is one image",
-            remedy="export the one you want as PNG",
-        )
+        raise several("several frames or pages")
 
 
-def with_key(texels: NDArray[Any], key: object) -> NDArray[Any]:
-    """An alpha of 0 where the texels are the key, of all bits elsewhere."""
-    opaque = (texels != np.array(key)).any(axis=2)
-    alpha = np.where(opaque, np.iinfo(texels.dtype).max, 0).astype(texels.dtype)
-    return np.concatenate([texels, alpha[:, :, None]], axis=2)
-
-
-def _texels(strip: Image, components: int) -> NDArray[Any]:
+def _texels(components: int, strip: Image) -> NDArray[Any]:
     if strip.mode in ("P", "PA"):
         strip = strip.convert("RGBA" if components == 4 else "RGB")
     elif strip.mode == "1":

@@ -9,7 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
-from ptmtools.texture.images.picture import Picture, check_size, damaged_image, unsupported
+from ptmtools.texture.images.picture import (
+    Picture,
+    check_size,
+    damaged_image,
+    raster,
+    unsupported,
+)
 from ptmtools.texture.model import Description, Limits
 from ptmtools.texture.samples import KINDS
 
@@ -35,22 +41,8 @@ def read_npy(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
     if dtype.name not in KINDS:
         raise unsupported(f"samples of type {dtype}")
     height, width = shape[:2]
-    if height < 1 or width < 1:
-        raise damaged_image("no texels")
-    texel_bytes = components * dtype.itemsize
-    check_size(width, height, texel_bytes, None if path is not None else limits)
-    start, end = file.tell(), file.seek(0, 2)
-    size = height * width * texel_bytes
-    if end - start < size:
-        raise damaged_image(f"after {end} of {start + size} bytes")
-    order: Any = "F" if in_columns else "C"
-    texels: np.ndarray[Any, Any]
-    if path is not None:
-        texels = np.memmap(path, dtype, "r", start, shape, order)
-    else:
-        file.seek(start)
-        texels = np.ndarray(shape, dtype, file.read(size), order=order)
-    return Picture(texels)
+    check_size(width, height, components * dtype.itemsize, None if path is not None else limits)
+    return Picture(raster(file, path, dtype, shape, "F" if in_columns else "C"))
 
 
 def save_npy(file: IO[bytes], texels: NDArray[Any], description: Description) -> None:

@@ -10,7 +10,6 @@ from typing import IO, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import InputError
 from ptmtools.lazy import component
 from ptmtools.texture.images.declared import check_file, check_tile
 from ptmtools.texture.images.picture import (
@@ -18,6 +17,7 @@ from ptmtools.texture.images.picture import (
     check_size,
     damaged_image,
     not_held,
+    several,
     unsupported,
 )
 from ptmtools.texture.model import Description, Limits
@@ -47,16 +47,10 @@ def read_exr(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
     except Exception as error:  # its errors have no class in common
         raise damaged_image(error) from None
     if parts > 1:
-        raise InputError(
-            "PTM-I127",
-            f"holds {parts} parts; a texture is one image",
-            remedy="export only the one you want",
-        )
+        raise several(f"{parts} parts")
     wanted = next((order for order in _CHANNELS.values() if set(order) == names), None)
     if wanted is None or sampled:
         raise unsupported(f"the channels {', '.join(sorted(names))}")
-    if high[0] < low[0] or high[1] < low[1]:
-        raise damaged_image("no texels")
     check_size(high[0] - low[0] + 1, high[1] - low[1] + 1, 4 * len(wanted), limits)
     if tiles is not None:
         check_tile(int(tiles.xSize), int(tiles.ySize), 4 * len(wanted), limits)

@@ -22,22 +22,23 @@ if TYPE_CHECKING:
     from PIL.Image import Exif, Image
     from PIL.ImageFile import ImageFile
 
-#: First bytes → module and class of Pillow's.
-_PLUGINS = (
-    (b"\x89PNG\r\n\x1a\n", "PngImagePlugin", "PngImageFile"),
-    (b"\xff\xd8\xff", "JpegImagePlugin", "JpegImageFile"),
-    (b"II*\0", "TiffImagePlugin", "TiffImageFile"),
-    (b"MM\0*", "TiffImagePlugin", "TiffImageFile"),
-    (b"II+\0", "TiffImagePlugin", "TiffImageFile"),
-    (b"MM\0+", "TiffImagePlugin", "TiffImageFile"),
-    (b"RIFF", "WebPImagePlugin", "WebPImageFile"),
-    (b"BM", "BmpImagePlugin", "BmpImageFile"),
-    (b"GIF8", "GifImagePlugin", "GifImageFile"),
-    (b"P", "PpmImagePlugin", "PpmImageFile"),
-    (b"\n", "PcxImagePlugin", "PcxImageFile"),
+PNG = b"\x89PNG\r\n\x1a\n"
+TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+#: First bytes by the name of Pillow's plug-in.
+_PLUGINS: dict[str, bytes | tuple[bytes, ...]] = {
+    "Png": PNG,
+    "Jpeg": b"\xff\xd8\xff",
+    "Tiff": TIFF,
+    "WebP": b"RIFF",
+    "Bmp": b"BM",
+    "Gif": b"GIF8",
+    "Ppm": b"P",
+    "Pcx": b"\n",
     # A Targa file begins with anything; its own checks decide.
-    (b"", "TgaImagePlugin", "TgaImageFile"),
-)
+    "Tga": b"",
+}
+#: Of those whose first bytes say too little to call others damaged.
+_VAGUE = ("Ppm", "Pcx", "Tga")
 READABLE = "PNG, JPEG, TIFF, TGA, BMP, GIF, WebP, PPM, PCX, Radiance, OpenEXR or .npy"
 #: The tag of EXIF and TIFF.
 ORIENTATION = 0x0112
@@ -56,24 +57,25 @@ def opened(file: BinaryIO, limits: Limits) -> ImageFile:
     check_file(file, limits)
     file.seek(0)
     first = file.read(30)
-    magic, module, name = next(plugin for plugin in _PLUGINS if first.startswith(plugin[0]))
-    if magic == b"RIFF":
+    name = next(name for name, magic in _PLUGINS.items() if first.startswith(magic))
+    if name == "WebP":
         check_webp(first, limits)
-    elif magic == b"\xff\xd8\xff":
+    elif name == "Jpeg":
         check_jpeg(first + file.read())
     file.seek(0)
     try:
         with warnings.catch_warnings():
             # Its limits are not ours.
             warnings.simplefilter("ignore")
-            image = cast("ImageFile", getattr(import_module(f"PIL.{module}"), name)(file))
+            module = import_module(f"PIL.{name}ImagePlugin")
+            image = cast("ImageFile", getattr(module, f"{name}ImageFile")(file))
     except SyntaxError as error:
         if "pixel mode" in str(error):
             raise unsupported("a combination of samples that is not read") from None
-        if len(magic) > 1:
+        if name not in _VAGUE:
             raise damaged_image(error) from None
         raise
-    if image.format == "TIFF":
+    if name == "Tiff":
         tags: Any = image
         check_tile(tags.tag_v2.get(_TILE_WIDTH), tags.tag_v2.get(_TILE_LENGTH), 4, limits)
     return image

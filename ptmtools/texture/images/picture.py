@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -57,24 +58,19 @@ def oriented(texels: Samples, orientation: int) -> Samples:
     return texels
 
 
+@dataclass(frozen=True)
 class Strips:
     """Rows that are made when they are asked for, a strip at a time.
 
-    Parameters
+    Attributes
     ----------
     shape, dtype: of the whole.
     make: ``make(y0, y1)`` gives those rows, (y1 - y0, w, c).
     """
 
-    def __init__(
-        self,
-        shape: tuple[int, int, int],
-        dtype: np.dtype[Any],
-        make: Callable[[int, int], Samples],
-    ) -> None:
-        self.shape = shape
-        self.dtype = dtype
-        self._make = make
+    shape: tuple[int, int, int]
+    dtype: np.dtype[Any]
+    make: Callable[[int, int], Samples]
 
     def __getitem__(self, rows: slice) -> Samples:
         height, width, components = self.shape
@@ -83,15 +79,34 @@ class Strips:
         step = max(1, _STRIP_TEXELS // width)
         for y in range(start, stop, step):
             end = min(y + step, stop)
-            found[y - start : end - start] = self._make(y, end)
+            found[y - start : end - start] = self.make(y, end)
         return found
+
+
+def raster(
+    file: BinaryIO, path: str | None, dtype: np.dtype[Any], shape: tuple[int, ...], order: Any = "C"
+) -> Samples:
+    """Samples from where ``file`` stands on, mapped if it is the file at ``path``.
+
+    Raises InputError PTM-I125.
+    """
+    start, end = file.tell(), file.seek(0, 2)
+    size = math.prod(shape) * dtype.itemsize
+    if end - start < size:
+        raise damaged_image(f"after {end} of {start + size} bytes")
+    if path is not None:
+        return np.memmap(path, dtype, "r", start, shape, order)
+    file.seek(start)
+    return np.ndarray(shape, dtype, file.read(size), order=order)
 
 
 def check_size(width: int, height: int, texel_bytes: int, limits: Limits | None) -> None:
     """Raise LimitError PTM-L104 for what cannot be stored or is more than may be decoded.
 
-    limits: None for what takes no memory.
+    limits: None for what takes no memory. Raises InputError PTM-I125 for no texels at all.
     """
+    if min(width, height) < 1:
+        raise damaged_image("no texels")
     if max(width, height) > MAX_SIDE:
         raise LimitError(
             "PTM-L104",
@@ -113,6 +128,15 @@ def damaged_image(what: object) -> InputError:
         "PTM-I125",
         f"is damaged or cut short ({what})",
         remedy="download or export it again",
+    )
+
+
+def several(what: str) -> InputError:
+    """The error for a file of more than one image."""
+    return InputError(
+        "PTM-I127",
+        f"holds {what}; a texture is one image",
+        remedy="export the one you want as PNG",
     )
 
 

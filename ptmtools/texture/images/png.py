@@ -16,11 +16,10 @@ from typing import IO, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.images.opening import ORIENTATION
+from ptmtools.texture.images.opening import ORIENTATION, PNG
 from ptmtools.texture.images.picture import damaged_image, not_held
 from ptmtools.texture.model import Description
 
-_MAGIC = b"\x89PNG\r\n\x1a\n"
 #: Colour type by number of components.
 _COLOUR = {1: 0, 2: 4, 3: 2, 4: 6}
 _DEFLATE_LEVEL = 6
@@ -65,7 +64,7 @@ def _save_deep(file: IO[bytes], image: NDArray[np.uint16], description: Descript
         file.write(struct.pack(">I", zlib.crc32(kind + data)))
 
     height, width, components = image.shape
-    file.write(_MAGIC)
+    file.write(PNG)
     put(b"IHDR", struct.pack(">IIBBBBB", width, height, 16, _COLOUR[components], 0, 0, 0))
     for kind, data in _colour_chunks(description):
         put(kind, data)
@@ -85,7 +84,7 @@ def check_chunks(file: BinaryIO) -> None:
 
     Raises InputError PTM-I125.
     """
-    file.seek(len(_MAGIC))
+    file.seek(len(PNG))
     kind = b""
     while kind != b"IEND":
         head = file.read(8)

@@ -48,8 +48,6 @@ def read_hdr(file: BinaryIO, limits: Limits) -> Picture:
         raise unsupported("rows that do not go from the top and left")
     height, width = int(size[2]), int(size[4])
     check_size(width, height, 12, limits)
-    if not width or not height:
-        raise damaged_image("in its size")
     # A run codes at most 127 bytes in two.
     if (len(data) - size.end()) * 64 < 4 * width * height:
         raise damaged_image(f"after {len(data)} bytes")
@@ -104,27 +102,24 @@ def _coded_row(data: bytes, at: int, row: NDArray[np.uint8]) -> int:
     """One run-length coded scanline into (w, 4); where the next one begins."""
     width = len(row)
     for component in range(4):
-        parts = []
-        have = 0
-        while have < width:
+        plane = bytearray()
+        while len(plane) < width:
             pair = data[at : at + 2]
             if len(pair) < 2:
                 raise damaged_image(f"after {len(data)} bytes")
             count, value = pair
             if count > 128:
-                count -= 128
-                parts.append(bytes([value]) * count)
+                plane += bytes([value]) * (count - 128)
                 at += 2
             else:
                 part = data[at + 1 : at + 1 + count]
                 if not count or len(part) < count:
                     raise damaged_image(f"at byte {at}")
-                parts.append(part)
+                plane += part
                 at += 1 + count
-            have += count
-        if have > width:
+        if len(plane) > width:
             raise damaged_image(f"at byte {at}")
-        row[:, component] = np.frombuffer(b"".join(parts), np.uint8)
+        row[:, component] = np.frombuffer(plane, np.uint8)
     return at
 
 

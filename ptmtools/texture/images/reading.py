@@ -26,8 +26,6 @@ SUFFIXES = (
     *(".ppm", ".pgm", ".pbm", ".pnm", ".hdr", ".exr", ".npy"),
 )
 _LIMITS = Limits()
-_PNG = b"\x89PNG\r\n\x1a\n"
-_TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _PPM = (b"P2", b"P3", b"P5", b"P6")
 
 
@@ -144,6 +142,8 @@ def _by_pillow(
 ) -> Picture | Callable[[], Picture]:
     from ptmtools.texture.images import deep, eight_bit
     from ptmtools.texture.images.opening import (
+        PNG,
+        TIFF,
         high_colour,
         lossy_format,
         opened,
@@ -153,14 +153,14 @@ def _by_pillow(
     with pillow_faults():
         if first.startswith(_PPM) and (picture := deep.read_ppm(file, path, limits)):
             return picture
-        if first.startswith(_PNG):
+        if first.startswith(PNG):
             check_chunks(file)
-        if first.startswith(_TIFF) and deep.is_deep(tags := deep.tiff_tags(file)):
+        if first.startswith(TIFF) and deep.is_deep(tags := deep.tiff_tags(file)):
             return deep.read_tiff(file, tags, limits)
         image = opened(file, limits)
         eight_bit.one_frame(image)
         depth = 8
-        if first.startswith(_PNG):
+        if first.startswith(PNG):
             depth, colour = first[24], first[25]
             if depth == 16:
                 return deep.read_png(file, image, colour, limits)

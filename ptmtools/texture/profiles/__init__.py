@@ -33,25 +33,25 @@ class Profile:
     name: on the command line and in `EncodeOptions`.
     number: what stands for it in a file; never that of another, once files have been written.
     about: what it is for, in a few words, for the help.
-    module: the `Coder`, by name: it is imported when it is first used.
     lossy: whether it can make use of an allowed error.
     since: the first version of the container that may hold it.
     ahead: what another process may compile meanwhile, and a module of its kernels
         (`ptmtools.ahead.compile_ahead`).
+    module: the `Coder`, if not the module of this package that has the profile's name.
     """
 
     name: str
     number: int
     about: str
-    module: str
     lossy: bool = False
     since: int = 2
     ahead: tuple[Lazy[Callable[[], object]], str] | None = None
+    module: str = ""
 
     @property
     def coder(self) -> Coder:
-        """What codes and decodes."""
-        return cast("Coder", import_module(self.module))
+        """What codes and decodes; imported when it is first used."""
+        return cast("Coder", import_module(self.module or f"{__name__}.{self.name}"))
 
 
 #: All profiles, by name.
@@ -62,7 +62,6 @@ PROFILES = {
             "fast",
             1,
             "for streaming",
-            f"{__name__}.fast",
             lossy=True,
             since=1,
             ahead=(
@@ -70,21 +69,9 @@ PROFILES = {
                 "ptmtools.texture.coders.haar.kernels",
             ),
         ),
-        Profile(
-            "small",
-            2,
-            "for archives; smaller, but 30 to 60 times slower",
-            f"{__name__}.small",
-            lossy=True,
-        ),
-        Profile(
-            "raw",
-            0,
-            "uncompressed, the layout of Marvie & Bouatouch, 2003",
-            f"{__name__}.raw",
-            since=1,
-        ),
-        Profile("paper", 3, "the same with lossless JPEG, for comparison", f"{__name__}.paper"),
+        Profile("small", 2, "for archives; smaller, but 30 to 60 times slower", lossy=True),
+        Profile("raw", 0, "uncompressed, the layout of Marvie & Bouatouch, 2003", since=1),
+        Profile("paper", 3, "the same with lossless JPEG, for comparison"),
     )
 }
 
@@ -127,7 +114,7 @@ class Coder(Protocol):
     def encode_base(self, level: Samples) -> bytes:
         """The coarsest level, which has nothing below it; without error."""
 
-    def decode_base(self, data: bytes, shape: Shape, dtype: np.dtype[Any]) -> Samples:
+    def decode_base(self, data: bytes | memoryview, shape: Shape, dtype: np.dtype[Any]) -> Samples:
         """The inverse of `encode_base`."""
 
     def encode_tile(
@@ -142,7 +129,7 @@ class Coder(Protocol):
 
     def decode_tile(
         self,
-        data: bytes,
+        data: bytes | memoryview,
         below: Samples,
         shape: Shape,
         max_error: int = 0,

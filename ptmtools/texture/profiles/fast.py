@@ -28,8 +28,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.damage import damaged
 from ptmtools.texture.coders.haar import coder as haar
+from ptmtools.texture.coders.reading import Reader, damaged
 from ptmtools.texture.coders.repeats import coder as repeats
 from ptmtools.texture.profiles import Tile, raw
 from ptmtools.texture.profiles.nested import pack_levels, shapes_to, unpack_levels
@@ -58,9 +58,10 @@ Bytes = NDArray[np.uint8]
 
 def compile_ahead() -> None:
     """Compiles what `encode_tile` of bytes needs but for `repeats`, with which that begins."""
-    from ptmtools.texture.coders.rans.stream import encode_symbols
+    from ptmtools.texture.coders.rans.stream import empty_sink, encode_symbols
+    from ptmtools.texture.coders.rans.tables import built_in
 
-    encode_symbols(np.zeros(1, np.uint16), np.zeros(1, np.uint8), np.full((1, 256), 8), 1)
+    encode_symbols(empty_sink(0, 1), 1, built_in())
     # So large that weights are fitted.
     haar.encode(np.zeros((192, 192, 1), np.uint8), np.zeros((96, 96, 1), np.uint8))
 
@@ -74,19 +75,21 @@ def encode_base(level: Samples) -> bytes:
     return min(nested, bytes([STORED]) + raw.encode_base(level), key=len)
 
 
-def decode_base(data: bytes, shape: Shape, dtype: np.dtype[Any]) -> Samples:
+def decode_base(data: bytes | memoryview, shape: Shape, dtype: np.dtype[Any]) -> Samples:
     """The inverse of `encode_base`. Raises InputError PTM-I112."""
-    coder, body = _split(data)
+    reader = Reader(data)
+    coder = reader.number(1)
     if coder == PYRAMID:
         shapes = shapes_to(shape)
-        return unpack_levels(decode_tile, body, _nothing(shapes[0], dtype), shapes)
+        return unpack_levels(decode_tile, reader, _nothing(shapes[0], dtype), shapes)
+    body = reader.rest()
     if coder == DEFLATED_1:
         from ptmtools.texture.coders.deflated import inflate
 
-        body = inflate(body, shape[0] * shape[1] * shape[2])
-    elif coder != STORED:
-        raise damaged(f"coder {coder} is unknown for the coarsest level")
-    return raw.decode_base(body, shape, dtype)
+        return raw.decode_base(inflate(body, shape[0] * shape[1] * shape[2]), shape, dtype)
+    if coder == STORED:
+        return raw.decode_base(body, shape, dtype)
+    raise damaged(f"coder {coder} is unknown for the coarsest level")
 
 
 def encode_tile(
@@ -94,7 +97,10 @@ def encode_tile(
 ) -> Tile:
     """One byte that names the coder, then what it wrote."""
     if level.dtype == np.uint8 and max_error == 0:
-        return Tile(_encode_bytes(level, below), level)
+        coded = _encode_best(level, below)
+        if len(coded) > 1 + group_length((level.shape[0], level.shape[1], level.shape[2])):
+            coded = bytes([STORED]) + raw.encode_tile(level, below).data
+        return Tile(coded, level)
     from ptmtools.texture.coders.texel import coder as texel
 
     data, texels = texel.encode(level, below, max_error)
@@ -102,7 +108,7 @@ def encode_tile(
 
 
 def decode_tile(
-    data: bytes,
+    data: bytes | memoryview,
     below: Samples,
     shape: Shape,
     max_error: int = 0,
@@ -114,25 +120,18 @@ def decode_tile(
         return Tile(b"", _decode_bytes(data, below, shape))
     from ptmtools.texture.coders.texel import coder as texel
 
-    return Tile(b"", texel.decode(data, below, shape, below.dtype, max_error))
-
-
-def _encode_bytes(level: Bytes, below: Bytes) -> bytes:
-    """Any level, of 8 bits, without error."""
-    coded = _encode_best(level, below)
-    if len(coded) <= 1 + group_length((level.shape[0], level.shape[1], level.shape[2])):
-        return coded
-    return bytes([STORED]) + raw.encode_tile(level, below).data
+    return Tile(b"", texel.decode(data, below, shape, max_error))
 
 
 def _encode_best(level: Bytes, below: Bytes) -> bytes:
+    """Any level, of 8 bits, without error, by repeats or Haar."""
     blocks = below.shape[0] * below.shape[1]
     if blocks > TOO_MANY_BLOCKS:
         return bytes([HAAR]) + haar.encode(level, below)
     new = BOTH_FROM
     if blocks >= PROBED_BLOCKS:
         piece, under = _probe(level, below)
-        new = repeats.find(piece, under).new / (3 * under.shape[0] * under.shape[1])
+        new = repeats.new_texels(repeats.find(piece, under)) / (3 * under[..., 0].size)
     if new > BOTH_TO and level.shape[2] > 2:
         return bytes([HAAR]) + haar.encode(level, below)
     repeated = bytes([REPEATS]) + repeats.write(repeats.find(level, below))
@@ -151,8 +150,9 @@ def _probe(level: Bytes, below: Bytes) -> tuple[Bytes, Bytes]:
     return piece, np.concatenate([below[y : y + rows] for y in starts])
 
 
-def _decode_bytes(data: bytes, below: Bytes, shape: Shape) -> Bytes:
-    coder, body = _split(data)
+def _decode_bytes(data: bytes | memoryview, below: Bytes, shape: Shape) -> Bytes:
+    reader = Reader(data)
+    coder, body = reader.number(1), reader.rest()
     if coder == REPEATS:
         return repeats.decode(body, below, shape)
     if coder in (HAAR, HAAR_1):
@@ -164,18 +164,12 @@ def _decode_bytes(data: bytes, below: Bytes, shape: Shape) -> Bytes:
     if coder == DEFLATED_1:
         from ptmtools.texture.coders.deflated import inflate
 
-        body = inflate(body, group_length(shape))
-    elif coder != STORED:
-        raise damaged(f"coder {coder} is unknown")
-    return raw.decode_tile(body, below, shape).texels
+        return raw.decode_tile(inflate(body, group_length(shape)), below, shape).texels
+    if coder == STORED:
+        return raw.decode_tile(body, below, shape).texels
+    raise damaged(f"coder {coder} is unknown")
 
 
 def _nothing(shape: tuple[int, ...], dtype: np.dtype[Any]) -> Samples:
     """What lies below a level whose shorter side is 1."""
     return np.zeros((shape[0] >> 1, shape[1] >> 1, shape[2]), dtype)
-
-
-def _split(data: bytes) -> tuple[int, bytes]:
-    if not data:
-        raise damaged("it is empty")
-    return data[0], data[1:]

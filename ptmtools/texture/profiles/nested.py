@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
-from ptmtools.texture.coders.damage import damaged
+from ptmtools.texture.coders.reading import Reader
 from ptmtools.texture.pyramid import level_sizes
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def pack_levels(
 
 
 def unpack_levels(
-    decode_tile: Callable[..., Tile], data: bytes, below: Samples, shapes: Iterable[Shape]
+    decode_tile: Callable[..., Tile], reader: Reader, below: Samples, shapes: Iterable[Shape]
 ) -> Samples:
     """The last of the levels of `pack_levels`, which have these shapes.
 
@@ -38,13 +38,10 @@ def unpack_levels(
     """
     memory = None
     for shape in shapes:
-        end = _LENGTH + int.from_bytes(data[:_LENGTH], "little")
-        if len(data) < end:
-            raise damaged("it is cut short")
-        tile = decode_tile(data[_LENGTH:end], below, shape, memory=memory)
-        below, memory, data = tile.texels, tile.memory, data[end:]
-    if data:
-        raise damaged("it is too long")
+        data = reader.take(reader.number(_LENGTH))
+        tile = decode_tile(data, below, shape, memory=memory)
+        below, memory = tile.texels, tile.memory
+    reader.end()
     return below
 
 

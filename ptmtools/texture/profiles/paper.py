@@ -18,17 +18,15 @@ import numpy as np
 
 from ptmtools.errors import InputError
 from ptmtools.lazy import component
-from ptmtools.texture.coders.damage import damaged
+from ptmtools.texture.coders.reading import Reader, damaged
 from ptmtools.texture.profiles import Tile, raw
 from ptmtools.texture.profiles.raw import (
     corners,
-    expect_length,
     pack_pairs,
     place_last,
+    read_pairs,
     residuals,
     sample_bytes,
-    samples_from,
-    unpack_pairs,
 )
 
 if TYPE_CHECKING:
@@ -48,7 +46,7 @@ def encode_base(level: Samples) -> bytes:
     return raw.encode_base(level)
 
 
-def decode_base(data: bytes, shape: Shape, dtype: np.dtype[Any]) -> Samples:
+def decode_base(data: bytes | memoryview, shape: Shape, dtype: np.dtype[Any]) -> Samples:
     """The inverse of `encode_base`. Raises InputError PTM-I112."""
     _codecs(dtype)
     return raw.decode_base(data, shape, dtype)
@@ -84,7 +82,7 @@ def encode_tile(
 
 
 def decode_tile(
-    data: bytes,
+    data: bytes | memoryview,
     below: Samples,
     shape: Shape,
     max_error: int = 0,
@@ -93,24 +91,20 @@ def decode_tile(
 ) -> Tile:
     """The inverse of `encode_tile`. Raises InputError PTM-I112."""
     codecs = _codecs(below.dtype)
-    if data[:1] == bytes([RAW]):
-        return raw.decode_tile(data[1:], below, shape)
-    if data[:1] != bytes([JPEG]) or not below.size:
+    reader = Reader(data)
+    form = reader.number(1)
+    if form == RAW:
+        return raw.decode_tile(reader.rest(), below, shape)
+    if form != JPEG or not below.size:
         raise damaged("its form is unknown")
     level = np.empty(shape, below.dtype)
-    packed = -(-below.size // 4)
-    at = 1 + packed
+    codes = read_pairs(reader, below)
     for edge in _edges(level):
-        piece = data[at : at + edge.nbytes]
-        expect_length(piece, edge.nbytes)
-        edge[:] = samples_from(piece, below.dtype).reshape(edge.shape)
-        at += edge.nbytes
+        edge[:] = reader.texels(edge.shape, below.dtype)
     for texels in corners(level, below)[:3]:
-        end = at + _LENGTH + int.from_bytes(data[at : at + _LENGTH], "little")
-        texels[:] = _decoded(codecs, data[at + _LENGTH : end], texels)
-        at = end
-    expect_length(data, at)
-    codes = unpack_pairs(data[1 : 1 + packed], below.size).reshape(below.shape)
+        jpeg = bytes(reader.take(reader.number(_LENGTH)))
+        texels[:] = _decoded(codecs, jpeg, texels)
+    reader.end()
     place_last(level, below, codes, b"")
     return Tile(b"", level)
 

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.damage import damaged
+from ptmtools.texture.coders.reading import Reader, damaged
 from ptmtools.texture.profiles import Tile
 from ptmtools.texture.samples import from_ordered, kind_of, round_to, to_ordered
 
@@ -41,10 +41,12 @@ def encode_base(level: Samples) -> bytes:
     return sample_bytes(level)
 
 
-def decode_base(data: bytes, shape: Shape, dtype: np.dtype[Any]) -> Samples:
+def decode_base(data: bytes | memoryview, shape: Shape, dtype: np.dtype[Any]) -> Samples:
     """The inverse of `encode_base`. Raises InputError PTM-I112 if the length is wrong."""
-    expect_length(data, shape[0] * shape[1] * shape[2] * dtype.itemsize)
-    return samples_from(data, dtype).reshape(shape).copy()
+    reader = Reader(data)
+    level = reader.texels(shape, dtype)
+    reader.end()
+    return level
 
 
 def encode_tile(
@@ -56,7 +58,7 @@ def encode_tile(
 
 
 def decode_tile(
-    data: bytes,
+    data: bytes | memoryview,
     below: Samples,
     shape: Shape,
     max_error: int = 0,
@@ -64,14 +66,14 @@ def decode_tile(
     threads: int = 1,
 ) -> Tile:
     """The inverse of `encode_tile` (paper Eq. 3). Raises InputError PTM-I112."""
-    length = group_length(shape, below.dtype)
-    if len(data) < length or not kind_of(below.dtype).is_float:
-        expect_length(data, length)
-    packed = -(-below.size // 4)
+    reader = Reader(data)
+    codes = read_pairs(reader, below)
     level = np.empty(shape, below.dtype)
-    _place_partial_level(samples_from(data[packed:length], below.dtype), level)
-    residual = unpack_pairs(data[:packed], below.size).reshape(below.shape)
-    place_last(level, below, residual, data[length:])
+    partial = level.size - below.size
+    _place_partial_level(reader.texels((1, 1, partial), below.dtype)[0, 0], level)
+    escapes = reader.rest() if kind_of(below.dtype).is_float else b""
+    reader.end()
+    place_last(level, below, codes, escapes)
     return Tile(b"", level)
 
 
@@ -89,11 +91,6 @@ def sample_bytes(*parts: Samples) -> bytes:
     )
 
 
-def samples_from(data: bytes, dtype: np.dtype[Any]) -> Samples:
-    """The inverse of `sample_bytes`, one row of samples in native byte order."""
-    return np.frombuffer(data, dtype.newbyteorder("<")).astype(dtype, copy=False)
-
-
 def residuals(level: Samples, below: Samples) -> tuple[NDArray[np.uint8], bytes]:
     """The code, 0 … 3, of every component of every block (bh, bw, c), and the escapes."""
     p, q, r, s = corners(level, below)
@@ -108,7 +105,9 @@ def residuals(level: Samples, below: Samples) -> tuple[NDArray[np.uint8], bytes]
     return np.minimum(codes, ESCAPE).astype(np.uint8), _pack_numbers(codes[escaped] - ESCAPE)
 
 
-def place_last(level: Samples, below: Samples, codes: NDArray[np.uint8], escapes: bytes) -> None:
+def place_last(
+    level: Samples, below: Samples, codes: NDArray[np.uint8], escapes: bytes | memoryview
+) -> None:
     """Fill in s of every block of ``level``. Raises InputError PTM-I112 for wrong escapes."""
     p, q, r, s = corners(level, below)
     if not kind_of(level.dtype).is_float:
@@ -174,10 +173,11 @@ def pack_pairs(codes: NDArray[np.uint8]) -> bytes:
     return (four[:, 0] | four[:, 1] << 2 | four[:, 2] << 4 | four[:, 3] << 6).tobytes()
 
 
-def unpack_pairs(data: bytes, n: int) -> NDArray[np.uint8]:
-    """The inverse of `pack_pairs`: n codes."""
-    packed = np.frombuffer(data, np.uint8)
-    return np.stack([packed >> shift & 3 for shift in (0, 2, 4, 6)], axis=1).reshape(-1)[:n]
+def read_pairs(reader: Reader, below: Samples) -> NDArray[np.uint8]:
+    """The inverse of `pack_pairs`: a code for every sample of ``below``."""
+    packed = reader.numbers("u1", -(-below.size // 4))
+    codes = np.stack([packed >> shift & 3 for shift in (0, 2, 4, 6)], axis=1)
+    return codes.reshape(-1)[: below.size].reshape(below.shape)
 
 
 def _pack_numbers(numbers: NDArray[Any]) -> bytes:
@@ -199,7 +199,7 @@ def _pack_numbers(numbers: NDArray[Any]) -> bytes:
     return (nibbles[::2] | nibbles[1::2] << 4).tobytes()
 
 
-def _unpack_numbers(data: bytes, n: int, bits: int) -> NDArray[np.uint64]:
+def _unpack_numbers(data: bytes | memoryview, n: int, bits: int) -> NDArray[np.uint64]:
     """Exactly n numbers of at most so many bits. Raises InputError PTM-I112."""
     pairs = np.frombuffer(data, np.uint8)
     nibbles = np.stack([pairs & 15, pairs >> 4], axis=1).reshape(-1)
@@ -223,9 +223,3 @@ def _unpack_numbers(data: bytes, n: int, bits: int) -> NDArray[np.uint64]:
     if n and int(numbers.max()) >> bits:
         raise damaged("an escape is too large")
     return numbers
-
-
-def expect_length(data: bytes, length: int) -> None:
-    """Raise InputError PTM-I112 unless there are so many bytes."""
-    if len(data) != length:
-        raise damaged(f"it has {len(data)} bytes instead of {length}")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptmtools.texture.coders.damage import damaged
+from ptmtools.texture.coders.reading import Reader, damaged
 from ptmtools.texture.profiles import Tile
 from ptmtools.texture.profiles.nested import pack_levels, shapes_to, unpack_levels
 from ptmtools.texture.pyramid import build_pyramid
@@ -31,11 +31,11 @@ def encode_base(level: Samples) -> bytes:
     return coarsest.tobytes() + pack_levels(encode_tile, coarsest, finer)
 
 
-def decode_base(data: bytes, shape: Shape, dtype: np.dtype[Any]) -> Samples:
+def decode_base(data: bytes | memoryview, shape: Shape, dtype: np.dtype[Any]) -> Samples:
     """The inverse of `encode_base`. Raises InputError PTM-I112."""
     coarsest, *finer = shapes_to(shape)
-    level, rest = _texels(data, coarsest, dtype)
-    return unpack_levels(decode_tile, rest, level, finer)
+    reader = Reader(data)
+    return unpack_levels(decode_tile, reader, reader.texels(coarsest, dtype), finer)
 
 
 def encode_tile(
@@ -64,7 +64,7 @@ def encode_tile(
 
 
 def decode_tile(
-    data: bytes,
+    data: bytes | memoryview,
     below: Samples,
     shape: Shape,
     max_error: int = 0,
@@ -72,33 +72,22 @@ def decode_tile(
     threads: int = 1,
 ) -> Tile:
     """The inverse of `encode_tile`. Raises InputError PTM-I112."""
-    if not data:
-        raise damaged("it is empty")
-    coder, data = data[0], data[1:]
+    reader = Reader(data)
+    coder, eight_bits = reader.number(1), below.dtype == np.uint8
     if coder == STORED:
-        level, rest = _texels(data, shape, below.dtype)
-        if rest:
-            raise damaged("it is too long")
+        level = reader.texels(shape, below.dtype)
+        reader.end()
         return Tile(b"", level, memory)
-    if coder == TEXEL and below.dtype != np.uint8:
+    if coder == TEXEL and not eight_bits:
         from ptmtools.texture.coders.texel import coder as texel
 
-        return Tile(b"", texel.decode(data, below, shape, below.dtype, max_error))
-    if coder == EVEN and max_error == 0 and below.dtype == np.uint8:
+        return Tile(b"", texel.decode(reader.rest(), below, shape, max_error))
+    if eight_bits and (coder == MIXED or (coder == EVEN and max_error == 0)):
         from ptmtools.texture.coders.mixing import coder as mixing
 
-        return Tile(b"", mixing.decode_even(data, below, shape), memory)
-    if coder == MIXED and below.dtype == np.uint8:
-        from ptmtools.texture.coders.mixing import coder as mixing
-
-        texels, learned = mixing.decode_mixing(data, below, shape, max_error, memory, threads)
+        body = reader.rest()
+        if coder == EVEN:
+            return Tile(b"", mixing.decode_even(body, below, shape), memory)
+        texels, learned = mixing.decode_mixing(body, below, shape, max_error, memory, threads)
         return Tile(b"", texels, learned)
     raise damaged(f"coder {coder} is unknown here")
-
-
-def _texels(data: bytes, shape: Shape, dtype: np.dtype[Any]) -> tuple[Samples, bytes]:
-    """A level as it is at the start of ``data``, and what follows it."""
-    size = shape[0] * shape[1] * shape[2] * dtype.itemsize
-    if len(data) < size:
-        raise damaged("it is cut short")
-    return np.frombuffer(bytearray(data[:size]), dtype).reshape(shape), data[size:]

@@ -6,103 +6,54 @@ frequency tables; the number of escapes and the escapes; the rANS words to the e
 
 from __future__ import annotations
 
-from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.damage import damaged
 from ptmtools.texture.coders.haar import layout
 from ptmtools.texture.coders.haar.weights import fit_weights
+from ptmtools.texture.coders.planes import plane_order, references
 from ptmtools.texture.coders.rans import tables
-from ptmtools.texture.coders.rans.stream import encode_symbols, read_stream
+from ptmtools.texture.coders.rans.sizes import Sink
+from ptmtools.texture.coders.rans.stream import check_end, empty_sink, encode_symbols, read_stream
+from ptmtools.texture.coders.reading import Reader, damaged
 
 if TYPE_CHECKING:
-    from ptmtools.texture.coders.haar.kernels import Sink, Source
+    from ptmtools.texture.coders.haar.kernels import Source
 
 #: Flag bits: weights are sent; from bit 4 on, component i is coded by rank.
 SENT_WEIGHTS = 1
 RANKED = 16
 
 Bytes = NDArray[np.uint8]
-
-
-class _Ranks:
-    """For each component, ranks in place of values (``ranks``) and back (``values``)."""
-
-    def __init__(self, sets: tuple[NDArray[np.intp] | None, ...]) -> None:
-        count = len(sets)
-        self.ranks = np.tile(np.arange(256, dtype=np.int32), (count, 1))
-        self.values = self.ranks.copy()
-        self.tops = np.zeros(count, np.int64)
-        for c, used in enumerate(sets):
-            if used is not None:
-                # A value that does not occur (below, means do) has the rank of the nearest that
-                # does; the lower one where two are as near.
-                self.ranks[c] = np.searchsorted((used[:-1] + used[1:]) // 2, np.arange(256))
-                self.values[c, : len(used)] = used
-                self.tops[c] = len(used) - 1
-
-
-@cache
-def _values_themselves(components: int) -> _Ranks:
-    return _Ranks((None,) * components)
-
-
-def _ranks(sets: tuple[NDArray[np.intp] | None, ...]) -> _Ranks:
-    if all(used is None for used in sets):
-        return _values_themselves(len(sets))
-    return _Ranks(sets)
-
-
-def _sparse_values(blocks: Bytes) -> tuple[NDArray[np.intp] | None, ...]:
-    """For each component its distinct values, if they are few for their range; else None."""
-    from ptmtools.texture.coders.haar import kernels
-
-    components = blocks.shape[2]
-    used = np.zeros((components, 256), np.uint8)
-    kernels.mark_values(blocks, used)
-    return tuple(_if_sparse(np.flatnonzero(one), blocks.size // components) for one in used)
-
-
-def _if_sparse(values: NDArray[np.intp], samples: int) -> NDArray[np.intp] | None:
-    if len(values) < 2 or samples < 64 * len(values):
-        return None
-    return values if 100 * len(values) <= 88 * (values[-1] - values[0] + 1) else None
+#: For each component its distinct values, rising, if it is coded by rank; else none.
+Sets = list[NDArray[np.intp]]
 
 
 def encode(level: Bytes, below: Bytes) -> bytes:
     """The group that refines ``below`` (h >> 1, w >> 1, c) to ``level`` (h, w, c)."""
-    from ptmtools.texture.coders.haar import kernels
-
     components = level.shape[2]
     sets = _sparse_values(level[: 2 * below.shape[0], : 2 * below.shape[1]])
-    ranks = _ranks(sets)
+    ranks = _Ranks(sets)
     sent = fit_weights(level, below, ranks.ranks)
-    n = level.size - below.size
-    sink = kernels.Sink(
-        symbols=np.zeros(n, np.uint16),
-        contexts=np.zeros(n, np.uint8),
-        counts=np.zeros((layout.TABLES, 256), np.int64),
-    )
+    sink = empty_sink(level.size - below.size, layout.TABLES)
     _pass(level, below, sent, ranks, sink, None)
-    frequency, packed_tables = tables.choose(sink.counts, layout.EDGE_TABLE)
     flags = SENT_WEIGHTS if sent is not None else 0
-    flags |= sum(RANKED << c for c in range(components) if sets[c] is not None)
+    flags |= sum(RANKED << c for c, used in enumerate(sets) if used.size)
+    bitmaps = [np.isin(np.arange(256), used) for used in sets if used.size]
     return b"".join(
         [
             bytes([flags]),
-            *(_bitmap(used) for used in sets if used is not None),
-            b"" if sent is None else sent[_sent_mask(components)].astype("<i2").tobytes(),
-            packed_tables,
-            encode_symbols(sink.symbols, sink.contexts, frequency, layout.EDGE_TABLE),
+            *(np.packbits(bitmap, bitorder="little").tobytes() for bitmap in bitmaps),
+            b"" if sent is None else sent[layout.sent_mask(components)].astype("<i2").tobytes(),
+            *encode_symbols(sink, layout.EDGE_TABLE, tables.built_in()),
         ]
     )
 
 
 def decode(
-    data: bytes, below: Bytes, shape: tuple[int, int, int], version_1: bool = False
+    data: bytes | memoryview, below: Bytes, shape: tuple[int, int, int], version_1: bool = False
 ) -> Bytes:
     """The inverse of `encode`, or the decoder of files of version 1.
 
@@ -111,27 +62,30 @@ def decode(
     from ptmtools.texture.coders.haar import kernels
 
     components = shape[2]
-    reader = _Reader(data)
-    flags = reader.take(1)[0]
+    reader = Reader(data)
+    flags = reader.number(1)
     if flags & ~(SENT_WEIGHTS | RANKED * ((1 << components) - 1)):
         raise damaged(f"flags {flags} are unknown")
-    sets = tuple(_bits(reader.take(32)) if flags >> 4 + c & 1 else None for c in range(components))
+    sets = []
+    for c in range(components):
+        bitmap = reader.numbers("u1", 32 if flags & RANKED << c else 0)
+        sets.append(np.flatnonzero(np.unpackbits(bitmap, bitorder="little")))
+        if bitmap.size and len(sets[c]) < 2:
+            raise damaged("a rank bitmap has fewer than two values")
     sent = None
     if flags & SENT_WEIGHTS:
-        mask = _sent_mask(components)
+        mask = layout.sent_mask(components)
         sent = np.zeros(mask.shape, np.int32)
-        sent[mask] = np.frombuffer(reader.take(2 * int(mask.sum())), "<i2")
+        sent[mask] = reader.numbers("<i2", int(mask.sum()))
         if int(np.abs(sent).max()) > layout.WEIGHT_TOP:
             raise damaged("a weight is out of range")
-    parse = tables.parse_version_1 if version_1 else tables.parse
-    frequency, used = parse(reader.rest(), layout.TABLES)
-    reader.take(used)
+    frequency = tables.parse(reader, layout.TABLES, tables.built_in(), version_1)
     level = np.empty(shape, np.uint8)
     edge = level.size - 4 * below.size
-    stream = read_stream(reader.rest(), max(below.shape[1], edge))
+    stream = read_stream(reader, max(below.shape[1], edge))
     table, begins = tables.row_tables(frequency)
     classes = layout.class_of_activity()
-    ranks = _ranks(sets)
+    ranks = _Ranks(sets)
     source = kernels.Source(
         words=stream.words,
         limit=stream.limit,
@@ -148,12 +102,39 @@ def decode(
         pairs=np.zeros((2, components, below.shape[1]), np.uint16),
         mixed=np.zeros(components * below.shape[1], np.uint16),
     )
-    result = _pass(level, below, sent, ranks, None, source)
-    if result == kernels.TRUNCATED:
-        raise damaged("its stream ends early")
-    if result != kernels.OK:
-        raise damaged("its stream leads to impossible texels")
+    check_end(_pass(level, below, sent, ranks, None, source))
     return level
+
+
+class _Ranks:
+    """For each component, ranks in place of values (``ranks``) and back (``values``)."""
+
+    def __init__(self, sets: Sets) -> None:
+        self.ranks = np.tile(np.arange(256, dtype=np.int32), (len(sets), 1))
+        self.values = self.ranks.copy()
+        self.tops = np.array([max(len(used) - 1, 0) for used in sets])
+        for c, used in enumerate(sets):
+            if used.size:
+                # A value that does not occur (below, means do) has the rank of the nearest that
+                # does; the lower one where two are as near.
+                self.ranks[c] = np.searchsorted((used[:-1] + used[1:]) // 2, np.arange(256))
+                self.values[c, : len(used)] = used
+
+
+def _sparse_values(blocks: Bytes) -> Sets:
+    """For each component its distinct values, if they are few for their range; else none."""
+    from ptmtools.texture.coders.haar import kernels
+
+    components = blocks.shape[2]
+    used = np.zeros((components, 256), np.uint8)
+    kernels.mark_values(blocks, used)
+    sets = [np.flatnonzero(one) for one in used]
+    samples = blocks.size // components
+    for c, values in enumerate(sets):
+        few = 2 <= len(values) <= samples // 64
+        if not few or 100 * len(values) > 88 * (values[-1] - values[0] + 1):
+            sets[c] = values[:0]
+    return sets
 
 
 def _pass(
@@ -168,58 +149,17 @@ def _pass(
     from ptmtools.texture.coders.haar import kernels
 
     components = level.shape[2]
-    references = layout.references(components)
+    others = references(components)
     return kernels.haar_pass(
         level,
         below,
-        np.array(layout.plane_order(components), np.int64),
-        references,
-        layout.BUILT_IN_WEIGHTS[references] if sent is None else sent,
-        layout.ACTIVITY_WEIGHTS[references],
+        plane_order(components),
+        others,
+        layout.BUILT_IN_WEIGHTS[others] if sent is None else sent,
+        layout.ACTIVITY_WEIGHTS[others],
         layout.class_of_activity(),
         ranks.ranks,
         sink,
         source,
         kernels.workspace(below.shape[1], components),
     )
-
-
-@cache
-def _sent_mask(components: int) -> NDArray[np.bool_]:
-    """Which weights (c, 3, 7) are sent, in this order."""
-    mask = np.zeros((components, 3, 7), np.bool_)
-    for c in range(components):
-        for k in range(3):
-            mask[c, k, layout.features_used(k, layout.reference_count(components, c))] = True
-    return mask
-
-
-def _bitmap(values: NDArray[np.intp]) -> bytes:
-    used = np.zeros(256, np.bool_)
-    used[values] = True
-    return np.packbits(used, bitorder="little").tobytes()
-
-
-def _bits(bitmap: bytes) -> NDArray[np.intp]:
-    values = np.flatnonzero(np.unpackbits(np.frombuffer(bitmap, np.uint8), bitorder="little"))
-    if len(values) < 2:
-        raise damaged("a rank bitmap has fewer than two values")
-    return values
-
-
-class _Reader:
-    """Bytes from the front; asking for more than there are is an error of the file."""
-
-    def __init__(self, data: bytes) -> None:
-        # A view: slices of it copy nothing.
-        self._data = memoryview(data)
-        self._at = 0
-
-    def take(self, n: int) -> bytes:
-        if self._at + n > len(self._data):
-            raise damaged("it is cut short")
-        self._at += n
-        return bytes(self._data[self._at - n : self._at])
-
-    def rest(self) -> memoryview:
-        return self._data[self._at :]

@@ -37,13 +37,12 @@ from ptmtools.texture.coders.rans.kernels import (
     rotate_states,
     start_states,
 )
-from ptmtools.texture.coders.rans.sizes import ESCAPE
+from ptmtools.texture.coders.rans.sizes import ESCAPE, IMPOSSIBLE, OK, TRUNCATED
 
 i32, u16 = np.int32, np.uint16
 
 #: A component with more distinct values than this is not coded by rank.
 MANY_VALUES = 225
-OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2
 
 
 class Workspace(NamedTuple):
@@ -78,14 +77,6 @@ class Source(NamedTuple):
     zeros: Any  # int32, likewise
     pairs: Any  # (2, c, blocks) uint16
     mixed: Any  # (c * blocks,) uint16
-
-
-class Sink(NamedTuple):
-    """Where an encoder's symbols go."""
-
-    symbols: Any  # (n,) uint16
-    contexts: Any  # (n,) uint8
-    counts: Any  # (tables, 256) int64, zeros before
 
 
 def workspace(blocks: int, components: int) -> Workspace:
@@ -145,16 +136,12 @@ def _absorb(decoded: Any, prediction: Any, residual: Any, near: Any, values: Any
 @kernel
 def _edge_prediction(level: Any, y: int, x: int, plane: int) -> Any:
     """Median of left, upper and left + upper - upper left; what lies outside gives way."""
-    left, up, corner = i32(0), i32(0), i32(0)
-    if x > 0:
-        left = i32(level[y, x - 1, plane])
-    if y > 0:
-        up = i32(level[y - 1, x, plane])
     if x == 0:
-        return up
+        return i32(level[y - 1, x, plane]) if y > 0 else i32(0)
+    left = i32(level[y, x - 1, plane])
     if y == 0:
         return left
-    corner = i32(level[y - 1, x - 1, plane])
+    up, corner = i32(level[y - 1, x, plane]), i32(level[y - 1, x - 1, plane])
     return max(min(left, up), min(max(left, up), i32(left + up - corner)))
 
 

@@ -1,8 +1,7 @@
 """What encoder and decoder of the `fast` profile agree on without sending it.
 
-Planes in coding order, which earlier planes each refers to, the built-in weights, and the classes
-of activity. The numbers were fitted once to photographs (12 of the Kodak images and 7 textures)
-and are part of the format.
+The built-in weights and the classes of activity. The numbers were fitted once to photographs (12 of
+the Kodak images and 7 textures) and are part of the format.
 """
 
 from __future__ import annotations
@@ -11,6 +10,8 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ptmtools.texture.coders.planes import references
 
 #: Weights are in 1/256 and stay within ± this, so that predictions fit in 32 bits.
 WEIGHT_TOP = 2047
@@ -46,24 +47,14 @@ ACTIVITY_WEIGHTS = np.array(
 )  # fmt: skip
 
 
-def plane_order(components: int) -> list[int]:
-    """Components in coding order: green, red, blue, alpha; grey, alpha."""
-    return [1, 0, 2, 3][:components] if components >= 3 else list(range(components))
-
-
-def reference_count(components: int, c: int) -> int:
-    """How many of the planes coded first plane c (in coding order) refers to: alpha to none."""
-    return c if components >= 3 and c < 3 else 0
-
-
-def features_used(k: int, references: int) -> list[int]:
-    """Indices of the weights of coefficient k (0 V, 1 h1, 2 h2') that are sent."""
-    return [*range(5 if k == 2 else 4), *range(5, 5 + references)]
-
-
-def references(components: int) -> NDArray[np.int64]:
-    """`reference_count` of every plane, in coding order."""
-    return np.array([reference_count(components, c) for c in range(components)], np.int64)
+@cache
+def sent_mask(components: int) -> NDArray[np.bool_]:
+    """Which weights (c, 3, 7) are sent, in this order."""
+    mask = np.zeros((components, 3, 7), np.bool_)
+    mask[:, :, :4] = mask[:, 2, 4] = True
+    for c, others in enumerate(references(components)):
+        mask[c, :, 5 : 5 + others] = True
+    return mask
 
 
 @cache

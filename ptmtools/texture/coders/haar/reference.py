@@ -1,7 +1,8 @@
 """A decoder of the Haar coder in plain Python, written line by line from ``docs/format-ptm.md``.
 
-It shares nothing with the compiled decoder but the numbers of `layout`. The tests compare the two;
-whoever ports the format can step through it. Thousands of times slower; no damage is looked for.
+It shares nothing with the compiled decoder but the numbers of `layout`, the order of planes and how
+bytes are read. The tests compare the two; whoever ports the format can step through it. Thousands
+of times slower; no damage is looked for.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.texture.coders.haar import layout
+from ptmtools.texture.coders.planes import plane_order, references
 from ptmtools.texture.coders.rans.reference import Symbols, read_tables
+from ptmtools.texture.coders.reading import Reader
 
 Row = list[int]
 Plane = list[Row]
@@ -26,23 +29,20 @@ def decode_haar(
     """The level (h, w, c) that a Haar-coded group (without its first byte) refines ``below`` to."""
     height, width, components = shape
     bh, bw = height >> 1, width >> 1
-    flags, at = group[0], 1
+    reader = Reader(group)
+    flags = reader.number(1)
     values: list[Row] = []
     for c in range(components):
-        bitmap = group[at : at + 32] if flags >> (4 + c) & 1 else bytes(32)
-        at += 32 if flags >> (4 + c) & 1 else 0
-        values.append([v for v in range(256) if bitmap[v >> 3] >> (v & 7) & 1])
-    order = [1, 0, 2, 3][:components] if components > 2 else list(range(components))
-    count = [c if components > 2 and c < 3 else 0 for c in range(components)]
+        bitmap = reader.number(32 if flags >> (4 + c) & 1 else 0)
+        values.append([v for v in range(256) if bitmap >> v & 1])
+    order, count = plane_order(components).tolist(), references(components).tolist()
     weights = [[list(map(int, layout.BUILT_IN_WEIGHTS[n][k])) for k in range(3)] for n in count]
     if flags & 1:
         for c, n in enumerate(count):
             for k in range(3):
                 for i in [*range(5 if k == 2 else 4), *range(5, 5 + n)]:
-                    weights[c][k][i] = int.from_bytes(group[at : at + 2], "little", signed=True)
-                    at += 2
-    tables, at = read_tables(group, at, 29, version_1)
-    symbols = Symbols(group, at, tables, 28, version_1)
+                    weights[c][k][i] = int(reader.numbers("<i2", 1)[0])
+    symbols = Symbols(reader, read_tables(reader, 29, version_1), 28, version_1)
 
     texels = np.zeros(shape, np.int64)
     v, h, g = ([_zeros(bh, bw) for _ in order] for _ in range(3))
@@ -78,8 +78,7 @@ def decode_haar(
             factors = map(int, layout.ACTIVITY_WEIGHTS[count[c]][k])
             a = min(sum(m * n for m, n in zip(factors, activity, strict=True)) >> 6, 1023)
             klass = sum(bound <= a for bound in layout.CLASS_BOUNDS)
-            z = symbols.next(klass + 14 * (k == 2))
-            e = -((z + 1) >> 1) if z & 1 else z >> 1
+            e = symbols.signed(klass + 14 * (k == 2))
             residuals[k][c][y][x] = e
             out[y][x] = prediction + e
 
@@ -93,14 +92,13 @@ def decode_haar(
                 for x in range(bw):
                     block = (v[c][y - 1][x], h[c][y - 1][x], g[c][y - 1][x])
                     mean = int(below[y - 1, x, plane])
-                    four = _by_rank(*block, mean, values[plane]) or _by_value(*block, mean)
+                    four = _by_rank(*block, mean, values[plane]) or by_value(*block, mean)
                     texels[2 * y - 2 : 2 * y, 2 * x : 2 * x + 2, plane] = np.reshape(four, (2, 2))
     symbols.begin_row()
-    for y, x in _edge(height, width):
+    for y, x in edge(height, width):
         for plane in range(components):
-            z = symbols.next(28)
-            e = -((z + 1) >> 1) if z & 1 else z >> 1
-            texels[y, x, plane] = (_median(texels[:, :, plane], y, x) + e) & 255
+            guess = _median(texels[:, :, plane], y, x)
+            texels[y, x, plane] = (guess + symbols.signed(28)) & 255
     return texels.astype(np.uint8)
 
 
@@ -122,7 +120,8 @@ def _features_g(i: At, h: int, under: int, slope: int) -> Row:
     return [i(1, 0) - i(-1, 0), i(1, 1) - i(-1, 1), h, under, slope]
 
 
-def _by_value(v: int, h: int, g: int, mean: int) -> Row:
+def by_value(v: int, h: int, g: int, mean: int) -> Row:
+    """p, q, r, s of a block from its Haar differences and its mean."""
     t = (v + (v & 1)) >> 1
     upper = 2 * mean + ((h ^ t) & 1) + t
     lower = upper - v
@@ -160,7 +159,8 @@ def _outside(row: Row, x: int) -> int:
     return row[x] if 0 <= x < len(row) else 0
 
 
-def _edge(height: int, width: int) -> Iterator[tuple[int, int]]:
+def edge(height: int, width: int) -> Iterator[tuple[int, int]]:
+    """The texels that belong to no block: the odd last column, then the odd last row."""
     if width & 1:
         yield from ((y, width - 1) for y in range(height & ~1))
     if height & 1:

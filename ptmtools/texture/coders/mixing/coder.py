@@ -12,15 +12,14 @@ from __future__ import annotations
 
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from functools import cache
-from itertools import accumulate, pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.damage import damaged
-from ptmtools.texture.coders.mixing.memory import Memory, fresh_memory, level_tables
-from ptmtools.texture.coders.varints import pack_varints, read_varints
+from ptmtools.texture.coders.mixing.memory import Memory, copied, fresh_state, level_tables
+from ptmtools.texture.coders.planes import plane_order
+from ptmtools.texture.coders.reading import Reader, damaged, pack_varints
 
 if TYPE_CHECKING:
     from ptmtools.texture.coders.mixing.kernels import Canvas, Place
@@ -43,7 +42,7 @@ def encode_mixing(
 
 
 def decode_mixing(
-    data: bytes,
+    data: bytes | memoryview,
     below: Level,
     shape: tuple[int, int, int],
     max_error: int = 0,
@@ -53,44 +52,37 @@ def decode_mixing(
     """The inverse of `encode_mixing`. Raises InputError PTM-I112 for what no encoder writes."""
     coded = _Pass(None, below, shape, max_error, memory, data)
     coded.run(threads)
-    coded.check()
+    for stream in coded.streams:
+        stream.check()
     return coded.texels(), coded.memory
 
 
 def encode_even(level: Level, below: Level) -> bytes:
     """``level`` as if all blocks with the same mean were equally likely: the coder for noise."""
-    coder, buffer = _coder(None), np.zeros(2 * level.size + 64, np.uint8)
-    _even(level, below, level.shape, coder, buffer)
-    return _closed(coder, buffer)
+    stream = _Stream(2 * level.size + 64)
+    _even(level, below, level.shape, stream)
+    return stream.closed()
 
 
-def decode_even(data: bytes, below: Level, shape: tuple[int, int, int]) -> Level:
+def decode_even(data: bytes | memoryview, below: Level, shape: tuple[int, int, int]) -> Level:
     """The inverse of `encode_even`. Raises InputError PTM-I112 for what no encoder writes."""
-    buffer = np.frombuffer(bytearray(data), np.uint8)
-    coder = _coder(buffer)
-    level = _even(None, below, shape, coder, buffer)
-    _check(coder, buffer)
+    stream = _Stream(data)
+    level = _even(None, below, shape, stream)
+    stream.check()
     return level
 
 
-def _even(
-    level: Level | None,
-    below: Level,
-    shape: tuple[int, ...],
-    coder: NDArray[np.int64],
-    buffer: NDArray[np.uint8],
-) -> Level:
+def _even(level: Level | None, below: Level, shape: tuple[int, ...], stream: _Stream) -> Level:
     from ptmtools.texture.coders.mixing.even import code_even
 
     height, width, components = shape
-    order = list(range(components))
-    canvas, places = _canvas(level, below, height, width, order)
+    canvas, places = _canvas(level, below, height, width, list(range(components)))
     for place in places:
         code_even(
             level is not None, height, width, place, canvas.cells, canvas.parents, canvas.goal,
-            _ways(), coder, buffer,
+            _ways(), stream.coder, stream.buffer,
         )  # fmt: skip
-    return _cropped(canvas, places, order, shape)
+    return _cropped(canvas, places, list(range(components)), shape)
 
 
 @cache
@@ -115,26 +107,22 @@ class _Pass:
         shape: tuple[int, ...],
         max_error: int,
         memory: Memory | None,
-        data: bytes | None,
+        data: bytes | memoryview | None,
     ) -> None:
         height, width, components = shape
-        self.shape = height, width, components
-        self.order = [1, 0, 2, 3][:components] if components > 2 else list(range(components))
+        self.shape = shape
+        self.order = plane_order(components).tolist()
         self.step = 2 * max_error + 1
-        self.memory = memory.copied() if memory else fresh_memory(components)
+        self.memory = copied(memory) if memory else tuple(fresh_state() for _ in self.order)
         self.tables = [level_tables(height * width) for _ in range(components)]
         self.canvas, self.places = _canvas(level, below, height, width, self.order)
         self.strips = max((width // 2 + STRIP - 1) // STRIP, 1)
         # The planes of a narrow level share one stream: it cannot be a pipeline.
-        streams = components if self.strips > 1 else 1
+        count = components if self.strips > 1 else 1
         self.encoding = data is None
-        if data is None:
-            size = 2 * height * width * (components // streams) + 64
-            self.buffers = [np.zeros(size, np.uint8) for _ in range(streams)]
-        else:
-            parts = _split(data, streams)
-            self.buffers = [np.frombuffer(bytearray(part), np.uint8) for part in parts]
-        self.coders = [_coder(None if self.encoding else b) for b in self.buffers]
+        room = 2 * height * width * (components // count) + 64
+        parts = [room] * count if data is None else _split(data, count)
+        self.streams = [_Stream(part) for part in parts]
 
     def run(self, threads: int) -> None:
         planes = len(self.order)
@@ -162,23 +150,19 @@ class _Pass:
         from ptmtools.texture.coders.mixing.kernels import code_strip
 
         height, width, _ = self.shape
-        stream = c if len(self.buffers) > 1 else 0
+        stream = self.streams[c if len(self.streams) > 1 else 0]
         end = min((strip + 1) * STRIP, width // 2)
         code_strip(
             self.encoding, height, width, strip * STRIP, end, self.step, min(c, 2),
-            self.places[c], self.canvas, self.memory.planes[c], self.tables[c],
-            self.coders[stream], self.buffers[stream],
+            self.places[c], self.canvas, self.memory[c], self.tables[c],
+            stream.coder, stream.buffer,
         )  # fmt: skip
 
     def stream(self) -> bytes | None:
-        if any(c[3] > b.size for c, b in zip(self.coders, self.buffers, strict=True)):
+        if any(stream.coder[3] > stream.buffer.size for stream in self.streams):
             return None
-        parts = [_closed(c, b) for c, b in zip(self.coders, self.buffers, strict=True)]
+        parts = [stream.closed() for stream in self.streams]
         return b"".join([pack_varints(*map(len, parts[:-1])), *parts])
-
-    def check(self) -> None:
-        for coder, buffer in zip(self.coders, self.buffers, strict=True):
-            _check(coder, buffer)
 
     def texels(self) -> Level:
         return _cropped(self.canvas, self.places, self.order, self.shape)
@@ -189,10 +173,8 @@ def _cropped(
 ) -> Level:
     height, width, components = shape
     level = np.empty(shape, np.uint8)
-    size = places[0].errors // components
-    for c, plane in enumerate(order):
-        cells = canvas.cells[c * size : (c + 1) * size].reshape(-1, places[0].stride)
-        level[:, :, plane] = cells[PAD : PAD + height, PAD : PAD + width]
+    cells = canvas.cells[: places[0].errors].reshape(components, -1, places[0].stride)
+    level[:, :, order] = cells[:, PAD : PAD + height, PAD : PAD + width].transpose(1, 2, 0)
     return level
 
 
@@ -204,19 +186,18 @@ def _canvas(
 
     if below.size == 0:
         below = np.full((max(height >> 1, 1), max(width >> 1, 1), len(order)), 128, np.uint8)
-    border = [(PAD // 2, PAD // 2 + 1)] * 2
-    parents = np.stack([np.pad(below[:, :, c], border, mode="edge") for c in order])
+    border = (PAD // 2, PAD // 2 + 1)
+    parents = np.pad(below.transpose(2, 0, 1)[order], [(0, 0), border, border], mode="edge")
     parents = parents.astype(np.int32)
     texels = parents.repeat(2, axis=1).repeat(2, axis=2)
     cells = np.concatenate([texels, np.zeros_like(texels)]).reshape(-1)
     goal = cells
     if level is not None:
         wanted = np.zeros_like(texels)
-        for c, plane in enumerate(order):
-            wanted[c, PAD : PAD + height, PAD : PAD + width] = level[:, :, plane]
+        wanted[:, PAD : PAD + height, PAD : PAD + width] = level.transpose(2, 0, 1)[order]
         goal = wanted.reshape(-1)
     planes, tall, stride = texels.shape
-    across = stride // 2
+    size, across = tall * stride, stride // 2
     lists = (kernels.TEXELS_AT, kernels.PARENTS_AT, kernels.COLOUR_AT)
     offsets = np.zeros((len(lists), kernels.POSITIONS, 8), np.int64)
     for row, positions in enumerate(lists):
@@ -225,15 +206,15 @@ def _canvas(
             offsets[row, k, : len(near)] = [dy * step + dx for dy, dx in near]
     places = [
         kernels.Place(
-            texels=c * tall * stride + PAD * stride + PAD,
-            parents=c * (tall // 2) * across + (PAD // 2) * across + PAD // 2,
+            texels=c * size + PAD * stride + PAD,
+            parents=c * size // 4 + PAD // 2 * across + PAD // 2,
             stride=stride,
             across=across,
-            errors=planes * tall * stride,
+            errors=planes * size,
             # The two planes before; of alpha too, which need not be like green.
-            first=-c * tall * stride,
-            second=(1 - c) * tall * stride if c > 1 else 0,
-            before=-c * (tall // 2) * across,
+            first=-c * size,
+            second=(1 - c) * size if c > 1 else 0,
+            before=-c * size // 4,
         )
         for c in range(planes)
     ]
@@ -241,37 +222,39 @@ def _canvas(
     return kernels.Canvas(cells, parents.reshape(-1), flats, goal, offsets), places
 
 
-def _coder(buffer: Any) -> NDArray[np.int64]:
-    window = 0 if buffer is None else int.from_bytes(buffer[:4].tobytes().ljust(4, b"\0"), "big")
-    return np.array([0, 0xFFFFFFFF, window, 0 if buffer is None else 4], np.int64)
+class _Stream:
+    """The arithmetic coder and its bytes: those to read, or room for so many to write."""
+
+    def __init__(self, data: bytes | memoryview | int) -> None:
+        self.buffer = np.frombuffer(bytearray(data), np.uint8)
+        first = 0 if isinstance(data, int) else 4
+        window = int.from_bytes(self.buffer[:first].tobytes().ljust(4, b"\0"), "big")
+        self.coder = np.array([0, 0xFFFFFFFF, window, first], np.int64)
+
+    def closed(self) -> bytes:
+        """What was written."""
+        value, size = self._final()
+        return self.buffer[: int(self.coder[3])].tobytes() + value.to_bytes(4, "big")[:size]
+
+    def check(self) -> None:
+        """Raise InputError PTM-I112 unless all was read."""
+        value, size = self._final()
+        if self.coder[2] != value or self.coder[3] - 4 + size != self.buffer.size:
+            raise damaged("its stream does not end with its last texel")
+
+    def _final(self) -> tuple[int, int]:
+        """The value in low … high that needs the fewest bytes if zeros follow, and how many."""
+        low, high = int(self.coder[0]), int(self.coder[1])
+        for size in range(4):
+            zeros = 32 - 8 * size
+            value = -(-low >> zeros) << zeros
+            if value <= high:
+                return value, size
+        return low, 4
 
 
-def _final(coder: NDArray[np.int64]) -> tuple[int, int]:
-    """The value in low … high that needs the fewest bytes if zeros follow, and how many."""
-    low, high = int(coder[0]), int(coder[1])
-    for size in range(4):
-        zeros = 32 - 8 * size
-        value = -(-low >> zeros) << zeros
-        if value <= high:
-            return value, size
-    return low, 4
-
-
-def _closed(coder: NDArray[np.int64], buffer: NDArray[np.uint8]) -> bytes:
-    value, size = _final(coder)
-    return buffer[: int(coder[3])].tobytes() + value.to_bytes(4, "big")[:size]
-
-
-def _check(coder: NDArray[np.int64], buffer: NDArray[np.uint8]) -> None:
-    value, size = _final(coder)
-    if coder[2] != value or coder[3] - 4 + size != buffer.size:
-        raise damaged("its stream does not end with its last texel")
-
-
-def _split(data: bytes, streams: int) -> list[bytes]:
+def _split(data: bytes | memoryview, streams: int) -> list[memoryview]:
     """Lengths of all streams but the last, then the streams."""
-    lengths, at = read_varints(data, 0, streams - 1)
-    ends = [*accumulate(lengths, initial=at), len(data)]
-    if ends[-2] > ends[-1]:
-        raise damaged("its streams are cut short")
-    return [data[begin:end] for begin, end in pairwise(ends)]
+    reader = Reader(data)
+    lengths = [reader.varint() for _ in range(streams - 1)]
+    return [*(reader.take(length) for length in lengths), reader.rest()]

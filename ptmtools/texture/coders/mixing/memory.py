@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,22 +16,16 @@ SLOT_BITS = (8, 16)
 VALUE_BITS = (8, 18)
 
 
-@dataclass(frozen=True)
-class Memory:
-    """The state of all planes behind a level. Coding changes it in place: give it a copy."""
-
-    planes: tuple[State, ...]
-
-    def copied(self) -> Memory:
-        return Memory(tuple(type(s)(*(array.copy() for array in s)) for s in self.planes))
+#: The state of all planes behind a level. Coding changes it in place: give it a copy.
+Memory = tuple["State", ...]
 
 
-def fresh_memory(planes: int) -> Memory:
-    """The state before anything was coded."""
-    return Memory(tuple(_fresh_state() for _ in range(planes)))
+def copied(memory: Memory) -> Memory:
+    return tuple(type(state)(*(array.copy() for array in state)) for state in memory)
 
 
-def _fresh_state() -> State:
+def fresh_state() -> State:
+    """Of a plane, before anything was coded."""
     from ptmtools.texture.coders.mixing import decisions
     from ptmtools.texture.coders.mixing.kernels import POSITIONS, SECOND, State
     from ptmtools.texture.coders.mixing.squares import BATCH, FEATURES, SAMPLE
@@ -65,7 +58,9 @@ def level_tables(texels: int) -> Tables:
     from ptmtools.texture.coders.mixing.kernels import Tables
     from ptmtools.texture.coders.mixing.squares import FEATURES
 
-    slots, values = table_bits(texels)
+    bits = max(texels - 1, 0).bit_length()
+    slots = min(max(bits - 1, SLOT_BITS[0]), SLOT_BITS[1])
+    values = min(max(bits, VALUE_BITS[0]), VALUE_BITS[1])
     return Tables(
         slots=np.zeros((decisions.COUNTERS << slots) * decisions.SLOT, np.uint32),
         values=np.zeros(decisions.MATCHES << values, np.int32),
@@ -74,10 +69,3 @@ def level_tables(texels: int) -> Tables:
         left=np.zeros((FEATURES, FEATURES)),
         right=np.zeros((FEATURES, FEATURES)),
     )
-
-
-def table_bits(texels: int) -> tuple[int, int]:
-    """Binary logarithms of the numbers of slots and of values for a level of h · w ``texels``."""
-    bits = max(texels - 1, 0).bit_length()
-    slots = min(max(bits - 1, SLOT_BITS[0]), SLOT_BITS[1])
-    return slots, min(max(bits, VALUE_BITS[0]), VALUE_BITS[1])

@@ -1,7 +1,8 @@
 """A decoder of the context mixing coder in plain Python, written from ``docs/profile-small.md``.
 
-It shares nothing with the compiled decoder but the numeric tables. The tests compare the two;
-whoever ports the format can step through it. Thousands of times slower; no damage is looked for.
+It shares nothing with the compiled decoder but the numbers of the format. The tests compare the
+two; whoever ports the format can step through it. Thousands of times slower; no damage is looked
+for.
 """
 
 from __future__ import annotations
@@ -13,34 +14,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.mixing import tables
+from ptmtools.texture.coders.haar.reference import edge
+from ptmtools.texture.coders.mixing import kernels, tables
+from ptmtools.texture.coders.mixing.kernels import COLOUR_AT, PARENTS_AT, TEXELS_AT
+from ptmtools.texture.coders.planes import plane_order
 
-SQUASH = [int(p) for p in tables.squash()]
-STRETCH = [int(x) for x in tables.stretch(tables.squash())]
-SOFT_PLUS = [int(x) for x in tables.soft_plus()]
-SURVIVAL = [int(x) for x in tables.survival()]
-LEVEL = [int(x) for x in tables.magnitude()]
-RATE = [655360 // (10 * n + 16) for n in range(1024)]
-BUCKETS = [1, 2, 3, 5, 9, 17, 33, 65, 129, 257, 513]
-WITHIN = [0, 0, 0, 1, 4, 11, 14, 17, 20, 20]
-W, N, NW, NE = (0, -1), (-1, 0), (-1, -1), (-1, 1)
-TEXELS = [
-    [W, N, NW, NE, (1, -1), (0, -2), (-2, 0), (-1, 2)],
-    [W, N, NW, NE, (0, -2), (-1, 2), (-2, 0), (1, -2)],
-    [W, N, NW, NE, (-2, 0), (0, -2), (1, -1), (-2, 1)],
-    [N, NW, NE, (0, -2), (-2, 0)],
-    [W, N, NW, NE, (0, -2), (-2, 0)],
-]
-PARENTS = [
-    [(0, 1), (1, 0), (1, 1), (1, -1), (-1, 1)],
-    [(0, 1), (1, 0), (1, 1), (-1, 1), (1, -1)],
-    [(0, 1), (1, 0), (1, 1), (1, -1)],
-    [(0, 1), (1, 0), (1, 1)],
-    [],
-]
-COLOUR = [[(0, 0), W, N, (0, 1), (1, 0)]] * 3 + [[(0, 0), (1, 0), N, (0, 1)], [(0, 0), W, N]]
+SQUASH: list[int] = tables.squash().tolist()
+STRETCH: list[int] = tables.stretch(tables.squash()).tolist()
+SOFT_PLUS: list[int] = tables.soft_plus().tolist()
+SURVIVAL: list[int] = tables.survival().tolist()
+LEVEL: list[int] = tables.magnitude().tolist()
+RATE: list[int] = tables.rates().tolist()
+BUCKETS, WITHIN = kernels.BUCKETS.tolist(), kernels.WITHIN.tolist()
 
-Grid = Callable[[int, int], int]
+Grid = dict[tuple[int, int], int]
+
+
+def near(values: Grid, y: int, x: int) -> Callable[[int, int], int]:
+    """What stands so many rows and columns from a place."""
+    return lambda dy, dx: values[y + dy, x + dx]
 
 
 def clamp(a: int, low: int, high: int) -> int:
@@ -80,10 +72,7 @@ class ReferenceState:
         self.weights = [[0] * 24 for _ in range(5)]
         self.seen = [0] * 5
         self.bias = [0] * (5 * 729)
-        lowest = [LEVEL.index(s) if s in LEVEL else None for s in range(24)]
-        for s in range(22, -1, -1):
-            lowest[s] = lowest[s + 1] if lowest[s] is None else lowest[s]
-        first = [(low or 0) * 16384 + 41500 for low in lowest]
+        first = [int(low) * 16384 + 41500 for low in np.searchsorted(LEVEL, range(24))]
         self.scale = [[first[i // 12 % 24], 0] for i in range(5 * 24 * 12)]
         mix = [42600, 19661, 9830, 3277, 3277, 3277, 3277, 13107, 13107, 13107, 0]
         self.mix = [list(mix) for _ in range(320 + 24 * 36)]
@@ -166,13 +155,13 @@ class _Plane:
     def __init__(
         self, below: NDArray[np.uint8], height: int, width: int, state: ReferenceState, bits: _Bits
     ) -> None:
-        self.parent = {}
+        self.parent: Grid = {}
         bh, bw = below.shape
         for y in range(-2, (height >> 1) + 3):
             for x in range(-2, (width >> 1) + 3):
                 inside = clamp(y, 0, bh - 1), clamp(x, 0, bw - 1)
                 self.parent[y, x] = int(below[inside]) if bh and bw else 128
-        self.texel = {}
+        self.texel: Grid = {}
         for (y, x), mean in self.parent.items():
             for t in range(4):
                 self.texel[2 * y + (t >> 1), 2 * x + (t & 1)] = mean
@@ -195,11 +184,10 @@ def decode_reference(
 ) -> NDArray[np.uint8]:
     """The level (h, w, c); one state for each plane, changed in place."""
     height, width, components = shape
-    order = [1, 0, 2, 3][:components] if components > 2 else list(range(components))
     bits = [_Bits(stream) for stream in streams]
     planes: list[_Plane] = []
     level = np.zeros(shape, np.uint8)
-    for c, component in enumerate(order):
+    for c, component in enumerate(plane_order(components)):
         coder = bits[min(c, len(bits) - 1)]
         plane = _Plane(below[:, :, component], height, width, states[c], coder)
         _decode_plane(plane, planes[: min(c, 2)], height, width, 2 * max_error + 1)
@@ -217,12 +205,8 @@ def _decode_plane(own: _Plane, refs: list[_Plane], height: int, width: int, step
                 if not _flat(own, refs, by, bx):
                     for k in range(4):
                         _texel(own, refs, k, 2 * by + (k >> 1), 2 * bx + (k & 1), (by, bx), step)
-    if width & 1:
-        for y in range(height & ~1):
-            _texel(own, refs, 4, y, width - 1, (0, 0), step)
-    if height & 1:
-        for x in range(width):
-            _texel(own, refs, 4, height - 1, x, (0, 0), step)
+    for y, x in edge(height, width):
+        _texel(own, refs, 4, y, x, (0, 0), step)
 
 
 def _flat(own: _Plane, refs: list[_Plane], y: int, x: int) -> int:
@@ -246,30 +230,18 @@ def _texel(
     state = own.state
     by, bx = block
 
-    def T(dy: int, dx: int) -> int:
-        return own.texel[y + dy, x + dx]
-
-    def E(dy: int, dx: int) -> int:
-        return own.error[y + dy, x + dx]
-
-    def P(dy: int, dx: int) -> int:
-        return own.parent[by + dy, bx + dx]
-
-    def R(r: int, dy: int, dx: int) -> int:
-        return refs[r].texel[y + dy, x + dx]
-
-    def ER(r: int, dy: int, dx: int) -> int:
-        return refs[r].error[y + dy, x + dx]
+    T, E, P = near(own.texel, y, x), near(own.error, y, x), near(own.parent, by, bx)
+    R, ER = [near(ref.texel, y, x) for ref in refs], [near(ref.error, y, x) for ref in refs]
 
     mean, w, n, nw, ne = P(0, 0), T(0, -1), T(-1, 0), T(-1, -1), T(-1, 1)
     base = mean if k < 3 else w
-    sample = [T(*d) - base for d in TEXELS[k]] + [P(*d) - base for d in PARENTS[k]]
+    sample = [T(*d) - base for d in TEXELS_AT[k]] + [P(*d) - base for d in PARENTS_AT[k]]
     for ref in refs:
         if k < 3:
             here = sum(ref.texel[2 * by + i, 2 * bx + j] for i in (0, 1) for j in (0, 1)) >> 2
         else:
             here = ref.texel[y, x - 1]
-        sample += [ref.texel[y + dy, x + dx] - here for dy, dx in COLOUR[k]]
+        sample += [near(ref.texel, y, x)(*d) - here for d in COLOUR_AT[k]]
     features = len(sample)
     sample += [0] * (24 - features)
 
@@ -280,22 +252,18 @@ def _texel(
         rest = 4 * mean - known
         lo, hi = max(rest - 255 * (3 - k), 0), min(rest + 3, 255)
 
-    near, far = abs(E(-1, 0)) + abs(E(0, -1)), abs(E(-1, -1)) + abs(E(-1, 1))
-    if k == 3:
-        activity = 2 * near + 2 * abs(E(-1, -1)) + abs(E(-1, 1))
-    else:
-        more = [[(1, -1), (-2, 0)], [(0, -2), (-1, 2)], [(0, -2), (-2, 0)]][min(k, 2)]
-        activity = 2 * near + far + sum(abs(E(*d)) for d in more)
-    e1 = ER(0, 0, 0) if refs else 0
-    e2 = ER(1, 0, 0) if len(refs) > 1 else 0
-    v1 = R(0, 0, 0) if refs else 0
-    v2 = R(1, 0, 0) if len(refs) > 1 else 0
+    beyond = [(0, -2), (-2, 0)]
+    more = ([(1, -1), (-2, 0)], [(0, -2), (-1, 2)], beyond, [(-1, -1)], beyond)
+    activity = 2 * (abs(E(-1, 0)) + abs(E(0, -1))) + abs(E(-1, -1)) + abs(E(-1, 1))
+    activity += sum(abs(E(*d)) for d in more[k])
+    e1, e2, *_ = [error(0, 0) for error in ER] + [0, 0]
+    v1, v2, *_ = [value(0, 0) for value in R] + [0, 0]
     if not refs:
         slope = sum(abs(P(*d) - mean) for d in ((0, 1), (1, 0), (0, -1), (-1, 0)))
         s1, s2 = level_of(activity), level_of(2 * slope) >> 1
     else:
         own_error = abs(e1) + abs(e2) if len(refs) > 1 else 2 * abs(e1)
-        around = sum(abs(ER(0, *d)) for d in ((0, -1), (-1, 0), (1, 0), (0, 1)))
+        around = sum(abs(ER[0](*d)) for d in ((0, -1), (-1, 0), (1, 0), (0, 1)))
         s1, s2 = level_of((activity + around) >> 1), level_of(2 * own_error) >> 1
 
     scale = state.scale[(k * 24 + s1) * 12 + s2]
@@ -321,22 +289,22 @@ def _texel(
         other = class_of(e2) if len(refs) > 1 else class_of(E(0, -1))
         context.append(hashed(60 + last, guess, v1, v2))
         context.append(hashed(40 + k, class_of(e1) * 9 + other, s1 >> 2, fraction))
-        left, over = left + v1 - R(0, 0, -1), over + v1 - R(0, -1, 0)
-        far_w, far_n = far_w + v1 - R(0, -1, -1), far_n + v1 - R(0, -1, 1)
+        left, over = left + v1 - R[0](0, -1), over + v1 - R[0](-1, 0)
+        far_w, far_n = far_w + v1 - R[0](-1, -1), far_n + v1 - R[0](-1, 1)
     else:
         bend = class_of(w - nw) * 9 + class_of(n - nw)
         bend = bend * 9 + class_of(ne - n if k == 1 else P(0, 1) - mean)
         context.append(hashed(80 + last, guess, w, size >> 3))
         context.append(hashed(40 + k, bend, size >> 1, fraction))
     if len(refs) > 1:
-        far_w, far_n = w + v2 - R(1, 0, -1) - guess, n + v2 - R(1, -1, 0) - guess
+        far_w, far_n = w + v2 - R[1](0, -1) - guess, n + v2 - R[1](-1, 0) - guess
     left, over, far_w, far_n = (clamp(d, -20, 20) for d in (left, over, far_w, far_n))
     context.append(hashed(90 + k, left * 41 + over, size >> 2, 0))
     context.append(hashed(110 + k, far_w * 41 + far_n, left * 41 + over, 0))
 
     where = [hashed(7, (w * 256 + n) * 256 + ne, (nw * 256 + v1) * 256 + v2, 0)]
     if refs:
-        where.append(hashed(17, v1 * 256 + v2, R(0, 0, -1) * 256 + w, 0))
+        where.append(hashed(17, v1 * 256 + v2, R[0](0, -1) * 256 + w, 0))
         where.append(hashed(27, v1 * 256 + v2, 0, 0))
     else:
         cy, cx = y - (k >> 1), x - (k & 1)

@@ -8,6 +8,7 @@ from fractions import Fraction
 import numpy as np
 
 from ptmtools.texture.coders.rans.tables import BUILT_IN_MEANS
+from ptmtools.texture.coders.reading import Reader
 
 Row = list[int]
 
@@ -16,12 +17,10 @@ class Symbols:
     """The four rANS states over their words, and the escapes."""
 
     def __init__(
-        self, group: bytes, at: int, tables: list[Row], plain: int = 256, version_1: bool = False
+        self, reader: Reader, tables: list[Row], plain: int = 256, version_1: bool = False
     ) -> None:
-        escapes = int.from_bytes(group[at : at + 4], "little")
-        numbers = np.frombuffer(group, "<u2", offset=at + 4).tolist()
-        self._escapes = iter(numbers[:escapes])
-        words = numbers[escapes:]
+        self._escapes = iter(reader.numbers("<u2", reader.number(4)).tolist())
+        words = np.frombuffer(reader.rest(), "<u2").tolist()
         self._states = [words[2 * i] | words[2 * i + 1] << 16 for i in range(4)]
         self._words = iter(words[8:])
         self._tables = tables
@@ -50,6 +49,11 @@ class Symbols:
         self._states[lane] = state
         return next(self._escapes) if z == 255 and table < self._plain else z
 
+    def signed(self, table: int) -> int:
+        """The next symbol as a residual: 0, -1, 1, -2, 2 …"""
+        z = self.next(table)
+        return -((z + 1) >> 1) if z & 1 else z >> 1
+
 
 def built_in(kind: int) -> Row:
     """Built-in table number ``kind``, from 1, of the coders of 8 bits."""
@@ -57,25 +61,16 @@ def built_in(kind: int) -> Row:
 
 
 def read_tables(
-    group: bytes,
-    at: int,
+    reader: Reader,
     count: int,
     version_1: bool = False,
     family: Callable[[int], Row] = built_in,
-) -> tuple[list[Row], int]:
-    """The frequency tables at ``at`` in a group, and where they end.
-
-    ``family`` makes built-in tables.
-    """
-    kinds: Row = []
-    if version_1:
-        kinds = list(group[at : at + count])
-        at += count
-    size = int.from_bytes(group[at : at + 2], "little")
-    at += 2
+) -> list[Row]:
+    """Frequency tables; ``family`` makes the built-in ones."""
+    kinds = list(reader.take(count)) if version_1 else []
     numbers: Row = []
     n, shift = 0, 0
-    for byte in group[at : at + size]:
+    for byte in reader.take(reader.number(2)):
         for nibble in (byte & 15, byte >> 4):
             n |= (nibble & 7) << shift
             shift += 3
@@ -103,7 +98,7 @@ def read_tables(
         elif kind:
             table = family(kind)
         tables.append(table)
-    return tables, at + size
+    return tables
 
 
 def _geometric(mean: int) -> Row:

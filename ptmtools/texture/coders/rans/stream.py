@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.damage import damaged
-from ptmtools.texture.coders.rans.tables import Frequencies
+from ptmtools.texture.coders.rans import tables
+from ptmtools.texture.coders.rans.sizes import OK, TRUNCATED, Sink
+from ptmtools.texture.coders.reading import Reader, damaged
 
 
 @dataclass(frozen=True)
@@ -31,44 +32,48 @@ class Stream:
     escapes: NDArray[np.uint16]
 
 
-def encode_symbols(
-    symbols: NDArray[np.uint16], contexts: NDArray[np.uint8], frequency: Frequencies, plain: int
-) -> bytes:
-    """The stream of ``symbols`` (n,), each by the table that ``contexts`` (n,) names.
+def empty_sink(n: int, count: int) -> Sink:
+    """For up to n symbols by so many tables."""
+    counts = np.zeros((count, 256), np.int64)
+    return Sink(np.empty(n, np.uint16), np.empty(n, np.uint8), counts)
 
-    ``frequency`` (tables, 256) comes from `tables.choose`; tables from ``plain`` on have no escape.
-    """
+
+def encode_symbols(sink: Sink, plain: int, family: tables.Family) -> tuple[bytes, bytes]:
+    """The tables, as `tables.choose` finds them, and the stream of a full sink."""
     from ptmtools.texture.coders.rans import kernels
 
+    symbols, contexts, counts = sink
+    frequency, packed = tables.choose(counts, plain, family)
     words = np.empty(len(symbols) + 8, np.uint16)
     escapes = np.empty(len(symbols), np.uint16)
     work = np.empty((len(frequency), 256), np.uint64)
     first, escaped = kernels.encode(
         symbols, contexts, plain, frequency, work, np.empty(4, np.uint64), words, escapes
     )
-    return b"".join(
-        [
-            (len(escapes) - escaped).to_bytes(4, "little"),
-            escapes[escaped:].astype("<u2").tobytes(),
-            words[first:].astype("<u2").tobytes(),
-        ]
-    )
+    count = (len(escapes) - escaped).to_bytes(4, "little")
+    parts = (escapes[escaped:], words[first:])
+    return packed, count + b"".join(part.astype("<u2").tobytes() for part in parts)
 
 
-def read_stream(data: bytes | memoryview, longest_row: int) -> Stream:
-    """The stream in ``data``, to be decoded in rows of at most ``longest_row`` symbols.
+def read_stream(reader: Reader, longest_row: int) -> Stream:
+    """The stream in what is left, to be decoded in rows of at most ``longest_row`` symbols.
 
     Raises InputError PTM-I112 if the bytes are none.
     """
     from ptmtools.texture.coders.rans import kernels
 
-    escaped = int.from_bytes(data[:4], "little")
-    begin = 4 + 2 * escaped
-    if len(data) < begin + 16 or len(data) % 2:
+    escapes = reader.numbers("<u2", reader.number(4))
+    data = reader.rest()
+    limit = len(data) // 2
+    if limit < 8 or len(data) % 2:
         raise damaged("its stream is not a whole number of words")
-    limit = (len(data) - begin) // 2
-    words = np.empty(limit + longest_row + kernels.PADDING, np.uint16)
-    words[limit:] = 0
-    words[:limit] = np.frombuffer(data, "<u2", offset=begin)
-    escapes = np.frombuffer(data, "<u2", escaped, 4).astype(np.uint16)
+    words = np.zeros(limit + longest_row + kernels.PADDING, np.uint16)
+    words[:limit] = np.frombuffer(data, "<u2")
     return Stream(words, limit, escapes)
+
+
+def check_end(result: int) -> None:
+    """Raise InputError PTM-I112 for what a decoding pass returns, but for OK."""
+    if result != OK:
+        early = result == TRUNCATED
+        raise damaged("its stream " + ("ends early" if early else "leads to impossible texels"))

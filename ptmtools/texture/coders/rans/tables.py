@@ -10,13 +10,15 @@ Deflating the frequencies was rejected: the bytes of a file would depend on the 
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.damage import damaged
 from ptmtools.texture.coders.rans.sizes import ESCAPE, TABLE_BITS, TABLE_SIZE
+from ptmtools.texture.coders.reading import Reader, damaged
 
 #: Mean magnitudes, in sixteenths, of the built-in distributions 1, 2, …
 BUILT_IN_MEANS = (
@@ -47,39 +49,50 @@ def normalise(counts: NDArray[np.int64]) -> Frequencies:
     return frequency
 
 
-@cache
-def built_in() -> NDArray[np.int64]:
-    """The built-in tables (1 + n, 256); row 0 is empty.
+class Family(NamedTuple):
+    """Built-in tables.
 
-    Weight of magnitude m: 2^24 at 0, then each times ρ = mean / (16 + mean) in 16 bits; 2^14 is
-    added to the escape. Weights below 2^12 of the sum's 2^-11 share have frequency 0: they escape.
+    Attributes
+    ----------
+    tables: (1 + n, 256) int64; row 0 is empty.
+    lengths: (n, 256) int64, of every symbol under every table but the empty one, in 1/256 bits.
     """
-    tables = np.zeros((1 + len(BUILT_IN_MEANS), 256), np.int64)
-    for row, mean in enumerate(BUILT_IN_MEANS, start=1):
-        ratio = 65536 * mean // (16 + mean)
-        weight = np.zeros(256, np.int64)
-        w = 1 << 24
-        for symbol in range(ESCAPE):
-            if symbol % 2 == 1:
-                w = w * ratio >> 16
-            weight[symbol] = w
-        weight[weight * (2 * TABLE_SIZE) < weight.sum()] = 0
-        weight[ESCAPE] = weight.sum() >> 10
-        tables[row] = weight
-    return normalise(tables)
+
+    tables: Frequencies
+    lengths: NDArray[np.int64]
+
+
+def family(rows: Iterable[Sequence[int]]) -> Family:
+    """Tables from the weights of their first symbols.
+
+    Weights are scaled to a sum of 2^24. Those below 2^12 then have frequency 0: they escape. The
+    escape has 1/1024 of the sum.
+    """
+    weights = [[0] * 256]
+    for row in rows:
+        total = sum(row)
+        kept = [0 if w << 12 < total else (w << 24) // total for w in row]
+        weights.append([*kept, *[0] * (ESCAPE - len(kept)), sum(kept) >> 10])
+    tables = normalise(np.array(weights, np.int64))
+    lengths = _log_table()[tables[1:]]
+    escaped = lengths[:, ESCAPE, None] + 16 * 256
+    return Family(tables, np.where(tables[1:] > 0, lengths, escaped))
 
 
 @cache
-def _built_in_lengths() -> NDArray[np.int64]:
-    """`_lengths` of the built-in tables."""
-    return _lengths(built_in())
+def built_in() -> Family:
+    """The built-in tables of the coders of 8 bits.
 
-
-def _lengths(family: Frequencies) -> NDArray[np.int64]:
-    """Length (n, 256) in 1/256 bits of every symbol under every table but the empty first."""
-    lengths = _log_table()[family[1:]]
-    escaped = lengths[:, ESCAPE, None] + 16 * 256
-    return np.where(family[1:] > 0, lengths, escaped)
+    Weight of magnitude m: 2^24 at 0, then each times ρ = mean / (16 + mean) in 16 bits.
+    """
+    rows = []
+    for mean in BUILT_IN_MEANS:
+        row = [1 << 24]
+        for symbol in range(1, ESCAPE):
+            ratio = 65536 * mean // (16 + mean)
+            row.append(row[-1] * ratio >> 16 if symbol % 2 else row[-1])
+        rows.append(row)
+    return family(rows)
 
 
 @cache
@@ -103,69 +116,45 @@ def _log_table() -> NDArray[np.int64]:
     return table
 
 
-def choose(
-    counts: NDArray[np.int64], plain: int, family: Frequencies | None = None
-) -> tuple[Frequencies, bytes]:
+def choose(counts: NDArray[np.int64], plain: int, family: Family) -> tuple[Frequencies, bytes]:
     """Tables (t, 256) for the symbol counts (t, 256) of a group, and their serialised form.
 
     Tables from number ``plain`` on have no escape: one that is built in is used only where it holds
-    every symbol that occurs. ``family``: other tables in place of `built_in`, an empty one first.
+    every symbol that occurs.
     """
     from ptmtools.texture.coders.rans import frequencies
 
-    lengths = _built_in_lengths() if family is None else _lengths(family)
-    family = built_in() if family is None else family
     exact = normalise(counts)
     kinds = np.zeros(len(counts), np.int64)
     frequencies.choose_kinds(
-        counts, exact, family, lengths, _log_table(), plain, SENT, kinds, np.empty(256, np.int64)
+        counts, exact, *family, _log_table(), plain, SENT, kinds, np.empty(256, np.int64)
     )
     frequency = exact.copy()
     named = (kinds != UNUSED) & (kinds != SENT)
-    frequency[named] = family[kinds[named]]
-    packed = np.zeros(_most_bytes(len(kinds), int(np.count_nonzero(kinds == SENT))), np.uint8)
+    frequency[named] = family.tables[kinds[named]]
+    # Numbers take four nibbles at most.
+    most = 2 * (2 * len(kinds) + 257 * int(np.count_nonzero(kinds == SENT)))
+    packed = np.zeros(most, np.uint8)
     size = frequencies.write_tables(kinds, _FIRST_KIND, SENT, exact, packed)
     return frequency, size.to_bytes(2, "little") + packed[:size].tobytes()
 
 
-def _most_bytes(tables: int, sent: int) -> int:
-    """Of so many tables, so many of them sent: numbers take four nibbles at most."""
-    return 2 * (2 * tables + 257 * sent)
+def parse(reader: Reader, tables: int, family: Family, version_1: bool = False) -> Frequencies:
+    """The inverse of `choose`: frequencies (tables, 256).
 
-
-def parse(
-    data: bytes | memoryview, tables: int, family: Frequencies | None = None
-) -> tuple[Frequencies, int]:
-    """The inverse of `choose`: frequencies (tables, 256), and how many bytes they took.
+    Files of version 1 have a byte for each table first, which names its kind.
 
     Raises InputError PTM-I112 for tables that no encoder writes.
     """
-    end = 2 + int.from_bytes(data[:2], "little")
-    if len(data) < end:
-        raise damaged("its tables are cut short")
-    kinds = np.zeros(tables, np.int64)
-    return _read(data[2:end], False, kinds, built_in() if family is None else family), end
-
-
-def parse_version_1(data: bytes | memoryview, tables: int) -> tuple[Frequencies, int]:
-    """As `parse`, of files of version 1: a byte for each table names its kind."""
-    end = tables + 2 + int.from_bytes(data[tables : tables + 2], "little")
-    if len(data) < end:
-        raise damaged("its tables are cut short")
-    kinds = np.frombuffer(data, np.uint8, tables).astype(np.int64)
-    return _read(data[tables + 2 : end], True, kinds, built_in()), end
-
-
-def _read(
-    packed: bytes | memoryview, named: bool, kinds: NDArray[np.int64], family: Frequencies
-) -> Frequencies:
     from ptmtools.texture.coders.rans import frequencies
 
-    frequency = np.zeros((len(kinds), 256), np.int64)
-    numbers = np.frombuffer(packed, np.uint8).copy()
-    state = np.zeros(2, np.int64)
+    kinds = np.zeros(tables, np.int64)
+    if version_1:
+        kinds[:] = reader.numbers("u1", tables)
+    packed = reader.numbers("u1", reader.number(2))
+    frequency = np.zeros((tables, 256), np.int64)
     error = frequencies.read_tables(
-        numbers, named, kinds, _FIRST_KIND, SENT, family, frequency, state
+        packed, version_1, kinds, _FIRST_KIND, SENT, family.tables, frequency, np.zeros(2, np.int64)
     )
     if error:
         raise damaged(_ERRORS[error])

@@ -22,7 +22,8 @@ from typing import Any
 import numpy as np
 
 from ptmtools.compiled import plain_kernel as kernel
-from ptmtools.texture.coders.rans.kernels import STATE_LOW
+from ptmtools.texture.coders.rans.kernels import STATE_LOW, start_states
+from ptmtools.texture.coders.rans.sizes import IMPOSSIBLE, OK, TRUNCATED
 from ptmtools.texture.coders.repeats.seen import (
     K0,
     K1,
@@ -54,8 +55,6 @@ from ptmtools.texture.coders.repeats.symbols import (
 )
 from ptmtools.texture.coders.repeats.unseen import differences, edge_texel, remainders, texel
 
-OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2
-
 #: Answers to "which guess": after those that name one, `TEXELS`, one by one, and `DIFFERENCES`.
 GUESSES, TEXELS, DIFFERENCES = 3, 3, 4
 #: A block is coded texel by texel if so many samples of p, q and r are among the guesses, or if its
@@ -68,13 +67,12 @@ MOST_SYMBOLS = 24
 
 #: Positions in a block. Of one type: the helpers are compiled once for all of them.
 _P, _Q, _R = np.int64(0), np.int64(1), np.int64(2)
-_C0, _C1, _C2, _C3 = np.uint64(0), np.uint64(1), np.uint64(2), np.uint64(3)
+_C0, _C1, _C2 = np.uint64(0), np.uint64(1), np.uint64(2)
 
 
 @kernel
-def move_texels(packing: bool, level: Any, texels: Any) -> None:
-    """(h, w, c) uint8 to (h, w) uint32, or back: component c in bits 8 c to 8 c + 7."""
-    components = level.shape[2]
+def move_rgb(packing: bool, level: Any, texels: Any) -> None:
+    """(h, w, 3) uint8 to (h, w) uint32, or back: component c in bits 8 c to 8 c + 7."""
     for y in range(texels.shape[0]):
         row, packed = level[y], texels[y]
         # Written out, and with unsigned places: a loop over components took five times as long.
@@ -82,22 +80,13 @@ def move_texels(packing: bool, level: Any, texels: Any) -> None:
             x = np.uint64(place)
             if packing:
                 texel = np.uint32(row[x, _C0])
-                if components > 1:
-                    texel |= np.uint32(row[x, _C1]) << np.uint32(8)
-                if components > 2:
-                    texel |= np.uint32(row[x, _C2]) << np.uint32(16)
-                if components > 3:
-                    texel |= np.uint32(row[x, _C3]) << np.uint32(24)
-                packed[x] = texel
+                texel |= np.uint32(row[x, _C1]) << np.uint32(8)
+                packed[x] = texel | np.uint32(row[x, _C2]) << np.uint32(16)
             else:
                 texel = packed[x]
                 row[x, _C0] = texel
-                if components > 1:
-                    row[x, _C1] = texel >> np.uint32(8)
-                if components > 2:
-                    row[x, _C2] = texel >> np.uint32(16)
-                if components > 3:
-                    row[x, _C3] = texel >> np.uint32(24)
+                row[x, _C1] = texel >> np.uint32(8)
+                row[x, _C2] = texel >> np.uint32(16)
 
 
 @kernel
@@ -128,11 +117,7 @@ def repeats_pass(
     one, two, three = np.uint64(1), np.uint64(2), np.uint64(3)
     wide = np.uint64(width)
     if source is not None:
-        for lane in range(4):
-            at = state[ESCAPES_END] + 2 * lane
-            state[lane] = np.int64(source.words[at]) | (
-                np.int64(source.words[at + 1] & 0x7FFF) << 16
-            )
+        start_states(source.words[state[ESCAPES_END] :], state)
         state[WORD] = state[ESCAPES_END] + 8
     for y in range(bh):
         before = 0

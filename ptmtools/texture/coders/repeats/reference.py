@@ -1,7 +1,7 @@
 """A decoder of the repeats coder in plain Python, written from ``docs/format-ptm.md``.
 
-It shares nothing with the compiled decoder but the numbers of the format. The tests compare the
-two; whoever ports the format can step through it. No damage is looked for.
+It shares nothing with the compiled decoder but the numbers of the format and how bytes are read.
+The tests compare the two; whoever ports the format can step through it. No damage is looked for.
 """
 
 from __future__ import annotations
@@ -11,23 +11,27 @@ from collections import defaultdict
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.texture.coders.haar.reference import by_value, edge
+from ptmtools.texture.coders.planes import plane_order
 from ptmtools.texture.coders.rans.reference import Symbols, read_tables
+from ptmtools.texture.coders.reading import Reader
+from ptmtools.texture.coders.repeats import coder
+from ptmtools.texture.coders.repeats.coder import CLASS_BOUNDS
 
 #: A texel: one integer for each component.
 Texel = tuple[int, ...]
 Block = tuple[Texel, Texel, Texel, Texel]
 
+WEIGHTS = coder.WEIGHTS.tolist()
 K = [0x9E3779B1, 0x85EBCA6B, 0xC2B2AE35, 0x27D4EB2F, 0x165667B1, 0xA24BAED5]
-CLASS_BOUNDS = [2, 4, 8, 16, 32, 64, 128, 256, 512]
-WEIGHTS = [[20, 24, -10, -7], [2, 27, -12, -2], [13, -7, -6, -39]]
 
 
 def decode_repeats(
     group: bytes, below: NDArray[np.uint8], shape: tuple[int, int, int]
 ) -> NDArray[np.uint8]:
     """The level (h, w, c) that a group (without its first byte) refines ``below`` to."""
-    tables, at = read_tables(group, 0, 196)
-    return _Level(below, shape, Symbols(group, at, tables)).decode()
+    reader = Reader(group)
+    return _Level(below, shape, Symbols(reader, read_tables(reader, 196))).decode()
 
 
 class _Level:
@@ -40,9 +44,7 @@ class _Level:
         zero: Texel = (0,) * self.components
         self.texels: list[list[Texel]] = [[zero] * self.width for _ in range(self.height)]
         self.symbols = symbols
-        self.order = [1, 0, 2, 3][: self.components]
-        if self.components < 3:
-            self.order = list(range(self.components))
+        self.order = plane_order(self.components).tolist()
         self.bits: int = min(max((self.bh * self.bw).bit_length(), 6), 13)
         # Where in the level the last block with a key was; how often it was right.
         self.first: dict[int, tuple[int, int, int]] = {}
@@ -69,7 +71,7 @@ class _Level:
                     missed_above[x] = missed
                     ended = False
                     x += 1
-        for y, x in self.edge():
+        for y, x in edge(self.height, self.width):
             self.edge_texel(y, x)
         return np.array(self.texels, np.uint8).reshape(self.height, self.width, self.components)
 
@@ -184,7 +186,7 @@ class _Level:
                 activity = (activity >> 2) + 4 * abs(reference)
                 context += 20
             guess = min(max(guess, 0), 255)
-            out[c] = (guess + _signed(self.symbols.next(context + _class(activity)))) & 255
+            out[c] = (guess + self.symbols.signed(context + _class(activity))) & 255
             if j == 0:
                 reference = out[c] - guess
             elif j == 1:
@@ -195,7 +197,7 @@ class _Level:
         self, i: Texel, w0: Texel, w1: Texel, n0: Texel, n1: Texel, e: Texel, s: Texel, sw: Texel,
         se: Texel,
     ) -> Block:  # fmt: skip
-        corners = [[0] * self.components for _ in range(4)]
+        corners = np.zeros((4, self.components), int)
         ev = eh = eg = 0
         for j, c in enumerate(self.order):
             refers = self.refers(j)
@@ -210,7 +212,7 @@ class _Level:
                 context = 85 + 10 * kind + 30 * refers
                 if refers:
                     activity = (activity >> 2) + 3 * abs(reference)
-                return _signed(self.symbols.next(context + _class(activity)))
+                return self.symbols.signed(context + _class(activity))
 
             v_error = residual(0, calm + abs(south), ev)
             v = v_error + ((88 * north - 50 * south + 176 * down + 220 * ev + 128) >> 8)
@@ -220,15 +222,9 @@ class _Level:
             g = g_error + ((20 * west - 8 * east - 2 * tilt + 47 * h + 235 * eg + 128) >> 8)
             if j == 0:
                 ev, eh, eg = v_error, h_error, g_error
-            t = (v + (v & 1)) >> 1
-            a = 2 * i[c] + ((h ^ t) & 1) + t
-            b = a - v
-            corners[0][c] = (a + h) >> 1
-            corners[1][c] = corners[0][c] - h
-            d = 2 * g + (b & 1)
-            corners[2][c] = (b + d) >> 1
-            corners[3][c] = corners[2][c] - d
-        return tuple(corners[0]), tuple(corners[1]), tuple(corners[2]), tuple(corners[3])
+            corners[:, c] = by_value(v, h, g, i[c])
+        p, q, r, last = (tuple(corner) for corner in corners.tolist())
+        return p, q, r, last
 
     def edge_texel(self, y: int, x: int) -> None:
         zero = (0,) * self.components
@@ -242,7 +238,7 @@ class _Level:
         if found >= 5:
             for a, b, c in zip(w, n, nw, strict=True):
                 guess = sorted((a, b, a + b - c))[1]
-                texel += ((guess + _signed(self.symbols.next(84))) & 255,)
+                texel += ((guess + self.symbols.signed(84)) & 255,)
         self.seen[key] = self.texels[y][x] = texel
 
     def around(self, y: int, x: int, mean: Texel) -> list[Texel]:
@@ -289,14 +285,6 @@ class _Level:
         h ^= h >> 15
         return int(((h * K[1]) & 0xFFFFFFFF) >> (32 - self.bits))
 
-    def edge(self) -> list[tuple[int, int]]:
-        places = []
-        if self.width & 1:
-            places += [(y, self.width - 1) for y in range(self.height & ~1)]
-        if self.height & 1:
-            places += [(self.height - 1, x) for x in range(self.width)]
-        return places
-
 
 def _number(texel: Texel) -> int:
     return sum(value << (8 * c) for c, value in enumerate(texel))
@@ -312,7 +300,3 @@ def _plus(one: Texel, other: Texel) -> Texel:
 
 def _class(activity: int) -> int:
     return sum(bound <= activity for bound in CLASS_BOUNDS)
-
-
-def _signed(z: int) -> int:
-    return -((z + 1) >> 1) if z & 1 else z >> 1

@@ -23,6 +23,19 @@ LARGEST_ACTIVITY = 1023
 
 
 @kernel
+def sample(texel: Any, at: Any) -> Any:
+    """The component of a texel in the bits from ``at`` on."""
+    return np.int64((texel >> at) & np.uint64(255))
+
+
+@kernel
+def residual(e: Any, context: Any, sink: Any, source: Any, state: Any) -> Any:
+    """A `symbol` with a sign: 0, -1, 1, -2, 2 …"""
+    z = symbol((e << 1) ^ (e >> 63), context, sink, source, state)
+    return (z >> 1) ^ -(z & 1)
+
+
+@kernel
 def _index(activity: Any) -> Any:
     return np.uint64(activity if activity < LARGEST_ACTIVITY else LARGEST_ACTIVITY)
 
@@ -35,12 +48,11 @@ def _samples(
     """p, q or r of a block, sample by sample, each predicted from its surroundings."""
     out = np.uint64(0)
     reference = np.int64(0)
-    byte = np.uint64(255)
     for c in range(order.size):
         at = np.uint64(8 * order[c])
-        i = np.int64((mean >> at) & byte)
-        fw, fn = np.int64((w >> at) & byte) - i, np.int64((n >> at) & byte) - i
-        fnw, fne = np.int64((nw >> at) & byte) - i, np.int64((ne >> at) & byte) - i
+        i = sample(mean, at)
+        fw, fn = sample(w, at) - i, sample(n, at) - i
+        fnw, fne = sample(nw, at) - i, sample(ne, at) - i
         guess = i + (
             (weights[position, 0] * fw + weights[position, 1] * fn + weights[position, 2] * fnw
              + weights[position, 3] * fne + 32) >> 6
@@ -55,9 +67,8 @@ def _samples(
             context += 2 * CLASSES
         guess = min(max(guess, 0), 255)
         level = np.int64(classes[_index(activity)])
-        e = ((np.int64((texel >> at) & byte) - guess + 128) & 255) - 128
-        z = symbol((e << 1) ^ (e >> 63), context + level, sink, source, state)
-        value = (guess + ((z >> 1) ^ -(z & 1))) & 255
+        e = ((sample(texel, at) - guess + 128) & 255) - 128
+        value = (guess + residual(e, context + level, sink, source, state)) & 255
         if c == 0:
             reference = value - guess
         elif c == 1:
@@ -86,16 +97,14 @@ def remainders(
 ) -> Any:  # fmt: skip
     """s of a block by the remainder of the sum in each component."""
     out = np.uint64(0)
-    byte = np.uint64(255)
     for c in range(order.size):
         at = np.uint64(8 * order[c])
-        a, b = np.int64((q >> at) & byte), np.int64((r >> at) & byte)
-        corner = np.int64((p >> at) & byte)
-        base = 4 * np.int64((mean >> at) & byte) - a - b - corner
+        a, b, corner = sample(q, at), sample(r, at), sample(p, at)
+        base = 4 * sample(mean, at) - a - b - corner
         guess: Any = max(min(a, b), min(max(a, b), a + b - corner)) - base
         kind = 0 if guess < 0 else 1 if guess < 4 else 2
         guess = min(max(guess, 0), 3)
-        value = np.int64((s >> at) & byte) - base
+        value = sample(s, at) - base
         z = symbol((value - guess) & 3, REMAINDER + kind, sink, source, state)
         value = base + ((z + guess) & 3)
         if value < 0 or value > 255:
@@ -113,24 +122,21 @@ def differences(
 
     around: w0, w1, n0, n1 and the means to the east, south, south-west and south-east.
     """
-    byte = np.uint64(255)
     out0, out1, out2, out3 = np.uint64(0), np.uint64(0), np.uint64(0), np.uint64(0)
     for c in range(order.size):
         at = np.uint64(8 * order[c])
-        i = np.int64((mean >> at) & byte)
-        w0, w1 = np.int64((around[0] >> at) & byte), np.int64((around[1] >> at) & byte)
-        n0, n1 = np.int64((around[2] >> at) & byte), np.int64((around[3] >> at) & byte)
-        east, south = np.int64((around[4] >> at) & byte), np.int64((around[5] >> at) & byte)
-        tilt = np.int64((around[7] >> at) & byte) - np.int64((around[6] >> at) & byte)
-        p, q = np.int64((block[0] >> at) & byte), np.int64((block[1] >> at) & byte)
-        r, s = np.int64((block[2] >> at) & byte), np.int64((block[3] >> at) & byte)
+        i = sample(mean, at)
+        w0, w1 = sample(around[0], at), sample(around[1], at)
+        n0, n1 = sample(around[2], at), sample(around[3], at)
+        east, south = sample(around[4], at) - i, sample(around[5], at) - i
+        tilt = sample(around[7], at) - sample(around[6], at)
+        p, q = sample(block[0], at), sample(block[1], at)
+        r, s = sample(block[2], at), sample(block[3], at)
         referring = c > 0 and c < 3 and order.size > 2
         if not referring:
             errors[0] = errors[1] = errors[2] = 0
         north, west = n0 + n1 - 2 * i, w0 + w1 - 2 * i
         across, down = n0 - n1, w0 - w1
-        east -= i
-        south -= i
         calm = abs(north) + abs(west) + abs(across) + abs(down)
 
         v, h, g = np.int64(0), np.int64(0), np.int64(0)
@@ -149,10 +155,8 @@ def differences(
             if referring:
                 context += 3 * CLASSES
                 activity = (activity >> 2) + 3 * abs(reference)
-            e = value - guess
             context += np.int64(classes[_index(activity)])
-            z = symbol((e << 1) ^ (e >> 63), context, sink, source, state)
-            e = (z >> 1) ^ -(z & 1)
+            e = residual(value - guess, context, sink, source, state)
             if kind == 0:
                 v = guess + e
             elif kind == 1:
@@ -191,12 +195,10 @@ def edge_texel(
     if found != OTHER:
         return found
     out = np.uint64(0)
-    byte = np.uint64(255)
     for c in range(components):
         at = np.uint64(8 * c)
-        a, b = np.int64((w >> at) & byte), np.int64((n >> at) & byte)
-        guess = max(min(a, b), min(max(a, b), a + b - np.int64((nw >> at) & byte)))
-        e = ((np.int64((texel >> at) & byte) - guess + 128) & 255) - 128
-        z = symbol((e << 1) ^ (e >> 63), EDGE, sink, source, state)
-        out |= np.uint64((guess + ((z >> 1) ^ -(z & 1))) & 255) << at
+        a, b = sample(w, at), sample(n, at)
+        guess = max(min(a, b), min(max(a, b), a + b - sample(nw, at)))
+        e = ((sample(texel, at) - guess + 128) & 255) - 128
+        out |= np.uint64((guess + residual(e, EDGE, sink, source, state)) & 255) << at
     return out

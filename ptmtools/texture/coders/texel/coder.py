@@ -19,21 +19,30 @@ times what zstd needs. With an error of 1, 2, 4, 8, 12 Kodak images of 8 bits ta
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.damage import damaged
-from ptmtools.texture.coders.rans import stream, tables
+from ptmtools.texture.coders.planes import plane_order, references
+from ptmtools.texture.coders.rans import tables
+from ptmtools.texture.coders.rans.sizes import OK, Sink
+from ptmtools.texture.coders.rans.stream import (
+    check_end,
+    empty_sink,
+    encode_symbols,
+    read_stream,
+)
+from ptmtools.texture.coders.reading import Reader, damaged
 from ptmtools.texture.coders.texel import layout
 from ptmtools.texture.coders.texel.fit import fit_weights
 from ptmtools.texture.coders.texel.numbering import Numbering, number_planes, read_numbering
 from ptmtools.texture.profiles import raw
-from ptmtools.texture.profiles.raw import expect_length, sample_bytes, samples_from
+from ptmtools.texture.profiles.raw import sample_bytes
 from ptmtools.texture.samples import SampleKind, from_ordered, kind_of, to_ordered
 
 if TYPE_CHECKING:
+    from ptmtools.texture.coders.texel.kernels import Source
     from ptmtools.texture.profiles import Samples, Shape
 
 #: Forms of a group.
@@ -49,6 +58,8 @@ WINDOW_USUAL, WINDOW_TOP, WINDOW_ROWS = 12, 40, 64
 
 Numbers = NDArray[np.uint32]
 Weights = NDArray[np.int64]
+#: Form and bytes of a group, and the texels that a decoder will have.
+Coded = tuple[int, bytes, "Samples"]
 
 
 def encode(level: Samples, below: Samples, max_error: int = 0) -> tuple[bytes, Samples]:
@@ -60,179 +71,196 @@ def encode(level: Samples, below: Samples, max_error: int = 0) -> tuple[bytes, S
         allowed, else anything.
     max_error: how far each sample may be off; for integers only.
     """
-    candidates = [_Coded(PLAIN, sample_bytes(level), level)]
+    candidates: list[Coded] = [(PLAIN, sample_bytes(level), level)]
     if below.size:
-        candidates += _codings(_Group.of(level, below, max_error))
+        candidates += _codings(level, below, max_error)
     # The raw form takes no less than three quarters of the plain one.
-    if not max_error and 4 * min(len(one.body) for one in candidates) > 3 * level.nbytes:
-        candidates.append(_Coded(RAW, raw.encode_tile(level, below).data, level))
-    best = min(candidates, key=lambda one: len(one.body))
-    return bytes([best.form]) + best.body, best.texels
+    if not max_error and 4 * min(len(body) for _, body, _ in candidates) > 3 * level.nbytes:
+        candidates.append((RAW, raw.encode_tile(level, below).data, level))
+    form, body, texels = min(candidates, key=lambda coded: len(coded[1]))
+    return bytes([form]) + body, texels
 
 
-def decode(
-    data: bytes, below: Samples, shape: Shape, dtype: np.dtype[Any], max_error: int = 0
-) -> Samples:
+def decode(data: bytes | memoryview, below: Samples, shape: Shape, max_error: int = 0) -> Samples:
     """The inverse of `encode`. Raises InputError PTM-I112 for what no encoder writes."""
-    if not data:
-        raise damaged("it is empty")
-    form, body = data[0], data[1:]
+    reader = Reader(data)
+    form = reader.number(1)
     if form == PLAIN:
-        expect_length(body, shape[0] * shape[1] * shape[2] * dtype.itemsize)
-        return samples_from(body, dtype).reshape(shape).copy()
+        level = reader.texels(shape, below.dtype)
+        reader.end()
+        return level
     if form == RAW and not max_error:
-        return raw.decode_tile(body, below, shape).texels
+        return raw.decode_tile(reader.rest(), below, shape).texels
     if form in (CODED, CODED_WITH_WEIGHTS) and below.size:
-        return _decode(body, below, shape, max_error, form == CODED_WITH_WEIGHTS)
+        return _decode(reader, below, shape, max_error, form == CODED_WITH_WEIGHTS)
     raise damaged(f"form {form} is unknown")
 
 
 @dataclass(frozen=True)
-class _Coded:
-    form: int
-    body: bytes
-    texels: Samples
-
-
-@dataclass(frozen=True)
 class _Group:
-    """A group in numbers: what the pass works on, in either direction.
+    """What the pass works on, in either direction.
 
     Attributes
     ----------
-    level: (h, w, c) of any kind.
+    kind: of the samples.
     means: (h >> 1, w >> 1, c), ordered values of the level below.
     numbering: of the values of the level.
-    numbers: (h, w, c), of the level's values.
     work: (c, rows, columns), numbers of the level below at twice its size, with a frame.
     max_error: the error allowed.
     """
 
-    level: Samples
+    kind: SampleKind
     means: Numbers
     numbering: Numbering
-    numbers: Numbers
     work: Numbers
     max_error: int
 
-    @classmethod
-    def of(cls, level: Samples, below: Samples, max_error: int) -> _Group:
-        values = to_ordered(level).astype(np.uint32)
-        means = to_ordered(below).astype(np.uint32)
-        numbering = number_planes(values, kind_of(level.dtype).top, max_error)
-        work = _enlarged(numbering.nearest(means), level.shape)
-        return cls(level, means, numbering, numbering.nearest(values), work, max_error)
+    def code(
+        self,
+        numbers: Numbers,
+        weights: Weights | None,
+        window: int,
+        plain: Numbers,
+        limits: NDArray[np.int64],
+        sink: Sink | None = None,
+        source: Source | None = None,
+    ) -> int:
+        """`kernels.texel_pass`, with empty arrays for the direction that it does not take."""
+        from ptmtools.texture.coders.texel import kernels
+
+        components = numbers.shape[2]
+        others = references(components)
+        exact = {"float16": kernels.HALF, "float32": kernels.SINGLE}.get(
+            self.kind.name, kernels.WHOLE
+        )
+        none = np.zeros(0, np.uint16)
+        return int(
+            kernels.texel_pass(
+                sink is not None,
+                numbers,
+                self.means,
+                self.work.copy().reshape(-1),
+                self.work.shape[2],
+                self.max_error,
+                kernels.FREE if self.max_error else exact,
+                plane_order(components),
+                others,
+                (layout.BUILT_IN_WEIGHTS[others] if weights is None else weights).reshape(-1),
+                layout.offsets(self.work.shape[2]).reshape(-1),
+                self.numbering.arrays,
+                window,
+                sink or empty_sink(0, 0),
+                source or kernels.Source(none, none, np.zeros(0, np.uint32)),
+                plain,
+                limits,
+                kernels.workspace(numbers.shape[1], components),
+            )
+        )
 
 
-def _codings(group: _Group) -> list[_Coded]:
+def _codings(level: Samples, below: Samples, max_error: int) -> list[Coded]:
     """The group as it is coded, in one or two ways; none if the level below is not its mean."""
-    blocks = group.means.shape[:2]
-    codings: list[_Coded | None] = []
+    kind = kind_of(level.dtype)
+    values, means = (to_ordered(one).astype(np.uint32) for one in (level, below))
+    numbering = number_planes(values, kind.top, max_error)
+    numbers = numbering.nearest(values)
+    work = _enlarged(numbering.nearest(means), level.shape)
+    group = _Group(kind, means, numbering, work, max_error)
+    blocks = below.shape[:2]
+    codings: list[Coded | None] = []
     # Where all tops are 0 there is nothing to predict.
-    if blocks[0] * blocks[1] >= FEWEST_BLOCKS and min(blocks) >= 4 and group.numbering.tops.any():
-        codings.append(_coding(group, fit_weights(group.work, group.numbers, group.max_error)))
-    light = LIGHT * 2 * int(layout.sent_mask(group.level.shape[2]).sum())
-    if not codings or (codings[0] and len(codings[0].body) < light):
-        codings.append(_coding(group, None))
-    return [one for one in codings if one is not None]
+    many = blocks[0] * blocks[1] >= FEWEST_BLOCKS and min(blocks) >= 4
+    if many and numbering.arrays.tops.any():
+        weights = fit_weights(work, numbers, max_error)
+        codings.append(_coding(group, level, numbers, weights))
+    light = LIGHT * 2 * int(layout.sent_mask(level.shape[2]).sum())
+    if not codings or (codings[0] and len(codings[0][1]) < light):
+        codings.append(_coding(group, level, numbers, None))
+    return [one for one in codings if one]
 
 
-def _coding(group: _Group, weights: Weights | None) -> _Coded | None:
-    from ptmtools.texture.coders.texel import kernels
+def _coding(
+    group: _Group, level: Samples, numbers: Numbers, weights: Weights | None
+) -> Coded | None:
+    from ptmtools.texture.coders.texel.kernels import TABLES
 
-    n, components = group.level.size, group.level.shape[2]
-    most = n * group.numbering.symbols
-    symbols, contexts = np.empty(most, np.uint16), np.empty(most, np.uint8)
-    counts = np.zeros((kernels.TABLES, 256), np.int64)
-    plain, limits = np.zeros(n + 2, np.uint32), np.zeros(2, np.int64)
-    numbers = group.numbers.copy() if group.max_error else group.numbers
-    window = _window(group)
-    result = _pass(
-        True, numbers, group.means, group.work.copy(), group.max_error, kind_of(group.level.dtype),
-        group.numbering, weights, window, plain, limits, symbols=symbols, contexts=contexts,
-        counts=counts,
-    )  # fmt: skip
-    if result != kernels.OK:
+    sink = empty_sink(level.size * group.numbering.symbols, TABLES)
+    plain, limits = np.zeros(level.size + 2, np.uint32), np.zeros(2, np.int64)
+    window = _window(group, numbers)
+    if group.max_error:
+        numbers = numbers.copy()
+    if group.code(numbers, weights, window, plain, limits, sink=sink) != OK:
         return None
     used, bits = limits.tolist()
     size = (bits + 7) // 8
-    frequency, packed = tables.choose(counts, kernels.TABLES, layout.table_family())
-    sent = b"" if weights is None else weights[layout.sent_mask(components)].astype("<i2").tobytes()
+    sink = sink._replace(symbols=sink.symbols[:used], contexts=sink.contexts[:used])
+    packed, stream = encode_symbols(sink, TABLES, layout.table_family())
     body = b"".join(
         [
             group.numbering.packed(),
             bytes([window]),
-            sent,
+            b"" if weights is None
+            else weights[layout.sent_mask(level.shape[2])].astype("<i2").tobytes(),
             packed,
             size.to_bytes(4, "little"),
             plain.astype("<u4", copy=False).tobytes()[:size],
-            stream.encode_symbols(symbols[:used], contexts[:used], frequency, kernels.TABLES),
+            stream,
         ]
-    )
-    texels = numbers.astype(group.level.dtype) if group.max_error else group.level
-    return _Coded(CODED if weights is None else CODED_WITH_WEIGHTS, body, texels)
+    )  # fmt: skip
+    texels = numbers.astype(level.dtype) if group.max_error else level
+    return CODED if weights is None else CODED_WITH_WEIGHTS, body, texels
 
 
-def _window(group: _Group) -> int:
+def _window(group: _Group, numbers: Numbers) -> int:
     """How many doublings of activity are one class, so that usual ones have their own."""
-    step = max(1, group.numbers.shape[0] // WINDOW_ROWS)
-    rows = group.numbers[::step].astype(np.int64)
+    step = max(1, numbers.shape[0] // WINDOW_ROWS)
+    rows = numbers[::step].astype(np.int64)
     if rows.shape[1] < 2:
         return 0
-    changes = np.abs(np.diff(rows, axis=1)) >> group.numbering.grids
-    usual = 96 * int(changes.sum()) // changes.size // (2 * group.max_error + 1)
+    changes = np.abs(np.diff(rows, axis=1)) >> group.numbering.arrays.grids
+    usual: int = 96 * int(changes.sum()) // changes.size // (2 * group.max_error + 1)
     return min(max(usual.bit_length() - WINDOW_USUAL, 0), WINDOW_TOP)
 
 
-def _decode(data: bytes, below: Samples, shape: Shape, max_error: int, sent: bool) -> Samples:
+def _decode(reader: Reader, below: Samples, shape: Shape, max_error: int, sent: bool) -> Samples:
     from ptmtools.texture.coders.texel import kernels
 
     kind = kind_of(below.dtype)
     means = to_ordered(below).astype(np.uint32)
-    numbering, at = read_numbering(data, shape[2], kind.top)
+    numbering = read_numbering(reader, shape[2], kind.top)
     if max_error and not numbering.plain:
         raise damaged("values are numbered although an error is allowed")
-    window = int.from_bytes(data[at : at + 1], "little")
-    if not at < len(data) or window > WINDOW_TOP:
+    window = reader.number(1)
+    if window > WINDOW_TOP:
         raise damaged("its window is impossible")
-    at += 1
-    weights = None
-    if sent:
-        weights, at = _read_weights(data, at, shape[2])
-    frequency, used = tables.parse(data[at:], kernels.TABLES, layout.table_family())
-    at += used + 4
-    size = int.from_bytes(data[at - 4 : at], "little")
-    if len(data) < at + size:
-        raise damaged("it is cut short")
+    weights = _read_weights(reader, shape[2]) if sent else None
+    frequency = tables.parse(reader, kernels.TABLES, layout.table_family())
+    size = reader.number(4)
     # A row of blocks is decoded before it is looked whether the stream was long enough.
     row = 4 * (shape[1] + 1 >> 1) * shape[2] * numbering.symbols
-    plain = np.zeros(-(-size // 4) + row + 2, np.uint32)
-    plain[: -(-size // 4)] = np.frombuffer(data[at : at + size] + bytes(-size % 4), "<u4")
-    read = stream.read_stream(data[at + size :], row)
+    plain = np.zeros(-(-size // 4) + row + 2, "<u4")
+    plain.view(np.uint8)[:size] = reader.numbers("u1", size)
+    stream = read_stream(reader, row)
     numbers = np.zeros(shape, np.uint32)
     work = _enlarged(numbering.nearest(means), shape)
-    result = _pass(
-        False, numbers, means, work, max_error, kind, numbering, weights, window, plain,
-        np.array([read.limit, 8 * size], np.int64), words=read.words, escapes=read.escapes,
-        table=tables.single_tables(frequency),
-    )  # fmt: skip
-    if result == kernels.TRUNCATED:
-        raise damaged("its stream ends early")
-    if result != kernels.OK:
-        raise damaged("its stream leads to impossible texels")
+    limits = np.array([stream.limit, 8 * size], np.int64)
+    source = kernels.Source(stream.words, stream.escapes, tables.single_tables(frequency))
+    group = _Group(kind, means, numbering, work, max_error)
+    check_end(
+        group.code(
+            numbers, weights, window, plain.astype(np.uint32, copy=False), limits, source=source
+        )
+    )
     return from_ordered(numbering.values(numbers).astype(f"u{kind.size}"), below.dtype)
 
 
-def _read_weights(data: bytes, at: int, components: int) -> tuple[Weights, int]:
+def _read_weights(reader: Reader, components: int) -> Weights:
     mask = layout.sent_mask(components)
-    end = at + 2 * int(mask.sum())
-    if len(data) < end:
-        raise damaged("it is cut short")
     weights = np.zeros(mask.shape, np.int64)
-    weights[mask] = np.frombuffer(data[at:end], "<i2")
+    weights[mask] = reader.numbers("<i2", int(mask.sum()))
     if int(np.abs(weights).sum(axis=2).max()) > layout.WEIGHT_SUM:
         raise damaged("a weight is out of range")
-    return weights, end
+    return weights
 
 
 def _enlarged(numbers: Numbers, shape: tuple[int, ...]) -> Numbers:
@@ -247,62 +275,3 @@ def _enlarged(numbers: Numbers, shape: tuple[int, ...]) -> Numbers:
     # Columns first: there are fewer rows then, and whole rows are copied quickly.
     wide = np.ascontiguousarray(numbers.transpose(2, 0, 1))[:, :, columns]
     return wide[:, rows]
-
-
-def _pass(
-    encoding: bool,
-    numbers: Numbers,
-    means: Numbers,
-    work: Numbers,
-    max_error: int,
-    kind: SampleKind,
-    numbering: Numbering,
-    weights: Weights | None,
-    window: int,
-    plain: Numbers,
-    limits: NDArray[np.int64],
-    symbols: NDArray[np.uint16] | None = None,
-    contexts: NDArray[np.uint8] | None = None,
-    counts: NDArray[np.int64] | None = None,
-    words: NDArray[np.uint16] | None = None,
-    escapes: NDArray[np.uint16] | None = None,
-    table: Numbers | None = None,
-) -> int:
-    """`kernels.texel_pass`, with empty arrays for what a direction does not use."""
-    from ptmtools.texture.coders.texel import kernels
-
-    components = numbers.shape[2]
-    references = layout.references(components)
-    exact = {"float16": kernels.HALF, "float32": kernels.SINGLE}.get(kind.name, kernels.WHOLE)
-    none = np.zeros(0, np.uint16)
-    return int(
-        kernels.texel_pass(
-            encoding,
-            numbers,
-            means,
-            work.reshape(-1),
-            work.shape[2],
-            max_error,
-            kernels.FREE if max_error else exact,
-            kind.top,
-            np.array(layout.plane_order(components), np.int64),
-            references,
-            (layout.BUILT_IN_WEIGHTS[references] if weights is None else weights).reshape(-1),
-            layout.offsets(work.shape[2]).reshape(-1),
-            numbering.steps,
-            numbering.offsets,
-            numbering.lists,
-            numbering.tops,
-            numbering.grids,
-            window,
-            none if symbols is None else symbols,
-            np.zeros(0, np.uint8) if contexts is None else contexts,
-            np.zeros((0, 256), np.int64) if counts is None else counts,
-            plain,
-            limits,
-            none if words is None else words,
-            none if escapes is None else escapes,
-            np.zeros(0, np.uint32) if table is None else table,
-            kernels.workspace(numbers.shape[1], components),
-        )
-    )

@@ -15,15 +15,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.equations import bareiss
-from ptmtools.texture.coders.texel.layout import (
-    NEIGHBOURS,
-    WEIGHT_BITS,
-    WEIGHT_SUM,
-    WEIGHT_TOP,
-    plane_order,
-    reference_count,
-)
+from ptmtools.texture.coders.equations import fitted
+from ptmtools.texture.coders.planes import plane_order, references
+from ptmtools.texture.coders.texel.layout import NEIGHBOURS, WEIGHT_BITS, WEIGHT_SUM, WEIGHT_TOP
 
 #: About so many blocks are sampled.
 SAMPLED_BLOCKS = 6144
@@ -50,24 +44,20 @@ def fit_weights(work: NDArray[np.uint32], level: NDArray[np.uint32], max_error: 
     apart = max(1, bh * bw // SAMPLED_BLOCKS)
     y = np.arange(apart // 2, bh, apart)
     weights = np.zeros((nc, 4, 12), np.int64)
-    # One plane more than there are: it stays 0 and stands for an absent reference.
-    errors = np.zeros((nc + 1, 4, len(y), bw), np.int64)
+    errors = np.zeros((nc, 4, len(y), bw), np.int64)
     rough = max_error if max_error >= ROUGH_ERROR else 0
-    for c, plane in enumerate(plane_order(nc)):
-        references = reference_count(nc, c)
-        used = 10 + references
-        others = errors[[0 if references > 0 else nc, 1 if references > 1 else nc]]
+    for c, (plane, others) in enumerate(zip(plane_order(nc), references(nc), strict=True)):
         sample = _Sample(work[plane], level[:, :, plane], y, rough)
         for k in range(4):
             neighbours, target = sample.of(k)
-            f = np.stack([*neighbours, *others[:references, k]])
-            candidates = [_solve(f, target, LEAST_SPREAD + max_error), *_continuations(used)]
+            f = np.stack([*neighbours, *errors[:others, k]])
+            candidates = [_solve(f, target, LEAST_SPREAD + max_error), *_continuations(len(f))]
             found = [target - _predicted(w, f) for w in candidates]
             costs = [_cost(one) for one in found]
             # The others have to be better by a sixteenth of a bit each.
             costs[0] -= target.size // 16
             best = costs.index(min(costs))
-            weights[c, k, :used] = candidates[best]
+            weights[c, k, : len(f)] = candidates[best]
             errors[c, k] = _rounded(found[best], rough)
     return weights
 
@@ -78,36 +68,32 @@ class _Sample:
     def __init__(
         self, work: NDArray[np.uint32], level: NDArray[np.uint32], y: Array, max_error: int
     ) -> None:
-        self.width = 2 * (level.shape[1] >> 1)
-        self.exact = level.astype(np.int64)[:, : self.width]
-        self.y = y
-        # Rows and columns -2 … 3 of every block: so far, all of them are those of the level below.
-        self.rows = work[2 * y[:, None] + np.arange(6)].astype(np.int64)
-        self.base = self.rows[:, 2, 2 : 2 + self.width : 2].copy()
-        known = _rounded(self.exact, max_error)
+        width = 2 * (level.shape[1] >> 1)
+        self._exact = level.astype(np.int64)[:, :width]
+        self._y = y
+        # Rows and columns -2 … 3 of every block, with all texels of the blocks unknown, and known.
+        self._unknown = work[2 * y[:, None] + np.arange(6)].astype(np.int64)
+        known = _rounded(self._exact, max_error)
         above = y > 0
         for row in (0, 1):
-            self.rows[above, row, 2 : 2 + self.width] = known[2 * y[above] - 2 + row]
-        self.known = np.stack([known[2 * y], known[2 * y + 1]], axis=1)
+            self._unknown[above, row, 2 : 2 + width] = known[2 * y[above] - 2 + row]
+        self._known = self._unknown.copy()
+        self._known[:, 2:4, 2 : 2 + width] = known[2 * y[:, None] + np.arange(2)]
 
     def of(self, k: int) -> tuple[list[Array], Array]:
         """The ten neighbours of texel k of each block and itself, less the block's mean."""
-        neighbours = [self._neighbour(k, dy, dx) - self.base for dy, dx in NEIGHBOURS[k]]
-        own = self.exact[2 * self.y + (k >> 1), k & 1 :: 2]
-        return neighbours, own - self.base
+        base = self._at(self._unknown, 0, 0)
+        own = self._exact[2 * self._y + (k >> 1), k & 1 :: 2]
+        return [self._neighbour(k, *place) - base for place in NEIGHBOURS[k]], own - base
 
     def _neighbour(self, k: int, dy: int, dx: int) -> Array:
-        column = 2 + dx
-        below: Array = self.rows[:, dy + 2, column : column + self.width : 2]
-        if not 0 <= dy <= 1 or dx > 1 or (dx >= 0 and 2 * dy + dx >= k):
-            return below
         # To the left in the rows of the block, or in the block itself: known by now.
-        found = below.copy()
-        inside = -(dx >> 1) if dx < 0 else 0
-        found[:, inside:] = self.known[:, dy, dx + 2 * inside : self.width : 2][
-            :, : found.shape[1] - inside
-        ]
-        return found
+        known = 0 <= dy <= 1 and (dx < 0 or (dx <= 1 and 2 * dy + dx < k))
+        return self._at(self._known if known else self._unknown, dy, dx)
+
+    def _at(self, rows: Array, dy: int, dx: int) -> Array:
+        end = 2 + dx + self._exact.shape[1]
+        return rows[:, dy + 2, 2 + dx : end : 2]
 
 
 def _rounded(values: Array, max_error: int) -> Array:
@@ -125,19 +111,10 @@ def _predicted(weights: Array, features: Array) -> Array:
 def _solve(f: Array, target: Array, least: int) -> Array:
     """Weights of the features f (m, rows, blocks) that fit the target (rows, blocks)."""
     # Single operations of float64 on whole numbers, rounded as IEEE says: alike on every machine.
-    # The sums of products are whole numbers below 2^53, in whatever order they are added.
     scale = SCALE / (np.abs(f[:6]).sum(axis=0) / 4 + least)
-    g = np.clip(np.rint(f * scale), -FEATURE_TOP, FEATURE_TOP).reshape(len(f), -1)
-    t = np.clip(np.rint(target * scale), -FEATURE_TOP, FEATURE_TOP).reshape(-1)
-    matrix = [[int(a) for a in row] for row in g @ g.T]
-    right = [int(a) for a in g @ t]
-    for i in range(len(f)):
-        # A ridge: a feature that never varies gets the weight 0.
-        matrix[i][i] += (matrix[i][i] >> 12) + SCALE * SCALE
-    numerators, determinant = bareiss(matrix, right)
-    one = 2 << WEIGHT_BITS
-    found = [(one * n + determinant) // (2 * determinant) for n in numerators]
-    weights = np.clip(found, -WEIGHT_TOP, WEIGHT_TOP).astype(np.int64)
+    g = np.clip(np.rint(np.stack([*f, target]) * scale), -FEATURE_TOP, FEATURE_TOP)
+    g = g.reshape(len(f) + 1, -1)
+    weights = fitted(g[:-1] @ g.T, WEIGHT_BITS, WEIGHT_TOP, ridge=SCALE * SCALE, share=12)
     total = int(np.abs(weights).sum())
     if total <= WEIGHT_SUM:
         return weights

@@ -25,9 +25,8 @@ from ptmtools.texture.coders.rans.kernels import (
     decode_single,
     start_states,
 )
-from ptmtools.texture.coders.rans.sizes import ESCAPE
+from ptmtools.texture.coders.rans.sizes import ESCAPE, IMPOSSIBLE, OK, TRUNCATED
 
-OK, TRUNCATED, IMPOSSIBLE = 0, 1, 2
 #: How the fourth texel follows from the others: not at all, as integers, as floats of 16, 32 bits.
 FREE, WHOLE, HALF, SINGLE = 0, 1, 2, 3
 #: Texels of the work plane outside the level: above and left, below and right.
@@ -53,6 +52,14 @@ DIRECT = 16
 PLAIN_TOP = 30
 
 
+class Source(NamedTuple):
+    """Where a decoder's symbols come from."""
+
+    words: Any  # uint16, and
+    escapes: Any  # uint16: as in `rans.stream.Stream`
+    table: Any  # uint32 of `rans.tables.single_tables`
+
+
 class Workspace(NamedTuple):
     """What a pass needs besides its arguments; made outside, which compiles quicker."""
 
@@ -61,7 +68,6 @@ class Workspace(NamedTuple):
     range: Any
     grid: Any
     state: Any
-    bits: Any
 
 
 def workspace(width: int, components: int) -> Workspace:
@@ -73,7 +79,6 @@ def workspace(width: int, components: int) -> Workspace:
         range=np.zeros(2, np.int64),
         grid=np.zeros(components, np.int64),
         state=np.zeros(4, np.uint64),
-        bits=np.zeros(1, np.int64),
     )
 
 
@@ -122,35 +127,33 @@ def ordered(value: Any, kind: int) -> Any:
 @kernel
 def _unit(value: Any, kind: int) -> Any:
     """The unit in the last place of a float of that kind, finite, given as float64."""
-    if kind == SINGLE:
-        power = np.uint32(np.float32(value).view(np.uint32) & np.uint32(0x7F800000))
-        return max(np.float64(power.view(np.float32)), 2.0**-126) * 2.0**-23
-    size = _bit_length(np.int64(abs(value) * 16777216.0))
-    return np.float64(np.int64(1) << max(size - 11, np.int64(0))) / 16777216.0
+    least, mantissa = (-126, 23) if kind == SINGLE else (-14, 10)
+    exponent: Any = ((np.float64(value).view(np.int64) >> 52) & 2047) - 1023
+    return np.int64((max(exponent, least) - mantissa + 1023) << 52).view(np.float64)
 
 
 @kernel
-def _value(number: Any, plane: int, steps: Any, offsets: Any, lists: Any) -> Any:
+def _value(number: Any, plane: int, numbering: Any) -> Any:
     """The ordered value of that number."""
-    step = steps[plane]
-    return offsets[plane] + np.int64(number) * step if step > 0 else lists[plane, number]
+    step = numbering.steps[plane]
+    if step == 0:
+        return numbering.lists[plane, number]
+    return numbering.offsets[plane] + np.int64(number) * step
 
 
 @kernel
-def _numbers_below(
-    bound: Any, plane: int, steps: Any, offsets: Any, lists: Any, top: Any
-) -> Any:  # fmt: skip
+def _numbers_below(bound: Any, plane: int, numbering: Any, top: Any) -> Any:
     """How many values of a plane are below ``bound``."""
-    step = steps[plane]
+    step = numbering.steps[plane]
     if step > 0:
-        rest = bound - offsets[plane]
+        rest = bound - numbering.offsets[plane]
         if step > 1:
             rest = (rest + step - 1) // step
         return min(max(rest, np.int64(0)), top + 1)
     low, high = np.int64(0), top + 1
     while low < high:
         middle = (low + high) >> 1
-        if lists[plane, middle] < bound:
+        if numbering.lists[plane, middle] < bound:
             low = middle + 1
         else:
             high = middle
@@ -159,11 +162,10 @@ def _numbers_below(
 
 @kernel
 def _last_range(
-    p: Any, q: Any, r: Any, mean: Any, kind: int, largest: Any, plane: int, steps: Any,
-    offsets: Any, lists: Any, top: Any, out: Any,
+    p: Any, q: Any, r: Any, mean: Any, kind: int, plane: int, numbering: Any, top: Any, out: Any,
 ) -> None:  # fmt: skip
     """Lowest and highest number of s, given the values p, q, r and the mean of the block."""
-    low, high = np.int64(0), np.int64(largest)
+    low, high = np.int64(0), np.int64(0xFFFFFFFF)
     if kind == WHOLE:
         low = 4 * mean - p - q - r
         high = low + 3
@@ -175,8 +177,8 @@ def _last_range(
             unit = _unit(m, kind)
             margin = 2.0 * unit + (4.0 * abs(m) + ((abs(a) + abs(b)) + abs(c))) * 2.0**-50
             low, high = ordered(value - margin, kind), ordered(value + margin, kind)
-    out[0] = _numbers_below(low, plane, steps, offsets, lists, top)
-    out[1] = _numbers_below(high + 1, plane, steps, offsets, lists, top) - 1
+    out[0] = _numbers_below(low, plane, numbering, top)
+    out[1] = _numbers_below(high + 1, plane, numbering, top) - 1
 
 
 @kernel
@@ -207,32 +209,28 @@ def _next_symbol(state: Any, n: Any, words: Any, at: Any, table: Any, context: A
 @kernel
 def texel_pass(
     encoding: bool, level: Any, means: Any, work: Any, stride: int, near: Any, kind: int,
-    largest: Any, planes: Any, references: Any, weights: Any, around: Any, steps: Any,
-    offsets: Any, lists: Any, tops: Any, grids: Any, window: Any, symbols: Any, contexts: Any,
-    counts: Any, plain: Any, limits: Any, words: Any, escapes: Any, table: Any, space: Any,
+    planes: Any, references: Any, weights: Any, around: Any, numbering: Any, window: Any,
+    sink: Any, source: Any, plain: Any, limits: Any, space: Any,
 ) -> int:  # fmt: skip
     """One group in either direction.
 
     Parameters
     ----------
-    encoding: True reads ``level`` and fills ``symbols``, ``contexts``, ``counts`` and ``plain``,
-        and leaves in ``limits`` how many symbols and plain bits there are; False reads ``words``,
-        ``escapes``, ``table`` and ``plain``.
+    encoding: True reads ``level`` and fills ``sink`` and ``plain``, and leaves in ``limits`` how
+        many symbols and plain bits there are; False reads ``source`` and ``plain``.
     level: (h, w, c) uint32, numbers of the values; written when decoding, and when encoding with
         an error.
     means: (h >> 1, w >> 1, c) uint32, ordered values of the level below; not empty.
     work: (c * rows * stride,) uint32, numbers of the level below at twice its size, with
         a frame; overwritten with the texels as they become known.
-    near: the error allowed. kind: FREE, WHOLE, HALF, SINGLE. largest: ordered value.
+    near: the error allowed. kind: FREE, WHOLE, HALF, SINGLE.
     planes, references: (c,) int64, in coding order. weights: (c * 4 * 12,) int64, in coding order.
     around: (4 * 10,) uint64, offsets in ``work`` of the neighbours of p, q, r, s, modulo 2^64.
-    steps, offsets, tops: (c,) int64 and lists: (c, n) int64, by component: value i is
-        ``offset + i * step`` for i up to ``top``, or where ``step`` is 0 stands in the list.
+    numbering: `numbering.Arrays`.
     window: doublings of activity that are one class at the low end.
-    symbols: uint16, contexts: uint8, of n or with grids 2 * n, counts: (TABLES, 256) int64.
+    sink: `rans.sizes.Sink`, for n or with grids 2 * n symbols. source: `Source`.
     plain: uint32 words of plain bits, with padding for a row of blocks.
     limits: (2,) int64, decoding: numbers of words and of plain bits.
-    words, escapes: as in `rans.stream.Stream`. table: of `rans.tables.single_tables`.
     space: from `workspace`.
 
     Returns OK, TRUNCATED (the stream ended early) or IMPOSSIBLE (no encoder writes this).
@@ -240,6 +238,8 @@ def texel_pass(
     height, width, nc = level.shape
     bh, bw = height >> 1, width >> 1
     errors, residual, state = space.errors, space.residual, space.state
+    symbols, contexts, counts = sink.symbols, sink.contexts, sink.counts
+    words, escapes, table = source.words, source.escapes, source.table
     # Indices are unsigned (numba need not look for negative ones) and arrays flat: a slice made in
     # the inner loop would cost more than what is done with it.
     wide = np.uint64(width + BEFORE + BEHIND)
@@ -267,7 +267,7 @@ def texel_pass(
                 own = np.uint64(4 * c)
                 first = zero if count > 0 else np.uint64(4 * nc)
                 second = np.uint64(4) if count > 1 else np.uint64(4 * nc)
-                top, grid = tops[pu], grids[pu]
+                top, grid = numbering.tops[pu], numbering.grids[pu]
                 for k in range(4):
                     py, px = 2 * y + (k >> 1), 2 * x + (k & 1)
                     if not whole and (py >= height or px >= width):
@@ -309,11 +309,11 @@ def texel_pass(
                     if last:
                         p, q = work[place], work[place + one]
                         _last_range(
-                            _value(p, plane, steps, offsets, lists),
-                            _value(q, plane, steps, offsets, lists),
-                            _value(work[here - one], plane, steps, offsets, lists),
-                            np.int64(means[np.uint64(y), np.uint64(x), pu]), kind, largest, plane,
-                            steps, offsets, lists, top, space.range,
+                            _value(p, plane, numbering),
+                            _value(q, plane, numbering),
+                            _value(work[here - one], plane, numbering),
+                            np.int64(means[np.uint64(y), np.uint64(x), pu]), kind, plane,
+                            numbering, top, space.range,
                         )  # fmt: skip
                         low, high = space.range[0], space.range[1]
                         if low > high:

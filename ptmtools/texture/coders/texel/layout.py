@@ -1,7 +1,7 @@
 """What encoder and decoder of the texel coder agree on without sending it.
 
-Which neighbours a texel is predicted from, the planes in coding order and which of them refer to
-which, and the built-in weights. The numbers are part of the format.
+Which neighbours a texel is predicted from, the built-in weights and the built-in tables. The
+numbers are part of the format.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.texture.coders.planes import references
 from ptmtools.texture.coders.rans import tables
 
 #: Rows and columns, from p, of the ten neighbours of p, q, r and s; the first three are those to
@@ -32,16 +33,6 @@ WEIGHT_TOP = 32767
 WEIGHT_SUM = 32767
 
 
-def plane_order(components: int) -> list[int]:
-    """Components in coding order: green, red, blue, alpha; their own for fewer than three."""
-    return [1, 0, 2, 3][:components] if components >= 3 else list(range(components))
-
-
-def reference_count(components: int, c: int) -> int:
-    """How many of the planes coded first plane c, in coding order, refers to: alpha to none."""
-    return c if components >= 3 and c < 3 else 0
-
-
 def offsets(stride: int) -> NDArray[np.uint64]:
     """`NEIGHBOURS` (4, 10) as distances in a plane with rows so far apart, modulo 2^64."""
     return np.array([[y * stride + x for y, x in k] for k in NEIGHBOURS], np.int64).view(np.uint64)
@@ -52,29 +43,23 @@ EVEN = (2, 3, 4, 5, 6, 9, 16)
 
 
 @cache
-def table_family() -> NDArray[np.int64]:
-    """The built-in frequency tables (1 + n, 256); row 0 is empty. In exact integers.
+def table_family() -> tables.Family:
+    """The built-in frequency tables.
 
     First even ones, for the fourth texels of few possible values. Then, of mean magnitude M = 1, 2,
     3, 4, 6, 8, 12 … sixteenths, weights that fall as (M / (M + 16·m))^POWER with the magnitude m.
     """
-    means = [1, *(m << i for i in range(35) for m in (2, 3))]
-    weights = [[1 << 24] * n for n in EVEN]
+    rows = [[1 << 24] * n for n in EVEN]
     spans = [token_span(token) for token in range(TOKENS)]
-    for mean in means:
-        row = []
-        for first, count in spans:
-            magnitude = 8 * (2 * first + count)
-            row.append((count * mean**POWER << 40) // (mean + magnitude) ** POWER)
-        weights.append(row)
-    rows = np.zeros((1 + len(weights), 256), np.int64)
-    for number, row in enumerate(weights, start=1):
-        total = sum(row)
-        scaled = [(w << 24) // total for w in row]
-        kept = [0 if w < 1 << 12 else w for w in scaled]
-        rows[number, : len(row)] = kept
-        rows[number, 255] = sum(kept) >> 10
-    return tables.normalise(rows)
+    for mean in (1, *(m << i for i in range(35) for m in (2, 3))):
+        magnitudes = [8 * (2 * first + count) for first, count in spans]
+        rows.append(
+            [
+                (count * mean**POWER << 40) // (mean + magnitude) ** POWER
+                for (_, count), magnitude in zip(spans, magnitudes, strict=True)
+            ]
+        )
+    return tables.family(rows)
 
 
 def token_span(token: int) -> tuple[int, int]:
@@ -85,16 +70,11 @@ def token_span(token: int) -> tuple[int, int]:
     return (4 + (token & 3)) << bits, 1 << bits
 
 
-def references(components: int) -> NDArray[np.int64]:
-    """`reference_count` of every plane, in coding order."""
-    return np.array([reference_count(components, c) for c in range(components)], np.int64)
-
-
 def sent_mask(components: int) -> NDArray[np.bool_]:
     """Which weights (c, 4, 12) are sent, in this order."""
     mask = np.zeros((components, 4, 12), np.bool_)
-    for c in range(components):
-        mask[c, :, : 10 + reference_count(components, c)] = True
+    for c, others in enumerate(references(components)):
+        mask[c, :, : 10 + others] = True
     return mask
 
 

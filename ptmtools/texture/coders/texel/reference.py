@@ -1,7 +1,8 @@
 """A decoder of the texel coder in plain Python, written line by line from ``docs/format-kinds.md``.
 
-It shares nothing with the compiled decoder but the numbers of `layout`. The tests compare the two;
-whoever ports the format can step through it. Thousands of times slower; no damage is looked for.
+It shares nothing with the compiled decoder but the numbers of `layout`, the order of planes and how
+bytes are read. The tests compare the two; whoever ports the format can step through it. Thousands
+of times slower; no damage is looked for.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.texture.coders.planes import plane_order, references
 from ptmtools.texture.coders.rans.reference import Symbols, normalised, read_tables
+from ptmtools.texture.coders.reading import Reader
 from ptmtools.texture.coders.texel import layout
 
 CLASSES, NARROW, GRID, TABLES = 18, 216, 232, 236
@@ -29,27 +32,6 @@ def decode_texels(
     return _Decoder(group, below, shape, max_error).level()
 
 
-class _Bytes:
-    """Bytes from the front."""
-
-    def __init__(self, data: bytes) -> None:
-        self.data = data
-        self.at = 0
-
-    def take(self, n: int) -> int:
-        self.at += n
-        return int.from_bytes(self.data[self.at - n : self.at], "little")
-
-    def varint(self) -> int:
-        number, shift = 0, 0
-        while True:
-            byte = self.take(1)
-            number |= (byte & 127) << shift
-            shift += 7
-            if byte < 128:
-                return number
-
-
 class _Decoder:
     def __init__(
         self, group: bytes, below: NDArray[Any], shape: tuple[int, int, int], max_error: int
@@ -57,10 +39,10 @@ class _Decoder:
         self.shape, self.max_error, self.dtype = shape, max_error, below.dtype
         self.letter = {"float16": "e", "float32": "f"}.get(below.dtype.name, "")
         self.bits = 8 * below.dtype.itemsize
-        read = _Bytes(group)
-        sent = read.take(1) == 3
+        read = Reader(group)
+        sent = read.number(1) == 3
         components = shape[2]
-        kinds = read.take(1)
+        kinds = read.number(1)
         self.grids = [0] * components
         self.values: list[Sequence[int]] = [range(1 << self.bits)] * components
         for c in range(components):
@@ -73,114 +55,107 @@ class _Decoder:
                 self.values[c] = np.cumsum(gaps).tolist()
             elif kind == 3:
                 self.grids[c] = read.varint()
-        self.window = read.take(1)
-        self.order = [1, 0, 2, 3][:components] if components > 2 else list(range(components))
-        self.references = [c if components > 2 and c < 3 else 0 for c in range(components)]
+        self.window = read.number(1)
+        self.order = plane_order(components).tolist()
+        self.references = references(components).tolist()
         self.weights = [layout.BUILT_IN_WEIGHTS[n].tolist() for n in self.references]
         if sent:
             for c, n in enumerate(self.references):
                 for k in range(4):
-                    for i in range(10 + n):
-                        w = read.take(2)
-                        self.weights[c][k][i] = w - 65536 if w > 32767 else w
-        tables, read.at = read_tables(group, read.at, TABLES, family=built_in)
-        size = read.take(4)
-        self.plain = read.take(size)
-        self.symbols = Symbols(group[read.at :], 0, tables)
+                    self.weights[c][k][: 10 + n] = read.numbers("<i2", 10 + n).tolist()
+        tables = read_tables(read, TABLES, family=built_in)
+        self.plain = read.number(read.number(4))
+        self.symbols = Symbols(read, tables)
         self.means = [[[self._ordered(v) for v in texel] for texel in row] for row in below]
+
+        #: Numbers and the magnitudes of their errors so far, by plane, row and column.
+        self.numbers: dict[tuple[int, int, int], int] = {}
+        self.errors: dict[tuple[int, int, int], int] = {}
+        self.off = [0] * components
 
     def level(self) -> NDArray[Any]:
         height, width, components = self.shape
-        numbers = [[[0] * width for _ in range(height)] for _ in range(components)]
-        known = [[[False] * width for _ in range(height)] for _ in range(components)]
-        errors = [[[0] * width for _ in range(height)] for _ in range(components)]
-        off = [0] * components
-        for y in range((height + 1) // 2):
-            for x in range((width + 1) // 2):
+        for y in range(0, height, 2):
+            for x in range(0, width, 2):
                 signed = [[0] * 4 for _ in range(components)]
-                for c, plane in enumerate(self.order):
+                for c in range(components):
                     for k in range(4):
-                        ty, tx = 2 * y + k // 2, 2 * x + k % 2
-                        if ty >= height or tx >= width:
-                            continue
-
-                        def look(dy: int, dx: int, y: int = y, x: int = x, c: int = plane) -> int:
-                            """Number at that place from p, or of the texel below it."""
-                            v, u = 2 * y + dy, 2 * x + dx
-                            if 0 <= v < height and 0 <= u < width and known[c][v][u]:
-                                return numbers[c][v][u]
-                            rows, columns = height // 2, width // 2
-                            v, u = (
-                                min(max(a >> 1, 0), b - 1) for a, b in ((v, rows), (u, columns))
-                            )
-                            return self._nearest(self.means[v][u][c], c)
-
-                        def error(v: int, u: int, c: int = plane) -> int:
-                            inside = 0 <= v < height and 0 <= u < width
-                            return errors[c][v][u] if inside else 0
-
-                        base = look(k // 2, k % 2)
-                        f = [look(*place) - base for place in layout.NEIGHBOURS[k]]
-                        n = self.references[c]
-                        e = [signed[0][k] if n > 0 else 0, signed[1][k] if n > 1 else 0]
-                        total = sum(a * b for a, b in zip(self.weights[c][k], f + e, strict=True))
-                        top = len(self.values[plane]) - 1
-                        guess = min(max(base + ((total + 2048) >> 12), 0), top)
-                        slope = sum(map(abs, f[:6]))
-                        west = error(ty, tx - 1)
-                        east = error(ty - 1, tx + 1) if k < 3 else west
-                        around = 2 * (west + error(ty - 1, tx)) + error(ty - 1, tx - 1) + east
-                        activity = [
-                            16 * around + 2 * slope,
-                            8 * around + slope + 16 * abs(e[0]),
-                            8 * around + slope + 8 * abs(e[0]) + 24 * abs(e[1]),
-                        ][n] >> ((2 * self.max_error + 1).bit_length() - 1)
-                        low, high, target = 0, top, guess
-                        last = k == 3 and not self.max_error
-                        if last:
-                            three = [
-                                numbers[plane][2 * y + i // 2][2 * x + i % 2] for i in range(3)
-                            ]
-                            low, high = self._range(plane, three, self.means[y][x][plane])
-                            target = min(max(guess, low), high)
-                        shift = self.grids[plane]
-                        if shift:
-                            lowest, highest = -(-low >> shift), high >> shift
-                            before = 2 * off[plane] + (off[self.order[0]] if c > 0 else 0)
-                            fits = lowest <= highest
-                            off[plane] = self.symbols.next(GRID + before) if fits else 1
-                            if off[plane]:
-                                shift = 0
-                            else:
-                                target = (target + ((1 << shift) - 1 >> 1)) >> shift
-                                low, high, activity = lowest, highest, activity >> shift
-                                target = min(max(target, low), high)
-                        if last and high - low < 16:
-                            grade = min(((activity >> 4).bit_length() + 1) // 2, 3)
-                            table = NARROW + 4 * ((high - low).bit_length() - 1) + grade
-                        else:
-                            octave = activity.bit_length() - self.window
-                            table = min(max(octave, 1), CLASSES - 1) if activity else 0
-                            table += CLASSES * (4 * n + k)
-                        z = self._number(table) if high > low else 0
-                        change = -(z + 1) // 2 if z & 1 else z // 2
-                        if self.max_error:
-                            number = target + change * (2 * self.max_error + 1)
-                            number = min(max(number, 0), top)
-                        else:
-                            near = min(target - low, high - target)
-                            if z > 2 * near:
-                                change = z - near if target - low == near else near - z
-                            number = (target + change) << shift
-                        numbers[plane][ty][tx] = number
-                        known[plane][ty][tx] = True
-                        signed[c][k] = number - guess
-                        errors[plane][ty][tx] = abs(number - guess)
+                        if y + k // 2 < height and x + k % 2 < width:
+                            self._texel(y, x, c, k, signed)
         out = np.empty(self.shape, f"u{self.bits // 8}")
-        for c in range(components):
-            for ty in range(height):
-                out[ty, :, c] = [self._bits(self.values[c][i]) for i in numbers[c][ty]]
+        for (plane, y, x), number in self.numbers.items():
+            out[y, x, plane] = self._bits(self.values[plane][number])
         return out.view(self.dtype)
+
+    def _texel(self, y: int, x: int, c: int, k: int, signed: list[list[int]]) -> None:
+        """Texel k of the block whose p is at y, x; ``signed``: the errors of the block so far."""
+        plane, n = self.order[c], self.references[c]
+        ty, tx = y + k // 2, x + k % 2
+
+        def error(dy: int, dx: int) -> int:
+            return self.errors.get((plane, ty + dy, tx + dx), 0)
+
+        base = self._look(plane, ty, tx)
+        f = [self._look(plane, y + dy, x + dx) - base for dy, dx in layout.NEIGHBOURS[k]]
+        e = [signed[i][k] if n > i else 0 for i in range(2)]
+        total = sum(a * b for a, b in zip(self.weights[c][k], f + e, strict=True))
+        top = len(self.values[plane]) - 1
+        guess = min(max(base + ((total + 2048) >> 12), 0), top)
+        slope = sum(map(abs, f[:6]))
+        east = error(-1, 1) if k < 3 else error(0, -1)
+        around = 2 * (error(0, -1) + error(-1, 0)) + error(-1, -1) + east
+        activity = [
+            16 * around + 2 * slope,
+            8 * around + slope + 16 * abs(e[0]),
+            8 * around + slope + 8 * abs(e[0]) + 24 * abs(e[1]),
+        ][n] >> ((2 * self.max_error + 1).bit_length() - 1)
+        low, high, target = 0, top, guess
+        last = k == 3 and not self.max_error
+        if last:
+            three = [self.numbers[plane, y + i // 2, x + i % 2] for i in range(3)]
+            low, high = self._range(plane, three, self.means[y // 2][x // 2][plane])
+            target = min(max(guess, low), high)
+        shift = self.grids[plane]
+        if shift:
+            lowest, highest = -(-low >> shift), high >> shift
+            before = 2 * self.off[plane] + (self.off[self.order[0]] if c > 0 else 0)
+            self.off[plane] = self.symbols.next(GRID + before) if lowest <= highest else 1
+            if self.off[plane]:
+                shift = 0
+            else:
+                target = (target + ((1 << shift) - 1 >> 1)) >> shift
+                low, high, activity = lowest, highest, activity >> shift
+                target = min(max(target, low), high)
+        if last and high - low < 16:
+            grade = min(((activity >> 4).bit_length() + 1) // 2, 3)
+            table = NARROW + 4 * ((high - low).bit_length() - 1) + grade
+        else:
+            octave = activity.bit_length() - self.window
+            table = min(max(octave, 1), CLASSES - 1) if activity else 0
+            table += CLASSES * (4 * n + k)
+        z = self._number(table) if high > low else 0
+        change = -(z + 1) // 2 if z & 1 else z // 2
+        if self.max_error:
+            number = target + change * (2 * self.max_error + 1)
+            number = min(max(number, 0), top)
+        else:
+            near = min(target - low, high - target)
+            if z > 2 * near:
+                change = z - near if target - low == near else near - z
+            number = (target + change) << shift
+        self.numbers[plane, ty, tx] = number
+        signed[c][k] = number - guess
+        self.errors[plane, ty, tx] = abs(number - guess)
+
+    def _look(self, plane: int, y: int, x: int) -> int:
+        """The number there, or of the texel below it."""
+        if (plane, y, x) in self.numbers:
+            return self.numbers[plane, y, x]
+        row, column = (
+            min(max(at >> 1, 0), side // 2 - 1)
+            for at, side in zip((y, x), self.shape[:2], strict=True)
+        )
+        return self._nearest(self.means[row][column][plane], plane)
 
     def _range(self, c: int, numbers: list[int], mean: int) -> tuple[int, int]:
         """Lowest and highest number of s."""
