@@ -15,147 +15,61 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ptmtools.lazy import names
-from ptmtools.version import __version__
+from ptmtools.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from ptmtools.cells import Cells, SubdivideOptions, subdivide
-    from ptmtools.coverage.ach import compute_ach
-    from ptmtools.coverage.model import Ach
-    from ptmtools.coverage.options import AchOptions
-    from ptmtools.database import EmitOptions, PlotOptions, ValidationReport, emit, plot_plan
+    from ptmtools.cells import (
+        Cells as Cells,
+        SubdivideOptions as SubdivideOptions,
+        subdivide as subdivide,
+    )
+    from ptmtools.coverage.ach import compute_ach as compute_ach
+    from ptmtools.coverage.model import Ach as Ach
+    from ptmtools.coverage.options import AchOptions as AchOptions
+    from ptmtools.database import (
+        EmitOptions as EmitOptions,
+        PlotOptions as PlotOptions,
+        ValidationReport as ValidationReport,
+        emit as emit,
+        plot_plan as plot_plan,
+    )
     from ptmtools.errors import (
-        CheckError,
-        DatabaseError,
-        InputError,
-        LimitError,
-        MissingComponentError,
-        OutputError,
-        PtmError,
+        CheckError as CheckError,
+        DatabaseError as DatabaseError,
+        InputError as InputError,
+        LimitError as LimitError,
+        MissingComponentError as MissingComponentError,
+        OutputError as OutputError,
+        PtmError as PtmError,
     )
     from ptmtools.pipeline import (
-        Artifacts,
-        BuildReport,
-        TextureOptions,
-        build_scene,
-        run_stage,
-        validate,
+        Artifacts as Artifacts,
+        BuildReport as BuildReport,
+        TextureOptions as TextureOptions,
+        build_scene as build_scene,
+        run_stage as run_stage,
+        validate as validate,
     )
-    from ptmtools.scene import IngestOptions, Scene, ingest
-    from ptmtools.store.folder import DatabaseFolder
+    from ptmtools.scene import IngestOptions as IngestOptions, Scene as Scene, ingest as ingest
+    from ptmtools.store.folder import DatabaseFolder as DatabaseFolder
     from ptmtools.texture import (
-        Description,
-        EncodeOptions,
-        Limits,
-        Picture,
-        PtmHeader,
-        PtmReader,
-        decode,
-        encode,
-        encode_to,
-        load_image,
-        read_header,
-        read_image,
-        write_image,
+        Description as Description,
+        EncodeOptions as EncodeOptions,
+        Limits as Limits,
+        Picture as Picture,
+        PtmHeader as PtmHeader,
+        PtmReader as PtmReader,
+        decode as decode,
+        encode as encode,
+        encode_to as encode_to,
+        load_image as load_image,
+        read_header as read_header,
+        read_image as read_image,
+        write_image as write_image,
     )
     from ptmtools.texture.reader import open as open
-    from ptmtools.visibility.model import Pvs
-    from ptmtools.visibility.options import PvsOptions
-    from ptmtools.visibility.pvs import compute_pvs
+    from ptmtools.visibility.model import Pvs as Pvs
+    from ptmtools.visibility.options import PvsOptions as PvsOptions
+    from ptmtools.visibility.pvs import compute_pvs as compute_pvs
 
-_HOME = {
-    "Ach": "coverage.model",
-    "AchOptions": "coverage.options",
-    "Artifacts": "pipeline",
-    "BuildReport": "pipeline",
-    "Cells": "cells",
-    "CheckError": "errors",
-    "DatabaseError": "errors",
-    "DatabaseFolder": "store.folder",
-    "Description": "texture",
-    "EmitOptions": "database",
-    "EncodeOptions": "texture",
-    "IngestOptions": "scene",
-    "InputError": "errors",
-    "LimitError": "errors",
-    "Limits": "texture",
-    "MissingComponentError": "errors",
-    "OutputError": "errors",
-    "Picture": "texture",
-    "PlotOptions": "database",
-    "PtmError": "errors",
-    "PtmHeader": "texture",
-    "PtmReader": "texture",
-    "Pvs": "visibility.model",
-    "PvsOptions": "visibility.options",
-    "Scene": "scene",
-    "SubdivideOptions": "cells",
-    "TextureOptions": "pipeline",
-    "ValidationReport": "database",
-    "build_scene": "pipeline",
-    "compute_ach": "coverage.ach",
-    "compute_pvs": "visibility.pvs",
-    "decode": "texture",
-    "emit": "database",
-    "encode": "texture",
-    "encode_to": "texture",
-    "ingest": "scene",
-    "load_image": "texture",
-    "open": "texture",
-    "plot_plan": "database",
-    "read_header": "texture",
-    "read_image": "texture",
-    "run_stage": "pipeline",
-    "subdivide": "cells",
-    "validate": "pipeline",
-    "write_image": "texture",
-}
-
-__all__ = [
-    "Ach",
-    "AchOptions",
-    "Artifacts",
-    "BuildReport",
-    "Cells",
-    "CheckError",
-    "DatabaseError",
-    "DatabaseFolder",
-    "Description",
-    "EmitOptions",
-    "EncodeOptions",
-    "IngestOptions",
-    "InputError",
-    "LimitError",
-    "Limits",
-    "MissingComponentError",
-    "OutputError",
-    "Picture",
-    "PlotOptions",
-    "PtmError",
-    "PtmHeader",
-    "PtmReader",
-    "Pvs",
-    "PvsOptions",
-    "Scene",
-    "SubdivideOptions",
-    "TextureOptions",
-    "ValidationReport",
-    "__version__",
-    "build_scene",
-    "compute_ach",
-    "compute_pvs",
-    "decode",
-    "emit",
-    "encode",
-    "encode_to",
-    "ingest",
-    "load_image",
-    "plot_plan",
-    "read_header",
-    "read_image",
-    "run_stage",
-    "subdivide",
-    "validate",
-    "write_image",
-]
-
-__getattr__ = names(__name__, _HOME)
+__getattr__ = names(__name__)

@@ -109,7 +109,7 @@ def writing(path: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise _output_error(Path(path), error) from error
+        raise output_error(path, error) from error
 
 
 def refuse_existing(path: str | os.PathLike[str]) -> None:
@@ -145,9 +145,7 @@ def open_regular(path: str | os.PathLike[str]) -> BufferedReader:
     return os.fdopen(descriptor, "rb")  # which closes it, whatever happens
 
 
-def real_folder(
-    root: str | os.PathLike[str], relative: str | os.PathLike[str] = "", *, make: bool = True
-) -> Path:
+def real_folder(root: Path, relative: str = "", *, make: bool = True) -> Path:
     """The folder ``relative`` (with slashes) below ``root``, reached through no link.
 
     ``root`` may be a link: whoever named it chose it. What is absent is made, or with ``make``
@@ -158,8 +156,7 @@ def real_folder(
     OutputError: PTM-O005 if a component below the root is a symbolic link; PTM-O002 if one is no
         folder, or the name leads out of the root, or a folder cannot be made; PTM-O003.
     """
-    here = Path(root)
-    steps = _steps(here, relative)
+    here, steps = root, _steps(root, relative)
     with writing(here.joinpath(*steps)):
         if make:
             here.mkdir(parents=True, exist_ok=True)
@@ -181,13 +178,13 @@ def real_folder(
     return here
 
 
-def real_file(root: str | os.PathLike[str], relative: str | os.PathLike[str]) -> Path | None:
+def real_file(root: Path, relative: str) -> Path | None:
     """The regular file ``relative`` (with slashes) below ``root``, or None if there is none.
 
     For what is read to be written on, moved or removed. Raises OutputError PTM-O005 if it is a
     symbolic link or is reached through one, and as `real_folder` does.
     """
-    steps = _steps(Path(root), relative)
+    steps = _steps(root, relative)
     if not steps:
         return None
     file = real_folder(root, "/".join(steps[:-1]), make=False) / steps[-1]
@@ -198,24 +195,25 @@ def real_file(root: str | os.PathLike[str], relative: str | os.PathLike[str]) ->
     return file if stat.S_ISREG(mode) else None
 
 
-def _steps(root: Path, relative: str | os.PathLike[str]) -> list[str]:
+def _steps(root: Path, name: str) -> list[str]:
     """The components of a relative name, none of which leads out on any system."""
-    name = Path(relative).as_posix() if isinstance(relative, os.PathLike) else relative
-    steps = [] if name in ("", ".") else name.split("/")
-    if (
-        "\\" in name
-        or "\0" in name
-        or ":" in name
-        or {"", ".", ".."} & set(steps)
-        or len(steps) > _DEEPEST
-    ):
+    if not name:
+        return []
+    if not leads_inside(name):
         raise OutputError(
             "PTM-O002",
             f"{name[:80]!r} would lead out of the folder, or is nested too deep",
             file=root,
             remedy="nothing was written; the name comes from a damaged file",
         )
-    return steps
+    return name.split("/")
+
+
+def leads_inside(name: str) -> bool:
+    """Whether a relative name, with slashes, is that of something below its root on any system."""
+    steps = name.split("/")
+    strange = any(letter in name for letter in "\\\0:") or {"", ".", ".."}.intersection(steps)
+    return not strange and len(steps) <= _DEEPEST
 
 
 def _mode(path: Path) -> int:
@@ -235,7 +233,8 @@ def _link(path: Path) -> OutputError:
     )
 
 
-def _output_error(target: Path, error: OSError) -> OutputError:
+def output_error(target: str | os.PathLike[str], error: OSError) -> OutputError:
+    """What `writing` makes of an error of the system."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return OutputError(
             "PTM-O003",
@@ -245,6 +244,6 @@ def _output_error(target: Path, error: OSError) -> OutputError:
         )
     remedy = "check that the folder exists and may be written to"
     if error.errno == errno.ENOENT:
-        remedy = f"create the folder {target.parent} first"
+        remedy = f"create the folder {Path(target).parent} first"
     reason = error.strerror or str(error)
     return OutputError("PTM-O002", f"cannot be written ({reason})", file=target, remedy=remedy)

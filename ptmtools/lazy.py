@@ -1,12 +1,15 @@
 """What is imported when it is first used, so that ``ptm --help`` is instant.
 
-A package says where each of its names lives, and takes what `names` returns for its
+A package imports its names for type checkers only, and takes what `names` makes of that for its
 ``__getattr__`` (PEP 562). A table says by `Lazy` where the function lives that does something.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import ast
+import builtins
+import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Generic, TypeVar, cast
@@ -28,13 +31,22 @@ class Lazy(Generic[T]):
         return cast(T, getattr(import_module(module), name))
 
 
-def names(package: str, home: Mapping[str, str]) -> Callable[[str], Any]:
-    """The ``__getattr__`` of ``package``; ``home`` maps each name to its module, relative to it."""
+def names(package: str) -> Callable[[str], Any]:
+    """The ``__getattr__`` of a package that imports what it offers ``if TYPE_CHECKING``, each name
+    as itself: ``from ptmtools.scene.ingestion import ingest as ingest``.
+
+    They are its ``__all__`` too, but for those that Python itself has.
+    """
+    module: Any = sys.modules[package]
+    statements = ast.walk(ast.parse(module.__loader__.get_source(package)))
+    imports = [node for node in statements if isinstance(node, ast.ImportFrom)]
+    home = {a.name: node.module for node in imports for a in node.names if a.name == a.asname}
+    module.__all__ = sorted(name for name in home if not hasattr(builtins, name))
 
     def attribute(name: str) -> Any:
         if name not in home:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        return getattr(import_module(f"{package}.{home[name]}"), name)
+        return getattr(import_module(str(home[name])), name)
 
     return attribute
 

@@ -21,8 +21,15 @@ from numpy.typing import NDArray
 
 from benchmarks.fuzz.mutation import NUMBERS, damaged
 from benchmarks.fuzz.target import Case
-from ptmtools.texture import EncodeOptions, Limits, decode, encode, load_image, read_header
-from ptmtools.texture import open as open_ptm
+from ptmtools.texture import (
+    EncodeOptions,
+    Limits,
+    decode,
+    encode,
+    load_image,
+    open as open_ptm,
+    read_header,
+)
 
 LIMITS = Limits(decoded_bytes=1 << 24)
 #: Fields of the head of a `.ptm`: offset and bytes, as in docs/format-ptm.md.

@@ -7,19 +7,9 @@ from typing import TYPE_CHECKING
 from ptmtools.lazy import names
 
 if TYPE_CHECKING:
-    from ptmtools.cells.model import Cells
-    from ptmtools.cells.naming import structural_triangles
-    from ptmtools.cells.options import SubdivideOptions
-    from ptmtools.cells.subdivision import subdivide
+    from ptmtools.cells.model import Cells as Cells
+    from ptmtools.cells.naming import structural_triangles as structural_triangles
+    from ptmtools.cells.options import SubdivideOptions as SubdivideOptions
+    from ptmtools.cells.subdivision import subdivide as subdivide
 
-__all__ = ["Cells", "SubdivideOptions", "structural_triangles", "subdivide"]
-
-__getattr__ = names(
-    __name__,
-    {
-        "Cells": "model",
-        "SubdivideOptions": "options",
-        "structural_triangles": "naming",
-        "subdivide": "subdivision",
-    },
-)
+__getattr__ = names(__name__)

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-import errno
 import glob
 import os
 import stat
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import click
 
+from ptmtools.cli.common import as_json, forced, limited, voiced, workers
 from ptmtools.cli.failures import report
 from ptmtools.cli.output import Voice, abandon_stdout
 from ptmtools.errors import InputError, OutputError, PtmError, naming
-from ptmtools.files import write_with, writing
+from ptmtools.files import output_error, refuse_existing, write_with, writing
+
+if TYPE_CHECKING:
+    from ptmtools.texture.model import Limits
 
 #: What is said of a file, as in JSON.
 Report = dict[str, Any]
@@ -55,6 +59,36 @@ def expanded(names: Iterable[str], suffixes: Sequence[str]) -> list[str]:
     return found
 
 
+def many_files(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Adds the options of a command that makes a file of each file, and hands in the `Batch`."""
+
+    @click.option(
+        "--skip-existing",
+        is_flag=True,
+        help="Skip files whose result exists already, for example after an interrupted run.",
+    )
+    @limited
+    @workers
+    @forced
+    @as_json
+    @voiced
+    @wraps(function)
+    def command(
+        voice: Voice,
+        force: bool,
+        skip_existing: bool,
+        workers: int,
+        limits: Limits,
+        as_json: bool,
+        **values: Any,
+    ) -> Any:
+        if force and skip_existing:
+            raise click.UsageError("give either --force or --skip-existing, not both")
+        return function(Batch(voice, force, skip_existing, workers, limits, as_json), **values)
+
+    return command
+
+
 @dataclass(frozen=True)
 class Job:
     """One file that a command works on.
@@ -90,21 +124,22 @@ class Job:
 
 
 def jobs_for(
-    sources: Sequence[str],
-    output: str | None,
     given: Sequence[str],
+    inside: Sequence[str],
+    output: str | None,
     suffix: str,
     suffixes: Sequence[str],
 ) -> list[Job]:
-    """What is to be done, each file once.
+    """What is to be done, each of the files that `expanded` finds once.
 
-    ``output`` is a folder if it is one already or ends with a slash, or if ``given``, what the user
-    named the sources, are several, a folder or a pattern; of the last two, a single file may still
-    go to a name with one of ``suffixes``. Different sources whose results would lie in one place
-    are one job, a fault.
+    ``output`` is a folder if it is one already or ends with a slash, or if those ``given`` by the
+    user are several, a folder or a pattern; of the last two, a single file may still go to a name
+    with one of ``suffixes``. Different sources whose results would lie in one place are one job, a
+    fault.
 
-    Raises click.UsageError.
+    Raises click.UsageError; InputError PTM-I128.
     """
+    sources = expanded(given, inside)
     if output == "":
         raise click.BadParameter("the name is empty", None, None, "-o")
     if STANDARD in sources and len(sources) > 1:
@@ -198,52 +233,70 @@ def _apart(targets: dict[str, Path], folder: Path | None) -> list[Job]:
     return jobs
 
 
-def for_each(
-    voice: Voice,
-    jobs: Sequence[Job],
-    work: Callable[[Job, int], Report],
-    lines: Callable[[Report], Iterable[str]],
-    workers: int,
-    as_json: bool,
-) -> tuple[int, list[Report]]:
-    """``work(job, threads)`` for every job, several at a time; the first failure's exit status, and
-    the reports of those done, in the order of the jobs.
+@dataclass(frozen=True)
+class Batch:
+    """How a command treats its files: as its options say."""
 
-    What ``lines`` makes of a report is printed, or with ``as_json`` all of them at the end; in both
-    cases a warning in it goes to stderr. A job that fails is reported and the others go on. One job
-    has all the threads to itself; of several, each has one.
-    """
-    from ptmtools.texture.parallel import ordered
+    voice: Voice
+    force: bool
+    skip_existing: bool
+    workers: int
+    limits: Limits
+    as_json: bool
 
-    workers = workers or os.cpu_count() or 1
-    at_once = min(workers, len(jobs))
+    def skips(self, target: Path | None) -> bool:
+        """Whether the result is there and stays. Raises OutputError PTM-O001 if it must not be."""
+        if target is None or self.force:
+            return False
+        if not self.skip_existing:
+            refuse_existing(target)
+        return target.exists()
 
-    def guarded(job: Job) -> Report | Exception:
-        if job.fault:
-            return job.fault
-        try:
-            return work(job, max(1, workers // at_once))
-        except Exception as fault:
-            return fault
+    def each(
+        self,
+        jobs: Sequence[Job],
+        work: Callable[[Job, int], Report],
+        lines: Callable[[Report], Iterable[str]],
+    ) -> tuple[int, list[Report]]:
+        """``work(job, threads)`` for every job, several at a time; the first failure's exit status,
+        and the reports of those done, in the order of the jobs.
 
-    status = 0
-    reports: list[Report] = []
-    with voice.progress() as progress:
-        for done, result in enumerate(ordered(guarded, jobs, at_once)):
-            progress(done, len(jobs), "files")
-            if isinstance(result, Exception):
-                with voice.above_progress():
-                    failed = report(result, voice.verbose)
-                status = status or failed
-                continue
-            reports.append(result)
-            if result.get("warning"):
-                voice.warn(f"{result['file']}: {result['warning']}")
-            for line in lines(result) if not as_json else ():
-                voice.say(line)
-    if as_json:
-        voice.emit_json(reports)
-    return status, reports
+        What ``lines`` makes of a report is printed, or with ``as_json`` all of them at the end; in
+        both cases a warning in it goes to stderr. A job that fails is reported and the others go
+        on. One job has all the threads to itself; of several, each has one.
+        """
+        from ptmtools.texture.parallel import ordered
+
+        voice, workers = self.voice, self.workers or os.cpu_count() or 1
+        voice.to_stderr = any(job.to_stdout for job in jobs)
+        at_once = min(workers, len(jobs))
+
+        def guarded(job: Job) -> Report | Exception:
+            if job.fault:
+                return job.fault
+            try:
+                return work(job, max(1, workers // at_once))
+            except Exception as fault:
+                return fault
+
+        status = 0
+        reports: list[Report] = []
+        with voice.progress() as progress:
+            for done, result in enumerate(ordered(guarded, jobs, at_once)):
+                progress(done, len(jobs), "files")
+                if isinstance(result, Exception):
+                    with voice.above_progress():
+                        failed = report(result, voice.verbose)
+                    status = status or failed
+                    continue
+                reports.append(result)
+                if result.get("warning"):
+                    voice.warn(f"{result['file']}: {result['warning']}")
+                for line in lines(result) if not self.as_json else ():
+                    voice.say(line)
+        if self.as_json:
+            voice.emit_json(reports)
+        return status, reports
 
 
 def standard_input() -> bytes:
@@ -270,10 +323,6 @@ def to_standard_output(write: Callable[[IO[bytes]], object]) -> None:
             raise
         except OSError as error:
             abandon_stdout()
-            full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-            raise OutputError(
-                "PTM-O003" if full else "PTM-O002",
-                "the disk is full" if full else f"cannot be written ({error.strerror})",
-                file="standard output",
-                remedy="the output is incomplete",
-            ) from error
+            fault = output_error("standard output", error)
+            fault.remedy = "the output is incomplete"
+            raise fault from error

@@ -3,54 +3,29 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from functools import wraps
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 import click
 
 from ptmtools.ahead import compile_ahead
-from ptmtools.cli.batch import STANDARD, Job, Report, expanded, for_each, jobs_for, standard_input
-from ptmtools.cli.common import as_json, forced, limited, voiced, workers
-from ptmtools.cli.output import Voice
+from ptmtools.cli.batch import (
+    STANDARD,
+    Batch,
+    Job,
+    Report,
+    jobs_for,
+    many_files,
+    standard_input,
+)
 from ptmtools.cli.parameters import Numbers, options_of, take
 from ptmtools.errors import InputError, OutputError, naming
 from ptmtools.executors.model import processors
-from ptmtools.files import refuse_existing
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Description, EncodeOptions
 from ptmtools.texture.profiles import PROFILES
-
-if TYPE_CHECKING:
-    from ptmtools.texture.model import Limits
-
-
-def _skipping(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Adds ``--skip-existing``."""
-
-    @click.option(
-        "--skip-existing",
-        is_flag=True,
-        help="Skip files whose result exists already, for example after an interrupted run.",
-    )
-    @wraps(function)
-    def command(*arguments: Any, force: bool, skip_existing: bool, **values: Any) -> Any:
-        if force and skip_existing:
-            raise click.UsageError("give either --force or --skip-existing, not both")
-        return function(*arguments, force=force, skip_existing=skip_existing, **values)
-
-    return command
-
-
-def _skipped(target: Path | None, force: bool, skip_existing: bool) -> bool:
-    """Whether the result is there and may stay. Raises OutputError PTM-O001 if it may not."""
-    if target is None or force:
-        return False
-    if not skip_existing:
-        refuse_existing(target)
-    return target.exists()
 
 
 @click.command("encode")
@@ -68,23 +43,9 @@ def _skipped(target: Path | None, force: bool, skip_existing: bool) -> bool:
     "--orient / --no-orient",
     help="Rotate the texels upright by the image's EXIF orientation, instead of recording it.",
 )
-@_skipping
-@limited
-@workers
-@forced
-@as_json
-@voiced
+@many_files
 def encode(
-    voice: Voice,
-    images: tuple[str, ...],
-    output: str | None,
-    orient: bool,
-    skip_existing: bool,
-    limits: Limits,
-    workers: int,
-    force: bool,
-    as_json: bool,
-    **values: Any,
+    batch: Batch, images: tuple[str, ...], output: str | None, orient: bool, **values: Any
 ) -> int:
     """Encode images as progressive textures (.ptm).
 
@@ -99,11 +60,9 @@ def encode(
     options = take(EncodeOptions, values)
     check_options(options)
     ahead = PROFILES[options.profile].ahead
-    if ahead and (workers or processors()) > 1:
+    if ahead and (batch.workers or processors()) > 1:
         compile_ahead(*ahead)
-    sources = expanded(images, SUFFIXES)
-    jobs = jobs_for(sources, output, images, ".ptm", (".ptm", *SUFFIXES))
-    voice.to_stderr = any(job.to_stdout for job in jobs)
+    jobs = jobs_for(images, SUFFIXES, output, ".ptm", (".ptm", *SUFFIXES))
     if output and any(job.target and not job.folder for job in jobs):
         _refuse_image_suffix(output)
 
@@ -112,7 +71,7 @@ def encode(
         report: Report = {
             "image": source,
             "file": os.fspath(target) if target else STANDARD,
-            "skipped": _skipped(target, force, skip_existing),
+            "skipped": batch.skips(target),
         }
         if report["skipped"]:
             return report
@@ -135,12 +94,12 @@ def encode(
 
         with naming(source):
             data = standard_input() if source == STANDARD else source
-            picture = load_image(data, limits)
+            picture = load_image(data, batch.limits)
             report["image_bytes"] = len(data) if isinstance(data, bytes) else os.path.getsize(data)
             report["lossy"] = picture.lossy
             if orient:
                 picture = picture.upright()
-            job.put(write, force)
+            job.put(write, batch.force)
         return report
 
     def lines(report: Report) -> Iterator[str]:
@@ -157,9 +116,9 @@ def encode(
         if note := _note_on_sides(report, options.max_side):
             yield f"  {note}"
 
-    status, reports = for_each(voice, jobs, work, lines, workers, as_json)
-    if not as_json and (hint := _hint_on_lossy(reports, options)):
-        voice.say(hint)
+    status, reports = batch.each(jobs, work, lines)
+    if not batch.as_json and (hint := _hint_on_lossy(reports, options)):
+        batch.voice.say(hint)
     return status
 
 
@@ -228,23 +187,13 @@ def _share(part: int, whole: int) -> str:
     "folder, which is created if it does not exist. A name that ends with / is a folder. By "
     "default each image is written next to its file: a .png, or an .npy for floats.",
 )
-@_skipping
-@limited
-@workers
-@forced
-@as_json
-@voiced
+@many_files
 def decode(
-    voice: Voice,
+    batch: Batch,
     files: tuple[str, ...],
     level: int | None,
     window: tuple[int, int, int, int] | None,
     output: str | None,
-    skip_existing: bool,
-    limits: Limits,
-    workers: int,
-    force: bool,
-    as_json: bool,
 ) -> int:
     """Decode .ptm files to images.
 
@@ -256,9 +205,7 @@ def decode(
     from ptmtools.texture.images.writing import writer
     from ptmtools.texture.reader import open
 
-    sources = expanded(files, (".ptm",))
-    jobs = jobs_for(sources, output, files, "", tuple(WRITTEN))
-    voice.to_stderr = any(job.to_stdout for job in jobs)
+    jobs = jobs_for(files, (".ptm",), output, "", tuple(WRITTEN))
     # One name is an image's; what goes into a folder, or beside its file, gets a suffix.
     named = output is not None and any(job.target and not job.folder for job in jobs)
     if named:
@@ -268,7 +215,7 @@ def decode(
     def work(job: Job, threads: int) -> Report:
         source, target = job.source, job.target
         where = standard_input() if source == STANDARD else source
-        with naming(source), open(where, limits=limits, threads=threads) as ptm:
+        with naming(source), open(where, limits=batch.limits, threads=threads) as ptm:
             suffix = ".npy" if ptm.dtype.kind == "f" else ".png"
             if target and named:
                 suffix = target.suffix
@@ -277,7 +224,7 @@ def decode(
             report: Report = {
                 "file": source,
                 "image": os.fspath(target) if target else STANDARD,
-                "skipped": _skipped(target, force, skip_existing),
+                "skipped": batch.skips(target),
             }
             if report["skipped"]:
                 return report
@@ -290,7 +237,7 @@ def decode(
             except InputError as error:  # the texels are intact
                 warning = error
         replace(job, target=target).put(
-            lambda file: write_to(file, suffix, texels, description), force
+            lambda file: write_to(file, suffix, texels, description), batch.force
         )
         height, width, components = texels.shape
         return report | {
@@ -313,7 +260,7 @@ def decode(
             f"{count(report['components'], 'component')}{kind}, level {report['level']}"
         )
 
-    return for_each(voice, jobs, work, lines, workers, as_json)[0]
+    return batch.each(jobs, work, lines)[0]
 
 
 def _refuse_image_suffix(output: str) -> None:

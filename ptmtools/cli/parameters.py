@@ -109,8 +109,8 @@ def descriptions(cls: type) -> dict[str, str]:
     return {name: re.sub(r"``?([^`]*)``?", r"\1", text) for name, text in found.items()}
 
 
-def options_of(*classes: type, omit: Sequence[str] = ()) -> Decorator:
-    """A decorator that adds the options of all fields of ``classes`` that are not in ``omit``."""
+def options_of(*classes: type) -> Decorator:
+    """A decorator that adds the options of all fields of ``classes``."""
     found: dict[str, Decorator] = {}
     former: dict[str, str] = {}
     deprecated: dict[str, tuple[Any, str]] = {}
@@ -119,7 +119,7 @@ def options_of(*classes: type, omit: Sequence[str] = ()) -> Decorator:
         hints, texts = typing.get_type_hints(cls), descriptions(cls)
         for field in fields(cls):
             name = _option_name(field)
-            if field.name not in omit and name not in found:
+            if name not in found:
                 found[name] = _option(field, hints[field.name], texts.get(field.name))
                 if reason := field.metadata.get("deprecated"):
                     deprecated[name] = _default(field), reason

@@ -17,8 +17,7 @@ from ptmtools.cli.parameters import options_of, take
 from ptmtools.database import PlotOptions, ValidationReport
 from ptmtools.database.validation.findings import NOT_BUILT, SEEN_BY_BUILD
 from ptmtools.errors import CheckError
-from ptmtools.pipeline import Artifacts, shoot_segments
-from ptmtools.pipeline import validate as check
+from ptmtools.pipeline import Artifacts, shoot_segments, validate as check
 from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE
 from ptmtools.quantities import count, size
 from ptmtools.store.folder import DatabaseFolder

@@ -28,8 +28,7 @@ from ptmtools.cli.parameters import options_of, take
 from ptmtools.cli.warm_up import WARM_UP
 from ptmtools.executors.model import processors
 from ptmtools.lazy import Lazy
-from ptmtools.pipeline.build import build_scene as build
-from ptmtools.pipeline.build import run_stage
+from ptmtools.pipeline.build import build_scene as build, run_stage
 from ptmtools.pipeline.changes import NEVER_RUN
 from ptmtools.pipeline.report import BuildReport, StageReport
 from ptmtools.pipeline.run import Artifacts
@@ -56,12 +55,24 @@ model_argument = click.argument("model", type=click.Path())
 
 def build_scene() -> click.Command:
     """The command that runs all stages, with the options of all."""
+    return click.command("build-scene")(_from_model(None))
 
-    @click.command("build-scene")
+
+def stage_command(stage: Stage[Any]) -> click.Command:
+    """The command of a stage."""
+    command = _from_model(stage) if stage.from_model else _of_database(stage)
+    return click.command(stage.name, help=stage.about)(command)
+
+
+def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
+    """All stages, or the first ones up to one that is cut out of the model."""
+    stages = list(STAGES.values())
+    stages = stages[: stages.index(last) + 1] if last else stages
+
     @model_argument
     @new_database
-    @options_of(*(stage.options for stage in STAGES.values()))
-    @many_machines
+    @options_of(*(stage.options for stage in stages))
+    @(workers if last else many_machines)
     @forced
     @click.option(
         "--rebuild", is_flag=True, help="Run every stage again, even if it is up to date."
@@ -79,8 +90,8 @@ def build_scene() -> click.Command:
         dry_run: bool,
         rebuild: bool,
         workers: int,
-        scheduler: str | None,
         force: bool,
+        scheduler: str | None = None,
         **values: Any,
     ) -> None:
         """Build a database from MODEL, or bring it up to date.
@@ -89,62 +100,27 @@ def build_scene() -> click.Command:
         database is a folder: museum.obj makes museum.db, unless -o names another. Only what has
         changed since the last build is computed again.
         """
-        options: list[Any] = [take(stage.options, values) for stage in STAGES.values()]
+        options: list[Any] = [take(stage.options, values) for stage in stages]
         if dry_run:
             from ptmtools.cli.status import print_plan
             from ptmtools.pipeline.plan import plan_build
 
-            print_plan(voice, plan_build(model, db, *options, force=force), as_json)
+            plans = plan_build(model, db, *options, force=force)
+            print_plan(voice, plans[: len(stages)], as_json)
             return
-        if (workers or processors()) > 1:
+        if last is None and (workers or processors()) > 1:
             compile_ahead(*WARM_UP)
         with voice.progress() as progress:
             report = build(
                 model,
                 db,
                 *options,
+                until=last,
                 workers=workers,
                 scheduler=scheduler,
                 force=force,
                 rebuild=rebuild,
                 progress=progress,
-            )
-        print_report(voice, report, as_json)
-
-    return command
-
-
-def stage_command(stage: Stage[Any]) -> click.Command:
-    """The command of a stage."""
-    command = _from_model(stage) if stage.from_model else _of_database(stage)
-    return click.command(stage.name, help=stage.about)(command)
-
-
-def _from_model(last: Stage[Any]) -> Callable[..., None]:
-    """The first stages of a database, up to one that is cut out of the model."""
-    stages = list(STAGES.values())
-    stages = stages[: stages.index(last) + 1]
-
-    @model_argument
-    @new_database
-    @options_of(*(stage.options for stage in stages))
-    @workers
-    @forced
-    @as_json
-    @voiced
-    def command(
-        voice: Voice,
-        model: str,
-        db: str,
-        as_json: bool,
-        force: bool,
-        workers: int,
-        **values: Any,
-    ) -> None:
-        options: list[Any] = [take(stage.options, values) for stage in stages]
-        with voice.progress() as progress:
-            report = build(
-                model, db, *options, until=last, workers=workers, force=force, progress=progress
             )
         print_report(voice, report, as_json)
 

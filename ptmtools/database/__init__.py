@@ -4,45 +4,25 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ptmtools.database.model import (
-    EmitOptions,
-    EmitReport,
-    GivenViewpoint,
-    Issue,
-    PlotOptions,
-    PlotReport,
-    TextureRecord,
-    ValidationReport,
-    Viewpoint,
-)
 from ptmtools.lazy import names
 
 if TYPE_CHECKING:
-    from ptmtools.database.emission import emit
-    from ptmtools.database.plans.plan import plot_plan
-    from ptmtools.database.validation.database import validate_database, validate_ptm
+    from ptmtools.database.emission import emit as emit
+    from ptmtools.database.model import (
+        EmitOptions as EmitOptions,
+        EmitReport as EmitReport,
+        GivenViewpoint as GivenViewpoint,
+        Issue as Issue,
+        PlotOptions as PlotOptions,
+        PlotReport as PlotReport,
+        TextureRecord as TextureRecord,
+        ValidationReport as ValidationReport,
+        Viewpoint as Viewpoint,
+    )
+    from ptmtools.database.plans.plan import plot_plan as plot_plan
+    from ptmtools.database.validation.database import (
+        validate_database as validate_database,
+        validate_ptm as validate_ptm,
+    )
 
-__all__ = [
-    "EmitOptions",
-    "EmitReport",
-    "GivenViewpoint",
-    "Issue",
-    "PlotOptions",
-    "PlotReport",
-    "TextureRecord",
-    "ValidationReport",
-    "Viewpoint",
-    "emit",
-    "plot_plan",
-    "validate_database",
-    "validate_ptm",
-]
-
-_HOME = {
-    "emit": "emission",
-    "plot_plan": "plans.plan",
-    "validate_database": "validation.database",
-    "validate_ptm": "validation.database",
-}
-
-__getattr__ = names(__name__, _HOME)
+__getattr__ = names(__name__)

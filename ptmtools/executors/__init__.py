@@ -17,22 +17,9 @@ from typing import TYPE_CHECKING
 from ptmtools.lazy import names
 
 if TYPE_CHECKING:
-    from ptmtools.executors.background import BackgroundTask
-    from ptmtools.executors.local import Local
-    from ptmtools.executors.model import Executor, Sharing
-    from ptmtools.executors.opening import open_executor
-    from ptmtools.executors.serial import Serial
+    from ptmtools.executors.local import Local as Local, open_executor as open_executor
+    from ptmtools.executors.model import Executor as Executor, Sharing as Sharing
+    from ptmtools.executors.serial import Serial as Serial
+    from ptmtools.executors.worker import BackgroundTask as BackgroundTask
 
-__all__ = ["BackgroundTask", "Executor", "Local", "Serial", "Sharing", "open_executor"]
-
-__getattr__ = names(
-    __name__,
-    {
-        "BackgroundTask": "background",
-        "Executor": "model",
-        "Local": "local",
-        "Serial": "serial",
-        "Sharing": "model",
-        "open_executor": "opening",
-    },
-)
+__getattr__ = names(__name__)

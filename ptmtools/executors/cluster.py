@@ -15,20 +15,20 @@ import uuid
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
-from dataclasses import replace
 from hashlib import sha256
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import MissingComponentError, WorkerError
+from ptmtools.errors import WorkerError
 from ptmtools.executors.cluster_worker import Behind, Work, check_in, forget, perform, receive
 from ptmtools.executors.model import AHEAD, Executor
-from ptmtools.executors.order import chunks, in_order
+from ptmtools.executors.order import in_chunks
 from ptmtools.executors.outcome import Outcome
 from ptmtools.executors.packing import packed
 from ptmtools.executors.software import software
+from ptmtools.lazy import component
 from ptmtools.progress import announce
 
 if TYPE_CHECKING:
@@ -60,6 +60,8 @@ class Cluster(Executor):
         they have other software than this process.
     """
 
+    remote = True
+
     def __init__(self, address: str, workers: int = 0) -> None:
         self.address, self._limit = address, workers
         self._client = _connected(address)
@@ -71,11 +73,6 @@ class Cluster(Executor):
         except BaseException:
             self.close()
             raise
-
-    @property
-    def remote(self) -> bool:
-        """See `Executor.remote`."""
-        return True
 
     @property
     def workers(self) -> int:
@@ -183,44 +180,37 @@ class _OnCluster(Generic[S]):
         """See `Sharing.each`."""
 
         def submit(some: list[T]) -> _Pending:
-            call = pickle.dumps((function, some), protocol=5)
-            work = Work(self._name, len(self._changes), self._alone, software(), call)
-            return _Pending(self, work)
+            return _Pending(self, pickle.dumps((function, some), protocol=5))
 
-        for found in in_order(submit, chunks(tasks, chunk), lambda: AHEAD * self._cluster.workers):
-            yield from found
+        return in_chunks(submit, tasks, chunk, lambda: AHEAD * self._cluster.workers)
 
     def change(self, function: Callable[[S, T], object], change: T) -> None:
         """See `Sharing.change`."""
         function(self._shared, change)
         if self._there is None:
             return
-        self._changes.append(pickle.dumps((function, change), protocol=5))
-        number = len(self._changes) - 1
+        pickled = pickle.dumps((function, change), protocol=5)
         with self._cluster.naming_losses():
-            self._client.run(
-                receive, self._name, {number: self._changes[number]}, on_error="ignore"
-            )
+            fresh = {len(self._changes): pickled}
+            self._client.run(receive, self._name, fresh, on_error="ignore")
+        self._changes.append(pickled)
 
     def close(self) -> None:
         """Frees the workers' memory."""
         if self._there is not None:
             self._there = None
-            self._forget()
+            with suppress(Exception):  # of a lost cluster
+                self._client.run(forget, self._name, on_error="ignore")
 
-    def _forget(self) -> None:
-        with suppress(Exception):  # of a lost cluster
-            self._client.run(forget, self._name, on_error="ignore")
-
-    def submit(self, work: Work) -> Future[Outcome | Behind]:
+    def submit(self, call: bytes) -> Future[Outcome | Behind]:
         """Hands out some tasks."""
         with self._cluster.naming_losses():
             if self._there is None:
                 self._there = self._cluster.shipped(self._shared)
-            given = work
-            if len(work.call) > LARGE:
-                given = self._client.scatter(work, hash=False, direct=True)
-            return self._client.submit(perform, self._there, given, pure=False)
+            work: Any = Work(self._name, len(self._changes), self._alone, software(), call)
+            if len(call) > LARGE:
+                work = self._client.scatter(work, hash=False, direct=True)
+            return self._client.submit(perform, self._there, work, pure=False)
 
     def catch_up(self, behind: Behind) -> None:
         """Sends a worker what it lacks."""
@@ -257,37 +247,35 @@ class _OnCluster(Generic[S]):
         self._again += 1
         self._cluster.wait_for_workers()
         self._cluster.forget_last()
-        self._there = None
-        self._forget()
+        self.close()
         # The caller's own is as changed as it is for all that is under way.
         self._name, self._changes = _name(), []
         for pending in self.under_way:
-            pending.work = replace(pending.work, sharing=self._name, version=0)
-            pending.future = self.submit(pending.work)
+            pending.hand_out()
 
 
 class _Pending:
     """See `order.Pending`: some tasks on their way."""
 
-    def __init__(self, sharing: _OnCluster[Any], work: Work) -> None:
-        self._sharing, self.work = sharing, work
+    def __init__(self, sharing: _OnCluster[Any], call: bytes) -> None:
+        self._sharing, self._call = sharing, call
         self.came: Outcome | Behind | None = None
-        self._submit()
+        self.hand_out()
+        sharing.under_way.append(self)
 
-    def _submit(self) -> None:
-        self.future = self._sharing.submit(self.work)
-        self._sharing.under_way.append(self)
+    def hand_out(self) -> None:
+        """Once more, where it was lost."""
+        self.future = self._sharing.submit(self._call)
 
     def result(self) -> Outcome:
-        while True:
-            if self.came is None:
-                self._sharing.fetch(self)
-            if isinstance(self.came, Outcome):
-                return self.came
-            if isinstance(self.came, Behind):
+        while not isinstance(self.came, Outcome):
+            if self.came:
                 self._sharing.catch_up(self.came)
                 self.came = None
-                self._submit()
+                self.hand_out()
+                self._sharing.under_way.append(self)
+            self._sharing.fetch(self)
+        return self.came
 
     def cancel(self) -> None:
         if self in self._sharing.under_way:
@@ -302,13 +290,10 @@ def _name() -> str:
 
 def _connected(address: str) -> Client:
     """Raises MissingComponentError PTM-M700, WorkerError PTM-W001."""
-    try:
-        from distributed import Client
-        from distributed.comm import get_address_host_port
-    except ImportError as fault:
-        raise MissingComponentError(
-            "PTM-M700", "a cluster needs Dask", remedy="pip install 'ptmtools[cluster]'"
-        ) from fault
+    component("distributed", "PTM-M700", "a cluster needs Dask", "cluster")
+    from distributed import Client
+    from distributed.comm import get_address_host_port
+
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # it is raised below
     try:
         host, port = get_address_host_port(address)

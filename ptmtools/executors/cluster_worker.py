@@ -10,6 +10,7 @@ import pickle
 import threading
 from collections import defaultdict
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -83,10 +84,8 @@ def perform(block: NDArray[np.uint8], work: Work) -> Outcome | Behind:
             function(copy.value, changed)
             copy.version += 1
     function, tasks = pickle.loads(work.call)
-    if not work.alone:
-        return outcome(function, copy.value, tasks)
-    with copy.alone:
-        return outcome(function, copy.value, tasks)
+    with copy.alone if work.alone else nullcontext():
+        return outcome(function(copy.value, task) for task in tasks)
 
 
 def receive(sharing: str, changes: Mapping[int, bytes]) -> None:

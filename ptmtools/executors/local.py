@@ -10,15 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, nullcontext
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
-from ptmtools.executors.background import BackgroundTask
 from ptmtools.executors.model import AHEAD, Executor, Pending, Sharing, processors
 from ptmtools.executors.order import in_order
-from ptmtools.executors.serial import SerialSharing
-
-if TYPE_CHECKING:
-    from ptmtools.executors.processes import Processes
+from ptmtools.executors.processes import InProcesses, Processes
+from ptmtools.executors.serial import Serial, SerialSharing
+from ptmtools.executors.worker import BackgroundTask
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -35,36 +33,25 @@ class Local(Executor):
 
     def __init__(self, workers: int = 0, *, threads: bool = True) -> None:
         self._workers = workers or processors()
-        self._by_threads = threads
-        self._threads: ThreadPoolExecutor | None = None
-        self._processes: Processes | None = None
+        self.remote = not threads
+        # Both start what they consist of when there is first something to do.
+        self._threads = ThreadPoolExecutor(self._workers, "ptmtools")
+        self._processes = Processes(self._workers)
 
     @property
     def workers(self) -> int:
         """How many threads, or processes."""
         return self._workers
 
-    @property
-    def remote(self) -> bool:
-        """See `Executor.remote`. What is on the disk need not go through a pipe: in Python 3.11.2
-        a pool whose worker ends waits for ever to be rid of a task that is too long for one."""
-        return not self._by_threads
-
     def sharing(
         self, shared: S, *, releases_lock: bool = False
     ) -> AbstractContextManager[Sharing[S]]:
         """See `Executor.sharing`."""
-        if self._by_threads and self._workers == 1:
+        if self._workers == 1 and not self.remote:
             return nullcontext(SerialSharing(shared))
-        if self._by_threads and releases_lock:
-            if self._threads is None:
-                self._threads = ThreadPoolExecutor(self._workers, "ptmtools")
+        if releases_lock and not self.remote:
             return nullcontext(_InThreads(shared, self._threads, self._workers))
-        from ptmtools.executors.processes import Processes
-
-        if self._processes is None:
-            self._processes = Processes(self._workers)
-        return self._processes.sharing(shared)
+        return InProcesses(shared, self._processes, self._threads, self._workers)
 
     def submit(
         self, function: Callable[[S, T], R], shared: S, task: T, *, long: bool = True
@@ -75,12 +62,10 @@ class Local(Executor):
         return BackgroundTask(function, shared, task)
 
     def close(self) -> None:
-        """See `Executor.close`."""
-        if self._threads:
-            self._threads.shutdown(cancel_futures=True)
-            self._threads = None
-        if self._processes:
-            self._processes.close()
+        """See `Executor.close`. Any thread may; no more is begun then."""
+        self._threads.shutdown(wait=False, cancel_futures=True)
+        self._processes.close()
+        self._threads.shutdown()
 
 
 class _InThreads(SerialSharing[S]):
@@ -100,3 +85,26 @@ class _InThreads(SerialSharing[S]):
 
         # Whoever is told of an error may change what the threads are still reading.
         return in_order(submit, tasks, lambda: AHEAD * self._workers, wait)
+
+
+def open_executor(workers: int = 0, scheduler: str | None = None) -> Executor:
+    """The executor for ``workers`` tasks at a time, or a cluster's; to be closed after use.
+
+    Parameters
+    ----------
+    workers: 0 is one for each processor that this process may use, or each thread of the cluster.
+        Changes nothing in the result.
+    scheduler: address of a Dask scheduler, such as ``tcp://10.0.0.1:8786``.
+
+    Raises
+    ------
+    MissingComponentError: PTM-M700 Dask is not installed.
+    WorkerError: PTM-W001 the scheduler cannot be reached, PTM-W002 it has no workers, PTM-W003
+        they have other software than this process.
+    """
+    if scheduler is not None:
+        from ptmtools.executors.cluster import Cluster
+
+        return Cluster(scheduler, workers)
+    workers = workers or processors()
+    return Serial() if workers == 1 else Local(workers)

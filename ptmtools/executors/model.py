@@ -36,7 +36,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Generic, Protocol, Self, TypeVar
 
 S = TypeVar("S")
@@ -88,15 +87,13 @@ class Sharing(Protocol[S_co]):
 class Executor(ABC):
     """Does tasks, several at a time. Not to be used by two threads at once."""
 
+    #: Whether all tasks are done elsewhere, by who may see the disks of this machine.
+    remote = False
+
     @property
     @abstractmethod
     def workers(self) -> int:
         """How many tasks are done at a time."""
-
-    @property
-    def remote(self) -> bool:
-        """Whether all tasks are done elsewhere, by who may see the disks of this machine."""
-        return False
 
     def each(
         self,
@@ -134,12 +131,7 @@ class Executor(ABC):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        fault: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 

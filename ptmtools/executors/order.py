@@ -39,8 +39,14 @@ def in_order(
             dropped(list(waiting))
 
 
-def chunks(tasks: Iterable[T], size: int) -> Iterator[list[T]]:
-    """The tasks in lists of ``size``, the last one shorter."""
+def in_chunks(
+    submit: Callable[[list[T]], Pending[Iterable[R]]],
+    tasks: Iterable[T],
+    size: int,
+    ahead: Callable[[], int],
+) -> Iterator[R]:
+    """As `in_order`, for tasks that are submitted in lists of ``size``, the last one shorter."""
     rest = iter(tasks)
-    while some := list(islice(rest, max(1, size))):
-        yield some
+    chunks = iter(lambda: list(islice(rest, max(1, size))), [])
+    for results in in_order(submit, chunks, ahead):
+        yield from results

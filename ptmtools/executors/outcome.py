@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,12 +23,12 @@ class Outcome:
             raise self.fault
 
 
-def outcome(function: Callable[[Any, Any], Any], shared: Any, tasks: Sequence[Any]) -> Outcome:
-    """Does the tasks up to the first that fails."""
+def outcome(work: Iterable[Any]) -> Outcome:
+    """What ``work`` yields, up to its exception."""
     results: list[Any] = []
     try:
-        for task in tasks:
-            results.append(function(shared, task))
+        for result in work:
+            results.append(result)
     except Exception as fault:
         return Outcome(results, _travelling(fault))
     return Outcome(results)

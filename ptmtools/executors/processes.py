@@ -4,9 +4,6 @@ A shared value is written once to a temporary file, which the workers map, so it
 memory once (a worker that changes some has those pages for itself). Changes are appended to the
 file, and a worker reads on before its next task. Where the system can, the file has no name and
 each task says where it is open; so nothing is left behind, however this process ends.
-
-Nor are the processes: each waits, in a thread, for the end of a pipe that only this process holds
-open. (Those of `concurrent.futures` would wait for work for ever if their parent was killed.)
 """
 
 from __future__ import annotations
@@ -14,24 +11,19 @@ from __future__ import annotations
 import mmap
 import os
 import pickle
-import signal
 import tempfile
-import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from dataclasses import dataclass
+from concurrent.futures import Executor as Threads, Future
 from itertools import count
-from multiprocessing import get_context
-from multiprocessing.connection import Connection
-from typing import IO, Any, Generic, TypeVar
+from queue import LifoQueue
+from typing import IO, Any, NamedTuple, TypeVar
 
-from ptmtools.errors import WorkerError
 from ptmtools.executors.model import AHEAD
-from ptmtools.executors.order import chunks, in_order
-from ptmtools.executors.outcome import Outcome, outcome
+from ptmtools.executors.order import in_chunks
+from ptmtools.executors.outcome import Outcome
 from ptmtools.executors.packing import packed, size, unpacked
+from ptmtools.executors.serial import SerialSharing
+from ptmtools.executors.worker import Worker
 from ptmtools.files import writing
 
 S = TypeVar("S")
@@ -40,68 +32,35 @@ R = TypeVar("R")
 
 
 class Processes:
-    """A pool of processes, started when there is first something to do."""
+    """So many workers."""
 
     def __init__(self, workers: int) -> None:
-        self.workers = workers
-        self._changing = threading.Lock()
-        self._closed = False
-        self._pool: ProcessPoolExecutor | None = None
-        self._lifeline: Connection | None = None
+        self._workers = [Worker() for _ in range(workers)]
+        #: Those that have been started are taken first.
+        self._idle: LifoQueue[Worker] = LifoQueue()
+        for worker in self._workers:
+            self._idle.put(worker)
 
-    @contextmanager
-    def sharing(self, shared: S) -> Iterator[_InProcesses[S]]:
-        """See `Executor.sharing`."""
-        with _InProcesses(self, shared) as sharing:
-            yield sharing
-
-    def outcomes(self, jobs: Iterable[tuple[Any, ...]]) -> Iterator[Outcome]:
-        """``_outcome(*job)`` for each job, in order.
-
-        Raises WorkerError PTM-W004 if a process ends.
-        """
-        pool = self._opened()
-
-        def submit(job: tuple[Any, ...]) -> Future[Outcome]:
-            with ctrl_c_blocked():
-                return pool.submit(_outcome, *job)
-
+    def call(self, function: Callable[..., Iterable[Any]], *arguments: Any) -> Outcome:
+        """As `Worker.call`, by one that is idle; any thread may."""
+        worker = self._idle.get()
         try:
-            yield from in_order(submit, jobs, lambda: AHEAD * self.workers)
-        except BrokenProcessPool as fault:
-            self._drop()
-            raise lost() from fault
+            return worker.call(function, *arguments)
+        finally:
+            self._idle.put(worker)
 
     def close(self) -> None:
-        """Ends the processes, whatever they are doing; no more are started. Any thread may."""
-        self._drop(for_good=True)
-
-    def _drop(self, for_good: bool = False) -> None:
-        with self._changing:
-            pool, lifeline = self._pool, self._lifeline
-            self._pool = self._lifeline = None
-            self._closed |= for_good
-        if lifeline:
-            lifeline.close()
-        if pool:
-            pool.shutdown(cancel_futures=True)
-
-    def _opened(self) -> ProcessPoolExecutor:
-        with self._changing:
-            if self._closed:
-                raise RuntimeError("these processes have been closed")
-            if self._pool is None:
-                context = get_context("spawn")
-                theirs, self._lifeline = context.Pipe(duplex=False)
-                self._pool = ProcessPoolExecutor(self.workers, context, begin, (theirs,))
-            return self._pool
+        """Ends all of them, for good. Any thread may."""
+        for worker in self._workers:
+            worker.close()
 
 
-class _InProcesses(Generic[S]):
-    """See `Sharing`."""
+class InProcesses(SerialSharing[S]):
+    """See `Sharing`: each of the processes has a copy; ``threads``, as many, wait for them."""
 
-    def __init__(self, processes: Processes, shared: S) -> None:
-        self._processes, self._shared = processes, shared
+    def __init__(self, shared: S, processes: Processes, threads: Threads, workers: int) -> None:
+        super().__init__(shared)
+        self._processes, self._threads, self._ahead = processes, threads, AHEAD * workers
         self._log: _Log | None = None
 
     def each(
@@ -111,17 +70,19 @@ class _InProcesses(Generic[S]):
         if self._log is None:
             self._log = _Log(self._shared)
         place = self._log.place()
-        jobs = ((place, function, some) for some in chunks(tasks, chunk))
-        for found in self._processes.outcomes(jobs):
-            yield from found
+
+        def submit(some: list[T]) -> Future[Outcome]:
+            return self._threads.submit(self._processes.call, _results, place, function, some)
+
+        return in_chunks(submit, tasks, chunk, lambda: self._ahead)
 
     def change(self, function: Callable[[S, T], object], change: T) -> None:
         """See `Sharing.change`."""
-        function(self._shared, change)
+        super().change(function, change)
         if self._log:
             self._log.append(pickle.dumps((function, change), protocol=5))
 
-    def __enter__(self) -> _InProcesses[S]:
+    def __enter__(self) -> InProcesses[S]:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -129,8 +90,7 @@ class _InProcesses(Generic[S]):
             self._log.close()
 
 
-@dataclass(frozen=True)
-class _Place:
+class _Place(NamedTuple):
     """Where a shared value lies: the name of this value, a path that the workers can open, the
     length of the block, and where the last change so far ends."""
 
@@ -204,7 +164,9 @@ class _Copy:
 _copy: _Copy | None = None
 
 
-def _outcome(place: _Place, function: Callable[[Any, Any], Any], tasks: list[Any]) -> Outcome:
+def _results(
+    place: _Place, function: Callable[[Any, Any], Any], tasks: Iterable[Any]
+) -> Iterator[Any]:
     """In a worker: does some tasks."""
     global _copy
     if _copy is None or _copy.name != place.name:
@@ -212,40 +174,5 @@ def _outcome(place: _Place, function: Callable[[Any, Any], Any], tasks: list[Any
             _copy.close()
         _copy = None  # before the next one takes memory
         _copy = _Copy(place)
-    return outcome(function, _copy.value(place.end), tasks)
-
-
-def lost() -> WorkerError:
-    """The error for a process that is no more, PTM-W004."""
-    return WorkerError(
-        "PTM-W004",
-        "a worker process ended while it worked",
-        remedy="if it ran out of memory, use fewer workers (-j 1); a script "
-        "that starts processes needs `if __name__ == '__main__'`",
-    )
-
-
-@contextmanager
-def ctrl_c_blocked() -> Iterator[None]:
-    """A process that this thread starts hears of no Ctrl-C, not even while it is being started."""
-    if not hasattr(signal, "pthread_sigmask"):  # not POSIX
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def begin(lifeline: Connection) -> None:
-    """In a worker, first of all: end with the parent, and leave Ctrl-C to it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def follow() -> None:
-        try:
-            lifeline.poll(None)
-        finally:
-            os._exit(0)
-
-    threading.Thread(target=follow, daemon=True).start()
+    value = _copy.value(place.end)
+    return (function(value, task) for task in tasks)

@@ -16,10 +16,7 @@ R = TypeVar("R")
 class Serial(Executor):
     """See `Executor`. Takes no task before its result is asked for."""
 
-    @property
-    def workers(self) -> int:
-        """One."""
-        return 1
+    workers = 1
 
     def sharing(
         self, shared: S, *, releases_lock: bool = False

@@ -10,44 +10,16 @@ from typing import TYPE_CHECKING
 from ptmtools.lazy import names
 
 if TYPE_CHECKING:
-    from ptmtools.pipeline.build import build_scene, run_stage
-    from ptmtools.pipeline.options import TextureOptions
-    from ptmtools.pipeline.plan import StagePlan, plan_build
-    from ptmtools.pipeline.report import BuildReport, StageReport
-    from ptmtools.pipeline.run import Artifacts
-    from ptmtools.pipeline.status import DatabaseStatus, StageStatus, database_status
-    from ptmtools.pipeline.validation import shoot_segments, validate
+    from ptmtools.pipeline.build import build_scene as build_scene, run_stage as run_stage
+    from ptmtools.pipeline.options import TextureOptions as TextureOptions
+    from ptmtools.pipeline.plan import StagePlan as StagePlan, plan_build as plan_build
+    from ptmtools.pipeline.report import BuildReport as BuildReport, StageReport as StageReport
+    from ptmtools.pipeline.run import Artifacts as Artifacts
+    from ptmtools.pipeline.status import (
+        DatabaseStatus as DatabaseStatus,
+        StageStatus as StageStatus,
+        database_status as database_status,
+    )
+    from ptmtools.pipeline.validation import shoot_segments as shoot_segments, validate as validate
 
-_HOME = {
-    "Artifacts": "run",
-    "BuildReport": "report",
-    "DatabaseStatus": "status",
-    "StagePlan": "plan",
-    "StageReport": "report",
-    "StageStatus": "status",
-    "TextureOptions": "options",
-    "build_scene": "build",
-    "database_status": "status",
-    "plan_build": "plan",
-    "run_stage": "build",
-    "shoot_segments": "validation",
-    "validate": "validation",
-}
-
-__all__ = [
-    "Artifacts",
-    "BuildReport",
-    "DatabaseStatus",
-    "StagePlan",
-    "StageReport",
-    "StageStatus",
-    "TextureOptions",
-    "build_scene",
-    "database_status",
-    "plan_build",
-    "run_stage",
-    "shoot_segments",
-    "validate",
-]
-
-__getattr__ = names(__name__, _HOME)
+__getattr__ = names(__name__)

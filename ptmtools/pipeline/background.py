@@ -12,11 +12,10 @@ from functools import cached_property
 from threading import Event
 from typing import Any, TypeVar
 
-from ptmtools.executors.background import BackgroundTask
-from ptmtools.executors.local import Local
+from ptmtools.executors.local import Local, open_executor
 from ptmtools.executors.model import Executor, Pending, processors
-from ptmtools.executors.opening import open_executor
 from ptmtools.executors.serial import Serial
+from ptmtools.executors.worker import BackgroundTask
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -35,12 +34,10 @@ class Workers:
         self.here = processors() if scheduler else workers or processors()
         #: The executor for a stage of one thread.
         self.alone = _Alone(self.here, shared=bool(scheduler))
-        self._used = False
 
     @cached_property
     def executor(self) -> Executor:
         """All workers, for the stage whose turn it is."""
-        self._used = True
         return open_executor(*self._asked)
 
     def background(self, tasks: int) -> Executor | None:
@@ -57,7 +54,7 @@ class Workers:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._used:
+        if "executor" in vars(self):  # it was asked for
             self.executor.close()
 
 

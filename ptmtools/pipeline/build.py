@@ -123,21 +123,16 @@ def _run(
                     if finished.issuperset(later.stage.read_with(later.options)):
                         later.begin()
             job.do()
-            run.end_of_turn(job.stage)
             finished.add(job.stage)
     except BaseException:
         with ExitStack() as abandoned:
             for job in jobs:
                 abandoned.callback(job.abandon)
         raise
-    return _report(run, start)
-
-
-def _report(run: Run, start: float) -> BuildReport:
     return BuildReport(
         model=run.db.manifest.model,
         database=str(run.db.path),
-        stages=tuple(run.reports.values()),
+        stages=tuple(run.reports),
         seconds=time.perf_counter() - start,
         peak_memory=peak_memory(),
         peak_memory_of_workers=peak_memory(of_workers=True),

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ptmtools.pipeline.encoding import fallback_level
 from ptmtools.pipeline.images import image_digests
-from ptmtools.pipeline.run import Artifacts, Job, Made
+from ptmtools.pipeline.run import Artifacts, Job
 from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE, TEXTURES
 from ptmtools.pipeline.textures import header_of, texture_files
 from ptmtools.store.layout import SERVED
+from ptmtools.store.manifest import StageRecord
 from ptmtools.store.transaction import Transaction
 
 if TYPE_CHECKING:
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
 class EmissionJob(Job):
     """Writes the served files; raises what `ptmtools.database.emit` raises."""
 
-    def make(self, transaction: Transaction) -> Made:
+    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
         """See `Job.make`."""
         from ptmtools.database import emit
 
@@ -30,13 +32,13 @@ class EmissionJob(Job):
             run[PVS],
             run[ACH],
             texture_records(run),
-            transaction.made(SERVED),
+            transaction.subfolder(SERVED),
             self.options,
             run.progress,
             force=True,
         )
         for name in report.files:
-            transaction.adopt(f"{SERVED}/{name}")
+            transaction.take(f"{SERVED}/{name}", transaction.folder / SERVED / name)
         counts = {
             "files": len(report.files),
             "bytes": report.bytes,
@@ -45,7 +47,7 @@ class EmissionJob(Job):
             "collapsed": report.collapsed,
             "viewpoints": len(report.viewpoints),
         }
-        return Made(transaction.pending(), counts, report.notes)
+        return replace(work, counts=counts, notes=report.notes)
 
 
 def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
@@ -56,22 +58,20 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
     options = run.recorded(TEXTURES)
     records = []
     for i, name in enumerate(texture_files(image_digests(run))):
-        fallback = f"{name.removesuffix('ptm')}png"
-        has_fallback = f"{SERVED}/{fallback}" in record.outputs
+        png = f"{name.removesuffix('ptm')}png"
+        fallback = png if f"{SERVED}/{png}" in record.outputs else None
         header = header_of(run.db.path / SERVED / name)
         records.append(
             TextureRecord(
                 image=i,
                 file=name,
-                fallback=fallback if has_fallback else None,
+                fallback=fallback,
                 width=header.levels[-1].width,
                 height=header.levels[-1].height,
                 components=header.components,
                 levels=header.levels,
                 sha256=run.db.output(TEXTURES.name, f"{SERVED}/{name}"),
-                fallback_level=(
-                    fallback_level(header, options.fallback_size) if has_fallback else None
-                ),
+                fallback_level=fallback_level(header, options.fallback_size) if fallback else None,
             )
         )
     return tuple(records)

@@ -37,15 +37,6 @@ def image_rows(data: bytes) -> list[Mapping[str, Any]]:
     return rows
 
 
-def image_list(images: Iterable[SourceImage]) -> bytes:
-    """Inverse of `image_rows`, of the images themselves."""
-    rows = [
-        {"name": i.name, "sha256": i.sha256, "files": list(i.files), "plain": i.plain}
-        for i in images
-    ]
-    return (json.dumps({"images": rows}, indent=1, ensure_ascii=False) + "\n").encode()
-
-
 def image_rows_of(artifacts: Artifacts) -> list[Mapping[str, Any]]:
     """The list of the scene's images; raises PTM-D004 to PTM-D006."""
     data = artifacts.db.read_output
@@ -83,12 +74,14 @@ def load_scene(artifacts: Artifacts, arrays: Mapping[str, NDArray[np.generic]]) 
 
 
 def keep_images(artifacts: Artifacts, images: Iterable[SourceImage]) -> bytes:
-    """Keeps images that were just read; returns the text of their list."""
+    """Keeps images that were just read; returns the text of their list, see `image_rows`."""
     kept = tuple(images)
-    data = image_list(kept)
+    rows = [
+        {"name": i.name, "sha256": i.sha256, "files": list(i.files), "plain": i.plain} for i in kept
+    ]
     artifacts.hold(IMAGES, kept)
-    artifacts.hold(IMAGE_LIST, image_rows(data))
-    return data
+    artifacts.hold(IMAGE_LIST, rows)
+    return (json.dumps({"images": rows}, indent=1, ensure_ascii=False) + "\n").encode()
 
 
 def missing_images(artifacts: Artifacts, scene: Scene) -> Iterator[tuple[str, str, str]]:

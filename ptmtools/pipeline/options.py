@@ -23,3 +23,9 @@ class TextureOptions(EncodeOptions):
     fallback: bool = True
     fallback_size: int = 0
     limit: int = field(default=1024, compare=False)
+
+    def __post_init__(self) -> None:
+        """Raises InputError PTM-I111 for what no image can be encoded with."""
+        from ptmtools.texture.options import check_options
+
+        check_options(self)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -15,7 +14,6 @@ from ptmtools.pipeline.stage import Options, Stage
 from ptmtools.pipeline.stages import STAGES
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import arrays_of
-from ptmtools.store.manifest import StageRecord
 from ptmtools.store.writer import admitted
 
 Plan = Literal["current", "run", "maybe"]
@@ -59,48 +57,37 @@ def plan_build(
     artifacts = Artifacts(
         DatabaseFolder(folder, admitted(folder, Path(model).name, force=force)), Path(model)
     )
-    planning = _Planning(artifacts, chosen)
-    plans = tuple(planning.plan(stage) for stage in STAGES.values())
+    #: Stages of which others may read something else than there is.
+    changing: set[Stage[Any]] = set()
+    plans = tuple(_plan(artifacts, stage, chosen[stage], changing) for stage in STAGES.values())
     artifacts.db.digests.save()
     return plans
 
 
-class _Planning:
-    def __init__(self, artifacts: Artifacts, options: Mapping[Stage[Any], Options]) -> None:
-        self._artifacts, self._options = artifacts, options
-        #: Stages of which others may read something else than there is.
-        self._changing: set[Stage[Any]] = set()
-
-    def plan(self, stage: Stage[Any]) -> StagePlan:
-        """Of a stage, after those that it reads."""
-        before, work = self._artifacts.before(stage), self._work(stage)
-        why = reasons(before, work, self._artifacts.db)
-        tasks = stage.tasks.load()(self._artifacts, work) if stage.tasks else []
-        textures = tuple(Path(name).stem for name in tasks)
-        reads = stage.read_with(self._options[stage])
-        anew = [read.name for read in reads if read in self._changing]
-        plan: Plan = "run" if why else "maybe" if anew else "current"
-        if plan == "maybe":
-            why = (f"if {' or '.join(anew)} makes other files than there are",)
-        known = plan == "run" and stage.foresee and stage.foresee.load()(self._artifacts, work)
-        if plan != "current" and not known:
-            self._changing.add(stage)
-        return StagePlan(stage.name, plan, why, textures)
-
-    def _work(self, stage: Stage[Any]) -> StageRecord:
-        """What the stage would do, of the files as they are."""
-        artifacts, options = self._artifacts, self._options[stage]
-        before = artifacts.before(stage)
-        reads = stage.read_with(options)
-        if stage.inputs and not self._changing.intersection(reads):
-            inputs = stage.inputs.load()(artifacts)
-        elif stage.inputs:
-            inputs = before.inputs if before else {}
-        else:
-            inputs = {}
-            for read in reads:
-                record = artifacts.before(read)
-                outputs = record.outputs if record else {}
-                name = arrays_of(read.name)
-                inputs |= {name: outputs.get(name, "")} if read.artifact else outputs
-        return work_of(stage, options, inputs)
+def _plan(
+    artifacts: Artifacts, stage: Stage[Any], options: Options, changing: set[Stage[Any]]
+) -> StagePlan:
+    """Of a stage, after those that it reads; it is added to those ``changing`` where it is one."""
+    reads, before = stage.read_with(options), artifacts.before(stage)
+    anew = [read.name for read in reads if read in changing]
+    # What it would do, of the files as they are.
+    inputs: dict[str, str] = {}
+    if not stage.inputs:
+        for read in reads:
+            record, name = artifacts.before(read), arrays_of(read.name)
+            outputs = record.outputs if record else {}
+            inputs |= {name: outputs.get(name, "")} if read.artifact else outputs
+    elif not anew:
+        inputs |= stage.inputs.load()(artifacts)
+    elif before:
+        inputs |= before.inputs
+    work = work_of(stage, options, inputs)
+    why = reasons(before, work, artifacts.db)
+    tasks = stage.tasks.load()(artifacts, work) if stage.tasks else []
+    plan: Plan = "run" if why else "maybe" if anew else "current"
+    if plan == "maybe":
+        why = (f"if {' or '.join(anew)} makes other files than there are",)
+    known = plan == "run" and stage.foresee and stage.foresee.load()(artifacts, work)
+    if plan != "current" and not known:
+        changing.add(stage)
+    return StagePlan(stage.name, plan, why, tuple(Path(name).stem for name in tasks))

@@ -7,13 +7,14 @@ neither the cells nor what follows from them. If nothing but the contents of pla
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ptmtools.errors import DatabaseError, naming
 from ptmtools.pipeline.images import image_rows_of, images_of, keep_images
-from ptmtools.pipeline.run import Artifacts, Job, Made
+from ptmtools.pipeline.run import Artifacts, Job
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.store.digests import Digests
 from ptmtools.store.layout import IMAGE_LIST, IMAGES, sha256
@@ -45,17 +46,17 @@ def files_of(model: Path, names: Iterable[str], digests: Digests) -> dict[str, s
     return found
 
 
-def repainted(
-    before: StageRecord, work: StageRecord, rows: Sequence[Mapping[str, Any]]
-) -> dict[int, str] | None:
+def repainted(artifacts: Artifacts, work: StageRecord) -> dict[int, str] | None:
     """Which rows of the list of images have other contents, and the names of their files, if the
-    contents of plain images are all that has changed; else None."""
-    same = (before.recipe, before.parameters, set(before.inputs)) == (
-        work.recipe,
-        work.parameters,
-        set(work.inputs),
-    )
-    if not same:
+    contents of plain images are all that has changed since the last run; else None."""
+    before = artifacts.before(SCENE)
+    if before is None or before.inputs.keys() != work.inputs.keys():
+        return None
+    if (before.recipe, before.parameters) != (work.recipe, work.parameters):
+        return None
+    try:
+        rows = image_rows_of(artifacts)
+    except DatabaseError:
         return None
     row_of = {row["files"][0]: i for i, row in enumerate(rows) if len(row["files"]) == 1}
     changed = [name for name, digest in work.inputs.items() if before.inputs[name] != digest]
@@ -71,16 +72,11 @@ def repainted(
 def foresee(artifacts: Artifacts, work: StageRecord) -> bool:
     """See `Stage.foresee`: known if plain images alone have been painted over. ``artifacts`` then
     hold the list of images as it will be."""
-    before = artifacts.before(SCENE)
-    try:
-        rows = image_rows_of(artifacts)
-    except DatabaseError:
-        return False
-    changed = repainted(before, work, rows) if before else None
+    changed = repainted(artifacts, work)
     if changed is None:
         return False
-    new = {i: work.inputs[name] for i, name in changed.items()}
-    rows = [{**row, "sha256": new.get(i, row["sha256"])} for i, row in enumerate(rows)]
+    new = {i: {"sha256": work.inputs[name]} for i, name in changed.items()}
+    rows = [{**row, **new.get(i, {})} for i, row in enumerate(image_rows_of(artifacts))]
     artifacts.hold(IMAGE_LIST, rows)
     return True
 
@@ -93,12 +89,11 @@ class ReadingJob(Job):
         assert self.run.model
         return self.run.model
 
-    def make(self, transaction: Transaction) -> Made:
+    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
         """Raises what `ingest` and `check_image` raise."""
-        before = self.run.before(SCENE)
-        return (before and self._repainted(transaction, before)) or self._read(transaction)
+        return self._repainted(transaction, work) or self._read(transaction, work)
 
-    def _read(self, transaction: Transaction) -> Made:
+    def _read(self, transaction: Transaction, work: StageRecord) -> StageRecord:
         from ptmtools.scene import ingest
 
         run = self.run
@@ -107,27 +102,23 @@ class ReadingJob(Job):
         transaction.put_arrays(SCENE.name, scene.to_arrays())
         self._put_images(transaction, scene.images, scene.images)
         assert SCENE.counts
-        return Made(
-            transaction.pending(),
-            SCENE.counts(scene),
-            tuple(_line(note) for note in scene.notes),
-            files_of(self._model, scene.files, run.db.digests),
+        return replace(
+            work,
+            inputs=files_of(self._model, scene.files, run.db.digests),
+            counts=SCENE.counts(scene),
+            notes=tuple(_line(note) for note in scene.notes),
         )
 
-    def _repainted(self, transaction: Transaction, before: StageRecord) -> Made | None:
+    def _repainted(self, transaction: Transaction, work: StageRecord) -> StageRecord | None:
         """The scene, if nothing but plain images has changed; None if more has."""
         from ptmtools.scene.images import is_plain
         from ptmtools.scene.model import SourceImage
         from ptmtools.scene.source import FileRange, HeldBytes
 
-        work, _ = self.planned()
-        try:
-            rows = image_rows_of(self.run)
-        except DatabaseError:
-            return None
-        changed = repainted(before, work, rows)
+        changed = repainted(self.run, work)
         if changed is None:
             return None
+        before, rows = self.run.record(SCENE), image_rows_of(self.run)
         fresh: dict[int, SourceImage] = {}
         for i, name in changed.items():
             try:
@@ -145,7 +136,7 @@ class ReadingJob(Job):
             return None
         images = [fresh.get(i, image) for i, image in enumerate(images_of(self.run))]
         self._put_images(transaction, images, fresh.values())
-        return Made(transaction.pending(), before.counts, tuple(before.notes))
+        return replace(work, counts=before.counts, notes=before.notes)
 
     def _put_images(
         self,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from ptmtools.errors import DatabaseError
@@ -13,14 +13,13 @@ from ptmtools.pipeline.changes import reasons
 from ptmtools.pipeline.report import StageReport
 from ptmtools.pipeline.stage import Options, Stage, parameters
 from ptmtools.progress import Progress, silent
-from ptmtools.store.folder import DatabaseFolder
+from ptmtools.store.folder import DatabaseFolder, damaged
 from ptmtools.store.layout import MANIFEST, arrays_of
-from ptmtools.store.manifest import StageRecord
+from ptmtools.store.manifest import StageRecord, damaged_manifest
 from ptmtools.store.transaction import Transaction
 from ptmtools.store.writer import DatabaseWriter
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
     from ptmtools.pipeline.background import Workers
@@ -56,7 +55,7 @@ class Artifacts:
                     file=self.db.path,
                     remedy="run `ptm build-scene MODEL -o DB` to bring the database up to date",
                 )
-            arrays = self.db.read_arrays(stage.name, "this command")
+            arrays = self.db.read_arrays(stage.name)
             kind = stage.artifact.load()
             with self.reading(arrays_of(stage.name)):
                 made = stage.load.load()(self, arrays) if stage.load else kind.from_arrays(arrays)
@@ -89,8 +88,11 @@ class Artifacts:
 
     def recorded(self, stage: Stage[Any]) -> Options:
         """The options of a stage's last run; raises PTM-D002 if the record has others."""
-        with _damaged_record(self.db):
-            return stage.recorded(self.record(stage).parameters)
+        record = self.record(stage)
+        try:
+            return stage.recorded(record.parameters)
+        except ValueError as fault:
+            raise damaged_manifest(self.db.path / MANIFEST, str(fault)) from fault
 
     def inputs(self, stage: Stage[Any], options: Options) -> dict[str, str]:
         """Name → SHA-256 of what the stage would read now; raises PTM-D004 and PTM-D002."""
@@ -98,11 +100,11 @@ class Artifacts:
             return dict(stage.inputs.load()(self))
         found: dict[str, str] = {}
         for read in stage.read_with(options):
-            outputs = self.record(read).outputs
-            name = arrays_of(read.name)
-            if read.artifact and name not in outputs:
-                self.db.output(read.name, name)  # says what is wrong
-            found |= {name: outputs[name]} if read.artifact else outputs
+            outputs, name = self.record(read).outputs, arrays_of(read.name)
+            if read.artifact:
+                found[name] = outputs.get(name) or self.db.output(read.name, name)  # which raises
+            else:
+                found |= outputs
         return found
 
     def outdated(self, stage: Stage[Any]) -> str:
@@ -138,25 +140,7 @@ class Artifacts:
         try:
             yield
         except _FAULTS as fault:
-            raise DatabaseError(
-                "PTM-D006",
-                f"damaged: {type(fault).__name__} {fault}",
-                file=self.db.path / name,
-                remedy="run `ptm build-scene` again to rebuild it",
-            ) from fault
-
-
-@contextmanager
-def _damaged_record(db: DatabaseFolder) -> Iterator[None]:
-    try:
-        yield
-    except ValueError as fault:
-        raise DatabaseError(
-            "PTM-D002",
-            f"damaged manifest: {fault}",
-            file=db.path / MANIFEST,
-            remedy="restore it, or build the database again with --force",
-        ) from fault
+            raise damaged(self.db.path / name, f"{type(fault).__name__} {fault}") from fault
 
 
 class Run(Artifacts):
@@ -172,11 +156,8 @@ class Run(Artifacts):
         rebuild: bool = False,
     ) -> None:
         super().__init__(db, model)
-        self.rebuild = rebuild
-        self.writer = db
-        self.workers = workers
-        self.progress = progress
-        self.reports: dict[Stage[Any], StageReport] = {}
+        self.writer, self.workers, self.progress, self.rebuild = db, workers, progress, rebuild
+        self.reports: list[StageReport] = []
         self._joint: Transaction | None = None
         self._uncommitted: dict[str, StageRecord] = {}
 
@@ -212,20 +193,17 @@ class Run(Artifacts):
         return self._joint or self.writer.begin(stage.name)
 
     def settle(self, stage: Stage[Any], transaction: Transaction, record: StageRecord) -> None:
-        """Records a stage, and commits unless it is `Stage.joined` to the next."""
-        self._uncommitted[stage.name] = record
-        self._joint = transaction if stage.joined else None
-        if not stage.joined:
-            self._commit(transaction)
+        """Records a stage, whose outputs are what was put into the transaction since the last."""
+        earlier = {name for record in self._uncommitted.values() for name in record.outputs}
+        outputs = {n: d for n, d in transaction.pending().items() if n not in earlier}
+        self._uncommitted[stage.name] = replace(record, outputs=outputs)
+        self._joint = transaction
 
-    def end_of_turn(self, stage: Stage[Any]) -> None:
-        """Commits what was left for this stage to commit, if it had nothing to do."""
+    def commit(self, stage: Stage[Any]) -> None:
+        """After a stage's turn: commits what there is, unless it is `Stage.joined` to the next."""
         if self._joint and not stage.joined:
-            self._commit(self._joint)
-
-    def _commit(self, transaction: Transaction) -> None:
-        transaction.commit(self._uncommitted)
-        self._joint, self._uncommitted = None, {}
+            self._joint.commit(self._uncommitted)
+            self._joint, self._uncommitted = None, {}
 
     def report(
         self,
@@ -235,26 +213,15 @@ class Run(Artifacts):
         tasks: tuple[int, int, int] | None = None,
     ) -> None:
         """Notes that a stage has been dealt with."""
-        record = self.record(stage)
-        self.reports[stage] = StageReport(
-            stage.name, bool(why), seconds, record.counts, tuple(record.notes), why, tasks
+        made = self.record(stage)
+        self.reports.append(
+            StageReport(stage.name, bool(why), seconds, made.counts, tuple(made.notes), why, tasks)
         )
 
 
 def work_of(stage: Stage[Any], options: Options, inputs: Mapping[str, str]) -> StageRecord:
     """What a stage is to do, as its record will say; without outputs."""
     return StageRecord(stage.recipe, parameters(options), dict(inputs), {})
-
-
-@dataclass(frozen=True)
-class Made:
-    """What a stage has made, as its record will have it; ``inputs`` where what it reads was not
-    known before."""
-
-    outputs: Mapping[str, str]
-    counts: Mapping[str, Any]
-    notes: tuple[str, ...] = ()
-    inputs: Mapping[str, str] | None = None
 
 
 class Job:
@@ -274,10 +241,8 @@ class Job:
         work, why = self.planned()
         if why:
             transaction = run.begin(stage)
-            made = self.make(transaction)
-            known = {name: value for name, value in vars(made).items() if value is not None}
-            record = replace(work, **known)
-            run.settle(stage, transaction, record)
+            run.settle(stage, transaction, self.make(transaction, work))
+        run.commit(stage)
         run.report(stage, why, time.perf_counter() - start)
 
     def planned(self) -> tuple[StageRecord, tuple[str, ...]]:
@@ -287,8 +252,9 @@ class Job:
             return work, ("a rebuild was asked for",)
         return work, reasons(self.run.before(self.stage), work, self.run.db)
 
-    def make(self, transaction: Transaction) -> Made:
-        """Puts what the stage makes into the transaction."""
+    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
+        """Puts what the stage makes into the transaction; returns ``work`` as it has been done,
+        but for the outputs."""
         raise NotImplementedError
 
     def check(self) -> None:
@@ -301,17 +267,15 @@ class Job:
 class ArraysJob(Job):
     """A stage that computes an artifact, which is stored as arrays."""
 
-    def make(self, transaction: Transaction) -> Made:
+    def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
         """Computes the artifact."""
         run, stage, options = self.run, self.stage, self.options
-        assert stage.compute is not None
-        assert stage.counts is not None
+        assert stage.compute
+        assert stage.counts
         reads = [run[read] for read in stage.read_with(options)]
         executor = run.workers.alone if stage.one_thread else run.workers.executor
         artifact = stage.compute.load()(*reads, options, run.progress, executor)
         run.keep(stage, artifact)
-        return Made(
-            transaction.put_arrays(stage.name, artifact.to_arrays()),
-            stage.counts(artifact),
-            tuple(stage.notes(artifact, options)),
-        )
+        transaction.put_arrays(stage.name, artifact.to_arrays())
+        notes = tuple(stage.notes(artifact, options))
+        return replace(work, counts=stage.counts(artifact), notes=notes)

@@ -30,12 +30,12 @@ def check_stages(db: DatabaseFolder, astray: Collection[str] = ()) -> tuple[Issu
         found.add("PTM-D650", MANIFEST, f"stages.{name}", "this ptmtools has no such stage")
     together = Artifacts(db)
     for stage in STAGES.values():
-        if stage.name in db.manifest.stages and stage.artifact:
-            _check_artifact(stage, db, together, astray, found)
+        if stage.name in db.manifest.stages:
+            _check_stage(stage, db, together, astray, found)
     return found.issues()
 
 
-def _check_artifact(
+def _check_stage(
     stage: Stage[Any],
     db: DatabaseFolder,
     together: Artifacts,
@@ -51,6 +51,8 @@ def _check_artifact(
         alone.recorded(stage)
     except DatabaseError as fault:
         found.add("PTM-D650", MANIFEST, f"stages.{stage.name}.parameters", fault.message)
+    if stage.artifact is None:
+        return
     try:
         made = alone[stage]
     except DatabaseError as fault:

@@ -12,7 +12,7 @@ import json
 import re
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
@@ -71,13 +71,8 @@ def texture_files(images: Iterable[str]) -> list[str]:
 
 
 def inputs_of(artifacts: Artifacts) -> dict[str, str]:
-    """See `Stage.inputs`."""
-    return texture_inputs(image_digests(artifacts))
-
-
-def texture_inputs(images: Mapping[str, str]) -> dict[str, str]:
-    """The inputs of the stage, for name → SHA-256 of the images: under the name of each `.ptm` the
-    digest of its image."""
+    """See `Stage.inputs`: under the name of each `.ptm` the digest of its image."""
+    images = image_digests(artifacts)
     return dict(zip(texture_files(images), images.values(), strict=True))
 
 
@@ -151,11 +146,11 @@ class TexturesJob(Job):
             headers = list(self._headers(transaction))
             record = replace(
                 self._work,
-                outputs=transaction.pending(),
                 counts=counts_of(headers),
                 notes=tuple(notes_on_size(self._names, headers, self.options.max_side)),
             )
             self.run.settle(self.stage, transaction, record)
+        self.run.commit(self.stage)
         self.run.report(self.stage, self._why, self._seconds, self._tasks)
 
     def _prepare(self) -> None:

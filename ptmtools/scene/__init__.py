@@ -11,26 +11,15 @@ from typing import TYPE_CHECKING
 from ptmtools.lazy import names
 
 if TYPE_CHECKING:
-    from ptmtools.scene.ingestion import ingest
-    from ptmtools.scene.model import Camera, Material, Note, Scene, SourceImage, Space
-    from ptmtools.scene.options import IngestOptions
+    from ptmtools.scene.ingestion import ingest as ingest
+    from ptmtools.scene.model import (
+        Camera as Camera,
+        Material as Material,
+        Note as Note,
+        Scene as Scene,
+        SourceImage as SourceImage,
+        Space as Space,
+    )
+    from ptmtools.scene.options import IngestOptions as IngestOptions
 
-__all__ = [
-    "Camera",
-    "IngestOptions",
-    "Material",
-    "Note",
-    "Scene",
-    "SourceImage",
-    "Space",
-    "ingest",
-]
-
-__getattr__ = names(
-    __name__,
-    {
-        **dict.fromkeys(__all__, "model"),
-        "IngestOptions": "options",
-        "ingest": "ingestion",
-    },
-)
+__getattr__ = names(__name__)

@@ -65,10 +65,7 @@ class Digests:
         before = time.time_ns()
         with open_regular(path) as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
-        if stamp == _stamp(path) and _settled(stamp, before):
-            self._known[name] = (stamp, digest)
-            self._used.add(name)
-            self._changed = True
+        self._remember(name, stamp, digest, before)
         return digest
 
     def note(self, path: Path, digest: str) -> None:
@@ -80,10 +77,7 @@ class Digests:
         """Remembers what was found out; in silence if that cannot be."""
         for name, (stamp, digest) in self._noted.items():
             with suppress(OSError):
-                if stamp == _stamp(Path(name)) and _settled(stamp, time.time_ns()):
-                    self._known[name] = (stamp, digest)
-                    self._used.add(name)
-                    self._changed = True
+                self._remember(name, stamp, digest, time.time_ns())
         self._noted = {}
         if self._file is None or not self._changed:
             return
@@ -103,6 +97,13 @@ class Digests:
             _forget_old(self._file.parent)
         self._changed = False
 
+    def _remember(self, name: str, stamp: Stamp, digest: str, before: int) -> None:
+        """The digest of a file that was read at the time ``before``, if it is known to stand."""
+        if stamp == _stamp(name) and _settled(stamp, before):
+            self._known[name] = (stamp, digest)
+            self._used.add(name)
+            self._changed = True
+
     def _load(self) -> None:
         if self._file is None:
             return
@@ -114,7 +115,7 @@ class Digests:
             }
 
 
-def _stamp(path: Path) -> Stamp:
+def _stamp(path: str | Path) -> Stamp:
     """Size, inode, and times of modification and of change in nanoseconds."""
     found = os.stat(path)
     return found.st_size, found.st_ino, found.st_mtime_ns, found.st_ctime_ns

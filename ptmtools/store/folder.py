@@ -11,7 +11,7 @@ from ptmtools.errors import DatabaseError
 from ptmtools.files import open_regular
 from ptmtools.store.digests import Digests
 from ptmtools.store.layout import MANIFEST, arrays_of, sha256
-from ptmtools.store.manifest import Manifest, StageRecord
+from ptmtools.store.manifest import Manifest, StageRecord, damaged_manifest
 
 if TYPE_CHECKING:
     import numpy as np
@@ -53,7 +53,7 @@ class DatabaseFolder:
             )
         return DatabaseFolder(folder, manifest)
 
-    def record(self, stage: str, needed_for: str = "this") -> StageRecord:
+    def record(self, stage: str) -> StageRecord:
         """The record of a stage.
 
         Raises
@@ -64,7 +64,7 @@ class DatabaseFolder:
         if record is None:
             raise DatabaseError(
                 "PTM-D004",
-                f"the {stage} stage has not been run, {needed_for} needs it",
+                f"the {stage} stage has not been run, this command needs it",
                 file=self.path,
                 remedy="run `ptm build-scene MODEL -o DB` first",
             )
@@ -82,44 +82,30 @@ class DatabaseFolder:
             with open_regular(file) as stream:
                 data = stream.read()
         except OSError as fault:
-            raise DatabaseError(
-                "PTM-D005",
-                f"cannot be read ({fault.strerror or fault})",
-                file=file,
-                remedy="run `ptm build-scene` again to rebuild it",
-            ) from fault
+            reason = fault.strerror or fault
+            raise _unusable("PTM-D005", f"cannot be read ({reason})", file) from fault
         if sha256(data) != digest:
-            raise DatabaseError(
-                "PTM-D006",
-                "damaged: its SHA-256 is not the recorded one",
-                file=file,
-                remedy="run `ptm build-scene` again to rebuild it",
-            )
+            raise damaged(file, "its SHA-256 is not the recorded one")
         return data
 
-    def read_output(self, stage: str, name: str, needed_for: str = "this") -> bytes:
+    def read_output(self, stage: str, name: str) -> bytes:
         """The bytes of an output that a stage must have; raises as `output` and `read` do."""
-        return self.read(name, self.output(stage, name, needed_for))
+        return self.read(name, self.output(stage, name))
 
-    def output(self, stage: str, name: str, needed_for: str = "this") -> str:
+    def output(self, stage: str, name: str) -> str:
         """The recorded hash of an output that a stage must have; raises as `record` does, and
         PTM-D002 if it has no such output."""
-        digest = self.record(stage, needed_for).outputs.get(name)
+        digest = self.record(stage).outputs.get(name)
         if digest is None:
-            raise DatabaseError(
-                "PTM-D002",
-                f"damaged manifest: the {stage} stage lists no {name}",
-                file=self.path / MANIFEST,
-                remedy="restore it, or build the database again with --force",
-            )
+            raise damaged_manifest(self.path / MANIFEST, f"the {stage} stage lists no {name}")
         return digest
 
-    def read_arrays(self, stage: str, needed_for: str) -> dict[str, NDArray[np.generic]]:
+    def read_arrays(self, stage: str) -> dict[str, NDArray[np.generic]]:
         """The arrays of a stage; raises as `read_output` does."""
         from ptmtools.store.archive import unpack_arrays
 
         name = arrays_of(stage)
-        return unpack_arrays(self.read_output(stage, name, needed_for), file=self.path / name)
+        return unpack_arrays(self.read_output(stage, name), file=self.path / name)
 
     def damaged(self, outputs: Mapping[str, str]) -> str | None:
         """The first file that is not there with its recorded hash, or None."""
@@ -130,6 +116,16 @@ class DatabaseFolder:
             except OSError:
                 return name
         return None
+
+
+def damaged(file: Path, what: str) -> DatabaseError:
+    """The error for a file of a database whose contents cannot be right, PTM-D006."""
+    return _unusable("PTM-D006", f"damaged: {what}", file)
+
+
+def _unusable(code: str, message: str, file: Path) -> DatabaseError:
+    remedy = "run `ptm build-scene` again to rebuild it"
+    return DatabaseError(code, message, file=file, remedy=remedy)
 
 
 def read_manifest(folder: Path) -> Manifest | None:

@@ -28,6 +28,7 @@ from typing import Any
 
 from ptmtools import schemas
 from ptmtools.errors import DatabaseError
+from ptmtools.files import leads_inside
 from ptmtools.store.layout import WRITTEN
 
 FORMAT = "ptmtools database"
@@ -88,9 +89,9 @@ class Manifest:
         try:
             document = json.loads(data)
         except (ValueError, RecursionError) as fault:
-            raise _damaged(file, f"not JSON ({fault})") from fault
-        if _nested(document):
-            raise _damaged(file, f"nested more than {_DEEPEST} deep")
+            raise damaged_manifest(file, f"not JSON ({fault})") from fault
+        if _nested(document, _DEEPEST):
+            raise damaged_manifest(file, f"nested more than {_DEEPEST} deep")
         if not isinstance(document, dict) or document.get("format") != FORMAT:
             raise DatabaseError(
                 "PTM-D001", "not a ptmtools database", file=file, remedy="give a database folder"
@@ -105,7 +106,7 @@ class Manifest:
         try:
             schemas.check(document, schemas.MANIFEST)
         except schemas.ShapeError as fault:
-            raise _damaged(file, str(fault)) from fault
+            raise damaged_manifest(file, str(fault)) from fault
         names = StageRecord.__dataclass_fields__
         return Manifest(
             document["model"],
@@ -134,31 +135,24 @@ def listed_before(data: bytes) -> tuple[str, set[str]] | None:
         return None
 
 
-def _nested(document: object) -> bool:
-    """Whether something lies deeper in it than any option or figure does. It would be written a
-    line for each, indented."""
-    level = [document] if isinstance(document, dict | list) else []
-    for _ in range(_DEEPEST):
-        level = [
-            inner
-            for value in level
-            for inner in (value.values() if isinstance(value, dict) else value)
-            if isinstance(inner, dict | list)
-        ]
-        if not level:
-            return False
-    return True
+def _nested(value: object, deepest: int) -> bool:
+    """Whether lists and objects lie deeper in it than any option or figure does. They would be
+    written a line for each, indented."""
+    if not isinstance(value, dict | list):
+        return False
+    inner = value.values() if isinstance(value, dict) else value
+    return deepest == 0 or any(_nested(each, deepest - 1) for each in inner)
 
 
 def _is_output(path: str) -> bool:
     """Whether a path is one that stages write to: inside of the database on every system, and
     nothing that somebody else has put beside it."""
-    parts = path.split("/")
-    inside = "\\" not in path and ":" not in path and "\0" not in path
-    return inside and len(parts) > 1 and parts[0] in WRITTEN and not {"", ".", ".."} & set(parts)
+    folder, _, name = path.partition("/")
+    return folder in WRITTEN and name != "" and leads_inside(path)
 
 
-def _damaged(file: str | PathLike[str], what: str) -> DatabaseError:
+def damaged_manifest(file: str | PathLike[str], what: str) -> DatabaseError:
+    """The error for a manifest that cannot be right, PTM-D002."""
     return DatabaseError(
         "PTM-D002",
         f"damaged manifest: {what}",

@@ -51,7 +51,7 @@ class Transaction:
         self._turn = turn
         self._relative = f"{STAGING}/{name}"
         self._pending: dict[str, str] = {}
-        self._standing = dict(db.manifest.outputs())
+        self._standing = db.manifest.outputs()
         self._done = _read_journal(self.folder)
 
     @property
@@ -68,46 +68,32 @@ class Transaction:
         """
         digest = sha256(data)
         if not self.keep({name: digest}):
-            folder, _, base = name.rpartition("/")
-            write_bytes(self._real(folder) / base, data, force=True)
+            write_bytes(self._place(name), data, force=True)
         self._pending[name] = digest
 
-    def made(self, name: str) -> Path:
-        """A folder below `folder`, made where it is absent, for others to write in.
-
-        Raises OutputError PTM-O002, PTM-O003, PTM-O005.
-        """
-        return self._real(name)
-
-    def put_arrays(self, stage: str, arrays: Mapping[str, NDArray[np.generic]]) -> dict[str, str]:
-        """Stages the arrays of a stage; returns the outputs that they are."""
+    def put_arrays(self, stage: str, arrays: Mapping[str, NDArray[np.generic]]) -> None:
+        """Stages the arrays of a stage; raises as `put`."""
         from ptmtools.store.archive import pack_arrays
 
-        name = arrays_of(stage)
-        self.put(name, pack_arrays(arrays))
-        return {name: self._pending[name]}
+        self.put(arrays_of(stage), pack_arrays(arrays))
 
-    def adopt(self, name: str) -> None:
-        """Stages a file that another wrote into `folder`, unless it stands in the database."""
-        digest = sha256((self.folder / name).read_bytes())
-        if self.keep({name: digest}):
-            (self.folder / name).unlink()
-        self._pending[name] = digest
-
-    def take(self, name: str, file: Path, digest: str) -> None:
-        """Stages a file of this digest that a worker wrote into a `subfolder`, unless it stands in
-        the database; moves it, or removes it."""
+    def take(self, name: str, file: Path, digest: str = "") -> None:
+        """Stages a file that another wrote into a `subfolder`, unless it stands in the database;
+        moves it, or removes it. Its ``digest`` is taken where it is not given; raises as `put`."""
         with writing(file):
+            digest = digest or sha256(file.read_bytes())
             if self.keep({name: digest}):
                 file.unlink()
             else:
-                folder, _, base = name.rpartition("/")
-                file.replace(self._real(folder) / base)
+                file.replace(self._place(name))
         self._pending[name] = digest
 
-    def subfolder(self, name: str) -> Path:
-        """A folder below `folder`, for `take`. It goes with the transaction."""
-        return self._real(name)
+    def subfolder(self, name: str = "") -> Path:
+        """A folder below `folder`, made where it is absent. It goes with the transaction.
+
+        Raises OutputError PTM-O002, PTM-O003, PTM-O005.
+        """
+        return real_folder(self._db.path, f"{self._relative}/{name}".rstrip("/"))
 
     def keep(self, outputs: Mapping[str, str]) -> bool:
         """Takes outputs that stand in the database as they are; False if one does not."""
@@ -132,7 +118,7 @@ class Transaction:
     def finish(self, task: str, names: Iterable[str]) -> None:
         """Notes in the journal that a task is done, whose outputs were put."""
         line = json.dumps({"task": task, "outputs": {name: self._pending[name] for name in names}})
-        folder = self._real()
+        folder = self.subfolder()
         with writing(folder), open(folder / _JOURNAL, "a", encoding="utf-8") as journal:
             journal.write(line + "\n")
 
@@ -150,17 +136,18 @@ class Transaction:
         """Makes what was put the outputs of these stages, and records them."""
         with self._turn:
             manifest = self._db.manifest.with_stages(records)
-            write_bytes(self._real() / MANIFEST, manifest.to_bytes(), force=True)
+            write_bytes(self.subfolder() / MANIFEST, manifest.to_bytes(), force=True)
             _complete(self._db.path, self._relative)
             self._db.manifest = manifest
         for name, digest in self._pending.items():
             self._db.digests.note(self._db.path / name, digest)
         self._pending, self._done = {}, {}
-        self._standing = dict(manifest.outputs())
+        self._standing = manifest.outputs()
 
-    def _real(self, folder: str = "") -> Path:
-        """A folder below the transaction's own, made where it is absent."""
-        return real_folder(self._db.path, "/".join(filter(None, (self._relative, folder))))
+    def _place(self, name: str) -> Path:
+        """Where an output waits, in a folder that is there."""
+        folder, _, base = name.rpartition("/")
+        return self.subfolder(folder) / base
 
 
 def recover(folder: Path) -> None:
@@ -174,10 +161,7 @@ def recover(folder: Path) -> None:
                 entry.unlink()
             elif real_file(entry, MANIFEST):
                 _complete(folder, f"{STAGING}/{entry.name}")
-            elif not _read_journal(entry):
-                shutil.rmtree(entry)
-        with suppress(OSError):
-            staging.rmdir()
+    discard(folder, also_finished=False)
 
 
 def finished_tasks(folder: Path) -> int:

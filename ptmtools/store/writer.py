@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from threading import Lock as Turn
-from types import TracebackType
 
-from ptmtools.errors import DatabaseError, InputError, LimitError, OutputError
+from ptmtools.errors import DatabaseError, InputError, OutputError
 from ptmtools.files import writing
 from ptmtools.store.folder import DatabaseFolder, read_manifest
 from ptmtools.store.layout import LOCK, MANIFEST, STAGING
-from ptmtools.store.lock import Lock, acquire
+from ptmtools.store.lock import acquire
 from ptmtools.store.manifest import Manifest, listed_before
 from ptmtools.store.transaction import Transaction, discard, recover
 
@@ -25,25 +25,23 @@ class DatabaseWriter(DatabaseFolder):
     committed or finished.
     """
 
-    def __init__(self, path: Path, manifest: Manifest, lock: Lock, made: list[Path]) -> None:
-        super().__init__(path, manifest)
-        self._lock = lock
-        self._made = made
-        self._turn = Turn()
+    def __init__(self, path: Path, manifest: Callable[[], Manifest], made: list[Path]) -> None:
+        """``manifest`` is asked once nobody else writes; ``made`` are the folders that were made
+        for it, outermost first."""
+        self._lock, self._made, self._turn = acquire(path), made, Turn()
+        try:
+            recover(path)
+            super().__init__(path, manifest())
+        except BaseException:
+            self._lock.release()
+            raise
 
     @staticmethod
     def open_for_stage(path: str | os.PathLike[str]) -> DatabaseWriter:
         """An existing database, to run one of its stages; raises as `DatabaseFolder.open` does,
         and PTM-D007 if another process is writing it."""
-        folder = Path(path)
-        DatabaseFolder.open(folder)
-        lock = acquire(folder)
-        try:
-            recover(folder)
-            return DatabaseWriter(folder, DatabaseFolder.open(folder).manifest, lock, [])
-        except BaseException:
-            lock.release()
-            raise
+        DatabaseFolder.open(path)
+        return DatabaseWriter(Path(path), lambda: DatabaseFolder.open(path).manifest, [])
 
     @staticmethod
     def open_for_model(
@@ -68,35 +66,24 @@ class DatabaseWriter(DatabaseFolder):
                 file=folder,
                 remedy="name another folder with -o",
             )
-        made: list[Path] = []
+        made = [p for p in (*reversed(folder.parents), folder) if not p.exists()]
         try:
-            made = _make(folder)
-            lock = acquire(folder)
+            with writing(folder):
+                folder.mkdir(parents=True, exist_ok=True)
+            return DatabaseWriter(folder, lambda: admitted(folder, model, force=force), made)
         except BaseException as fault:
             _unmake(made)
-            if isinstance(fault, OutputError):
+            if isinstance(fault, OutputError) and fault.code == "PTM-O002":
                 fault.remedy = "name a folder that you may write to with -o"
-            raise
-        try:
-            recover(folder)
-            return DatabaseWriter(folder, admitted(folder, model, force=force), lock, made)
-        except BaseException:
-            lock.release()
-            _unmake(made)
             raise
 
     def __enter__(self) -> DatabaseWriter:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         begun = (self.path / MANIFEST).exists()
         # A model of which nothing can be made leaves nothing behind.
-        hopeless = kind is not None and issubclass(kind, InputError | LimitError)
+        hopeless = kind is not None and issubclass(kind, InputError)
         with suppress(OSError):
             discard(self.path, also_finished=kind is None or (not begun and hopeless))
         self.digests.save()
@@ -122,38 +109,28 @@ def admitted(folder: Path, model: str, *, force: bool) -> Manifest:
         if not force and (earlier is None or earlier[0] != model):
             raise
         return Manifest(model)
-    if manifest is None:
-        if not force and _has_foreign_files(folder):
-            raise OutputError(
-                "PTM-O010",
-                "the folder is not empty and not a ptmtools database",
-                file=folder,
-                remedy="name another folder with -o, or give --force to write into it",
-            )
-        return Manifest(model)
-    if manifest.model != model:
-        if not force:
-            raise OutputError(
-                "PTM-O011",
-                f"holds the database of another model, {manifest.model}",
-                file=folder,
-                remedy="name another folder with -o, or give --force to replace it",
-            )
-        return Manifest(model)
-    return manifest
+    if manifest and manifest.model == model:
+        return manifest
+    if manifest and not force:
+        raise OutputError(
+            "PTM-O011",
+            f"holds the database of another model, {manifest.model}",
+            file=folder,
+            remedy="name another folder with -o, or give --force to replace it",
+        )
+    if not force and _has_foreign_files(folder):
+        raise OutputError(
+            "PTM-O010",
+            "the folder is not empty and not a ptmtools database",
+            file=folder,
+            remedy="name another folder with -o, or give --force to write into it",
+        )
+    return Manifest(model)
 
 
 def _has_foreign_files(folder: Path) -> bool:
     with writing(folder):
         return folder.is_dir() and bool({e.name for e in folder.iterdir()} - {STAGING, LOCK})
-
-
-def _make(folder: Path) -> list[Path]:
-    """Makes the folder; returns what was made, outermost first."""
-    made = [p for p in (*reversed(folder.parents), folder) if not p.exists()]
-    with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-    return made
 
 
 def _unmake(made: list[Path]) -> None:

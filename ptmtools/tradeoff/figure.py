@@ -6,7 +6,7 @@ import io
 from collections.abc import Sequence
 from typing import Any
 
-from ptmtools.errors import MissingComponentError
+from ptmtools.lazy import component
 from ptmtools.tradeoff.experiment import Trade
 
 COLORS = ("#1b6ca8", "#d1603d", "#5a9367", "#8d6a9f", "#b08d2e", "#5b6770", "#c2437a", "#2f8f8b")
@@ -14,12 +14,7 @@ COLORS = ("#1b6ca8", "#d1603d", "#5a9367", "#8d6a9f", "#b08d2e", "#5b6770", "#c2
 
 def require() -> None:
     """Raises `MissingComponentError` PTM-M600 without matplotlib."""
-    try:
-        import matplotlib.figure  # noqa: F401 - whether it is there
-    except ImportError as fault:
-        raise MissingComponentError(
-            "PTM-M600", "matplotlib is missing", remedy="pip install 'ptmtools[plot]'"
-        ) from fault
+    component("matplotlib.figure", "PTM-M600", "matplotlib is missing", "plot")
 
 
 def picture(trades: Sequence[Trade]) -> bytes:

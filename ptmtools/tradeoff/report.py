@@ -8,6 +8,12 @@ from collections.abc import Sequence
 
 from ptmtools.tradeoff.experiment import Trade
 
+#: Of the CSV.
+COLUMNS = (
+    *("stage", "setting", "cpu_s", "work", "work_unit"),
+    *("error", "worst", "error_of", "best", "more"),
+)
+
 
 def table(trade: Trade, wanted: float | None = None) -> list[str]:
     """Lines of text: every trial by cost, a star where no other is as good for less; the rates; and
@@ -43,20 +49,7 @@ def as_csv(trades: Sequence[Trade]) -> str:
     """All trials of all stages: what is in `Measured`, other figures as ``name=value``."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(
-        [
-            "stage",
-            "setting",
-            "cpu_s",
-            "work",
-            "work_unit",
-            "error",
-            "worst",
-            "error_of",
-            "best",
-            "more",
-        ]
-    )
+    rows.writerow(COLUMNS)
     for trade in trades:
         for trial in trade.trials:
             m = trial.measured

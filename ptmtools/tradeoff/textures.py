@@ -22,8 +22,8 @@ from ptmtools.texture.profiles import PROFILES
 from ptmtools.tradeoff.experiment import Measured, Setting, timed
 from ptmtools.tradeoff.experiments import Subject
 
-#: Texels a side that are encoded of an image.
-CORNER = 512
+#: So many images stand for all of them, each by a corner of so many texels a side.
+TRIED, CORNER = 4, 512
 
 
 def prepare(subject: Subject) -> TexturesTrade:
@@ -38,11 +38,8 @@ class TexturesTrade:
     error = "bytes of all levels, as a share of the uncompressed finest"
     reference_error = 0.0
 
-    def __init__(
-        self, images: Sequence[SourceImage], options: EncodeOptions, images_tried: int = 4
-    ) -> None:
-        """The corner of ``images_tried`` images stands for all of them."""
-        chosen = np.linspace(0, len(images) - 1, min(images_tried, len(images))).astype(int)
+    def __init__(self, images: Sequence[SourceImage], options: EncodeOptions) -> None:
+        chosen = np.linspace(0, len(images) - 1, min(TRIED, len(images))).astype(int)
         whole = [read_image(images[i].load()) for i in np.unique(chosen)]
         self._pixels = [pixels[:CORNER, :CORNER] for pixels in whole]
         tried = sum(pixels.size for pixels in self._pixels)

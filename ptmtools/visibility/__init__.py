@@ -10,28 +10,13 @@ from typing import TYPE_CHECKING
 from ptmtools.lazy import names
 
 if TYPE_CHECKING:
-    from ptmtools.visibility.model import Pvs
-    from ptmtools.visibility.options import PvsOptions
-    from ptmtools.visibility.pvs import compute_pvs
-    from ptmtools.visibility.segments import MissedPair, SegmentReport, check_conservative
+    from ptmtools.visibility.model import Pvs as Pvs
+    from ptmtools.visibility.options import PvsOptions as PvsOptions
+    from ptmtools.visibility.pvs import compute_pvs as compute_pvs
+    from ptmtools.visibility.segments import (
+        MissedPair as MissedPair,
+        SegmentReport as SegmentReport,
+        check_conservative as check_conservative,
+    )
 
-__all__ = [
-    "MissedPair",
-    "Pvs",
-    "PvsOptions",
-    "SegmentReport",
-    "check_conservative",
-    "compute_pvs",
-]
-
-__getattr__ = names(
-    __name__,
-    {
-        "MissedPair": "segments",
-        "Pvs": "model",
-        "PvsOptions": "options",
-        "SegmentReport": "segments",
-        "check_conservative": "segments",
-        "compute_pvs": "pvs",
-    },
-)
+__getattr__ = names(__name__)

@@ -26,11 +26,9 @@ from ptmtools.texture import (
     decode,
     encode,
     load_image,
+    open as open_ptm,
     read_header,
     write_image,
-)
-from ptmtools.texture import (
-    open as open_ptm,
 )
 from ptmtools.texture.images.png import png_bytes
 

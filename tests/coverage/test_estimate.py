@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.estimate import GROUPS, estimate, grouped, ninety_fifth, shares, spread

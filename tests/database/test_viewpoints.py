@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 
 from ptmtools.database import EmitOptions, GivenViewpoint
 from ptmtools.database.plans.storeys import storeys

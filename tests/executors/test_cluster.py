@@ -14,8 +14,7 @@ import pytest
 
 from ptmtools.cli.main import main
 from ptmtools.errors import MissingComponentError, WorkerError
-from ptmtools.executors import cluster as module
-from ptmtools.executors import open_executor
+from ptmtools.executors import cluster as module, open_executor
 from ptmtools.executors.software import software
 
 

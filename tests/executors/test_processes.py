@@ -133,6 +133,18 @@ def test_without_threads_even_one_worker_is_another_process():
     assert os.getpid() not in found
 
 
+@pytest.mark.parametrize("releases_lock", [False, True])
+def test_nothing_is_begun_once_it_is_closed(releases_lock):
+    """By a thread that comes late, say: it would be waited for, or left behind."""
+    local = Local(2)
+    with local.sharing(None) as shared:
+        local.close()
+        with pytest.raises(RuntimeError, match="after shutdown"):
+            list(shared.each(tasks.process, range(3)))
+    with pytest.raises(RuntimeError, match="after shutdown"):
+        list(local.each(tasks.process, None, range(3), releases_lock=releases_lock))
+
+
 def test_one_task_in_the_background():
     ended = threading.Event()
     task = BackgroundTask(tasks.slower_at_first, 0.02, 4)

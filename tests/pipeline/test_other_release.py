@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from ptmtools.cli.main import main
 from ptmtools.pipeline import build_scene, database_status
-from ptmtools.pipeline.stages import CELLS, PVS, STAGES
+from ptmtools.pipeline.stage import Stage
+from ptmtools.pipeline.stages import CELLS, EMIT, PVS, STAGES, TEXTURES
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"
 
@@ -47,6 +49,28 @@ def test_another_recipe_is_out_of_date(db: Path, capsys: pytest.CaptureFixture[s
     assert "--max-leaves 99 --samples 8 --backend embree" in said.err
     build_scene(db.parent / "two_rooms.obj", db, until=PVS)
     assert database_status(db).stages[1].state == "done"
+
+
+@pytest.mark.parametrize(
+    ("stage", "option", "value"),
+    [
+        (TEXTURES, "profile", "shiny"),
+        (TEXTURES, "tile", 7),
+        (TEXTURES, "fallback", "no"),
+        (EMIT, "format", "shiny"),
+        (PVS, "method", "shiny"),
+    ],
+)
+def test_recorded_options_that_are_impossible(
+    db: Path, stage: Stage[Any], option: str, value: object, capsys: pytest.CaptureFixture[str]
+) -> None:
+    manifest = json.loads((db / "manifest.json").read_bytes())
+    manifest["stages"][stage.name]["parameters"][option] = value
+    (db / "manifest.json").write_text(json.dumps(manifest))
+    assert main(["validate", str(db), "--json"]) == 8
+    (issue,) = json.loads(capsys.readouterr().out)["issues"]
+    assert (issue["code"], issue["place"]) == ("PTM-D650", f"stages.{stage.name}.parameters")
+    assert str(value) in issue["message"]
 
 
 def test_rebuild_runs_all_and_gives_the_same_bytes(db: Path, built: Path) -> None:

@@ -61,7 +61,7 @@ def test_what_is_left_when_it_is_stopped_is_done_later(tmp_path: Path) -> None:
         assert 0 < job.left < images
         job.do()
         assert job.left == 0
-        assert run.reports[TEXTURES].tasks == (images, 0, 0)
+        assert run.reports[0].tasks == (images, 0, 0)
         assert run.record(TEXTURES).counts["textures"] == images
 
 

@@ -21,9 +21,14 @@ import pytest
 from PIL import Image
 
 from ptmtools.errors import InputError, LimitError, PtmError
-from ptmtools.scene import IngestOptions, Scene, gltf_document, ingest
-from ptmtools.scene import mtl as mtl_module
-from ptmtools.scene import obj as obj_module
+from ptmtools.scene import (
+    IngestOptions,
+    Scene,
+    gltf_document,
+    ingest,
+    mtl as mtl_module,
+    obj as obj_module,
+)
 from ptmtools.scene.images import ImageStore
 from ptmtools.scene.obj import read_obj
 from ptmtools.scene.source import FileRange, Findings

@@ -6,8 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from ptmtools.scene.mtl import MapStatement, parse_map, read_mtl
 from ptmtools.scene.source import Findings

@@ -117,7 +117,7 @@ def test_says_what_is_missing_or_damaged(tmp_path: Path) -> None:
     with pytest.raises(DatabaseError, match="PTM-D004"):
         db.record("pvs")
     with pytest.raises(DatabaseError, match="PTM-D006"):
-        db.read_arrays("cells", "this")
+        db.read_arrays("cells")
     (tmp_path / "www/a").write_bytes(b"2")
     with pytest.raises(DatabaseError, match="PTM-D006"):
         db.read("www/a", db.record("cells").outputs["www/a"])

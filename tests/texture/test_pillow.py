@@ -20,10 +20,8 @@ from ptmtools.texture import (
     decode,
     encode,
     load_image,
-    read_header,
-)
-from ptmtools.texture import (
     open as open_ptm,
+    read_header,
 )
 
 RNG = np.random.default_rng(3)

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.repeats import coder as repeats
-from ptmtools.texture.coders.repeats import symbols
+from ptmtools.texture.coders.repeats import coder as repeats, symbols
 from ptmtools.texture.coders.repeats.reference import decode_repeats
 from ptmtools.texture.pyramid import mean_below
 

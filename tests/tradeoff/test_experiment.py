@@ -6,8 +6,7 @@ import csv
 import io
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from ptmtools.tradeoff.experiment import Measured, Setting, Trial, pareto, rates, run
 from ptmtools.tradeoff.report import as_csv, table

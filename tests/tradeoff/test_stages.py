@@ -24,6 +24,7 @@ from ptmtools.tradeoff.textures import TexturesTrade
 from ptmtools.tradeoff.visibility import VisibilityTrade
 from ptmtools.visibility.options import PvsOptions
 from ptmtools.visibility.pvs import compute_pvs
+from tests.conftest import files_below
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data/two_rooms/two_rooms.obj"
 LITTLE = ("--cells-tried", "2", "--reference", "64")
@@ -36,13 +37,9 @@ def db(tmp_path_factory) -> Path:
     return path
 
 
-def contents(folder: Path) -> dict[str, bytes]:
-    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
-
-
 def test_all_stages(db, tmp_path, capsys) -> None:
     """One table for the whole pipeline; the database is as it was."""
-    before = contents(db)
+    before = files_below(db)
     table, plot = tmp_path / "t.csv", tmp_path / "t.png"
     asked = ["tradeoff", str(db), *LITTLE, "--csv", str(table), "--plot", str(plot)]
     assert main([*asked, "--error", "0.05"]) == 0
@@ -50,7 +47,7 @@ def test_all_stages(db, tmp_path, capsys) -> None:
     for stage in ("cells:", "pvs:", "ach:", "textures:"):
         assert output.count(stage) == 1
     assert output.count("cheapest for an error of at most 0.05") == 4
-    assert contents(db) == before
+    assert files_below(db) == before
     rows = table.read_text().splitlines()
     assert {row.split(",")[0] for row in rows[1:]} == {"cells", "pvs", "ach", "textures"}
     with Image.open(plot) as picture:

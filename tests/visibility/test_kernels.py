@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
-from ptmtools.visibility import bit_kernels as bits
-from ptmtools.visibility import clipping_kernels as clipping
-from ptmtools.visibility import flow_kernels
-from ptmtools.visibility import prepass_kernels as prepass
+from ptmtools.visibility import (
+    bit_kernels as bits,
+    clipping_kernels as clipping,
+    flow_kernels,
+    prepass_kernels as prepass,
+)
 from ptmtools.visibility.flow import Portals, geometry
 from ptmtools.visibility.searching import GROWTH, scratch
 

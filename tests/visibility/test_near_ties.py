@@ -6,13 +6,17 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from ptmtools.executors import Local
 from ptmtools.tolerance import Tolerance
-from ptmtools.visibility import compute_pvs, double_double, near_ties, searching
-from ptmtools.visibility import double_double_kernels as kernels
+from ptmtools.visibility import (
+    compute_pvs,
+    double_double,
+    double_double_kernels as kernels,
+    near_ties,
+    searching,
+)
 from ptmtools.visibility.double_double import SequenceTest
 from ptmtools.visibility.flow import Portals, geometry, portal_flow
 from ptmtools.visibility.pvs import portals_of

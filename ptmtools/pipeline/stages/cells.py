@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ptmtools.cells.options import SubdivideOptions
@@ -26,10 +26,6 @@ def _counts(cells: Cells) -> Mapping[str, Any]:
     }
 
 
-def _notes(cells: Cells, _: SubdivideOptions) -> Iterable[str]:
-    return cells.notes
-
-
 def _summary(n: Mapping[str, Any]) -> str:
     leaves = f" of {count(n['leaves'], 'leaf', 'leaves')}" if n["leaves"] != n["cells"] else ""
     state = "closed" if n["closed"] else "open"
@@ -50,7 +46,7 @@ CELLS: Stage[Cells] = Stage(
     artifact=Lazy("ptmtools.cells.model:Cells"),
     compute=Lazy("ptmtools.cells:subdivide"),
     counts=_counts,
-    notes=_notes,
+    notes=lambda cells, _: cells.notes,
     summary=_summary,
     fits={SCENE: _fits_scene},
     from_model=True,

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError, naming
 from ptmtools.texture.container import HEAD_MAX, MAGIC, read_header
 from ptmtools.texture.images import openexr, radiance
-from ptmtools.texture.images.npy import MAGIC as NPY_MAGIC
-from ptmtools.texture.images.npy import read_npy
+from ptmtools.texture.images.npy import MAGIC as NPY_MAGIC, read_npy
 from ptmtools.texture.images.picture import Picture, unsupported
 from ptmtools.texture.images.png import check_chunks
 from ptmtools.texture.model import Limits

@@ -13,8 +13,7 @@ from urllib.parse import unquote
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from ptmtools.database import EmitOptions, validate_database
 from ptmtools.database.gltf.buffer import BufferWriter
