@@ -112,13 +112,13 @@ class _Held(DatabaseFolder):
         self._stages = stages
         self._images = images
 
-    def record(self, stage: str, needed_for: str = "this") -> StageRecord:
+    def record(self, stage: str) -> StageRecord:
         return StageRecord(STAGES[stage].recipe, {}, {}, {})
 
-    def read_output(self, stage: str, name: str, needed_for: str = "this") -> bytes:
+    def read_output(self, stage: str, name: str) -> bytes:
         return self._images
 
-    def read_arrays(self, stage: str, needed_for: str) -> Any:
+    def read_arrays(self, stage: str) -> Any:
         held = self._stages[stage]
         return unpack_arrays(held, file=arrays_of(stage)) if isinstance(held, bytes) else held
 
