@@ -62,9 +62,7 @@ sample: build/museum/.made
 # The cell of the first viewpoint.
 FIRST_CELL = $(BIN)/python -c 'import json; hints = json.load(open("build/museum.db/www/hints.json")); print(hints["viewpoints"][0]["cell"])'
 
-# While the museum is painted, the other processor compiles what the build needs.
-demo: $(VENV)/.installed
-	$(BIN)/ptm warm-up & $(MAKE) --no-print-directory sample && wait
+demo: build/museum/.made
 	$(BIN)/ptm build-scene build/museum/museum.obj -o build/museum.db
 	$(BIN)/ptm plot build/museum.db --cell "$$($(FIRST_CELL))" -o build/museum.png --force
 	@echo

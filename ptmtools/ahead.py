@@ -10,25 +10,47 @@ import atexit
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 
 from ptmtools.lazy import Lazy
-from ptmtools.machine_code import announce_compilation, is_kept
+from ptmtools.machine_code import announce_compilation, marker
+
+Task = Lazy[Callable[[], object]]
+#: For the other process to end, seconds, when this one does.
+PATIENCE = 5.0
+_begun: set[Task] = set()
 
 
-def compile_ahead(task: Lazy[Callable[[], object]], kernels: str) -> None:
-    """Another process calls ``task``, which calls kernels, unless machine code of the module
-    ``kernels``, one of theirs, is at hand.
+def compile_now(task: Task) -> bool:
+    """Calls a task, which calls kernels, so that they are compiled; whether that was still to be
+    done."""
+    done = marker(task.place)
+    if done and done.exists():
+        return False
+    task.load()()
+    if done:
+        with suppress(OSError):
+            done.parent.mkdir(parents=True, exist_ok=True)
+            done.touch()
+    return True
 
-    The other process ends with this one, and whether it fails does not matter.
+
+def compile_ahead(task: Task) -> None:
+    """As `compile_now`, by another process, if the machine code can be kept.
+
+    That process ends with this one, and whether it fails does not matter.
     """
-    if is_kept(kernels):
+    done = marker(task.place)
+    if done is None or done.exists() or task in _begun:
         return
+    _begun.add(task)
     announce_compilation()
     # With the modules of this process, wherever they come from; ends tidily when told to.
     program = (
         f"import signal, sys; sys.path[:] = {sys.path!r}\n"
         "signal.signal(signal.SIGTERM, lambda *_: sys.exit())\n"
-        f"from ptmtools.lazy import Lazy; Lazy({task.place!r}).load()()"
+        "from ptmtools.ahead import Lazy, compile_now\n"
+        f"compile_now(Lazy({task.place!r}))"
     )
     nothing = subprocess.DEVNULL
     try:
@@ -37,4 +59,13 @@ def compile_ahead(task: Lazy[Callable[[], object]], kernels: str) -> None:
         )
     except OSError:
         return
-    atexit.register(other.terminate)
+    atexit.register(_end, other)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    try:
+        process.wait(PATIENCE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

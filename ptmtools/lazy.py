@@ -38,7 +38,10 @@ def names(package: str) -> Callable[[str], Any]:
     They are its ``__all__`` too, but for those that Python itself has.
     """
     module: Any = sys.modules[package]
-    statements = ast.walk(ast.parse(module.__loader__.get_source(package)))
+    source = module.__loader__.get_source(package)
+    if source is None:
+        raise ImportError(f"{package} cannot be used without its source files")
+    statements = ast.walk(ast.parse(source))
     imports = [node for node in statements if isinstance(node, ast.ImportFrom)]
     home = {a.name: node.module for node in imports for a in node.names if a.name == a.asname}
     module.__all__ = sorted(name for name in home if not hasattr(builtins, name))

@@ -17,9 +17,11 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 import tempfile
 from functools import cache
 from hashlib import sha256
+from importlib.util import find_spec
 from pathlib import Path
 
 from ptmtools.progress import announce
@@ -33,10 +35,19 @@ _IMPORT = re.compile(
 )
 
 
-def is_kept(module: str) -> bool:
-    """Whether machine code of a module's functions, as it now is, has been made here before."""
-    file = _module(module)
-    return file is not None and os.path.isdir(folder_of(file))
+def marker(task: str) -> Path | None:
+    """The file that stands once a task has compiled all that it needs, of this very package and by
+    this numba; None if there is no place."""
+    place = _chosen()
+    if not place:
+        return None
+    digest = sha256(f"{task} {sys.version}".encode())
+    numba = find_spec("numba")
+    if numba and numba.origin:
+        digest.update(f"{numba.origin} {os.stat(numba.origin).st_mtime_ns}".encode())
+    for file in sorted(_PACKAGE.rglob("*.py")):
+        digest.update(sha256(_source(file)).digest())
+    return Path(place, f"{digest.hexdigest()[:12]}.done")
 
 
 @cache
@@ -47,8 +58,12 @@ def announce_compilation() -> None:
 
 def folder_of(file: Path) -> str:
     """Where machine code of the functions in that file is kept; "" if there is no place."""
-    place = os.environ.get("NUMBA_CACHE_DIR") or _place()
+    place = _chosen()
     return place and os.path.join(place, _digest(file))
+
+
+def _chosen() -> str:
+    return os.environ.get("NUMBA_CACHE_DIR") or _place()
 
 
 @cache

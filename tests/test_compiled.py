@@ -100,27 +100,32 @@ def test_one_of_two_processes_compiles(package: Path) -> None:
     assert sorted(len(lines) for lines in printed) == [1, 2]
 
 
-def test_another_process_compiles_ahead(package: Path) -> None:
-    """Unless that was done before; one that fails is not noticed."""
+@pytest.mark.parametrize(
+    ("ending", "sign", "again"), [("raise ValueError", "begun", True), ("", "*/*/*.done", False)]
+)
+def test_another_process_compiles_ahead(package: Path, ending: str, sign: str, again: bool) -> None:
+    """Unless that was done before; one that fails is not noticed, and tried again."""
     (package / "task.py").write_text(
         "from pathlib import Path; from ptmtools.two import inner\n"
-        "def begin():\n    inner(1.0)\n    Path('done').touch()\n    raise ValueError"
+        f"def begin():\n    inner(1.0)\n    Path('ptmtools/begun').touch()\n    {ending}"
     )
-    program = """
-import os, time
+    program = f"""
+import time
+from pathlib import Path
 from ptmtools.ahead import compile_ahead
 from ptmtools.lazy import Lazy
 from ptmtools.progress import listen
 listen(print)
-compile_ahead(Lazy("ptmtools.task:begin"), "ptmtools.two")
-while {0} and not os.path.exists("done"):
+compile_ahead(Lazy("ptmtools.task:begin"))
+while not list(Path("ptmtools").glob("{sign}")):
     time.sleep(0.01)
 from ptmtools.two import inner
 print(inner(1.0))
 """
     announced = "compiling for this machine (first run only, up to a minute)"
-    for wait, lines in ((1, [announced, "11.0"]), (0, ["11.0"])):
-        assert run(program.format(wait), package.parent, NUMBA_CACHE_DIR="") == lines
+    for first in (True, False):
+        lines = [announced, "11.0"] if first or again else ["11.0"]
+        assert run(program, package.parent, NUMBA_CACHE_DIR="") == lines
 
 
 def test_literals_are_not_types_of_their_own(package: Path) -> None:

@@ -59,12 +59,12 @@ def encode(
 
     options = take(EncodeOptions, values)
     check_options(options)
-    ahead = PROFILES[options.profile].ahead
-    if ahead and (batch.workers or processors()) > 1:
-        compile_ahead(*ahead)
     jobs = jobs_for(images, SUFFIXES, output, ".ptm", (".ptm", *SUFFIXES))
     if output and any(job.target and not job.folder for job in jobs):
         _refuse_image_suffix(output)
+    ahead = PROFILES[options.profile].ahead
+    if ahead and (batch.workers or processors()) > 1:
+        compile_ahead(ahead)
 
     def work(job: Job, threads: int) -> Report:
         source, target = job.source, job.target

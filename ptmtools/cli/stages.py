@@ -13,7 +13,6 @@ from typing import Any
 
 import click
 
-from ptmtools.ahead import compile_ahead
 from ptmtools.cli.common import (
     as_json,
     database,
@@ -25,8 +24,6 @@ from ptmtools.cli.common import (
 )
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
-from ptmtools.cli.warm_up import WARM_UP
-from ptmtools.executors.model import processors
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.build import build_scene as build, run_stage
 from ptmtools.pipeline.changes import NEVER_RUN
@@ -108,8 +105,6 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
             plans = plan_build(model, db, *options, force=force)
             print_plan(voice, plans[: len(stages)], as_json)
             return
-        if last is None and (workers or processors()) > 1:
-            compile_ahead(*WARM_UP)
         with voice.progress() as progress:
             report = build(
                 model,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,8 +30,13 @@ def outcome(work: Iterable[Any]) -> Outcome:
         for result in work:
             results.append(result)
     except Exception as fault:
-        return Outcome(results, _travelling(fault))
+        return failed(fault, results)
     return Outcome(results)
+
+
+def failed(fault: Exception, results: Sequence[Any] = ()) -> Outcome:
+    """What came before an exception, and it."""
+    return Outcome(list(results), _travelling(fault))
 
 
 def _travelling(fault: Exception) -> Exception:

@@ -175,4 +175,5 @@ def _results(
         _copy = None  # before the next one takes memory
         _copy = _Copy(place)
     value = _copy.value(place.end)
-    return (function(value, task) for task in tasks)
+    for task in tasks:
+        yield function(value, task)

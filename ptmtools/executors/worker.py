@@ -18,7 +18,7 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ptmtools.errors import WorkerError
-from ptmtools.executors.outcome import Outcome, outcome
+from ptmtools.executors.outcome import Outcome, failed, outcome
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -106,7 +106,11 @@ def _work(parent: Connection) -> None:
     threading.Thread(target=listen, daemon=True).start()
     while True:
         function, arguments = pickle.loads(calls.get())
-        parent.send(outcome(function(*arguments)))
+        found = outcome(function(*arguments))
+        try:
+            parent.send(found)
+        except Exception as fault:  # of pickling, before anything is sent
+            parent.send(failed(fault))
 
 
 class BackgroundTask(Generic[R]):

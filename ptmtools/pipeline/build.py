@@ -13,6 +13,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from ptmtools.ahead import Task, compile_ahead
+from ptmtools.lazy import Lazy
 from ptmtools.pipeline.background import Workers
 from ptmtools.pipeline.report import BuildReport, peak_memory
 from ptmtools.pipeline.run import Run
@@ -22,6 +24,9 @@ from ptmtools.progress import Progress, silent
 from ptmtools.store.writer import DatabaseWriter
 
 PathLike = str | os.PathLike[str]
+
+#: Calls the kernels of all stages.
+WARM_UP: Task = Lazy("ptmtools.pipeline.warm_up:warm_up")
 
 
 def build_scene(
@@ -116,8 +121,11 @@ def _run(
 
     run.progress = progress
     finished: set[Stage[Any]] = set()
+    ahead = run.workers.here > 1 and len(stages) == len(STAGES)
     try:
         for i, job in enumerate(jobs):
+            if ahead and job.planned()[1]:
+                compile_ahead(WARM_UP)
             if job.stage.one_thread and job.planned()[1]:
                 for later in jobs[i + 1 :]:
                     if finished.issuperset(later.stage.read_with(later.options)):

@@ -65,7 +65,7 @@ class Digests:
         before = time.time_ns()
         with open_regular(path) as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
-        self._remember(name, stamp, digest, before)
+        self._remember(path, stamp, digest, before)
         return digest
 
     def note(self, path: Path, digest: str) -> None:
@@ -77,7 +77,7 @@ class Digests:
         """Remembers what was found out; in silence if that cannot be."""
         for name, (stamp, digest) in self._noted.items():
             with suppress(OSError):
-                self._remember(name, stamp, digest, time.time_ns())
+                self._remember(Path(name), stamp, digest, time.time_ns())
         self._noted = {}
         if self._file is None or not self._changed:
             return
@@ -97,9 +97,10 @@ class Digests:
             _forget_old(self._file.parent)
         self._changed = False
 
-    def _remember(self, name: str, stamp: Stamp, digest: str, before: int) -> None:
+    def _remember(self, path: Path, stamp: Stamp, digest: str, before: int) -> None:
         """The digest of a file that was read at the time ``before``, if it is known to stand."""
-        if stamp == _stamp(name) and _settled(stamp, before):
+        if stamp == _stamp(path) and _settled(stamp, before):
+            name = os.path.abspath(path)  # another file's, if a link stands before a ``..``
             self._known[name] = (stamp, digest)
             self._used.add(name)
             self._changed = True
@@ -115,7 +116,7 @@ class Digests:
             }
 
 
-def _stamp(path: str | Path) -> Stamp:
+def _stamp(path: Path) -> Stamp:
     """Size, inode, and times of modification and of change in nanoseconds."""
     found = os.stat(path)
     return found.st_size, found.st_ino, found.st_mtime_ns, found.st_ctime_ns

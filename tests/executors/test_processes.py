@@ -185,3 +185,14 @@ def test_which_executor():
         assert three.workers == 3
         assert all_.workers == len(os.sched_getaffinity(0))
         assert isinstance(three, Local)
+
+
+def test_what_goes_wrong_on_the_way_is_told_as_it_is(local: Local) -> None:
+    """Neither a shared value that cannot be taken in nor a result that cannot be sent costs a
+    worker."""
+    with pytest.raises(InputError, match="cannot be taken in"):
+        list(local.each(tasks.keep, tasks.Unreadable(), range(2)))
+    with pytest.raises(Exception, match="pickle") as raised:
+        list(local.each(tasks.unsendable, None, range(4)))
+    assert not isinstance(raised.value, WorkerError)
+    assert list(local.each(tasks.unsendable, None, [2, 3])) == [2, 3]

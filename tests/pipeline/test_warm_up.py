@@ -7,10 +7,12 @@ from typing import Any
 
 import pytest
 
-from ptmtools import compiled
+from ptmtools import compiled, machine_code
+from ptmtools.ahead import compile_now
+from ptmtools.cells import line_kernels
 from ptmtools.cli.main import main
-from ptmtools.cli.warm_up import WARM_UP
-from ptmtools.pipeline.build import build_scene
+from ptmtools.errors import InputError
+from ptmtools.pipeline.build import WARM_UP, build_scene
 from ptmtools.pipeline.stages import CELLS
 from ptmtools.pipeline.warm_up import warm_up, write_building
 
@@ -47,23 +49,45 @@ def test_the_building(tmp_path: Path) -> None:
     assert cells["closed"]
 
 
-def test_the_command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    done = []
-    monkeypatch.setattr("ptmtools.pipeline.warm_up.warm_up", lambda: done.append(True))
-    for kept, printed in ((False, "compiled in"), (True, "nothing to compile")):
-        monkeypatch.setattr("ptmtools.cli.warm_up.is_kept", lambda _, kept=kept: kept)
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where nothing has been compiled; what would be, is not."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "place"))
+    monkeypatch.setattr("ptmtools.pipeline.warm_up.warm_up", lambda: None)
+    return tmp_path / "place"
+
+
+def test_the_command(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A folder that was merely begun does not count."""
+    (place / machine_code._digest(Path(line_kernels.__file__))).mkdir(parents=True)
+    for printed in ("compiled in", "nothing to compile"):
         assert main(["warm-up"]) == 0
         assert printed in capsys.readouterr().out
-    assert done == [True]
 
 
-def test_a_first_build_begins_with_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_what_is_compiled_depends_on_all_sources(
+    place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Not if it may use one processor only."""
+    assert compile_now(WARM_UP)
+    assert not compile_now(WARM_UP)
+    source = machine_code._source
+    monkeypatch.setattr(machine_code, "_source", lambda file: source(file) + b"#")
+    assert compile_now(WARM_UP)
+
+
+def test_a_first_build_begins_with_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not if it may use one processor only, nor if there is nothing to do."""
     begun = []
-    monkeypatch.setattr("ptmtools.cli.stages.compile_ahead", lambda *task: begun.append(task))
-    for workers, tasks in (("1", []), ("2", [WARM_UP])):
-        arguments = ["build-scene", str(tmp_path / "none.obj"), "-o", str(tmp_path / "a.db")]
-        assert main([*arguments, "-j", workers]) == 3
-        assert begun == tasks
+    monkeypatch.setattr("ptmtools.pipeline.build.compile_ahead", begun.append)
+    db = tmp_path / "a.db"
+    with pytest.raises(InputError):
+        build_scene(tmp_path / "none.obj", db, workers=2)
+    model = write_building(tmp_path)
+    build_scene(model, db, until=CELLS, workers=2)
+    assert not begun
+    build_scene(model, db, workers=2)
+    assert set(begun) == {WARM_UP}
+    begun.clear()
+    build_scene(model, db, workers=2)
+    build_scene(model, db, workers=1, rebuild=True)
+    assert not begun

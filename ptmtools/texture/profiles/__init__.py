@@ -35,8 +35,7 @@ class Profile:
     about: what it is for, in a few words, for the help.
     lossy: whether it can make use of an allowed error.
     since: the first version of the container that may hold it.
-    ahead: what another process may compile meanwhile, and a module of its kernels
-        (`ptmtools.ahead.compile_ahead`).
+    ahead: what another process may compile while the coder compiles the first of its loops.
     module: the `Coder`, if not the module of this package that has the profile's name.
     """
 
@@ -45,7 +44,7 @@ class Profile:
     about: str
     lossy: bool = False
     since: int = 2
-    ahead: tuple[Lazy[Callable[[], object]], str] | None = None
+    ahead: Lazy[Callable[[], object]] | None = None
     module: str = ""
 
     @property
@@ -64,10 +63,7 @@ PROFILES = {
             "for streaming",
             lossy=True,
             since=1,
-            ahead=(
-                Lazy(f"{__name__}.fast:compile_ahead"),
-                "ptmtools.texture.coders.haar.kernels",
-            ),
+            ahead=Lazy(f"{__name__}.fast:compile_ahead"),
         ),
         Profile("small", 2, "for archives; smaller, but 30 to 60 times slower", lossy=True),
         Profile("raw", 0, "uncompressed, the layout of Marvie & Bouatouch, 2003", since=1),

@@ -98,3 +98,18 @@ def note_and_sleep(folder: Path, seconds: float) -> None:
 def process(_: Any, i: int) -> int:
     time.sleep(0.02)
     return os.getpid()
+
+
+class Unreadable:
+    """A value that no other process can take in."""
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        raise InputError("PTM-I999", "cannot be taken in")
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {}
+
+
+def unsendable(_: Any, i: int) -> Any:
+    """What cannot be pickled, now and then."""
+    return (lambda: i) if i == 1 else i
