@@ -109,14 +109,19 @@ class ImageStore:
         self._examined: dict[tuple[Callable[[], bytes], str | None], _Examined] = {}
         self._index: dict[str, int] = {}
         self._images: list[SourceImage] = []
+        self._files: list[set[str]] = []
         self._masks: set[str] = set()
         self._stems: set[str] = set()
 
     @property
     def images(self) -> tuple[SourceImage, ...]:
         return tuple(
-            replace(image, plain=image.plain and self._masks.isdisjoint(image.files))
-            for image in self._images
+            replace(
+                image,
+                plain=image.plain and self._masks.isdisjoint(files),
+                files=tuple(sorted(files)),
+            )
+            for image, files in zip(self._images, self._files, strict=True)
         )
 
     def examine(self, textures: Iterable[Texture], workers: int, progress: Progress) -> None:
@@ -144,10 +149,9 @@ class ImageStore:
             name = self._name(texture.label, found.format)
             load = VerifiedBytes(texture.read, found.sha256, texture.label)
             self._images.append(SourceImage(name, found.sha256, load, plain=not found.alpha))
+            self._files.append(set())
         if file := self._whole_file(texture):
-            image = self._images[index]
-            files = tuple(sorted({*image.files, file}))
-            self._images[index] = replace(image, files=files)
+            self._files[index].add(file)
         return index, found.holes
 
     def _whole_file(self, texture: Texture) -> str | None:

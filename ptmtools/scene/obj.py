@@ -84,8 +84,9 @@ def read_obj(
     """Read an OBJ file with its materials.
 
     Raises InputError with the line for what cannot be read, and where there is no face at all;
-    LimitError for a line longer than `LONGEST_LINE` (PTM-L202), more than ``max_triangles``
-    (PTM-L203, before polygons are cut), and what `read_mtl` raises.
+    LimitError for more vertices than int32 can number (PTM-L200), a line longer than `LONGEST_LINE`
+    (PTM-L202), more than ``max_triangles`` (PTM-L203, before polygons are cut), and what `read_mtl`
+    raises.
     """
     said = _read_statements(path, findings, progress, max_triangles)
     for key, lines in said.unknown.items():
@@ -267,6 +268,10 @@ def _read_statements(
                     file=path,
                     place=f"line {number}",
                 ) from None
+    if len(points) // 3 > MAX_VERTICES:
+        raise LimitError(
+            "PTM-L200", f"more than {MAX_VERTICES} vertices", file=path, remedy="split the model"
+        )
     if short:
         findings.miss(
             "PTM-N220", "faces of fewer than three corners", f"{path.name}:{short[0]}", len(short)

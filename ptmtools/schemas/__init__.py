@@ -131,9 +131,11 @@ def _not_finite(number: str) -> None:
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found = dict(pairs)
     if len(found) < len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
-        raise ShapeError(f"an object has two fields {twice!r}")
+        seen: set[str] = set()
+        for name, _ in pairs:
+            if name in seen:
+                raise ShapeError(f"an object has two fields {name!r}")
+            seen.add(name)
     return found
 
 

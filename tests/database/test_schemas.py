@@ -217,6 +217,11 @@ def test_validate_refuses_what_the_schema_refuses(hints) -> None:
         (b"\xef\xbb\xbf{}", "not JSON"),
         (b"[" * 100_000, "not JSON"),
         (b'{"a": 1, "b": {"c": 1, "c": 2}}', "two fields 'c'"),
+        (
+            b"{" + b",".join(b'"%d":0' % (i // 2 + i % 2) for i in range(100_000)) + b"}",
+            "fields '1'",
+        ),
+        (b"{" + b",".join(b'"%d":0' % (i % 99_999) for i in range(100_000)) + b"}", "fields '0'"),
         (b"[NaN]", "NaN is not finite"),
         (b"[-Infinity]", "not finite"),
         (b"[" + b"9" * 10_000 + b"]", "not JSON"),

@@ -294,6 +294,15 @@ def test_a_face_of_a_million_corners(put: Put) -> None:
         read(path, 999_997)
 
 
+def test_vertices_are_counted_before_triangles_are_made(
+    put: Put, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(obj_module, "MAX_VERTICES", 3)
+    monkeypatch.setattr(obj_module, "triangulate", None)
+    with pytest.raises(LimitError, match=r"more than 3 vertices.*split the model.*PTM-L200"):
+        read(put("a.obj", QUAD + FACE))
+
+
 def test_triangles_are_counted_before_they_are_made(put: Put) -> None:
     path = put("a.obj", QUAD + "f 1 2 3 4\n" * 50 + "f 1 2 3\n")
     assert read(path, 101) == 101

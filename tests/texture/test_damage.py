@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache, partial
 from importlib.util import find_spec
 from typing import Any
@@ -18,6 +19,7 @@ from ptmtools.texture.coders.texel import coder as texel
 from ptmtools.texture.profiles import paper, raw
 from ptmtools.texture.pyramid import mean_below
 from ptmtools.texture.samples import KINDS, from_ordered, to_ordered
+from tests.memory import little_memory
 from tests.texture.coding import Samples, textured
 from tests.texture.test_repeats import ZOO
 from tests.texture.test_texel import smooth
@@ -72,6 +74,19 @@ def coded(name: str) -> tuple[Samples, bytes, Decoder]:
     make, (encode, decode) = CASES[name]
     level = make()
     return level, encode(level, mean_below(level)), decode
+
+
+def test_sizes_are_checked_before_memory_is_taken() -> None:
+    """Whichever four bytes are a size, such as that of the bits that are sent as they are."""
+    level = smooth(16, 18, 1, np.dtype("u2"))
+    below = mean_below(level)
+    encode, decode = by_texel(0)
+    group = encode(level, below)
+    assert group[0] == texel.CODED
+    decode(group, below, level.shape)  # which compiles
+    for at in range(len(group) - 3):
+        with little_memory(1 << 27), suppress(InputError):
+            decode(group[:at] + b"\xff" * 4 + group[at + 4 :], below, level.shape)
 
 
 @pytest.mark.parametrize("name", CASES)

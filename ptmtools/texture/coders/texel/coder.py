@@ -235,15 +235,15 @@ def _decode(reader: Reader, below: Samples, shape: Shape, max_error: int, sent: 
         raise damaged("its window is impossible")
     weights = _read_weights(reader, shape[2]) if sent else None
     frequency = tables.parse(reader, kernels.TABLES, layout.table_family())
-    size = reader.number(4)
+    bits = reader.numbers("u1", reader.number(4))
     # A row of blocks is decoded before it is looked whether the stream was long enough.
     row = 4 * (shape[1] + 1 >> 1) * shape[2] * numbering.symbols
-    plain = np.zeros(-(-size // 4) + row + 2, "<u4")
-    plain.view(np.uint8)[:size] = reader.numbers("u1", size)
+    plain = np.zeros(-(-len(bits) // 4) + row + 2, "<u4")
+    plain.view(np.uint8)[: len(bits)] = bits
     stream = read_stream(reader, row)
     numbers = np.zeros(shape, np.uint32)
     work = _enlarged(numbering.nearest(means), shape)
-    limits = np.array([stream.limit, 8 * size], np.int64)
+    limits = np.array([stream.limit, 8 * len(bits)], np.int64)
     source = kernels.Source(stream.words, stream.escapes, tables.single_tables(frequency))
     group = _Group(kind, means, numbering, work, max_error)
     check_end(
