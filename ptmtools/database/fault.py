@@ -17,9 +17,10 @@ class FileError(Exception):
 
 
 @contextmanager
-def shaped(code: str) -> Iterator[None]:
-    """What is not as its schema says becomes a FileError of this code."""
+def shaped(code: str, place: str = "") -> Iterator[None]:
+    """What is not as its schema says becomes a FileError of this code; ``place`` is that of a
+    fault of the whole document."""
     try:
         yield
     except schemas.ShapeError as fault:
-        raise FileError(code, fault.place, fault.message) from None
+        raise FileError(code, fault.place or place, fault.message) from None

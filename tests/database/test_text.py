@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 
 from ptmtools.database.fault import FileError
 from ptmtools.database.floats import decimal, row_texts, single
-from ptmtools.database.vrml.pattern import HEADER
+from ptmtools.database.vrml.pattern import CELL, CELL_OF_LEAVES, HEADER, declaration
 from ptmtools.database.vrml.reader import parse
 from ptmtools.database.vrml.text import chosen, field, listed, loops, quoted
 from ptmtools.errors import DatabaseError
@@ -203,12 +203,17 @@ def test_points_read_back(points: list[tuple[float, float, float]]) -> None:
         ("Shape { geometry Material { } }", "PTM-D661", "line 2"),
         ("DEF a.b Shape { }", "PTM-D661", "line 2"),
         ("DEF a WorldInfo { }\nDEF a WorldInfo { }", "PTM-D661", "line 3"),
-        ("\nShape { appearance Appearance { } }", "PTM-D663", "line 3"),
         ("USE a", "PTM-D661", "line 2"),
         ("PTMCell { }", "PTM-D661", "line 2"),
         ("PROTO P [ field SFFoo a 1 ] { WorldInfo { } }", "PTM-D661", "line 2"),
         ("PROTO P [ exposedField SFBool a TRUE ] { WorldInfo { } }", "PTM-D661", "line 2"),
         ("PROTO P [ ] { Shape { } }", "PTM-D661", "line 2"),
+        ("PROTO PTMViewpointCell [ field\n SFInt32 a 1 ] { WorldInfo { } }", "PTM-D663", "line 3"),
+        ("PROTO PTMCell [ ] { WorldInfo { } }", "PTM-D663", "line 2"),
+        (declaration(*CELL).replace("ach ", "acht "), "PTM-D663", "line 8"),
+        (declaration(*CELL).replace("World", "Word"), "PTM-D661", "line 10"),
+        (declaration(*CELL).rstrip("}\n"), "PTM-D661", "line 11"),
+        (declaration(*CELL) + declaration(*CELL_OF_LEAVES), "PTM-D661", "line 12"),
         ("WorldInfo { title 'x' }", "PTM-D661", "line 2"),
         ('WorldInfo { info "x" }', "PTM-D661", "line 2"),
         ("WorldInfo {", "PTM-D661", "line 3"),
@@ -225,6 +230,21 @@ def test_what_the_pattern_does_not_have(body: str, kind: str, place: str) -> Non
     with pytest.raises(FileError) as fault:
         parse(document(body))
     assert (fault.value.code, fault.value.place) == (kind, place)
+
+
+def test_nodes_that_lack_fields_are_read() -> None:
+    """Fields that nodes in them lack count as theirs."""
+    parts = "appearance Appearance { texture ImageTexture { } } geometry IndexedFaceSet { }"
+    shape, _, inline = parse(
+        document(f"\nDEF a Shape {{ {parts} }}\nWorldInfo {{ }} Inline {{ }}")
+    ).nodes
+    wanted = (
+        "ImageTexture lacks url",
+        "IndexedFaceSet lacks coord",
+        "IndexedFaceSet lacks coordIndex",
+    )
+    assert (shape.lacks, shape.place) == (wanted, "line 3, a")
+    assert (len(inline.lacks), inline.place) == (3, "line 4")
 
 
 def test_the_header_and_the_encoding() -> None:

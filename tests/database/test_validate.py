@@ -246,6 +246,8 @@ C0, C1, C2 = "cells/c0000.wrl", "cells/c0001.wrl", "cells/c0002.wrl"
 HINTS, ROOT, A = "hints.json", "root.wrl", "textures/a.ptm"
 TRIANGLE = rf"\d+{S}\d+{S}\d+{S}-1{S}"
 VISIBLE = r'visibleUrl +\[ ("\w+.wrl"), ("\w+.wrl"), ("\w+.wrl") \]'
+#: One shape lacks its points, another has an index too large.
+TWO_SHAPES = (r"\n    coord C[^\n]*", ""), (r"(.*coordIndex \[ )\d+", r"\g<1>99")
 #: A bomb: a thousand times as long as it is.
 LONG = gzip.compress(bytes(1 << 22))
 
@@ -302,6 +304,12 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D663", replaced(ROOT, r"fieldOfView [.\d]+", "")),
     ("D663", replaced(ROOT, "ptm:database 1", "ptm:database 2")),
     ("D663", replaced(ROOT, r"bboxSize [^}]*", "")),
+    ("D663", replaced(C0, "MFFloat  ach", "MFFloat  share")),
+    ("D663 D680", all_of(*(replaced(C0, *change) for change in TWO_SHAPES))),
+    (
+        "D663 D699 D706",
+        replaced(ROOT, r"PTMViewpointCell \{ viewpoint \"VP_1\"", "PTMViewpointCell {"),
+    ),
     ("D670", replaced(C0, r"\.\./textures/a\.ptm", "../../secret.ptm")),
     ("D670", replaced(C0, r"\.\./textures/a\.ptm", "http://elsewhere/a.ptm")),
     ("D670", replaced(C0, r"\.\./textures/a\.ptm", "//elsewhere/a.ptm")),

@@ -44,5 +44,5 @@ def unpack(data: bytes) -> tuple[Any, bytes]:
             raise ValueError("not JSON and BIN alone, each of a multiple of 4 bytes", "byte 12")
     except ValueError as fault:
         raise FileError("PTM-D731", fault.args[1], fault.args[0]) from None
-    with shaped("PTM-D731"):
+    with shaped("PTM-D731", "JSON"):
         return schemas.parse(chunks[0][1]), b"".join(body for _, body in chunks[1:])

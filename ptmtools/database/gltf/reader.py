@@ -167,14 +167,17 @@ class _Reader:
         return found
 
     def _check_bounds(self, index: int, point: NDArray[np.float32]) -> None:
+        place, accessor = f"accessors[{index}]", self._tree["accessors"][index]
         for name, held in (("min", point.min(axis=0)), ("max", point.max(axis=0))):
-            written = np.array(self._tree["accessors"][index].get(name, ()), np.float64)
+            if name not in accessor:
+                _foreign(place, f"has no {name}")
+            written = np.array(accessor[name], np.float64)
             # In single precision, as they are written.
             with np.errstate(over="ignore"):
                 same = np.array_equal(written.astype(np.float32), held)
             if not same:
                 message = f"{name} is not that of the data, {held.tolist()}"
-                raise FileError("PTM-D735", f"accessors[{index}]", message)
+                raise FileError("PTM-D735", place, message)
 
     def _material(self, index: int) -> ReadMaterial:
         material = self._row("materials", index)

@@ -54,13 +54,15 @@ class ReadCell:
 
 
 def read_cell(document: Document, at: Place) -> ReadCell | None:
-    """The cell of a file, or None, and PTM-D663, if there is not one."""
+    """The cell of a file, or None if it lacks fields or, with PTM-D663, if there is not one."""
     nodes = document.of_type("PTMCell")
     if len(nodes) != 1:
         at.add("PTM-D663", f"{len(nodes)} PTMCell nodes, not 1")
         return None
+    if nodes[0].lacks:
+        return None
     fields, shapes = nodes[0].fields, document.of_type("Shape")
-    held = [fields["hullPoint"], *(s.at("geometry", "coord")["point"] for s in shapes)]
+    held = [fields["hullPoint"], *(s.at("geometry", "coord").get("point", ()) for s in shapes)]
     points = np.concatenate([some for some in held if len(some)] or [np.zeros((1, 3))])
     leaves = []
     if "leafPoint" in fields:
@@ -74,7 +76,7 @@ def read_cell(document: Document, at: Place) -> ReadCell | None:
         hull=fields["hullPoint"],
         box=np.stack([points.min(axis=0), points.max(axis=0)]),
         leaves=tuple(leaves),
-        textures=tuple(dict.fromkeys(texture["url"] for texture in textures if texture)),
+        textures=tuple(dict.fromkeys(texture["url"] for texture in textures if "url" in texture)),
     )
 
 
@@ -94,7 +96,9 @@ def check_cell(
     leaves = _check_leaves(node, cell, hull, tolerance, here)
     body, bodies = _without_rim(hull, box, tolerance), None
     for shape in document.of_type("Shape"):
-        there = at.at(f"line {shape.line}" + (f", {shape.name}" if shape.name else ""))
+        if shape.lacks:
+            continue
+        there = at.at(shape.place)
         _check_shape(shape, there)
         points = shape.at("geometry", "coord")["point"]
         far = farthest(body, points)

@@ -41,7 +41,9 @@ def served_files(folder: Path, found: Findings) -> list[str]:
             path = f"{below}{entry.name}"
             target = os.path.realpath(entry.path) if entry.is_symlink() else top
             if not Path(target).is_relative_to(top):
-                found.at(f"{SERVED}/{path}").add("PTM-D657", f"is a link to {target}")
+                found.at(f"{SERVED}/{path}").add(
+                    "PTM-D657", f"is a link to {os.readlink(entry.path)}"
+                )
             elif entry.is_dir(follow_symlinks=False):
                 folders.append(f"{path}/")
             elif os.path.isfile(entry):

@@ -10,7 +10,10 @@ from ptmtools.database.model import Issue, Severity
 
 #: Code → (severity, what it means). docs/database.md repeats this table.
 CODES: dict[str, tuple[Severity, str]] = {
-    "PTM-D650": ("error", "the manifest is missing or damaged"),
+    "PTM-D650": (
+        "error",
+        "the manifest is missing or damaged, or records options that a stage cannot have",
+    ),
     "PTM-D651": ("error", "a file of the database is missing"),
     "PTM-D652": ("error", "a file is not what its stage wrote: the hash differs"),
     "PTM-D653": ("warning", "a file in a folder of ptmtools that no stage wrote"),

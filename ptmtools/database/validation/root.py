@@ -23,12 +23,12 @@ class ReadRoot:
     ----------
     viewpoints: DEF name of each viewpoint → URL of its cell.
     poses: DEF name → the viewpoint's fields, which are named as in the hints.
-    inlines: URL → (2, 3) centre and size of its bounding box, as written.
+    inlines: URL → (2, 3) centre and size of its bounding box, as written; None if it lacks that.
     """
 
     viewpoints: dict[str, str]
     poses: dict[str, dict[str, Any]]
-    inlines: dict[str, NDArray[np.float64]]
+    inlines: dict[str, NDArray[np.float64] | None]
 
 
 def read_root(document: Document, at: Place) -> ReadRoot:
@@ -39,7 +39,7 @@ def read_root(document: Document, at: Place) -> ReadRoot:
     poses = {v.name: v.fields for v in document.of_type("Viewpoint")}
     viewpoints: dict[str, str] = {}
     for node in document.of_type("PTMViewpointCell"):
-        name, urls = node.fields["viewpoint"], node.fields["cellUrl"]
+        name, urls = node.fields.get("viewpoint", ""), node.fields.get("cellUrl", ())
         if name not in poses or name in viewpoints or len(urls) != 1:
             at.add("PTM-D699", f"{name!r} names no one viewpoint", f"line {node.line}")
         else:
@@ -53,13 +53,17 @@ def read_root(document: Document, at: Place) -> ReadRoot:
             here.add("PTM-D663", "info does not begin with the pattern")
         if {line for line in info if line.startswith("ptm:viewpoint ")} != wanted:
             here.add("PTM-D699", "info does not say the same of the viewpoints as PTMViewpointCell")
-    inlines: dict[str, NDArray[np.float64]] = {}
+    inlines: dict[str, NDArray[np.float64] | None] = {}
     for node in document.of_type("Inline"):
+        if "url" not in node.fields:
+            continue
         here, urls = at.at(f"line {node.line}"), node.fields["url"]
         if len(urls) != 1:
             here.add("PTM-D663", "an Inline without a URL")
         elif urls[0] in inlines:
             here.add("PTM-D699", f"{urls[0]} is listed twice")
+        elif node.lacks:
+            inlines[urls[0]] = None
         else:
             inlines[urls[0]] = np.stack([node.fields["bboxCenter"], node.fields["bboxSize"]])
     return ReadRoot(viewpoints, poses, inlines)
@@ -71,7 +75,9 @@ def check_root(root: ReadRoot, boxes: Mapping[str, NDArray[np.float64]], at: Pla
         if url not in root.inlines:
             at.add("PTM-D699", f"{url} is not inlined")
             continue
-        centre, size = root.inlines[url].astype(np.float32).astype(np.float64)
+        if (written := root.inlines[url]) is None:
+            continue
+        centre, size = written.astype(np.float32).astype(np.float64)
         slack = np.spacing(np.abs(box).max(axis=0).astype(np.float32))
         if not (np.abs(box - centre) <= size / 2 + slack).all():
             at.add("PTM-D699", "the bounding box does not hold the cell", url)

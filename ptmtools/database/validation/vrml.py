@@ -33,6 +33,10 @@ def read_file(path: str, data: bytes) -> Document | Row | None:
 def check_files(database: ServedDatabase) -> Mapping[str, int]:
     """All of them; counts shapes, triangles and viewpoints."""
     documents = {p: d for p, d in database.held.items() if isinstance(d, Document)}
+    for path, document in documents.items():
+        for node in document.nodes:
+            for lack in node.lacks:
+                database.at(path, node.place).add("PTM-D663", lack)
     cells = _check_cells(documents, database)
     root = _check_root(documents.get(ROOT), cells, database)
     _check_hints(root, cells, database)

@@ -15,6 +15,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_left
 from dataclasses import dataclass
+from itertools import islice, takewhile
 from typing import Any, NoReturn
 
 import numpy as np
@@ -36,21 +37,25 @@ _STRING = re.compile(r'"((?:[^"\\\r\n]++|\\["\\])*+)"')
 _STRINGS = re.compile(rf"(?:[ \t\n,]++|{_STRING.pattern})*+")
 _ESCAPED = re.compile(r"\\(.)")
 _NOT_FINITE = re.compile(r"[+-]?(?:nan|inf|infinity)\b", re.IGNORECASE)
-_PROTOS = [
-    (re.compile(r"[ \t\n,]++".join(map(re.escape, declaration(*proto).split()))), proto)
-    for proto in PROTOS
-]
+_PROTO_WORD = re.compile(r"[^ \t\n,]++")
+_PROTOS = [(declaration(*proto).split(), proto) for proto in PROTOS]
 
 
 @dataclass(frozen=True)
 class Node:
     """A node: strings and truths are Python's; numbers are arrays, (n, width) for multiple values
-    of vectors and colours; nodes are nodes. `line` is where it begins."""
+    of vectors and colours; nodes are nodes. `line` is where it begins; `lacks` says which fields of
+    the pattern it lacks, or those in it."""
 
     type: str
     name: str
     fields: dict[str, Any]
     line: int
+    lacks: tuple[str, ...]
+
+    @property
+    def place(self) -> str:
+        return f"line {self.line}" + (f", {self.name}" if self.name else "")
 
     def at(self, *path: str) -> dict[str, Any]:
         """The fields of the node in a field, or in a field of that; empty if there is none."""
@@ -74,8 +79,8 @@ def parse(data: bytes) -> Document:
     """Reads a file.
 
     Raises FileError: at the first thing that is not as in the emission pattern: PTM-D660 for bytes
-    that are not UTF-8, PTM-D662 for a number that is not finite, PTM-D663 for a node that lacks a
-    field, PTM-D661 for all else.
+    that are not UTF-8, PTM-D662 for a number that is not finite, PTM-D663 for a PROTO of other
+    fields, PTM-D661 for all else.
     """
     try:
         text = data.decode("utf-8")
@@ -104,12 +109,28 @@ class _Reader:
         return Document(tuple(nodes))
 
     def _proto(self) -> None:
-        for pattern, (name, fields) in _PROTOS:
-            if name not in self._types and (found := pattern.match(self._text, self._at)):
+        # How many words are the same as in a PROTO of the pattern, where the next one begins, and
+        # whether there a field of the pattern is not declared.
+        alike = [(0, self._at, False)]
+        for words, (name, fields) in _PROTOS:
+            if name in self._types:
+                continue
+            found = [*islice(_PROTO_WORD.finditer(self._text, self._at), len(words))]
+            pairs = zip(words, found, strict=False)
+            same = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1].group(), pairs))
+            if same == len(words):
                 self._types[name] = fields
-                self._at = found.end()
+                self._at = found[-1].end()
                 return
-        self._fail("a PROTO that the emission pattern does not have, or has once")
+            at = found[same].start() if same < len(found) else len(self._text)
+            alike.append((same, at, 3 <= same < words.index("{") and words[same].isalpha()))
+        _, self._at, declares = max(alike)
+        word = self._text[self._at : self._at + 12]
+        if declares:
+            self._fail(
+                f"{word!r}: the PROTO does not declare the pattern's fields", code="PTM-D663"
+            )
+        self._fail(f"{word!r} is in no PROTO of the emission pattern, or the PROTO stands twice")
 
     def _node(self, type: str) -> Node:
         name = ""
@@ -133,10 +154,14 @@ class _Reader:
                 self._fail(f"{type} has two fields {field!r}")
             fields[field] = self._value(known[field].removesuffix("?"))
         self._take("}")
-        for field, wanted in known.items():
-            if field not in fields and not wanted.endswith("?"):
-                raise FileError("PTM-D663", f"line {line}", f"{type} lacks {field}")
-        node = Node(type, name, fields, line)
+        lacks = [
+            f"{type} lacks {field}"
+            for field, wanted in known.items()
+            if field not in fields and not wanted.endswith("?")
+        ]
+        for value in fields.values():
+            lacks += value.lacks if isinstance(value, Node) else ()
+        node = Node(type, name, fields, line, tuple(lacks))
         if name:
             self._names[name] = node
         return node
