@@ -112,14 +112,16 @@ def writing(path: str | os.PathLike[str]) -> Iterator[None]:
         raise output_error(path, error) from error
 
 
-def refuse_existing(path: str | os.PathLike[str]) -> None:
+def refuse_existing(
+    path: str | os.PathLike[str], remedy: str = "use --force to replace it, or name another file"
+) -> None:
     """Raise OutputError PTM-O001 if there is something at ``path``."""
     if os.path.lexists(path):
         raise OutputError(
             "PTM-O001",
             "already exists and was not changed",
             file=path,
-            remedy="use --force to replace it, or name another file",
+            remedy=remedy,
         )
 
 

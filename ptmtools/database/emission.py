@@ -58,7 +58,8 @@ def emit(
     owned = [name for emitter in emitters for name in emitter.owns]
     for name in owned:
         if not force:
-            refuse_existing(folder / name)
+            remedy = "name another folder, or give --force to overwrite it"
+            refuse_existing(folder / name, remedy)
     viewpoints, notes = place_viewpoints(scene, cells, options)
     content = Content(scene, cells, pvs, ach, textures, viewpoints, options, progress)
     written = [emitter.files(content) for emitter in emitters]

@@ -33,6 +33,12 @@ from ptmtools.scene.texels import uses_holes
 SMALLEST_EXTENT, LARGEST_EXTENT = 1e-6, 1e9
 #: Colours where the model gives none: plain faces, and a tint that leaves an image as it is.
 PLAIN, WHITE = (0.8, 0.8, 0.8), (1.0, 1.0, 1.0)
+#: What the system says of links in a circle, of sockets, and `open_regular` of pipes and devices.
+_NO_FILE = {
+    errno.ELOOP: "no such file",
+    errno.ENXIO: "not a regular file",
+    errno.EINVAL: "not a regular file",
+}
 
 
 def ingest(
@@ -70,7 +76,12 @@ def ingest(
     findings = Findings(model, options.allow_outside)
     source = _read(model, findings, progress, options.max_triangles)
     if len(source.points) > MAX_VERTICES or len(source.triangles) > MAX_VERTICES:
-        raise LimitError("PTM-L200", f"more than {MAX_VERTICES} vertices or faces", file=model)
+        raise LimitError(
+            "PTM-L200",
+            f"more than {MAX_VERTICES} vertices or faces",
+            file=model,
+            remedy="split the model",
+        )
 
     kept = keep_faces(source.points, source.triangles)
     if not len(kept.triangles):
@@ -136,14 +147,15 @@ def check_file(model: Path) -> None:
         with open_regular(model) as stream:
             if not stream.read(1):
                 raise InputError("PTM-I242", "empty file", file=model)
-    except IsADirectoryError:
-        remedy = "name the model file in it"
-        raise InputError("PTM-I241", "is a directory", file=model, remedy=remedy) from None
     except (FileNotFoundError, NotADirectoryError, ValueError):  # also a NUL byte in the name
         raise InputError("PTM-I240", "no such file", file=model) from None
     except OSError as error:
-        code = "PTM-I240" if error.errno == errno.EINVAL else "PTM-I256"  # EINVAL: no file
-        raise InputError(code, error.strerror or str(error), file=model) from None
+        if os.path.isdir(model):  # also one that may not be read
+            remedy = "name the model file in it"
+            raise InputError("PTM-I241", "is a directory", file=model, remedy=remedy) from None
+        if what := _NO_FILE.get(error.errno or 0):
+            raise InputError("PTM-I240", what, file=model) from None
+        raise InputError("PTM-I256", error.strerror or str(error), file=model) from None
 
 
 def _read(model: Path, findings: Findings, progress: Progress, max_triangles: int) -> Source:

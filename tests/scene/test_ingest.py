@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
+import os
 import pickle
+import socket
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -329,17 +332,30 @@ def test_supported_formats_are_listed(put: Put) -> None:
 
 
 def test_bad_places_and_options(put: Put, tmp_path: Path) -> None:
-    path = put("a.obj", QUAD + FACE)
+    path, circle, listening = put("a.obj", QUAD + FACE), tmp_path / "b.obj", tmp_path / "c.obj"
+    circle.symlink_to(circle)
+    # The name of a socket may have about a hundred characters.
+    with contextlib.closing(socket.socket(socket.AF_UNIX)) as unheard:
+        unheard.bind(os.path.relpath(listening))
     cases: list[tuple[Path | str, dict[str, Any], str]] = [
         (tmp_path, {}, "PTM-I241"),
         (tmp_path / "gone.obj", {}, "PTM-I240"),
         ("a\0.obj", {}, "PTM-I240"),
+        (circle, {}, r"no such file.*PTM-I240"),
+        (listening, {}, r"not a regular file.*PTM-I240"),
         (path, {"unit": "mile"}, "PTM-I250"),
         (path, {"up": "x"}, "PTM-I251"),
     ]
     for place, options, code in cases:
         with pytest.raises(PtmError, match=code):
             ingest(place, IngestOptions(**options))
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read all")
+def test_a_folder_that_may_not_be_read(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").mkdir(0o300)
+    with pytest.raises(InputError, match="PTM-I241"):
+        ingest(tmp_path / "a.obj")
 
 
 def test_progress_ends_at_its_total(textured: Textured) -> None:

@@ -47,7 +47,7 @@ def read_exr(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
     except Exception as error:  # its errors have no class in common
         raise damaged_image(error) from None
     if parts > 1:
-        raise several(f"{parts} parts")
+        raise several(f"{parts} parts", "export only the one you want")
     wanted = next((order for order in _CHANNELS.values() if set(order) == names), None)
     if wanted is None or sampled:
         raise unsupported(f"the channels {', '.join(sorted(names))}")

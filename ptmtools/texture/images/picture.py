@@ -131,13 +131,9 @@ def damaged_image(what: object) -> InputError:
     )
 
 
-def several(what: str) -> InputError:
+def several(what: str, remedy: str = "export the one you want as PNG") -> InputError:
     """The error for a file of more than one image."""
-    return InputError(
-        "PTM-I127",
-        f"holds {what}; a texture is one image",
-        remedy="export the one you want as PNG",
-    )
+    return InputError("PTM-I127", f"holds {what}; a texture is one image", remedy=remedy)
 
 
 def unsupported(what: str) -> InputError:
