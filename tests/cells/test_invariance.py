@@ -81,11 +81,17 @@ def models(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Model]:
 
 def measures(cells: Cells) -> tuple[np.ndarray, np.ndarray]:
     """(L, 3) centroids and (L,) volumes of the leaves."""
-    corners, leaf = cells.tetrahedra()
-    part = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6
-    volume = np.bincount(leaf, part)
-    centre = [np.bincount(leaf, part * places) for places in corners.mean(axis=1).T] / volume
-    return centre.T, volume
+    centre, volume = np.zeros((cells.leaf_count, 3)), np.zeros(cells.leaf_count)
+    for leaf in range(cells.leaf_count):
+        middle = cells.leaf_points(leaf).mean(axis=0)
+        first, last = cells.leaf_face_start[leaf : leaf + 2]
+        rings = np.split(cells.face_index, cells.face_start[1:-1])[first:last]
+        fans = [(r[0], *r[i : i + 2]) for r in rings for i in range(1, len(r) - 1)]
+        corners = cells.leaf_point[np.array(fans)] - middle
+        part = np.linalg.det(corners) / 6
+        volume[leaf] = part.sum()
+        centre[leaf] = middle + part @ corners.sum(axis=1) / (4 * volume[leaf])
+    return centre, volume
 
 
 def assert_same(

@@ -1,8 +1,8 @@
 """A decoder of the context mixing coder in plain Python, written from ``docs/profile-small.md``.
 
-It shares nothing with the compiled decoder but the numbers of the format. The tests compare the
-two; whoever ports the format can step through it. Thousands of times slower; no damage is looked
-for.
+It shares nothing with the compiled decoder but the numeric tables and the order of planes. The
+tests compare the two; whoever ports the format can step through it. Thousands of times slower; no
+damage is looked for.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.texture.coders.haar.reference import edge
-from ptmtools.texture.coders.mixing import kernels, tables
-from ptmtools.texture.coders.mixing.kernels import COLOUR_AT, PARENTS_AT, TEXELS_AT
+from ptmtools.texture.coders.mixing import tables
 from ptmtools.texture.coders.planes import plane_order
 
 SQUASH: list[int] = tables.squash().tolist()
@@ -24,8 +23,25 @@ STRETCH: list[int] = tables.stretch(tables.squash()).tolist()
 SOFT_PLUS: list[int] = tables.soft_plus().tolist()
 SURVIVAL: list[int] = tables.survival().tolist()
 LEVEL: list[int] = tables.magnitude().tolist()
-RATE: list[int] = tables.rates().tolist()
-BUCKETS, WITHIN = kernels.BUCKETS.tolist(), kernels.WITHIN.tolist()
+RATE = [655360 // (10 * n + 16) for n in range(1024)]
+BUCKETS = [1, 2, 3, 5, 9, 17, 33, 65, 129, 257, 513]
+WITHIN = [0, 0, 0, 1, 4, 11, 14, 17, 20, 20]
+W, N, NW, NE = (0, -1), (-1, 0), (-1, -1), (-1, 1)
+TEXELS = [
+    [W, N, NW, NE, (1, -1), (0, -2), (-2, 0), (-1, 2)],
+    [W, N, NW, NE, (0, -2), (-1, 2), (-2, 0), (1, -2)],
+    [W, N, NW, NE, (-2, 0), (0, -2), (1, -1), (-2, 1)],
+    [N, NW, NE, (0, -2), (-2, 0)],
+    [W, N, NW, NE, (0, -2), (-2, 0)],
+]
+PARENTS = [
+    [(0, 1), (1, 0), (1, 1), (1, -1), (-1, 1)],
+    [(0, 1), (1, 0), (1, 1), (-1, 1), (1, -1)],
+    [(0, 1), (1, 0), (1, 1), (1, -1)],
+    [(0, 1), (1, 0), (1, 1)],
+    [],
+]
+COLOUR = [[(0, 0), W, N, (0, 1), (1, 0)]] * 3 + [[(0, 0), (1, 0), N, (0, 1)], [(0, 0), W, N]]
 
 Grid = dict[tuple[int, int], int]
 
@@ -235,13 +251,13 @@ def _texel(
 
     mean, w, n, nw, ne = P(0, 0), T(0, -1), T(-1, 0), T(-1, -1), T(-1, 1)
     base = mean if k < 3 else w
-    sample = [T(*d) - base for d in TEXELS_AT[k]] + [P(*d) - base for d in PARENTS_AT[k]]
+    sample = [T(*d) - base for d in TEXELS[k]] + [P(*d) - base for d in PARENTS[k]]
     for ref in refs:
         if k < 3:
             here = sum(ref.texel[2 * by + i, 2 * bx + j] for i in (0, 1) for j in (0, 1)) >> 2
         else:
             here = ref.texel[y, x - 1]
-        sample += [near(ref.texel, y, x)(*d) - here for d in COLOUR_AT[k]]
+        sample += [near(ref.texel, y, x)(*d) - here for d in COLOUR[k]]
     features = len(sample)
     sample += [0] * (24 - features)
 

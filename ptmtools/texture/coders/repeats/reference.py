@@ -1,7 +1,7 @@
 """A decoder of the repeats coder in plain Python, written from ``docs/format-ptm.md``.
 
-It shares nothing with the compiled decoder but the numbers of the format and how bytes are read.
-The tests compare the two; whoever ports the format can step through it. No damage is looked for.
+It shares nothing with the compiled decoder but the order of planes and how bytes are read. The
+tests compare the two; whoever ports the format can step through it. No damage is looked for.
 """
 
 from __future__ import annotations
@@ -15,14 +15,13 @@ from ptmtools.texture.coders.haar.reference import by_value, edge
 from ptmtools.texture.coders.planes import plane_order
 from ptmtools.texture.coders.rans.reference import Symbols, read_tables
 from ptmtools.texture.coders.reading import Reader
-from ptmtools.texture.coders.repeats import coder
-from ptmtools.texture.coders.repeats.coder import CLASS_BOUNDS
 
 #: A texel: one integer for each component.
 Texel = tuple[int, ...]
 Block = tuple[Texel, Texel, Texel, Texel]
 
-WEIGHTS = coder.WEIGHTS.tolist()
+WEIGHTS = [[20, 24, -10, -7], [2, 27, -12, -2], [13, -7, -6, -39]]
+CLASS_BOUNDS = [2, 4, 8, 16, 32, 64, 128, 256, 512]
 K = [0x9E3779B1, 0x85EBCA6B, 0xC2B2AE35, 0x27D4EB2F, 0x165667B1, 0xA24BAED5]
 
 
