@@ -19,6 +19,7 @@ Task = Lazy[Callable[[], object]]
 #: For the other process to end, seconds, when this one does.
 PATIENCE = 5.0
 _begun: set[Task] = set()
+_waiting: list[Task] = []
 
 
 def compile_now(task: Task) -> bool:
@@ -33,6 +34,18 @@ def compile_now(task: Task) -> bool:
             done.parent.mkdir(parents=True, exist_ok=True)
             done.touch()
     return True
+
+
+def compile_ahead_if_needed(task: Task) -> None:
+    """As `compile_ahead`, but only once this process compiles something: for what is over before
+    another process could find out that all is there."""
+    _waiting.append(task)
+
+
+def begin_waiting() -> None:
+    """Called as something is compiled."""
+    while _waiting:
+        compile_ahead(_waiting.pop(0))
 
 
 def compile_ahead(task: Task) -> None:

@@ -15,6 +15,7 @@ import numba
 import numba.core.event
 import numba.extending
 
+from ptmtools.ahead import begin_waiting
 from ptmtools.machine_code import announce_compilation, folder_of
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -212,6 +213,7 @@ class _FirstCompilation(numba.core.event.Listener):
             self._prepared = True
             _load_without_scipy()
             announce_compilation()
+            begin_waiting()
 
     def on_end(self, event: Any) -> None:
         pass

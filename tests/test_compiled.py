@@ -128,6 +128,33 @@ print(inner(1.0))
         assert run(program, package.parent, NUMBA_CACHE_DIR="") == lines
 
 
+def test_what_is_over_soon_waits_until_something_is_compiled(package: Path) -> None:
+    (package / "task.py").write_text(
+        "from pathlib import Path\ndef begin():\n    Path('ptmtools/begun').touch()"
+    )
+    program = """
+import time
+from pathlib import Path
+from ptmtools.ahead import compile_ahead_if_needed
+from ptmtools.lazy import Lazy
+from ptmtools.progress import listen
+said = []
+listen(said.append)
+compile_ahead_if_needed(Lazy("ptmtools.task:begin"))
+from ptmtools.two import inner
+inner(1)
+while said and not Path("ptmtools/begun").exists():
+    time.sleep(0.01)
+print(len(said))
+"""
+    assert run(program, package.parent, NUMBA_CACHE_DIR="") == ["1"]
+    for done in package.glob("*/*/*.done"):
+        done.unlink()
+    (package / "begun").unlink()
+    assert run(program, package.parent, NUMBA_CACHE_DIR="") == ["0"]
+    assert not (package / "begun").exists()
+
+
 def test_literals_are_not_types_of_their_own(package: Path) -> None:
     """Numba alone would compile inner kernels anew for every literal."""
     (package / "one.py").write_text(

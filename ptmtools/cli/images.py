@@ -10,7 +10,7 @@ from typing import IO, Any
 
 import click
 
-from ptmtools.ahead import compile_ahead
+from ptmtools.ahead import compile_ahead_if_needed
 from ptmtools.cli.batch import (
     STANDARD,
     Batch,
@@ -64,7 +64,7 @@ def encode(
         _refuse_image_suffix(output)
     ahead = PROFILES[options.profile].ahead
     if ahead and (batch.workers or processors()) > 1:
-        compile_ahead(ahead)
+        compile_ahead_if_needed(ahead)
 
     def work(job: Job, threads: int) -> Report:
         source, target = job.source, job.target
