@@ -8,8 +8,8 @@ from ptmtools.lazy import names
 
 if TYPE_CHECKING:
     from ptmtools.cells.model import Cells as Cells
-    from ptmtools.cells.naming import structural_triangles as structural_triangles
     from ptmtools.cells.options import SubdivideOptions as SubdivideOptions
+    from ptmtools.cells.structure import structural_triangles as structural_triangles
     from ptmtools.cells.subdivision import subdivide as subdivide
 
 __getattr__ = names(__name__)

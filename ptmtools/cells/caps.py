@@ -25,8 +25,8 @@ from ptmtools.tolerance import ranked
 
 #: Areas are compared with this share to spare before polygons are.
 _SPARE = 1e-3
-#: So many planes are cut with a leaf at a time, and so many are held against all triangles.
-_CHUNK, _ROWS = 4096, 256
+#: So many planes are cut with a leaf at a time.
+_CHUNK = 4096
 
 
 def closing(structure: Structure, body: Polyhedron) -> list[WallPlane]:
@@ -40,14 +40,16 @@ def closing(structure: Structure, body: Polyhedron) -> list[WallPlane]:
     near = near[~apart.any(axis=1)]
     inside = _reaching_into(body, structure, near)
     areas, planes = structure.areas[inside], structure.planes[inside]
+    beside = structure.bins.beside(inside, areas)
     needed = _section_areas(body, planes) * (1 - _SPARE)
-    free = needed <= areas.sum()
-    free[free] = needed[free] <= _in_planes(planes[free], structure, inside)
+    free = needed <= beside
+    own = structure.bins.own[inside]
     found: list[tuple[int, WallPlane]] = []
-    for seed in ranked(areas):
+    for seed in ranked(np.where(free, areas, 0.0))[: np.count_nonzero(free)]:
         if not free[seed]:
             continue
-        members = np.flatnonzero(structure.lie_in(planes[seed], inside))
+        mates = np.flatnonzero(structure.bins.holds(own[seed], inside))
+        members = mates[structure.lie_in(planes[seed], inside[mates])]
         free[members] = False
         free[seed] = False
         if areas[members].sum() >= needed[seed]:
@@ -64,17 +66,6 @@ def _reaching_into(body: Polyhedron, structure: Structure, triangles: Ints) -> I
         height = structure.corners[found] @ plane[:3] + plane[3]
         found = found[height.min(axis=1) < -structure.tolerance.plane]
     return found
-
-
-def _in_planes(planes: Floats, structure: Structure, triangles: Ints) -> Floats:
-    """(n,) for each of (n, 4) planes at least the area of those triangles that lie in it."""
-    middle, areas = structure.corners[triangles].mean(axis=1), structure.areas[triangles]
-    found = [np.zeros(0)]
-    for first in range(0, len(planes), _ROWS):
-        plane = planes[first : first + _ROWS]
-        height = plane[:, :3] @ middle.T + plane[:, 3:]
-        found.append((np.abs(height) <= structure.tolerance.plane) @ areas)
-    return np.concatenate(found)
 
 
 def _cap(body: Polyhedron, plane: Floats, structure: Structure, near: Ints) -> WallPlane | None:

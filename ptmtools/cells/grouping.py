@@ -65,14 +65,31 @@ def rank_in_file(cells: Cells) -> Ints:
     held = np.bincount(row, area[piece])
     whole = np.bincount(source, area)[pair % max(count, 1)]
     share = np.round(np.divide(held, whole, out=np.zeros(len(held)), where=whole > 0), DIGITS)
-    held_by: list[list[tuple[int, float]]] = [[] for _ in range(cells.leaf_count)]
-    for at, part in zip(pair.tolist(), share.tolist(), strict=True):
-        if part > 0:
-            held_by[at // count].append((at % count, -part))
-    rank = np.empty(cells.leaf_count, dtype=np.int64)
-    # A leaf that holds nothing more comes last, not first.
-    key = [[*held, (count, 0.0)] for held in held_by]
-    rank[sorted(range(cells.leaf_count), key=key.__getitem__)] = np.arange(cells.leaf_count)
+    holds = share > 0
+    return _in_order(pair[holds] // count, pair[holds] % count, share[holds], cells.leaf_count)
+
+
+def _in_order(leaf: Ints, source: Ints, share: Floats, leaves: int) -> Ints:
+    """(leaves,) the places of leaves in order, given the share that each, ascending, holds of each
+    source, ascending: the more of an earlier one, the earlier. A leaf that holds nothing more
+    comes last, not first."""
+    start = np.searchsorted(leaf, np.arange(leaves + 1))
+    source, share = np.append(source, np.iinfo(np.int64).max), np.append(share, 0.0)
+    before = np.zeros(leaves, dtype=np.int64)  # how many leaves come before each
+    tied, k = np.arange(leaves), 0
+    while len(tied):
+        at = np.where(start[tied] + k < start[tied + 1], start[tied] + k, len(leaf))
+        order = np.lexsort((-share[at], source[at], before[tied]))
+        tied, at = tied[order], at[order]
+        group = np.diff(before[tied], prepend=-1) > 0
+        run = group | (np.diff(source[at], prepend=-1) != 0) | (np.diff(share[at], prepend=-1) != 0)
+        row = np.arange(len(tied))
+        first_of_run = np.maximum.accumulate(np.where(run, row, 0))
+        before[tied] += first_of_run - np.maximum.accumulate(np.where(group, row, 0))
+        alone = run & np.append(run[1:], True)
+        tied, k = tied[~alone & (at < len(leaf))], k + 1
+    rank = np.empty(leaves, dtype=np.int64)
+    rank[np.lexsort((np.arange(leaves), before))] = np.arange(leaves)
     return rank
 
 

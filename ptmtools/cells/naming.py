@@ -12,8 +12,8 @@ from ptmtools.cells.options import SubdivideOptions
 from ptmtools.scene.model import Scene
 
 
-def structural_triangles(scene: Scene, options: SubdivideOptions) -> Bools:
-    """(T,) which triangles occlude: opaque, and not called detail by name."""
+def may_occlude(scene: Scene, options: SubdivideOptions) -> Bools:
+    """(T,) which triangles are opaque and not called detail by name."""
     detail = named(scene, options.detail) & ~named(scene, options.structural)
     return scene.opaque & ~detail
 

@@ -34,6 +34,8 @@ class SubdivideOptions:
         area. May be given several times.
     detail: objects or materials (names, with * and ?) that never divide the building and never hide
         anything, such as furniture; --structural takes precedence. May be given several times.
+    detail_by_shape: take for detail, too, what is small, dense and round, such as sofas, statues
+        and plants: it can neither divide nor hide anything.
     cells: what a cell, the unit that clients load and draw, consists of: a single "leaf", or a
         "room", all leaves between its doors; but see --gain.
     gain: keep the leaves of a room as separate cells if that saves viewers at least this share of
@@ -48,6 +50,7 @@ class SubdivideOptions:
     max_leaves: int = field(default=10_000, metadata={"was": ("max-cells",)})
     structural: tuple[str, ...] = ()
     detail: tuple[str, ...] = ()
+    detail_by_shape: bool = True
     cells: CellKind = "room"
     gain: float = 0.1
     viewpoints: tuple[Position, ...] = field(

@@ -6,10 +6,12 @@ source triangle. A piece that *lies* in a plane has two owners: the leaf that it
 the one behind it. It therefore sinks twice, once siding with its front and once with its back
 (design, "Ownership": true positions decide, not the plane that a cluster was snapped to).
 
-A whole tree node is treated at once in numpy, pieces as arrays; crossing points are computed from
-the endpoint in front to the endpoint behind, so that two triangles sharing an edge are cut in the
-same point to the last bit. Pieces outside the root box belong to the leaf that the planes alone
-assign: nothing of the model is lost to a clipped box.
+Most triangles end in one leaf, or in the two on both sides of a plane, in one piece: a compiled
+loop takes them there (`ownership_kernels`). Of those that are cut a whole tree node is treated at
+once in numpy, pieces as arrays; crossing points are computed from the endpoint in front to the
+endpoint behind, so that two triangles sharing an edge are cut in the same point to the last bit.
+Pieces outside the root box belong to the leaf that the planes alone assign: nothing of the model is
+lost to a clipped box.
 """
 
 from __future__ import annotations
@@ -28,11 +30,12 @@ from ptmtools.tolerance import Tolerance
 
 @dataclass(frozen=True)
 class Pieces:
-    """Triangles cut to the leaves."""
+    """Triangles cut to the leaves, in the order of the scene's triangles that they are of."""
 
-    corner: Floats  # (M, 3, 6) positions, and barycentric coordinates in the source triangle
     source: Ints  # (M,) index of the scene's triangle
     leaf: Ints  # (M, 2) leaf of the tree on the front and on the back
+    cut: Ints  # (K,) which pieces are not whole triangles, ascending
+    corner: Floats  # (K, 3, 6) their positions, and barycentric coordinates in the source triangle
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,7 @@ class _Batch:
     source: Ints
     front: Ints  # (n,) the leaf on their front, once that is known
     lying: Bools  # (n,) whether they lay in some plane on the way
+    at: Ints  # (n,) where they are: a node, or leaf i as -2 - i
 
     def take(self, rows: Ints | Bools) -> _Batch:
         return _Batch(*(array[rows] for array in vars(self).values()))
@@ -57,60 +61,97 @@ def cut_to_leaves(scene: Scene, tree: Tree, tolerance: Tolerance) -> Pieces:
     """Cut all triangles of a scene along the planes of a tree."""
     corners = scene.corners
     facing = normals(corners)
-    count = len(corners)
-    whole = _Batch(
-        corner=np.concatenate([corners, np.tile(np.eye(3), (count, 1, 1))], axis=2),
-        source=np.arange(count),
-        front=np.full(count, -1),
-        lying=np.zeros(count, dtype=bool),
+    at, lying = _settled(tree, corners, facing, tolerance)
+    front = np.where(at < 0, -2 - at, -1)
+    cut = _cut(tree, _batch(corners, at >= 0, front, lying, at), facing, tolerance)
+    cut = replace(cut, front=-2 - cut.at)
+    # What lies in a plane sinks again, siding with its back.
+    back = at.copy()
+    twice = np.flatnonzero(lying & (at < 0))
+    back[twice], _ = _settled(tree, corners[twice], -facing[twice], tolerance)
+    again = cut.take(cut.lying)
+    down, _ = _settled(tree, again.corner[..., :3], -facing[again.source], tolerance)
+    boundary = _batch(corners, (at < 0) & (back >= 0), front, lying, back)
+    boundary = _Batch.join([boundary, replace(again, at=down)])
+    boundary = _cut(tree, boundary, -facing, tolerance)
+    whole = np.flatnonzero((at < 0) & (back < 0))
+    within = cut.take(~cut.lying)
+    parts = _Batch.join([within, boundary])
+    source = np.concatenate([whole, parts.source])
+    order = np.argsort(source, kind="stable")
+    sides = np.concatenate([-2 - back[whole], -2 - parts.at])
+    is_cut = order >= len(whole)
+    return Pieces(
+        source[order],
+        np.stack([np.append(front[whole], parts.front), sides], axis=1)[order],
+        np.flatnonzero(is_cut),
+        parts.corner[order[is_cut] - len(whole)],
     )
-    batch, front = _sink(tree, whole, facing, tolerance)
-    boundary = replace(batch, front=front).take(batch.lying)
-    boundary, back = _sink(tree, boundary, -facing, tolerance)
-    within = ~batch.lying
-    pieces = _Batch.join([batch.take(within), boundary])
-    leaf = np.stack(
-        [np.append(front[within], boundary.front), np.append(front[within], back)], axis=1
-    )
-    order = np.argsort(pieces.source, kind="stable")
-    return Pieces(pieces.corner[order], pieces.source[order], leaf[order])
 
 
-def _sink(tree: Tree, batch: _Batch, facing: Floats, tolerance: Tolerance) -> tuple[_Batch, Ints]:
-    """Let pieces sink to leaves; what lies in a plane goes to the side that ``facing`` (one
-    direction per scene triangle) points to. Returns the cut pieces and the leaf of each."""
-    arrived: list[_Batch] = []
-    leaves: list[Ints] = []
-    stack = [(0 if len(tree.planes) else -2, batch)]
+def _batch(corners: Floats, which: Bools, front: Ints, lying: Bools, at: Ints) -> _Batch:
+    """Those of all triangles that are about to be cut."""
+    rows = np.flatnonzero(which)
+    shares = np.broadcast_to(np.eye(3), (len(rows), 3, 3))
+    corner = np.concatenate([corners[rows], shares], axis=2)
+    return _Batch(corner, rows, front[rows], lying[rows], at[rows])
+
+
+def _settled(
+    tree: Tree, corners: Floats, facing: Floats, tolerance: Tolerance
+) -> tuple[Ints, Bools]:
+    """(n,) how far (n, 3, 3) triangles sink in one piece, to a node that cuts them or to leaf i as
+    -2 - i, and (n,) whether they lie in the plane of a node on the way; such a one goes to the side
+    that ``facing``, (n, 3), points to."""
+    from ptmtools.cells.ownership_kernels import sink
+
+    at = np.full(len(corners), 0 if len(tree.planes) else -2)
+    lying = np.zeros(len(corners), dtype=bool)
+    sink(tree.planes, tree.children, corners, facing, tolerance.plane, at, lying)
+    return at, lying
+
+
+def _cut(tree: Tree, batch: _Batch, facing: Floats, tolerance: Tolerance) -> _Batch:
+    """Cuts pieces at the nodes where they are, and on down to the leaves; what lies in a plane goes
+    to the side that ``facing`` (one direction per scene triangle) points to."""
+    arrived = [batch.take(batch.at < 0)]
+    order = np.argsort(batch.at, kind="stable")
+    start = np.searchsorted(batch.at[order], np.arange(len(tree.planes) + 1))
+    nothing = batch.take(np.zeros(0, dtype=np.int64))
+    stack = [(0, nothing)] if len(tree.planes) else []
     while stack:
         node, here = stack.pop()
         if node < 0:
-            arrived.append(here)
-            leaves.append(np.full(len(here.source), -2 - node))
+            arrived.append(replace(here, at=np.full(len(here.at), node)))
             continue
-        plane = tree.planes[node]
-        distance = here.corner[..., :3] @ plane[:3] + plane[3]
-        ahead = distance > tolerance.plane
-        behind = distance < -tolerance.plane
-        some_ahead, some_behind = ahead.any(axis=1), behind.any(axis=1)
-        lies = ~some_ahead & ~some_behind
-        turned = facing[here.source] @ plane[:3] > 0
-        to_front = some_ahead & ~some_behind | lies & turned
-        to_back = some_behind & ~some_ahead | lies & ~turned
-        crossing = some_ahead & some_behind
-        here = replace(here, lying=here.lying | lies)
-        sides = [[here.take(to_front)], [here.take(to_back)]]
-        if crossing.any():
-            sign = ahead[crossing].astype(np.int8) - behind[crossing]
-            for side, parts in enumerate(_split(here.take(crossing), distance[crossing], sign)):
-                sides[side].extend(parts)
-        for side in (0, 1):
-            joined = _Batch.join(sides[side])
-            if len(joined.source):
-                stack.append((int(tree.children[node, side]), joined))
-    if not arrived:
-        return batch, np.zeros(0, dtype=np.int64)
-    return _Batch.join(arrived), np.concatenate(leaves)
+        waiting = order[start[node] : start[node + 1]]
+        here = _Batch.join([here, batch.take(waiting)]) if len(waiting) else here
+        sides = _parted(here, tree.planes[node], facing, tolerance) if len(here.at) else [here] * 2
+        stack += zip(tree.children[node].tolist(), sides, strict=True)
+    return _Batch.join(arrived)
+
+
+def _parted(here: _Batch, plane: Floats, facing: Floats, tolerance: Tolerance) -> list[_Batch]:
+    """What of some pieces is in front of a (4,) plane, and what is behind it."""
+    x, y, z = (here.corner[..., k] for k in range(3))
+    distance = x * plane[0] + y * plane[1] + z * plane[2] + plane[3]  # to the bit as `sink` has it
+    ahead = distance > tolerance.plane
+    behind = distance < -tolerance.plane
+    some_ahead, some_behind = ahead.any(axis=1), behind.any(axis=1)
+    lies = ~some_ahead & ~some_behind
+    turned = facing[here.source] @ plane[:3] > 0
+    to_front = some_ahead & ~some_behind | lies & turned
+    to_back = some_behind & ~some_ahead | lies & ~turned
+    crossing = some_ahead & some_behind
+    here = replace(here, lying=here.lying | lies)
+    sides = [[here.take(to_front)], [here.take(to_back)]]
+    if crossing.any():
+        sign = ahead[crossing].astype(np.int8) - behind[crossing]
+        for side, parts in zip(
+            sides, _split(here.take(crossing), distance[crossing], sign), strict=True
+        ):
+            side.extend(parts)
+    return [_Batch.join(side) for side in sides]
 
 
 def _split(

@@ -22,22 +22,17 @@ import numpy as np
 import shapely
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.cells.naming import named, structural_triangles
+from ptmtools.cells.bins import Bins
+from ptmtools.cells.detail import recognised
+from ptmtools.cells.facets import UPWARD, Facets
+from ptmtools.cells.naming import may_occlude, named
 from ptmtools.cells.nearby import Nearby
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
 from ptmtools.cells.vectors import cross, normals
+from ptmtools.cells.welding import Welded
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import TIE_SHARE, Tolerance, ranked
-
-#: Normals are binned on a grid of this step, only to find candidates quickly.
-_NORMAL_STEP = 0.02
-#: So many grids, each moved on by as large a share of the step: one more than a plane has numbers,
-#: so that in one of them none of its numbers is nearer to an edge than half that share.
-_GRIDS = 5
-#: Of the two normals of a plane the one that points this way is taken: no wall lies in the
-#: direction, so that rounding never decides.
-_UPWARD = np.array([0.5772156649, 0.8346268417, 0.2614972128])
 
 
 @dataclass(frozen=True)
@@ -81,22 +76,41 @@ class WallPlane:
 
 @dataclass(frozen=True)
 class Structure:
-    """The triangles that may bound a leaf, and what is asked of them again and again."""
+    """The triangles that may bound a leaf, as few as will do, and what is asked of them again and
+    again."""
 
     corners: Floats  # (T, 3, 3) metres
     forced: Bools  # (T,) whether `SubdivideOptions.structural` names them
     planes: Floats  # (T, 4) and
     areas: Floats  # (T,), see `planes_of`
     nearby: Nearby
+    bins: Bins
     tolerance: Tolerance
+    detail: Ints  # (d,) triangles of the scene that are detail by their shape
 
     @staticmethod
     def of(scene: Scene, options: SubdivideOptions, tolerance: Tolerance) -> Structure:
-        """The structural triangles of a scene."""
-        mask = structural_triangles(scene, options)
-        corners, forced = scene.corners[mask], named(scene, options.structural)[mask]
-        nearby = Nearby(corners, tolerance.rounding)
-        return Structure(corners, forced, *planes_of(corners), nearby, tolerance)
+        """The structural triangles of a scene, without repetitions and in the order of the file,
+        flat regions of many in as few as their outlines need (`facets`)."""
+        facets, source, detail = _opaque(scene, options)
+        forced = named(scene, options.structural)[source]
+        parts = [
+            facets.fewer(~detail & (forced == value), scene.tolerance) for value in (False, True)
+        ]
+        first = np.concatenate([first for _, first in parts])
+        order = np.argsort(first, kind="stable")
+        corners = np.concatenate([corners for corners, _ in parts])[order]
+        planes, areas = planes_of(corners)
+        return Structure(
+            corners=corners,
+            forced=forced[first[order]],
+            planes=planes,
+            areas=areas,
+            nearby=Nearby(corners, tolerance.rounding),
+            bins=Bins(planes, tolerance),
+            tolerance=tolerance,
+            detail=source[detail],
+        )
 
     def lie_in(self, plane: Floats, triangles: Ints) -> Bools:
         """(n,) which of these triangles, by number, lie in a plane."""
@@ -107,6 +121,29 @@ class Structure:
     def united(self, frame: Frame, triangles: Ints) -> Geometry:
         """The union of these triangles in a plane."""
         return unite(frame.to_plane(self.corners[triangles]), self.tolerance.grid)
+
+
+def structural_triangles(scene: Scene, options: SubdivideOptions) -> Bools:
+    """(T,) which triangles occlude: opaque, and detail neither by name nor by shape. Of triangles
+    that are the same, the first may stand for all."""
+    _, source, detail = _opaque(scene, options)
+    found = np.zeros(len(scene.triangles), dtype=bool)
+    found[source[~detail]] = True
+    return found
+
+
+def _opaque(scene: Scene, options: SubdivideOptions) -> tuple[Facets, Ints, Bools]:
+    """The mesh of what is opaque and not called detail; the scene's triangles that it consists of;
+    and which of them are detail by their shape."""
+    candidates = np.flatnonzero(may_occlude(scene, options))
+    mesh = Welded.of(scene.points, scene.triangles[candidates])
+    source = candidates[mesh.source]
+    facets = Facets.of(mesh, scene.tolerance)
+    detail = np.zeros(len(source), dtype=bool)
+    if options.detail_by_shape:
+        detail = recognised(facets, scene.triangle_object[source], options.wall_area)
+        detail &= ~named(scene, options.structural)[source]
+    return facets, source, detail
 
 
 def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
@@ -137,7 +174,7 @@ def planes_of(corners: Floats) -> tuple[Floats, Floats]:
     double = np.linalg.norm(normal, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         normal = np.where(double[:, None] > 0, normal / double[:, None], 0.0)
-    normal *= np.where(normal @ _UPWARD < 0, -1.0, 1.0)[:, None]
+    normal *= np.where(normal @ UPWARD < 0, -1.0, 1.0)[:, None]
     offset = -np.einsum("ij,ij->i", normal, corners.mean(axis=1))
     return np.concatenate([normal, offset[:, None]], axis=1), double / 2.0
 
@@ -150,67 +187,31 @@ def _layers(structure: Structure, wall_area: float) -> list[Floats]:
     anything quadratic happens.
     """
     planes, areas, forced = structure.planes, structure.areas, structure.forced
+    bins = structure.bins
     # A bin with a triangle that is forced is never left for want of area.
-    bins = _Bins(planes, areas + 2 * wall_area * forced, structure.tolerance)
+    weights = areas + 2 * wall_area * forced
+    waiting = bins.weights(weights)
+    start, members_of = bins.members()
     free = areas > 0
     layers: list[tuple[float, Floats]] = []
-    for seed in ranked(areas):
+    promising = free & (waiting[bins.own] >= wall_area)
+    for seed in ranked(np.where(promising, areas, 0.0))[: np.count_nonzero(promising)]:
         if not free[seed]:
             continue
         free[seed] = False
-        if bins.weight(seed) < wall_area:
-            bins.drop(seed)
+        own = bins.own[seed]
+        if waiting[own] < wall_area:
+            bins.drop(waiting, seed[None], weights[seed, None])
             continue
-        near = bins.near(seed)
+        near = members_of[start[own] : start[own + 1]]
         near = near[free[near]]
         members = np.append(near[structure.lie_in(planes[seed], near)], seed)
         free[members] = False
-        bins.drop(members)
+        bins.drop(waiting, members, weights[members])
         weight = float(areas[members].sum())
         if weight >= wall_area or np.any(forced[members]):
             layers.append((weight, planes[seed]))
     return [layers[i][1] for i in ranked(np.array([weight for weight, _ in layers]))]
-
-
-class _Bins:
-    """Planes in bins of similar normal and offset, so that each finds all that are near it.
-
-    There are `_GRIDS` grids of bins, and a plane is looked up in the one in which it lies furthest
-    from the edges of its bin: its neighbours to a tenth of the step are there, wherever it lies.
-    """
-
-    def __init__(self, planes: Floats, weights: Floats, tolerance: Tolerance) -> None:
-        """``weights``: (n,), of the (n, 4) planes."""
-        step = np.array([_NORMAL_STEP] * 3 + [_NORMAL_STEP * tolerance.extent])
-        self._weights = weights
-        labels, inner, bins = [], [], 0
-        for grid in range(_GRIDS):
-            at = planes / step + grid / _GRIDS
-            key = np.floor(at)
-            _, label = np.unique(key.astype(np.int64), axis=0, return_inverse=True)
-            labels.append(label.ravel() + bins)
-            bins += int(label.max(initial=-1)) + 1
-            inner.append(np.minimum(at - key, 1 - (at - key)).min(axis=1))
-        self._label = np.stack(labels, axis=1)
-        self._grid = np.argmax(np.stack(inner), axis=0)
-        every = self._label.ravel()
-        order = np.argsort(every, kind="stable") // _GRIDS
-        self._rows = np.split(order, np.cumsum(np.bincount(every, minlength=1))[:-1])
-        self._free = np.bincount(every, np.repeat(weights, _GRIDS), bins)
-
-    def near(self, plane: int) -> Ints:
-        """The planes in the bin of one of them, dropped or not."""
-        rows: Ints = self._rows[self._label[plane, self._grid[plane]]]
-        return rows
-
-    def weight(self, plane: int) -> float:
-        """What is not dropped in that bin weighs so much."""
-        return float(self._free[self._label[plane, self._grid[plane]]])
-
-    def drop(self, planes: Ints | int) -> None:
-        """Planes weigh no more."""
-        weights = np.repeat(self._weights[planes], _GRIDS)
-        np.subtract.at(self._free, self._label[planes].ravel(), weights)
 
 
 def parallel_gap(plane: Floats, other: Floats, tolerance: Tolerance) -> float:

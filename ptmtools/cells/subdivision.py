@@ -31,6 +31,7 @@ from ptmtools.cells.reach import at_box, flood, largest_leaf, roofed_share
 from ptmtools.cells.rejoin import rejoined
 from ptmtools.cells.reveals import Reveals
 from ptmtools.cells.structure import Structure, WallPlane, find_walls
+from ptmtools.cells.welding import distinct
 from ptmtools.errors import InputError
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
@@ -43,6 +44,8 @@ from ptmtools.tolerance import Tolerance
 BOX_MARGIN = 0.01
 #: So many triangles take as long to subdivide as two processes to start.
 LARGE = 4000
+#: So many objects that were taken for detail are named.
+NAMED = 3
 #: A model is open above if less than this share of its floor has something over it.
 ROOFED = 0.5
 
@@ -102,7 +105,7 @@ def subdivide(
     wide = Polyhedron.box(low - margin, high + margin)
     wide = replace(wide, points=wide.points @ axes)
     tight = _thickened(*_bounds(corners if len(corners) else scene.corners), tolerance)
-    notes: list[str] = []
+    notes = _detail_notes(scene, model.structure.detail)
     executor = executor or Serial()
     clipped = executor.submit(_divide_inside, model, tight, long=len(scene.triangles) >= LARGE)
     try:
@@ -181,6 +184,20 @@ def _viewpoint_leaves(tree: Tree, box: Floats, options: SubdivideOptions) -> tup
     return tuple(dict.fromkeys((-2 - sunk(tree.planes, tree.children, places)).tolist()))
 
 
+def _detail_notes(scene: Scene, detail: Ints) -> list[str]:
+    """What is said of triangles that were taken for detail because of their shape."""
+    if not len(detail):
+        return []
+    owners, size = np.unique(scene.triangle_object[detail], return_counts=True)
+    names = [scene.objects[i] for i in owners[np.argsort(-size, kind="stable")][:NAMED]]
+    more = ", …" if len(owners) > NAMED else ""
+    return [
+        f"{len(detail):,} triangles of {len(owners):,} objects ({', '.join(names)}{more}) are "
+        "small, dense and round: detail, which neither divides nor hides; --structural NAME, or "
+        "--no-detail-by-shape, says otherwise"
+    ]
+
+
 def _bounds(corners: Floats) -> tuple[Floats, Floats]:
     points = corners.reshape(-1, 3)
     return points.min(axis=0), points.max(axis=0)
@@ -217,7 +234,9 @@ def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> 
 
     owner = rename[pieces.leaf]
     owned = np.any(owner >= 0, axis=1)
-    lost = len(np.unique(pieces.source)) - len(np.unique(pieces.source[owned]))
+    nowhere = np.ones(len(scene.triangles), dtype=bool)
+    nowhere[pieces.source[owned]] = False
+    lost = int(np.count_nonzero(nowhere))
     if lost:
         notes = [*notes, f"{lost} triangles lie outside all cells, where nobody can see them"]
     dropped = int(np.count_nonzero(~keep))
@@ -261,8 +280,12 @@ def _starts(lengths: Iterable[int]) -> Ints:
 
 def _weld(scene: Scene, pieces: Pieces, owned: Bools) -> tuple[Floats, Floats, NDArray[np.int32]]:
     """Vertices (position and texture coordinate) shared by the pieces, and (M, 3) indices."""
-    points, weights = np.split(pieces.corner[owned], 2, axis=2)
-    uv = np.einsum("mcw,mwk->mck", weights, scene.uv[pieces.source[owned]])
-    both = np.concatenate([points, uv], axis=2).reshape(-1, 5) + 0.0
-    distinct, index = np.unique(both, axis=0, return_inverse=True)
-    return distinct[:, :3].copy(), distinct[:, 3:].copy(), index.reshape(-1, 3).astype(np.int32)
+    source = pieces.source
+    both = np.concatenate([scene.corners[source], scene.uv[source]], axis=2)
+    points, shares = np.split(pieces.corner, 2, axis=2)
+    both[pieces.cut, :, :3] = points
+    both[pieces.cut, :, 3:] = np.einsum("mcw,mwk->mck", shares, scene.uv[source[pieces.cut]])
+    rows = both[owned].reshape(-1, 5) + 0.0
+    first, index = distinct(rows)
+    vertex = rows[first]
+    return vertex[:, :3].copy(), vertex[:, 3:].copy(), index.reshape(-1, 3).astype(np.int32)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
 
@@ -33,6 +36,11 @@ def volumes(corners: Floats) -> Floats:
     """(n,) volumes of (n, 4, 3) tetrahedra, m³."""
     a, b, c = (corners[:, 1:] - corners[:, :1]).transpose(1, 0, 2)
     return np.asarray(np.abs(np.einsum("ij,ij->i", a, cross(b, c))) / 6)
+
+
+def summed(group: NDArray[np.integer], weights: NDArray[Any], count: int) -> Floats:
+    """(count,) the sum of the (n,) weights of each group."""
+    return np.asarray(np.bincount(group, weights, count), dtype=np.float64)
 
 
 def fans(start: Ints) -> tuple[Ints, Ints]:

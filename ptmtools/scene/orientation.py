@@ -17,6 +17,7 @@ from ptmtools.tolerance import PARALLEL_COSINE, Tolerance, ranked
 
 #: The largest triangles, this many, propose directions.
 _CANDIDATES = 64
+_AT_ONCE = 4096
 #: Directions with a lesser dot product than this are square to one another.
 _SQUARE = 1e-3
 
@@ -38,8 +39,11 @@ def main_axes(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     whole = areas > 0
     normals, areas = normals[whole] / areas[whole, None], areas[whole]
     candidates = normals[ranked(areas)[:_CANDIDATES]]
-    weights = [areas @ (np.abs(normals @ c) >= PARALLEL_COSINE) for c in candidates]
-    order = ranked(np.array(weights))
+    weights = np.zeros(len(candidates))
+    for first in range(0, len(areas), _AT_ONCE):  # so many at a time stay in the cache
+        rows = slice(first, first + _AT_ONCE)
+        weights += areas[rows] @ (np.abs(normals[rows] @ candidates.T) >= PARALLEL_COSINE)
+    order = ranked(weights)
     square = [i for i in order if abs(float(candidates[i] @ candidates[order[0]])) < _SQUARE]
     if not square:
         return np.eye(3)

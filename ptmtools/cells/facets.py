@@ -1,0 +1,157 @@
+"""Facets: flat regions of the structure, in as few triangles as their outlines need.
+
+A wall may come as two triangles or as a hundred thousand: what splits space and what blocks is the
+same. Triangles that share edges and lie in one plane, well within the distance at which two planes
+are one, are gathered into regions; a region of many triangles is replaced by as few as its outline
+allows. No corner moves, and corners are left out only where an outline runs on straight, so
+that a crack that opens beside one is far narrower than a hairline, which is no opening.
+
+A region stays as it is unless three quarters of its triangles can be saved: the walls of most
+models are two triangles, and keep them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.vectors import cross, normals, summed
+from ptmtools.cells.welding import Welded, across_edges, distinct
+from ptmtools.tolerance import Tolerance, ranked
+
+#: A corner lies in the plane of a region if it is within this share of the on-plane distance.
+_FLAT_SHARE = 1 / 4
+#: A corner may be left out of an outline that it stands off by at most this share of it: more than
+#: coordinates in single precision do.
+_STRAIGHT_SHARE = 1 / 32
+#: Regions of fewer triangles are left alone, and those of which less than this share is saved.
+_MANY = 16
+_SAVED = 3 / 4
+#: Of the two normals of a plane the one that points this way is taken: no wall lies in the
+#: direction, so that rounding never decides.
+UPWARD = np.array([0.5772156649, 0.8346268417, 0.2614972128])
+
+
+@dataclass(frozen=True)
+class Facets:
+    """The flat regions of a mesh."""
+
+    mesh: Welded
+    beyond: NDArray[np.int32]  # (n, 3) see `across_edges`
+    turned: Bools  # (n,) whether a triangle faces away from `UPWARD`
+    region: Ints  # (n,) the region of each triangle
+    areas: Floats  # (n,) m² of each triangle
+    area: Floats  # (r,) m² of each region
+    normal: Floats  # (r, 3) unit vectors
+    whole: Bools  # (r,) whether all of it lies in one plane
+
+    @staticmethod
+    def of(mesh: Welded, tolerance: Tolerance) -> Facets:
+        """The regions of a mesh, the largest triangles first."""
+        from ptmtools.cells.facet_kernels import grow_regions
+
+        corners = mesh.corners
+        normal = normals(corners)
+        turned = normal @ UPWARD < 0
+        normal *= np.where(turned, -1.0, 1.0)[:, None]
+        double = np.linalg.norm(normal, axis=1)
+        beyond = across_edges(mesh.triangle, turned)
+        region, queue = np.full(len(turned), -1), np.empty(len(turned), dtype=np.int64)
+        slack = _FLAT_SHARE * tolerance.plane
+        seeds = ranked(double)
+        count = grow_regions(mesh.point, mesh.triangle, beyond, normal, seeds, slack, region, queue)
+        mean = np.stack([summed(region, column, count) for column in normal.T], axis=1)
+        mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), np.finfo(float).tiny)
+        height = np.einsum("tci,ti->tc", corners, mean[region])
+        level = summed(region, double * height.mean(axis=1), count)
+        weight = summed(region, double, count)
+        level = np.divide(level, weight, out=level, where=weight > 0)
+        away = np.abs(height - level[region, None]).max(axis=1) > 2 * slack
+        whole = np.bincount(region, away, count) == 0
+        return Facets(mesh, beyond, turned, region, double / 2, weight / 2, mean, whole)
+
+    def fewer(self, which: Bools, tolerance: Tolerance) -> tuple[Floats, Ints]:
+        """The same surface in fewer triangles, (m, 3, 3), and (m,) for each the first triangle of
+        the mesh that it is of or is, ascending; of the (n,) triangles ``which``."""
+        size = np.bincount(self.region, which, len(self.area))
+        rim = which[:, None] & (self.beyond < 0)
+        inner = ~rim & which[:, None]
+        other = np.where(inner, self.beyond, 0)
+        rim |= inner & ((self.region[other] != self.region[:, None]) | ~which[other])
+        edges = np.bincount(self.region, rim.sum(axis=1), len(self.area))
+        # An outline of e edges takes e - 2 triangles or more; most of its corners are on straights.
+        many = self.whole & (size >= _MANY) & (edges <= size / 2)
+        chosen = np.flatnonzero(many)
+        outline = rim & many[self.region][:, None]
+        corners, of = self._retriangulated(chosen, outline, tolerance)
+        saved = np.bincount(of, minlength=len(chosen)) <= (1 - _SAVED) * size[chosen]
+        saved &= np.bincount(of, minlength=len(chosen)) > 0
+        kept = which.copy()
+        replaced = np.zeros(len(self.area), dtype=bool)
+        replaced[chosen[saved]] = True
+        kept &= ~replaced[self.region]
+        first = np.full(len(self.area), len(which))
+        np.minimum.at(first, self.region, np.where(which, np.arange(len(which)), len(which)))
+        fresh = saved[of]
+        source = np.concatenate([np.flatnonzero(kept), first[chosen[of[fresh]]]])
+        every = np.concatenate([self.mesh.corners[kept], corners[fresh]])
+        order = np.argsort(source, kind="stable")
+        return every[order], source[order]
+
+    def _retriangulated(
+        self, chosen: Ints, outline: Bools, tolerance: Tolerance
+    ) -> tuple[Floats, Ints]:
+        """Triangles (m, 3, 3) of the chosen regions, of which (n, 3) edges are the ``outline``,
+        and (m,) which of those each is of; none of a region whose outline bounds another area."""
+        if not len(chosen):
+            return np.zeros((0, 3, 3)), np.zeros(0, dtype=np.int64)
+        at, k = np.nonzero(outline)
+        place = np.full(len(self.area), -1)
+        place[chosen] = np.arange(len(chosen))
+        of = place[self.region[at]]
+        order = np.argsort(of, kind="stable")
+        at, k, of = at[order], k[order], of[order]
+        ends = np.stack([self.mesh.triangle[at, k], self.mesh.triangle[at, (k + 1) % 3]], axis=1)
+        u, v = _axes(self.normal[chosen])
+        space = self.mesh.point[ends]
+        flat = np.stack(
+            [np.einsum("eki,ei->ek", space, u[of]), np.einsum("eki,ei->ek", space, v[of])], axis=2
+        )
+        segments = shapely.linestrings(flat)
+        areas = shapely.build_area(shapely.multilinestrings(segments, indices=of))
+        straight = _STRAIGHT_SHARE * tolerance.plane
+        areas = shapely.simplify(areas, straight)
+        allowed = straight * shapely.length(areas) + tolerance.rounding * tolerance.extent
+        sound = shapely.is_valid(areas) & (
+            np.abs(shapely.area(areas) - self.area[chosen]) <= allowed
+        )
+        sound_rows = np.flatnonzero(sound)
+        parts, which = shapely.get_parts(
+            shapely.constrained_delaunay_triangles(areas[sound_rows]), return_index=True
+        )
+        which = sound_rows[which]
+        rings = shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, :3]
+        return self._lifted(rings, which, flat, of, space), which
+
+    def _lifted(self, rings: Floats, which: Ints, flat: Floats, of: Ints, space: Floats) -> Floats:
+        """(m, 3, 3) positions of (m, 3, 2) triangles of regions ``which``: those of the ends of
+        edges, ``flat`` and in ``space``, (e, 2, …), of the regions ``of``."""
+        known = np.column_stack([np.repeat(of, 2).astype(np.float64), flat.reshape(-1, 2)])
+        asked = np.column_stack([np.repeat(which, 3).astype(np.float64), rings.reshape(-1, 2)])
+        first, row = distinct(np.concatenate([known, asked]))
+        origin = first[row[len(known) :]]
+        assert np.all(origin < len(known)), "a triangulation has new corners"
+        lifted: Floats = space.reshape(-1, 3)[origin].reshape(-1, 3, 3)
+        return lifted
+
+
+def _axes(normal: Floats) -> tuple[Floats, Floats]:
+    """(r, 3) and (r, 3): directions square to each of (r, 3) unit normals and to one another."""
+    axis = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
+    u = cross(axis, normal)
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    return u, cross(normal, u)
