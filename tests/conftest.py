@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -92,6 +93,27 @@ def scene_of(
         objects=tuple(objects or [f"quad{i}" for i in range(n)]),
         materials=tuple(materials),
         tolerance=tolerance_of(points, triangles),
+    )
+
+
+def subdivided(scene: Scene, times: int) -> Scene:
+    """The same scene with every triangle in ``times``² alike, corners in single precision."""
+    i, j = (k.ravel() for k in np.meshgrid(np.arange(times), np.arange(times), indexing="ij"))
+    upper, lower = i + j < times, i + j < times - 1
+    first = np.stack([i, j], axis=1)
+    steps = np.array([[[0, 0], [1, 0], [0, 1]], [[1, 0], [1, 1], [0, 1]]])
+    second_third = np.concatenate([first[upper, None] + steps[0], first[lower, None] + steps[1]])
+    share = np.concatenate([times - second_third.sum(2, keepdims=True), second_third], 2) / times
+    corners = np.einsum("pcw,twx->tpcx", share, scene.corners).reshape(-1, 3)
+    count = len(share)
+    return replace(
+        scene,
+        points=corners.astype(np.float32).astype(np.float64),
+        triangles=np.arange(len(corners), dtype=np.int32).reshape(-1, 3),
+        uv=np.einsum("pcw,twx->tpcx", share, scene.uv).reshape(-1, 3, 2),
+        triangle_object=np.repeat(scene.triangle_object, count),
+        triangle_material=np.repeat(scene.triangle_material, count),
+        two_sided=np.repeat(scene.two_sided, count),
     )
 
 

@@ -87,7 +87,8 @@ class Facets:
         many = self.whole & (size >= _MANY) & (edges <= size / 2)
         chosen = np.flatnonzero(many)
         outline = rim & many[self.region][:, None]
-        corners, of = self._retriangulated(chosen, outline, tolerance)
+        area = summed(self.region, self.areas * which, len(self.area))[chosen]
+        corners, of = self._retriangulated(chosen, area, outline, tolerance)
         saved = np.bincount(of, minlength=len(chosen)) <= (1 - _SAVED) * size[chosen]
         saved &= np.bincount(of, minlength=len(chosen)) > 0
         kept = which.copy()
@@ -103,10 +104,10 @@ class Facets:
         return every[order], source[order]
 
     def _retriangulated(
-        self, chosen: Ints, outline: Bools, tolerance: Tolerance
+        self, chosen: Ints, area: Floats, outline: Bools, tolerance: Tolerance
     ) -> tuple[Floats, Ints]:
-        """Triangles (m, 3, 3) of the chosen regions, of which (n, 3) edges are the ``outline``,
-        and (m,) which of those each is of; none of a region whose outline bounds another area."""
+        """Triangles (m, 3, 3) of the chosen regions, whose ``area`` these (n, 3) edges outline, and
+        (m,) which of them each is of; none of a region whose outline bounds another area."""
         if not len(chosen):
             return np.zeros((0, 3, 3)), np.zeros(0, dtype=np.int64)
         at, k = np.nonzero(outline)
@@ -126,9 +127,7 @@ class Facets:
         straight = _STRAIGHT_SHARE * tolerance.plane
         areas = shapely.simplify(areas, straight)
         allowed = straight * shapely.length(areas) + tolerance.rounding * tolerance.extent
-        sound = shapely.is_valid(areas) & (
-            np.abs(shapely.area(areas) - self.area[chosen]) <= allowed
-        )
+        sound = shapely.is_valid(areas) & (np.abs(shapely.area(areas) - area) <= allowed)
         sound_rows = np.flatnonzero(sound)
         parts, which = shapely.get_parts(
             shapely.constrained_delaunay_triangles(areas[sound_rows]), return_index=True

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ptmtools.cells import Cells, SubdivideOptions, subdivide
+from ptmtools.cells import Cells, SubdivideOptions, grouping, subdivide
 from ptmtools.cells.gain import join_by_gain
 from ptmtools.cells.sight import _even, _lines, sampled_sight
 from ptmtools.errors import InputError
@@ -230,3 +230,17 @@ def test_any_number_of_lines_comes_in_eights(
 def test_a_gain_that_is_no_share_is_refused(halved: Callable[[float], Scene], gain: float) -> None:
     with pytest.raises(InputError, match="PTM-I300"):
         subdivide(halved(1.0), SubdivideOptions(gain=gain))
+
+
+def test_leaves_are_put_in_order_as_their_lists_of_shares_are() -> None:
+    random = np.random.default_rng(3)
+    for _ in range(200):
+        leaves = int(random.integers(1, 8))
+        held = random.integers(0, 3, (leaves, 4)) / 2  # many ties, and some that hold nothing
+        leaf, source = np.nonzero(held)
+        lists = [
+            [(s, -held[i, s]) for s in np.flatnonzero(held[i])] + [(99, 0.0)] for i in range(leaves)
+        ]
+        order = sorted(range(leaves), key=lists.__getitem__)
+        rank = grouping._in_order(leaf, source, held[leaf, source], leaves)
+        assert np.argsort(rank).tolist() == order

@@ -1,0 +1,127 @@
+"""Flat regions and the fewer triangles that they become."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from ptmtools.cells import SubdivideOptions, subdivide
+from ptmtools.cells.facets import Facets
+from ptmtools.cells.structure import Structure
+from ptmtools.cells.vectors import areas
+from ptmtools.cells.welding import Welded
+from ptmtools.tolerance import Tolerance
+from tests.conftest import scene_of, subdivided
+
+TOLERANCE = Tolerance.for_extent(10.0)
+
+
+def facets_of(corners: np.ndarray) -> Facets:
+    mesh = Welded.of(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    return Facets.of(mesh, TOLERANCE)
+
+
+def fewer(facets: Facets) -> tuple[np.ndarray, np.ndarray]:
+    return facets.fewer(np.ones(len(facets.region), dtype=bool), TOLERANCE)
+
+
+def grid(n: int, hole: tuple[int, int] | None = None, turn: float = 0.0) -> np.ndarray:
+    """2n² triangles of a wall of 10 m, less the squares from ``hole[0]`` to ``hole[1]`` both
+    ways; turned about two axes."""
+    i, j = (k.ravel() for k in np.meshgrid(np.arange(n), np.arange(n)))
+    if hole:
+        low, high = hole
+        outside = ~((i >= low) & (i < high) & (j >= low) & (j < high))
+        i, j = i[outside], j[outside]
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=np.float64)
+    quads = (np.stack([i, j, 0 * i], axis=1)[:, None] + square) * 10 / n
+    c, s = np.cos(turn), np.sin(turn)
+    quads = quads @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]).T
+    quads = quads @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]]).T
+    return quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3).astype(np.float32).astype(float)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4])
+@pytest.mark.parametrize(("hole", "triangles"), [(None, 2), ((3, 9), 8)])
+def test_a_wall_is_as_few_triangles_as_its_outline_needs(
+    turn: float, hole: tuple[int, int] | None, triangles: int
+) -> None:
+    corners = grid(16, hole, turn)
+    found, source = fewer(facets_of(corners))
+    assert len(found) == triangles
+    assert np.all(source == 0)
+    assert areas(found).sum() == pytest.approx(areas(corners).sum(), rel=1e-6)
+    # Every corner is one that was there, to the last bit.
+    known = {tuple(point) for point in corners.reshape(-1, 3).tolist()}
+    assert all(tuple(point) in known for point in found.reshape(-1, 3).tolist())
+    if not turn:
+        unions = [shapely.union_all(shapely.polygons(c[:, :, :2])) for c in (corners, found)]
+        assert shapely.area(shapely.symmetric_difference(*unions)) < 1e-9
+
+
+def test_walls_that_meet_in_a_corner_stay_two() -> None:
+    wall = grid(8)
+    facets = facets_of(np.concatenate([wall, wall[:, :, [2, 0, 1]]]))
+    assert len(facets.area) == 2
+    found, source = fewer(facets)
+    assert sorted(source.tolist()) == [0, 0, len(wall), len(wall)]
+    assert areas(found).sum() == pytest.approx(200)
+
+
+def test_what_is_curved_stays_as_it_is() -> None:
+    wall = grid(24)
+    wall[:, :, 2] = 0.2 * np.sin(wall[:, :, 0]) * np.cos(wall[:, :, 1])
+    found, source = fewer(facets_of(wall))
+    assert np.array_equal(found, wall)
+    assert np.array_equal(source, np.arange(len(wall)))
+
+
+def test_a_bend_far_below_the_tolerance_does_not_add_up() -> None:
+    # Each row of a wide arch lies in the plane of the one before, but the last not in the first's.
+    wall = grid(64)
+    wall[:, :, 2] = 2e-3 * (wall[:, :, 0] - 5) ** 2
+    facets = facets_of(wall)
+    assert 1 < len(facets.area) < len(wall)
+    found, _ = fewer(facets)
+    for corners in found:
+        middle = corners.mean(axis=0)
+        assert abs(middle[2] - 2e-3 * (middle[0] - 5) ** 2) <= TOLERANCE.plane
+
+
+def test_two_triangles_stay_two() -> None:
+    corners = grid(1)
+    found, source = fewer(facets_of(corners))
+    assert np.array_equal(found, corners)
+    assert source.tolist() == [0, 1]
+
+
+def test_a_crossing_wall_leaves_the_floor_in_two_parts() -> None:
+    # Three triangles meet in the edges of its foot: the floor is not one region; nothing is lost.
+    floor = grid(8)
+    wall = grid(8)[:, :, [2, 0, 1]] + [5.0, 0, 0]
+    found, _ = fewer(facets_of(np.concatenate([floor, wall])))
+    assert areas(found).sum() == pytest.approx(200)
+    assert len(found) == 6
+
+
+@pytest.mark.parametrize("times", [5, 12])
+def test_subdivided_walls_divide_the_building_as_whole_ones_do(room_row, times: int) -> None:
+    scene = room_row(2)[0]
+    dense = subdivided(scene, times)
+    assert len(dense.triangles) == times**2 * len(scene.triangles)
+    few, many = (subdivide(s, SubdivideOptions(cells="leaf")) for s in (scene, dense))
+    assert few.cell_count == many.cell_count == 2
+    assert np.allclose(few.portal_area, many.portal_area)
+    assert np.allclose(np.sort(few.leaf_volumes()), np.sort(many.leaf_volumes()))
+
+
+def test_structural_names_hold_for_their_own_triangles_alone(quads) -> None:
+    # One flat region, half of it named: the halves are not mixed.
+    halves = [grid(8) * [0.5, 1, 1], grid(8) * [0.5, 1, 1] + [5, 0, 0]]
+    faces = np.concatenate(halves)
+    scene = scene_of(faces, objects=["a"] * 128 + ["b"] * 128)
+    structure = Structure.of(scene, SubdivideOptions(structural=("b",)), scene.tolerance)
+    assert len(structure.corners) == 4
+    right = structure.corners.reshape(4, 9)[:, ::3].mean(axis=1) > 5
+    assert np.array_equal(structure.forced, right)
