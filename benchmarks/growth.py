@@ -1,7 +1,11 @@
-"""How time and memory grow with the building: ``python benchmarks/growth.py [--rooms 12,50,200]``
+"""How time and memory grow with the model: ``python benchmarks/growth.py [rooms|walls|furniture]``
 
-Sample museums of 12, 50, 200 and 800 rooms (`sample_data/make_museum.py`, the least textures) are
-made in a temporary folder, or in ``--folder``, and go through the stages with default options:
+rooms         sample museums of 12, 50, 200 and 800 rooms (`sample_data/make_museum.py`)
+walls         the museum of 12 rooms, its walls subdivided into 200,000 to 5 million triangles
+furniture     the same with curved furniture of as many triangles (`grown`)
+
+They have the least textures, are made in a temporary folder, or in ``--folder``, and go through the
+stages with default options:
 
 scene         reading the model
 leaves        the subdivision into convex leaves with their portals
@@ -10,14 +14,15 @@ pvs           the portal flow
 ach           coverage hints, Embree, the default preset
 emit          the served files but for textures, which know nothing of cells
 
-Every stage of every museum runs in a process of its own, after the two rooms of the sample data,
+Every stage of every model runs in a process of its own, after the two rooms of the sample data,
 which compile the kernels and load the libraries. *CPU* and *wall* are seconds of the stage alone;
 what it reads and writes between stages does not count. *Peak* is the most memory that was resident
 during the stage over what was resident before it, inputs read; where the system does not tell, it
 is that of the process.
 
-The last rows are the exponents b of seconds or megabytes = a · leavesᵇ, by least squares in the
-logarithms, with the standard error of b. A museum that hit `--max-leaves` is marked.
+The last rows are the exponents b of seconds or megabytes = a · leavesᵇ, or of triangles in place of
+leaves where the rooms stay the same, by least squares in the logarithms, with the standard error of
+b. A museum that hit `--max-leaves` is marked.
 """
 
 from __future__ import annotations
@@ -36,6 +41,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from grown import grown
 from memory import with_peak
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
@@ -50,7 +56,14 @@ from ptmtools.visibility import Pvs, compute_pvs
 
 ROOT = Path(__file__).resolve().parent.parent
 SMALL = ROOT / "sample_data/two_rooms/two_rooms.obj"
-ROOMS = (12, 50, 200, 800)
+#: The kinds of growth: what is counted, so many of it, and what figures are held against.
+KINDS = {
+    "rooms": ("rooms", (12, 50, 200, 800), "leaves"),
+    "walls": ("triangles", (200_000, 1_000_000, 5_000_000), "triangles"),
+    "furniture": ("triangles", (200_000, 1_000_000, 5_000_000), "triangles"),
+}
+#: The rooms of the museum that other things than rooms are added to.
+FEW_ROOMS = 12
 STAGES = ("scene", "leaves", "rooms", "pvs", "ach", "emit")
 FIGURES = ("cpu", "wall", "peak")
 
@@ -132,14 +145,24 @@ def one_stage(stage: str, work: Work) -> None:
     print(json.dumps(work.run(stage)))
 
 
-def measured(rooms: int, folder: Path, options: list[str]) -> dict[str, Any]:
-    """Makes a museum and runs all of its stages, each in a process of its own."""
-    folder = folder / f"museum{rooms}"
-    maker = [sys.executable, str(ROOT / "sample_data/make_museum.py"), "-o", str(folder / "model")]
+def make_model(kind: str, size: int, folder: Path) -> None:
+    """A museum of so many rooms, or of `FEW_ROOMS` with so many triangles of a ``kind``."""
+    model = folder / "model/museum.obj"
+    if model.is_file():
+        return
+    rooms = size if kind == "rooms" else FEW_ROOMS
+    maker = [sys.executable, str(ROOT / "sample_data/make_museum.py"), "-o", str(model.parent)]
     maker += ["--rooms", str(rooms), "--size", "16", "--force"]
-    if not (folder / "model/museum.obj").is_file():
-        subprocess.run(maker, check=True, stdout=subprocess.DEVNULL)
-    row: dict[str, Any] = {"rooms": rooms}
+    subprocess.run(maker, check=True, stdout=subprocess.DEVNULL)
+    if kind != "rooms":
+        model.write_bytes(b"".join(grown(ingest(model), kind, size, "museum.mtl")))
+
+
+def measured(kind: str, size: int, folder: Path, options: list[str]) -> dict[str, Any]:
+    """Makes a model and runs all of its stages, each in a process of its own."""
+    folder = folder / f"{kind}{size}"
+    make_model(kind, size, folder)
+    row: dict[str, Any] = {"size": size}
     for stage in STAGES:
         call = [sys.executable, __file__, "--stage", stage, "--folder", str(folder), *options]
         done = subprocess.run(call, check=True, stdout=subprocess.PIPE, text=True)
@@ -148,9 +171,9 @@ def measured(rooms: int, folder: Path, options: list[str]) -> dict[str, Any]:
     return row
 
 
-def exponent(leaves: list[float], figures: list[float]) -> tuple[float, float]:
-    """The slope of log figures over log leaves, and its standard error (nan below 3 points)."""
-    x, y = np.log(leaves), np.log(np.maximum(figures, 1e-9))
+def exponent(sizes: list[float], figures: list[float]) -> tuple[float, float]:
+    """The slope of log figures over log sizes, and its standard error (nan below 3 points)."""
+    x, y = np.log(sizes), np.log(np.maximum(figures, 1e-9))
     spread = float(((x - x.mean()) ** 2).sum())
     if len(x) < 2 or spread == 0:
         return float("nan"), float("nan")
@@ -164,7 +187,7 @@ def print_row(row: dict[str, Any]) -> None:
     mark = "*" if row["limited"] else ""
     sizes = " | ".join(f"{row[k]:,}" for k in ("triangles", "leaves", "cells", "portals"))
     for figure, digits in (("cpu", 1), ("wall", 1), ("peak", 0)):
-        head = f"{row['rooms']} | {sizes}{mark}" if figure == "cpu" else " | | | | "
+        head = f"{row['size']:,} | {sizes}{mark}" if figure == "cpu" else " | | | | "
         stages = " | ".join(f"{row[f'{stage} {figure}']:,.{digits}f}" for stage in STAGES)
         print(f"| {head} | {_UNITS[figure]} | {stages} |", flush=True)
 
@@ -176,7 +199,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--rooms", default=",".join(map(str, ROOMS)), metavar="N,N,…")
+    parser.add_argument(
+        "kinds", nargs="*", choices=[[], *KINDS], metavar="KIND", help=", ".join(KINDS)
+    )
+    parser.add_argument("--sizes", metavar="N,N,…", help="other numbers of rooms or triangles")
     parser.add_argument("--wall-area", type=float, default=SubdivideOptions().wall_area)
     parser.add_argument("--max-leaves", type=int, default=SubdivideOptions().max_leaves)
     parser.add_argument("--csv", type=Path, metavar="FILE", help="the figures as a table")
@@ -191,23 +217,33 @@ def main(arguments: list[str] | None = None) -> int:
     options = [f"--wall-area={given.wall_area}", f"--max-leaves={given.max_leaves}"]
     with tempfile.TemporaryDirectory() as scratch:
         folder = given.folder or Path(scratch)
-        print(f"| rooms | triangles | leaves | cells | portals | | {' | '.join(STAGES)} |")
-        print("|---" * (6 + len(STAGES)) + "|")
         rows = []
-        for rooms in map(int, given.rooms.split(",")):
-            rows.append(measured(rooms, folder, options))
-            print_row(rows[-1])
-    leaves = [row["leaves"] for row in rows]
-    for figure in FIGURES:
-        fits = [exponent(leaves, [row[f"{stage} {figure}"] for row in rows]) for stage in STAGES]
-        cells = " | ".join(f"{slope:.2f} ± {error:.2f}" for slope, error in fits)
-        print(f"| exponent | | | | | {_UNITS[figure]} | {cells} |")
+        for kind in given.kinds or KINDS:
+            rows += [{"kind": kind, **row} for row in grow(kind, given.sizes, folder, options)]
     if given.csv:
         with given.csv.open("w", newline="", encoding="utf-8") as file:
             writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
             writer.writeheader()
             writer.writerows(rows)
     return 0
+
+
+def grow(kind: str, sizes: str | None, folder: Path, options: list[str]) -> list[dict[str, Any]]:
+    """Measures and prints one kind of growth."""
+    counted, usual, against = KINDS[kind]
+    print(f"\n{kind}\n")
+    print(f"| {counted} | triangles | leaves | cells | portals | | {' | '.join(STAGES)} |")
+    print("|---" * (6 + len(STAGES)) + "|")
+    rows = []
+    for size in [int(float(n)) for n in sizes.split(",")] if sizes else usual:
+        rows.append(measured(kind, size, folder, options))
+        print_row(rows[-1])
+    x = [row[against] for row in rows]
+    for figure in FIGURES:
+        fits = [exponent(x, [row[f"{stage} {figure}"] for row in rows]) for stage in STAGES]
+        cells = " | ".join(f"{slope:.2f} ± {error:.2f}" for slope, error in fits)
+        print(f"| exponent | | | | | {_UNITS[figure]} | {cells} |", flush=True)
+    return rows
 
 
 if __name__ == "__main__":

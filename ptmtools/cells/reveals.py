@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ptmtools.arrays import Floats
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.polyhedron import BOX_FACE, Polyhedron
 from ptmtools.cells.structure import Frame, Structure, WallPlane, parallel_gap
 from ptmtools.tolerance import TIE_SHARE, ranked
@@ -63,7 +63,7 @@ class Reveals:
         low, high = depth.min(axis=1), depth.max(axis=1)
         within = (high > slack) & (low < width - slack) & (areas[near] > 0)
         inside, low, high = near[within], low[within], high[within]
-        spans = (np.abs(low) <= slack) & (np.abs(high - width) <= slack)
+        spans = self._span(inside, low, high, width)
         bridging = inside[spans]
         found: list[WallPlane] = []
         for seed in bridging[ranked(areas[bridging])]:
@@ -77,6 +77,19 @@ class Reveals:
                 WallPlane(frame, structure.united(frame, walls), structure.united(frame, blocking))
             )
         return found
+
+    def _span(self, triangles: Ints, low: Floats, high: Floats, width: float) -> Bools:
+        """(n,) which triangles, ``low`` and ``high`` deep in a slab, are of a flat region that
+        reaches from one of its faces to the other; of the region, what lies between them."""
+        slack = self._tolerance.hairline
+        between = np.flatnonzero((low >= -slack) & (high <= width + slack))
+        names, region = np.unique(self._structure.region[triangles[between]], return_inverse=True)
+        least, most = np.full(len(names), np.inf), np.full(len(names), -np.inf)
+        np.minimum.at(least, region, low[between])
+        np.maximum.at(most, region, high[between])
+        spans = np.zeros(len(triangles), dtype=bool)
+        spans[between] = ((least <= slack) & (most >= width - slack))[region]
+        return spans
 
 
 def _bounds(body: Polyhedron, walls: list[WallPlane]) -> list[Floats]:

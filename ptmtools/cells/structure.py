@@ -83,6 +83,7 @@ class Structure:
     forced: Bools  # (T,) whether `SubdivideOptions.structural` names them
     planes: Floats  # (T, 4) and
     areas: Floats  # (T,), see `planes_of`
+    region: Ints  # (T,) the flat region that each is of
     nearby: Nearby
     bins: Bins
     tolerance: Tolerance
@@ -99,6 +100,7 @@ class Structure:
         ]
         first = np.concatenate([first for _, first in parts])
         order = np.argsort(first, kind="stable")
+        regions = facets.region[first]
         corners = np.concatenate([corners for corners, _ in parts])[order]
         planes, areas = planes_of(corners)
         return Structure(
@@ -106,6 +108,7 @@ class Structure:
             forced=forced[first[order]],
             planes=planes,
             areas=areas,
+            region=regions[order],
             nearby=Nearby(corners, tolerance.rounding),
             bins=Bins(planes, tolerance),
             tolerance=tolerance,

@@ -11,6 +11,7 @@ import pytest
 from ptmtools.cells import Cells, SubdivideOptions, structural_triangles, subdivide
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Material, Scene
+from tests.conftest import subdivided
 
 LEAF = SubdivideOptions(cells="leaf")
 
@@ -54,8 +55,10 @@ def test_portals_lie_in_both_leaves_and_point_forward(room_row) -> None:
         assert cells.locate_leaf(middle - 0.1 * plane[:3]) == behind
 
 
-@pytest.mark.parametrize("length", [4, 500])
-def test_walls_with_thickness_leave_solids_out(quads, room_faces, length: float) -> None:
+@pytest.mark.parametrize(("length", "times"), [(4, 1), (500, 1), (4, 2), (4, 3)])
+def test_walls_with_thickness_leave_solids_out(
+    quads, room_faces, length: float, times: int
+) -> None:
     # Two rooms 0.3 m apart, a door tunnel between them with jambs, floor and lintel. In a building
     # of 500 m 0.3 m is less than the cluster distance would be without a bound.
     left = room_faces((0, 0, -2), (4, 4, 2), "+x")
@@ -65,7 +68,8 @@ def test_walls_with_thickness_leave_solids_out(quads, room_faces, length: float)
         for y0, y1, z0, z1 in ((0, 4, -2, -1), (0, 4, 1, 2), (3, 4, -1, 1)):
             walls.append([[x, y0, z0], [x, y1, z0], [x, y1, z1], [x, y0, z1]])
     tunnel = room_faces((4, 0, -1), (4.3, 3, 1), "-x +x")
-    cells = subdivide(quads(left + right + walls + tunnel), LEAF)
+    # No triangle of a subdivided jamb reaches from one face of the wall to the other.
+    cells = subdivide(subdivided(quads(left + right + walls + tunnel), times), LEAF)
     assert cells.closed
     inside = cells.locate(np.array([[2.0, 1, 0], [4.15, 1, 0], [6, 1, 0]]))
     assert len(set(inside)) == 3
