@@ -4,17 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 from ptmtools.errors import InputError
 
 CellKind = Literal["leaf", "room"]
+Reach = Literal["all", "main"]
 Position = tuple[float, float, float]
 
 
 def _positions(viewpoints: Sequence[tuple[float, ...]]) -> tuple[Position, ...]:
     """The positions (x, y, z) of viewpoints (x, y, z[, yaw])."""
     return tuple((x, y, z) for x, y, z, *_ in viewpoints)
+
+
+class Walker(NamedTuple):
+    """The body of whoever walks: an upright cylinder from ``step`` to ``height`` above the floor,
+    metres."""
+
+    radius: float
+    step: float
+    height: float
 
 
 @dataclass(frozen=True)
@@ -40,9 +50,12 @@ class SubdivideOptions:
         "room", all leaves between its doors; but see --gain.
     gain: keep the leaves of a room as separate cells if that saves viewers at least this share of
         what they download; 0 keeps all of them apart, 1 makes every room one cell.
+    walker: radius, highest step and height, in metres, of whoever walks. A place is where such a
+        body fits.
     viewpoints: a starting point inside the building: metres, Y up, and the yaw in degrees,
-        counter-clockwise from -Z. What cannot be reached from the given points is dropped. By
-        default one is chosen. May be given several times.
+        counter-clockwise from -Z. By default one is chosen. May be given several times.
+    reach: what becomes of space that cannot be reached from the start, behind closed doors or in
+        another building: "all" keeps what has a place in it, "main" drops everything.
     """
 
     wall_area: float = 2.0
@@ -53,6 +66,8 @@ class SubdivideOptions:
     detail_by_shape: bool = True
     cells: CellKind = "room"
     gain: float = 0.1
+    walker: tuple[float, float, float] = Walker(0.25, 0.5, 1.7)
+    reach: Reach = "all"
     viewpoints: tuple[Position, ...] = field(
         default=(), metadata={"option": "viewpoint", "numbers": (3, 4), "parse": _positions}
     )
@@ -63,6 +78,14 @@ class SubdivideOptions:
             (area > 0, f"wall area {area:g} m² is not positive", "try 2"),
             (thickness >= 0, f"wall thickness {thickness:g} m is negative", "try 0.5"),
             (0 <= gain <= 1, f"a gain of {gain:g} is not between 0 and 1", "try 0.1"),
+            (self.reach in get_args(Reach), f"unknown reach {self.reach!r}", "all or main"),
+            (
+                all(0 <= length < float("inf") for length in self.walker)
+                and self.walker[0] > 0
+                and self.walker[1] < self.walker[2],
+                f"nobody's radius, step and height are {self.walker}",
+                "try 0.25,0.5,1.7",
+            ),
             (self.cells in get_args(CellKind), f"unknown cells {self.cells!r}", "leaf or room"),
             (self.max_leaves >= 1, f"at most {self.max_leaves} leaves is too few", "try 500"),
         ):

@@ -20,11 +20,13 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree, build_tree
+from ptmtools.cells.cut_off import CutOff, cut_off
 from ptmtools.cells.grouping import grouped
 from ptmtools.cells.model import OUTSIDE, Cells, sunk
 from ptmtools.cells.naming import matches
-from ptmtools.cells.options import SubdivideOptions
+from ptmtools.cells.options import SubdivideOptions, Walker
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
+from ptmtools.cells.places import Floors
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import Portal, find_portals, portals_rejoined
 from ptmtools.cells.reach import at_box, flood, largest_leaf, roofed_share
@@ -57,6 +59,7 @@ class _Model:
     structure: Structure
     walls: list[WallPlane]
     reveals: Reveals
+    floors: Floors
     options: SubdivideOptions
 
     @staticmethod
@@ -65,7 +68,8 @@ class _Model:
         structure = Structure.of(scene, options, tolerance)
         walls = find_walls(structure, options.wall_area)
         reveals = Reveals(structure, options.wall_thickness)
-        return _Model(structure, walls, reveals, options)
+        floors = Floors.of(scene, structure, options)
+        return _Model(structure, walls, reveals, floors, options)
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,7 @@ class _Space:
     portals: list[Portal]
     reached: Bools  # (L,) which leaves somebody can reach
     closed: bool  # whether they do not touch the root box
+    cut_off: list[CutOff]  # where the flood did not come to; reached all the same if asked for
 
 
 def subdivide(
@@ -116,6 +121,7 @@ def subdivide(
             space = clipped.result()
     finally:
         clipped.cancel()
+    notes += _cut_off_notes(space.cut_off, options)
     if space.tree.unsplit:
         notes.append(
             f"the limit of {options.max_leaves:,} leaves was reached: {space.tree.unsplit:,} of "
@@ -161,11 +167,18 @@ def _divide(
     start = start or largest_leaf(tree, outer <= inside, structure.corners)
     reached = flood(len(tree.leaves), portals, start)
     closed = bool(start) and not bool(np.any(reached & outer))
-    if tree.capped and (inside or closed):  # else it is thrown away
+    others: list[CutOff] = []
+    if inside or closed:  # else it is thrown away
+        outside = outer & (not inside)
+        walker = Walker(*options.walker)
+        others = cut_off(tree, portals, reached, outside, model.floors, structure, walker)
+        if options.reach == "all":
+            reached[np.concatenate([[], *(other.leaves for other in others)]).astype(int)] = True
+    if tree.capped and (inside or closed):
         joint = rejoined(tree, reached)
         portals = portals_rejoined(portals, tree, joint, structure.tolerance)
         tree, reached = joint.tree, np.bincount(joint.leaf, reached) > 0
-    return _Space(box, tree, portals, reached, closed)
+    return _Space(box, tree, portals, reached, closed, others)
 
 
 def _viewpoint_leaves(tree: Tree, box: Floats, options: SubdivideOptions) -> tuple[int, ...]:
@@ -196,6 +209,29 @@ def _detail_notes(scene: Scene, detail: Ints) -> list[str]:
         "small, dense and round: detail, which neither divides nor hides; --structural NAME, or "
         "--no-detail-by-shape, says otherwise"
     ]
+
+
+def _cut_off_notes(others: list[CutOff], options: SubdivideOptions) -> list[str]:
+    """What is said of places that the flood did not come to."""
+    if not others:
+        return []
+    kept = options.reach == "all"
+    does = "is kept as rooms of its own" if kept else "is left out"
+    notes = [
+        f"{other.place:.1f} m² to stand on around {_position(other)} cannot be reached from the "
+        f"start and {does}; --viewpoint {_position(other)} starts there"
+        for other in others[:NAMED]
+    ]
+    if rest := others[NAMED:]:
+        area = sum(other.place for other in rest)
+        notes.append(f"so {does} what is around {len(rest)} more places, {area:.1f} m² in all")
+    if kept:
+        notes.append("--reach main leaves out what cannot be reached from the start")
+    return notes
+
+
+def _position(other: CutOff) -> str:
+    return ",".join(f"{c:.2f}" for c in other.eye)
 
 
 def _bounds(corners: Floats) -> tuple[Floats, Floats]:
