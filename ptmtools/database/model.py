@@ -98,17 +98,6 @@ def _numbers(viewpoints: Sequence[GivenViewpoint]) -> list[tuple[float, ...]]:
     return [(*v.position, *(() if v.yaw is None else (v.yaw,))) for v in viewpoints]
 
 
-def _former_meaning(format: str) -> str | None:
-    """What there is to say of a format whose name alone meant something else before."""
-    emitter = EMITTERS.get(format)
-    if emitter is None or not emitter.before:
-        return None
-    return (
-        f"--format {format} writes {emitter.before} for now; the next release will write {format} "
-        f"alone: say --format {emitter.before} to keep both"
-    )
-
-
 @dataclass(frozen=True)
 class EmitOptions:
     """
@@ -139,14 +128,13 @@ class EmitOptions:
     avatar_size: Vector = (0.25, 1.6, 0.75)
     field_of_view: float = 1.1
     gzip: bool = False
-    format: str = field(
-        default="vrml", metadata={"choices": EMITTERS, "several": True, "note": _former_meaning}
-    )
+    format: str = field(default="vrml,gltf", metadata={"choices": EMITTERS, "several": True})
 
     def __post_init__(self) -> None:
         wrong = None
         try:
-            names = ",".join(emitter.name for emitter in chosen_emitters(self.format))
+            chosen = {emitter.name for emitter in chosen_emitters(self.format)}
+            names = ",".join(name for name in EMITTERS if name in chosen)
             object.__setattr__(self, "format", names)
         except ValueError as fault:
             wrong = f"--format: {fault}"

@@ -25,8 +25,8 @@ def _summary(n: Mapping[str, Any]) -> str:
 
 EMIT: Stage[None] = Stage(
     name="emit",
-    about="Write the served files: cells and hints.json.",
-    recipe=4,
+    about="Write the served files: cells and hints.",
+    recipe=5,
     options=EmitOptions,
     reads=(SCENE, CELLS, PVS, ACH, TEXTURES),
     job=Lazy("ptmtools.pipeline.emission:EmissionJob"),
