@@ -188,7 +188,9 @@ def shortened(value: Any) -> Any:
     if isinstance(value, dict):
         return {name: shortened(inner) for name, inner in value.items()}
     if isinstance(value, list):
-        return [shortened(v) for v in (value[:1] if value and isinstance(value[0], dict) else value)]
+        return [
+            shortened(v) for v in (value[:1] if value and isinstance(value[0], dict) else value)
+        ]
     return value
 
 
