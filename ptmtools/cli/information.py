@@ -41,11 +41,19 @@ def info(voice: Voice, target: str, as_json: bool) -> None:
 
 def _info_database(voice: Voice, target: str, as_json: bool) -> None:
     from ptmtools.cli.parameters import words
+    from ptmtools.cli.stages import print_visitor
+    from ptmtools.cli.status import build_command
     from ptmtools.pipeline.stages import STAGES
+    from ptmtools.pipeline.visitor import Visitor
     from ptmtools.store.folder import DatabaseFolder
 
     db = DatabaseFolder.open(target)
     stages = db.manifest.stages
+    visitor = Visitor.of(db.manifest)
+    old = [n for n, s in STAGES.items() if n in stages and stages[n].recipe != s.recipe]
+    if old:
+        made = f"{', '.join(old)}: made by another release of ptmtools"
+        voice.warn(f"{target}: {made}; run `{build_command(target)}`")
     if as_json:
         voice.emit_json(
             {
@@ -60,6 +68,8 @@ def _info_database(voice: Voice, target: str, as_json: bool) -> None:
                     }
                     for name, record in stages.items()
                 },
+                "outdated": old,
+                "visitor": visitor and asdict(visitor),
             }
         )
         return
@@ -70,13 +80,15 @@ def _info_database(voice: Voice, target: str, as_json: bool) -> None:
         record = stages[name]
         voice.say(f"{name:<9} {stage.summarize(record.counts)}")
         with suppress(ValueError):
-            if given := words([stage.recorded(record.parameters)]):
+            if given := words([stage.recorded(record)]):
                 voice.say(f"{'':<9}   options: {shlex.join(given)}")
         if voice.verbose:
             for key, value in record.parameters.items():
                 voice.say(f"{'':<9}   {key} = {value}")
             for note in record.notes:
                 voice.say(f"{'':<9}   note: {note}")
+    if visitor:
+        print_visitor(voice, visitor)
 
 
 def _info_ptm(voice: Voice, target: str, as_json: bool) -> None:

@@ -15,6 +15,7 @@ from ptmtools.database.emitters import EMITTERS, chosen_emitters
 from ptmtools.errors import InputError
 
 if TYPE_CHECKING:
+    from ptmtools.database.visit import Visit
     from ptmtools.texture.model import Level
 
 Vector = tuple[float, float, float]
@@ -34,6 +35,7 @@ class TextureRecord:
     sha256: hex digest of the `.ptm`'s bytes.
     fallback_level: index into `levels` of the one that the fallback image holds; None if there is
         no image, or if it is the finest.
+    fallback_bytes: of the fallback image; 0 without.
     """
 
     image: int
@@ -45,6 +47,7 @@ class TextureRecord:
     levels: tuple[Level, ...]
     sha256: str
     fallback_level: int | None = None
+    fallback_bytes: int = 0
 
 
 @dataclass(frozen=True)
@@ -128,7 +131,10 @@ class EmitOptions:
     avatar_size: Vector = (0.25, 1.6, 0.75)
     field_of_view: float = 1.1
     gzip: bool = False
-    format: str = field(default="vrml,gltf", metadata={"choices": EMITTERS, "several": True})
+    format: str = field(
+        default="vrml,gltf",
+        metadata={"choices": EMITTERS, "several": True, "default_before": (5, "vrml")},
+    )
 
     def __post_init__(self) -> None:
         wrong = None
@@ -159,6 +165,7 @@ class EmitReport:
     shapes, triangles: written, over all cells; a piece in a boundary counts once per cell.
     collapsed: pieces left out because two corners are one after rounding to float32.
     bytes: of all files together.
+    visit: what they mean for a visitor.
     notes: what there is to say, one line each.
     """
 
@@ -168,6 +175,7 @@ class EmitReport:
     triangles: int
     collapsed: int
     bytes: int
+    visit: Visit
     notes: tuple[str, ...] = ()
 
 
