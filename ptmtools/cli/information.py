@@ -21,6 +21,9 @@ from ptmtools.texture.model import Description, PtmHeader
 #: Components that a texel has in the memory of most graphics processors: RGB is filled up.
 _PADDED = {1: 1, 2: 2, 3: 4, 4: 4}
 
+#: Of a stage whose record has another recipe.
+_OLD = "made by another release of ptmtools"
+
 
 @click.command("info")
 @click.argument("target", metavar="FILE|DB", type=click.Path())
@@ -52,8 +55,7 @@ def _info_database(voice: Voice, target: str, as_json: bool) -> None:
     visitor = Visitor.of(db.manifest)
     old = [n for n, s in STAGES.items() if n in stages and stages[n].recipe != s.recipe]
     if old:
-        made = f"{', '.join(old)}: made by another release of ptmtools"
-        voice.warn(f"{target}: {made}; run `{build_command(target)}`")
+        voice.warn(f"{target}: {', '.join(old)}: {_OLD}; run `{build_command(target)}`")
     if as_json:
         voice.emit_json(
             {
@@ -78,7 +80,7 @@ def _info_database(voice: Voice, target: str, as_json: bool) -> None:
         if name not in stages:
             continue
         record = stages[name]
-        voice.say(f"{name:<9} {stage.summarize(record.counts)}")
+        voice.say(f"{name:<9} {_OLD if name in old else stage.summarize(record.counts)}")
         with suppress(ValueError):
             if given := words([stage.recorded(record)]):
                 voice.say(f"{'':<9}   options: {shlex.join(given)}")

@@ -40,7 +40,7 @@ class Visitor:
         """What there is to say, a line each; of a manifest that makes no sense nothing."""
         try:
             return self._lines()
-        except (LookupError, TypeError, ValueError):
+        except (ArithmeticError, LookupError, TypeError, ValueError):
             return []
 
     def _lines(self) -> list[str]:
