@@ -59,7 +59,8 @@ def visit_of(content: Content, sizes: Mapping[str, int]) -> Visit:
     """
     pvs, records = content.pvs, content.textures
     forms = [e for e in chosen_emitters(content.options.format) if e.cell_files]
-    geometry = min((_geometry(content, form, sizes) for form in forms), key=_total)
+    nothing = np.zeros(pvs.cell_count, np.int64)
+    geometry = min((_geometry(content, f, sizes) for f in forms), key=_total, default=nothing)
     paints = np.zeros((pvs.cell_count, len(records)), dtype=np.bool_)
     for cell, places in enumerate(content.painted):
         paints[cell, places] = True
