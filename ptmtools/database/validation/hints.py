@@ -14,6 +14,7 @@ from ptmtools import schemas
 from ptmtools.database.emitters import EMITTERS
 from ptmtools.database.fault import FileError, shaped
 from ptmtools.database.hints.index import SCHEMA
+from ptmtools.database.hints.record import FORMAT
 from ptmtools.database.names import HINTS, HINTS_FOLDER, STATISTICS, path_of
 from ptmtools.database.validation.findings import Place
 from ptmtools.database.validation.lists import check_graph, check_list, check_shares
@@ -110,7 +111,7 @@ def gather(database: ServedDatabase) -> ReadHints | None:
     database.resolve(HINTS, index["statistics"])
     records: list[Row | None] = []
     for i, path in enumerate(paths):
-        record: Row | None = database.held.get(path) if path else None
+        record = database.held.get(path) if path else None
         if record is not None and (fault := _misplaced(record, i, len(cells), len(textures))):
             database.at(path or "", fault.place).add(fault.code, fault.message)
             record = None
@@ -156,8 +157,10 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
     return {}
 
 
-def _misplaced(record: Row, i: int, cells: int, textures: int) -> FileError | None:
-    """Why a record is none of the cell ``i`` of so many."""
+def _misplaced(record: Any, i: int, cells: int, textures: int) -> FileError | None:
+    """Why what is held of a file is no record of the cell ``i`` of so many."""
+    if not isinstance(record, dict) or record["format"] != FORMAT:
+        return FileError("PTM-D741", "", "is no record of a cell, as the index has it")
     if record["cell"] != i:
         return FileError("PTM-D741", "cell", f"is {record['cell']}, in the index {i}")
     try:
