@@ -6,14 +6,18 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 
 from ptmtools.cli.main import main
 from ptmtools.pipeline import build_scene
+from ptmtools.pipeline.stages import CELLS, PVS
 from ptmtools.pipeline.visitor import Visitor
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.manifest import Manifest, StageRecord
+from ptmtools.visibility import PvsOptions
+from ptmtools.visibility.model import Pvs
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"
 VISIT = {
@@ -83,9 +87,22 @@ def test_the_model_as_it_was(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert [line.removeprefix("visitor").strip() for line in told.splitlines()[-5:]] == lines
 
 
-def test_only_what_is_served_means_something(tmp_path: Path) -> None:
-    from ptmtools.pipeline.stages import CELLS
+@pytest.mark.parametrize(("volume", "little"), [(91.0, True), (1.0, False)])
+def test_culling_gains_little_where_most_of_the_volume_is_at_hand(
+    volume: float, little: bool
+) -> None:
+    """Nine closets that see a hall and not each other: few cells, but most of the building."""
+    sees = np.eye(10, dtype=np.bool_)
+    sees[0] = sees[:, 0] = True
+    pvs = Pvs.from_matrix(sees, volume=np.array([volume] + [1.0] * 9))
+    assert pvs.average_share < 0.3
+    assert any("gains little" in note for note in PVS.notes(pvs, PvsOptions())) is little
+    assert PVS.counts is not None
+    said = PVS.summarize(PVS.counts(pvs))
+    assert said == f"{pvs.volume_at_hand[0]:.1%} of the volume at hand on average, 100.0% at most"
 
+
+def test_only_what_is_served_means_something(tmp_path: Path) -> None:
     model = TWO_ROOMS / "two_rooms.obj"
     assert build_scene(model, tmp_path / "db", until=CELLS).visitor is None
     assert Visitor.of(DatabaseFolder.open(tmp_path / "db").manifest) is None
