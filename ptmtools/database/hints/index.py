@@ -1,8 +1,8 @@
 """The index, `hints.json`: what a client needs before the first step, and no more.
 
 Tried: the level sizes and `gpuBytes` of textures beside the ends of their levels, for 0.4 kB more
-of the museum's 2.7 gzipped, although they follow from the rest; the URLs of each cell instead of
-templates, for 3.6 kB more of willowgarage's 5.0; no boxes, for 2.8 less, but then a client that
+of the museum's 2.3 gzipped, although they follow from the rest; the URLs of each cell instead of
+templates, for 3.6 kB more of willowgarage's 5.5; no boxes, for 3.1 less, but then a client that
 comes to a place without a viewpoint would have to fetch all records to find its cell.
 """
 
