@@ -116,13 +116,16 @@ class Pvs:
         leak = stored.array("leak", np.int32, None, 4)
         if len(leak) and not 0 <= int(leak[:, 0].min()) <= int(leak[:, 0].max()) < cells:
             raise ValueError("leak has an index out of range")
+        volume = stored.array("volume", np.float64, None)
+        if len(volume) not in (0, cells) or not ((volume >= 0) & (volume < np.inf)).all():
+            raise ValueError("volume is not that of the cells")
         return Pvs(
             start,
             entries,
             **{name: stored.array(name, np.int64, None) for name in COUNTED},
             cut=stored.array("cut", np.bool_, None),
             leak=leak,
-            volume=stored.array("volume", np.float64, None),
+            volume=volume,
             conservative=bool(stored.array("conservative", np.bool_, 1)[0]),
         )
 
