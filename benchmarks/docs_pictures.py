@@ -63,17 +63,18 @@ def levels(file: Path) -> Image.Image:
 
 def views(database: Path) -> Image.Image:
     """A viewpoint with coarse and with whole textures, with the bytes of the visible ones."""
-    hints = json.loads((database / "www/hints.json").read_text("utf-8"))
-    viewpoint = hints["viewpoints"][VIEWPOINT]
-    seen = hints["cells"][viewpoint["cell"]]["visible"]
-    used = {image for cell in seen for image in hints["cells"][cell]["textures"]}
-    groups = [hints["textures"][image]["levels"] for image in sorted(used)]
+    index = json.loads((database / "www/hints.json").read_text("utf-8"))
+    viewpoint = index["viewpoints"][VIEWPOINT]
+    name = index["cells"][viewpoint["cell"]]["name"]
+    record = json.loads((database / f"www/hints/{name}.json").read_text("utf-8"))
+    used = {image for images in record["textures"] for image in images}
+    rows = [index["textures"][image] for image in sorted(used)]
     sheet = Image.new("RGB", (2 * WIDTH + 10, HEIGHT + 24), "white")
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(13)
     view, scene = View.of_hint(viewpoint, WIDTH, HEIGHT), load(database)
-    for x, number in ((0, COARSE), (WIDTH + 10, -1)):
-        ends = [levels[number] for levels in groups]
-        side, size = ends[0]["width"], sum(level["offset"] + level["length"] for level in ends)
+    for x, number in ((0, COARSE), (WIDTH + 10, len(rows[0]["ends"]) - 1)):
+        side = rows[0]["width"] >> (len(rows[0]["ends"]) - 1 - number)
+        size = sum(row["ends"][number] for row in rows)
         sheet.paste(
             Image.fromarray(render(scene, view, LOOKS["flat"], samples=2, side=side)), (x, 0)
         )

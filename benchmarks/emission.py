@@ -32,7 +32,7 @@ from PIL import Image
 from ptmtools import AchOptions, compute_ach
 from ptmtools.cells import Cells, subdivide
 from ptmtools.coverage.model import Ach
-from ptmtools.database import TextureRecord, emit
+from ptmtools.database import EmitOptions, TextureRecord, emit
 from ptmtools.database.content import Content
 from ptmtools.database.floats import row_texts
 from ptmtools.database.geometry import Geometry
@@ -147,9 +147,9 @@ def heading(name: str) -> None:
 
 def emitted(scene: Scene, cells: Cells, pvs: Pvs, ach: Ach, folder: Path) -> Written:
     """The VRML files and the hints, as they are on the disk."""
-    some, out = records(scene), folder / "www"
-    seconds = best(lambda: emit(scene, cells, pvs, ach, some, out, force=True))
-    report = emit(scene, cells, pvs, ach, some, out, force=True)
+    some, out, options = records(scene), folder / "www", EmitOptions(format="vrml")
+    seconds = best(lambda: emit(scene, cells, pvs, ach, some, out, options, force=True))
+    report = emit(scene, cells, pvs, ach, some, out, options, force=True)
     return Written(report.triangles, [(out / name).read_bytes() for name in report.files], seconds)
 
 
@@ -194,7 +194,7 @@ def compare(model: Path, folder: Path) -> None:
     ours = emitted(scene, cells, pvs, ach, folder)
     ours.row("VRML and hints")
     vrml = Written(ours.triangles, ours.files[: cells.cell_count], ours.seconds)
-    hints = Written(ours.triangles, ours.files[-2:-1], ours.seconds)
+    hints = Written(ours.triangles, ours.files[cells.cell_count + 1 :], ours.seconds)
     vrml.row("  of them the cells")
     hints.row("  of them the hints")
     try:

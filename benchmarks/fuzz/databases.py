@@ -45,7 +45,7 @@ WRITING = ("textures -j 1", "emit", "pvs -j 1", "validate --segments 50")
 def built(folder: Path) -> Path:
     """The database of a small model."""
     model = Path(shutil.copytree(MODEL, folder / "model"))
-    options = ["--samples", "16", "--backend", "embree", "-j", "1", "-q", "--format", "gltf"]
+    options = ["--samples", "16", "--backend", "embree", "-j", "1", "-q"]
     db = folder / "db"
     status = main(["build-scene", str(model / "two_rooms.obj"), "-o", str(db), *options])
     assert status == 0

@@ -21,6 +21,9 @@ from ptmtools.texture.model import Description, PtmHeader
 #: Components that a texel has in the memory of most graphics processors: RGB is filled up.
 _PADDED = {1: 1, 2: 2, 3: 4, 4: 4}
 
+#: Of a stage whose record has another recipe.
+_OLD = "made by another release of ptmtools"
+
 
 @click.command("info")
 @click.argument("target", metavar="FILE|DB", type=click.Path())
@@ -41,11 +44,18 @@ def info(voice: Voice, target: str, as_json: bool) -> None:
 
 def _info_database(voice: Voice, target: str, as_json: bool) -> None:
     from ptmtools.cli.parameters import words
+    from ptmtools.cli.stages import print_visitor
+    from ptmtools.cli.status import build_command
     from ptmtools.pipeline.stages import STAGES
+    from ptmtools.pipeline.visitor import Visitor
     from ptmtools.store.folder import DatabaseFolder
 
     db = DatabaseFolder.open(target)
     stages = db.manifest.stages
+    visitor = Visitor.of(db.manifest)
+    old = [n for n, s in STAGES.items() if n in stages and stages[n].recipe != s.recipe]
+    if old:
+        voice.warn(f"{target}: {', '.join(old)}: {_OLD}; run `{build_command(target)}`")
     if as_json:
         voice.emit_json(
             {
@@ -60,6 +70,8 @@ def _info_database(voice: Voice, target: str, as_json: bool) -> None:
                     }
                     for name, record in stages.items()
                 },
+                "outdated": old,
+                "visitor": visitor and asdict(visitor),
             }
         )
         return
@@ -68,15 +80,17 @@ def _info_database(voice: Voice, target: str, as_json: bool) -> None:
         if name not in stages:
             continue
         record = stages[name]
-        voice.say(f"{name:<9} {stage.summarize(record.counts)}")
+        voice.say(f"{name:<9} {_OLD if name in old else stage.summarize(record.counts)}")
         with suppress(ValueError):
-            if given := words([stage.recorded(record.parameters)]):
+            if given := words([stage.recorded(record)]):
                 voice.say(f"{'':<9}   options: {shlex.join(given)}")
         if voice.verbose:
             for key, value in record.parameters.items():
                 voice.say(f"{'':<9}   {key} = {value}")
             for note in record.notes:
                 voice.say(f"{'':<9}   note: {note}")
+    if visitor:
+        print_visitor(voice, visitor)
 
 
 def _info_ptm(voice: Voice, target: str, as_json: bool) -> None:

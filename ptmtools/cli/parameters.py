@@ -114,7 +114,6 @@ def options_of(*classes: type) -> Decorator:
     found: dict[str, Decorator] = {}
     former: dict[str, str] = {}
     deprecated: dict[str, tuple[Any, str]] = {}
-    notes: dict[str, Callable[[Any], str | None]] = {}
     for cls in classes:
         hints, texts = typing.get_type_hints(cls), descriptions(cls)
         for field in fields(cls):
@@ -123,8 +122,6 @@ def options_of(*classes: type) -> Decorator:
                 found[name] = _option(field, hints[field.name], texts.get(field.name))
                 if reason := field.metadata.get("deprecated"):
                     deprecated[name] = _default(field), reason
-                if "note" in field.metadata:
-                    notes[name] = field.metadata["note"]
                 for old in field.metadata.get("was", ()):
                     found[old] = _option(field, hints[field.name], None, former=old)
                     former[old] = name
@@ -144,9 +141,6 @@ def options_of(*classes: type) -> Decorator:
                 if values[_variable(name)] != default:
                     word = f"no-{name}" if default is True else name
                     click.echo(f"ptm: note: --{word} does nothing any more: {reason}", err=True)
-            for name, note in notes.items():
-                if text := note(values[_variable(name)]):
-                    click.echo(f"ptm: note: {text}", err=True)
             return function(*arguments, **values)
 
         command: Callable[..., Any] = renamed

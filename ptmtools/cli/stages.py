@@ -8,6 +8,7 @@ import shutil
 import sys
 from collections.abc import Callable
 from dataclasses import asdict
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from ptmtools.pipeline.report import BuildReport, StageReport
 from ptmtools.pipeline.run import Artifacts
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import EMIT, PVS, STAGES
+from ptmtools.pipeline.visitor import Visitor
 from ptmtools.quantities import size
 from ptmtools.store.folder import DatabaseFolder
 
@@ -182,6 +184,8 @@ def print_report(voice: Voice, report: BuildReport, as_json: bool) -> None:
         voice.say(f"note: {note}")
     if len(shown) < len(report.notes):
         voice.say(f"note: {len(report.notes) - len(shown):,} more notes; -v shows them all")
+    if report.visitor:
+        print_visitor(voice, report.visitor)
     if any(stage.stage == EMIT.name for stage in report.stages):
         ptm, db = _invoked(), shlex.quote(report.database)
         voice.say("")
@@ -194,6 +198,12 @@ def print_report(voice: Voice, report: BuildReport, as_json: bool) -> None:
         width = max(map(len, commands))
         for command, purpose in commands.items():
             voice.say(f"  {command:<{width}}  {purpose}")
+
+
+def print_visitor(voice: Voice, visitor: Visitor) -> None:
+    """Says what a database means for a visitor."""
+    for head, line in zip_longest(["visitor"], visitor.lines(), fillvalue=""):
+        voice.say(f"{head:<9} {line}".rstrip())
 
 
 def _tasks(stage: StageReport) -> str:

@@ -64,7 +64,7 @@ def build_command(db: str) -> str:
     recorded = []
     for name, stage in STAGES.items():
         with suppress(KeyError, ValueError):
-            recorded.append(stage.recorded(manifest.stages[name].parameters))
+            recorded.append(stage.recorded(manifest.stages[name]))
     model = shlex.quote(manifest.model) if manifest.model else "MODEL"
     return " ".join(
         ["ptm build-scene", model, "-o", shlex.quote(db), *map(shlex.quote, words(recorded))]

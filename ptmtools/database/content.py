@@ -3,7 +3,7 @@ from them once for all."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
 from ptmtools.database.geometry import Geometry
-from ptmtools.database.hints import hints_text
+from ptmtools.database.hints.numbers import shares_of
 from ptmtools.database.model import EmitOptions, TextureRecord, Viewpoint
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
@@ -64,7 +64,7 @@ class Content:
         cells = np.split(of_shape, self.geometry.cell_start[1:-1])
         return [np.unique(used[used >= 0]) for used in cells]
 
-    def hints(self, cell_url: Callable[[int], str], up: str = "") -> str:
-        """The text of a `hints.json`; ``cell_url`` gives a cell's URL from where it lies, ``up`` is
-        the way from there to the served folder. Raises PTM-D601."""
-        return hints_text(self, cell_url, up)
+    @cached_property
+    def shares(self) -> list[list[float]]:
+        """Of each cell its ACH as it is written, aligned with its row of the PVS."""
+        return [shares_of(row) for row in np.split(self.ach.value, self.pvs.start[1:-1])]

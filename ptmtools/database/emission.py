@@ -16,6 +16,7 @@ from ptmtools.database.emitters import chosen_emitters
 from ptmtools.database.model import EmitOptions, EmitReport, TextureRecord
 from ptmtools.database.served import write_files
 from ptmtools.database.viewpoints.placement import place_viewpoints
+from ptmtools.database.visit import visit_of
 from ptmtools.errors import DatabaseError
 from ptmtools.files import real_folder, refuse_existing
 from ptmtools.progress import Progress, silent
@@ -66,22 +67,21 @@ def emit(
     for name in owned:
         if name.endswith("/"):
             real_folder(folder, name[:-1])
-    names: list[str] = []
-    size = 0
+    sizes: dict[str, int] = {}
     entries = {emitter.entry for emitter in emitters}
     for given in written:
         # What leads to others comes when those are there.
         for _, files in groupby(given, lambda file: file[0] in entries):
-            for some, length in write_files(folder, files, force=force, gzip=options.gzip):
-                names += some
-                size += length
+            for some in write_files(folder, files, force=force, gzip=options.gzip):
+                sizes |= some
     return EmitReport(
-        files=tuple(names),
+        files=tuple(sizes),
         viewpoints=viewpoints,
         shapes=len(content.geometry.object),
         triangles=len(content.geometry.triangle),
         collapsed=content.geometry.collapsed,
-        bytes=size,
+        bytes=sum(sizes.values()),
+        visit=visit_of(content, sizes),
         notes=notes,
     )
 

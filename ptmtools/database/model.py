@@ -15,6 +15,7 @@ from ptmtools.database.emitters import EMITTERS, chosen_emitters
 from ptmtools.errors import InputError
 
 if TYPE_CHECKING:
+    from ptmtools.database.visit import Visit
     from ptmtools.texture.model import Level
 
 Vector = tuple[float, float, float]
@@ -34,6 +35,7 @@ class TextureRecord:
     sha256: hex digest of the `.ptm`'s bytes.
     fallback_level: index into `levels` of the one that the fallback image holds; None if there is
         no image, or if it is the finest.
+    fallback_bytes: of the fallback image; 0 without.
     """
 
     image: int
@@ -45,6 +47,7 @@ class TextureRecord:
     levels: tuple[Level, ...]
     sha256: str
     fallback_level: int | None = None
+    fallback_bytes: int = 0
 
 
 @dataclass(frozen=True)
@@ -98,17 +101,6 @@ def _numbers(viewpoints: Sequence[GivenViewpoint]) -> list[tuple[float, ...]]:
     return [(*v.position, *(() if v.yaw is None else (v.yaw,))) for v in viewpoints]
 
 
-def _former_meaning(format: str) -> str | None:
-    """What there is to say of a format whose name alone meant something else before."""
-    emitter = EMITTERS.get(format)
-    if emitter is None or not emitter.before:
-        return None
-    return (
-        f"--format {format} writes {emitter.before} for now; the next release will write {format} "
-        f"alone: say --format {emitter.before} to keep both"
-    )
-
-
 @dataclass(frozen=True)
 class EmitOptions:
     """
@@ -140,13 +132,15 @@ class EmitOptions:
     field_of_view: float = 1.1
     gzip: bool = False
     format: str = field(
-        default="vrml", metadata={"choices": EMITTERS, "several": True, "note": _former_meaning}
+        default="vrml,gltf",
+        metadata={"choices": EMITTERS, "several": True, "default_before": (5, "vrml")},
     )
 
     def __post_init__(self) -> None:
         wrong = None
         try:
-            names = ",".join(emitter.name for emitter in chosen_emitters(self.format))
+            chosen = {emitter.name for emitter in chosen_emitters(self.format)}
+            names = ",".join(name for name in EMITTERS if name in chosen)
             object.__setattr__(self, "format", names)
         except ValueError as fault:
             wrong = f"--format: {fault}"
@@ -171,6 +165,7 @@ class EmitReport:
     shapes, triangles: written, over all cells; a piece in a boundary counts once per cell.
     collapsed: pieces left out because two corners are one after rounding to float32.
     bytes: of all files together.
+    visit: what they mean for a visitor.
     notes: what there is to say, one line each.
     """
 
@@ -180,6 +175,7 @@ class EmitReport:
     triangles: int
     collapsed: int
     bytes: int
+    visit: Visit
     notes: tuple[str, ...] = ()
 
 

@@ -12,12 +12,17 @@ import unicodedata
 #: In the served folder.
 ROOT = "root.wrl"
 HINTS = "hints.json"
+HINTS_FOLDER = "hints"
+STATISTICS = f"{HINTS_FOLDER}/statistics.json"
 CELL_FOLDER = "cells"
 TEXTURE_FOLDER = "textures"
 GLTF_FOLDER = "gltf"
-#: The hints whose URLs start from the glTF folder, and the way back from there.
-GLTF_HINTS = f"{GLTF_FOLDER}/{HINTS}"
+#: From one of these folders back to the served one.
 UP = "../"
+#: The files of a cell, as the index names them: URI templates (RFC 6570, level 1).
+RECORD_FILES = f"{HINTS_FOLDER}/{{name}}.json"
+VRML_FILES = f"{CELL_FOLDER}/{{name}}.wrl"
+GLTF_FILES = f"{GLTF_FOLDER}/{{name}}.glb"
 
 _ILLEGAL = re.compile(r"[^A-Za-z0-9_]+")
 #: Longer object names are cut: they come from generators and say nothing more.
@@ -30,18 +35,13 @@ def cell_name(cell: int) -> str:
 
 
 def cell_file(cell: int) -> str:
-    """The name of a cell's file, as other cell files refer to it."""
+    """The name of a cell's VRML file, as other cell files refer to it."""
     return f"{cell_name(cell)}.wrl"
 
 
-def cell_path(cell: int) -> str:
-    """A cell's file relative to the served folder."""
-    return f"{CELL_FOLDER}/{cell_file(cell)}"
-
-
-def glb_file(cell: int) -> str:
-    """The name of a cell's GLB, as the hints beside it refer to it."""
-    return f"{cell_name(cell)}.glb"
+def path_of(cell: int, files: str) -> str:
+    """A cell's file relative to the served folder, by the template of such files."""
+    return files.replace("{name}", cell_name(cell))
 
 
 class DefNames:

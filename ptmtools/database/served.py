@@ -36,9 +36,9 @@ def compressed(data: bytes) -> bytes:
 
 def write_files(
     folder: Path, files: Iterable[tuple[str, str | bytes]], *, force: bool, gzip: bool
-) -> Iterator[tuple[list[str], int]]:
-    """Of each file the names of what was written, its own and that of a copy, and all their bytes;
-    at the end all are on the disk.
+) -> Iterator[dict[str, int]]:
+    """Of each file what was written, itself and a copy, as name → bytes; at the end all are on the
+    disk.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def write_files(
     Raises OutputError: PTM-O001 to PTM-O003, of the first file that cannot be written.
     """
 
-    def write(file: tuple[str, str | bytes]) -> tuple[list[str], int]:
+    def write(file: tuple[str, str | bytes]) -> dict[str, int]:
         name, content = file
         data = content.encode() if isinstance(content, str) else content
         copy = folder / f"{name}{GZIP}"
@@ -58,10 +58,10 @@ def write_files(
         if gzip and name.endswith(_TEXT):
             packed = compressed(data)
             write_bytes(copy, packed, force=force)
-            return [name, f"{name}{GZIP}"], len(data) + len(packed)
+            return {name: len(data), f"{name}{GZIP}": len(packed)}
         if force:
             with writing(copy):
                 copy.unlink(missing_ok=True)
-        return [name], len(data)
+        return {name: len(data)}
 
     return ordered(write, files, _WRITERS)

@@ -19,7 +19,8 @@ from ptmtools.pipeline.background import Workers
 from ptmtools.pipeline.report import BuildReport, peak_memory
 from ptmtools.pipeline.run import Run
 from ptmtools.pipeline.stage import Options, Stage
-from ptmtools.pipeline.stages import STAGES
+from ptmtools.pipeline.stages import EMIT, STAGES
+from ptmtools.pipeline.visitor import Visitor
 from ptmtools.progress import Progress, silent
 from ptmtools.store.writer import DatabaseWriter
 
@@ -144,4 +145,5 @@ def _run(
         seconds=time.perf_counter() - start,
         peak_memory=peak_memory(),
         peak_memory_of_workers=peak_memory(of_workers=True),
+        visitor=Visitor.of(run.db.manifest) if EMIT in finished else None,
     )

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ptmtools.store.folder import DatabaseFolder
-from ptmtools.store.manifest import StageRecord
+from ptmtools.store.manifest import SCHEMA, StageRecord
 
 #: Files that are named one by one.
 _NAMED = 3
@@ -14,13 +14,20 @@ _NAMED = 3
 NEVER_RUN = ("has not been run",)
 
 
-def reasons(before: StageRecord | None, work: StageRecord, db: DatabaseFolder) -> tuple[str, ...]:
-    """What makes a stage with this record do ``work``; empty if it is current."""
+def reasons(
+    before: StageRecord | None, work: StageRecord, db: DatabaseFolder, changed: str = ""
+) -> tuple[str, ...]:
+    """What makes a stage with this record do ``work``; empty if it is current. ``changed`` is what
+    its recipe has changed."""
     if before is None:
-        return NEVER_RUN
+        earlier = db.manifest.replaced
+        if earlier is None:
+            return NEVER_RUN
+        return (f"the database has schema {earlier}, this ptmtools writes {SCHEMA}",)
     found = []
     if before.recipe != work.recipe:
-        found.append(f"this ptmtools computes it differently (recipe {before.recipe} before)")
+        what = f": {changed}" if changed and before.recipe < work.recipe else ""
+        found.append(f"this ptmtools computes it differently (recipe {before.recipe} before){what}")
     names = [*before.parameters, *(n for n in work.parameters if n not in before.parameters)]
     for name in names:
         old, new = before.parameters.get(name), work.parameters.get(name)

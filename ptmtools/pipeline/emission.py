@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 from ptmtools.pipeline.encoding import fallback_level
@@ -46,6 +46,7 @@ class EmissionJob(Job):
             "triangles": report.triangles,
             "collapsed": report.collapsed,
             "viewpoints": len(report.viewpoints),
+            "visit": asdict(report.visit),
         }
         return replace(work, counts=counts, notes=report.notes)
 
@@ -55,12 +56,12 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
     from ptmtools.database import TextureRecord
 
     record = run.record(TEXTURES)
-    options = run.recorded(TEXTURES)
+    options, served = run.recorded(TEXTURES), run.db.path / SERVED
     records = []
     for i, name in enumerate(texture_files(image_digests(run))):
         png = f"{name.removesuffix('ptm')}png"
         fallback = png if f"{SERVED}/{png}" in record.outputs else None
-        header = header_of(run.db.path / SERVED / name)
+        header = header_of(served / name)
         records.append(
             TextureRecord(
                 image=i,
@@ -72,6 +73,7 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
                 levels=header.levels,
                 sha256=run.db.output(TEXTURES.name, f"{SERVED}/{name}"),
                 fallback_level=fallback_level(header, options.fallback_size) if fallback else None,
+                fallback_bytes=(served / fallback).stat().st_size if fallback else 0,
             )
         )
     return tuple(records)

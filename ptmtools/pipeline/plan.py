@@ -82,7 +82,7 @@ def _plan(
     elif before:
         inputs |= before.inputs
     work = work_of(stage, options, inputs)
-    why = reasons(before, work, artifacts.db)
+    why = reasons(before, work, artifacts.db, stage.changed)
     tasks = stage.tasks.load()(artifacts, work) if stage.tasks else []
     plan: Plan = "run" if why else "maybe" if anew else "current"
     if plan == "maybe":

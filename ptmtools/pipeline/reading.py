@@ -105,7 +105,7 @@ class ReadingJob(Job):
         return replace(
             work,
             inputs=files_of(self._model, scene.files, run.db.digests),
-            counts=SCENE.counts(scene),
+            counts={**SCENE.counts(scene), **self._bytes(scene.files, scene.images)},
             notes=tuple(_line(note) for note in scene.notes),
         )
 
@@ -136,7 +136,16 @@ class ReadingJob(Job):
             return None
         images = [fresh.get(i, image) for i, image in enumerate(images_of(self.run))]
         self._put_images(transaction, images, fresh.values())
-        return replace(work, counts=before.counts, notes=before.notes)
+        counts = {**before.counts, **self._bytes(work.inputs, images)}
+        return replace(work, counts=counts, notes=before.notes)
+
+    def _bytes(self, names: Iterable[str], images: Iterable[SourceImage]) -> dict[str, int]:
+        """What the model's files take, and those of its images apart."""
+        painted = {name for image in images for name in image.files} - {self._model.name}
+        files = {name: self._model.parent / name for name in {self._model.name, *names} | painted}
+        sizes = {name: f.stat().st_size for name, f in files.items() if f.is_file()}
+        image_bytes = sum(length for name, length in sizes.items() if name in painted)
+        return {"model_bytes": sum(sizes.values()) - image_bytes, "image_bytes": image_bytes}
 
     def _put_images(
         self,

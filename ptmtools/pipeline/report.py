@@ -5,7 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ptmtools.pipeline.visitor import Visitor
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,7 @@ class BuildReport:
     peak_memory: bytes, the most that this process ever held; 0 where the system does not tell.
     peak_memory_of_workers: bytes, the most that any process held that this one started and that
         has ended; 0 if there was none.
+    visitor: what the served files mean for a visitor, if they were written.
     """
 
     model: str
@@ -55,6 +59,7 @@ class BuildReport:
     seconds: float
     peak_memory: int
     peak_memory_of_workers: int = 0
+    visitor: Visitor | None = None
 
     def counts(self, stage: str) -> Mapping[str, Any]:
         """The figures of a stage; empty if it was no part of this run."""

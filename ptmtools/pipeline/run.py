@@ -53,7 +53,7 @@ class Artifacts:
                     "PTM-D008",
                     f"the {stage.name} stage was run by another release of ptmtools",
                     file=self.db.path,
-                    remedy="run `ptm build-scene MODEL -o DB` to bring the database up to date",
+                    remedy=f"run `{self.db.build_command}` to bring the database up to date",
                 )
             arrays = self.db.read_arrays(stage.name)
             kind = stage.artifact.load()
@@ -90,7 +90,7 @@ class Artifacts:
         """The options of a stage's last run; raises PTM-D002 if the record has others."""
         record = self.record(stage)
         try:
-            return stage.recorded(record.parameters)
+            return stage.recorded(record)
         except ValueError as fault:
             raise damaged_manifest(self.db.path / MANIFEST, str(fault)) from fault
 
@@ -184,7 +184,7 @@ class Run(Artifacts):
                     "PTM-D008",
                     f"the {read.name} stage was made from an earlier {earlier}",
                     file=self.db.path,
-                    remedy="run `ptm build-scene MODEL -o DB` first",
+                    remedy=f"run `{self.db.build_command}` first",
                 )
         return work_of(stage, options, inputs)
 
@@ -250,7 +250,8 @@ class Job:
         work = self.run.work(self.stage, self.options)
         if self.run.rebuild:
             return work, ("a rebuild was asked for",)
-        return work, reasons(self.run.before(self.stage), work, self.run.db)
+        before, changed = self.run.before(self.stage), self.stage.changed
+        return work, reasons(before, work, self.run.db, changed)
 
     def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
         """Puts what the stage makes into the transaction; returns ``work`` as it has been done,

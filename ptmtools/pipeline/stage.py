@@ -42,7 +42,9 @@ class Stage(Generic[A]):
     about: what it does, a sentence for ``--help``.
     recipe: a number that is raised when the stage makes different bytes from the same inputs, so
         that a new release runs again what it changed and nothing else.
-    options: the frozen class of its options.
+    changed: what the recipe changed that a user notices, for who has a database of an earlier one.
+    options: the frozen class of its options. A field's metadata may have ``default_before``: a
+        recipe, and what the default was before that.
     reads: the stages that it reads, in the order in which `compute` takes their artifacts; a
         function of the options if it depends on them.
     artifact: the class of what it makes, with ``to_arrays`` and ``from_arrays``; None if it makes
@@ -73,6 +75,7 @@ class Stage(Generic[A]):
     about: str
     recipe: int
     options: type
+    changed: str = ""
     reads: tuple[Stage[Any], ...] | Callable[[Options], tuple[Stage[Any], ...]] = ()
     artifact: Lazy[Any] | None = None
     compute: Lazy[Callable[..., A]] | None = None
@@ -102,12 +105,14 @@ class Stage(Generic[A]):
         except (ArithmeticError, LookupError, TypeError, ValueError):
             return "figures that make no sense"
 
-    def recorded(self, parameters: Mapping[str, Any]) -> Options:
+    def recorded(self, record: StageRecord) -> Options:
         """The options of a run, of the parameters that its record has.
 
         Raises ValueError if they are not such. Fields that the class does not have any more are
-        passed over, and those that it has gained have their default.
+        passed over, and those that it has gained have their default; so has what was the default
+        when it was recorded.
         """
+        parameters = record.parameters
         hints = typing.get_type_hints(self.options)
         given: dict[str, Any] = {}
         try:
@@ -115,7 +120,10 @@ class Stage(Generic[A]):
                 former = (name.replace("-", "_") for name in each.metadata.get("was", ()))
                 for name in (each.name, *former):
                     if name in parameters and each.compare:
-                        given[each.name] = _restored(hints[each.name], parameters[name])
+                        value = _restored(hints[each.name], parameters[name])
+                        recipe, former = each.metadata.get("default_before", (0, None))
+                        if record.recipe >= recipe or value != former:
+                            given[each.name] = value
                         break
             return self.options(**given)
         except (PtmError, AttributeError, LookupError, TypeError) as fault:

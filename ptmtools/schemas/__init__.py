@@ -26,7 +26,8 @@ from importlib.resources import files
 from typing import Any
 
 #: Names of the schemas.
-HINTS, MANIFEST, VALIDATION, GLB, SCENE = "hints", "manifest", "validation", "glb", "scene"
+HINTS, CELL, STATISTICS = "hints", "cell", "statistics"
+MANIFEST, VALIDATION, GLB, SCENE = "manifest", "validation", "glb", "scene"
 #: So many lists and objects lie in each other at most, where anything may stand.
 DEEPEST = 16
 #: How the message of a number ends that is beyond float64.

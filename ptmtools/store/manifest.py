@@ -21,10 +21,12 @@ by the same recipe with the same parameters on the same inputs, and its outputs 
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from os import PathLike
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from ptmtools import schemas
 from ptmtools.errors import DatabaseError
@@ -55,14 +57,22 @@ class StageRecord:
 
 @dataclass(frozen=True)
 class Manifest:
-    """The contents of `manifest.json`."""
+    """The contents of `manifest.json`.
+
+    Attributes
+    ----------
+    model: the file's name.
+    stages: by name.
+    replaced: the schema of an earlier manifest that this one takes the place of; not written.
+    """
 
     model: str
     stages: Mapping[str, StageRecord] = field(default_factory=dict)
+    replaced: int | None = field(default=None, compare=False)
 
     def with_stages(self, records: Mapping[str, StageRecord]) -> Manifest:
         """This manifest with some stages recorded anew."""
-        return Manifest(self.model, {**self.stages, **records})
+        return replace(self, stages={**self.stages, **records})
 
     def outputs(self) -> dict[str, str]:
         """Every file of the database with its SHA-256, except the manifest itself."""
@@ -97,11 +107,13 @@ class Manifest:
                 "PTM-D001", "not a ptmtools database", file=file, remedy="give a database folder"
             )
         if document.get("schema") != SCHEMA:
+            earlier = listed_before(data)
+            anew = earlier and f"build it again with `{build_command(earlier.model, file)}`, or "
             raise DatabaseError(
                 "PTM-D003",
                 f"schema version {document.get('schema')!r}, this ptmtools reads {SCHEMA}",
                 file=file,
-                remedy="build the database again, or use the ptmtools that wrote it",
+                remedy=f"{anew or ''}use the ptmtools that wrote it",
             )
         try:
             schemas.check(document, schemas.MANIFEST)
@@ -117,9 +129,22 @@ class Manifest:
         )
 
 
-def listed_before(data: bytes) -> tuple[str, set[str]] | None:
-    """The model, and the files that are listed, of a manifest of an earlier schema; None if it is
-    no such manifest.
+def build_command(model: str, manifest: str | PathLike[str]) -> str:
+    """The command that brings the database of a model up to date, by the path of its manifest."""
+    folder = Path(manifest).parent
+    return f"ptm build-scene {shlex.quote(model)} -o {shlex.quote(str(folder))}"
+
+
+class Earlier(NamedTuple):
+    """A manifest of an earlier schema: its number, the model, and the files that are listed."""
+
+    schema: int
+    model: str
+    outputs: set[str]
+
+
+def listed_before(data: bytes) -> Earlier | None:
+    """What a manifest of an earlier schema says; None if it is no such manifest.
 
     Of such a database nothing can be used but the knowledge of what is ours in its folder.
     """
@@ -130,7 +155,8 @@ def listed_before(data: bytes) -> tuple[str, set[str]] | None:
         if document["format"] != FORMAT or not earlier or not isinstance(model, str):
             return None
         listed = [path for stage in document["stages"].values() for path in stage["outputs"]]
-        return model, {path for path in listed if isinstance(path, str) and _is_output(path)}
+        outputs = {path for path in listed if isinstance(path, str) and _is_output(path)}
+        return Earlier(schema, model, outputs)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
 

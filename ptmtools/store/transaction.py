@@ -224,7 +224,7 @@ def _listed(folder: Path) -> Iterable[str]:
     except DatabaseError:
         with suppress(OSError):
             earlier = listed_before((folder / MANIFEST).read_bytes())
-            return sorted(earlier[1]) if earlier else ()
+            return sorted(earlier.outputs) if earlier else ()
         return ()
     return manifest.outputs() if manifest else ()
 

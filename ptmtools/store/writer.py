@@ -106,9 +106,9 @@ def admitted(folder: Path, model: str, *, force: bool) -> Manifest:
         manifest = read_manifest(folder)
     except DatabaseError:
         earlier = listed_before((folder / MANIFEST).read_bytes())
-        if not force and (earlier is None or earlier[0] != model):
+        if not force and (earlier is None or earlier.model != model):
             raise
-        return Manifest(model)
+        return Manifest(model, replaced=earlier and earlier.schema)
     if manifest and manifest.model == model:
         return manifest
     if manifest and not force:

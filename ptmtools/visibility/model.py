@@ -32,6 +32,7 @@ class Pvs:
     opened: (K,) int64 those that let a line pass; see `PortalFlow`.
     leak: (n, 4) int32 cells that see suspiciously much: the cell, how many cells it sees, the
         smallest portal that shows it half of them, and how many that one shows.
+    volume: (C,) float64 m³ of each cell, for shares of the building; empty if it is not known.
     conservative: False if the sets are of what random lines happened to show.
     """
 
@@ -43,6 +44,7 @@ class Pvs:
     decided: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     opened: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     leak: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), np.int32))
+    volume: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     conservative: bool = True
 
     @property
@@ -63,6 +65,19 @@ class Pvs:
         """Mean share of all cells that a cell may see, itself included, in [0, 1]."""
         n = self.cell_count
         return float(len(self.cell) / (n * n)) if n else 0.0
+
+    def at_hand(self, size: NDArray[np.number]) -> NDArray[np.float64]:
+        """(C,) the sum of ``size`` (C,) over the cells that each may see."""
+        if not self.cell_count:
+            return np.zeros(0)
+        return np.add.reduceat(size[self.cell].astype(np.float64), self.start[:-1])
+
+    @property
+    def volume_at_hand(self) -> tuple[float, float]:
+        """Share of the building that is at hand, in [0, 1]: on average over places, and at most. If
+        no volume is known, of the cells."""
+        volume = self.volume if self.volume.any() else np.ones(self.cell_count)
+        return over_places(self.at_hand(volume) / max(volume.sum(), np.finfo(float).tiny), volume)
 
     def to_matrix(self) -> NDArray[np.bool_]:
         """(C, C) dense matrix."""
@@ -101,11 +116,24 @@ class Pvs:
         leak = stored.array("leak", np.int32, None, 4)
         if len(leak) and not 0 <= int(leak[:, 0].min()) <= int(leak[:, 0].max()) < cells:
             raise ValueError("leak has an index out of range")
+        volume = stored.array("volume", np.float64, None)
+        if len(volume) not in (0, cells) or not ((volume >= 0) & (volume < np.inf)).all():
+            raise ValueError("volume is not that of the cells")
         return Pvs(
             start,
             entries,
             **{name: stored.array(name, np.int64, None) for name in COUNTED},
             cut=stored.array("cut", np.bool_, None),
             leak=leak,
+            volume=volume,
             conservative=bool(stored.array("conservative", np.bool_, 1)[0]),
         )
+
+
+def over_places(values: NDArray[np.float64], volume: NDArray[np.float64]) -> tuple[float, float]:
+    """The mean of (C,) values of cells over all places, so that a cell counts by its (C,)
+    ``volume``, and the greatest; (0, 0) of no cells."""
+    if not len(values):
+        return 0.0, 0.0
+    weight = volume if volume.any() else np.ones(len(values))
+    return float(np.average(values, weights=weight)), float(values.max())

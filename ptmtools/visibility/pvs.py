@@ -37,9 +37,10 @@ def compute_pvs(
     Raises what `portal_flow` raises.
     """
     portals = portals_of(cells)
+    volume = np.bincount(cells.leaf_cell, cells.leaf_volumes(), cells.cell_count)
     if options.method == "sampled":
         leaves = sampled_leaves(portals, options.lines, executor)
-        return Pvs.from_matrix(_lifted(cells, leaves), conservative=False)
+        return Pvs.from_matrix(_lifted(cells, leaves), volume=volume, conservative=False)
     budget = options.budget if options.method == "full" else 0
     flow = portal_flow(portals, budget, progress, executor)
     matrix = _lifted(cells, leaf_matrix(portals, flow))
@@ -51,6 +52,7 @@ def compute_pvs(
         decided=flow.decided,
         opened=flow.opened,
         leak=find_leaks(cells, flow, matrix),
+        volume=volume,
     )
 
 

@@ -62,7 +62,16 @@ def test_figures_of_a_damaged_manifest(stage: str, value: object) -> None:
     """Whatever the manifest says, a line comes out."""
     names = (
         *("triangles", "objects", "images", "metres", "up", "unit_guessed", "up_guessed", "closed"),
-        *("cells", "leaves", "portals", "average_share", "samples", "backend", "renderer"),
+        *(
+            "cells",
+            "leaves",
+            "portals",
+            "mean_volume",
+            "most_volume",
+            "samples",
+            "backend",
+            "renderer",
+        ),
         *("textures", "raw_bytes", "ptm_bytes", "files", "bytes", "viewpoints"),
     )
     assert isinstance(STAGES[stage].summarize(dict.fromkeys(names, value)), str)

@@ -15,7 +15,7 @@ from PIL import Image
 
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
-from ptmtools.database import TextureRecord, emit
+from ptmtools.database import EmitOptions, TextureRecord, emit
 from ptmtools.scene.model import Material, Scene, SourceImage
 from ptmtools.texture import encode, read_header
 from ptmtools.visibility.model import Pvs
@@ -147,10 +147,10 @@ def write_manifest(db: Path) -> None:
 
 @pytest.fixture(scope="session")
 def finished(artifacts: Artifacts, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The database; not to be changed."""
+    """The database, with VRML alone; not to be changed."""
     db = tmp_path_factory.mktemp("finished") / "rooms"
-    records = write_textures(db / "www")
-    emit(artifacts.scene, artifacts.cells, artifacts.pvs, artifacts.ach, records, db / "www")
+    a, records = artifacts, write_textures(db / "www")
+    emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", EmitOptions(format="vrml"))
     write_manifest(db)
     return db
 

@@ -44,7 +44,7 @@ def replaced(name: str, pattern: str, new: str) -> Damage:
 
 
 def hinted(change: Callable[[dict[str, Any]], object], name: str = "hints.json") -> Damage:
-    """Changes hints."""
+    """Changes a file of the hints, the index if no other is named."""
 
     def changed(data: bytes) -> bytes:
         document = json.loads(data)

@@ -154,12 +154,12 @@ def test_same_bytes_again(artifacts, tmp_path: Path) -> None:
 
 def test_gzip_copies(artifacts, tmp_path: Path) -> None:
     """Of each text a gzip file without name and time, listed after it; the texts are the same."""
-    plain = write(artifacts, tmp_path / "plain", EmitOptions(format="vrml,gltf"))
-    options = EmitOptions(format="vrml,gltf", gzip=True)
+    plain = write(artifacts, tmp_path / "plain")
+    options = EmitOptions(gzip=True)
     twice = [write(artifacts, tmp_path / n, options) for n in ("a", "b")]
     assert twice[0] == twice[1]
     text = [n for n in plain.files if n.endswith((".wrl", ".json"))]
-    assert len(text) == 3 + 3, "cells, a root and two hints"
+    assert len(text) == 2 * 3 + 3, "cells and their records, a root, an index and statistics"
     wanted = [name for n in plain.files for name in ([n, f"{n}.gz"] if n in text else [n])]
     assert list(twice[0].files) == wanted
     for name in plain.files:
@@ -176,14 +176,22 @@ def test_gzip_copies(artifacts, tmp_path: Path) -> None:
     assert not list((tmp_path / "a").glob("*.gz")), "none is left of another emission"
 
 
-@pytest.mark.parametrize("name", ["cells/c0000.wrl", "cells/c0002.wrl", "hints.json"])
-def test_a_file_that_cannot_be_written(artifacts, tmp_path: Path, name: str) -> None:
-    """The fault is reported, and there is no root that leads to it."""
+@pytest.mark.parametrize(
+    ("name", "entry"),
+    [
+        ("cells/c0000.wrl", "root.wrl"),
+        ("cells/c0002.wrl", "root.wrl"),
+        ("hints/c0000.json", "hints.json"),
+        ("hints/statistics.json", "hints.json"),
+    ],
+)
+def test_a_file_that_cannot_be_written(artifacts, tmp_path: Path, name: str, entry: str) -> None:
+    """The fault is reported, and there is no file that leads to it."""
     (tmp_path / name).mkdir(parents=True)
     with pytest.raises(OutputError, match="PTM-O002") as fault:
         write(artifacts, tmp_path, force=True)
     assert name in str(fault.value)
-    assert not (tmp_path / "root.wrl").exists()
+    assert not (tmp_path / entry).exists()
 
 
 def test_compressing_nothing_and_much() -> None:
@@ -232,11 +240,11 @@ def test_a_cell_of_two_leaves(artifacts, tmp_path: Path, made_up_hints) -> None:
     assert len(node.fields["hullPoint"]) == 8
     issues = {i.code for i in validate_database(tmp_path / "db").issues}
     assert issues == {"PTM-D650", "PTM-D671"}, "no manifest and no textures here, nothing else"
-    hints = tmp_path / "db/www/hints.json"
-    document = json.loads(hints.read_text())
-    assert [len(cell["leaves"]) for cell in document["cells"]] == [2, 1]
-    document["cells"][0]["leaves"].reverse()
-    hints.write_text(json.dumps(document))
+    files = [tmp_path / f"db/www/hints/c000{cell}.json" for cell in range(2)]
+    records = [json.loads(file.read_text()) for file in files]
+    assert [len(record["leaves"]) for record in records] == [2, 1]
+    records[0]["leaves"].reverse()
+    files[0].write_text(json.dumps(records[0]))
     assert "PTM-D701" in {i.code for i in validate_database(tmp_path / "db").issues}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 from ptmtools.cli.main import main
 from ptmtools.database import EmitOptions, emit, validate_database
 from ptmtools.database.content import Content
-from ptmtools.database.emitters import EMITTERS, Emitter, chosen_emitters
+from ptmtools.database.emitters import EMITTERS, Emitter, all_emitters, owner_of
 from ptmtools.database.validation.served import ServedDatabase
 from ptmtools.errors import InputError, OutputError
 from ptmtools.lazy import Lazy
@@ -57,13 +58,15 @@ def test_a_toy_emitter(
     a, db = artifacts, tmp_path / "db"
     records, options = put_textures(db / "www"), EmitOptions(format=format)
     report = emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", options)
-    assert report.files[-4:] == ("toys/0.txt", "toys/1.txt", "toys/2.txt", "toy.txt")
+    ours = ("toys/0.txt", "toys/1.txt", "toys/2.txt", "toy.txt")
+    hints = tuple(f"hints/{name}.json" for name in ("c0000", "c0001", "c0002", "statistics"))
+    assert report.files[-9:] == (*ours, *hints, "hints.json"), "the hints are always written"
     assert ("root.wrl" in report.files) is ("vrml" in format)
-    assert ("gltf/hints.json" in report.files) is ("gltf" in format)
+    assert ("gltf/c0000.glb" in report.files) is ("gltf" in format)
     with pytest.raises(OutputError, match="PTM-O001"):
         emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", EmitOptions(format="toy"))
     seal(db)
-    unnamed = {"PTM-D677"} if format == "toy" else set()
+    unnamed = {"PTM-D741"} if format == "toy" else set()
     assert {issue.code for issue in validate_database(db).issues} == unnamed
     (db / "www/toys/3.txt").write_text("7 shapes\n")
     seal(db)
@@ -84,25 +87,24 @@ def test_names_in_any_order() -> None:
             EmitOptions(format=wrong)
 
 
-def test_gltf_alone_still_means_both(artifacts, tmp_path: Path, put_textures) -> None:
-    assert chosen_emitters("gltf") == chosen_emitters("vrml,gltf")
+def test_both_by_default_and_each_alone(artifacts, tmp_path: Path, put_textures) -> None:
     a, records = artifacts, put_textures(tmp_path)
-    for format in ("gltf", "vrml,gltf"):
+    assert EmitOptions().format == "vrml,gltf"
+    for format in ("vrml,gltf", "vrml", "gltf"):
         options = EmitOptions(format=format)
-        assert options == EmitOptions(format="gltf,vrml")
         report = emit(a.scene, a.cells, a.pvs, a.ach, records, tmp_path / format, options)
-        assert {"root.wrl", "gltf/hints.json"} <= set(report.files)
-
-
-@pytest.mark.parametrize("format", ["gltf", "vrml,gltf", "vrml"])
-def test_a_note_where_a_name_has_changed_its_meaning(tmp_path: Path, capsys, format: str) -> None:
-    main(["emit", str(tmp_path), "--format", format])
-    assert ("say --format vrml,gltf" in capsys.readouterr().err) is (format == "gltf")
+        assert ("root.wrl" in report.files) is ("vrml" in format)
+        assert ("gltf/c0000.glb" in report.files) is ("gltf" in format)
+        index = json.loads((tmp_path / format / "hints.json").read_text())
+        assert list(index["geometry"]) == format.split(",")
 
 
 def test_each_declaration_names_what_there_is() -> None:
     for name, emitter in EMITTERS.items():
         assert emitter.name == name
-        assert emitter.is_owner(emitter.entry)
-        assert emitter.is_owner(f"{emitter.entry}.gz")
+    for emitter in all_emitters():
+        for path in filter(None, (emitter.entry, emitter.cell_files)):
+            assert emitter.is_owner(path)
+            assert emitter.is_owner(f"{path}.gz")
+            assert owner_of(path) is emitter
         assert not emitter.is_owner("index.html")

@@ -17,14 +17,20 @@ from ptmtools import schemas
 from ptmtools.cli.main import main
 from ptmtools.database.fault import FileError
 from ptmtools.database.validation.findings import CODES
-from ptmtools.database.validation.hints import read_hints
+from ptmtools.database.validation.hints import read_file
 from ptmtools.pipeline.stages import STAGES
 from ptmtools.store.manifest import FORMAT, SCHEMA, Manifest, StageRecord
 
 Step = str | int
 
 DOCS = Path(__file__).parents[2] / "docs"
-NAMES = (schemas.HINTS, schemas.MANIFEST, schemas.VALIDATION)
+#: Those of the hints, and a file of each.
+SERVED = {
+    schemas.HINTS: "hints.json",
+    schemas.CELL: "hints/c0001.json",
+    schemas.STATISTICS: "hints/statistics.json",
+}
+NAMES = (*SERVED, schemas.MANIFEST, schemas.VALIDATION)
 
 
 def validator(name: str) -> jsonschema.Draft202012Validator:
@@ -32,12 +38,12 @@ def validator(name: str) -> jsonschema.Draft202012Validator:
 
 
 @pytest.fixture(scope="module")
-def hints(finished: Path) -> dict[str, Any]:
-    """With an optional field that no other database here has."""
-    document = json.loads((finished / "www/hints.json").read_text())
-    cell = document["cells"][2]
-    cell["coverage"]["textures"] = [[[0, cell["ach"][0]]], [[None, cell["ach"][1]]], []]
-    return document
+def served(finished: Path) -> dict[str, dict[str, Any]]:
+    """By schema; the record with an optional field that no other database here has."""
+    found = {n: json.loads((finished / "www" / file).read_text()) for n, file in SERVED.items()}
+    record = found[schemas.CELL]
+    record["textureShares"] = [[[0, record["ach"][0]]], [[None, record["ach"][1]]], []]
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -90,15 +96,16 @@ def test_schemas_are_schemas(name: str) -> None:
     assert schema["$id"] == f"urn:ptmtools:{name}:{schema['properties']['schema']['const']}"
 
 
-def test_every_field_of_the_hints_is_described() -> None:
-    schema = json.loads(schemas.schema_text(schemas.HINTS))
+@pytest.mark.parametrize("name", SERVED)
+def test_every_field_of_the_hints_is_described(name: str) -> None:
+    schema = json.loads(schemas.schema_text(name))
     page = (DOCS / "hints.md").read_text()
     objects = [schema, *(d for d in schema["$defs"].values() if d.get("type") == "object")]
     for parent in objects:
-        for name, field in parent["properties"].items():
-            assert re.search(rf"`[^`\n]*\b{name}\b[^`\n]*`", page), name
-            if field.get("type") in ("number", "integer"):
-                assert "description" in field, name
+        for field, form in parent["properties"].items():
+            assert re.search(rf"`[^`\n]*\b{field}\b[^`\n]*`", page), field
+            if form.get("type") in ("number", "integer"):
+                assert "description" in form, field
 
 
 def shape_fault(document: object, name: str) -> str:
@@ -109,8 +116,8 @@ def shape_fault(document: object, name: str) -> str:
     return ""
 
 
-def test_what_we_write_satisfies_them(hints, manifest, report) -> None:
-    for name, document in zip(NAMES, (hints, manifest, report), strict=True):
+def test_what_we_write_satisfies_them(served, manifest, report) -> None:
+    for name, document in zip(NAMES, (*served.values(), manifest, report), strict=True):
         validator(name).validate(document)
         assert shape_fault(document, name) == ""
 
@@ -181,13 +188,16 @@ def shortened(value: Any) -> Any:
     if isinstance(value, dict):
         return {name: shortened(inner) for name, inner in value.items()}
     if isinstance(value, list):
-        return [shortened(v) for v in (value[:1] if isinstance(value[0], dict) else value)]
+        return [
+            shortened(v) for v in (value[:1] if value and isinstance(value[0], dict) else value)
+        ]
     return value
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_our_reader_and_jsonschema_agree(name: str, hints, manifest, report) -> None:
-    document = dict(zip(NAMES, (shortened(hints), manifest, report), strict=True))[name]
+def test_our_reader_and_jsonschema_agree(name: str, served, manifest, report) -> None:
+    hints = map(shortened, served.values())
+    document = dict(zip(NAMES, (*hints, manifest, report), strict=True))[name]
     theirs = validator(name)
     refused = tried = 0
     for changed, what in mutations(document):
@@ -198,15 +208,17 @@ def test_our_reader_and_jsonschema_agree(name: str, hints, manifest, report) -> 
     assert refused > tried // 2
 
 
-def test_validate_refuses_what_the_schema_refuses(hints) -> None:
-    for changed, what in mutations(hints):
+@pytest.mark.parametrize("name", SERVED)
+def test_validate_refuses_what_the_schema_refuses(name: str, served) -> None:
+    for changed, what in mutations(served[name]):
         code = ""
         try:
-            read_hints(json.dumps(changed).encode())
+            read_file(SERVED[name], json.dumps(changed).encode())
         except FileError as fault:
             code = fault.code
-        assert code in ("", "PTM-D700")
-        assert code or not shape_fault(changed, schemas.HINTS), what
+        number = changed.get("schema") if isinstance(changed, dict) else 2
+        assert code in ("", "PTM-D700" if type(number) is not int or number == 2 else "PTM-D740")
+        assert code or not shape_fault(changed, name), what
 
 
 @pytest.mark.parametrize(
@@ -241,18 +253,18 @@ def test_what_is_no_document(data: bytes, message: str) -> None:
         (lambda d: d.update(unit=0), "unit: 0 is not more than 0"),
         (lambda d: d.update(unit=math.inf), "unit: Infinity is not finite"),
         (lambda d: d.update(unit=10**400), "is not finite"),
-        (lambda d: d["cells"][1]["ach"].__setitem__(2, 1.5), "cells[1].ach[2]: 1.5 is more than 1"),
-        (lambda d: d["cells"][0]["visible"].__setitem__(1, 1.0), "cells[0].visible[1]: 1.0 is not"),
-        (lambda d: d["textures"][0].update(sha256="0" * 64 + "\n"), "does not match"),
-        (lambda d: d["cells"][0].update(portals={}), "portals: an object is not of type array"),
-        (lambda d: d["cells"][0]["coverage"]["views"].pop(), "5 entries, fewer than 6"),
-        (lambda d: d.update(schema=True), "schema: true is not 1"),
+        (lambda d: d["cells"][1]["box"].__setitem__(2, None), "cells[1].box[2]: null is not of"),
+        (lambda d: d["viewpoints"][0].update(cell=1.0), "viewpoints[0].cell: 1.0 is not of type"),
+        (lambda d: d["cells"][0].update(name="c0000\n"), "does not match"),
+        (lambda d: d["textures"][0].update(ends={}), "ends: an object is not of type array"),
+        (lambda d: d["cells"][0]["box"].pop(), "5 entries, fewer than 6"),
+        (lambda d: d.update(schema=True), "schema: true is not 2"),
     ],
 )
 def test_faults_are_told_with_their_place(
-    hints, change: Callable[[dict], object], message: str
+    served, change: Callable[[dict], object], message: str
 ) -> None:
-    changed = copy.deepcopy(hints)
+    changed = copy.deepcopy(served[schemas.HINTS])
     change(changed)
     assert message in shape_fault(changed, schemas.HINTS)
 

@@ -25,10 +25,14 @@ def test_textures_of_visible_cells(artifacts, tmp_path: Path) -> None:
     )
     emit(artifacts.scene, artifacts.cells, artifacts.pvs, ach, records, tmp_path)
     document = json.loads((tmp_path / "hints.json").read_text())
+    records_of_cells = [
+        json.loads((tmp_path / f"hints/{cell['name']}.json").read_text())
+        for cell in document["cells"]
+    ]
     place = {1: "textures/1.ptm", 0: "textures/0.ptm"}
     listed = [texture["file"] for texture in document["textures"]]
-    for i, cell in enumerate(document["cells"]):
-        shares = cell["coverage"]["textures"]
+    for i, cell in enumerate(records_of_cells):
+        shares = cell["textureShares"]
         assert len(shares) == len(cell["ach"])
         for k, (entry, share) in enumerate(zip(shares, cell["ach"], strict=True)):
             assert math.fsum(s for _, s in entry) == pytest.approx(share, rel=1e-3)

@@ -37,6 +37,7 @@ from tests.database.damage import (
 )
 
 TESTS = Path(__file__).parents[1]
+FALLBACK_FREE = EmitOptions(fallback=False, format="vrml")
 
 
 def codes(db: Path) -> set[str]:
@@ -54,7 +55,7 @@ def test_a_good_database_has_no_issue(finished: Path) -> None:
     report = validate_database(finished)
     assert report.issues == ()
     assert report.ok
-    assert report.files == 9
+    assert report.files == 13
     assert report.bytes == sum(
         p.stat().st_size for p in (finished / "www").rglob("*") if p.is_file()
     )
@@ -81,7 +82,7 @@ def roomy(artifacts, tmp_path_factory, put_textures, made_up_hints, seal) -> Pat
     records = put_textures(db / "www")
     for image in (db / "www/textures").glob("*.png"):
         image.unlink()
-    emit(artifacts.scene, cells, pvs, ach, records, db / "www", EmitOptions(fallback=False))
+    emit(artifacts.scene, cells, pvs, ach, records, db / "www", FALLBACK_FREE)
     seal(db)
     return db
 
@@ -112,16 +113,18 @@ def test_faults_of_leaves(
     assert codes(db) == {f"PTM-{c}" for c in expected.split()}, findings(db)
 
 
-def test_gltf(artifacts, tmp_path: Path, put_textures, seal) -> None:
+@pytest.mark.parametrize("format", ["vrml", "gltf"])
+def test_one_form_alone(artifacts, tmp_path: Path, put_textures, seal, format: str) -> None:
     db = tmp_path / "db"
     a, records = artifacts, put_textures(db / "www")
-    emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", EmitOptions(format="vrml,gltf"))
+    emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", EmitOptions(format=format))
     seal(db)
     assert findings(db) == []
+    assert list(json.loads((db / "www/hints.json").read_text())["geometry"]) == [format]
 
 
 def test_gzip_copies(database: Path, seal: Damage) -> None:
-    for name in ("root.wrl", "hints.json", "cells/c0001.wrl"):
+    for name in ("root.wrl", "hints.json", "hints/c0001.json", "cells/c0001.wrl"):
         zipped(name)(database)
     seal(database)
     assert findings(database) == []
@@ -185,19 +188,22 @@ def recoded(change: Callable[[np.ndarray], np.ndarray], **options: object) -> Da
 
 
 def cell(number: int, change: Callable[[dict], object]) -> Damage:
-    return hinted(lambda d: change(d["cells"][number]))
+    """Changes the record of a cell."""
+    return hinted(change, f"hints/c{number:04d}.json")
+
+
+def counted(number: int, change: Callable[[dict], object]) -> Damage:
+    """Changes the statistics of a cell."""
+    return hinted(lambda d: change(d["cells"][number]), STATISTICS)
 
 
 def portal(change: Callable[[dict], object]) -> Damage:
     """Changes the portal between the first two rooms, on both sides."""
 
-    def on_both_sides(document: dict) -> None:
-        for here, beyond in ((0, 1), (1, 0)):
-            for row in document["cells"][here]["portals"]:
-                if row["neighbour"] == beyond:
-                    change(row)
+    def of(beyond: int) -> Callable[[dict], object]:
+        return lambda c: [change(row) for row in c["portals"] if row["neighbour"] == beyond]
 
-    return hinted(on_both_sides)
+    return all_of(cell(0, of(1)), cell(1, of(0)))
 
 
 def moved(row: dict, corner: int, axis: int, by: float) -> None:
@@ -213,15 +219,12 @@ def shifted(row: dict, by: float) -> None:
 
 def painted(texture: object) -> Damage:
     """Says that this texture alone is what a cell sees."""
-    return cell(
-        2,
-        lambda c: c["coverage"].update(textures=[[[texture, share]] for share in c["ach"]]),
-    )
+    return cell(2, lambda c: c.update(textureShares=[[[texture, share]] for share in c["ach"]]))
 
 
 def textured(shares: object) -> Damage:
     """Puts something in the place of the shares of textures of a cell that sees three."""
-    return cell(2, lambda c: c["coverage"].update(textures=shares))
+    return cell(2, lambda c: c.update(textureShares=shares))
 
 
 def repainted(db: Path) -> None:
@@ -231,19 +234,26 @@ def repainted(db: Path) -> None:
 flipped = rewritten("textures/a.ptm", lambda data: data[:-3] + bytes([data[-3] ^ 1]) + data[-2:])
 
 
+def misplaced(db: Path) -> None:
+    """The second room where the first one is."""
+    first = json.loads((db / "www" / R0).read_text())
+    cell(1, lambda c: c.update(leaves=first["leaves"]))(db)
+
+
 def unused(db: Path) -> None:
     """A texture that all files list, and no cell uses."""
     for number in range(3):
         path = db / f"www/cells/c{number:04d}.wrl"
         text = path.read_text()
         path.write_text(text.replace("textures/b.", "textures/a."))
-    hinted(lambda d: [c.update(textures=[0]) for c in d["cells"] if c["textures"]])(db)
+        cell(number, lambda c: c.update(textures=[[0] if t else [] for t in c["textures"]]))(db)
 
 
 #: Between the entries of a list.
 S = r"[\s,]+"
 C0, C1, C2 = "cells/c0000.wrl", "cells/c0001.wrl", "cells/c0002.wrl"
 HINTS, ROOT, A = "hints.json", "root.wrl", "textures/a.ptm"
+R0, STATISTICS = "hints/c0000.json", "hints/statistics.json"
 TRIANGLE = rf"\d+{S}\d+{S}\d+{S}-1{S}"
 VISIBLE = r'visibleUrl +\[ ("\w+.wrl"), ("\w+.wrl"), ("\w+.wrl") \]'
 #: One shape lacks its points, another has an index too large.
@@ -323,8 +333,8 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D673", replaced(C0, r"\.\./textures/a\.ptm", "../textures/a b.ptm")),
     ("D673", replaced(C0, r"\.\./textures/a\.ptm", "../textures/%ff.ptm")),
     ("D673", replaced(C0, r"\.\./textures/a\.ptm", "")),
-    ("D674 D708", hinted(lambda d: d["textures"].append(d["textures"][0]))),
-    ("D674 D701 D706", hinted(lambda d: d["cells"][2].update(url="cells/c0001.wrl"))),
+    ("D674 D708 D741", hinted(lambda d: d["textures"].append(d["textures"][0]))),
+    ("D674 D701 D706 D741", hinted(lambda d: d["cells"][2].update(name="c0001"))),
     ("D674 D701", replaced(C0, r"\.\./textures/a\.png", "../textures/a.ptm")),
     ("D675 D677", all_of(copied(A, "textures/A.ptm"), copied("textures/a.png", "textures/A.png"))),
     ("D675", put("Cells/c0000.txt")),
@@ -371,39 +381,47 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D699 D706", replaced(ROOT, r'viewpoint "VP_1"', 'viewpoint "VP_9"')),
     ("D699", replaced(ROOT, "ptm:viewpoint VP_1", "ptm:viewpoint VP_9")),
     ("D700", put(HINTS, b"")),
+    ("D700", put(R0, b"")),
+    ("D700", put(STATISTICS, b"")),
     ("D700", rewritten(HINTS, lambda data: b"\xef\xbb\xbf" + data)),
     ("D700", rewritten(HINTS, lambda data: data.replace(b'"c0000', b'"c\xff000'))),
     ("D700", rewritten(HINTS, lambda data: data[:-3])),
     ("D700", replaced(HINTS, r'"unit":', '"units":')),
     ("D700", replaced(HINTS, r'"unit":', '"up": "y", "unit":')),
-    ("D700", replaced(HINTS, r'"area":[.\d]+', '"area":NaN')),
-    ("D700", replaced(HINTS, r'"area":[.\d]+', '"area":1e999')),
-    ("D700", replaced(HINTS, r'"visible":\[\d', '"visible":[77')),
+    ("D700", replaced(HINTS, r'"schema":2', '"schema":2.0')),
+    ("D700", replaced(R0, r'"area":[.\d]+', '"area":NaN')),
+    ("D700", replaced(R0, r'"area":[.\d]+', '"area":1e999')),
+    ("D700", replaced(R0, r'"visible":\[\d', '"visible":[77')),
     ("D700", appended(HINTS, b"}")),
     ("D700", put(HINTS, b"[" * 100_000)),
+    ("D700", put(R0, b"[]")),
     ("D700", cell(0, lambda c: c["ach"].__setitem__(0, 1.5))),
     ("D700", cell(0, lambda c: c["leaves"][0]["faces"][0].append(99))),
     ("D700", cell(0, lambda c: c["portals"][0].update(neighbour=3))),
-    ("D700", cell(2, lambda c: c["coverage"].pop("floor"))),
-    ("D700", cell(2, lambda c: c["coverage"]["views"].pop())),
-    ("D700", cell(1, lambda c: c["coverage"]["p95"].__setitem__(0, None))),
-    ("D700", cell(0, lambda c: c["coverage"]["seen"].__setitem__(1, 1.5))),
+    ("D700", cell(0, lambda c: c["textures"][2].append(2))),
+    ("D700", cell(2, lambda c: c.pop("floor"))),
+    ("D700", counted(2, lambda c: c["views"].pop())),
+    ("D700", counted(1, lambda c: c["p95"].__setitem__(0, None))),
+    ("D700", counted(0, lambda c: c["seen"].__setitem__(1, 1.5))),
     ("D700", hinted(lambda d: d["viewpoints"][0].update(cell=True))),
-    ("D700", hinted(lambda d: d["textures"][0].update(sha256="0" * 63))),
+    ("D700", hinted(lambda d: d["viewpoints"][0].update(cell=3))),
+    ("D700", hinted(lambda d: d["textures"][0].update(sha256="0" * 63), STATISTICS)),
+    ("D700", hinted(lambda d: d.update(record="hints/c0000.json"))),
     ("D701", cell(1, lambda c: c.update(name="c0007"))),
     ("D701", cell(1, lambda c: c["ach"].reverse())),
-    ("D701", cell(1, lambda c: c["textures"].pop())),
-    ("D701 D709", cell(1, lambda c: c["leaves"][0]["points"][0].reverse())),
-    ("D701 D690", cell(1, lambda c: c["visible"].reverse())),
-    ("D701 D702", cell(1, lambda c: c["ach"].pop())),
+    ("D701 D741", cell(1, lambda c: c["textures"][0].pop())),
+    ("D701 D709 D741", cell(1, lambda c: c["leaves"][0]["points"][0].reverse())),
+    ("D701 D690 D741", cell(1, lambda c: c["visible"].reverse())),
+    ("D701 D702 D707", cell(1, lambda c: c["ach"].pop())),
+    ("D702", cell(1, lambda c: c["textures"].pop())),
     ("D701 D697", cell(1, lambda c: c["adjacent"].reverse())),
     ("D701 D694 D705", cell(1, lambda c: c["adjacent"].pop())),
     ("D702", cell(1, lambda c: c["ach"].__setitem__(0, 0.6 + 1e-8))),
-    ("D703", cell(2, lambda c: c.update(missed=2e-4))),
-    ("D704", hinted(lambda d: d["textures"][0].update(sha256="0" * 64))),
-    ("D704", hinted(lambda d: d["textures"][0]["levels"].pop())),
-    ("D704", hinted(lambda d: d["textures"][0]["levels"][1].update(gpuBytes=1))),
-    ("D704", hinted(lambda d: d["textures"][0]["levels"][1].update(offset=1))),
+    ("D703", counted(2, lambda c: c.update(missed=2e-4))),
+    ("D704", hinted(lambda d: d["textures"][0].update(sha256="0" * 64), STATISTICS)),
+    ("D704", hinted(lambda d: d["textures"][0]["ends"].pop())),
+    ("D704", hinted(lambda d: d["textures"][0].update(texelBytes=1))),
+    ("D704", hinted(lambda d: d["textures"][0]["ends"].__setitem__(1, 1))),
     ("D704", hinted(lambda d: d["textures"][0].update(width=23))),
     ("D704", hinted(lambda d: d["textures"][0].update(components=4))),
     ("D704", hinted(lambda d: d["textures"][0].update(fallbackLevel=0))),
@@ -424,19 +442,18 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D706", hinted(lambda d: d["viewpoints"][0]["position"].__setitem__(0, 99.0))),
     ("D706", hinted(lambda d: d["viewpoints"][0].update(fieldOfView=1.0))),
     ("D706", hinted(lambda d: d["viewpoints"][0]["direction"].reverse())),
-    ("D706", hinted(lambda d: d["viewpoints"][0]["orientation"].reverse())),
     ("D706", hinted(lambda d: d["viewpoints"].pop())),
-    ("D707", cell(0, lambda c: c["coverage"]["seen"].__setitem__(1, 0))),
-    ("D707", cell(1, lambda c: c["coverage"]["p95"].pop())),
-    ("D707", cell(2, lambda c: c["coverage"]["views"][3].__setitem__(0, 0.5))),
+    ("D707", counted(0, lambda c: c["seen"].__setitem__(1, 0))),
+    ("D707", counted(1, lambda c: c["p95"].pop())),
+    ("D707", counted(2, lambda c: c["views"][3].__setitem__(0, 0.5))),
     ("D707", textured([[[0, 0.5]]] * 3)),
-    ("D707", textured([[[0, 0.8]], []])),
+    ("D702", textured([[[0, 0.8]], [[0, 0.1]]])),
     ("D708", unused),
-    ("D709 D701", cell(1, lambda c: c["leaves"][0]["points"][0].__setitem__(1, -1.0))),
+    ("D709 D701 D741", cell(1, lambda c: c["leaves"][0]["points"][0].__setitem__(1, -1.0))),
     ("D709", cell(1, lambda c: c["leaves"][0]["faces"].pop())),
     ("D709", cell(1, lambda c: c["leaves"][0]["faces"][0].reverse())),
     ("D709", cell(1, lambda c: [loop.reverse() for loop in c["leaves"][0]["faces"]])),
-    ("D709 D701 D705 D706", hinted(lambda d: d["cells"][1].update(leaves=d["cells"][0]["leaves"]))),
+    ("D709 D701 D705 D706 D741", misplaced),
     ("D710 D704", flipped),
     ("D710 D704", appended(A, b"x")),
     ("D710 D704", rewritten(A, lambda data: data[:-1])),
@@ -463,6 +480,21 @@ FAULTS: list[tuple[str, Damage]] = [
         )
     ),
     *(("D700", painted(texture)) for texture in (2, -1, 0.0, True, "0", [])),
+    *(("D740", hinted(lambda d: d.update(schema=1), name)) for name in (HINTS, R0, STATISTICS)),
+    ("D740", hinted(lambda d: d.update(schema=3, cells="of another kind"))),
+    ("D741", cell(0, lambda c: c.update(cell=1))),
+    ("D741", hinted(lambda d: d.update(record="cells/{name}.wrl"))),
+    ("D674 D741", hinted(lambda d: d.update(record="hints/{name}/../statistics.json"))),
+    ("D674 D741", hinted(lambda d: d.update(record="{name}/../hints.json"))),
+    ("D741", cell(0, lambda c: c["textures"][1].pop())),
+    ("D741", hinted(lambda d: d["cells"][1]["box"].__setitem__(3, -0.5))),
+    ("D741", hinted(lambda d: d["cells"].pop(), STATISTICS)),
+    ("D741", hinted(lambda d: d["textures"].pop(), STATISTICS)),
+    ("D741", hinted(lambda d: d.update(geometry={"gltf": "cells/{name}.wrl"}))),
+    ("D741", hinted(lambda d: d["geometry"].clear())),
+    ("D671", hinted(lambda d: d["geometry"].update(usd="usd/{name}.usd"))),
+    ("D671", removed(R0)),
+    ("D671", removed(STATISTICS)),
 ]
 
 
@@ -484,12 +516,27 @@ def test_each_planted_fault_is_found(
 
 def test_symmetry_in_the_hints_alone(database: Path, seal: Damage) -> None:
     """Relations that a client of the hints relies on are checked there, too."""
-    hinted(lambda d: d["cells"][0]["visible"].remove(2))(database)
-    hinted(lambda d: d["cells"][0]["adjacent"].append(2))(database)
+    cell(0, lambda c: c["visible"].remove(2))(database)
+    cell(0, lambda c: c["adjacent"].append(2))(database)
     seal(database)
-    found = {(i.code, i.place) for i in validate_database(database).issues if "hints" in i.file}
-    wanted = {("PTM-D694", "cells[2]"), ("PTM-D695", "cells[0]"), ("PTM-D696", "cells[0]")}
-    assert wanted <= found
+    found = {(i.code, i.file) for i in validate_database(database).issues}
+    wanted = {("PTM-D694", 2), ("PTM-D695", 0), ("PTM-D696", 0)}
+    assert {(code, f"www/hints/c000{number}.json") for code, number in wanted} <= found
+
+
+def test_fields_of_later_releases_are_passed_over(database: Path, seal: Damage) -> None:
+    for name in (HINTS, R0, STATISTICS):
+        hinted(lambda d: d.update(standing=False, more={"a": [1]}), name)(database)
+    hinted(lambda d: [c.update(standing=False) for c in d["cells"]])(database)
+    seal(database)
+    assert findings(database) == []
+
+
+def test_hints_of_another_schema_name_the_command(database: Path, seal: Damage) -> None:
+    hinted(lambda d: d.update(schema=1))(database)
+    seal(database)
+    (line,) = findings(database)
+    assert "schema: error: is 1, this ptmtools reads 2; `ptm build-scene`" in line
 
 
 @pytest.mark.parametrize("texture", [None, 0, 1])
@@ -560,7 +607,7 @@ def with_stage(db: Path, name: str, **record: object) -> None:
 
 GOOD_COUNTS = {
     "textures": {"textures": 2, "ptm_bytes": None, "raw_bytes": 16 * 24 * 3 + 9 * 5 * 4},
-    "emit": {"files": 5, "bytes": None, "shapes": None, "triangles": None, "viewpoints": 3},
+    "emit": {"files": 9, "bytes": None, "shapes": None, "triangles": None, "viewpoints": 3},
 }
 
 
@@ -572,7 +619,7 @@ def test_counts(database: Path, stage: str) -> None:
         counts["ptm_bytes"] = sum(p.stat().st_size for p in served.glob("textures/*.ptm"))
     else:
         text = "".join(p.read_text() for p in served.glob("cells/*.wrl"))
-        files = (*served.glob("*.*"), *served.glob("cells/*.wrl"))
+        files = (p for p in served.rglob("*.*") if p.parent.name != "textures")
         counts["bytes"] = sum(p.stat().st_size for p in files)
         counts["shapes"] = text.count(" Shape {")
         counts["triangles"] = sum(

@@ -75,10 +75,10 @@ def make_museum(folder: Path, rooms: int = 1, textures: int = 9, size: int = 64)
 
 @pytest.fixture(scope="session")
 def gltf_museum(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The database of the smallest museum, with glTF files; not to be changed."""
+    """The database of the smallest museum; not to be changed."""
     folder = tmp_path_factory.mktemp("museum")
     built = ["-q", "build-scene", str(make_museum(folder / "model")), "-o", str(folder / "db")]
-    assert main([*built, "-j", "1", "--format", "gltf"]) == 0
+    assert main([*built, "-j", "1"]) == 0
     return folder / "db"
 
 

@@ -64,7 +64,8 @@ def test_two_rooms(tmp_path: Path) -> None:
     assert (tmp_path / "plan.png").read_bytes().startswith(b"\x89PNG")
 
     served = {p.relative_to(db / "www").as_posix() for p in (db / "www").rglob("*") if p.is_file()}
-    assert {"root.wrl", "hints.json", "cells/c0000.wrl", "textures/floor.ptm"} <= served
+    assert {"root.wrl", "hints.json", "hints/c0000.json", "cells/c0000.wrl"} <= served
+    assert {"gltf/c0000.glb", "textures/floor.ptm", "textures/floor.png"} <= served
     manifest = (db / "manifest.json").read_text()
     assert str(tmp_path) not in manifest
     assert str(TWO_ROOMS) not in manifest

@@ -197,8 +197,14 @@ CHANGES: dict[str, list[Change]] = {
         lambda arrays: arrays.update(conservative=np.zeros(0, bool)),
         lambda arrays: arrays.update(leak=np.full((1, 4), 99, np.int32)),
         lambda arrays: arrays.update(leak=np.zeros(4, np.int32)),
+        first("volume", np.nan),
+        first("volume", -1.0),
+        shorter("volume"),
+        without("volume"),
         # A sound one, of another subdivision.
-        lambda arrays: arrays.update(start=np.array([0, 1]), cell=np.zeros(1, np.int32)),
+        lambda arrays: arrays.update(
+            start=np.array([0, 1]), cell=np.zeros(1, np.int32), volume=np.ones(1)
+        ),
     ],
     "ach": [
         first("start", 1),

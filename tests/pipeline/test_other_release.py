@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,8 @@ import pytest
 from ptmtools.cli.main import main
 from ptmtools.pipeline import build_scene, database_status
 from ptmtools.pipeline.stage import Stage
-from ptmtools.pipeline.stages import CELLS, EMIT, PVS, STAGES, TEXTURES
+from ptmtools.pipeline.stages import CELLS, EMIT, PVS, SCENE, STAGES, TEXTURES
+from ptmtools.store.folder import DatabaseFolder
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"
 
@@ -49,6 +52,103 @@ def test_another_recipe_is_out_of_date(db: Path, capsys: pytest.CaptureFixture[s
     assert "--max-leaves 99 --samples 8 --backend embree" in said.err
     build_scene(db.parent / "two_rooms.obj", db, until=PVS)
     assert database_status(db).stages[1].state == "done"
+
+
+def aged(db: Path) -> None:
+    """As release 0.2 left it: hints of schema 1, VRML alone by default, other recipes."""
+    manifest = json.loads((db / "manifest.json").read_bytes())
+    stages = manifest["stages"]
+    for stage in (SCENE, PVS, EMIT):
+        stages[stage.name]["recipe"] -= 1
+    for name in ("model_bytes", "image_bytes"):
+        del stages[SCENE.name]["counts"][name]
+    emitted = stages[EMIT.name]
+    emitted["parameters"]["format"] = "vrml"
+    del emitted["counts"]["visit"]
+    for path in [p for p in emitted["outputs"] if p.startswith(("www/hints/", "www/gltf/"))]:
+        del emitted["outputs"][path]
+    for folder in ("hints", "gltf"):
+        shutil.rmtree(db / "www" / folder)
+    hints = b'{"format": "ptmtools hints", "schema": 1, "cells": []}\n'
+    (db / "www/hints.json").write_bytes(hints)
+    emitted["outputs"]["www/hints.json"] = hashlib.sha256(hints).hexdigest()
+    (db / "manifest.json").write_text(json.dumps(manifest))
+
+
+COMMAND = "ptm build-scene two_rooms.obj -o"
+
+
+@pytest.mark.parametrize(
+    ("command", "status"),
+    [
+        ("info", 0),
+        ("info --json", 0),
+        ("status", 0),
+        ("validate", 8),
+        ("plot -o plan.png", 5),
+        ("ach", 5),
+        ("emit", 5),
+    ],
+)
+def test_every_command_names_what_brings_it_up_to_date(
+    db: Path, capsys: pytest.CaptureFixture[str], monkeypatch, command: str, status: int
+) -> None:
+    monkeypatch.chdir(db.parent)
+    aged(db)
+    name, *options = command.split()
+    assert main([name, str(db), *options]) == status
+    said = capsys.readouterr()
+    assert f"`{COMMAND} {db}" in said.out + said.err
+    assert "--format" not in said.out + said.err, "what was the default is not asked for"
+    assert "make no sense" not in said.out
+
+
+@pytest.mark.parametrize("command", ["info", "status", "validate", "plot -o plan.png", "emit"])
+def test_of_an_earlier_schema_too(
+    db: Path, capsys: pytest.CaptureFixture[str], monkeypatch, command: str
+) -> None:
+    monkeypatch.chdir(db.parent)
+    manifest = json.loads((db / "manifest.json").read_bytes())
+    (db / "manifest.json").write_text(json.dumps(manifest | {"schema": 1}))
+    name, *options = command.split()
+    assert main([name, str(db), *options]) == 5
+    err = capsys.readouterr().err
+    assert "PTM-D003" in err
+    assert f"`{COMMAND} {db}`" in err
+
+
+def test_the_first_build_says_what_is_rebuilt_and_why(
+    db: Path, built: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    aged(db)
+    build = ["build-scene", str(db.parent / "two_rooms.obj"), "--samples", "8"]
+    build += ["--backend", "embree", "--max-leaves", "99"]
+    assert main(build) == 0
+    said = capsys.readouterr().out
+    for stage in (SCENE, PVS, EMIT):
+        assert f"because this ptmtools computes it differently (recipe {stage.recipe - 1}" in said
+    assert "hints.json is an index, with a record for each cell" in said
+    assert "because format: vrml → vrml,gltf" in said
+    names = ("manifest.json", "www/hints.json", "www/hints/c0000.json", "www/gltf/c0000.glb")
+    assert all((db / name).read_bytes() == (built / name).read_bytes() for name in names)
+    assert main(["validate", str(db), "--strict"]) == 0
+    capsys.readouterr()
+
+    manifest = json.loads((db / "manifest.json").read_bytes())
+    (db / "manifest.json").write_text(json.dumps(manifest | {"schema": 1}))
+    assert main(build) == 0
+    said = capsys.readouterr().out
+    assert said.count("because the database has schema 1, this ptmtools writes 2") == len(STAGES)
+    assert (db / "manifest.json").read_bytes() == (built / "manifest.json").read_bytes()
+
+
+def test_a_format_that_was_asked_for_is_kept(db: Path) -> None:
+    record = DatabaseFolder.open(db).record(EMIT.name)
+    chosen = replace(record, parameters={**record.parameters, "format": "vrml"})
+    assert EMIT.recorded(chosen).format == "vrml"
+    assert EMIT.recorded(replace(chosen, recipe=4)).format == "vrml,gltf", "the default then"
+    both = replace(record, recipe=4)
+    assert EMIT.recorded(both).format == "vrml,gltf"
 
 
 @pytest.mark.parametrize(

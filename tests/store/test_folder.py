@@ -94,8 +94,9 @@ def test_a_database_of_an_earlier_schema_is_built_again(tmp_path: Path) -> None:
     now = f'"schema": {SCHEMA}'
     earlier = manifest.read_text().replace(now, '"schema": 1')
     manifest.write_text(earlier)
-    with pytest.raises(DatabaseError, match="PTM-D003"):
+    with pytest.raises(DatabaseError, match="PTM-D003") as fault:
         DatabaseFolder.open(tmp_path)
+    assert f"`ptm build-scene m.obj -o {tmp_path}`" in str(fault.value.remedy)
     with pytest.raises(DatabaseError, match="PTM-D003"):
         DatabaseWriter.open_for_model(tmp_path, "other.obj")
     with DatabaseWriter.open_for_model(tmp_path, "m.obj") as writer:
@@ -107,6 +108,9 @@ def test_a_database_of_an_earlier_schema_is_built_again(tmp_path: Path) -> None:
     manifest.write_text(earlier.replace('"schema": 1', f'"schema": {SCHEMA + 1}'))
     with pytest.raises(DatabaseError, match="PTM-D003"):
         DatabaseWriter.open_for_model(tmp_path, "m.obj")
+    with pytest.raises(DatabaseError) as later:
+        DatabaseFolder.open(tmp_path)
+    assert later.value.remedy == "use the ptmtools that wrote it", "building it would lose it"
 
 
 def test_says_what_is_missing_or_damaged(tmp_path: Path) -> None:

@@ -139,12 +139,12 @@ def test_names_of_outputs(db: Path, name: str) -> None:
     }
 
 
-@pytest.mark.parametrize("inner", ["www", "www/cells", "www/gltf"])
+@pytest.mark.parametrize("inner", ["www", "www/cells", "www/gltf", "www/hints"])
 def test_links_where_cells_are_to_be_written(tmp_path: Path, inner: str) -> None:
     """What an interrupted run has finished is kept, and with it whatever lies beside it."""
     shutil.copytree(TWO_ROOMS, tmp_path / "model")
     build = ["-q", "build-scene", str(tmp_path / "model/two_rooms.obj"), "-o", str(tmp_path / "db")]
-    options = ["--samples", "16", "--backend", "embree", "-j", "1", "--format", "gltf"]
+    options = ["--samples", "16", "--backend", "embree", "-j", "1"]
     assert main([*build, *options]) == 0
     begun = tmp_path / "db/.ptm-new/emit"
     begun.mkdir(parents=True)

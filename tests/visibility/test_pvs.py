@@ -103,6 +103,17 @@ def test_the_result_is_symmetric_and_begins_with_the_cell(build_rooms):
     assert [int(pvs.row(i)[0]) for i in range(4)] == [0, 1, 2, 3]
     again = Pvs.from_arrays(pvs.to_arrays())
     assert np.array_equal(again.cell, pvs.cell)
+    assert np.array_equal(again.volume, pvs.volume)
+
+
+def test_cells_have_the_volume_of_their_leaves(build_rooms):
+    cells = build_rooms(*ROW, ZIGZAG).cells
+    grouped = replace(cells, leaf_cell=np.array([0, 1, 2, 2], np.int32))
+    leaves = cells.leaf_volumes()
+    assert compute_pvs(cells).volume == pytest.approx(leaves)
+    for options in (PvsOptions(), PvsOptions(method="sampled", lines=100)):
+        volume = compute_pvs(grouped, options).volume
+        assert volume == pytest.approx([leaves[0], leaves[1], leaves[2] + leaves[3]])
 
 
 def test_cells_of_several_leaves_see_what_their_leaves_see(build_rooms):

@@ -22,11 +22,13 @@ class Emitter:
 
     Attributes
     ----------
-    name: as `--format` has it.
+    name: as `--format` and the index of the hints have it.
     about: what it is, in a few words, for help.
     owns: files and folders in the served folder that are its own; a folder ends in a slash. The
         files must be there once it has been written.
-    entry: the one of its files that leads to the others; written when those are on the disk.
+    entry: the one of its files that leads to the others, if any; written when those are on the
+        disk.
+    cell_files: template of the paths of the cells' geometry (`names.path_of`), if it writes that.
     writer: function from a `Content` to the files, as (path in the served folder, str or bytes);
         what it can refuse, it refuses before it gives the first.
     reader: function from (path in the served folder, bytes) of one of its files to what the check
@@ -34,17 +36,16 @@ class Emitter:
         `ptmtools.database.fault`. Without one nothing is read.
     check: function from a `ServedDatabase` to the counts of the manifest that it can tell, by name.
         Without one there is nothing to check.
-    before: what the name alone meant in the release before, if that was something else.
     """
 
     name: str
     about: str
     owns: tuple[str, ...]
-    entry: str
     writer: Lazy[Callable[[Content], Iterator[tuple[str, str | bytes]]]]
     reader: Lazy[Callable[[str, bytes], object | None]] | None = None
     check: Lazy[Callable[[ServedDatabase], Mapping[str, int]]] | None = None
-    before: str = ""
+    entry: str = ""
+    cell_files: str = ""
 
     def is_owner(self, path: str) -> bool:
         """Whether a path in the served folder is that of one of its files, or of a gzip copy."""

@@ -21,21 +21,20 @@ from ptmtools.database.geometry import Geometry, Shape
 from ptmtools.database.gltf.buffer import BufferWriter
 from ptmtools.database.gltf.container import pack
 from ptmtools.database.gltf.material import MaterialWriter
-from ptmtools.database.names import GLTF_FOLDER, GLTF_HINTS, UP, cell_name, glb_file
+from ptmtools.database.names import GLTF_FILES, cell_name, path_of
 from ptmtools.scene.model import Scene
 
 
-def gltf_files(content: Content) -> Iterator[tuple[str, bytes | str]]:
-    """Path, relative to the served folder, and bytes of every GLB, and of the hints beside them.
+def gltf_files(content: Content) -> Iterator[tuple[str, bytes]]:
+    """Path, relative to the served folder, and bytes of every GLB.
 
     Raises LimitError: PTM-L600 a cell is longer than a GLB can be.
     """
     count = content.cells.cell_count
     for cell in range(count):
         content.progress(cell, count, "glTF")
-        yield f"{GLTF_FOLDER}/{glb_file(cell)}", _glb(content, cell)
+        yield path_of(cell, GLTF_FILES), _glb(content, cell)
     content.progress(count, count, "glTF")
-    yield GLTF_HINTS, content.hints(glb_file, UP)
 
 
 def flipped(uv: NDArray[np.floating]) -> NDArray[np.float32]:

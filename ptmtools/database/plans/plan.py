@@ -291,7 +291,7 @@ class _Plan:
             f"{count(len(self._doors()), 'portal')} between them",
         ]
         if self._pvs is not None:
-            parts.append(f"a cell sees {100 * self._pvs.average_share:.1f} %")
+            parts.append(f"{100 * self._pvs.volume_at_hand[0]:.1f} % of the volume at hand")
         if len(self._floors) > 1:
             parts.append(f"{len(self._floors)} storeys")
         place = {"ha": "left", "va": "center", "color": _INK}

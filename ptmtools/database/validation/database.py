@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from ptmtools import schemas
-from ptmtools.database.emitters import EMITTERS, Emitter, chosen_emitters, owner_of
+from ptmtools.database.emitters import Emitter, all_emitters, chosen_emitters, owner_of
 from ptmtools.database.model import EmitOptions, ValidationReport
-from ptmtools.database.names import TEXTURE_FOLDER
+from ptmtools.database.names import HINTS, TEXTURE_FOLDER
 from ptmtools.database.validation.files import check_names, served_files
 from ptmtools.database.validation.findings import Findings, one_line
 from ptmtools.database.validation.reading import FileReader
@@ -120,12 +120,11 @@ class _Check:
         self._note_others([path for path in there if path not in ours])
         self._strays = any(f"{SERVED}/{path}" not in self._outputs for path in ours)
         self._read_files(ours, database, progress, workers)
-        first, *_ = EMITTERS.values()
-        if _EMIT not in self._stages and not any(e.entry in ours for e in EMITTERS.values()):
-            database.at(first.entry).add("PTM-D655", f"the stage `{_EMIT}` has not run")
+        if _EMIT not in self._stages and not any(e.entry in ours for e in all_emitters()):
+            database.at(HINTS).add("PTM-D655", f"the stage `{_EMIT}` has not run")
             return
         listed = {path for path in ours if f"{SERVED}/{path}" in self._outputs} or ours
-        present = [e for e in EMITTERS.values() if any(map(e.is_owner, listed))]
+        present = [e for e in all_emitters() if any(map(e.is_owner, listed))]
         for emitter in {*present, *self._asked_for(present)}:
             for name in emitter.owns:
                 if not (name.endswith("/") or name in ours or f"{SERVED}/{name}" in self._outputs):

@@ -51,21 +51,27 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D697": ("error", "a list of cells has a cell twice or out of order, or the cell itself"),
     "PTM-D698": ("error", "a cell's name differs from its file's"),
     "PTM-D699": ("error", "the root file contradicts itself or the cells"),
-    "PTM-D700": ("error", "hints.json does not match its schema, or an index is out of range"),
-    "PTM-D701": ("error", "hints.json and the cell files disagree"),
-    "PTM-D702": ("error", "the ach values in hints.json are outside 0 to 1, or do not sum to 1"),
+    "PTM-D700": (
+        "error",
+        "the hints do not match their schemas, or an index in them is out of range",
+    ),
+    "PTM-D701": ("error", "the hints and the cell files disagree"),
+    "PTM-D702": (
+        "error",
+        "the ach values in a record are outside 0 to 1, do not sum to 1, or are not aligned",
+    ),
     "PTM-D703": (
         "warning",
         "pixels fell on cells outside the potentially visible set (PVS): missed mass",
     ),
-    "PTM-D704": ("error", "hints.json and a texture file disagree"),
-    "PTM-D705": ("error", "portals in hints.json are wrong, or do not match the adjacent cells"),
+    "PTM-D704": ("error", "the hints and a texture file disagree"),
+    "PTM-D705": ("error", "portals in a record are wrong, or do not match the adjacent cells"),
     "PTM-D706": ("error", "viewpoints in hints.json are wrong, or do not match the root file"),
-    "PTM-D707": ("error", "the coverage statistics in hints.json do not match the ach values"),
+    "PTM-D707": ("error", "the coverage statistics do not match the ach values"),
     "PTM-D708": ("warning", "a texture is listed in hints.json that no cell uses"),
     "PTM-D709": (
         "error",
-        "a leaf (convex part of a cell) in hints.json is not convex, or lies in another",
+        "a leaf (convex part of a cell) in a record is not convex, or lies in another",
     ),
     "PTM-D710": ("error", "a .ptm file is damaged"),
     "PTM-D711": ("error", "a .ptm file and its fallback image show different images"),
@@ -73,20 +79,21 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D713": ("warning", "a file is too large for --limit: only its checksum was checked"),
     "PTM-D720": ("error", "the arrays of a stage cannot be read"),
     "PTM-D721": ("error", "the arrays of the stages do not belong together"),
-    "PTM-D730": ("error", "the GLBs do not match the cells, or gltf/hints.json is missing"),
+    "PTM-D730": ("error", "the GLBs do not match the cells"),
     "PTM-D731": ("error", "a GLB is damaged: its header, its chunks or its JSON"),
     "PTM-D732": ("error", "a GLB is not in the emission pattern"),
     "PTM-D733": ("error", "an accessor of a GLB leads out of its bytes, or is misaligned"),
     "PTM-D734": ("error", "indices of a GLB are out of range, or not a list of triangles"),
     "PTM-D735": ("error", "a number in a GLB is not finite, or bounds do not match the data"),
     "PTM-D736": ("error", "a GLB and hints.json disagree about a texture"),
-    "PTM-D737": ("error", "gltf/hints.json and hints.json disagree"),
     "PTM-D738": ("error", "a GLB and its cell's VRML file have different triangles"),
     "PTM-D739": ("error", "a material of a GLB differs from that of its shape in the VRML file"),
+    "PTM-D740": ("error", "the hints have another schema: the database is of another release"),
+    "PTM-D741": ("error", "the index, the records and the statistics contradict each other"),
 }
 
 #: Of files that are not as their stage wrote them: a build sees that by itself.
-SEEN_BY_BUILD = frozenset(f"PTM-D65{n}" for n in "12456")
+SEEN_BY_BUILD = frozenset(f"PTM-D{n}" for n in (651, 652, 654, 655, 656, 740))
 #: What no build can mend: files of others, too little memory, and what the model is like.
 NOT_BUILT = frozenset(f"PTM-D{n}" for n in (653, 657, 658, 675, 703, 708, 713))
 

@@ -1,13 +1,11 @@
 """What the glTF files must satisfy: each by itself, and beside the hints and the VRML files.
 
 A GLB has the shapes of its cell's VRML file, in the same order and bit for bit: the same triangles,
-texture coordinates turned upside down, the same images and sides. `gltf/hints.json` is
-`hints.json` with other URLs.
+texture coordinates turned upside down, the same images and sides.
 """
 
 from __future__ import annotations
 
-import json
 import posixpath
 from collections.abc import Collection, Mapping
 from typing import Any
@@ -15,20 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools import schemas
-from ptmtools.database.fault import shaped
 from ptmtools.database.gltf.cell import flipped
 from ptmtools.database.gltf.material import WRAPS, linear
 from ptmtools.database.gltf.reader import ReadGlb, ReadMaterial, read_glb
-from ptmtools.database.names import (
-    CELL_FOLDER,
-    GLTF_FOLDER,
-    GLTF_HINTS,
-    HINTS,
-    UP,
-    cell_name,
-    glb_file,
-)
+from ptmtools.database.names import CELL_FOLDER, GLTF_FOLDER, UP, cell_name
 from ptmtools.database.validation.findings import Place
 from ptmtools.database.validation.served import ServedDatabase
 from ptmtools.database.vrml.reader import Document, Node
@@ -37,29 +25,27 @@ from ptmtools.database.vrml.reader import Document, Node
 _SLACK = 1e-5
 
 
-def read_file(path: str, data: bytes) -> Any:
-    """A GLB as `ReadGlb`, or the hints beside them as JSON has them."""
-    if path.endswith(".glb"):
-        return read_glb(data)
-    with shaped("PTM-D737"):
-        return schemas.parse(data) if path == GLTF_HINTS else None
+#: The form of the index that these files are.
+_FORM = "gltf"
+
+
+def read_file(path: str, data: bytes) -> ReadGlb | None:
+    """A GLB; nothing of other files."""
+    return read_glb(data) if path.endswith(".glb") else None
 
 
 def check_files(database: ServedDatabase) -> Mapping[str, int]:
     """Holds them against each other, the hints and the VRML files; counts nothing."""
-    files, held = database.files, database.held
-    wanted, there = _stems(files, CELL_FOLDER, ".wrl"), _stems(files, GLTF_FOLDER, ".glb")
+    files, held, hints = database.files, database.held, database.hints
+    there = _stems(files, GLTF_FOLDER, ".glb")
+    if hints is None:
+        wanted = _stems(files, CELL_FOLDER, ".wrl") or there
+    else:
+        wanted = {posixpath.splitext(posixpath.basename(url))[0] for url in hints.urls(_FORM) or ()}
     for stem in sorted(wanted ^ there):
         what = "is missing" if stem in wanted else "belongs to no cell"
         database.at(f"{GLTF_FOLDER}/{stem}.glb").add("PTM-D730", what)
-    if GLTF_HINTS not in files:
-        database.at(GLTF_HINTS).add("PTM-D730", "is missing")
-    textures = None
-    if HINTS in held:
-        hints = _moved(held[HINTS])
-        textures = hints["textures"]
-        if place := _difference(held.get(GLTF_HINTS, hints), hints):
-            database.at(GLTF_HINTS, place).add("PTM-D737", f"not as in {HINTS}")
+    textures = hints.index["textures"] if hints else None
     for stem in sorted(there):
         path = f"{GLTF_FOLDER}/{stem}.glb"
         cell: ReadGlb | None = held.get(path)
@@ -80,16 +66,6 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
     return {}
 
 
-def _moved(hints: Mapping[str, Any]) -> dict[str, Any]:
-    """Hints with the URLs that they have beside the GLBs."""
-    cells = [cell | {"url": glb_file(i)} for i, cell in enumerate(hints["cells"])]
-    textures = [
-        row | {url: UP + row[url] for url in ("file", "fallback") if row[url] is not None}
-        for row in hints["textures"]
-    ]
-    return {**hints, "cells": cells, "textures": textures}
-
-
 def _check_texture(material: ReadMaterial, textures: list[Any], at: Place) -> None:
     """A material that says which texture of the hints it has."""
     place = material.texture
@@ -98,7 +74,8 @@ def _check_texture(material: ReadMaterial, textures: list[Any], at: Place) -> No
         at.add("PTM-D736", f"the hints have no texture {place}")
         return
     record = textures[place]
-    if (material.ptm, material.image) != (record["file"], record["fallback"]):
+    named = [url and UP + url for url in (record["file"], record["fallback"])]
+    if [material.ptm, material.image] != named:
         at.add("PTM-D736", f"{material.ptm} and {material.image} are not texture {place}")
     elif material.blends and material.factor[3] == 1 and record["components"] in (1, 3):
         at.add("PTM-D739", f"blends, but texture {place} is opaque")
@@ -160,25 +137,6 @@ def _corners(shape: Node, values: str, index: str) -> NDArray[np.float64] | None
     except (KeyError, ValueError, IndexError):
         return None
     return corners
-
-
-def _difference(own: object, other: dict[str, Any]) -> str:
-    """Where a document of JSON differs first from another, "" if it does not."""
-    if not isinstance(own, dict):
-        return "document"
-    for name in sorted(own.keys() | other.keys()):
-        one, two = own.get(name), other.get(name)
-        if (name in own) != (name in other) or not _same(one, two):
-            if isinstance(one, list) and isinstance(two, list):
-                rows = (i for i, ab in enumerate(zip(one, two, strict=False)) if not _same(*ab))
-                return f"{name}[{next(rows, min(len(one), len(two)))}]"
-            return name
-    return ""
-
-
-def _same(one: object, other: object) -> bool:
-    """Whether two values of JSON are the same; for Python, 1 is true."""
-    return json.dumps(one, sort_keys=True) == json.dumps(other, sort_keys=True)
 
 
 def _stems(files: Collection[str], folder: str, suffix: str) -> set[str]:

@@ -1,26 +1,36 @@
-"""What `hints.json` must satisfy beside its schema: by itself, and against the cell files."""
+"""What the hints must satisfy beside their schemas: the index, the records and the statistics, each
+by itself and beside each other. The emitters' checks hold them against their own files."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools import schemas
+from ptmtools.database.emitters import EMITTERS
 from ptmtools.database.fault import FileError, shaped
-from ptmtools.database.validation.cells import ReadCell
+from ptmtools.database.hints.index import SCHEMA
+from ptmtools.database.hints.record import FORMAT
+from ptmtools.database.names import HINTS, HINTS_FOLDER, STATISTICS, path_of
 from ptmtools.database.validation.findings import Place
 from ptmtools.database.validation.lists import check_graph, check_list, check_shares
+from ptmtools.database.validation.served import ServedDatabase
 from ptmtools.database.validation.space import check_space
+from ptmtools.database.validation.textures import check_record
 
 #: How far sums of statistics, which are rounded, may be off.
 ROUNDED = 1e-3
-#: How far the ach values in full precision may sum up beside 1.
+#: How far the ach values may sum up beside 1.
 ACH_SLACK = 1e-9
 #: Missed mass above this is worth a warning.
 MISSED = 1e-4
+
+#: What the statistics have a row for each of the index of.
+_LISTS = ("cells", "textures")
 
 #: Hints, or an object in them, as JSON has them: as the schema says, and every index in range.
 Row = Mapping[str, Any]
@@ -28,94 +38,147 @@ Row = Mapping[str, Any]
 Images = tuple[str | None, ...]
 
 
-def read_hints(data: bytes) -> Row:
-    """The hints. Raises FileError PTM-D700 if they are not what their schema says."""
+@dataclass(frozen=True)
+class ReadHints:
+    """The hints as far as they can be used.
+
+    Attributes
+    ----------
+    index: what `hints.json` holds.
+    paths: of each cell where its record should be, in the served folder.
+    records: of each cell its record, whose indices are in range; None without.
+    statistics: None without; as many rows as the index has.
+    images: of each texture its files.
+    """
+
+    index: Row
+    paths: Sequence[str]
+    records: Sequence[Row | None]
+    statistics: Row | None
+    images: Sequence[Images]
+
+    def urls(self, form: str) -> list[str] | None:
+        """The URLs of the cells' geometry in a form; None if the index does not name it."""
+        template: str | None = self.index["geometry"].get(form)
+        cells = self.index["cells"]
+        return None if template is None else [_expanded(template, cell) for cell in cells]
+
+    def known(self) -> Iterator[tuple[int, Row]]:
+        """The records that can be used, with their cells' numbers."""
+        return ((i, record) for i, record in enumerate(self.records) if record is not None)
+
+
+def _expanded(template: str, cell: Row) -> str:
+    return template.replace("{name}", cell["name"])
+
+
+def read_file(path: str, data: bytes) -> Row | None:
+    """The index, a record or the statistics; nothing of other files.
+
+    Raises FileError: PTM-D740 of another schema; PTM-D700 not as the schema says.
+    """
+    if path == HINTS:
+        index = _read(data, schemas.HINTS)
+        for i, view in enumerate(index["viewpoints"]):
+            _in_range([view["cell"]], len(index["cells"]), f"viewpoints[{i}].cell")
+        return index
+    if not path.startswith(f"{HINTS_FOLDER}/") or not path.endswith(".json"):
+        return None
+    return _read(data, schemas.STATISTICS if path == STATISTICS else schemas.CELL)
+
+
+def _read(data: bytes, name: str) -> Row:
     with shaped("PTM-D700"):
-        hints: Row = schemas.read(data, schemas.HINTS)
-    _check_indices(hints)
+        document = schemas.parse(data)
+    number = document.get("schema") if isinstance(document, dict) else None
+    if type(number) is int and number != SCHEMA:
+        message = f"is {number}, this ptmtools reads {SCHEMA}; `ptm build-scene` writes it anew"
+        raise FileError("PTM-D740", "schema", message)
+    with shaped("PTM-D700"):
+        schemas.check(document, name)
+    hints: Row = document
     return hints
 
 
-def check_hints(hints: Row, at: Place) -> None:
-    """Checks all that needs no other file."""
-    cells = hints["cells"]
-    places = [at.at(f"cells[{i}]") for i in range(len(cells))]
-    for i, (cell, here) in enumerate(zip(cells, places, strict=True)):
-        check_list("adjacent", i, cell["adjacent"], here)
-        check_list("visible", i, cell["visible"], here)
-        check_list("textures", None, cell["textures"], here)
-        ach = np.array(cell["ach"], dtype=np.float64)
-        check_shares(ach, ACH_SLACK, ("PTM-D702", "PTM-D702"), here)
-        if len(ach) != len(cell["visible"]):
-            here.add("PTM-D702", f"{len(ach)} ach values for {len(cell['visible'])} visible cells")
-        elif wrong := _misfit(cell["coverage"], ach):
-            here.add("PTM-D707", wrong)
-        if cell["missed"] > MISSED:
-            share = f"{cell['missed']:.3g} of the pixels"
-            here.add("PTM-D703", f"{share} fell on cells outside the PVS")
+def gather(database: ServedDatabase) -> ReadHints | None:
+    """The hints of a database, whose URLs are resolved on the way; None without an index."""
+    index: Row | None = database.held.get(HINTS)
+    if index is None:
+        return None
+    cells, textures = index["cells"], index["textures"]
+    urls = [_expanded(index["record"], cell) for cell in cells]
+    paths = database.resolve_each(HINTS, "cells", urls)
+    database.resolve(HINTS, index["statistics"])
+    records: list[Row | None] = []
+    for i, path in enumerate(paths):
+        record = database.held.get(path) if path else None
+        if record is not None and (fault := _misplaced(record, i, len(cells), len(textures))):
+            database.at(path or "", fault.place).add(fault.code, fault.message)
+            record = None
+        records.append(record)
+    statistics: Row | None = database.held.get(STATISTICS)
+    if statistics is not None:
+        counts = [f"{len(rows[name])} {name}" for rows in (statistics, index) for name in _LISTS]
+        if counts[:2] != counts[2:]:
+            message = f"of {' and '.join(counts[:2])}, not {' and '.join(counts[2:])}"
+            database.at(STATISTICS).add("PTM-D741", message)
+            statistics = None
+    images: list[Images] = []
+    files = database.resolve_each(HINTS, "textures", [row["file"] for row in textures])
+    for row, file in zip(textures, files, strict=True):
+        fallback = row["fallback"]
+        images.append((file,) if fallback is None else (database.resolve(HINTS, fallback), file))
+    shown = [path or url for path, url in zip(paths, urls, strict=True)]
+    return ReadHints(index, shown, records, statistics, images)
+
+
+def check_files(database: ServedDatabase) -> Mapping[str, int]:
+    """Checks all that needs no cell files; counts nothing."""
+    hints = database.hints
+    if hints is None:
+        return {}
+    at = database.at(HINTS)
+    places = [database.at(path) for path in hints.paths]
+    known = dict(hints.known())
+    for i, record in known.items():
+        _check_record(record, i, places[i])
+        if not _holds(hints.index["cells"][i]["box"], record["leaves"]):
+            at.add("PTM-D741", "does not hold the leaves of the cell", f"cells[{i}].box")
     adjacent, visible = (
-        {i: cell[name] for i, cell in enumerate(cells)} for name in ("adjacent", "visible")
+        {i: record[name] for i, record in known.items()} for name in ("adjacent", "visible")
     )
     check_graph(adjacent, visible, places.__getitem__)
-    used = {texture for cell in cells for texture in cell["textures"]}
-    for i, texture in enumerate(hints["textures"]):
-        if i not in used:
-            at.add("PTM-D708", f"no cell uses {texture['file']}", f"textures[{i}]")
-    check_space(cells, hints["viewpoints"], at)
+    own = {i: record["textures"][0] for i, record in known.items() if record["textures"]}
+    _check_own_textures(known, own, places)
+    _check_textures(hints, {t for textures in own.values() for t in textures}, database)
+    _check_statistics(hints, database)
+    _check_forms(hints, database)
+    check_space(hints.records, hints.index["viewpoints"], places, at)
+    return {}
 
 
-def check_against_cells(
-    hints: Row,
-    known: Sequence[str],
-    images: Sequence[Images],
-    cells: Mapping[str, ReadCell],
-    cell_images: Mapping[str, set[Images]],
-    at: Place,
-) -> None:
-    """Compares with the cell files.
-
-    Parameters
-    ----------
-    known: for each cell of the hints the name of its file in cells/, which need not be there.
-    images: for each texture of the hints its files.
-    cells: by the names of their files.
-    cell_images: the files of each of their image textures.
-    """
-    for absent in sorted(set(cells) - set(known)):
-        at.add("PTM-D701", f"{absent} is missing")
-    for i, (name, row) in enumerate(zip(known, hints["cells"], strict=True)):
-        cell = cells.get(name)
-        if cell is None:
-            continue
-        listed, shown = {images[t] for t in row["textures"]}, cell_images[name]
-        complete = not any(None in files for files in listed | shown)
-        same: dict[str, bool] = {
-            "name": row["name"] == cell.name,
-            "adjacent": tuple(known[c] for c in row["adjacent"]) == cell.adjacent,
-            "visible": tuple(known[c] for c in row["visible"]) == cell.visible,
-            "ach": _equal_single(row["ach"], cell.ach),
-            "leaves": _same_leaves(row["leaves"], cell),
-            "textures": listed == shown or not complete,
-        }
-        for field in (f for f, equal in same.items() if not equal):
-            at.add("PTM-D701", f"differs from {name}", f"cells[{i}].{field}")
-
-
-def _check_indices(hints: Row) -> None:
-    cells, textures = len(hints["cells"]), len(hints["textures"])
-    for i, view in enumerate(hints["viewpoints"]):
-        _in_range([view["cell"]], cells, f"viewpoints[{i}].cell")
-    for i, cell in enumerate(hints["cells"]):
-        place = f"cells[{i}]"
-        _in_range(cell["adjacent"], cells, f"{place}.adjacent")
-        _in_range(cell["visible"], cells, f"{place}.visible")
-        _in_range(cell["textures"], textures, f"{place}.textures")
-        _in_range([p["neighbour"] for p in cell["portals"]], cells, f"{place}.portals")
-        for leaf in cell["leaves"]:
-            for loop in leaf["faces"]:
-                _in_range(loop, len(leaf["points"]), f"{place}.leaves")
-        painted = [t for shares in cell["coverage"].get("textures", ()) for t, _ in shares]
-        _in_range([t for t in painted if t is not None], textures, f"{place}.coverage.textures")
+def _misplaced(record: Any, i: int, cells: int, textures: int) -> FileError | None:
+    """Why what is held of a file is no record of the cell ``i`` of so many."""
+    if not isinstance(record, dict) or record["format"] != FORMAT:
+        return FileError("PTM-D741", "", "is no record of a cell, as the index has it")
+    if record["cell"] != i:
+        return FileError("PTM-D741", "cell", f"is {record['cell']}, in the index {i}")
+    try:
+        for name in ("adjacent", "visible"):
+            _in_range(record[name], cells, name)
+        for k, row in enumerate(record["textures"]):
+            _in_range(row, textures, f"textures[{k}]")
+        for k, portal in enumerate(record["portals"]):
+            _in_range([portal["neighbour"]], cells, f"portals[{k}].neighbour")
+        for k, leaf in enumerate(record["leaves"]):
+            for f, loop in enumerate(leaf["faces"]):
+                _in_range(loop, len(leaf["points"]), f"leaves[{k}].faces[{f}]")
+        for k, shares in enumerate(record.get("textureShares", ())):
+            used = [texture for texture, _ in shares if texture is not None]
+            _in_range(used, textures, f"textureShares[{k}]")
+    except FileError as fault:
+        return fault
+    return None
 
 
 def _in_range(indices: Sequence[int], count: int, place: str) -> None:
@@ -123,37 +186,91 @@ def _in_range(indices: Sequence[int], count: int, place: str) -> None:
         raise FileError("PTM-D700", place, f"the index {max(indices)} is out of range")
 
 
-def _misfit(coverage: Row, ach: NDArray[np.float64]) -> str:
-    """What is wrong with the statistics of a row of (n,) shares; empty if nothing is."""
-    views = coverage["views"]
-    columns = {
-        name: coverage[name] for name in ("error", "p95", "seen", "textures") if name in coverage
-    }
-    columns |= {f"views[{i}]": view for i, view in enumerate(views)}
+def _check_record(record: Row, i: int, at: Place) -> None:
+    check_list("adjacent", i, record["adjacent"], at)
+    check_list("visible", i, record["visible"], at)
+    for textures in record["textures"]:
+        check_list("textures", None, textures, at)
+    ach = np.array(record["ach"], dtype=np.float64)
+    check_shares(ach, ACH_SLACK, ("PTM-D702", "PTM-D702"), at)
+    for name in ("ach", "textures", "textureShares"):
+        if len(record.get(name, ach)) != len(record["visible"]):
+            at.add("PTM-D702", f"{name} is not aligned with visible")
+    for shares, share in zip(record.get("textureShares", ()), ach, strict=False):
+        if abs(sum(part for _, part in shares) - share) > ROUNDED:
+            at.add("PTM-D707", "the shares of textures do not sum to those of their cells")
+            break
+
+
+def _holds(box: Sequence[float], leaves: Sequence[Row]) -> bool:
+    points = np.array([point for leaf in leaves for point in leaf["points"]])
+    return bool((points >= box[:3]).all() and (points <= box[3:]).all())
+
+
+def _check_own_textures(
+    records: Mapping[int, Row], own: Mapping[int, Sequence[int]], places: Sequence[Place]
+) -> None:
+    """What a record says of the textures of other cells is what theirs say."""
+    for i, record in records.items():
+        for other, textures in zip(record["visible"], record["textures"], strict=False):
+            if own.get(other, textures) != textures:
+                places[i].add("PTM-D741", f"not the textures of cell {other}", "textures")
+
+
+def _check_textures(hints: ReadHints, used: set[int], database: ServedDatabase) -> None:
+    complete = all(record is not None for record in hints.records)
+    for i, (row, files) in enumerate(zip(hints.index["textures"], hints.images, strict=True)):
+        at = database.at(HINTS, f"textures[{i}]")
+        if complete and i not in used:
+            at.add("PTM-D708", f"no cell uses {row['file']}")
+        texture = database.textures.get(files[-1] or "")
+        if texture is None:
+            continue
+        check_record(row, texture, at)
+        if hints.statistics and hints.statistics["textures"][i]["sha256"] != texture.sha256:
+            place = database.at(STATISTICS, f"textures[{i}].sha256")
+            place.add("PTM-D704", f"is {texture.sha256} in the file")
+
+
+def _check_statistics(hints: ReadHints, database: ServedDatabase) -> None:
+    rows = hints.statistics["cells"] if hints.statistics else ()
+    for i, (row, record) in enumerate(zip(rows, hints.records, strict=False)):
+        at = database.at(STATISTICS, f"cells[{i}]")
+        if record is not None and (wrong := _misfit(row, record["ach"])):
+            at.add("PTM-D707", wrong)
+        if row["missed"] > MISSED:
+            share = f"{row['missed']:.3g} of the pixels"
+            at.add("PTM-D703", f"{share} fell on cells outside the PVS")
+
+
+def _misfit(row: Row, ach: Sequence[float] | NDArray[np.float64]) -> str:
+    """What is wrong with the statistics of (n,) shares; empty if nothing is."""
+    columns = {name: row[name] for name in ("error", "p95", "seen")}
+    columns |= {f"views[{i}]": view for i, view in enumerate(row["views"])}
     for name, values in columns.items():
         if len(values) != len(ach):
             return f"{name} is not aligned with ach"
-    if any(abs(sum(view) - 1) > ROUNDED for view in views):
+    if any(abs(sum(view) - 1) > ROUNDED for view in row["views"]):
         return "the shares of a view do not sum to 1"
     # But for a cell that sees nothing, which has 1 for itself.
-    if any(seen == 0 < share < 1 for seen, share in zip(coverage["seen"], ach, strict=True)):
+    if any(seen == 0 < share < 1 for seen, share in zip(row["seen"], ach, strict=True)):
         return "what is seen from nowhere has a share"
-    for shares, share in zip(coverage.get("textures", ()), ach, strict=False):
-        if abs(sum(part for _, part in shares) - share) > ROUNDED:
-            return "the shares of textures do not sum to those of their cells"
     return ""
 
 
-def _equal_single(full: Sequence[Any], written: NDArray[np.float64]) -> bool:
-    return np.array_equal(np.array(full, np.float32), written.astype(np.float32))
+def _check_forms(hints: ReadHints, database: ServedDatabase) -> None:
+    """The index names the forms that there are, and no other. What the emitters' checks know is
+    left to them."""
+    at, geometry = database.at(HINTS, "geometry"), hints.index["geometry"]
+    if not geometry:
+        at.add("PTM-D741", "there is no geometry")
+    there = {form for form in EMITTERS if _is_there(form, len(hints.records), database)}
+    for form in sorted(there - set(geometry)):
+        at.add("PTM-D741", f"{form} is there, and not named")
+    for form in sorted(set(geometry) - there):
+        database.resolve_each(HINTS, "geometry", hints.urls(form) or ())
 
 
-def _same_leaves(leaves: Sequence[Row], cell: ReadCell) -> bool:
-    """Whether the leaves are those of the file, if it has some, and reach as far as its hull."""
-    if len(leaves) != max(len(cell.leaves), 1) or not len(cell.hull):
-        return False
-    points = [point for leaf in leaves for point in leaf["points"]]
-    pairs = zip(leaves, cell.leaves, strict=False)
-    return all(_equal_single(leaf["points"], written) for leaf, written in pairs) and all(
-        _equal_single(end(points, axis=0), end(cell.hull, axis=0)) for end in (np.min, np.max)
-    )
+def _is_there(form: str, cells: int, database: ServedDatabase) -> bool:
+    files = EMITTERS[form].cell_files
+    return bool(files) and any(path_of(cell, files) in database.files for cell in range(cells))

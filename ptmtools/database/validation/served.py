@@ -7,13 +7,17 @@ import posixpath
 import re
 from collections import Counter
 from collections.abc import Iterable
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote_to_bytes
 
 from ptmtools.database.names import CELL_FOLDER
 from ptmtools.database.validation.findings import Findings, Place
 from ptmtools.database.validation.textures import ReadTexture
 from ptmtools.store.layout import SERVED
+
+if TYPE_CHECKING:
+    from ptmtools.database.validation.hints import ReadHints
 
 #: A path as a relative reference may have it (RFC 3986); all else is percent-encoded there.
 _PATH = re.compile(r"(?:[A-Za-z0-9._~!$&'()*+,;=:@/-]|%[0-9A-Fa-f]{2})+")
@@ -39,6 +43,14 @@ class ServedDatabase:
         self._found = found
         self._folded = {file.casefold(): file for file in sorted(self.files)}
         self._known: dict[tuple[str, str], tuple[str, str, str]] = {}
+
+    @cached_property
+    def hints(self) -> ReadHints | None:
+        """What the hints say; None if there is no index that can be read. To be asked for when all
+        is held."""
+        from ptmtools.database.validation.hints import gather
+
+        return gather(self)
 
     def at(self, path: str, place: str = "") -> Place:
         """Who adds what is found in a served file."""

@@ -27,36 +27,41 @@ Row = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class _Leaf:
-    """A leaf of the hints: its cell, its name in findings, (n, 3) points, planes if it is sound."""
+    """A leaf of the hints: its cell, its place in the record, (n, 3) points, planes if sound."""
 
     cell: int
-    place: str
+    place: Place
     points: Points
     planes: Planes | None
 
 
-def check_space(cells: Sequence[Row], viewpoints: Sequence[Row], at: Place) -> None:
-    """Checks `cells` and `viewpoints` of the hints, whose indices are in range."""
+def check_space(
+    records: Sequence[Row | None], viewpoints: Sequence[Row], places: Sequence[Place], at: Place
+) -> None:
+    """Checks the leaves and portals of the records, each with its place, and the viewpoints of the
+    index, whose place is ``at``; indices are in range."""
     read = [
-        (i, f"cells[{i}].leaves[{k}]", leaf, np.array(leaf["points"], np.float64))
-        for i, cell in enumerate(cells)
-        for k, leaf in enumerate(cell["leaves"])
+        (i, places[i].at(f"leaves[{k}]"), leaf, np.array(leaf["points"], np.float64))
+        for i, record in enumerate(records)
+        for k, leaf in enumerate(record["leaves"] if record is not None else ())
     ]
+    if not read:
+        return
     tolerance = Tolerance.for_points(np.concatenate([points for *_, points in read]))
     leaves: list[_Leaf] = []
     for cell, place, leaf, points in read:
         try:
             planes = solid_planes(points, leaf["faces"], tolerance)
         except SolidError as fault:
-            at.add("PTM-D709", str(fault), place)
+            place.add("PTM-D709", str(fault))
             planes = None
         leaves.append(_Leaf(cell, place, points, planes))
-    _check_apart(leaves, tolerance, at)
-    bodies: list[list[Planes]] = [[] for _ in cells]
+    _check_apart(leaves, tolerance)
+    bodies: list[list[Planes]] = [[] for _ in records]
     for each in leaves:
         if each.planes is not None:
             bodies[each.cell].append(each.planes)
-    _check_portals(cells, bodies, tolerance, at)
+    _check_portals(records, bodies, tolerance, places)
     for i, view in enumerate(viewpoints):
         inside = _inside(bodies[view["cell"]], np.array([view["position"]], np.float64), tolerance)
         if bodies[view["cell"]] and not inside:
@@ -64,7 +69,7 @@ def check_space(cells: Sequence[Row], viewpoints: Sequence[Row], at: Place) -> N
             at.add("PTM-D706", message, f"viewpoints[{i}].position")
 
 
-def _check_apart(leaves: Sequence[_Leaf], tolerance: Tolerance, at: Place) -> None:
+def _check_apart(leaves: Sequence[_Leaf], tolerance: Tolerance) -> None:
     """The middle of a leaf lies in no other leaf."""
     middles = np.array([leaf.points.mean(axis=0) for leaf in leaves])
     order = np.argsort(middles[:, 0], kind="stable")
@@ -77,31 +82,37 @@ def _check_apart(leaves: Sequence[_Leaf], tolerance: Tolerance, at: Place) -> No
         near = near[((middles[near] >= low) & (middles[near] <= high)).all(axis=1)]
         within = near[farthest(leaf.planes, middles[near]) < -tolerance.rounding]
         for other in within[within != k].tolist():
-            at.add("PTM-D709", f"lies in {leaf.place}", leaves[other].place)
+            where = f"{leaf.place.file}: {leaf.place.place}"
+            leaves[other].place.add("PTM-D709", f"lies in {where}")
 
 
 def _check_portals(
-    cells: Sequence[Row], bodies: Sequence[Sequence[Planes]], tolerance: Tolerance, at: Place
+    records: Sequence[Row | None],
+    bodies: Sequence[Sequence[Planes]],
+    tolerance: Tolerance,
+    places: Sequence[Place],
 ) -> None:
-    openings: list[Counter[tuple[Any, ...]]] = [Counter() for _ in cells]
-    for i, cell in enumerate(cells):
-        place = f"cells[{i}].portals"
-        to = {portal["neighbour"] for portal in cell["portals"]}
-        if to != set(cell["adjacent"]):
-            at.add("PTM-D705", "they lead to other cells than the adjacent", place)
-        for k, portal in enumerate(cell["portals"]):
+    openings: list[Counter[tuple[Any, ...]]] = [Counter() for _ in records]
+    for i, record in enumerate(records):
+        if record is None:
+            continue
+        to = {portal["neighbour"] for portal in record["portals"]}
+        if to != set(record["adjacent"]):
+            places[i].add("PTM-D705", "they lead to other cells than the adjacent", "portals")
+        for k, portal in enumerate(record["portals"]):
             polygon = tuple(map(tuple, portal["polygon"]))
             openings[i][(portal["neighbour"], polygon, portal["area"])] += 1
             # The other half of the portals is the same turned round.
             if i < portal["neighbour"] and (
                 fault := _misplaced(portal, bodies[i], bodies[portal["neighbour"]], tolerance)
             ):
-                at.add("PTM-D705", fault, f"{place}[{k}]")
+                places[i].add("PTM-D705", fault, f"portals[{k}]")
     for i, of_cell in enumerate(openings):
         for (neighbour, polygon, area), count in of_cell.items():
-            if openings[neighbour][(i, polygon[::-1], area)] != count:
+            turned = openings[neighbour][(i, polygon[::-1], area)]
+            if records[neighbour] is not None and turned != count:
                 message = f"a portal to cell {neighbour} does not stand there, turned round"
-                at.add("PTM-D705", message, f"cells[{i}].portals")
+                places[i].add("PTM-D705", message, "portals")
 
 
 def _misplaced(

@@ -1,32 +1,28 @@
-"""What the VRML files and `hints.json` must satisfy: each by itself, and beside each other."""
+"""What the VRML files must satisfy: each by itself, and beside each other and the hints."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.database.names import CELL_FOLDER, HINTS, ROOT
 from ptmtools.database.validation.cells import ReadCell, check_cell, read_cell
-from ptmtools.database.validation.hints import (
-    Images,
-    Row,
-    check_against_cells,
-    check_hints,
-    read_hints,
-)
+from ptmtools.database.validation.hints import Images, Row
 from ptmtools.database.validation.lists import check_graph
 from ptmtools.database.validation.root import ReadRoot, check_root, check_viewpoints, read_root
 from ptmtools.database.validation.served import ServedDatabase
-from ptmtools.database.validation.textures import check_record
 from ptmtools.database.vrml.reader import Document, parse
 from ptmtools.tolerance import Tolerance
 
+#: The form of the index that these files are.
+_FORM = "vrml"
 
-def read_file(path: str, data: bytes) -> Document | Row | None:
-    """A VRML file or the hints; nothing of other files."""
-    if path == HINTS:
-        return read_hints(data)
+
+def read_file(path: str, data: bytes) -> Document | None:
+    """A VRML file; nothing of other files."""
     return parse(data) if path.endswith(".wrl") else None
 
 
@@ -91,27 +87,63 @@ def _check_root(
 def _check_hints(
     root: ReadRoot | None, cells: Mapping[str, ReadCell], database: ServedDatabase
 ) -> None:
-    at, folder = database.at(HINTS), f"{CELL_FOLDER}/"
+    folder = f"{CELL_FOLDER}/"
     cell_images = {
         own: {tuple(database.resolve_each(folder + own, "url", u)) for u in cell.textures}
         for own, cell in cells.items()
     }
-    hints: Row | None = database.held.get(HINTS)
-    if hints is None:
+    hints = database.hints
+    urls = hints.urls(_FORM) if hints else None
+    if hints is None or urls is None:
         return
-    check_hints(hints, at)
-    urls = [row["url"] for row in hints["cells"]]
     database.resolve_each(HINTS, "cells", urls)
-    files = database.resolve_each(HINTS, "textures", [row["file"] for row in hints["textures"]])
-    images: list[Images] = []
-    for i, (record, path) in enumerate(zip(hints["textures"], files, strict=True)):
-        fallback = record["fallback"]
-        images.append((path,) if fallback is None else (database.resolve(HINTS, fallback), path))
-        if path in database.textures:
-            check_record(record, database.textures[path], at.at(f"textures[{i}]"))
     known = [url.removeprefix(folder) for url in urls]
-    check_against_cells(hints, known, images, cells, cell_images, at)
+    for absent in sorted(set(cells) - set(known)):
+        database.at(HINTS).add("PTM-D701", f"{absent} is missing")
+    for i, row in hints.known():
+        if (cell := cells.get(known[i])) is not None:
+            for field in _differences(row, cell, known, hints.images, cell_images[known[i]]):
+                at = database.at(hints.paths[i], field)
+                at.add("PTM-D701", f"differs from {folder}{known[i]}")
     if root is not None:
-        check_viewpoints(
-            root, hints["viewpoints"], [urls[view["cell"]] for view in hints["viewpoints"]], at
-        )
+        views = hints.index["viewpoints"]
+        check_viewpoints(root, views, [urls[view["cell"]] for view in views], database.at(HINTS))
+
+
+def _differences(
+    row: Row, cell: ReadCell, known: Sequence[str], images: Sequence[Images], shown: set[Images]
+) -> list[str]:
+    """In which fields a record differs from the cell's file.
+
+    Parameters
+    ----------
+    known: for each cell the name of its file in cells/.
+    images: for each texture of the hints its files.
+    shown: the files of each of the cell's image textures.
+    """
+    listed = {images[t] for textures in row["textures"][:1] for t in textures}
+    complete = not any(None in files for files in listed | shown)
+    same: dict[str, bool] = {
+        "name": row["name"] == cell.name,
+        "adjacent": tuple(known[c] for c in row["adjacent"]) == cell.adjacent,
+        "visible": tuple(known[c] for c in row["visible"]) == cell.visible,
+        "ach": _equal_single(row["ach"], cell.ach),
+        "leaves": _same_leaves(row["leaves"], cell),
+        "textures": listed == shown or not complete,
+    }
+    return [field for field, equal in same.items() if not equal]
+
+
+def _equal_single(given: Sequence[Any], written: NDArray[np.float64]) -> bool:
+    return np.array_equal(np.array(given, np.float32), written.astype(np.float32))
+
+
+def _same_leaves(leaves: Sequence[Row], cell: ReadCell) -> bool:
+    """Whether the leaves are those of the file, if it has some, and reach as far as its hull."""
+    if len(leaves) != max(len(cell.leaves), 1) or not len(cell.hull):
+        return False
+    points = [point for leaf in leaves for point in leaf["points"]]
+    pairs = zip(leaves, cell.leaves, strict=False)
+    return all(_equal_single(leaf["points"], written) for leaf, written in pairs) and all(
+        _equal_single(end(points, axis=0), end(cell.hull, axis=0)) for end in (np.min, np.max)
+    )

@@ -58,7 +58,7 @@ class CellWriter:
         cells, self._pvs = content.cells, content.pvs
         self._adjacent = cells.adjacent()
         self._cell_url = [quoted(cell_file(c)) for c in range(cells.cell_count)]
-        self._ach = row_texts(single(content.ach.value, "ach")[:, None])
+        self._ach = row_texts(single(np.concatenate(content.shares), "ach")[:, None])
         self._point, self._uv = row_texts(g.point), row_texts(g.uv)
         self._leaves = [
             [single(cells.leaf_points(leaf), "leaf points") for leaf in leaves]

@@ -1,6 +1,4 @@
-"""All VRML files of a database, and the hints beside them, in the order in which they refer to each
-other: cells, hints, and `root.wrl`, where a walk can begin.
-"""
+"""All VRML files of a database: the cells, and `root.wrl`, where a walk can begin."""
 
 from __future__ import annotations
 
@@ -12,7 +10,7 @@ from numpy.typing import NDArray
 from ptmtools.database.content import Content
 from ptmtools.database.floats import decimal, row_texts, single
 from ptmtools.database.model import EmitOptions, Viewpoint
-from ptmtools.database.names import HINTS, ROOT, cell_path
+from ptmtools.database.names import ROOT, VRML_FILES, path_of
 from ptmtools.database.vrml.cell import CellWriter
 from ptmtools.database.vrml.pattern import HEADER, PATTERN, VIEWPOINT_CELL, declaration
 from ptmtools.database.vrml.text import listed, quoted
@@ -33,9 +31,8 @@ def _files(content: Content, writer: CellWriter) -> Iterator[tuple[str, str]]:
         content.progress(c, count, "cells")
         text, box = writer.cell(c)
         boxes.append(box)
-        yield cell_path(c), text
+        yield path_of(c, VRML_FILES), text
     content.progress(count, count, "cells")
-    yield HINTS, content.hints(cell_path)
     yield ROOT, _root_text(content.viewpoints, boxes, content.options)
 
 
@@ -44,7 +41,10 @@ def _root_text(
 ) -> str:
     """The root file; ``boxes`` are the (2, 3) bounds of every cell's contents."""
     info = [quoted(f"ptm:database {PATTERN}")]
-    info += [quoted(f"ptm:viewpoint {v.name} {cell_path(v.cell)}") for v in viewpoints]
+    entered = [path_of(v.cell, VRML_FILES) for v in viewpoints]
+    info += [
+        quoted(f"ptm:viewpoint {v.name} {url}") for v, url in zip(viewpoints, entered, strict=True)
+    ]
     avatar = ", ".join(decimal(x) for x in options.avatar_size)
     parts = [
         HEADER,
@@ -62,12 +62,11 @@ def _root_text(
         for v, position, turn, field in zip(viewpoints, *poses, strict=True)
     ]
     parts += [
-        f"PTMViewpointCell {{ viewpoint {quoted(v.name)} cellUrl [ {quoted(cell_path(v.cell))} ]"
-        " }\n"
-        for v in viewpoints
+        f"PTMViewpointCell {{ viewpoint {quoted(v.name)} cellUrl [ {quoted(url)} ] }}\n"
+        for v, url in zip(viewpoints, entered, strict=True)
     ]
     for cell, (centre, size) in enumerate(zip(*map(row_texts, _centred(boxes)), strict=True)):
-        url = quoted(cell_path(cell))
+        url = quoted(path_of(cell, VRML_FILES))
         parts.append(f"Inline {{ url [ {url} ] bboxCenter {centre} bboxSize {size} }}\n")
     return "".join(parts)
 

@@ -14,13 +14,16 @@ if TYPE_CHECKING:
     from ptmtools.cells.model import Cells
     from ptmtools.visibility.model import Pvs
 
-#: Above this share of cells visible on average, culling by cells does not pay.
+#: Above this share of the building's volume at hand on average, culling by cells does not pay.
 CULLING_GAINS_LITTLE = 0.7
 
 
 def _counts(pvs: Pvs) -> Mapping[str, Any]:
+    mean, most = pvs.volume_at_hand
     return {
         "average_share": pvs.average_share,
+        "mean_volume": mean,
+        "most_volume": most,
         "fallbacks": pvs.fallbacks,
         "ties": int(pvs.ties.sum()),
         "decided": int(pvs.decided.sum()),
@@ -31,12 +34,12 @@ def _counts(pvs: Pvs) -> Mapping[str, Any]:
 
 
 def _notes(pvs: Pvs, _: PvsOptions) -> Iterator[str]:
-    share = pvs.average_share
+    share = pvs.volume_at_hand[0]
     # Of a single cell, the cells stage has said it.
     if share > CULLING_GAINS_LITTLE and pvs.cell_count > 1:
         yield (
-            f"culling by visibility gains little here: on average a cell sees {share:.0%} of all "
-            "cells, as in a single hall"
+            f"culling by visibility gains little here: on average {share:.0%} of the volume is at "
+            "hand, as in a single hall"
         )
     if not pvs.conservative:
         yield (
@@ -57,13 +60,15 @@ def _fits_cells(pvs: Pvs, cells: Cells) -> str:
 PVS: Stage[Pvs] = Stage(
     name="pvs",
     about="Find which cells may see each other.",
-    recipe=2,
+    recipe=3,
     options=PvsOptions,
     reads=(CELLS,),
     artifact=Lazy("ptmtools.visibility.model:Pvs"),
     compute=Lazy("ptmtools.visibility:compute_pvs"),
     counts=_counts,
     notes=_notes,
-    summary=lambda n: f"a cell sees {n['average_share']:.1%} of all cells on average",
+    summary=lambda n: (
+        f"{n['mean_volume']:.1%} of the volume at hand on average, {n['most_volume']:.1%} at most"
+    ),
     fits={CELLS: _fits_cells},
 )

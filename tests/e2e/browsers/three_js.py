@@ -1,7 +1,7 @@
 """three.js in headless Chromium, with the client of docs/gltf.md as it stands there.
 
-The page knows nothing but the address of `gltf/`: it finds the cell of a viewpoint, loads what can
-be seen from it with the PNG files as textures, and takes a picture.
+The page knows nothing but the address of the served folder: it finds the cell of a viewpoint, loads
+what can be seen from it with the PNG files as textures, and takes a picture.
 """
 
 from __future__ import annotations
@@ -35,25 +35,25 @@ PAGE = (
 import * as THREE from "three";
 import { Walk } from "/client/walk.js";
 
-const { width, height, gpuBytes, index } = SETTINGS;
+const { width, height, gpuBytes, place } = SETTINGS;
 try {
-  const base = new URL("/www/gltf/", location).href;
-  const hints = await (await fetch(base + "hints.json")).json();
+  const base = new URL("/www/", location).href;
+  const index = await (await fetch(base + "hints.json")).json();
   const renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
   renderer.setSize(width, height);
   document.body.append(renderer.domElement);
   const levels = [];
   const images = new THREE.TextureLoader();
-  const walk = new Walk(base, hints, (record, level) => {
-    levels.push([record.file, level]);
-    return images.loadAsync(base + record.fallback);
+  const walk = new Walk(base, index, (row, level) => {
+    levels.push([row.file, level]);
+    return images.loadAsync(base + row.fallback);
   });
-  const view = hints.viewpoints[index];
+  const view = index.viewpoints[place];
   const camera = new THREE.PerspectiveCamera(
     THREE.MathUtils.radToDeg(view.fieldOfView), width / height, 0.05, 1000);
   camera.position.set(...view.position);
   camera.lookAt(camera.position.clone().add(new THREE.Vector3(...view.direction)));
-  const cell = walk.locate(camera.position);
+  const cell = await walk.locate(camera.position);
   await walk.enter(cell, gpuBytes);
   renderer.render(new THREE.Scene().add(walk.shown), camera);
   const picture = renderer.domElement.toDataURL("image/png");
@@ -123,7 +123,7 @@ def walk(
         "width": width,
         "height": height,
         "gpuBytes": gpu_bytes,
-        "index": viewpoint,
+        "place": viewpoint,
     }
     page = PAGE.replace("SETTINGS", json.dumps(settings))
     with tempfile.TemporaryDirectory(prefix="three-") as folder:

@@ -1,0 +1,108 @@
+"""What the summary and `ptm info` end with."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from ptmtools.cli.main import main
+from ptmtools.pipeline import build_scene
+from ptmtools.pipeline.stages import CELLS, PVS
+from ptmtools.pipeline.visitor import Visitor
+from ptmtools.store.folder import DatabaseFolder
+from ptmtools.store.manifest import Manifest, StageRecord
+from ptmtools.visibility import PvsOptions
+from ptmtools.visibility.model import Pvs
+
+TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data" / "two_rooms"
+VISIT = {
+    "browser": 4_000_000,
+    "first_room": 1_000_000,
+    "mean_at_hand": 1_500_000,
+    "most_at_hand": 2_500_000,
+    "mean_volume": 0.25,
+    "most_volume": 0.5,
+    "mean_texels": 0.3,
+    "most_texels": 1.0,
+}
+
+
+def test_what_is_heavier_than_the_model_is_said_to_be() -> None:
+    assert Visitor(500_000, 1_500_000, VISIT).lines() == [
+        "the model as it was: 2.0 MB (500.0 kB, and 1.5 MB of images)",
+        "a plain browser fetches 4.0 MB, heavier than the model",
+        "the first room is complete after 1.0 MB",
+        "at hand on average 25.0% of the volume and 30.0% of the texels: 1.5 MB",
+        "at hand at most 50.0% of the volume and 100.0% of the texels: 2.5 MB, heavier than the "
+        "model",
+    ]
+
+
+def test_what_is_not_known_is_left_out() -> None:
+    bare = {**VISIT, "browser": None, "mean_texels": None, "most_texels": None}
+    assert Visitor(None, None, bare).lines() == [
+        "the first room is complete after 1.0 MB",
+        "at hand on average 25.0% of the volume: 1.5 MB",
+        "at hand at most 50.0% of the volume: 2.5 MB",
+    ]
+
+
+@pytest.mark.parametrize("value", [None, "x", [], {}, 10**400])
+def test_a_damaged_manifest(value: object) -> None:
+    assert isinstance(Visitor(1, 1, dict.fromkeys(VISIT, value)).lines(), list)
+    assert Visitor(1, 1, {}).lines() == []
+    emitted = StageRecord(1, {}, {}, {}, {"visit": value})
+    found = Visitor.of(Manifest("m.obj", {"emit": emitted}))
+    assert (found is None) == (not isinstance(value, dict))
+    assert Visitor.of(Manifest("m.obj")) is None
+
+
+def test_the_model_as_it_was(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its own files and its images, also after one has been painted over."""
+    model = Path(shutil.copytree(TWO_ROOMS, tmp_path / "model")) / "two_rooms.obj"
+    db = tmp_path / "db"
+    build = ["build-scene", str(model), "-o", str(db), "--samples", "4", "--backend", "embree"]
+
+    def sizes(*suffixes: str) -> int:
+        return sum(p.stat().st_size for p in model.parent.iterdir() if p.suffix in suffixes)
+
+    for round in range(2):
+        assert main([*build, "--json"]) == 0
+        report = json.loads(capsys.readouterr().out)
+        assert main(["info", str(db), "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["visitor"] == report["visitor"]
+        assert report["visitor"]["model"] == sizes(".obj", ".mtl")
+        assert report["visitor"]["images"] == sizes(".png")
+        if round == 0:
+            Image.effect_noise((64, 64), 90).convert("RGB").save(model.with_name("floor.png"))
+    assert main(["info", str(db)]) == 0
+    told = capsys.readouterr().out
+    lines = Visitor.of(DatabaseFolder.open(db).manifest).lines()  # type: ignore[union-attr]
+    assert len(lines) == 5
+    assert [line.removeprefix("visitor").strip() for line in told.splitlines()[-5:]] == lines
+
+
+@pytest.mark.parametrize(("volume", "little"), [(91.0, True), (1.0, False)])
+def test_culling_gains_little_where_most_of_the_volume_is_at_hand(
+    volume: float, little: bool
+) -> None:
+    """Nine closets that see a hall and not each other: few cells, but most of the building."""
+    sees = np.eye(10, dtype=np.bool_)
+    sees[0] = sees[:, 0] = True
+    pvs = Pvs.from_matrix(sees, volume=np.array([volume] + [1.0] * 9))
+    assert pvs.average_share < 0.3
+    assert any("gains little" in note for note in PVS.notes(pvs, PvsOptions())) is little
+    assert PVS.counts is not None
+    said = PVS.summarize(PVS.counts(pvs))
+    assert said == f"{pvs.volume_at_hand[0]:.1%} of the volume at hand on average, 100.0% at most"
+
+
+def test_only_what_is_served_means_something(tmp_path: Path) -> None:
+    model = TWO_ROOMS / "two_rooms.obj"
+    assert build_scene(model, tmp_path / "db", until=CELLS).visitor is None
+    assert Visitor.of(DatabaseFolder.open(tmp_path / "db").manifest) is None
