@@ -40,7 +40,7 @@ def _summary(n: Mapping[str, Any]) -> str:
 SCENE: Stage[Scene] = Stage(
     name="scene",
     about="Read a model.",
-    recipe=3,
+    recipe=4,
     options=IngestOptions,
     artifact=Lazy("ptmtools.scene.model:Scene"),
     counts=_counts,
