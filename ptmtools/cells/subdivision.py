@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree, build_tree
+from ptmtools.cells.emptiness import check_seen
 from ptmtools.cells.grouping import grouped
 from ptmtools.cells.model import OUTSIDE, Cells, sunk
 from ptmtools.cells.naming import matches
@@ -90,7 +91,8 @@ def subdivide(
     Raises
     ------
     InputError: PTM-I300 if an option is out of range, PTM-I301 if a viewpoint lies in no leaf,
-        PTM-I302 if a name pattern matches nothing, PTM-I303 if the scene is a single triangle.
+        PTM-I302 if a name pattern matches nothing, PTM-I303 if the scene is a single triangle,
+        PTM-I304 if nothing of it would be seen.
     """
     options = options or SubdivideOptions()
     _check(scene, options)
@@ -120,7 +122,9 @@ def subdivide(
             "visible; raise --max-leaves"
         )
     pieces = cut_to_leaves(scene, space.tree, tolerance)
-    return grouped(_assemble(scene, space, pieces, notes), options)
+    cells = grouped(_assemble(scene, space, pieces, notes), options)
+    check_seen(scene, cells)
+    return cells
 
 
 def _check(scene: Scene, options: SubdivideOptions) -> None:

@@ -19,6 +19,7 @@ from ptmtools.errors import InputError, LimitError
 from ptmtools.files import open_regular
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.faces import KeptFaces, keep_faces
+from ptmtools.scene.facing import TURNED_AWAY, turned_away
 from ptmtools.scene.images import ImageStore
 from ptmtools.scene.model import Camera, Material, Scene, Space
 from ptmtools.scene.options import IngestOptions
@@ -129,16 +130,25 @@ def ingest(
         progress(done, len(used_material), "materials")
         materials.append(_material(source, index, uv, faces[done], store, findings))
     progress(len(used_material), len(used_material), "materials")
+    points, triangles = to_world(kept.points, space), kept.triangles.astype(np.int32)
+    two_sided = ~kept.paired if options.two_sided else _two_sided(kept, source)
+    away = turned_away(points, triangles, two_sided | kept.paired)
+    if away > TURNED_AWAY:
+        findings.say(
+            "PTM-N235",
+            f"the model seems to be inside out: {away:.0%} of what bounds its rooms is turned away "
+            "from them and not seen; give --two-sided to draw every face from both sides, or turn "
+            "the normals",
+        )
     if options.strict:
         findings.enforce()
-    points, triangles = to_world(kept.points, space), kept.triangles.astype(np.int32)
     return Scene(
         points=points,
         triangles=triangles,
         uv=uv,
         triangle_object=triangle_object.astype(np.int32),
         triangle_material=triangle_material.astype(np.int32),
-        two_sided=_two_sided(kept, source),
+        two_sided=two_sided,
         objects=tuple(source.objects[i] for i in used_object.tolist()),
         materials=tuple(materials),
         tolerance=tolerance_of(points, triangles),
