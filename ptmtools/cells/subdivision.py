@@ -35,6 +35,7 @@ from ptmtools.cells.structure import Structure, WallPlane, find_walls
 from ptmtools.errors import InputError
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
+from ptmtools.notes import Warned
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.scene.orientation import main_axes
@@ -117,9 +118,11 @@ def subdivide(
         clipped.cancel()
     if space.tree.unsplit:
         notes.append(
-            f"the limit of {options.max_leaves:,} leaves was reached: {space.tree.unsplit:,} of "
-            "them contain walls that do not divide them, so what is behind these walls counts as "
-            "visible; raise --max-leaves"
+            Warned(
+                f"the limit of {options.max_leaves:,} leaves was reached: {space.tree.unsplit:,} "
+                "of them contain walls that do not divide them, so what is behind these walls "
+                "counts as visible; raise --max-leaves"
+            )
         )
     pieces = cut_to_leaves(scene, space.tree, tolerance)
     cells = grouped(_assemble(scene, space, pieces, notes), options)
@@ -204,7 +207,8 @@ def _open_note(space: _Space, roofed: float, box: Floats) -> str:
     else:
         what = "open: the outside can be reached from the rooms (windows, doors or gaps)"
     size = " × ".join(f"{s:.2f}" for s in box[1] - box[0])
-    return f"the model is {what}; cells end at the bounding box of its walls, {size} m"
+    note = f"the model is {what}; cells end at the bounding box of its walls, {size} m"
+    return Warned(note) if roofed < ROOFED else note
 
 
 def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> Cells:

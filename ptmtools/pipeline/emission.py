@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from ptmtools.notes import warnings_in
 from ptmtools.pipeline.encoding import fallback_level
 from ptmtools.pipeline.images import image_digests
 from ptmtools.pipeline.run import Artifacts, Job
@@ -47,7 +48,7 @@ class EmissionJob(Job):
             "collapsed": report.collapsed,
             "viewpoints": len(report.viewpoints),
         }
-        return replace(work, counts=counts, notes=report.notes)
+        return replace(work, counts=counts, notes=report.notes, warnings=warnings_in(report.notes))
 
 
 def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:

@@ -22,6 +22,8 @@ from ptmtools.scene.readings import CLOSE_AXIS, CLOSE_UNIT, UNITS, Reading, read
 from ptmtools.scene.signs import Named, Up, looks
 from ptmtools.scene.source import Findings
 
+#: So many signs are named for a reading.
+_REASONS = 3
 #: A scene of less than a micrometre or more than a million kilometres is a mistake in the unit;
 #: in between, products of coordinates stay far from the ends of float64 and float32.
 SMALLEST_EXTENT, LARGEST_EXTENT = 1e-6, 1e9
@@ -114,27 +116,27 @@ def _judge_axis(ranked: list[Reading], by_format: Up | None, findings: Findings)
             return by_format
         findings.say(
             "PTM-N234",
-            f"the format has {by_format} up, but the model seems to lie on its side: it would be "
-            f"{rival.size}; with {best.up} up {best.size}{for_best}; give --up {best.up} to turn "
-            "it",
+            f"the format has {by_format} up, but the model seems to lie on its side: with "
+            f"{by_format} up it is {rival.size}, with {best.up} up {best.size}{for_best}; give "
+            f"--up {best.up} to turn it",
         )
     elif ahead < CLOSE_AXIS:
         findings.say(
             "PTM-N232",
-            f"the up axis is uncertain: {best.up} is taken ({best.size}{for_best}), but "
-            f"{rival.up} is nearly as likely ({rival.size}{for_rival}); give --up {best.up} or "
+            f"the up axis is uncertain: {best.up} is taken, {best.size}{for_best}, but "
+            f"{rival.up} is nearly as likely, {rival.size}{for_rival}; give --up {best.up} or "
             f"--up {rival.up}",
         )
     else:
         findings.say(
-            "PTM-N202", f"up axis guessed: {best.up} ({best.size}{for_best}); give --up to override"
+            "PTM-N202", f"up axis guessed: {best.up}, {best.size}{for_best}; give --up to override"
         )
     return best.up
 
 
 def _because(reading: Reading, other: Reading) -> str:
-    reasons = reading.reasons(other)
-    return f"; {', '.join(reasons)}" if reasons else ""
+    reasons = reading.reasons(other)[:_REASONS]
+    return f" ({', '.join(reasons)})" if reasons else ""
 
 
 def _judge_unit(ranked: list[Reading], by_format: float | None, findings: Findings) -> float:

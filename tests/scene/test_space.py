@@ -57,7 +57,7 @@ def test_guesses_are_noted() -> None:
     assert (space.metres, space.up, space.unit_guessed, space.up_guessed) == (0.0254, "z", 1, 1)
     assert list(notes) == ["PTM-N202", "PTM-N201"]
     assert notes["PTM-N202"].startswith(
-        "up axis guessed: z (19.2 m wide and 3.5 m high, most rooms"
+        "up axis guessed: z, 19.2 m wide and 3.5 m high, most rooms"
     )
     assert "rooms wider than high" in notes["PTM-N202"]
     assert notes["PTM-N201"].startswith("unit guessed: in (it would be 19.2 m wide")
@@ -91,7 +91,7 @@ def test_a_format_is_believed_and_doubted() -> None:
     assert told(y_up(house()), by_format=gltf)[1] == {}
     space, notes = told(house(), by_format=gltf)
     assert (space.up, space.up_guessed, list(notes)) == ("y", False, ["PTM-N234"])
-    assert "it would be 19.2 m wide and 11.6 m high" in notes["PTM-N234"]
+    assert "with y up it is 19.2 m wide and 11.6 m high" in notes["PTM-N234"]
     assert "with z up 19.2 m wide and 3.5 m high" in notes["PTM-N234"]
     assert notes["PTM-N234"].endswith("give --up z to turn it")
     space, notes = told(house(), Said(up="z"), gltf)
