@@ -76,7 +76,7 @@ class Reading:
         """Its size in words."""
         look, metres = self.look, self.metres
         width, height = look.width * metres, look.height * metres
-        rooms = f", most rooms {look.room * metres:.3g} m high" if look.room else ""
+        rooms = f", free height mostly {look.room * metres:.3g} m" if look.room else ""
         return f"{width:.3g} m wide and {height:.3g} m high{rooms}"
 
     def reasons(self, other: Reading) -> list[str]:

@@ -57,7 +57,7 @@ def test_guesses_are_noted() -> None:
     assert (space.metres, space.up, space.unit_guessed, space.up_guessed) == (0.0254, "z", 1, 1)
     assert list(notes) == ["PTM-N202", "PTM-N201"]
     assert notes["PTM-N202"].startswith(
-        "up axis guessed: z, 19.2 m wide and 3.5 m high, most rooms"
+        "up axis guessed: z, 19.2 m wide and 3.5 m high, free height"
     )
     assert "rooms wider than high" in notes["PTM-N202"]
     assert notes["PTM-N201"].startswith("unit guessed: in (it would be 19.2 m wide")
