@@ -26,7 +26,11 @@ _EVEN, _DENSE = 12, 12
 _OFF = (5.0**0.5 - 1) / 2
 #: So many points are asked where points are.
 _ASKED = 20_000
-#: Pairs of a line and a triangle that are tried at once.
+#: Where more pairs of a line and a triangle than this would be tried along an axis, as in a heap of
+#: large triangles, every other row is left out until there are fewer: a few seconds at most.
+_MOST = 1 << 22
+_PLANES = ((0, 1), (0, 2), (1, 2))
+#: Pairs that are tried at once.
 _AT_ONCE = 1 << 18
 
 
@@ -62,11 +66,23 @@ class SampleLines:
         self._first = np.empty((3, len(triangles)), dtype=np.int8)
         self._count = np.empty_like(self._first)
         corners = np.ascontiguousarray(triangles.T)
+        self._rank(corners)
+        while self._tried() > _MOST and max(map(len, self._rows)) > 1:
+            self._rows = [row[::2] for row in self._rows]
+            self._rank(corners)
+
+    def _rank(self, corners: NDArray[np.integer]) -> None:
+        """Finds the rows that each triangle meets: the first, and how many."""
         for k, row in enumerate(self._rows):
-            rank = np.searchsorted(row, points[:, k]).astype(np.int8)
+            rank = np.searchsorted(row, self._points[:, k]).astype(np.int8)
             a, b, c = (rank[corner] for corner in corners)
             self._first[k] = np.minimum(np.minimum(a, b), c)
             self._count[k] = np.maximum(np.maximum(a, b), c) - self._first[k]
+
+    def _tried(self) -> int:
+        """How many pairs of a line and a triangle are tried, along the axis with most of them."""
+        count = self._count.astype(np.int16)
+        return max(int((count[i] * count[j]).sum(dtype=np.int64)) for i, j in _PLANES)
 
     def rows(self, axis: int) -> Floats:
         """Where rows of lines stand along ``axis``; line i · n + j is where row i of the first of

@@ -61,6 +61,17 @@ def test_dividing_triangles_changes_nothing() -> None:
     assert one.section.sum() == pytest.approx(many.section.sum(), rel=0.1)
 
 
+def test_a_heap_of_large_triangles_is_met_by_fewer_lines() -> None:
+    """Each triangle spans the model, and hardly any meets a line."""
+    random = np.random.default_rng(0)
+    ends = random.random((2, 40_000, 3)) * 0.05 + np.array([0.0, 0.95])[:, None, None]
+    points = np.concatenate([*ends, ends[0] + 1e-4 * random.random((40_000, 3))])
+    faces = np.arange(120_000).reshape(3, -1).T
+    lines = SampleLines(points, faces)
+    assert 1 <= max(len(lines.rows(axis)) for axis in range(3)) <= 12
+    assert SampleLines(points, faces[:1000]).rows(0).size == 24
+
+
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_flat_and_tiny_models(axis: int) -> None:
     points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
