@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ptmtools.cells import subdivide
+from ptmtools.cells.emptiness import check_seen
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Scene
 from tests.conftest import scene_of
@@ -48,3 +49,12 @@ def test_nothing_is_seen(name: str) -> None:
 def test_something_is_seen(name: str) -> None:
     one_sided = scene(SEEN[name], two_sided=False)
     assert len(subdivide(one_sided).emitted(one_sided.two_sided)[0])
+
+
+def test_cells_without_faces() -> None:
+    """Where faces have backs, turning them helps nothing: another place to begin might."""
+    both_sides = scene(house(), two_sided=True)
+    cells = subdivide(both_sides)
+    nobody = replace(cells, triangle_cell=np.full_like(cells.triangle_cell, -1))
+    with pytest.raises(InputError, match=r"--viewpoint.*PTM-I304"):
+        check_seen(both_sides, nobody)
