@@ -1,6 +1,7 @@
-"""The up axis and the unit of made buildings: as a person would say of each. The costs were adjusted
-on these and on the real scenes; two lone corridors stayed wrong, if narrowly, and are among those of
-which it must be said that they cannot be told."""
+"""The up axis and the unit of made buildings: as a person would say of each.
+
+The costs were adjusted on these and on the real scenes. Two lone corridors stayed wrong, if
+narrowly, and are among those of which it must be said that they cannot be told."""
 
 from __future__ import annotations
 
