@@ -20,11 +20,12 @@ from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.rooms import room_of_leaf
 from ptmtools.cells.sight import sampled_sight
 from ptmtools.cells.vectors import areas
+from ptmtools.notes import Warned
 
 #: Shares of a triangle that differ by less are equal, in digits.
 DIGITS = 6
 #: What is said of a model of one cell.
-ONE_HALL = "visibility culling gains nothing here: 1 hall"
+ONE_HALL = Warned("visibility culling gains nothing here: 1 hall")
 
 
 def grouped(cells: Cells, options: SubdivideOptions) -> Cells:

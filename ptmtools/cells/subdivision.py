@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree, build_tree
 from ptmtools.cells.cut_off import CutOff, cut_off
+from ptmtools.cells.emptiness import check_seen
 from ptmtools.cells.grouping import grouped
 from ptmtools.cells.model import OUTSIDE, Cells, sunk
 from ptmtools.cells.naming import matches
@@ -37,6 +38,7 @@ from ptmtools.cells.welding import distinct
 from ptmtools.errors import InputError
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
+from ptmtools.notes import Warned
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.scene.orientation import main_axes
@@ -98,7 +100,8 @@ def subdivide(
     Raises
     ------
     InputError: PTM-I300 if an option is out of range, PTM-I301 if a viewpoint lies in no leaf,
-        PTM-I302 if a name pattern matches nothing, PTM-I303 if the scene is a single triangle.
+        PTM-I302 if a name pattern matches nothing, PTM-I303 if the scene is a single triangle,
+        PTM-I304 if nothing of it would be seen.
     """
     options = options or SubdivideOptions()
     _check(scene, options)
@@ -124,12 +127,16 @@ def subdivide(
     notes += _cut_off_notes(space.cut_off, options)
     if space.tree.unsplit:
         notes.append(
-            f"the limit of {options.max_leaves:,} leaves was reached: {space.tree.unsplit:,} of "
-            "them contain walls that do not divide them, so what is behind these walls counts as "
-            "visible; raise --max-leaves"
+            Warned(
+                f"the limit of {options.max_leaves:,} leaves was reached: {space.tree.unsplit:,} "
+                "of them contain walls that do not divide them, so what is behind these walls "
+                "counts as visible; raise --max-leaves"
+            )
         )
     pieces = cut_to_leaves(scene, space.tree, tolerance)
-    return grouped(_assemble(scene, space, pieces, notes), options)
+    cells = grouped(_assemble(scene, space, pieces, notes), options)
+    check_seen(scene, cells)
+    return cells
 
 
 def _check(scene: Scene, options: SubdivideOptions) -> None:
@@ -253,7 +260,8 @@ def _open_note(space: _Space, roofed: float, box: Floats) -> str:
     else:
         what = "open: the outside can be reached from the rooms (windows, doors or gaps)"
     size = " × ".join(f"{s:.2f}" for s in box[1] - box[0])
-    return f"the model is {what}; cells end at the bounding box of its walls, {size} m"
+    note = f"the model is {what}; cells end at the bounding box of its walls, {size} m"
+    return Warned(note) if roofed < ROOFED else note
 
 
 def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> Cells:

@@ -66,6 +66,7 @@ def _info_database(voice: Voice, target: str, as_json: bool) -> None:
                         "parameters": record.parameters,
                         "counts": record.counts,
                         "notes": record.notes,
+                        "warnings": record.warnings,
                         "files": len(record.outputs),
                     }
                     for name, record in stages.items()
@@ -84,6 +85,8 @@ def _info_database(voice: Voice, target: str, as_json: bool) -> None:
         with suppress(ValueError):
             if given := words([stage.recorded(record)]):
                 voice.say(f"{'':<9}   options: {shlex.join(given)}")
+        for warning in record.warnings:
+            voice.say(f"{'':<9}   warning: {warning}")
         if voice.verbose:
             for key, value in record.parameters.items():
                 voice.say(f"{'':<9}   {key} = {value}")

@@ -8,6 +8,7 @@ import shutil
 import sys
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -33,11 +34,8 @@ from ptmtools.pipeline.run import Artifacts
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import EMIT, PVS, STAGES
 from ptmtools.pipeline.visitor import Visitor
-from ptmtools.quantities import size
+from ptmtools.quantities import count, size
 from ptmtools.store.folder import DatabaseFolder
-
-#: Notes that are shown without ``-v``.
-SHOWN_NOTES = 12
 
 #: What ``ptm STAGE DB --report`` prints besides: what that is, and a function of the artifacts that
 #: returns it as a document and as lines.
@@ -118,6 +116,7 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
                 force=force,
                 rebuild=rebuild,
                 progress=progress,
+                tell=partial(_say_stage, voice, as_json),
             )
         print_report(voice, report, as_json)
 
@@ -146,6 +145,7 @@ def _of_database(stage: Stage[Any]) -> Callable[..., None]:
                 workers=workers,
                 scheduler=scheduler,
                 progress=progress,
+                tell=partial(_say_stage, voice, as_json),
             )
         if not wanted:
             print_report(voice, report, as_json)
@@ -165,25 +165,33 @@ def _of_database(stage: Stage[Any]) -> Callable[..., None]:
     return command
 
 
+def _say_stage(voice: Voice, as_json: bool, stage: StageReport) -> None:
+    """Says what became of a stage as soon as it is done, so that its warnings come before what
+    takes long."""
+    if as_json:
+        return
+    done = f"{stage.seconds:7.1f} s" if stage.ran else "unchanged"
+    summary = STAGES[stage.stage].summarize(stage.counts)
+    voice.say(f"{stage.stage:<9}{done:>10}   {summary}{_tasks(stage)}")
+    if voice.verbose or stage.reasons != NEVER_RUN:
+        for reason in stage.reasons:
+            voice.say(f"{'':<22}because {reason}")
+    for warning in stage.warnings:
+        voice.say(f"warning: {warning}")
+
+
 def print_report(voice: Voice, report: BuildReport, as_json: bool) -> None:
-    """Says what a run has done."""
+    """Says what a run has done as a whole; its stages have been told of (`_say_stage`)."""
     if as_json:
         voice.emit_json(asdict(report))
         return
-    for stage in report.stages:
-        done = f"{stage.seconds:7.1f} s" if stage.ran else "unchanged"
-        summary = STAGES[stage.stage].summarize(stage.counts)
-        voice.say(f"{stage.stage:<9}{done:>10}   {summary}{_tasks(stage)}")
-        if voice.verbose or stage.reasons != NEVER_RUN:
-            for reason in stage.reasons:
-                voice.say(f"{'':<22}because {reason}")
     memory = f", at most {size(report.peak_memory)} of memory" if report.peak_memory else ""
     voice.say(f"{'all':<9}{report.seconds:>8.1f} s{memory}")
-    shown = report.notes if voice.verbose else report.notes[:SHOWN_NOTES]
-    for note in shown:
+    further = [note for stage in report.stages for note in stage.further]
+    for note in further if voice.verbose else ():
         voice.say(f"note: {note}")
-    if len(shown) < len(report.notes):
-        voice.say(f"note: {len(report.notes) - len(shown):,} more notes; -v shows them all")
+    if further and not voice.verbose:
+        voice.say(f"{count(len(further), 'further note')}; -v lists them")
     if report.visitor:
         print_visitor(voice, report.visitor)
     if any(stage.stage == EMIT.name for stage in report.stages):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from typing import Any
 from ptmtools.ahead import Task, compile_ahead
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.background import Workers
-from ptmtools.pipeline.report import BuildReport, peak_memory
+from ptmtools.pipeline.report import BuildReport, StageReport, peak_memory
 from ptmtools.pipeline.run import Run
 from ptmtools.pipeline.stage import Options, Stage
 from ptmtools.pipeline.stages import EMIT, STAGES
@@ -25,9 +25,14 @@ from ptmtools.progress import Progress, silent
 from ptmtools.store.writer import DatabaseWriter
 
 PathLike = str | os.PathLike[str]
+Tell = Callable[[StageReport], None]
 
 #: Calls the kernels of all stages.
 WARM_UP: Task = Lazy("ptmtools.pipeline.warm_up:warm_up")
+
+
+def _nothing(report: StageReport) -> None:
+    """Tells nobody."""
 
 
 def build_scene(
@@ -40,6 +45,7 @@ def build_scene(
     force: bool = False,
     rebuild: bool = False,
     progress: Progress = silent,
+    tell: Tell = _nothing,
 ) -> BuildReport:
     """Builds a database, or brings it up to date: only stages whose inputs, options or recipe
     changed are run, and in the textures stage only what has changed itself.
@@ -51,6 +57,7 @@ def build_scene(
     workers, scheduler: of the executor, see `open_executor`. They change nothing in the result.
     force: write into a folder that is not ours, or over the database of another model.
     rebuild: run every stage, whether or not it is current.
+    tell: called with the report of each stage as soon as it is done.
 
     Raises
     ------
@@ -71,7 +78,7 @@ def build_scene(
         Workers(workers, scheduler) as used,
     ):
         run = Run(writer, used, progress, Path(model), rebuild=rebuild)
-        return _run(run, stages, chosen, start)
+        return _run(run, stages, chosen, start, tell)
 
 
 def run_stage(
@@ -81,14 +88,15 @@ def run_stage(
     workers: int = 0,
     scheduler: str | None = None,
     progress: Progress = silent,
+    tell: Tell = _nothing,
 ) -> BuildReport:
     """Runs one stage of a database, the one that these options are of: ``PvsOptions()`` runs the
-    visibility stage. ``workers`` and ``scheduler`` as for `build_scene`."""
+    visibility stage. ``workers``, ``scheduler`` and ``tell`` as for `build_scene`."""
     start = time.perf_counter()
     chosen = chosen_options([options])
     stages = [stage for stage in STAGES.values() if isinstance(options, stage.options)]
     with DatabaseWriter.open_for_stage(db) as writer, Workers(workers, scheduler) as used:
-        return _run(Run(writer, used, progress), stages, chosen, start)
+        return _run(Run(writer, used, progress), stages, chosen, start, tell)
 
 
 def chosen_options(given: Iterable[Options]) -> dict[Stage[Any], Options]:
@@ -110,7 +118,11 @@ def chosen_options(given: Iterable[Options]) -> dict[Stage[Any], Options]:
 
 
 def _run(
-    run: Run, stages: list[Stage[Any]], options: dict[Stage[Any], Options], start: float
+    run: Run,
+    stages: list[Stage[Any]],
+    options: dict[Stage[Any], Options],
+    start: float,
+    tell: Tell,
 ) -> BuildReport:
     jobs = [stage.job.load()(run, stage, options[stage]) for stage in stages]
     shown = run.progress
@@ -132,6 +144,7 @@ def _run(
                     if finished.issuperset(later.stage.read_with(later.options)):
                         later.begin()
             job.do()
+            tell(run.reports[-1])
             finished.add(job.stage)
     except BaseException:
         with ExitStack() as abandoned:

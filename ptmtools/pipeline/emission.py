@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
+from ptmtools.notes import warnings_in
 from ptmtools.pipeline.encoding import fallback_level
 from ptmtools.pipeline.images import image_digests
 from ptmtools.pipeline.run import Artifacts, Job
@@ -48,7 +49,7 @@ class EmissionJob(Job):
             "viewpoints": len(report.viewpoints),
             "visit": asdict(report.visit),
         }
-        return replace(work, counts=counts, notes=report.notes)
+        return replace(work, counts=counts, notes=report.notes, warnings=warnings_in(report.notes))
 
 
 def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:

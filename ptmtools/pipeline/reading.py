@@ -22,7 +22,7 @@ from ptmtools.store.manifest import StageRecord
 from ptmtools.store.transaction import Transaction
 
 if TYPE_CHECKING:
-    from ptmtools.scene.model import Note, SourceImage
+    from ptmtools.scene.model import SourceImage
 
 
 def inputs_of(artifacts: Artifacts) -> dict[str, str]:
@@ -95,6 +95,7 @@ class ReadingJob(Job):
 
     def _read(self, transaction: Transaction, work: StageRecord) -> StageRecord:
         from ptmtools.scene import ingest
+        from ptmtools.scene.notes import line, warnings
 
         run = self.run
         scene = ingest(self._model, self.options, run.progress, workers=run.workers.here)
@@ -106,7 +107,8 @@ class ReadingJob(Job):
             work,
             inputs=files_of(self._model, scene.files, run.db.digests),
             counts={**SCENE.counts(scene), **self._bytes(scene.files, scene.images)},
-            notes=tuple(_line(note) for note in scene.notes),
+            notes=tuple(map(line, scene.notes)),
+            warnings=tuple(warnings(scene.notes)),
         )
 
     def _repainted(self, transaction: Transaction, work: StageRecord) -> StageRecord | None:
@@ -137,7 +139,7 @@ class ReadingJob(Job):
         images = [fresh.get(i, image) for i, image in enumerate(images_of(self.run))]
         self._put_images(transaction, images, fresh.values())
         counts = {**before.counts, **self._bytes(work.inputs, images)}
-        return replace(work, counts=counts, notes=before.notes)
+        return replace(work, counts=counts, notes=before.notes, warnings=before.warnings)
 
     def _bytes(self, names: Iterable[str], images: Iterable[SourceImage]) -> dict[str, int]:
         """What the model's files take, and those of its images apart."""
@@ -163,9 +165,3 @@ class ReadingJob(Job):
             with naming(image.name):
                 check_image(data, Limits(self.options.limit << 20))
             transaction.put(f"{IMAGES}/{image.sha256}", data)
-
-
-def _line(note: Note) -> str:
-    where = f"{note.place}: " if note.place else ""
-    times = f" ({note.count:,} times)" if note.count > 1 else ""
-    return f"{where}{note.message}{times} [{note.code}]"

@@ -23,6 +23,7 @@ class StageReport:
         there is more than one worker, so the sum may be more than the whole.
     counts: the figures recorded in the manifest.
     notes: what it has to say, one line each.
+    warnings: the gravest of that, one line for each kind.
     reasons: why it ran, one line each.
     tasks: of a stage that consists of tasks: how many there are, how many had been done before and
         stayed, and how many were taken over from an interrupted run.
@@ -35,6 +36,12 @@ class StageReport:
     notes: tuple[str, ...] = ()
     reasons: tuple[str, ...] = ()
     tasks: tuple[int, int, int] | None = None
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def further(self) -> tuple[str, ...]:
+        """The notes that no warning repeats."""
+        return tuple(note for note in self.notes if note not in self.warnings)
 
 
 @dataclass(frozen=True)

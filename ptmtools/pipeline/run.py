@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from ptmtools.errors import DatabaseError
+from ptmtools.notes import warnings_in
 from ptmtools.pipeline.changes import reasons
 from ptmtools.pipeline.report import StageReport
 from ptmtools.pipeline.stage import Options, Stage, parameters
@@ -215,7 +216,16 @@ class Run(Artifacts):
         """Notes that a stage has been dealt with."""
         made = self.record(stage)
         self.reports.append(
-            StageReport(stage.name, bool(why), seconds, made.counts, tuple(made.notes), why, tasks)
+            StageReport(
+                stage.name,
+                bool(why),
+                seconds,
+                made.counts,
+                tuple(made.notes),
+                why,
+                tasks,
+                tuple(made.warnings),
+            )
         )
 
 
@@ -278,5 +288,10 @@ class ArraysJob(Job):
         artifact = stage.compute.load()(*reads, options, run.progress, executor)
         run.keep(stage, artifact)
         transaction.put_arrays(stage.name, artifact.to_arrays())
-        notes = tuple(stage.notes(artifact, options))
-        return replace(work, counts=stage.counts(artifact), notes=notes)
+        said = tuple(stage.notes(artifact, options))
+        return replace(
+            work,
+            counts=stage.counts(artifact),
+            notes=tuple(map(str, said)),
+            warnings=warnings_in(said),
+        )

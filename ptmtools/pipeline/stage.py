@@ -51,7 +51,8 @@ class Stage(Generic[A]):
         files only.
     compute: ``compute(*artifacts, options, progress, executor)``, which makes the artifact.
     counts: its figures, of an artifact. They are recorded, and checked by ``ptm validate``.
-    notes: what there is to say of an artifact and the options, one line each.
+    notes: what there is to say of an artifact and the options, one line each; `Warned` are those
+        that are told first.
     summary: what was made, in one line, of the recorded counts.
     fits: for stages whose artifacts this one refers to: what is wrong with (own, other), or "".
     job: how it is run; the default computes the artifact and stores its arrays.

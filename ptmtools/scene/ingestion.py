@@ -11,7 +11,6 @@ from __future__ import annotations
 import errno
 import os
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,18 +18,17 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError, LimitError
 from ptmtools.files import open_regular
 from ptmtools.progress import Progress, silent
-from ptmtools.scene import space as spaces
 from ptmtools.scene.faces import KeptFaces, keep_faces
+from ptmtools.scene.facing import TURNED_AWAY, turned_away
 from ptmtools.scene.images import ImageStore
 from ptmtools.scene.model import Camera, Material, Scene, Space
 from ptmtools.scene.options import IngestOptions
 from ptmtools.scene.orientation import tolerance_of
+from ptmtools.scene.signs import Named
 from ptmtools.scene.source import MAX_VERTICES, Findings, Source
+from ptmtools.scene.space import Said, parse_unit, settle, to_world, turned
 from ptmtools.scene.texels import uses_holes
 
-#: A scene of less than a micrometre or more than a million kilometres is a mistake in the unit;
-#: in between, products of coordinates stay far from the ends of float64 and float32.
-SMALLEST_EXTENT, LARGEST_EXTENT = 1e-6, 1e9
 #: Colours where the model gives none: plain faces, and a tint that leaves an image as it is.
 PLAIN, WHITE = (0.8, 0.8, 0.8), (1.0, 1.0, 1.0)
 #: What the system says of links in a circle, of sockets, and `open_regular` of pipes and devices.
@@ -71,7 +69,7 @@ def ingest(
     MissingComponentError: a format needs a library that is not installed.
     """
     model = Path(path)
-    metres = None if options.unit is None else spaces.parse_unit(options.unit)
+    metres = None if options.unit is None else parse_unit(options.unit)
     check_file(model)
     findings = Findings(model, options.allow_outside)
     source = _read(model, findings, progress, options.max_triangles)
@@ -92,7 +90,19 @@ def ingest(
             file=model,
         )
     _note_faces(kept, source, findings)
-    space = _settle_space(model, kept, source, metres, options.up, findings)
+    named = Named.of(
+        (source.objects, source.triangle_object[kept.source]),
+        ([material.name for material in source.materials], source.triangle_material[kept.source]),
+    )
+    space = settle(
+        model,
+        kept.points,
+        kept.triangles,
+        named,
+        Said(metres, options.up),
+        Said(source.metres, source.up),
+        findings,
+    )
     uv = source.uv[kept.source]
     finite_uv = np.asarray(np.isfinite(uv).all(axis=(1, 2)))
     if not finite_uv.all():
@@ -120,16 +130,25 @@ def ingest(
         progress(done, len(used_material), "materials")
         materials.append(_material(source, index, uv, faces[done], store, findings))
     progress(len(used_material), len(used_material), "materials")
+    points, triangles = to_world(kept.points, space), kept.triangles.astype(np.int32)
+    two_sided = ~kept.paired if options.two_sided else _two_sided(kept, source)
+    away = turned_away(points, triangles, two_sided | kept.paired)
+    if away > TURNED_AWAY:
+        findings.say(
+            "PTM-N235",
+            f"the model seems to be inside out: {away:.0%} of what bounds its rooms is turned away "
+            "from them and not seen; give --two-sided to draw every face from both sides, or turn "
+            "the normals",
+        )
     if options.strict:
         findings.enforce()
-    points, triangles = _to_world(kept.points, space), kept.triangles.astype(np.int32)
     return Scene(
         points=points,
         triangles=triangles,
         uv=uv,
         triangle_object=triangle_object.astype(np.int32),
         triangle_material=triangle_material.astype(np.int32),
-        two_sided=_two_sided(kept, source),
+        two_sided=two_sided,
         objects=tuple(source.objects[i] for i in used_object.tolist()),
         materials=tuple(materials),
         tolerance=tolerance_of(points, triangles),
@@ -210,59 +229,9 @@ def _two_sided(kept: KeptFaces, source: Source) -> NDArray[np.bool_]:
     return result & ~kept.paired
 
 
-def _settle_space(
-    model: Path,
-    kept: KeptFaces,
-    source: Source,
-    metres: float | None,
-    up: Literal["y", "z"] | None,
-    findings: Findings,
-) -> Space:
-    low, high = kept.points.min(axis=0), kept.points.max(axis=0)
-    with np.errstate(over="ignore"):
-        side = high - low
-    if not np.isfinite(side).all():
-        raise LimitError("PTM-L201", "coordinates are too large for float64", file=model)
-    known_up = up or source.up
-    if known_up is None:
-        up, why = spaces.guess_up(kept.points[kept.triangles])
-        findings.say("PTM-N202", f"up axis guessed: {up} ({why}); give --up to override")
-    else:
-        up = known_up
-    width, height = (max(side[0], side[2]), side[1]) if up == "y" else (max(side[:2]), side[2])
-    guess, why = spaces.guess_unit(float(width), float(height))
-    known = source.metres if metres is None else metres
-    if known is None:
-        findings.say("PTM-N201", f"unit guessed: {guess} ({why}); give --unit to override")
-    elif metres is None and spaces.UNITS[guess] != known:
-        findings.say(
-            "PTM-N227",
-            f"the format is in metres, but {guess} would be more likely ({why}); "
-            "give --unit to override",
-        )
-    scale = spaces.UNITS[guess] if known is None else known
-    extent = float(side.max()) * scale
-    if not SMALLEST_EXTENT <= extent <= LARGEST_EXTENT:
-        raise LimitError(
-            "PTM-L201",
-            f"the scene would be {extent:.3g} m large",
-            file=model,
-            remedy=f"give a --unit that makes it {SMALLEST_EXTENT:g} to {LARGEST_EXTENT:g} m",
-        )
-    origin = low + side / 2
-    floor = 1 if up == "y" else 2
-    origin[floor] = low[floor]
-    x, y, z = origin.tolist()
-    return Space((x, y, z), scale, up, unit_guessed=known is None, up_guessed=known_up is None)
-
-
-def _to_world(points: NDArray[np.float64], space: Space) -> NDArray[np.float64]:
-    return spaces.turned((points - np.array(space.origin)) * space.metres, space.up)
-
-
 def _camera(camera: Camera, space: Space) -> Camera:
-    position = _to_world(np.array([camera.position]), space)[0].tolist()
-    direction = spaces.turned(np.array([camera.direction]), space.up)[0].tolist()
+    position = to_world(np.array([camera.position]), space)[0].tolist()
+    direction = turned(np.array([camera.direction]), space.up)[0].tolist()
     return Camera(camera.name, tuple(position), tuple(direction), camera.field_of_view)
 
 

@@ -15,8 +15,10 @@ class IngestOptions:
     Attributes
     ----------
     unit: the model's unit: m, cm, mm, in, ft, or its length in metres. By default it is guessed
-        from the size of the model.
-    up: the model's up axis, "y" or "z". By default it is guessed from the floor area and the size.
+        from the size of the model and of its rooms.
+    up: the model's up axis, "y" or "z". By default it is what the format says (glTF: y), or guessed
+        from the rooms, walls and floors.
+    two_sided: draw every face from both sides, whatever the model says.
     strict: stop the build at missing files, unknown materials, unreadable images and dropped faces.
     allow_outside: also read files outside the model's folder that the model refers to.
     limit: refuse an image that takes more memory than this once decoded, in MiB.
@@ -25,6 +27,7 @@ class IngestOptions:
 
     unit: str | float | None = None
     up: Literal["y", "z"] | None = None
+    two_sided: bool = False
     strict: bool = False
     allow_outside: bool = False
     # Limits end a build or change nothing in it, so they do not decide whether a stage is current.

@@ -1,32 +1,32 @@
-"""Guesses the unit and the up axis of a model, and brings it to world metres, Y up.
+"""Settles the unit and the up axis of a model, and brings it to world metres, Y up.
 
-Up: floors and ceilings are large and level, and buildings are wider than high. Both are measured
-as shares and added. Unit: the one in which a building of this size is most plausible. Neither
-can be certain (a house drawn in feet may pass for a hall in metres), so both are noted, and the
-user can give them.
+What neither the user nor the format says is guessed (`readings`), and noted. A format that says it
+is believed: a glTF file is in metres and has Y up by its specification, and one that seems to lie
+about that is noted, not turned. Whoever wrote it wrote the same lie for every other program, and
+which of them the model was looked at in is known to its user alone.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Literal
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import InputError
+from ptmtools.arrays import Floats
+from ptmtools.errors import InputError, LimitError
+from ptmtools.scene.model import Space
+from ptmtools.scene.readings import CLOSE_AXIS, CLOSE_UNIT, UNITS, Reading, readings
+from ptmtools.scene.signs import Named, Up, looks
+from ptmtools.scene.source import Findings
 
-#: Metres in one unit, in the order of preference where two are equally plausible.
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
-#: Heights of buildings in metres: below the first nobody can stand; above the second it has
-#: several storeys, which is less usual and not impossible.
-HEIGHTS = (2.0, 15.0)
-#: Widths of buildings in metres.
-WIDTHS = (5.0, 500.0)
-#: What a unit costs beforehand, in the same measure as `_implausible`.
-PRIOR = {"m": 0.0, "cm": 0.1, "mm": 0.1, "in": 0.5, "ft": 0.5}
-#: Faces whose normal is within 8 degrees of an axis count as level or upright.
-AXIS_COSINE = 0.99
+#: So many signs are named for a reading.
+_REASONS = 3
+#: A scene of less than a micrometre or more than a million kilometres is a mistake in the unit;
+#: in between, products of coordinates stay far from the ends of float64 and float32.
+SMALLEST_EXTENT, LARGEST_EXTENT = 1e-6, 1e9
 
 
 def parse_unit(unit: str | float) -> float:
@@ -46,51 +46,131 @@ def parse_unit(unit: str | float) -> float:
     return metres
 
 
-def guess_up(corners: NDArray[np.float64]) -> tuple[Literal["y", "z"], str]:
-    """The up axis of (T, 3, 3) triangles in any unit, and the reason in a few words."""
-    points = corners.reshape(-1, 3)
-    side = np.ptp(points, axis=0)
-    scale = float(side.max()) or 1.0
-    local = (corners - points.min(axis=0)) / scale
-    normal = np.cross(local[:, 1] - local[:, 0], local[:, 2] - local[:, 0])
-    area = np.linalg.norm(normal, axis=1)
-    level = [float(area[np.abs(normal[:, k]) > AXIS_COSINE * area].sum()) for k in (1, 2)]
-    floor = level[0] / sum(level) if sum(level) > 0 else 0.5
-    flat = float(side[2] / (side[1] + side[2])) if side[1] + side[2] > 0 else 0.5
-    up: Literal["y", "z"] = "y" if floor + flat >= 1 else "z"
-    share = floor if up == "y" else 1 - floor
-    other = "z" if up == "y" else "y"
-    high, wide = (side[1], side[2]) if up == "y" else (side[2], side[1])
-    return up, (
-        f"{share:.0%} of the area perpendicular to y or z would be level, "
-        f"and the model would be {high:.4g} high and {wide:.4g} along {other}"
+@dataclass(frozen=True)
+class Said:
+    """What somebody says of a model's space: metres in one unit, and the up axis."""
+
+    metres: float | None = None
+    up: Up | None = None
+
+
+def settle(
+    model: Path,
+    points: Floats,
+    triangles: NDArray[np.integer],
+    named: Named,
+    said: Said,
+    by_format: Said,
+    findings: Findings,
+) -> Space:
+    """The space of a model of (T, 3) triangles over (V, 3) finite points: as the user has ``said``,
+    else as its format says, else as guessed.
+
+    Raises LimitError PTM-L201 if the model has no possible size.
+    """
+    low = points.min(axis=0)
+    with np.errstate(over="ignore"):
+        side = points.max(axis=0) - low
+    if not np.isfinite(side).all():
+        raise LimitError("PTM-L201", "coordinates are too large for float64", file=model)
+    metres, up = said.metres or by_format.metres, said.up or by_format.up
+    if said.metres is None or said.up is None:
+        seen = looks(points, triangles, named)
+        judged = said.up or _judge_axis(readings(seen, metres), by_format.up, findings)
+        up = up or judged
+        if said.metres is None:
+            upright = [reading for reading in readings(seen) if reading.up == judged]
+            metres = _judge_unit(upright, by_format.metres, findings)
+    assert metres
+    assert up
+    extent = float(side.max()) * metres
+    if not SMALLEST_EXTENT <= extent <= LARGEST_EXTENT:
+        raise LimitError(
+            "PTM-L201",
+            f"the scene would be {extent:.3g} m large",
+            file=model,
+            remedy=f"give a --unit that makes it {SMALLEST_EXTENT:g} to {LARGEST_EXTENT:g} m",
+        )
+    origin = low + side / 2
+    floor = 1 if up == "y" else 2
+    origin[floor] = low[floor]
+    x, y, z = origin.tolist()
+    return Space(
+        (x, y, z),
+        metres,
+        up,
+        unit_guessed=not (said.metres or by_format.metres),
+        up_guessed=not (said.up or by_format.up),
     )
 
 
-def guess_unit(width: float, height: float) -> tuple[str, str]:
-    """The unit of a model of this horizontal and vertical size, and the reason in a few words."""
-    unit = min(UNITS, key=lambda name: _implausible(width, height, name))
-    metres = UNITS[unit]
-    return unit, f"it would be {width * metres:.3g} m wide and {height * metres:.3g} m high"
+def _judge_axis(ranked: list[Reading], by_format: Up | None, findings: Findings) -> Up:
+    """The axis that is up by the looks of the model, and a note on it."""
+    best = ranked[0]
+    rival = next(reading for reading in ranked if reading.up != best.up)
+    ahead = rival.cost - best.cost
+    for_best, for_rival = _because(best, rival), _because(rival, best)
+    if by_format:
+        # What is flat has no rooms that could lie on their side.
+        if best.up == by_format or ahead < CLOSE_AXIS or best.flat:
+            return by_format
+        findings.say(
+            "PTM-N234",
+            f"the format has {by_format} up, but the model seems to lie on its side: with "
+            f"{by_format} up it is {rival.size}, with {best.up} up {best.size}{for_best}; give "
+            f"--up {best.up} to turn it",
+        )
+    elif ahead < CLOSE_AXIS:
+        findings.say(
+            "PTM-N232",
+            f"the up axis is uncertain: {best.up} is taken, {best.size}{for_best}, but "
+            f"{rival.up} is nearly as likely, {rival.size}{for_rival}; give --up {best.up} or "
+            f"--up {rival.up}",
+        )
+    else:
+        findings.say(
+            "PTM-N202", f"up axis guessed: {best.up}, {best.size}{for_best}; give --up to override"
+        )
+    return best.up
 
 
-def _implausible(width: float, height: float, unit: str) -> float:
-    """How unusual a building of this size is: 0 and the unit's prior at the best."""
-    w, h = width * UNITS[unit], height * UNITS[unit]
-    cost = PRIOR[unit]
-    if w > 0:
-        cost += 2 * max(0.0, _orders(WIDTHS[0], w), _orders(w, WIDTHS[1]))
-    if h > 0:
-        cost += max(0.0, 4 * _orders(HEIGHTS[0], h), 0.25 * _orders(h, HEIGHTS[1]))
-    return cost
+def _because(reading: Reading, other: Reading) -> str:
+    reasons = reading.reasons(other)[:_REASONS]
+    return f" ({', '.join(reasons)})" if reasons else ""
 
 
-def _orders(a: float, b: float) -> float:
-    """The logarithm of a / b, which itself may be too small or too large for a number."""
-    return math.log(a) - math.log(b)
+def _judge_unit(ranked: list[Reading], by_format: float | None, findings: Findings) -> float:
+    """Metres in one unit as the format says, else by the looks of the model, and a note on it."""
+    best, rival = ranked[:2]
+    if by_format is None:
+        if rival.cost - best.cost < CLOSE_UNIT:
+            findings.say(
+                "PTM-N233",
+                f"the unit is uncertain: {best.unit} is taken (it would be {best.size}), but "
+                f"{rival.unit} is nearly as likely ({rival.size}); give --unit {best.unit} or "
+                f"--unit {rival.unit}",
+            )
+        else:
+            findings.say(
+                "PTM-N201",
+                f"unit guessed: {best.unit} (it would be {best.size}); give --unit to override",
+            )
+        return best.metres
+    if best.metres != by_format:
+        findings.say(
+            "PTM-N227",
+            f"the format is in metres, but {best.unit} would be more likely (it would be "
+            f"{best.size}); give --unit to override",
+        )
+    return by_format
 
 
-def turned(vectors: NDArray[np.float64], up: Literal["y", "z"]) -> NDArray[np.float64]:
+def to_world(points: Floats, space: Space) -> Floats:
+    """(n, 3) points of the model in world metres, Y up."""
+    return turned((points - np.array(space.origin)) * space.metres, space.up)
+
+
+def turned(vectors: Floats, up: Up) -> Floats:
     """(n, 3) model vectors in world axes: Z up maps (x, y, z) to (x, z, -y)."""
     if up == "y":
         return vectors

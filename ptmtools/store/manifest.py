@@ -10,7 +10,8 @@
          "inputs":  {"stages/scene.npz": "9f86…"},   name → SHA-256 of what was read
          "outputs": {"stages/cells.npz": "60b7…"},   path in the database → SHA-256
          "counts":  {"cells": 52, "portals": 61, …}, figures and choices, for reports
-         "notes":   ["open above: …"]                what it had to say, one line each
+         "notes":   ["open above: …"],               what it had to say, one line each
+         "warnings": ["open above: …"]               the gravest of that
      }, …}}
 
 Stages stand in the order of their names. There is no time and no folder of the machine in it:
@@ -53,6 +54,7 @@ class StageRecord:
     outputs: Mapping[str, str]
     counts: Mapping[str, Any] = field(default_factory=dict)
     notes: Sequence[str] = ()
+    warnings: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,7 @@ class Manifest:
         return Manifest(
             document["model"],
             {
-                stage: StageRecord(**{name: entry[name] for name in names})
+                stage: StageRecord(**{name: entry[name] for name in names if name in entry})
                 for stage, entry in document["stages"].items()
             },
         )

@@ -329,7 +329,9 @@ def test_bad_input(name: str, folder: Path, ptm: Ptm) -> None:
     outcome = ptm(*split(arguments))
     assert LINE.fullmatch(outcome.err), outcome.err
     assert f"[PTM-{code}" in outcome.err
-    assert (outcome.status, outcome.out) == (status, "")
+    assert outcome.status == status
+    # Stages that were done before are told of.
+    assert all(line.startswith("scene ") for line in outcome.out.splitlines())
     assert listing(folder) == before
 
 

@@ -80,7 +80,7 @@ def said(capsys: pytest.CaptureFixture[str], *arguments: Any, status: int = 0) -
 def test_a_toy_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     db = tmp_path / "db"
     build = ("build-scene", TWO_ROOMS, "-o", db, "--samples", 8, "--backend", "embree")
-    assert "multiplied by 1" in said(capsys, *build)
+    assert "multiplied by 1" in said(capsys, *build, "-v")
     volume = Artifacts(DatabaseFolder.open(db))[TOY].volume
     plan = json.loads(said(capsys, *build, "--toy-factor", 2, "--dry-run", "--json"))["stages"]
     assert [p["stage"] for p in plan if p["plan"] != "current"] == ["toy"]

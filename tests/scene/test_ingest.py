@@ -32,7 +32,7 @@ def rgba(alpha: int, where: tuple[slice, slice] = (slice(None), slice(None))) ->
 
 def said(scene: Scene) -> list[tuple[str, str]]:
     """Codes and places of the notes, but for the guesses that every model brings."""
-    guesses = ("PTM-N201", "PTM-N202")
+    guesses = ("PTM-N201", "PTM-N202", "PTM-N232")
     return [(note.code, note.place) for note in scene.notes if note.code not in guesses]
 
 
@@ -100,7 +100,7 @@ def test_guesses_are_told(put: Put) -> None:
     messages = {note.code: note.message for note in scene.notes}
     assert messages["PTM-N201"].startswith("unit guessed: m (")
     assert messages["PTM-N201"].endswith("give --unit to override")
-    assert messages["PTM-N202"].startswith("up axis guessed: z (100%")
+    assert messages["PTM-N202"].startswith("up axis guessed: z, 10 m wide and 0 m high (more level")
     assert not ingest(put("a.obj", QUAD + FACE), IngestOptions(unit="m", up="y")).notes
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +63,42 @@ def test_office(shared: Path) -> None:
     assert (scene.space.metres, scene.space.up) == (1.0, "y")
     assert np.ptp(scene.points, axis=0) == pytest.approx([49.5, 5.15, 34.94], abs=0.02)
     assert [m.transparent for m in scene.materials] == [False]
+
+
+@pytest.mark.parametrize("name", ["hospital", "willowgarage", "gallery", "office"])
+def test_lying_on_its_side_it_is_set_up_again(shared: Path, tmp_path: Path, name: str) -> None:
+    """Written out with the other axis up, each model is read as before."""
+    before = load(shared, name)
+    text = (shared / "scenes" / name / f"{name}.obj").read_text()
+    swapped = re.sub(r"(?m)^v +(\S+) +(\S+) +(\S+)", r"v \1 \3 \2", text)
+    (tmp_path / "turned.obj").write_text(re.sub(r"(?m)^mtllib.*$", "", swapped))
+    after = ingest(tmp_path / "turned.obj")
+    assert after.space.up != before.space.up
+    assert after.space.metres == before.space.metres
+    assert np.ptp(after.points, axis=0) == pytest.approx(np.ptp(before.points, axis=0))
+    assert not {"PTM-N232", "PTM-N233"} & (counts(before).keys() | counts(after).keys())
+
+
+def test_gallery_as_glb(shared: Path, tmp_path: Path) -> None:
+    """As it is, nothing is to say; with its content lying, it is believed and doubted."""
+    path = shared / "scenes" / "gallery" / "gallery.glb"
+    assert counts(ingest(path)) == {}
+    data = path.read_bytes()
+    end = 20 + int.from_bytes(data[12:16], "little")
+    tree = json.loads(data[20:end])
+    (scene,) = tree["scenes"]
+    tree["nodes"].append({"children": scene["nodes"], "rotation": [0.5**0.5, 0, 0, 0.5**0.5]})
+    scene["nodes"] = [len(tree["nodes"]) - 1]
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    length = len(data) - end + 20 + len(text)
+    head = data[:8] + length.to_bytes(4, "little") + len(text).to_bytes(4, "little") + data[16:20]
+    (tmp_path / "lying.glb").write_bytes(head + text + data[end:])
+    lying = ingest(tmp_path / "lying.glb")
+    assert counts(lying) == {"PTM-N234": 1}
+    turned = ingest(tmp_path / "lying.glb", IngestOptions(up="z"))
+    assert counts(turned) == {}
+    assert np.ptp(turned.points, axis=0) == pytest.approx(np.ptp(ingest(path).points, axis=0))
 
 
 @pytest.mark.parametrize("unit", ["cm", "0.01"])

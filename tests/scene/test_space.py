@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
-from ptmtools.scene.space import UNITS, guess_unit, guess_up, parse_unit, turned
+from ptmtools.scene.model import Space
+from ptmtools.scene.signs import Named
+from ptmtools.scene.source import Findings
+from ptmtools.scene.space import UNITS, Said, parse_unit, settle, turned
+
+from .made import box, house, site_plan, welded, y_up
 
 
 @pytest.mark.parametrize(
@@ -25,47 +31,6 @@ def test_units_that_are_none(given: str | float) -> None:
         parse_unit(given)
 
 
-@pytest.mark.parametrize(
-    ("width", "height", "unit"),
-    [
-        (56, 6, "m"),
-        (10, 5, "m"),
-        (6, 3, "m"),
-        (60, 30, "m"),
-        (400, 100, "m"),
-        (5600, 600, "cm"),
-        (1000, 280, "cm"),
-        (56000, 6000, "mm"),
-        (8000, 2500, "mm"),
-        (2322, 112, "in"),
-        (1, 0, "m"),
-    ],
-)
-def test_guessed_units(width: float, height: float, unit: str) -> None:
-    assert guess_unit(width, height)[0] == unit
-
-
-def box(x: float, y: float, z: float) -> np.ndarray:
-    """The (12, 3, 3) triangles of a box."""
-    corner = np.array([[a, b, c] for a in (0, x) for b in (0, y) for c in (0, z)], float)
-    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    return corner[[t for q in quads for t in (q[:3], [q[0], q[2], q[3]])]]
-
-
-@pytest.mark.parametrize("scale", [1e-150, 1.0, 39.37, 1e150])
-def test_guessed_axes(scale: float) -> None:
-    assert guess_up(box(20, 3, 15) * scale)[0] == "y"
-    assert guess_up(box(20, 15, 3) * scale)[0] == "z"
-
-
-def test_floors_outweigh_height() -> None:
-    """A tower of 12 floors, higher than wide."""
-    floors = [box(20, 0, 20)[4:6] + [0, 3.0 * i, 0] for i in range(12)]
-    tower = np.concatenate([box(20, 36, 20), *floors])
-    assert guess_up(tower)[0] == "y"
-    assert guess_up(tower[..., [0, 2, 1]])[0] == "z"
-
-
 def test_turning_is_a_rotation() -> None:
     axes = turned(np.eye(3), "z")
     assert axes.tolist() == [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
@@ -78,8 +43,65 @@ def test_each_unit_can_be_guessed_or_given() -> None:
     assert list(UNITS) == ["m", "cm", "mm", "in", "ft"]
 
 
-@pytest.mark.parametrize("size", [0.0, 5e-324, 1e-300, 1e300, 1.7e308, math.inf])
-def test_sizes_at_the_ends_of_numbers_have_a_unit(size: float) -> None:
-    for other in (1.0, size):
-        assert guess_unit(size, other)[0] in UNITS
-        assert guess_unit(other, size)[0] in UNITS
+def told(triangles: Floats, said: Said = Said(), by_format: Said = Said()) -> tuple[Space, dict]:  # noqa: B008
+    """The space of triangles, and the notes on it by code."""
+    points, faces = welded(triangles)
+    findings = Findings(Path("house.obj"))
+    named = Named(*np.zeros((2, len(faces)), dtype=bool))
+    space = settle(Path("house.obj"), points, faces, named, said, by_format, findings)
+    return space, {note.code: note.message for note in findings.notes}
+
+
+def test_guesses_are_noted() -> None:
+    space, notes = told(house() / 0.0254)
+    assert (space.metres, space.up, space.unit_guessed, space.up_guessed) == (0.0254, "z", 1, 1)
+    assert list(notes) == ["PTM-N202", "PTM-N201"]
+    assert notes["PTM-N202"].startswith(
+        "up axis guessed: z, 19.2 m wide and 3.5 m high, free height"
+    )
+    assert "rooms wider than high" in notes["PTM-N202"]
+    assert notes["PTM-N201"].startswith("unit guessed: in (it would be 19.2 m wide")
+
+
+def test_what_is_uncertain_is_noted_with_the_runner_up() -> None:
+    space, notes = told(box((0, 0, 0), (300, 300, 300)))
+    assert space.metres == 0.01
+    assert list(notes) == ["PTM-N232", "PTM-N201"]
+    assert notes["PTM-N232"].endswith("give --up y or --up z")
+    _, notes = told(house() / 0.3048)
+    assert list(notes) == ["PTM-N202", "PTM-N233"]
+    assert "m is taken" in notes["PTM-N233"]
+    assert "ft is nearly as likely (19.2 m wide" in notes["PTM-N233"]
+    assert notes["PTM-N233"].endswith("give --unit m or --unit ft")
+
+
+def test_what_is_given_is_not_judged() -> None:
+    space, notes = told(house(), Said(0.3048, "y"))
+    assert (space.metres, space.up, space.unit_guessed, space.up_guessed) == (0.3048, "y", 0, 0)
+    assert not notes
+    space, notes = told(y_up(house()), Said(up="y"))
+    assert (space.up, space.up_guessed, list(notes)) == ("y", False, ["PTM-N201"])
+    space, notes = told(house(), Said(metres=1.0))
+    assert (space.up, space.unit_guessed, list(notes)) == ("z", False, ["PTM-N202"])
+
+
+def test_a_format_is_believed_and_doubted() -> None:
+    """glTF has metres and Y up: what lies on its side is not turned without being asked."""
+    gltf = Said(1.0, "y")
+    assert told(y_up(house()), by_format=gltf)[1] == {}
+    space, notes = told(house(), by_format=gltf)
+    assert (space.up, space.up_guessed, list(notes)) == ("y", False, ["PTM-N234"])
+    assert "with y up it is 19.2 m wide and 11.6 m high" in notes["PTM-N234"]
+    assert "with z up 19.2 m wide and 3.5 m high" in notes["PTM-N234"]
+    assert notes["PTM-N234"].endswith("give --up z to turn it")
+    space, notes = told(house(), Said(up="z"), gltf)
+    assert (space.up, notes) == ("z", {})
+    space, notes = told(y_up(house()) * 100, by_format=gltf)
+    assert (space.metres, list(notes)) == (1.0, ["PTM-N227"])
+    assert "cm would be more likely" in notes["PTM-N227"]
+
+
+def test_a_plan_does_not_lie_on_its_side() -> None:
+    """A sheet standing upright in a glTF file may be a picture or a wall."""
+    sheet = site_plan()[:2]
+    assert told(sheet, by_format=Said(1.0, "y"))[1] == {}

@@ -12,7 +12,7 @@ from ptmtools.store.manifest import FORMAT, SCHEMA, Manifest, StageRecord
 
 DIGEST = "ab" * 32
 RECORD = StageRecord(
-    1, {"wall_area": 2.0}, {"b": "", "a": DIGEST}, {"stages/x.npz": DIGEST}, {"cells": 2}, []
+    1, {"wall_area": 2.0}, {"b": "", "a": DIGEST}, {"stages/x.npz": DIGEST}, {"cells": 2}, [], []
 )
 
 
@@ -28,6 +28,14 @@ def test_reads_back_what_it_writes() -> None:
     assert again == manifest
     assert list(again.stages) == ["cells", "pvs"]
     assert again.to_bytes() == Manifest("m.obj", dict(again.stages)).to_bytes()
+
+
+def test_reads_one_of_an_earlier_release() -> None:
+    """Which told no warnings apart."""
+    earlier = document()
+    del earlier["stages"]["cells"]["warnings"]
+    again = Manifest.from_bytes(json.dumps(earlier).encode(), file="manifest.json")
+    assert again.stages["cells"].warnings == ()
 
 
 def test_the_order_of_inputs_does_not_show() -> None:
@@ -66,6 +74,7 @@ def broken(change: dict[str, Any]) -> bytes:
         (broken({"recipe": True}), "PTM-D002"),
         (broken({"inputs": {"a": 5}}), "PTM-D002"),
         (broken({"notes": [5]}), "PTM-D002"),
+        (broken({"warnings": [5]}), "PTM-D002"),
         (broken({"outputs": {"mine.txt": DIGEST}}), "PTM-D002"),
         (broken({"outputs": {"manifest.json": DIGEST}}), "PTM-D002"),
         (broken({"outputs": {"www/../mine.txt": DIGEST}}), "PTM-D002"),

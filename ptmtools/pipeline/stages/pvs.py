@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from ptmtools.lazy import Lazy
+from ptmtools.notes import Warned
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.visibility.options import PvsOptions
@@ -37,12 +38,12 @@ def _notes(pvs: Pvs, _: PvsOptions) -> Iterator[str]:
     share = pvs.volume_at_hand[0]
     # Of a single cell, the cells stage has said it.
     if share > CULLING_GAINS_LITTLE and pvs.cell_count > 1:
-        yield (
+        yield Warned(
             f"culling by visibility gains little here: on average {share:.0%} of the volume is at "
             "hand, as in a single hall"
         )
     if not pvs.conservative:
-        yield (
+        yield Warned(
             "these visible sets hold only what random lines happened to hit: a client that loads "
             "by them will show holes (build with `--pvs full` or `--pvs fast` before you publish)"
         )

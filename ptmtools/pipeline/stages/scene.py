@@ -20,6 +20,7 @@ def _counts(scene: Scene) -> Mapping[str, Any]:
         "objects": len(scene.objects),
         "materials": len(scene.materials),
         "images": len(scene.images),
+        "size": (scene.points.max(axis=0) - scene.points.min(axis=0)).tolist(),
         "origin": list(scene.space.origin),
         "metres": scene.space.metres,
         "up": scene.space.up,
@@ -31,9 +32,13 @@ def _counts(scene: Scene) -> Mapping[str, Any]:
 def _summary(n: Mapping[str, Any]) -> str:
     guessed = [what for what, key in (("unit", "unit"), ("up axis", "up")) if n[f"{key}_guessed"]]
     how = f" ({' and '.join(guessed)} guessed)" if guessed else ""
+    extent = ""
+    if "size" in n:  # which databases of earlier releases do not say
+        width, height, depth = n["size"]
+        extent = f"; {width:.3g} × {depth:.3g} m, {height:.3g} m high"
     return (
         f"{count(n['triangles'], 'triangle')} in {count(n['objects'], 'object')}, "
-        f"{count(n['images'], 'image')}; 1 unit = {n['metres']:g} m, {n['up']} up{how}"
+        f"{count(n['images'], 'image')}; 1 unit = {n['metres']:g} m, {n['up']} up{how}{extent}"
     )
 
 

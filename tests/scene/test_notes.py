@@ -1,0 +1,45 @@
+"""Notes as lines: which are warnings, and that these are few."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from ptmtools.scene.model import Note
+from ptmtools.scene.notes import WARNINGS, line, warnings
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_a_line() -> None:
+    assert line(Note("PTM-N211", "duplicate faces dropped", "", 52)) == (
+        "duplicate faces dropped (52 times) [PTM-N211]"
+    )
+    assert line(Note("PTM-N204", "a.png: not found", "m.mtl:4"), 1) == (
+        "m.mtl:4: a.png: not found, and 1 more like it [PTM-N204]"
+    )
+
+
+def test_warnings_are_the_gravest_first_and_one_of_each_kind() -> None:
+    missing = [Note("PTM-N204", f"{n}.png: not found", f"m.mtl:{n}") for n in range(1_200)]
+    given = [
+        Note("PTM-N211", "duplicate faces dropped"),
+        *missing,
+        Note("PTM-N234", "the model lies on its side"),
+        Note("PTM-N201", "unit guessed"),
+    ]
+    assert list(warnings(given)) == [
+        "the model lies on its side [PTM-N234]",
+        "m.mtl:0: 0.png: not found, and 1,199 more like it [PTM-N204]",
+    ]
+    assert list(warnings(given[:1])) == []
+
+
+def test_the_docs_list_the_same_warnings() -> None:
+    text = (ROOT / "docs" / "cli.md").read_text("utf-8")
+    table = text[text.index("| warnings | of |") : text.index("| notes | of |")]
+    found = set()
+    for row in re.findall(r"^\| PTM-([^|]*)\|", table, re.MULTILINE):
+        for first, _, last in re.findall(r"N(\d+)( to N(\d+))?", row):
+            found |= {f"PTM-N{n}" for n in range(int(first), int(last or first) + 1)}
+    assert found == set(WARNINGS)
