@@ -23,7 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.cells.outlines import Edges, loops, split_at_corners, straight_corners, united
+from ptmtools.cells.outlines import (
+    Edges,
+    bent_corners,
+    loops,
+    split_at_corners,
+    straight_corners,
+    united,
+)
 from ptmtools.cells.ownership import Pieces
 from ptmtools.cells.patches import patches
 from ptmtools.cells.triangulation import triangulated
@@ -120,9 +127,11 @@ class _Network:
         reach = tolerance.rounding
         triangle, of = np.unique(cut.source, return_inverse=True)
         model = scene.corners[triangle]
-        # The model's own corners first: where points are welded they stay what they are.
         points = np.concatenate([model.reshape(-1, 3), cut.corner[..., :3].reshape(-1, 3)])
-        whole, corner = np.split(welded(points, reach).reshape(-1, 3), [len(triangle)])
+        # The model's own corners stay what they are, however near each other.
+        same, number = distinct(points), welded(points, reach)
+        number = np.where(same < model.size // 3, same, number)
+        whole, corner = np.split(number.reshape(-1, 3), [len(triangle)])
         sound = _wide(points[corner], reach)
         corner, of = corner[sound], of[sound]
         cut = Pieces(cut.corner[sound], cut.source[sound], cut.leaf[sound])
@@ -158,9 +167,7 @@ class _Network:
         while True:
             kind = np.where(apart, len(self.points) + np.arange(count), self.kind)
             outline, union = united(self.edges, kind)
-            gone = np.zeros(len(self.points), dtype=np.bool_)
-            gone[straight_corners(self.points, outline, self.reach)] = True
-            row, of = self._triangles(outline, gone & ~fixed)
+            row, of = self._triangles(outline, fixed)
             done = np.zeros(count, dtype=np.bool_)
             done[of] = True
             lost = ~done[union] & ~apart
@@ -173,22 +180,28 @@ class _Network:
         at = self._first_starts(union, of[:, None] * len(self.points) + corner)
         source = self.cut.source[self.edges.polygon[at]]
         uv = np.einsum("mcw,mcwk->mck", self.weight[at], scene.uv[source])
-        point, weight = np.split(self.cut.corner[left], 2, axis=2)
+        weight = self.cut.corner[left, :, 3:]
         left_uv = np.einsum("mcw,mwk->mck", weight, scene.uv[self.cut.source[left]])
         return [
             _Parts(self.points[corner], uv, self.name[of], self.cut.leaf[of]),
-            _Parts(point, left_uv, self.name[left], self.cut.leaf[left]),
+            _Parts(self.points[self.corner[left]], left_uv, self.name[left], self.cut.leaf[left]),
         ]
 
-    def _triangles(self, outline: Edges, gone: Bools) -> tuple[Ints, Ints]:
+    def _triangles(self, outline: Edges, fixed: Bools) -> tuple[Ints, Ints]:
         """(m, 3) edges of the outlines of unions, whose starts are the corners of triangles, and
-        (m,) the union of each; without the corners that are ``gone``."""
+        (m,) the union of each; without corners that no edge needs, save those that are ``fixed``."""
         frame, origin = self.frame[outline.polygon], self.points[self.corner[outline.polygon, 0]]
         ends = np.stack([self.points[outline.start], self.points[outline.end]], axis=1)
         flat = np.einsum("nek,nfk->nef", ends - origin[:, None], frame)
         row, start = loops(flat, outline)
+        corner = outline.start[row]
+        gone = np.zeros(len(self.points), dtype=np.bool_)
+        gone[straight_corners(self.points, outline, self.reach)] = True
+        gone &= ~fixed
+        while len(bent := bent_corners(self.points[corner], start, gone[corner], self.reach)):
+            gone[corner[bent]] = False
         loop = np.repeat(np.arange(len(start) - 1), np.diff(start))
-        stays = ~gone[outline.start[row]]
+        stays = ~gone[corner]
         stays &= np.bincount(loop[stays], minlength=len(start) - 1)[loop] >= 3
         row, size = row[stays], np.bincount(loop[stays])
         size = size[size > 0]

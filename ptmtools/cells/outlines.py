@@ -135,11 +135,35 @@ def straight_corners(points: Floats, edges: Edges, reach: float) -> Ints:
     corner, first, count = np.unique(ends[order], return_index=True, return_counts=True)
     first, corner = first[count == 2], corner[count == 2]
     before, after = points[beyond[order[first]]], points[beyond[order[first + 1]]]
-    way, ahead = after - before, points[corner] - before
-    place = np.einsum("ij,ij->i", ahead, way) / np.einsum("ij,ij->i", way, way)
+    return np.asarray(corner[_between(points[corner], before, after, reach)])
+
+
+def bent_corners(point: Floats, start: Ints, gone: Bools, reach: float) -> Ints:
+    """Of rings, (n, 3) corners and their CSR, the rows that are ``gone`` but farther than ``reach``
+    from the edge that takes their place: many small bends make a large one."""
+    row = np.arange(len(point))
+    ring = np.repeat(np.arange(len(start) - 1), np.diff(start))
+    kept = np.where(gone, -1, row)
+    last = np.full(len(start) - 1, -1)
+    np.maximum.at(last, ring, kept)
+    first = np.full(len(start) - 1, len(point))
+    np.minimum.at(first, ring[~gone], row[~gone])
+    before = np.maximum.accumulate(kept)
+    before = np.where(before < start[ring], last[ring], before)
+    after = np.minimum.accumulate(np.where(gone, len(point), row)[::-1])[::-1]
+    after = np.where(after >= start[ring + 1], first[ring], after)
+    some = np.flatnonzero(gone)
+    ends = before[some], np.minimum(after[some], len(point) - 1)
+    return some[~_between(point[some], point[ends[0]], point[ends[1]], reach) | (ends[0] < 0)]
+
+
+def _between(point: Floats, before: Floats, after: Floats, reach: float) -> Bools:
+    """(n,) whether (n, 3) points lie, within ``reach``, on the lines between two others each."""
+    way, ahead = after - before, point - before
+    with np.errstate(invalid="ignore", divide="ignore"):  # both may be one
+        place = np.einsum("ij,ij->i", ahead, way) / np.einsum("ij,ij->i", way, way)
     off = ahead - place[:, None] * way
-    straight = (place > 0) & (place < 1) & (np.einsum("ij,ij->i", off, off) <= reach**2)
-    return np.asarray(corner[straight])
+    return (place > 0) & (place < 1) & (np.einsum("ij,ij->i", off, off) <= reach**2)
 
 
 def loops(flat: Floats, edges: Edges) -> tuple[Ints, Ints]:

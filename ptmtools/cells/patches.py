@@ -84,18 +84,16 @@ def _continues(
     a = corners[one, 0]
     u, v = corners[one, 1] - a, corners[one, 2] - a
     uu, uv_, vv = (np.einsum("ij,ij->i", p, q) for p, q in ((u, u), (u, v), (v, v)))
-    normal = normals(corners)
-    flat = np.einsum("ij,ij->i", normal[one], normal[other]) > 0
+    across = normals(corners)
+    flat = np.einsum("ij,ij->i", across[one], across[other]) > 0
     same = np.ones(len(one), dtype=np.bool_)
-    with np.errstate(
-        divide="ignore", invalid="ignore"
-    ):  # a triangle without area continues nothing
+    with np.errstate(divide="ignore", invalid="ignore"):  # one without area is continued by none
+        scale = 1 / (uu * vv - uv_**2)
         for k in range(3):
             w = corners[other, k] - a
             wu, wv = (np.einsum("ij,ij->i", w, p) for p in (u, v))
-            x, y = (np.array([vv * wu - uv_ * wv, uu * wv - uv_ * wu]) / (uu * vv - uv_**2))[
-                ..., None
-            ]
+            x = ((vv * wu - uv_ * wv) * scale)[:, None]
+            y = ((uu * wv - uv_ * wu) * scale)[:, None]
             flat &= np.linalg.norm(w - x * u - y * v, axis=1) <= tolerance.file
             said = uv[one, 0] + x * (uv[one, 1] - uv[one, 0]) + y * (uv[one, 2] - uv[one, 0])
             same &= np.abs(said - uv[other, k]).max(axis=1) <= _UV
