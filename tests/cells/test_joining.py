@@ -1,0 +1,265 @@
+"""Joined pieces: what they cover, and that nothing gapes between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ptmtools.cells import SubdivideOptions, subdivide, subdivision
+from ptmtools.cells.joining import Mesh, joined
+from ptmtools.cells.ownership import Pieces
+from ptmtools.cells.vectors import areas
+from ptmtools.scene import ingest
+from ptmtools.scene.model import Material, Scene
+
+#: So many open edges are compared with the model's at a time.
+CHUNK = 64
+
+
+def taken_apart(monkeypatch: pytest.MonkeyPatch, scene: Scene, **options: Any) -> tuple[Any, ...]:
+    """What `joined` is given for a scene: pieces of everything, those of nobody too."""
+    given: list[Any] = []
+
+    def spy(*arguments: Any) -> Mesh:
+        given.append(arguments)
+        return joined(*arguments)
+
+    monkeypatch.setattr(subdivision, "joined", spy)
+    subdivide(scene, SubdivideOptions(**options))
+    return tuple(given[0])
+
+
+def of_somebody(owner: np.ndarray) -> np.ndarray:
+    """The same owners, but what is nobody's belongs to one more cell."""
+    return np.where((owner < 0).all(axis=1, keepdims=True), owner.max() + 1, owner)
+
+
+def corners_of(mesh: Mesh) -> np.ndarray:
+    return mesh.vertex[mesh.triangle]
+
+
+def open_edges(corners: np.ndarray) -> np.ndarray:
+    """(k, 2, 3) the edges of (n, 3, 3) triangles that no other has, with the same two ends."""
+    distinct, number = np.unique(corners.reshape(-1, 3) + 0.0, axis=0, return_inverse=True)
+    number = number.reshape(-1, 3)
+    ends = np.sort(np.stack([number, np.roll(number, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges, count = np.unique(ends, axis=0, return_counts=True)
+    return distinct[edges[count == 1]]
+
+
+def gaping(scene: Scene, corners: np.ndarray) -> np.ndarray:
+    """The open edges of triangles that do not run along open edges of the model."""
+    found, model = open_edges(corners), open_edges(scene.corners)
+    way = model[:, 1] - model[:, 0]
+    length = np.linalg.norm(way, axis=1)
+    way /= length[:, None]
+    reach = 10 * scene.tolerance.rounding
+    along = np.zeros(len(found), dtype=bool)
+    for first in range(0, len(found), CHUNK):
+        ahead = found[first : first + CHUNK, :, None] - model[:, 0]
+        place = np.einsum("neki,ki->nek", ahead, way)
+        off = np.linalg.norm(ahead - place[..., None] * way, axis=3)
+        on = (off <= reach) & (place >= -reach) & (place <= length + reach)
+        along[first : first + CHUNK] = on.all(axis=1).any(axis=1)
+    return found[~along]
+
+
+def halls(quads: Callable[..., Scene], room_faces: Any, partition: Any, **look: Any) -> Scene:
+    """Two rooms that walls which end in mid-air cut into many leaves, and a bent banner through the
+    door."""
+    faces = room_faces((0, 0, -2), (8, 4, 2)) + partition(4, (0, 3, -1, 1))
+    faces += [[[x, 0, -2], [x, 0, 0.3], [x, 3, 0.3], [x, 3, -2]] for x in (1.3, 2.9, 5.7)]
+    faces += [[[1, 1, -0.9], [7, 1.2, 0.7], [7, 2.2, 0.7], [1, 2, -0.8]]]
+    return quads(faces, **look)
+
+
+@pytest.fixture(params=["halls", "hospital"])
+def given(
+    request: pytest.FixtureRequest,
+    monkeypatch: pytest.MonkeyPatch,
+    shared: Path,
+    quads: Any,
+    room_faces: Any,
+    partition: Any,
+) -> tuple[Any, ...]:
+    """The arguments of `joined` for several scenes."""
+    if request.param == "halls":
+        return taken_apart(monkeypatch, halls(quads, room_faces, partition))
+    file = shared / "scenes/hospital/hospital.obj"
+    if not file.is_file():
+        pytest.skip(f"there is no {file}")
+    return taken_apart(monkeypatch, ingest(file))
+
+
+def test_joined_pieces(given: tuple[Any, ...]) -> None:
+    scene, pieces, owner, tolerance = given
+    mesh = joined(scene, pieces, owner, tolerance)
+    owned = (owner >= 0).any(axis=1)
+    assert len(mesh.triangle) < owned.sum()
+
+    # Each owner has as much of each material as before.
+    def held(material: np.ndarray, cells: np.ndarray, area: np.ndarray) -> np.ndarray:
+        each = np.zeros((len(scene.materials), 2, owner.max() + 2))
+        for side in (0, 1):
+            np.add.at(each, (material, side, cells[:, side]), area)
+        return each
+
+    before = held(
+        scene.triangle_material[pieces.source[owned]],
+        owner[owned],
+        areas(pieces.corner[owned, :, :3]),
+    )
+    after = held(
+        scene.triangle_material[mesh.triangle_source], mesh.triangle_cell, areas(corners_of(mesh))
+    )
+    assert np.allclose(before, after, rtol=0, atol=tolerance.rounding * tolerance.extent)
+
+    # No position is new.
+    known = {
+        tuple(p) for p in np.concatenate([scene.points, pieces.corner[..., :3].reshape(-1, 3)])
+    }
+    assert {tuple(p) for p in mesh.vertex} <= known
+
+    # Triangles of one pair of owners are what they were.
+    whole = [
+        t
+        for t, n in enumerate(np.bincount(mesh.triangle_source, minlength=len(scene.triangles)))
+        if n == 1 and len(np.unique(owner[pieces.source == t], axis=0)) == 1
+    ]
+    assert whole
+    for t in whole:
+        (row,) = np.flatnonzero(mesh.triangle_source == t)
+        if np.isin(mesh.vertex[mesh.triangle[row]], scene.corners[t]).all():
+            assert np.array_equal(mesh.vertex[mesh.triangle[row]], scene.corners[t])
+            assert np.array_equal(mesh.vertex_uv[mesh.triangle[row]], scene.uv[t])
+
+
+def test_nothing_gapes_that_did_not(given: tuple[Any, ...]) -> None:
+    scene, pieces, owner, tolerance = given
+    mesh = joined(scene, pieces, of_somebody(owner), tolerance)
+    assert len(gaping(scene, corners_of(mesh))) == 0
+    assert len(gaping(scene, pieces.corner[..., :3])) > 0, "cutting alone leaves gaps"
+
+
+def test_a_planted_junction_is_found(quads: Any, room_faces: Any, partition: Any) -> None:
+    scene = halls(quads, room_faces, partition)
+    corners = scene.corners
+    assert len(gaping(scene, corners)) == 0
+    a, b, c = corners[0]
+    planted = np.concatenate([corners[1:], [[a, (a + b) / 2, c], [(a + b) / 2, b, c]]])
+    assert len(gaping(scene, planted)) > 0
+
+
+def floor_in_pieces(
+    quads: Any, x: tuple[float, ...], z: tuple[float, ...] = ()
+) -> tuple[Scene, np.ndarray, np.ndarray]:
+    """A floor of 4 m × 1 m, cut at ``x`` and at ``z``: the scene, (M, 3, 6) corners as `Pieces` has
+    them, and (M,) sources."""
+    scene = quads([[[0, 0, 0], [0, 0, 1], [4, 0, 1], [4, 0, 0]]])
+    corner, source = [], []
+    for t, triangle in enumerate(scene.corners):
+        system = np.vstack([triangle.T[[0, 2]], np.ones(3)])
+        for left, right in pairwise([0, *x, 4]):
+            for near, far in pairwise([0, *z, 1]):
+                shape = clipped(clipped(triangle, 0, left, right), 2, near, far)
+                weight = np.linalg.solve(
+                    system, np.vstack([shape.T[[0, 2]], np.ones(len(shape))])
+                ).T
+                rows = np.hstack([shape, np.where(np.abs(weight) < 1e-12, 0, weight)])
+                corner += [rows[[0, k, k + 1]] for k in range(1, len(rows) - 1)]
+                source += [t] * (len(rows) - 2)
+    return scene, np.array(corner), np.array(source)
+
+
+def clipped(polygon: np.ndarray, axis: int, low: float, high: float) -> np.ndarray:
+    """The part of a convex polygon between two planes across an axis."""
+    for sign, bound in ((1, low), (-1, high)):
+        kept = []
+        for p, q in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+            d, e = sign * (p[axis] - bound), sign * (q[axis] - bound)
+            if d >= 0:
+                kept.append(p)
+            if d * e < 0:
+                kept.append(p + d / (d - e) * (q - p))
+        polygon = np.array(kept).reshape(-1, 3)
+    return polygon
+
+
+def owners(corner: np.ndarray, who: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
+    """(M, 2) the same owner in front and behind, by the x and z of pieces' middles."""
+    x, _, z = corner[..., :3].mean(axis=1).T
+    return np.repeat(np.asarray(who(x, z), dtype=np.int32)[:, None], 2, axis=1)
+
+
+def test_a_floor_of_two_cells_is_two_rectangles(quads: Any) -> None:
+    scene, corner, source = floor_in_pieces(quads, (1, 2, 3))
+    owner = owners(corner, lambda x, z: x > 2)
+    mesh = joined(scene, Pieces(corner, source, owner), owner, scene.tolerance)
+    assert np.bincount(mesh.triangle_cell[:, 0]).tolist() == [2, 2]
+    assert len(mesh.vertex) == 6
+
+
+def test_halves_of_another_look_stay_apart(quads: Any) -> None:
+    scene, corner, source = floor_in_pieces(quads, (2,))
+    owner = owners(corner, lambda x, z: x > 2)
+    shifted = scene.uv + np.array([0, 1e-3])[:, None, None]
+    for other in (
+        {
+            "materials": (Material("one"), Material("other")),
+            "triangle_material": np.array([0, 1], dtype=np.int32),
+        },
+        {"two_sided": np.array([True, False])},
+        {"uv": shifted},
+    ):
+        apart = replace(scene, **other)
+        mesh = joined(apart, Pieces(corner, source, owner), owner, scene.tolerance)
+        # Of each a triangle and a quadrilateral.
+        assert np.bincount(mesh.triangle_source).tolist() == [3, 3], other
+
+
+def test_a_cell_in_the_middle_leaves_a_hole(quads: Any) -> None:
+    scene, corner, source = floor_in_pieces(quads, (1, 3), (0.25, 0.5))
+
+    def who(x: np.ndarray, z: np.ndarray) -> np.ndarray:
+        inner = (x > 1) & (x < 3) & (z > 0.25) & (z < 0.5)
+        return np.where((x > 3) & (z > 0.5), -1, inner)
+
+    owner = owners(corner, who)
+    mesh = joined(scene, Pieces(corner, source, owner), owner, scene.tolerance)
+    cell, area = mesh.triangle_cell[:, 0], areas(corners_of(mesh))
+    assert np.bincount(cell, area).tolist() == pytest.approx([3, 0.5])
+    # Six corners around, one of which is a corner of the hole, and three more of that.
+    assert np.bincount(cell).tolist() == [8, 2]
+    known = {tuple(p) for p in corner[..., :3].reshape(-1, 3)}
+    assert {tuple(p) for p in mesh.vertex} <= known
+
+
+def test_texture_coordinates_stay(given: tuple[Any, ...]) -> None:
+    """At random points of the joined pieces, texture coordinates are those of some triangle of the
+    model there, of the same material."""
+    scene, pieces, owner, tolerance = given
+    mesh = joined(scene, pieces, owner, tolerance)
+    rng = np.random.default_rng(5)
+    some = rng.choice(len(mesh.triangle), 200)
+    weight = rng.dirichlet([1, 1, 1], len(some))
+    point = np.einsum("nc,ncx->nx", weight, corners_of(mesh)[some])
+    shown = np.einsum("nc,ncx->nx", weight, mesh.vertex_uv[mesh.triangle[some]])
+    a, b, c = scene.corners.transpose(1, 0, 2)
+    sides = np.stack([b - a, c - a], axis=2)
+    inverse = np.linalg.pinv(sides)
+    for p, uv, source in zip(point, shown, mesh.triangle_source[some], strict=True):
+        place = np.einsum("tij,tj->ti", inverse, p - a)
+        off = np.linalg.norm(p - a - np.einsum("tij,tj->ti", sides, place), axis=1)
+        there = (place.min(axis=1) > -1e-6) & (place.sum(axis=1) < 1 + 1e-6)
+        there &= off < 2 * tolerance.file
+        there &= scene.triangle_material == scene.triangle_material[source]
+        said = scene.uv[there, 0] + np.einsum(
+            "tk,tkj->tj", place[there], scene.uv[there, 1:] - scene.uv[there, :1]
+        )
+        assert np.abs(said - uv).max(axis=1).min() < 2e-5
