@@ -132,7 +132,7 @@ class _Network:
         same, number = distinct(points), welded(points, reach)
         number = np.where(same < model.size // 3, same, number)
         whole, corner = np.split(number.reshape(-1, 3), [len(triangle)])
-        sound = _wide(points[corner], reach)
+        sound = (corner != np.roll(corner, 1, axis=1)).all(axis=1)
         corner, of = corner[sound], of[sound]
         cut = Pieces(cut.corner[sound], cut.source[sound], cut.leaf[sound])
 
@@ -189,7 +189,7 @@ class _Network:
 
     def _triangles(self, outline: Edges, fixed: Bools) -> tuple[Ints, Ints]:
         """(m, 3) edges of the outlines of unions, whose starts are the corners of triangles, and
-        (m,) the union of each; without corners that no edge needs, save those that are ``fixed``."""
+        (m,) the union of each; without corners that no edge needs, unless they are ``fixed``."""
         frame, origin = self.frame[outline.polygon], self.points[self.corner[outline.polygon, 0]]
         ends = np.stack([self.points[outline.start], self.points[outline.end]], axis=1)
         flat = np.einsum("nek,nfk->nef", ends - origin[:, None], frame)
@@ -226,12 +226,6 @@ class _Network:
         start = union[self.edges.polygon] * len(self.points) + self.edges.start
         known, first = np.unique(start, return_index=True)
         return np.asarray(first[np.searchsorted(known, key)])
-
-
-def _wide(corners: Floats, reach: float) -> Bools:
-    """(n,) which of the (n, 3, 3) triangles are higher than ``reach`` on their longest side."""
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    return np.asarray(np.linalg.norm(normals(corners), axis=1) > reach * longest)
 
 
 def _lines(whole: Ints, of: Ints, edges: Edges, start: Floats, end: Floats) -> Ints:
