@@ -51,6 +51,8 @@ class Mesh:
     triangle: NDArray[np.int32]
     triangle_source: NDArray[np.int32]
     triangle_cell: NDArray[np.int32]
+    visible: int
+    owners: int
 
 
 @dataclass(frozen=True)
@@ -60,10 +62,10 @@ class _Parts:
     point: Floats  # (n, 3, 3) corners
     uv: Floats  # (n, 3, 2)
     source: Ints  # (n,)
-    owner: Ints  # (n, 2)
+    owner: NDArray[np.integer]  # (n, 2)
 
 
-def joined(scene: Scene, pieces: Pieces, owner: NDArray[np.integer], tolerance: Tolerance) -> Mesh:
+def joined(scene: Scene, pieces: Pieces, owner: NDArray[np.int32], tolerance: Tolerance) -> Mesh:
     """Join pieces with the same ``owner``: (M, 2) the cells in front of and behind each piece, -1
     for none. Pieces that are nobody's are dropped."""
     count = len(scene.triangles)
@@ -77,7 +79,6 @@ def joined(scene: Scene, pieces: Pieces, owner: NDArray[np.integer], tolerance: 
     beside = single & _sharing_edges(corner, parted)
     whole = np.flatnonzero(single & ~beside)
     taken = owned & parted[pieces.source]
-    owner = owner.astype(np.int64)
     uncut = np.tile(np.eye(3), (int(beside.sum()), 1, 1))
     cut = Pieces(
         np.concatenate([np.dstack([scene.corners[beside], uncut]), pieces.corner[taken]]),
@@ -85,7 +86,20 @@ def joined(scene: Scene, pieces: Pieces, owner: NDArray[np.integer], tolerance: 
         np.concatenate([owner[first[beside]], owner[taken]]),
     )
     ready = _Parts(scene.corners[whole], scene.uv[whole], whole, owner[first[whole]])
-    return _mesh([ready, *_Network.of(scene, cut, parted, tolerance).parts(scene)])
+    return _mesh(
+        [ready, *_Network.of(scene, cut, parted, tolerance).parts(scene)],
+        _emitters(scene, pieces.source, owner),
+    )
+
+
+def _emitters(scene: Scene, source: Ints, owner: NDArray[np.int32]) -> Ints:
+    """(n,) a triangle of the scene for each cell that emits some of it, ascending."""
+    front, back = owner.T
+    behind = (back != front) & scene.two_sided[source]
+    triangle = np.append(source, source[behind])
+    cell = np.append(front, back[behind])
+    code = triangle * (int(cell.max(initial=0)) + 1) + cell
+    return np.unique(code[cell != _NOBODY]) // (int(cell.max(initial=0)) + 1)
 
 
 def _sharing_edges(corner: NDArray[np.integer], marked: Bools) -> Bools:
@@ -261,7 +275,7 @@ def _frames(corners: Floats) -> Floats:
     return np.asarray(np.divide(frame, length, out=np.zeros_like(frame), where=length > 0))
 
 
-def _mesh(parts: list[_Parts]) -> Mesh:
+def _mesh(parts: list[_Parts], emitters: Ints) -> Mesh:
     """Parts in the order of the model's triangles, with the vertices that they share."""
     columns = zip(*(vars(part).values() for part in parts), strict=True)
     point, uv, source, owner = (np.concatenate(column) for column in columns)
@@ -275,4 +289,6 @@ def _mesh(parts: list[_Parts]) -> Mesh:
         triangle=index.reshape(-1, 3).astype(np.int32),
         triangle_source=source[order].astype(np.int32),
         triangle_cell=owner[order].astype(np.int32),
+        visible=len(np.unique(emitters)),
+        owners=len(emitters),
     )

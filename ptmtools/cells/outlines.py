@@ -163,7 +163,8 @@ def _between(point: Floats, before: Floats, after: Floats, reach: float) -> Bool
     with np.errstate(invalid="ignore", divide="ignore"):  # both may be one
         place = np.einsum("ij,ij->i", ahead, way) / np.einsum("ij,ij->i", way, way)
     off = ahead - place[:, None] * way
-    return (place > 0) & (place < 1) & (np.einsum("ij,ij->i", off, off) <= reach**2)
+    near = np.einsum("ij,ij->i", off, off) <= reach**2
+    return np.asarray((place > 0) & (place < 1) & near)
 
 
 def loops(flat: Floats, edges: Edges) -> tuple[Ints, Ints]:
