@@ -14,7 +14,10 @@ import pytest
 from ptmtools.cells import SubdivideOptions, subdivide, subdivision
 from ptmtools.cells.joining import Mesh, joined
 from ptmtools.cells.ownership import Pieces
+from ptmtools.cells.patches import patches
+from ptmtools.cells.triangulation import triangulated
 from ptmtools.cells.vectors import areas
+from ptmtools.cells.welding import distinct, welded
 from ptmtools.scene import ingest
 from ptmtools.scene.model import Material, Scene
 
@@ -238,6 +241,66 @@ def test_a_cell_in_the_middle_leaves_a_hole(quads: Any) -> None:
     assert np.bincount(cell).tolist() == [8, 2]
     known = {tuple(p) for p in corner[..., :3].reshape(-1, 3)}
     assert {tuple(p) for p in mesh.vertex} <= known
+
+
+def test_what_cells_own_is_counted(quads: Any) -> None:
+    scene, corner, source = floor_in_pieces(quads, (1, 2, 3))
+    front = owners(corner, lambda x, z: x > 2)[:, 0]
+    # Behind everything but the far quarter is a third cell; the second half is one-sided.
+    back = owners(corner, lambda x, z: np.where(x > 3, -1, 2))[:, 1]
+    owner = np.stack([front, back], axis=1)
+    two_sided = np.array([True, False])
+    mesh = joined(
+        replace(scene, two_sided=two_sided), Pieces(corner, source, owner), owner, scene.tolerance
+    )
+    assert (mesh.visible, mesh.owners) == (2, 3 + 2)
+
+
+def test_a_column_of_narrow_strips_is_not_flattened(quads: Any) -> None:
+    """Each strip continues the next within rounding, but the first not the last."""
+    angle = np.linspace(0, 0.02, 60)
+    x, z = 30 * np.sin(angle), 30 * np.cos(angle)
+    strips = [
+        [[x[k], 0, z[k]], [x[k + 1], 0, z[k + 1]], [x[k + 1], 1, z[k + 1]], [x[k], 1, z[k]]]
+        for k in range(len(angle) - 1)
+    ]
+    scene = quads(strips)
+    tolerance = replace(scene.tolerance, file=1e-5)
+    one = np.zeros_like(scene.triangle_object)
+    scene = replace(scene, uv=np.zeros_like(scene.uv), triangle_object=one)
+    every = np.arange(len(scene.triangles))
+    _, corner = np.unique(scene.corners.reshape(-1, 3), axis=0, return_inverse=True)
+    numbered = corner.reshape(-1, 3)
+    may = np.ones(len(every), dtype=bool)
+    assert patches(scene, every, numbered, may, tolerance).tolist() == every.tolist()
+    few = patches(scene, every[:4], numbered[:4], may[:4], tolerance)
+    assert len(set(few.tolist())) == 1
+
+
+def test_welded_points_are_near() -> None:
+    points = np.array(
+        [[0, 0, 0], [1, 0, 0], [1e-9, 0, 0], [1, 1e-7, 0], [-0.0, 0, 0], [2e-9, 0, 0]]
+    )
+    assert welded(points, 1.5e-9).tolist() == [0, 1, 0, 3, 0, 0], "by way of another"
+    assert welded(points, 0.0).tolist() == distinct(points).tolist() == [0, 1, 2, 3, 0, 5]
+
+
+@pytest.mark.parametrize("turn", np.linspace(0, 3, 7))
+def test_corners_on_straight_edges_are_used(turn: float) -> None:
+    """A square with corners along its sides, and a hole that touches one of them."""
+    side = [[k / 4, 0] for k in range(4)]
+    outer = [[x, y] for x, y in side] + [[1, x] for x, _ in side]
+    outer += [[1 - x, 1] for x, _ in side] + [[0, 1 - x] for x, _ in side]
+    hole = [[0.25, 0.0], [0.25, 0.5], [0.5, 0.5]]
+    rotation = [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
+    corner = np.array(outer + hole) @ rotation
+    start = np.array([0, len(outer), len(outer) + 3])
+    triangle, polygon = triangulated(corner, start, np.array([0, 0]))
+    assert polygon.tolist() == [0] * (16 + 3 + 2 - 2 - 2)
+    area = areas(np.pad(corner[triangle], ((0, 0), (0, 0), (0, 1))))
+    assert area.sum() == pytest.approx(1 - 0.0625)
+    assert area.min() > 1e-3
+    assert len({tuple(p) for p in corner[triangle].reshape(-1, 2)}) == 18
 
 
 def test_texture_coordinates_stay(given: tuple[Any, ...]) -> None:
