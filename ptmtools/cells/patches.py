@@ -81,20 +81,20 @@ def _continues(
 ) -> tuple[Bools, Bools]:
     """Whether triangles ``other`` lie in the planes of triangles ``one`` and face the same way, and
     whether they have the texture coordinates that these would have there."""
-    a = corners[one, 0]
-    u, v = corners[one, 1] - a, corners[one, 2] - a
-    uu, uv_, vv = (np.einsum("ij,ij->i", p, q) for p, q in ((u, u), (u, v), (v, v)))
+    origin = corners[one, 0]
+    a, b = corners[one, 1] - origin, corners[one, 2] - origin
+    aa, ab, bb = (np.einsum("ij,ij->i", p, q) for p, q in ((a, a), (a, b), (b, b)))
     across = normals(corners)
     flat = np.einsum("ij,ij->i", across[one], across[other]) > 0
     same = np.ones(len(one), dtype=np.bool_)
     with np.errstate(divide="ignore", invalid="ignore"):  # one without area is continued by none
-        scale = 1 / (uu * vv - uv_**2)
+        scale = 1 / (aa * bb - ab**2)
         for k in range(3):
-            w = corners[other, k] - a
-            wu, wv = (np.einsum("ij,ij->i", w, p) for p in (u, v))
-            x = ((vv * wu - uv_ * wv) * scale)[:, None]
-            y = ((uu * wv - uv_ * wu) * scale)[:, None]
-            flat &= np.linalg.norm(w - x * u - y * v, axis=1) <= tolerance.file
+            to = corners[other, k] - origin
+            to_a, to_b = (np.einsum("ij,ij->i", to, side) for side in (a, b))
+            x = ((bb * to_a - ab * to_b) * scale)[:, None]
+            y = ((aa * to_b - ab * to_a) * scale)[:, None]
+            flat &= np.linalg.norm(to - x * a - y * b, axis=1) <= tolerance.file
             said = uv[one, 0] + x * (uv[one, 1] - uv[one, 0]) + y * (uv[one, 2] - uv[one, 0])
             same &= np.abs(said - uv[other, k]).max(axis=1) <= _UV
     return flat, same

@@ -160,11 +160,13 @@ def test_a_planted_junction_is_found(quads: Any, room_faces: Any, partition: Any
 
 
 def floor_in_pieces(
-    quads: Any, x: tuple[float, ...], z: tuple[float, ...] = ()
+    quads: Any, x: tuple[float, ...], z: tuple[float, ...] = (), times: int = 1
 ) -> tuple[Scene, np.ndarray, np.ndarray]:
-    """A floor of 4 m × 1 m, cut at ``x`` and at ``z``: the scene, (M, 3, 6) corners as `Pieces` has
-    them, and (M,) sources."""
-    scene = quads([[[0, 0, 0], [0, 0, 1], [4, 0, 1], [4, 0, 0]]])
+    """A floor of 4 m × 1 m, there so many ``times``, cut at ``x`` and ``z``: the scene, (M, 3, 6)
+    corners as `Pieces` has them, and (M,) sources."""
+    scene = quads([[[0, 0, 0], [0, 0, 1], [4, 0, 1], [4, 0, 0]]] * times)
+    if times > 1:
+        scene = replace(scene, triangle_object=np.zeros_like(scene.triangle_object))
     corner, source = [], []
     for t, triangle in enumerate(scene.corners):
         system = np.vstack([triangle.T[[0, 2]], np.ones(3)])
@@ -206,6 +208,15 @@ def test_a_floor_of_two_cells_is_two_rectangles(quads: Any) -> None:
     mesh = joined(scene, Pieces(corner, source, owner), owner, scene.tolerance)
     assert np.bincount(mesh.triangle_cell[:, 0]).tolist() == [2, 2]
     assert len(mesh.vertex) == 6
+
+
+def test_a_floor_that_is_there_twice_stays_so(quads: Any) -> None:
+    scene, corner, source = floor_in_pieces(quads, (1, 2, 3), times=2)
+    owner = owners(corner, lambda x, z: x > 2)
+    mesh = joined(scene, Pieces(corner, source, owner), owner, scene.tolerance)
+    area = areas(corners_of(mesh))
+    assert np.bincount(mesh.triangle_cell[:, 0], area).tolist() == pytest.approx([4, 4])
+    assert len(mesh.triangle) < len(corner)
 
 
 def test_halves_of_another_look_stay_apart(quads: Any) -> None:
