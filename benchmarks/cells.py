@@ -1,10 +1,14 @@
-"""The test models in cells: ``python benchmarks/cells.py [MODEL…] [--wall-area 8 4 2 1]``
+"""The test models in cells: ``python benchmarks/cells.py [MODEL…] [OPTION]``
 
 Prints a Markdown table with a row for each model at the default options: triangles, cells, leaves,
-portals, and the average share of all cells that a cell may see. With ``--wall-area`` a row for
-each least wall area, where each leaf is a cell. All figures are exact: the same on every machine.
-What the settings cost in seconds is in the tables of pvs_trade.py. The museum is made on the spot,
-with textures of 16 texels, which change none of this.
+portals, and the average share of all cells that a cell may see. With ``--wall-area 8 4 2 1`` a row
+for each least wall area, where each leaf is a cell. With ``--joined`` how many triangles of each
+model some cell emits; how many that are if each counts once for every cell that emits some of it;
+and how many triangles are emitted, as cut to the leaves and joined again.
+
+All figures are exact: the same on every machine. What the settings cost in seconds is in the tables
+of pvs_trade.py. The museum is made on the spot, with textures of 16 texels, which change none of
+this.
 """
 
 from __future__ import annotations
@@ -14,10 +18,12 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from unittest.mock import patch
 
+import numpy as np
 from at_hand import MODELS, MUSEUM, ROOT
 
-from ptmtools.cells import SubdivideOptions, subdivide
+from ptmtools.cells import SubdivideOptions, subdivide, subdivision
 from ptmtools.scene import Scene, ingest
 from ptmtools.visibility import compute_pvs
 
@@ -52,13 +58,40 @@ def area_row(name: str, scene: Scene, area: float) -> str:
     return f"| {name} | {shown} | {cells.leaf_count:,} | {cells.portal_count:,} | {share:.1%} |"
 
 
+def joined_row(name: str, scene: Scene) -> str:
+    """The triangles of a model before and after joining."""
+    with patch.object(subdivision, "joined", wraps=subdivision.joined) as joined:
+        cells = subdivide(scene)
+    _, pieces, owner, _ = joined.call_args.args
+    front, back = owner.T
+    behind = (back >= 0) & (back != front) & scene.two_sided[pieces.source]
+    cut = np.count_nonzero(front >= 0) + np.count_nonzero(behind)
+    emitted = len(cells.emitted(scene.two_sided)[0])
+    counts = len(scene.triangles), cells.visible, cells.owners, cut, emitted
+    shares = f"{cut / cells.owners:.2f} | {emitted / cells.owners:.2f}"
+    return f"| {name} | {' | '.join(f'{n:,}' for n in counts)} | {shares} |"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     at_hand = [name for name in MODELS if name == MUSEUM or MODELS[name].is_file()]
     parser.add_argument("models", nargs="*", default=at_hand, help=f"of {' '.join(MODELS)}")
     parser.add_argument("--wall-area", nargs="+", type=float, metavar="M2")
+    parser.add_argument("--joined", action="store_true")
     given = parser.parse_args()
-    if given.wall_area:
+    if given.joined:
+        columns = (
+            "triangles",
+            "seen",
+            "by cell",
+            "cut",
+            "joined",
+            "cut / by cell",
+            "joined / by cell",
+        )
+        print(f"| model | {' | '.join(columns)} |")
+        print("|---|---|---|---|---|---|---|---|")
+    elif given.wall_area:
         print("| model | wall area, m² | leaves | portals | average PVS of leaves |")
         print("|---|---|---|---|---|")
     else:
@@ -66,7 +99,9 @@ def main() -> None:
         print("|---|---|---|---|---|---|---|")
     for name in given.models:
         scene = opened(name)
-        if not given.wall_area:
+        if given.joined:
+            print(joined_row(name, scene), flush=True)
+        elif not given.wall_area:
             print(row(name, scene), flush=True)
         for area in given.wall_area or ():
             print(area_row(name, scene, area), flush=True)

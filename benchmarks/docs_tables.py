@@ -49,6 +49,9 @@ ALL = "museum hospital willowgarage gallery office"
 BY_AREA = "benchmarks/cells.py {} --wall-area {}"
 TABLES = {
     "scenes": Table("benchmarks/cells.py", "benchmarks/cells.py museum hospital gallery"),
+    "joined": Table(
+        "benchmarks/cells.py --joined", "benchmarks/cells.py --joined hospital gallery"
+    ),
     "wall-area": Table(
         BY_AREA.format("museum hospital willowgarage gallery", "8 4 2 1"),
         BY_AREA.format("gallery", "8 4 2"),

@@ -22,6 +22,9 @@ CLUSTER_SHARE = 1e-3
 #: But for what is farther apart than this share of the thickness that walls may have (6 cm of the
 #: usual 50): in a building of 250 m the other face of a wall of 20 cm is no picture.
 CLUSTER_OF_WALL = 0.12
+#: What coordinates in model files may be off by, having six decimals or 24 bits: points that were
+#: meant to lie in one plane lie so far from it. 5 µm in a building of 50 m.
+FILE_SHARE = 1e-7
 #: A cell thinner than this is refused: it could be flat after rounding to float32, and it must be
 #: thicker than the on-plane distance. 0.5 mm in a building of 50 m.
 THIN_SHARE = 1e-5
@@ -59,6 +62,7 @@ class Tolerance:
     extent: largest side of the scene's bounding box, metres.
     plane: a point nearer than this to a plane lies in it.
     cluster: parallel planes nearer than this count as one wall.
+    file: coordinates in model files are rounded by so much.
     thin: the least thickness of a cell.
     hairline: an opening narrower than this is a crack.
     rounding: distances below this are rounding errors of the arithmetic itself.
@@ -70,6 +74,7 @@ class Tolerance:
     extent: float
     plane: float
     cluster: float
+    file: float
     thin: float
     hairline: float
     rounding: float
@@ -102,6 +107,7 @@ class Tolerance:
             extent=extent,
             plane=PLANE_SHARE * extent,
             cluster=CLUSTER_SHARE * extent,
+            file=FILE_SHARE * extent,
             thin=THIN_SHARE * extent,
             hairline=HAIRLINE_SHARE * extent,
             rounding=ROUNDING_SHARE * extent,

@@ -52,6 +52,9 @@ class Cells:
     triangle_cell: (M, 2) int32 the cell on its front and on its back. Equal where the piece lies
         inside a cell; different only where it lies in a boundary; -1 where that side is no cell.
         A pixel of the item buffer counts for the viewer's side.
+    visible: how many of the scene's triangles some cell emits.
+    owners: how many cells emit each of these, in all: as many triangles as there would be if
+        cutting made none.
     tolerance: that of the scene.
     closed: whether the flood of the reachable never met the root box.
     notes: what the subdivision has to say, one line each ("open above: …").
@@ -79,6 +82,8 @@ class Cells:
     tolerance: Tolerance
     closed: bool = True
     notes: tuple[str, ...] = ()
+    visible: int = 0
+    owners: int = 0
 
     @property
     def leaf_count(self) -> int:
@@ -161,7 +166,7 @@ class Cells:
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
         """The subdivision as plain arrays."""
         arrays = {f.name: getattr(self, f.name) for f in fields(self)}
-        about = {"closed": arrays.pop("closed"), "notes": arrays.pop("notes")}
+        about = {name: arrays.pop(name) for name in ("closed", "notes", "visible", "owners")}
         text = json.dumps(about, sort_keys=True, ensure_ascii=False)
         extent = np.array(arrays.pop("tolerance").extent)
         return {**arrays, "extent": extent, "about": np.frombuffer(text.encode(), dtype=np.uint8)}
@@ -227,6 +232,8 @@ class Cells:
             tolerance=Tolerance.for_extent(stored.array("extent", np.float64, finite=True).item()),
             closed=bool(about["closed"]),
             notes=texts(about["notes"], "notes"),
+            visible=int(about["visible"]),
+            owners=int(about["owners"]),
         )
 
 

@@ -8,6 +8,7 @@
    again, so that the open space over low walls does not join everything to everything.
 3. The geometry is cut to the leaves, and each piece gets its owners (`ownership`).
 4. Each reachable leaf is a cell, or the leaves of a room are (`grouping`).
+5. Pieces of the geometry with the same owners are joined again (`joining`).
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from ptmtools.cells.bsp import Tree, build_tree
 from ptmtools.cells.cut_off import CutOff, cut_off
 from ptmtools.cells.emptiness import check_seen
 from ptmtools.cells.grouping import grouped
+from ptmtools.cells.joining import joined
 from ptmtools.cells.model import OUTSIDE, Cells, sunk
 from ptmtools.cells.naming import matches
 from ptmtools.cells.options import SubdivideOptions, Walker
@@ -34,7 +36,6 @@ from ptmtools.cells.reach import at_box, flood, largest_leaf, roofed_share
 from ptmtools.cells.rejoin import rejoined
 from ptmtools.cells.reveals import Reveals
 from ptmtools.cells.structure import Structure, WallPlane, find_walls
-from ptmtools.cells.welding import distinct
 from ptmtools.errors import InputError
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
@@ -134,7 +135,10 @@ def subdivide(
             )
         )
     pieces = cut_to_leaves(scene, space.tree, tolerance)
-    cells = grouped(_assemble(scene, space, pieces, notes), options)
+    owner = _named(space.reached)[pieces.leaf]
+    cells = grouped(_assemble(scene, space, pieces, owner, notes), options)
+    owner = np.append(cells.leaf_cell, np.int32(-1))[owner]
+    cells = replace(cells, **vars(joined(scene, pieces, owner, tolerance)))
     check_seen(scene, cells)
     return cells
 
@@ -264,10 +268,18 @@ def _open_note(space: _Space, roofed: float, box: Floats) -> str:
     return Warned(note) if roofed < ROOFED else note
 
 
-def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> Cells:
+def _named(keep: Bools) -> NDArray[np.int32]:
+    """(L,) the new names of the leaves that are kept, -1 for the others."""
+    return np.where(keep, np.cumsum(keep) - 1, -1).astype(np.int32)
+
+
+def _assemble(
+    scene: Scene, space: _Space, pieces: Pieces, owner: NDArray[np.int32], notes: list[str]
+) -> Cells:
+    """Cells that are single leaves, with the pieces of the geometry as they were cut."""
     tree = space.tree
     keep = space.reached
-    rename = np.where(keep, np.cumsum(keep) - 1, -1).astype(np.int32)
+    rename = _named(keep)
     bodies = [tree.leaves[i] for i in np.flatnonzero(keep)]
     portals = [portal for portal in space.portals if keep[[*portal.leaves]].all()]
     ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
@@ -276,7 +288,6 @@ def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> 
     leaf = rename[-2 - children[is_leaf]]
     children[is_leaf] = np.where(leaf >= 0, -2 - leaf, OUTSIDE)
 
-    owner = rename[pieces.leaf]
     owned = np.any(owner >= 0, axis=1)
     nowhere = np.ones(len(scene.triangles), dtype=bool)
     nowhere[pieces.source[owned]] = False
@@ -287,7 +298,9 @@ def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> 
     if dropped:
         unreached = f"{dropped} of {len(keep)} leaves (convex pieces of space)"
         notes = [*notes, f"{unreached} cannot be reached from inside and were dropped"]
-    vertex, vertex_uv, triangle = _weld(scene, pieces, owned)
+    corners = scene.corners[pieces.source]
+    corners[pieces.cut] = pieces.corner[..., :3]
+    vertex = corners[owned].reshape(-1, 3)
 
     point_start = _starts(len(b.points) for b in bodies)
     loops = [loop + point_start[i] for i, b in enumerate(bodies) for loop in b.faces]
@@ -307,10 +320,10 @@ def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> 
         portal_start=_starts(len(portal.polygon) for portal in portals),
         portal_area=np.array([portal.area for portal in portals]),
         vertex=vertex,
-        vertex_uv=vertex_uv,
-        triangle=triangle,
+        vertex_uv=np.zeros((len(vertex), 2)),
+        triangle=np.arange(len(vertex), dtype=np.int32).reshape(-1, 3),
         triangle_source=pieces.source[owned].astype(np.int32),
-        triangle_cell=owner[owned].astype(np.int32),
+        triangle_cell=owner[owned],
         tolerance=scene.tolerance,
         closed=space.closed,
         notes=tuple(notes),
@@ -320,16 +333,3 @@ def _assemble(scene: Scene, space: _Space, pieces: Pieces, notes: list[str]) -> 
 def _starts(lengths: Iterable[int]) -> Ints:
     """(n + 1,) where the rows of a CSR begin."""
     return np.cumsum([0, *lengths], dtype=np.int64)
-
-
-def _weld(scene: Scene, pieces: Pieces, owned: Bools) -> tuple[Floats, Floats, NDArray[np.int32]]:
-    """Vertices (position and texture coordinate) shared by the pieces, and (M, 3) indices."""
-    source = pieces.source
-    both = np.concatenate([scene.corners[source], scene.uv[source]], axis=2)
-    points, shares = np.split(pieces.corner, 2, axis=2)
-    both[pieces.cut, :, :3] = points
-    both[pieces.cut, :, 3:] = np.einsum("mcw,mwk->mck", shares, scene.uv[source[pieces.cut]])
-    rows = both[owned].reshape(-1, 5) + 0.0
-    first, index = distinct(rows)
-    vertex = rows[first]
-    return vertex[:, :3].copy(), vertex[:, 3:].copy(), index.reshape(-1, 3).astype(np.int32)

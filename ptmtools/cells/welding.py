@@ -14,10 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bits, Bools, Floats, Ints
+from ptmtools.cells.merging import connected
 
 #: Odd, with no pattern in its bits: 2⁶⁴ over the golden ratio.
 _FACTOR = np.uint64(0x9E3779B97F4A7C15)
 _HALF = np.uint64(32)
+#: A direction in no simple relation to the axes of any building.
+_ACROSS = np.array([0.683, 0.577, 0.448])
 
 
 @dataclass(frozen=True)
@@ -88,3 +91,33 @@ def across_edges(triangle: NDArray[np.integer], turned: Bools) -> NDArray[np.int
     beyond = np.full(3 * count, -1, dtype=np.int32)
     beyond[a], beyond[b] = b // 3, a // 3
     return beyond.reshape(-1, 3)
+
+
+def first_alike(rows: NDArray[np.float64] | NDArray[np.int64]) -> Ints:
+    """(n,) the first of the (n, w) rows that each is equal to."""
+    first, row = distinct(rows)
+    return first[row]
+
+
+def welded(points: Floats, reach: float) -> Ints:
+    """(n,) the first of the (n, 3) points that each is no farther from than ``reach``, directly or
+    by way of others."""
+    first = first_alike(points)
+    one_each = np.flatnonzero(first == np.arange(len(first)))
+    # What is near in space is near along any direction.
+    along = points[one_each] @ _ACROSS
+    order = np.argsort(along, kind="stable")
+    place, step = np.arange(len(order)), 1
+    pairs = [np.zeros((2, 0), dtype=np.int64)]
+    while len(place := place[place + step < len(order)]):
+        pair = order[np.stack([place, place + step])]
+        near = along[pair[1]] - along[pair[0]] <= reach
+        place, pair = place[near], pair[:, near]
+        apart = np.subtract(*points[one_each[pair]])
+        pairs.append(pair[:, np.einsum("ij,ij->i", apart, apart) <= reach**2])
+        step += 1
+    one, other = np.concatenate(pairs, axis=1)
+    group = connected(len(one_each), np.append(one, other), np.append(other, one))
+    to = np.arange(len(points))
+    to[one_each] = one_each[group]
+    return to[first]

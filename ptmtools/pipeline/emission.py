@@ -45,6 +45,8 @@ class EmissionJob(Job):
             "bytes": report.bytes,
             "shapes": report.shapes,
             "triangles": report.triangles,
+            "visible": run[CELLS].visible,
+            "owners": run[CELLS].owners,
             "collapsed": report.collapsed,
             "viewpoints": len(report.viewpoints),
             "visit": asdict(report.visit),

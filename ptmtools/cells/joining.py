@@ -1,0 +1,304 @@
+"""Pieces with the same owners are joined again.
+
+Geometry is cut to the leaves (`ownership`), and only then do leaves become cells. So triangles are
+cut where leaves of one cell part, by planes with one owner on both sides, and each cut makes two
+triangles of a quadrilateral. Here a triangle all of whose pieces have the same owners comes back as
+it was, to the last bit. Of the others, and of those that continue each other (`patches`), pieces
+with the same owners are united (`outlines`) and divided into triangles anew (`triangulation`).
+
+No position is new, and a corner goes from an edge only if it goes from all that have it there,
+whoever owns them; where one triangle has a corner on an edge, so have all others that share the
+edge. So nothing gapes that did not gape before, neither between parts of a triangle nor between
+triangles. (Cutting alone leaves gaps: a wall that lies in a plane is cut to the leaves on both its
+sides, the floor that it stands on only to those in front of it.)
+
+Triangles that go through GEOS are those of several owners; all others cost a few sorts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.outlines import (
+    Edges,
+    bent_corners,
+    loops,
+    split_at_corners,
+    straight_corners,
+    united,
+)
+from ptmtools.cells.ownership import Pieces
+from ptmtools.cells.patches import patches
+from ptmtools.cells.triangulation import triangulated
+from ptmtools.cells.vectors import cross, normals, ranges
+from ptmtools.cells.welding import distinct, first_alike, welded
+from ptmtools.scene.model import Scene
+from ptmtools.tolerance import Tolerance
+
+_NOBODY = -1
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """The geometry cut to the cells; the attributes are those of `Cells`."""
+
+    vertex: Floats
+    vertex_uv: Floats
+    triangle: NDArray[np.int32]
+    triangle_source: NDArray[np.int32]
+    triangle_cell: NDArray[np.int32]
+    visible: int
+    owners: int
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """Pieces that may be joined."""
+
+    corner: Floats  # (K, 3, 6) as in `Pieces`
+    source: Ints  # (K,)
+    owner: NDArray[np.integer]  # (K, 2)
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """Triangles on their way to a mesh."""
+
+    point: Floats  # (n, 3, 3) corners
+    uv: Floats  # (n, 3, 2)
+    source: Ints  # (n,)
+    owner: NDArray[np.integer]  # (n, 2)
+
+
+def joined(scene: Scene, pieces: Pieces, owner: NDArray[np.int32], tolerance: Tolerance) -> Mesh:
+    """Join pieces with the same ``owner``: (M, 2) the cells in front of and behind each piece, -1
+    for none. Pieces that are nobody's are dropped."""
+    count = len(scene.triangles)
+    owned = (owner != _NOBODY).any(axis=1)
+    first = np.searchsorted(pieces.source, np.arange(count))
+    alike = (owner == owner[first[pieces.source]]).all(axis=1)
+    single = np.bincount(pieces.source, ~alike, count) == 0
+    parted = np.bincount(pieces.source, owned, count) > 0
+    single, parted = single & parted, parted & ~single
+    corner = first_alike(scene.points)[scene.triangles]
+    beside = single & _sharing_edges(corner, parted)
+    whole = np.flatnonzero(single & ~beside)
+    taken = owned & parted[pieces.source]
+    uncut = np.tile(np.eye(3), (int(beside.sum()), 1, 1))
+    # What has several owners is cut.
+    parts = pieces.corner[np.searchsorted(pieces.cut, np.flatnonzero(taken))]
+    cut = _Cut(
+        np.concatenate([np.dstack([scene.corners[beside], uncut]), parts]),
+        np.concatenate([np.flatnonzero(beside), pieces.source[taken]]),
+        np.concatenate([owner[first[beside]], owner[taken]]),
+    )
+    ready = _Parts(scene.corners[whole], scene.uv[whole], whole, owner[first[whole]])
+    return _mesh(
+        [ready, *_Network.of(scene, cut, parted, tolerance).parts(scene)],
+        _emitters(scene, pieces.source, owner),
+    )
+
+
+def _emitters(scene: Scene, source: Ints, owner: NDArray[np.int32]) -> Ints:
+    """(n,) a triangle of the scene for each cell that emits some of it, ascending."""
+    front, back = owner.T
+    behind = (back != front) & scene.two_sided[source]
+    triangle = np.append(source, source[behind])
+    cell = np.append(front, back[behind])
+    code = triangle * (int(cell.max(initial=0)) + 1) + cell
+    return np.unique(code[cell != _NOBODY]) // (int(cell.max(initial=0)) + 1)
+
+
+def _sharing_edges(corner: NDArray[np.integer], marked: Bools) -> Bools:
+    """(T,) which triangles, (T, 3) numbers of their corners, share an edge with a marked one."""
+    touched = np.zeros(int(corner.max(initial=-1)) + 1, dtype=np.bool_)
+    touched[corner[marked]] = True
+    near = np.flatnonzero(touched[corner].sum(axis=1) >= 2)
+    code = _codes(corner[near], len(touched))
+    sharing = np.zeros(len(corner), dtype=np.bool_)
+    sharing[near] = np.isin(code, code[marked[near]]).any(axis=1)
+    return sharing
+
+
+def _codes(corner: NDArray[np.integer], count: int) -> Ints:
+    """(T, 3) a number for the edge that begins in each corner, below ``count``, of each triangle,
+    the same in both directions."""
+    start = corner.astype(np.int64)
+    end = np.roll(start, -1, axis=1)
+    return np.minimum(start, end) * count + np.maximum(start, end)
+
+
+@dataclass(frozen=True)
+class _Network:
+    """Pieces of triangles that share edges, each edge split at all corners on it."""
+
+    cut: _Cut
+    points: Floats  # (n, 3) by the numbers of corners
+    name: Ints  # (K,) the triangle of the scene that stands for each
+    corner: Ints  # (K, 3) numbers of the corners of each piece
+    kind: Ints  # (K,) the same for pieces that may be united
+    frame: Floats  # (K, 2, 3) two unit vectors in the plane of each piece
+    fixed: Bools  # (n,) which corners are those of the model
+    edges: Edges
+    weight: Floats  # (m, 3) where edges start: barycentric, in the triangle of their piece
+    reach: float
+
+    @staticmethod
+    def of(scene: Scene, cut: _Cut, parted: Bools, tolerance: Tolerance) -> _Network:
+        reach = tolerance.rounding
+        triangle, of = np.unique(cut.source, return_inverse=True)
+        model = scene.corners[triangle]
+        points = np.concatenate([model.reshape(-1, 3), cut.corner[..., :3].reshape(-1, 3)])
+        # The model's own corners stay what they are, however near each other.
+        same, number = first_alike(points), welded(points, reach)
+        number = np.where(same < model.size // 3, same, number)
+        whole, corner = np.split(number.reshape(-1, 3), [len(triangle)])
+        sound = (corner != np.roll(corner, 1, axis=1)).all(axis=1)
+        corner, of = corner[sound], of[sound]
+        cut = _Cut(cut.corner[sound], cut.source[sound], cut.owner[sound])
+
+        piece = np.repeat(np.arange(len(corner)), 3)
+        edges = Edges(corner.reshape(-1), np.roll(corner, -1, axis=1).reshape(-1), piece)
+        start = cut.corner[..., 3:].reshape(-1, 3)
+        end = np.roll(cut.corner[..., 3:], -1, axis=1).reshape(-1, 3)
+        lines = _lines(whole, of, edges, start, end)
+        parts, edge, place = split_at_corners(points, edges, lines, reach)
+        group = patches(scene, triangle, whole, parted[triangle], tolerance)
+        _, kind = np.unique(np.column_stack([group[of], cut.owner]), axis=0, return_inverse=True)
+        fixed = np.zeros(len(points), dtype=np.bool_)
+        fixed[whole] = True
+        return _Network(
+            cut=cut,
+            points=points,
+            name=triangle[group[of]],
+            corner=corner,
+            kind=kind.reshape(-1),
+            frame=_frames(model)[group[of]],
+            fixed=fixed,
+            edges=parts,
+            weight=start[edge] + place[:, None] * (end[edge] - start[edge]),
+            reach=reach,
+        )
+
+    def parts(self, scene: Scene) -> list[_Parts]:
+        """The triangles of the unions of pieces. A union that cannot be divided into triangles, as
+        in models with folds as thin as rounding, stays in pieces, with all its corners."""
+        count = len(self.corner)
+        apart, fixed = np.zeros(count, dtype=np.bool_), self.fixed.copy()
+        while True:
+            kind = np.where(apart, len(self.points) + np.arange(count), self.kind)
+            outline, union = united(self.edges, kind)
+            row, of = self._triangles(outline, fixed)
+            done = np.zeros(count, dtype=np.bool_)
+            done[of] = True
+            lost = ~done[union] & ~apart
+            if not lost.any():
+                break
+            apart |= lost
+            fixed[self.edges.start[lost[self.edges.polygon]]] = True
+        left = np.flatnonzero(~done[union])  # pieces alone that cannot be divided either
+        corner = outline.start[row]
+        at = self._first_starts(union, of[:, None] * len(self.points) + corner)
+        source = self.cut.source[self.edges.polygon[at]]
+        uv = np.einsum("mcw,mcwk->mck", self.weight[at], scene.uv[source])
+        weight = self.cut.corner[left, :, 3:]
+        left_uv = np.einsum("mcw,mwk->mck", weight, scene.uv[self.cut.source[left]])
+        return [
+            _Parts(self.points[corner], uv, self.name[of], self.cut.owner[of]),
+            _Parts(self.points[self.corner[left]], left_uv, self.name[left], self.cut.owner[left]),
+        ]
+
+    def _triangles(self, outline: Edges, fixed: Bools) -> tuple[Ints, Ints]:
+        """(m, 3) edges of the outlines of unions, whose starts are the corners of triangles, and
+        (m,) the union of each; without corners that no edge needs, unless they are ``fixed``."""
+        frame, origin = self.frame[outline.polygon], self.points[self.corner[outline.polygon, 0]]
+        ends = np.stack([self.points[outline.start], self.points[outline.end]], axis=1)
+        flat = np.einsum("nek,nfk->nef", ends - origin[:, None], frame)
+        row, start = loops(flat, outline)
+        corner = outline.start[row]
+        gone = np.zeros(len(self.points), dtype=np.bool_)
+        gone[straight_corners(self.points, outline, self.reach)] = True
+        gone &= ~fixed
+        while len(bent := bent_corners(self.points[corner], start, gone[corner], self.reach)):
+            gone[corner[bent]] = False
+        loop = np.repeat(np.arange(len(start) - 1), np.diff(start))
+        stays = ~gone[corner]
+        stays &= np.bincount(loop[stays], minlength=len(start) - 1)[loop] >= 3
+        row, size = row[stays], np.bincount(loop[stays])
+        size = size[size > 0]
+        start = np.append(0, np.cumsum(size)).astype(np.int64)
+        # The outer loop of each union first; it alone runs counter-clockwise.
+        x, y = flat[row, 0].T
+        after = np.arange(len(row)) + 1
+        after[start[1:] - 1] = start[:-1]
+        area = np.add.reduceat(x * y[after] - y * x[after], start[:-1]) if len(row) else x
+        union = outline.polygon[row[start[:-1]]]
+        order = np.lexsort((area <= 0, union))
+        row = row[ranges(start[order], size[order])]
+        named, polygon = np.unique(union[order], return_inverse=True)
+        start = np.append(0, np.cumsum(size[order]))
+        found, of = triangulated(flat[row, 0], start, polygon.reshape(-1))
+        simple = np.bincount(polygon.reshape(-1), area[order] > 0) == 1
+        found, of = found[simple[of]], of[simple[of]]
+        return row[found], named[of]
+
+    def _first_starts(self, union: Ints, key: Ints) -> Ints:
+        """The first edges that start in corners of unions; ``key``: union · points + corner."""
+        start = union[self.edges.polygon] * len(self.points) + self.edges.start
+        known, first = np.unique(start, return_index=True)
+        return np.asarray(first[np.searchsorted(known, key)])
+
+
+def _lines(whole: Ints, of: Ints, edges: Edges, start: Floats, end: Floats) -> Ints:
+    """(n,) numbers of the lines on which edges of pieces may overlap: an edge of the model, shared
+    by all its triangles, or the inside of a triangle.
+
+    ``whole``: (T, 3) the corners of the triangles; ``of``: (K,) the triangle of each piece;
+    ``start``, ``end``: (n, 3) the ends of the edges, barycentric.
+    """
+    inside = of[edges.polygon]
+    # Cuts do not change a coordinate of 0.
+    on = (start == 0) & (end == 0)
+    # The side opposite to corner k begins in the next.
+    code = np.roll(_codes(whole, int(whole.max(initial=0)) + 1), -1, axis=1)
+    _, side = np.unique(code, return_inverse=True)
+    side = side.reshape(-1, 3)[inside, on.argmax(axis=1)]
+    # Inside most edges have cancelled already, which leaves few corners to compare the others with.
+    number, way = edges.numbered()
+    _, number = np.unique(number * len(whole) + inside, return_inverse=True)
+    number = number.reshape(-1)
+    matched = np.bincount(number, way)[number] == 0
+    within = np.where(matched, len(whole) + np.arange(len(on)), inside)
+    return np.asarray(np.where(on.any(axis=1), side, code.size + within))
+
+
+def _frames(corners: Floats) -> Floats:
+    """(n, 2, 3) unit vectors that span the planes of (n, 3, 3) triangles, right-handed with their
+    normals."""
+    z = normals(corners)
+    across = np.eye(3)[np.argmin(np.abs(z), axis=1)]
+    frame = np.stack([x := cross(across, z), cross(z, x)], axis=1)
+    length = np.linalg.norm(frame, axis=2, keepdims=True)
+    return np.asarray(np.divide(frame, length, out=np.zeros_like(frame), where=length > 0))
+
+
+def _mesh(parts: list[_Parts], emitters: Ints) -> Mesh:
+    """Parts in the order of the model's triangles, with the vertices that they share."""
+    columns = zip(*(vars(part).values() for part in parts), strict=True)
+    point, uv, source, owner = (np.concatenate(column) for column in columns)
+    order = np.argsort(source, kind="stable")
+    rows = np.concatenate([point, uv], axis=2)[order].reshape(-1, 5) + 0.0
+    used, index = distinct(rows)
+    return Mesh(
+        vertex=rows[used, :3].copy(),
+        vertex_uv=rows[used, 3:].copy(),
+        triangle=index.reshape(-1, 3).astype(np.int32),
+        triangle_source=source[order].astype(np.int32),
+        triangle_cell=owner[order].astype(np.int32),
+        visible=len(np.unique(emitters)),
+        owners=len(emitters),
+    )

@@ -1,0 +1,162 @@
+"""Where somebody can stand, and that no such place is lost. What is expected follows from the
+definitions in docs/cells.md; it was written before the first run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ptmtools.cells import Cells, SubdivideOptions, subdivide
+from ptmtools.cells.options import Walker
+from ptmtools.cells.places import Floors, find_places
+from ptmtools.cells.structure import Structure
+from ptmtools.cells.vectors import areas
+from ptmtools.errors import InputError
+from ptmtools.scene.model import Scene
+from tests.conftest import scene_of, subdivided
+
+WALKER = Walker(0.25, 0.5, 1.7)
+SLACK = 0.02  # m², for circles that are polygons
+
+
+def place_area(scene: Scene, options: SubdivideOptions = SubdivideOptions()) -> float:  # noqa: B008
+    structure = Structure.of(scene, options, scene.tolerance)
+    floors = Floors.of(scene, structure, options)
+    places = find_places(floors, structure, Walker(*options.walker))
+    return float(areas(places).sum())
+
+
+def floor_of(x0: float, x1: float, z0: float, z1: float, y: float = 0.0, rise: float = 0.0) -> list:
+    return [[x0, y, z0], [x0, y, z1], [x1, y + rise, z1], [x1, y + rise, z0]]
+
+
+def wall_at(x: float, low: float, high: float, z0: float = -2.0, z1: float = 2.0) -> list:
+    return [[x, low, z0], [x, low, z1], [x, high, z1], [x, high, z0]]
+
+
+@pytest.mark.parametrize(
+    ("faces", "expected"),
+    [
+        pytest.param([floor_of(0, 8, -2, 2)], 32.0, id="nothing stands on it"),
+        pytest.param([floor_of(0, 8, -2, 2), wall_at(4, 0, 3)], 32 - 0.5 * 4, id="a wall"),
+        pytest.param(
+            [floor_of(0, 8, -2, 2), wall_at(4, 0, 0.45)], 32.0, id="a sill one steps over"
+        ),
+        pytest.param([floor_of(0, 8, -2, 2), wall_at(4, 1.8, 3)], 32.0, id="a lintel overhead"),
+        pytest.param([floor_of(0, 8, -2, 2), wall_at(4, 1.6, 3)], 30.0, id="a lintel at the head"),
+        pytest.param(
+            [floor_of(0, 8, -2, 2), floor_of(0, 8, -2, 2, 1.5)], 32.0, id="above a low ceiling only"
+        ),
+        pytest.param(
+            [floor_of(0, 8, -2, 2), wall_at(4, 0, 3, -2, 0)],
+            32 - 0.5 * 2 - np.pi * 0.25**2 / 2,
+            id="round the end of a wall",
+        ),
+        pytest.param([floor_of(0, 8, -2, 2, 0, 6)], 4 * 10.0, id="a ramp of 37 degrees"),
+        pytest.param([floor_of(0, 8, -2, 2, 0, 9)], 0.0, id="a roof of 48 degrees"),
+    ],
+)
+@pytest.mark.parametrize("times", [1, 5])
+def test_where_a_body_fits(faces: list, expected: float, times: int) -> None:
+    scene = subdivided(scene_of(faces), times)
+    assert place_area(scene) == pytest.approx(expected, abs=SLACK)
+
+
+def test_a_ramp_under_a_sloping_ceiling_has_its_head_room_along_the_slope() -> None:
+    ramp = floor_of(0, 8, -2, 2, 0, 4)
+    for above, area in ((1.6, 0.0), (1.8, 4 * np.hypot(8, 4))):
+        ceiling = floor_of(0, 8, -2, 2, above, 4)
+        options = SubdivideOptions()
+        scene = scene_of([ramp, ceiling])
+        structure = Structure.of(scene, options, scene.tolerance)
+        floors = Floors.of(scene, structure, options)
+        below = floors.only(floors.corners[:, :, 1].mean(axis=1) < 2 + above / 2)
+        found = areas(find_places(below, structure, WALKER)).sum()
+        assert found == pytest.approx(area, abs=0.3)
+
+
+def test_stairs_are_places_from_step_to_step() -> None:
+    steps = []
+    for i in range(12):
+        steps.append(floor_of(0.28 * i, 0.28 * (i + 1), -1, 1, 0.17 * (i + 1)))
+        steps.append(wall_at(0.28 * i, 0.17 * i, 0.17 * (i + 1), -1, 1))
+    assert place_area(scene_of(steps)) == pytest.approx(12 * 0.28 * 2, abs=SLACK)
+
+
+def test_a_larger_body_has_fewer_places() -> None:
+    scene = scene_of([floor_of(0, 8, -2, 2), wall_at(4, 0, 3)])
+    wide = SubdivideOptions(walker=(0.5, 0.5, 1.7))
+    assert place_area(scene, wide) == pytest.approx(32 - 4, abs=SLACK)
+
+
+@pytest.mark.parametrize("walker", [(0.0, 0.5, 1.7), (0.25, 1.7, 1.7), (0.25, -1.0, 1.7)])
+def test_nobody_is_like_that(walker: tuple[float, float, float]) -> None:
+    with pytest.raises(InputError, match="nobody"):
+        SubdivideOptions(walker=walker)
+
+
+def located(cells: Cells, *points: tuple[float, float, float]) -> list[bool]:
+    return (cells.locate(np.array(points, dtype=np.float64)) >= 0).tolist()
+
+
+HALL = (10.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("other", "point", "kept"),
+    [
+        pytest.param(((30, 0, -2), (34, 4, 2)), (32, 1, 0), True, id="another building"),
+        pytest.param(((0, 4.3, -4), (20, 8, 4)), (10, 6, 0), True, id="upstairs, without stairs"),
+        pytest.param(((20.2, 0, -4), (26, 4, 4)), (23, 1, 0), True, id="behind a wall"),
+        pytest.param(((20.05, 0, -4), (20.35, 4, 4)), (20.2, 1, 0), False, id="a wall's hollow"),
+        pytest.param(((20.2, 0, 0), (20.6, 4, 0.4)), (20.4, 1, 0.2), False, id="a shaft"),
+        pytest.param(((0, 4.1, -4), (20, 5.2, 4)), (10, 4.6, 0), False, id="above a ceiling"),
+    ],
+)
+def test_what_the_flood_does_not_reach(quads, room_faces, other, point, kept: bool) -> None:
+    scene = quads(room_faces((0, 0, -4), (20, 4, 4)) + room_faces(*other))
+    cells = subdivide(scene)
+    assert cells.closed
+    assert located(cells, HALL, point) == [True, kept]
+    said = [note for note in cells.notes if "to stand on" in note]
+    assert len(said) == kept
+    main = subdivide(scene, SubdivideOptions(reach="main"))
+    assert located(main, HALL, point) == [True, False]
+    for note in said:  # the viewpoint that is named leads there
+        there = tuple(float(c) for c in note.split("around ")[1].split(" ")[0].split(","))
+        options = SubdivideOptions(reach="main", viewpoints=(there,))  # type: ignore[arg-type]
+        assert located(subdivide(scene, options), HALL, point) == [False, True]
+
+
+def test_a_solid_is_no_room_but_a_hollow_box_is(quads, room_faces) -> None:
+    crate = [face[::-1] for face in room_faces((4, 0.5, -1.5), (7, 3.5, 1.5))]
+    scene = quads([*room_faces((0, 0, -4), (20, 4, 4)), *crate])
+    inside = (5.5, 2.0, 0.0)
+    assert located(subdivide(scene), HALL, inside) == [True, True]
+    solid = replace(scene, two_sided=np.zeros(len(scene.triangles), dtype=bool))
+    assert located(subdivide(solid), HALL, inside) == [True, False]
+
+
+def test_the_outside_of_a_closed_building_is_not_kept(quads, room_faces) -> None:
+    # One can stand on the roof and on the ground around it.
+    ground = floor_of(-20, 40, -20, 20, -0.3)
+    roof = floor_of(-0.3, 20.3, -4.3, 4.3, 4.3)
+    scene = quads([*room_faces((0, 0, -4), (20, 4, 4)), ground, roof])
+    cells = subdivide(scene)
+    assert cells.closed
+    assert located(cells, HALL, (10, 6, 0), (30, 1, 0)) == [True, False, False]
+    assert not any("to stand on" in note for note in cells.notes)
+
+
+def test_many_rooms_are_counted_after_the_largest(quads, room_faces) -> None:
+    faces = room_faces((0, 0, -4), (20, 4, 4))
+    for i in range(5):
+        faces += room_faces((30 + 10 * i, 0, -1 - i), (34 + 10 * i, 4, 1 + i))
+    cells = subdivide(quads(faces))
+    said = [note for note in cells.notes if "to stand on" in note]
+    assert len(said) == 3
+    size = [float(note.split(" ")[0]) for note in said]
+    assert size == pytest.approx([33.25, 26.25, 19.25], abs=0.06)
+    assert any("2 more places" in note for note in cells.notes)
