@@ -35,6 +35,29 @@ class CutOff:
     eye: tuple[float, float, float]  # a viewpoint in it, metres
 
 
+@dataclass(frozen=True)
+class Standing:
+    """Whoever stands in some leaves, spread over all places there."""
+
+    points: Floats  # (n, 3) the middles of their bodies, metres
+    place: Floats  # (n,) m² that each stands for
+    leaf: Ints  # (n,) where they are
+
+    @staticmethod
+    def of(
+        tree: Tree, leaves: Bools, floors: Floors, structure: Structure, walker: Walker
+    ) -> Standing:
+        """Whoever stands in these (L,) leaves."""
+        middle = np.array([0.0, (walker.step + walker.height) / 2, 0.0])
+        points, _, row = spread(floors.corners)
+        asked = np.zeros(len(floors.region), dtype=bool)
+        asked[row[_among(leaves, tree, points + middle)]] = True
+        points, place, _ = spread(find_places(floors.only(asked), structure, walker))
+        points = points + middle
+        inside = _among(leaves, tree, points)
+        return Standing(points[inside], place[inside], _leaf(tree, points[inside]))
+
+
 def cut_off(
     tree: Tree,
     portals: list[Portal],
@@ -47,26 +70,18 @@ def cut_off(
     """The groups that hold a place, the largest first; ``reached`` and ``outside``: (L,) leaves,
     groups with one of the latter are the outside."""
     group = _groups(len(tree.leaves), portals)
-    barred = reached.copy()
-    barred[outside] = True
+    barred = reached | outside
     waiting = ~barred & ~np.isin(group, group[barred])
     if not waiting.any():
         return []
-    middle = np.array([0.0, (walker.step + walker.height) / 2, 0.0])
-    points, _, row = spread(floors.corners)
-    asked = np.zeros(len(floors.region), dtype=bool)
-    asked[row[_among(waiting, tree, points + middle)]] = True
-    places = find_places(floors.only(asked), structure, walker)
-    points, weight, _ = spread(places)
-    inside = _among(waiting, tree, points + middle)
-    points, weight = points[inside], weight[inside]
-    leaf = _leaf(tree, points + middle)
-    area = summed(group[leaf], weight, len(group))
+    standing = Standing.of(tree, waiting, floors, structure, walker)
+    of = group[standing.leaf]
+    area = summed(of, standing.place, len(group))
     found = []
     for name in ranked(area)[: np.count_nonzero(area >= LEAST_PLACE)]:
-        here = np.flatnonzero(group[leaf] == name)
-        inmost = here[np.argmin(((points[here] - points[here].mean(axis=0)) ** 2).sum(axis=1))]
-        x, y, z = (points[inmost] + middle).tolist()
+        here = standing.points[of == name]
+        away = ((here - here.mean(axis=0)) ** 2).sum(axis=1)
+        x, y, z = here[np.argmin(away)].tolist()
         found.append(CutOff(np.flatnonzero(group == name), float(area[name]), (x, y, z)))
     return found
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree, build_tree
-from ptmtools.cells.cut_off import CutOff, cut_off
+from ptmtools.cells.cut_off import CutOff, Standing, cut_off
 from ptmtools.cells.emptiness import check_seen
 from ptmtools.cells.grouping import grouped
 from ptmtools.cells.joining import joined
@@ -51,6 +51,8 @@ BOX_MARGIN = 0.01
 LARGE = 4000
 #: So many objects that were taken for detail are named.
 NAMED = 3
+#: A greater share of all places is much to leave out.
+MUCH = 0.1
 #: A model is open above if less than this share of its floor has something over it.
 ROOFED = 0.5
 
@@ -85,6 +87,7 @@ class _Space:
     reached: Bools  # (L,) which leaves somebody can reach
     closed: bool  # whether they do not touch the root box
     cut_off: list[CutOff]  # where the flood did not come to; reached all the same if asked for
+    left_out: float  # the share of all places, by area, that is not reached
 
 
 def subdivide(
@@ -125,7 +128,7 @@ def subdivide(
             space = clipped.result()
     finally:
         clipped.cancel()
-    notes += _cut_off_notes(space.cut_off, options)
+    notes += _cut_off_notes(space, options)
     if space.tree.unsplit:
         notes.append(
             Warned(
@@ -179,17 +182,22 @@ def _divide(
     reached = flood(len(tree.leaves), portals, start)
     closed = bool(start) and not bool(np.any(reached & outer))
     others: list[CutOff] = []
+    left_out = 0.0
     if inside or closed:  # else it is thrown away
         outside = outer & (not inside)
         walker = Walker(*options.walker)
         others = cut_off(tree, portals, reached, outside, model.floors, structure, walker)
-        if options.reach == "all":
-            reached[np.concatenate([[], *(other.leaves for other in others)]).astype(int)] = True
+        for other in others if options.reach == "all" else ():
+            reached[other.leaves] = True
+        if others and options.reach == "main":
+            standing = Standing.of(tree, reached, model.floors, structure, walker)
+            beyond = sum(other.place for other in others)
+            left_out = beyond / (beyond + float(standing.place.sum()))
     if tree.capped and (inside or closed):
         joint = rejoined(tree, reached)
         portals = portals_rejoined(portals, tree, joint, structure.tolerance)
         tree, reached = joint.tree, np.bincount(joint.leaf, reached) > 0
-    return _Space(box, tree, portals, reached, closed, others)
+    return _Space(box, tree, portals, reached, closed, others, left_out)
 
 
 def _viewpoint_leaves(tree: Tree, box: Floats, options: SubdivideOptions) -> tuple[int, ...]:
@@ -222,11 +230,11 @@ def _detail_notes(scene: Scene, detail: Ints) -> list[str]:
     ]
 
 
-def _cut_off_notes(others: list[CutOff], options: SubdivideOptions) -> list[str]:
+def _cut_off_notes(space: _Space, options: SubdivideOptions) -> list[str]:
     """What is said of places that the flood did not come to."""
+    others, kept = space.cut_off, options.reach == "all"
     if not others:
         return []
-    kept = options.reach == "all"
     does = "is kept as rooms of its own" if kept else "is left out"
     notes = [
         f"{other.place:.1f} m² to stand on around {_position(other)} cannot be reached from the "
@@ -238,6 +246,9 @@ def _cut_off_notes(others: list[CutOff], options: SubdivideOptions) -> list[str]
         notes.append(f"so {does} what is around {len(rest)} more places, {area:.1f} m² in all")
     if kept:
         notes.append("--reach main leaves out what cannot be reached from the start")
+    if space.left_out > MUCH:
+        share = f"{space.left_out:.0%} of all that one can stand on"
+        notes.append(Warned(f"{share} is left out; --reach all keeps it"))
     return notes
 
 

@@ -14,6 +14,7 @@ from ptmtools.cells.places import Floors, find_places
 from ptmtools.cells.structure import Structure
 from ptmtools.cells.vectors import areas
 from ptmtools.errors import InputError
+from ptmtools.notes import Warned
 from ptmtools.scene.model import Scene
 from tests.conftest import scene_of, subdivided
 
@@ -105,17 +106,23 @@ HALL = (10.0, 1.0, 0.0)
 
 
 @pytest.mark.parametrize(
-    ("other", "point", "kept"),
+    ("other", "point", "kept", "share"),
     [
-        pytest.param(((30, 0, -2), (34, 4, 2)), (32, 1, 0), True, id="another building"),
-        pytest.param(((0, 4.3, -4), (20, 8, 4)), (10, 6, 0), True, id="upstairs, without stairs"),
-        pytest.param(((20.2, 0, -4), (26, 4, 4)), (23, 1, 0), True, id="behind a wall"),
-        pytest.param(((20.05, 0, -4), (20.35, 4, 4)), (20.2, 1, 0), False, id="a wall's hollow"),
-        pytest.param(((20.2, 0, 0), (20.6, 4, 0.4)), (20.4, 1, 0.2), False, id="a shaft"),
-        pytest.param(((0, 4.1, -4), (20, 5.2, 4)), (10, 4.6, 0), False, id="above a ceiling"),
+        pytest.param(((30, 0, -2), (34, 4, 2)), (32, 1, 0), True, 0.08, id="another building"),
+        pytest.param(
+            ((0, 4.3, -4), (20, 8, 4)), (10, 6, 0), True, 0.5, id="upstairs, without stairs"
+        ),
+        pytest.param(((20.2, 0, -4), (26, 4, 4)), (23, 1, 0), True, 0.2, id="behind a wall"),
+        pytest.param(
+            ((20.05, 0, -4), (20.35, 4, 4)), (20.2, 1, 0), False, 0.0, id="a wall's hollow"
+        ),
+        pytest.param(((20.2, 0, 0), (20.6, 4, 0.4)), (20.4, 1, 0.2), False, 0.0, id="a shaft"),
+        pytest.param(((0, 4.1, -4), (20, 5.2, 4)), (10, 4.6, 0), False, 0.0, id="above a ceiling"),
     ],
 )
-def test_what_the_flood_does_not_reach(quads, room_faces, other, point, kept: bool) -> None:
+def test_what_the_flood_does_not_reach(
+    quads, room_faces, other, point, kept: bool, share: float
+) -> None:
     scene = quads(room_faces((0, 0, -4), (20, 4, 4)) + room_faces(*other))
     cells = subdivide(scene)
     assert cells.closed
@@ -124,6 +131,8 @@ def test_what_the_flood_does_not_reach(quads, room_faces, other, point, kept: bo
     assert len(said) == kept
     main = subdivide(scene, SubdivideOptions(reach="main"))
     assert located(main, HALL, point) == [True, False]
+    left_out = [note for note in main.notes if "is left out; --reach all" in note]
+    assert [isinstance(note, Warned) for note in left_out] == [True] * (kept and share > 0.1)
     for note in said:  # the viewpoint that is named leads there
         there = tuple(float(c) for c in note.split("around ")[1].split(" ")[0].split(","))
         options = SubdivideOptions(reach="main", viewpoints=(there,))  # type: ignore[arg-type]
