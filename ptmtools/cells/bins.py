@@ -19,6 +19,10 @@ _STEP = 0.02
 #: So many grids, each moved on by as large a share of the step: one more than a plane has numbers,
 #: so that in one of them none of its numbers is nearer to an edge than half that share.
 _GRIDS = 5
+#: So many planes of a bin are tried in vain before only some of the others are.
+_TRIES = 64
+#: Of these, so many for each area that would do: one in 3,000 layers of just that area is missed.
+_DRAWS = 8
 
 
 class Bins:
@@ -66,3 +70,29 @@ class Bins:
         """(k,) which of these planes are in a bin."""
         found: Bools = (self._label[planes] == name).any(axis=1)
         return found
+
+
+class Tries:
+    """Which planes are worth trying, where most are tried in vain.
+
+    A scanned wall has a hundred thousand triangles, and each has a plane of its own, near which lie
+    all the others. To hold each against all takes the square of their number. A plane that holds
+    enough area is found as well by trying planes drawn in proportion to their areas, of which it
+    has its share, so the tries are as many as the area is times what is needed.
+    """
+
+    def __init__(self, bin_of: NDArray[np.integer], areas: Floats) -> None:
+        """``bin_of``, ``areas``: (n,) of each plane."""
+        self._bin, self._areas = bin_of, areas
+        self._failed = np.zeros(int(bin_of.max(initial=-1)) + 1, dtype=np.int64)
+        self.worth: Bools = np.ones(len(areas), dtype=bool)  # (n,)
+
+    def fail(self, plane: int, others: Ints, needed: float) -> None:
+        """A plane held less than the area ``needed``; ``others`` are those around it that have not
+        been tried."""
+        name = self._bin[plane]
+        self._failed[name] += 1
+        if self._failed[name] == _TRIES:
+            others = others[self._bin[others] == name]
+            along = np.floor(np.cumsum(self._areas[others]) * (_DRAWS / needed))
+            self.worth[others] = np.diff(along, prepend=0.0) > 0

@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 
 from ptmtools.arrays import Floats, Ints
+from ptmtools.cells.bins import Tries
 from ptmtools.cells.planar import left_open
 from ptmtools.cells.polyhedron import Polyhedron, section
 from ptmtools.cells.structure import Frame, Structure, WallPlane
@@ -45,8 +46,9 @@ def closing(structure: Structure, body: Polyhedron) -> list[WallPlane]:
     free = needed <= beside
     own = structure.bins.own[inside]
     found: list[tuple[int, WallPlane]] = []
+    tries = Tries(np.unique(own, return_inverse=True)[1].reshape(-1), areas)
     for seed in ranked(np.where(free, areas, 0.0))[: np.count_nonzero(free)]:
-        if not free[seed]:
+        if not (free[seed] and tries.worth[seed]):
             continue
         mates = np.flatnonzero(structure.bins.holds(own[seed], inside))
         members = mates[structure.lie_in(planes[seed], inside[mates])]
@@ -55,6 +57,8 @@ def closing(structure: Structure, body: Polyhedron) -> list[WallPlane]:
         if areas[members].sum() >= needed[seed]:
             cap = _cap(body, planes[seed], structure, near)
             found += [(int(inside[members[0]]), cap)] if cap else []
+        else:
+            tries.fail(seed, mates[free[mates]], float(needed[seed]))
     return [cap for _, cap in sorted(found, key=lambda one: one[0])]
 
 

@@ -22,7 +22,7 @@ import numpy as np
 import shapely
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.cells.bins import Bins
+from ptmtools.cells.bins import Bins, Tries
 from ptmtools.cells.detail import recognised
 from ptmtools.cells.facets import UPWARD, Facets
 from ptmtools.cells.naming import may_occlude, named
@@ -186,8 +186,8 @@ def _layers(structure: Structure, wall_area: float) -> list[Floats]:
     """Planes that hold enough coplanar area to carry a wall, heaviest first.
 
     Triangles are compared only within bins of similar normal and offset, and a bin is left as soon
-    as what is free in it cannot reach ``wall_area``: curved detail and slivers fall away before
-    anything quadratic happens.
+    as what is free in it cannot reach ``wall_area``, or too many planes were tried in vain: curved
+    detail, slivers and scans fall away before anything quadratic happens.
     """
     planes, areas, forced = structure.planes, structure.areas, structure.forced
     bins = structure.bins
@@ -198,8 +198,9 @@ def _layers(structure: Structure, wall_area: float) -> list[Floats]:
     free = areas > 0
     layers: list[tuple[float, Floats]] = []
     promising = free & (waiting[bins.own] >= wall_area)
+    tries = Tries(bins.own, areas)
     for seed in ranked(np.where(promising, areas, 0.0))[: np.count_nonzero(promising)]:
-        if not free[seed]:
+        if not (free[seed] and tries.worth[seed]):
             continue
         free[seed] = False
         own = bins.own[seed]
@@ -214,6 +215,8 @@ def _layers(structure: Structure, wall_area: float) -> list[Floats]:
         weight = float(areas[members].sum())
         if weight >= wall_area or np.any(forced[members]):
             layers.append((weight, planes[seed]))
+        else:
+            tries.fail(seed, near[free[near]], wall_area)
     return [layers[i][1] for i in ranked(np.array([weight for weight, _ in layers]))]
 
 

@@ -8,7 +8,7 @@ import shapely
 
 from ptmtools.cells import SubdivideOptions, subdivide
 from ptmtools.cells.facets import Facets
-from ptmtools.cells.structure import Structure
+from ptmtools.cells.structure import Structure, find_walls
 from ptmtools.cells.vectors import areas
 from ptmtools.cells.welding import Welded
 from ptmtools.tolerance import Tolerance
@@ -125,3 +125,24 @@ def test_structural_names_hold_for_their_own_triangles_alone(quads) -> None:
     assert len(structure.corners) == 4
     right = structure.corners.reshape(4, 9)[:, ::3].mean(axis=1) > 5
     assert np.array_equal(structure.forced, right)
+
+
+def test_a_flat_wall_is_found_among_a_scan_without_trying_every_triangle(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # The scan's triangles are larger, so they are tried first; all have similar planes. Those of
+    # the wall share no corners, and are no facet.
+    random = np.random.default_rng(5)
+    scan = grid(40) + random.normal(0, 2e-3, (3200, 3, 3))
+    wall = grid(24) * 0.4 + [3, 3, 0.02]
+    middle = wall.mean(axis=1, keepdims=True)
+    wall = middle + 0.9 * (wall - middle)
+    scene = scene_of(np.concatenate([scan, wall]))
+    tried = []
+    lie_in = Structure.lie_in
+    monkeypatch.setattr(
+        Structure, "lie_in", lambda *arguments: tried.append(1) or lie_in(*arguments)
+    )
+    walls = find_walls(Structure.of(scene, SubdivideOptions(), scene.tolerance), 2.0)
+    assert len(tried) < len(scene.triangles) / 2
+    assert any(abs(w.frame.plane[3] + 0.02) < 1e-4 and w.blocking.area > 10 for w in walls)
