@@ -131,12 +131,12 @@ def test_a_flat_wall_is_found_among_a_scan_without_trying_every_triangle(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # The scan's triangles are larger, so they are tried first; all have similar planes. Those of
-    # the wall share no corners, and are no facet.
+    # the wall overlap but share no corners, and are no facet.
     random = np.random.default_rng(5)
     scan = grid(40) + random.normal(0, 2e-3, (3200, 3, 3))
     wall = grid(24) * 0.4 + [3, 3, 0.02]
     middle = wall.mean(axis=1, keepdims=True)
-    wall = middle + 0.9 * (wall - middle)
+    wall = middle + 1.05 * (wall - middle)
     scene = scene_of(np.concatenate([scan, wall]))
     tried = []
     lie_in = Structure.lie_in
