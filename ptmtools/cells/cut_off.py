@@ -2,11 +2,14 @@
 
 Leaves that hang together through portals, but with none that is reached, are a group. One that
 holds a place is where somebody could be, and is not to be lost; one that holds none is a solid, the
-hollow of a wall or a shaft. What touches the root box of a closed model is the outside.
+hollow of a wall or a shaft, and so is one whose walls face away. What touches the root box of a
+closed model is the outside. Who is under a roof and between walls there is in another building,
+with a door or a window open: that cannot be told from the outside, but is told to the user.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,11 +22,18 @@ from ptmtools.cells.options import Walker
 from ptmtools.cells.places import Floors, find_places, spread
 from ptmtools.cells.portals import Portal
 from ptmtools.cells.structure import Structure
+from ptmtools.cells.surroundings import Surroundings
 from ptmtools.cells.vectors import summed
 from ptmtools.tolerance import ranked
 
 #: A group of leaves with less place than this, m², is none that anybody would miss.
 LEAST_PLACE = 0.05
+#: And outside, where bus shelters are, less than this.
+LEAST_INSIDE = 2.0
+#: If as large a share of the walls around faces away, it is the inside of a solid.
+AWAY = 0.9
+#: From so many points walls are looked at.
+_LOOKS = 16
 
 
 @dataclass(frozen=True)
@@ -33,6 +43,14 @@ class CutOff:
     leaves: Ints  # of the tree, ascending
     place: float  # m² where somebody can stand
     eye: tuple[float, float, float]  # a viewpoint in it, metres
+
+    @staticmethod
+    def of(leaves: Ints, standing: Standing) -> CutOff:
+        """Of leaves and of whoever stands in them."""
+        points = standing.points
+        away = ((points - points.mean(axis=0)) ** 2).sum(axis=1)
+        x, y, z = points[np.argmin(away)].tolist()
+        return CutOff(leaves, float(standing.place.sum()), (x, y, z))
 
 
 @dataclass(frozen=True)
@@ -47,59 +65,79 @@ class Standing:
     def of(
         tree: Tree, leaves: Bools, floors: Floors, structure: Structure, walker: Walker
     ) -> Standing:
-        """Whoever stands in these (L,) leaves."""
-        middle = np.array([0.0, (walker.step + walker.height) / 2, 0.0])
-        points, _, row = spread(floors.corners)
-        asked = np.zeros(len(floors.region), dtype=bool)
-        asked[row[_among(leaves, tree, points + middle)]] = True
-        points, place, _ = spread(find_places(floors.only(asked), structure, walker))
-        points = points + middle
-        inside = _among(leaves, tree, points)
-        return Standing(points[inside], place[inside], _leaf(tree, points[inside]))
+        """Whoever stands in these (L,) leaves, at least one."""
+        bodies = [tree.leaves[leaf].points for leaf in np.flatnonzero(leaves)]
+        boxes = np.array([(points.min(axis=0), points.max(axis=0)) for points in bodies])
+        points, place = spread(find_places(floors, structure, walker, boxes))
+        points = points + [0.0, walker.middle, 0.0]
+        every = np.concatenate([body.points for body in tree.leaves])
+        within = ((points >= every.min(axis=0)) & (points <= every.max(axis=0))).all(axis=1)
+        leaf = np.asarray(-2 - sunk(tree.planes, tree.children, points))
+        inside = within & leaves[leaf]
+        return Standing(points[inside], place[inside], leaf[inside])
+
+    def only(self, which: Bools | Ints) -> Standing:
+        """Some of them."""
+        return Standing(self.points[which], self.place[which], self.leaf[which])
 
 
-def cut_off(
+@dataclass(frozen=True)
+class Unreached:
+    """What the flood did not reach."""
+
+    rooms: list[CutOff]  # the largest first
+    outside: CutOff | None = None  # what is outside a closed model, but in a building
+
+
+def unreached(
     tree: Tree,
     portals: list[Portal],
     reached: Bools,
-    outside: Bools,
+    outer: Bools,
     floors: Floors,
     structure: Structure,
     walker: Walker,
-) -> list[CutOff]:
-    """The groups that hold a place, the largest first; ``reached`` and ``outside``: (L,) leaves,
+) -> Unreached:
+    """Where somebody could be that the flood did not reach. ``reached``, ``outer``: (L,) leaves;
     groups with one of the latter are the outside."""
     group = _groups(len(tree.leaves), portals)
-    barred = reached | outside
-    waiting = ~barred & ~np.isin(group, group[barred])
-    if not waiting.any():
-        return []
-    standing = Standing.of(tree, waiting, floors, structure, walker)
+    outside = np.isin(group, group[outer]) & ~reached
+    waiting = ~reached & ~outside & ~np.isin(group, group[reached])
+    beyond = outside & ~outer
+    if not ((waiting | beyond).any() and len(structure.corners)):
+        return Unreached([])
+    standing = Standing.of(tree, waiting | beyond, floors, structure, walker)
+    if not len(standing.leaf):
+        return Unreached([])
+    around = Surroundings(structure.corners)
+    here = standing.only(beyond[standing.leaf])
+    here = here.only(around.inside(here.points))
+    found = None
+    if here.place.sum() >= LEAST_INSIDE:
+        found = CutOff.of(np.unique(here.leaf), here)
+    # Of a model whose rooms face away themselves nothing can be said.
+    volumes = np.array([body.volume for body in tree.leaves]) * reached
+    looks = np.array([tree.leaves[i].points.mean(axis=0) for i in ranked(volumes)[:_LOOKS]])
+    sound = around.turned_away(looks) < AWAY
+    rooms = []
+    for room in _rooms(group, standing.only(waiting[standing.leaf])):
+        looks = room.points[:: -(-len(room.points) // _LOOKS)]
+        if not (sound and around.turned_away(looks) >= AWAY):
+            rooms.append(CutOff.of(np.flatnonzero(group == group[room.leaf[0]]), room))
+    return Unreached(rooms, found)
+
+
+def _rooms(group: Ints, standing: Standing) -> Iterator[Standing]:
+    """Whoever stands in each group of leaves that is large enough, the largest first."""
     of = group[standing.leaf]
+    order = np.argsort(of, kind="stable")
+    start = np.searchsorted(of[order], np.arange(len(group) + 1))
     area = summed(of, standing.place, len(group))
-    found = []
     for name in ranked(area)[: np.count_nonzero(area >= LEAST_PLACE)]:
-        here = standing.points[of == name]
-        away = ((here - here.mean(axis=0)) ** 2).sum(axis=1)
-        x, y, z = here[np.argmin(away)].tolist()
-        found.append(CutOff(np.flatnonzero(group == name), float(area[name]), (x, y, z)))
-    return found
+        yield standing.only(order[start[name] : start[name + 1]])
 
 
 def _groups(leaves: int, portals: list[Portal]) -> Ints:
     """(leaves,) the least leaf that each hangs together with through portals."""
     ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
     return connected(leaves, np.concatenate(ends.T), np.concatenate(ends[:, ::-1].T))
-
-
-def _leaf(tree: Tree, points: Floats) -> Ints:
-    """(n,) the leaf of the tree that each of (n, 3) points is in."""
-    return np.asarray(-2 - sunk(tree.planes, tree.children, points))
-
-
-def _among(leaves: Bools, tree: Tree, points: Floats) -> Bools:
-    """(n,) which of (n, 3) points lie in one of these (L,) leaves."""
-    corners = np.concatenate([body.points for body in tree.leaves])
-    inside = np.all((points >= corners.min(axis=0)) & (points <= corners.max(axis=0)), axis=1)
-    found: Bools = inside & leaves[_leaf(tree, points)]
-    return found

@@ -19,6 +19,7 @@ import shapely
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.planar import delaunay
 from ptmtools.cells.vectors import cross, normals, summed
 from ptmtools.cells.welding import Welded, across_edges, distinct
 from ptmtools.tolerance import Tolerance, ranked
@@ -89,6 +90,12 @@ class Facets:
         outline = rim & many[self.region][:, None]
         area = summed(self.region, self.areas * which, len(self.area))[chosen]
         corners, of = self._retriangulated(chosen, area, outline, tolerance)
+        # Wound as most of the region is.
+        way = summed(self.region, self.areas * which * (1 - 2 * self.turned), len(self.area))[
+            chosen
+        ]
+        back = np.einsum("ij,ij->i", normals(corners), self.normal[chosen[of]]) * way[of] < 0
+        corners[back] = corners[back][:, ::-1]
         saved = np.bincount(of, minlength=len(chosen)) <= (1 - _SAVED) * size[chosen]
         saved &= np.bincount(of, minlength=len(chosen)) > 0
         kept = which.copy()
@@ -129,9 +136,7 @@ class Facets:
         allowed = straight * shapely.length(areas) + tolerance.rounding * tolerance.extent
         sound = shapely.is_valid(areas) & (np.abs(shapely.area(areas) - area) <= allowed)
         sound_rows = np.flatnonzero(sound)
-        parts, which = shapely.get_parts(
-            shapely.constrained_delaunay_triangles(areas[sound_rows]), return_index=True
-        )
+        parts, which = shapely.get_parts(delaunay(areas[sound_rows]), return_index=True)
         which = sound_rows[which]
         rings = shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, :3]
         return self._lifted(rings, which, flat, of, space), which

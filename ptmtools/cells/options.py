@@ -26,6 +26,11 @@ class Walker(NamedTuple):
     step: float
     height: float
 
+    @property
+    def middle(self) -> float:
+        """How high above the floor the body's middle is."""
+        return (self.step + self.height) / 2
+
 
 @dataclass(frozen=True)
 class SubdivideOptions:
@@ -50,8 +55,8 @@ class SubdivideOptions:
         "room", all leaves between its doors; but see --gain.
     gain: keep the leaves of a room as separate cells if that saves viewers at least this share of
         what they download; 0 keeps all of them apart, 1 makes every room one cell.
-    walker: radius, highest step and height, in metres, of whoever walks. A place is where such a
-        body fits.
+    walker: radius, highest step and height, in metres, of whoever walks. Where such a body fits
+        is not left out, even if it cannot be reached; see --reach.
     viewpoints: a starting point inside the building: metres, Y up, and the yaw in degrees,
         counter-clockwise from -Z. By default one is chosen. May be given several times.
     reach: what becomes of space that cannot be reached from the start, behind closed doors or in
@@ -80,8 +85,8 @@ class SubdivideOptions:
             (0 <= gain <= 1, f"a gain of {gain:g} is not between 0 and 1", "try 0.1"),
             (self.reach in get_args(Reach), f"unknown reach {self.reach!r}", "all or main"),
             (
-                all(0 <= length < float("inf") for length in self.walker)
-                and self.walker[0] > 0
+                len(self.walker) == 3
+                and all(0 < length < float("inf") for length in self.walker)
                 and self.walker[1] < self.walker[2],
                 f"nobody's radius, step and height are {self.walker}",
                 "try 0.25,0.5,1.7",

@@ -22,23 +22,25 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.facets import Facets
 from ptmtools.cells.naming import named
 from ptmtools.cells.options import SubdivideOptions, Walker
-from ptmtools.cells.planar import Geometry
+from ptmtools.cells.planar import Geometry, delaunay
 from ptmtools.cells.reach import FLOOR_COSINE
 from ptmtools.cells.structure import Structure
-from ptmtools.cells.vectors import areas, normals
+from ptmtools.cells.vectors import areas, normals, ranges
 from ptmtools.cells.welding import Welded
 from ptmtools.scene.model import Scene
 
-#: Places smaller than this, m², are noise: a foot is larger.
-LEAST_AREA = 1e-2
+#: Floors so near to each other in height, in metres, are looked at together.
+_STOREY = 0.25
 #: Corners of a quarter of a circle.
 _QUARTER = 4
-#: Places are sampled in parts whose sides are at most this long, metres.
-_SAMPLE_SIDE = 0.25
+#: Places are sampled once in this area, m², and so often at most.
+_SAMPLE_AREA, _MOST_SAMPLES = 0.05, 500_000
+#: 1/g and 1/g², where g³ = g + 1 (Roberts' sequence): where in a triangle.
+_STEPS = np.array([0.7548776662466927, 0.5698402909980532])
 _PLAN = [0, 2]
 
 
@@ -65,40 +67,51 @@ class Floors:
         region = np.unique(facets.region[source[order]], return_inverse=True)[1].reshape(-1)
         return Floors(corners[order], region)
 
-    def only(self, which: Bools) -> Floors:
-        """The regions of which one of the (n,) triangles is asked for."""
-        wanted = np.zeros(int(self.region.max(initial=-1)) + 1, dtype=bool)
-        wanted[self.region[which]] = True
-        rows = np.flatnonzero(wanted[self.region])
-        region = np.unique(self.region[rows], return_inverse=True)[1].reshape(-1)
-        return Floors(self.corners[rows], region)
+    def within(self, boxes: Floats, above: float) -> tuple[Geometry, Ints]:
+        """(k,) pieces of floor in plan, what is ``above`` metres over which lies in one of
+        (m, 2, 3) boxes, and (k,) the region of each, ascending."""
+        plan = shapely.polygons(self.corners[:, :, _PLAN])
+        (x0, y0, z0), (x1, y1, z1) = boxes.transpose(1, 2, 0)
+        areas = shapely.box(x0, z0, x1, z1)
+        box, row = shapely.STRtree(plan).query(areas, "intersects")
+        height = self.corners[row, :, 1] + above
+        meets = (height.min(axis=1) <= y1[box]) & (height.max(axis=1) >= y0[box])
+        box, row = box[meets], row[meets]
+        pieces = shapely.intersection(plan[row], areas[box])
+        flat = np.flatnonzero(shapely.get_dimensions(pieces) == 2)
+        order = flat[np.argsort(self.region[row[flat]], kind="stable")]
+        return pieces[order], self.region[row[order]]
 
 
-def find_places(floors: Floors, structure: Structure, walker: Walker) -> Floats:
-    """(n, 3, 3) triangles, metres, on which somebody can stand."""
-    if not len(floors.region):
+def find_places(floors: Floors, structure: Structure, walker: Walker, boxes: Floats) -> Floats:
+    """(n, 3, 3) triangles, metres, on which somebody can stand, the middle of whose body is in one
+    of (m, 2, 3) boxes."""
+    pieces, region = floors.within(boxes, walker.middle)
+    if not len(pieces):
         return np.zeros((0, 3, 3))
-    slope = _slopes(floors.corners, floors.region)
-    plan = _joined(shapely.polygons(floors.corners[:, :, _PLAN]), floors.region)
-    return _triangles(shapely.difference(plan, _taken(structure, plan, slope, walker)), slope)
+    names, group = np.unique(region, return_inverse=True)
+    plan, slope = _joined(pieces, group.reshape(-1)), _slopes(floors)[names]
+    body = _taken(structure.corners, plan, slope, (walker.step, walker.height), walker.radius)
+    # A foot is on the uppermost of surfaces one step apart: not on the underside of a slab.
+    foot = _taken(floors.corners, plan, slope, (2 * structure.tolerance.plane, walker.step), 0.0)
+    return _triangles(shapely.difference(shapely.difference(plan, body), foot), slope)
 
 
-def spread(corners: Floats) -> tuple[Floats, Floats, Ints]:
-    """(m, 3) points spread over (n, 3, 3) triangles, (m,) the m² that each stands for, and (m,) the
-    triangle of each."""
-    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0)
-    times = np.maximum(np.ceil(sides / _SAMPLE_SIDE), 1).astype(np.int64)
-    points, weights, rows = [np.zeros((0, 3))], [np.zeros(0)], [np.zeros(0, dtype=np.int64)]
-    for n in np.unique(times).tolist():
-        row, share = np.flatnonzero(times == n), _centroids(n)
-        points.append(np.einsum("kc,tcx->tkx", share, corners[row]).reshape(-1, 3))
-        weights.append(np.repeat(areas(corners[row]) / len(share), len(share)))
-        rows.append(np.repeat(row, len(share)))
-    return np.concatenate(points), np.concatenate(weights), np.concatenate(rows)
+def spread(corners: Floats) -> tuple[Floats, Floats]:
+    """(m, 3) points spread evenly over (n, 3, 3) triangles, and (m,) the m² that each is for."""
+    size = areas(corners)
+    each = max(_SAMPLE_AREA, float(size.sum()) / _MOST_SAMPLES)
+    count = np.maximum(np.ceil(size / each), 1).astype(np.int64)
+    row = np.repeat(np.arange(len(corners)), count)
+    share = np.mod((ranges(np.zeros_like(count), count)[:, None] + 0.5) * _STEPS, 1.0)
+    share = np.where(share.sum(axis=1, keepdims=True) > 1, 1 - share, share)
+    weight = np.column_stack([1 - share.sum(axis=1), share])
+    return np.einsum("mc,mcx->mx", weight, corners[row]), (size / count)[row]
 
 
-def _slopes(corners: Floats, region: Ints) -> Floats:
+def _slopes(floors: Floors) -> Floats:
     """(r, 3): a region's height is a·x + b·z + c, by its largest triangle."""
+    corners, region = floors.corners, floors.region
     size = areas(corners)
     order = np.lexsort((-size, region))
     largest = order[np.unique(region[order], return_index=True)[1]]
@@ -118,23 +131,44 @@ def _joined(shapes: Geometry, group: Ints) -> Geometry:
     )
 
 
-def _taken(structure: Structure, plan: Geometry, slope: Floats, walker: Walker) -> Geometry:
-    """(r,) where the middle of a body cannot be, over each region of floor."""
-    corners = structure.corners
+def _taken(
+    corners: Floats, plan: Geometry, slope: Floats, band: tuple[float, float], radius: float
+) -> Geometry:
+    """(r,) what of regions of floor is less than a radius from triangles, (n, 3, 3), that are as
+    high above it as a ``band``; in plan."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     boxes = shapely.box(*low[:, _PLAN].T, *high[:, _PLAN].T)
-    region, obstacle = shapely.STRtree(boxes).query(plan, "dwithin", distance=walker.radius)
-    height = _above(corners[obstacle], slope[region])
-    meets = (height.min(axis=1) <= walker.height) & (height.max(axis=1) >= walker.step)
-    region, obstacle, height = region[meets], obstacle[meets], height[meets]
-    shadow = _shadows(corners[obstacle][:, :, _PLAN], height, walker)
-    # One by one: GEOS 3.14 buffers many lines at once with holes where they meet.
-    shadow = shapely.buffer(shadow, walker.radius, quad_segs=_QUARTER)
-    order = np.argsort(region, kind="stable")
-    names, group = np.unique(region[order], return_inverse=True)
+    least, most = _heights(plan, slope)
+    storey = np.floor(least / _STOREY)
     taken = np.full(len(plan), shapely.Polygon())
-    taken[names] = _joined(shadow[order], group.reshape(-1))
+    # Storey by storey, so that a floor is held against what is as high only.
+    for name in np.unique(storey):
+        here = np.flatnonzero(storey == name)
+        lowest, highest = least[here].min() + band[0], most[here].max() + band[1]
+        about = np.flatnonzero((high[:, 1] >= lowest) & (low[:, 1] <= highest))
+        if not len(about):
+            continue
+        tree = shapely.STRtree(boxes[about])
+        row, obstacle = tree.query(plan[here], "dwithin", distance=radius)
+        obstacle = about[obstacle]
+        height = _above(corners[obstacle], slope[here[row]])
+        meets = (height.min(axis=1) <= band[1]) & (height.max(axis=1) >= band[0])
+        row, obstacle, height = row[meets], obstacle[meets], height[meets]
+        shadow = _shadows(corners[obstacle][:, :, _PLAN], height, band)
+        # One by one: GEOS 3.14 buffers many lines at once with holes where they meet.
+        shadow = shapely.buffer(shadow, radius, quad_segs=_QUARTER)
+        order = np.argsort(row, kind="stable")
+        names, group = np.unique(row[order], return_inverse=True)
+        taken[here[names]] = _joined(shadow[order], group.reshape(-1))
     return taken
+
+
+def _heights(plan: Geometry, slope: Floats) -> tuple[Floats, Floats]:
+    """(r,) and (r,): the least and the greatest height, or a little beyond, of regions in plan."""
+    x0, z0, x1, z1 = shapely.bounds(plan).reshape(-1, 4).T
+    middle = slope[:, 0] * (x0 + x1) / 2 + slope[:, 1] * (z0 + z1) / 2 + slope[:, 2]
+    half = np.abs(slope[:, 0]) * (x1 - x0) / 2 + np.abs(slope[:, 1]) * (z1 - z0) / 2
+    return middle - half, middle + half
 
 
 def _above(corners: Floats, slope: Floats) -> Floats:
@@ -144,11 +178,12 @@ def _above(corners: Floats, slope: Floats) -> Floats:
     return above
 
 
-def _shadows(plan: Floats, height: Floats, walker: Walker) -> Geometry:
-    """(n,) what of triangles, (n, 3, 2) in plan and (n, 3) high, is as high as a body, in plan."""
-    points, valid = [plan], [(height >= walker.step) & (height <= walker.height)]
+def _shadows(plan: Floats, height: Floats, band: tuple[float, float]) -> Geometry:
+    """(n,) what of triangles, (n, 3, 2) in plan and (n, 3) high, is in a band of heights, in
+    plan."""
+    points, valid = [plan], [(height >= band[0]) & (height <= band[1])]
     following, after = np.roll(plan, -1, axis=1), np.roll(height, -1, axis=1)
-    for level in (walker.step, walker.height):
+    for level in band:
         crosses = (height - level) * (after - level) < 0
         share = np.divide(level - height, after - height, out=np.zeros(height.shape), where=crosses)
         points.append(plan + share[..., None] * (following - plan))
@@ -166,21 +201,33 @@ def _shadows(plan: Floats, height: Floats, walker: Walker) -> Geometry:
 def _triangles(free: Geometry, slope: Floats) -> Floats:
     """(n, 3, 3) triangles of regions in plan, on their slopes."""
     parts, region = shapely.get_parts(free, return_index=True)
-    large = shapely.area(parts) >= LEAST_AREA
-    parts, region = parts[large], region[large]
-    pieces, part = shapely.get_parts(
-        shapely.constrained_delaunay_triangles(parts), return_index=True
-    )
-    plan = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
-    slope = slope[region[part]]
+    flat = shapely.get_dimensions(parts) == 2
+    parts, region = parts[flat], region[flat]
+    found, of = [np.zeros((0, 3, 2))], [np.zeros(0, dtype=np.int64)]
+    while len(parts):
+        triangles = delaunay(parts)
+        pieces, part = shapely.get_parts(triangles, return_index=True)
+        found.append(shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3])
+        of.append(region[part])
+        # What GEOS cannot divide is cut in two, and tried again.
+        left = shapely.is_empty(triangles)
+        parts, which = _halves(parts[left])
+        region = region[left][which]
+    plan, slope = np.concatenate(found), slope[np.concatenate(of)]
     height = np.einsum("ncx,nx->nc", plan, slope[:, :2]) + slope[:, 2:]
     return np.stack([plan[..., 0], height, plan[..., 1]], axis=2)
 
 
-def _centroids(times: int) -> Floats:
-    """(times², 3) barycentric coordinates of the middles of a triangle's equal parts."""
-    i, j = (k.ravel() for k in np.meshgrid(np.arange(times), np.arange(times), indexing="ij"))
-    first = np.stack([i, j], axis=1)[i + j < times] + 1 / 3
-    second = np.stack([i, j], axis=1)[i + j < times - 1] + 2 / 3
-    share = np.concatenate([first, second]) / times
-    return np.column_stack([share, 1 - share.sum(axis=1)])
+def _halves(shapes: Geometry) -> tuple[Geometry, Ints]:
+    """(m,) the polygons to both sides of the middles of (n,) shapes, and (m,) the shape of each."""
+    x0, y0, x1, y1 = shapely.bounds(shapes).reshape(-1, 4).T
+    middle = np.where(x1 - x0 > y1 - y0, (x0 + x1) / 2, x1)
+    level = np.where(x1 - x0 > y1 - y0, y1, (y0 + y1) / 2)
+    sides = (
+        shapely.box(x0, y0, middle, level),
+        shapely.box(np.where(middle < x1, middle, x0), np.where(level < y1, level, y0), x1, y1),
+    )
+    both = np.concatenate([shapely.intersection(shapes, side) for side in sides])
+    parts, which = shapely.get_parts(both, return_index=True)
+    flat = (shapely.get_dimensions(parts) == 2) & (shapely.area(parts) > 0)
+    return parts[flat], which[flat] % max(len(shapes), 1)

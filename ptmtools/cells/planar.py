@@ -87,6 +87,18 @@ def left_open(region: Geometry, blocking: Geometry, tolerance: Tolerance) -> Geo
     return intersection(opening, grown, grid)
 
 
+def delaunay(shapes: Geometry) -> Geometry:
+    """The constrained Delaunay triangulations of an array of polygons; empty for those at which
+    GEOS gives up, such as some whose holes touch."""
+    try:
+        return shapely.constrained_delaunay_triangles(shapes)
+    except shapely.GEOSException:
+        if len(shapes) == 1:
+            return np.array([shapely.GeometryCollection()])
+        half = len(shapes) // 2
+        return np.concatenate([delaunay(shapes[:half]), delaunay(shapes[half:])])
+
+
 def _polygons_in(shapes: Geometry) -> Geometry:
     """The polygons among the parts of shapes."""
     parts = shapely.get_parts(shapely.get_parts(shapes))

@@ -52,6 +52,12 @@ class Polyhedron:
         return float(np.einsum("ij,ij->", cross(a, b), c)) / 6.0
 
     @property
+    def width(self) -> float:
+        """The least extent square to one of the faces, metres."""
+        heights = self.points @ self.planes[:, :3].T
+        return float(np.ptp(heights, axis=0).min())
+
+    @property
     def planes(self) -> Floats:
         """(f, 4) the planes of the faces, unit normals pointing outwards."""
         a, b, c = self._fan(self.points)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats
 from ptmtools.cells.bsp import Tree
+from ptmtools.cells.options import Walker
 from ptmtools.cells.polyhedron import BOX_FACE
 from ptmtools.cells.portals import Portal
 from ptmtools.cells.vectors import normals
@@ -40,11 +41,13 @@ def at_box(tree: Tree) -> Bools:
     return np.array([BOX_FACE in body.tags for body in tree.leaves], dtype=bool)
 
 
-def largest_leaf(tree: Tree, allowed: Bools, corners: Floats) -> tuple[int, ...]:
+def largest_leaf(tree: Tree, allowed: Bools, corners: Floats, walker: Walker) -> tuple[int, ...]:
     """The largest of the (L,) allowed leaves that has floor below its middle, or if none has the
-    largest, as a tuple of one; () if none is allowed. The floor is looked for in the (T, 3, 3)
-    structural triangles ``corners``."""
-    leaves = np.flatnonzero(allowed)
+    largest, as a tuple of one; () if none is allowed. Leaves too thin for a walker, such as the
+    hollow of a wall, are none unless all are. The floor is looked for in the (T, 3, 3) structural
+    triangles ``corners``."""
+    roomy = np.array([body.width >= 2 * walker.radius for body in tree.leaves])
+    leaves = np.flatnonzero(allowed & roomy if roomy.any() else allowed)
     order = leaves[ranked(np.array([tree.leaves[leaf].volume for leaf in leaves]))].tolist()
     for leaf in order:
         if np.any(_plumb(tree.leaves[leaf].points.mean(axis=0), corners) < 0):

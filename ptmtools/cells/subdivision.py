@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree, build_tree
-from ptmtools.cells.cut_off import CutOff, Standing, cut_off
+from ptmtools.cells.cut_off import Standing, Unreached, unreached
 from ptmtools.cells.emptiness import check_seen
 from ptmtools.cells.grouping import grouped
 from ptmtools.cells.joining import joined
@@ -34,6 +34,7 @@ from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import Portal, find_portals, portals_rejoined
 from ptmtools.cells.reach import at_box, flood, largest_leaf, roofed_share
 from ptmtools.cells.rejoin import rejoined
+from ptmtools.cells.remarks import of_detail, of_unreached
 from ptmtools.cells.reveals import Reveals
 from ptmtools.cells.structure import Structure, WallPlane, find_walls
 from ptmtools.errors import InputError
@@ -49,10 +50,6 @@ from ptmtools.tolerance import Tolerance
 BOX_MARGIN = 0.01
 #: So many triangles take as long to subdivide as two processes to start.
 LARGE = 4000
-#: So many objects that were taken for detail are named.
-NAMED = 3
-#: A greater share of all places is much to leave out.
-MUCH = 0.1
 #: A model is open above if less than this share of its floor has something over it.
 ROOFED = 0.5
 
@@ -86,8 +83,8 @@ class _Space:
     portals: list[Portal]
     reached: Bools  # (L,) which leaves somebody can reach
     closed: bool  # whether they do not touch the root box
-    cut_off: list[CutOff]  # where the flood did not come to; reached all the same if asked for
-    left_out: float  # the share of all places, by area, that is not reached
+    beyond: Unreached  # where the flood did not come to; reached all the same if asked for
+    place: float  # m² to stand on where it did, known if something is left out
 
 
 def subdivide(
@@ -117,7 +114,7 @@ def subdivide(
     wide = Polyhedron.box(low - margin, high + margin)
     wide = replace(wide, points=wide.points @ axes)
     tight = _thickened(*_bounds(corners if len(corners) else scene.corners), tolerance)
-    notes = _detail_notes(scene, model.structure.detail)
+    notes = of_detail(scene, model.structure.detail)
     executor = executor or Serial()
     clipped = executor.submit(_divide_inside, model, tight, long=len(scene.triangles) >= LARGE)
     try:
@@ -128,7 +125,7 @@ def subdivide(
             space = clipped.result()
     finally:
         clipped.cancel()
-    notes += _cut_off_notes(space, options)
+    notes += of_unreached(space.beyond, options.reach == "all", space.place)
     if space.tree.unsplit:
         notes.append(
             Warned(
@@ -178,26 +175,24 @@ def _divide(
     portals = find_portals(tree, structure.tolerance)
     outer = at_box(tree)
     start = _viewpoint_leaves(tree, box, options)
-    start = start or largest_leaf(tree, outer <= inside, structure.corners)
+    walker = Walker(*options.walker)
+    start = start or largest_leaf(tree, outer <= inside, structure.corners, walker)
     reached = flood(len(tree.leaves), portals, start)
     closed = bool(start) and not bool(np.any(reached & outer))
-    others: list[CutOff] = []
-    left_out = 0.0
+    beyond, place = Unreached([]), 0.0
     if inside or closed:  # else it is thrown away
-        outside = outer & (not inside)
-        walker = Walker(*options.walker)
-        others = cut_off(tree, portals, reached, outside, model.floors, structure, walker)
-        for other in others if options.reach == "all" else ():
-            reached[other.leaves] = True
-        if others and options.reach == "main":
-            standing = Standing.of(tree, reached, model.floors, structure, walker)
-            beyond = sum(other.place for other in others)
-            left_out = beyond / (beyond + float(standing.place.sum()))
+        surfaces = model.floors, structure, walker
+        beyond = unreached(tree, portals, reached, outer & (not inside), *surfaces)
+        if options.reach == "all":
+            for room in beyond.rooms:
+                reached[room.leaves] = True
+        elif beyond.rooms and reached.any():
+            place = float(Standing.of(tree, reached, *surfaces).place.sum())
     if tree.capped and (inside or closed):
         joint = rejoined(tree, reached)
         portals = portals_rejoined(portals, tree, joint, structure.tolerance)
         tree, reached = joint.tree, np.bincount(joint.leaf, reached) > 0
-    return _Space(box, tree, portals, reached, closed, others, left_out)
+    return _Space(box, tree, portals, reached, closed, beyond, place)
 
 
 def _viewpoint_leaves(tree: Tree, box: Floats, options: SubdivideOptions) -> tuple[int, ...]:
@@ -214,46 +209,6 @@ def _viewpoint_leaves(tree: Tree, box: Floats, options: SubdivideOptions) -> tup
             remedy="viewpoints are in metres, Y up, with the middle of the floor at 0,0,0",
         )
     return tuple(dict.fromkeys((-2 - sunk(tree.planes, tree.children, places)).tolist()))
-
-
-def _detail_notes(scene: Scene, detail: Ints) -> list[str]:
-    """What is said of triangles that were taken for detail because of their shape."""
-    if not len(detail):
-        return []
-    owners, size = np.unique(scene.triangle_object[detail], return_counts=True)
-    names = [scene.objects[i] for i in owners[np.argsort(-size, kind="stable")][:NAMED]]
-    more = ", …" if len(owners) > NAMED else ""
-    return [
-        f"{len(detail):,} triangles of {len(owners):,} objects ({', '.join(names)}{more}) are "
-        "small, dense and round: detail, which neither divides nor hides; --structural NAME, or "
-        "--no-detail-by-shape, says otherwise"
-    ]
-
-
-def _cut_off_notes(space: _Space, options: SubdivideOptions) -> list[str]:
-    """What is said of places that the flood did not come to."""
-    others, kept = space.cut_off, options.reach == "all"
-    if not others:
-        return []
-    does = "is kept as rooms of its own" if kept else "is left out"
-    notes = [
-        f"{other.place:.1f} m² to stand on around {_position(other)} cannot be reached from the "
-        f"start and {does}; --viewpoint {_position(other)} starts there"
-        for other in others[:NAMED]
-    ]
-    if rest := others[NAMED:]:
-        area = sum(other.place for other in rest)
-        notes.append(f"so {does} what is around {len(rest)} more places, {area:.1f} m² in all")
-    if kept:
-        notes.append("--reach main leaves out what cannot be reached from the start")
-    if space.left_out > MUCH:
-        share = f"{space.left_out:.0%} of all that one can stand on"
-        notes.append(Warned(f"{share} is left out; --reach all keeps it"))
-    return notes
-
-
-def _position(other: CutOff) -> str:
-    return ",".join(f"{c:.2f}" for c in other.eye)
 
 
 def _bounds(corners: Floats) -> tuple[Floats, Floats]:

@@ -7,12 +7,11 @@ corners it divided all without a sliver.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import shapely
 
 from ptmtools.arrays import Floats, Ints
+from ptmtools.cells.planar import delaunay
 from ptmtools.cells.welding import first_alike
 
 
@@ -60,21 +59,10 @@ def _delaunay(corner: Floats, ring: Ints, polygon: Ints) -> tuple[Ints, Ints]:
     rings = shapely.linearrings(corner, indices=ring)  # it closes them
     shapes = shapely.polygons(rings, indices=place)
     sound = np.flatnonzero(shapely.is_valid(shapes))
-    parts, of = shapely.get_parts(_each(shapes[sound]), return_index=True)
+    parts, of = shapely.get_parts(delaunay(shapes[sound]), return_index=True)
     points = shapely.get_coordinates(parts).reshape(-1, 4, 2)[:, :3].reshape(-1, 2)
     of = sound[of]
     # Which corner of its polygon a point is: they are the same to the last bit.
     whose = np.concatenate([place[ring], np.repeat(of, 3)])
     same = first_alike(np.column_stack([whose, np.concatenate([corner, points])]))
     return same[len(corner) :].reshape(-1, 3), owner[of]
-
-
-def _each(shapes: Any) -> Any:
-    """The triangulations of an array of polygons; empty for those at which GEOS gives up."""
-    try:
-        return shapely.constrained_delaunay_triangles(shapes)
-    except shapely.GEOSException:
-        if len(shapes) == 1:
-            return np.array([shapely.GeometryCollection()])
-        half = len(shapes) // 2
-        return np.concatenate([_each(shapes[:half]), _each(shapes[half:])])

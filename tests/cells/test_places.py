@@ -19,13 +19,14 @@ from ptmtools.scene.model import Scene
 from tests.conftest import scene_of, subdivided
 
 WALKER = Walker(0.25, 0.5, 1.7)
+EVERYWHERE = np.array([[[-1e3] * 3, [1e3] * 3]])
 SLACK = 0.02  # m², for circles that are polygons
 
 
 def place_area(scene: Scene, options: SubdivideOptions = SubdivideOptions()) -> float:  # noqa: B008
     structure = Structure.of(scene, options, scene.tolerance)
     floors = Floors.of(scene, structure, options)
-    places = find_places(floors, structure, Walker(*options.walker))
+    places = find_places(floors, structure, Walker(*options.walker), EVERYWHERE)
     return float(areas(places).sum())
 
 
@@ -73,9 +74,9 @@ def test_a_ramp_under_a_sloping_ceiling_has_its_head_room_along_the_slope() -> N
         scene = scene_of([ramp, ceiling])
         structure = Structure.of(scene, options, scene.tolerance)
         floors = Floors.of(scene, structure, options)
-        below = floors.only(floors.corners[:, :, 1].mean(axis=1) < 2 + above / 2)
-        found = areas(find_places(below, structure, WALKER)).sum()
-        assert found == pytest.approx(area, abs=0.3)
+        found = find_places(floors, structure, WALKER, EVERYWHERE)
+        below = found[:, :, 1].mean(axis=1) < found[:, :, 0].mean(axis=1) / 2 + above / 2
+        assert areas(found[below]).sum() == pytest.approx(area, abs=0.3)
 
 
 def test_stairs_are_places_from_step_to_step() -> None:
@@ -92,7 +93,9 @@ def test_a_larger_body_has_fewer_places() -> None:
     assert place_area(scene, wide) == pytest.approx(32 - 4, abs=SLACK)
 
 
-@pytest.mark.parametrize("walker", [(0.0, 0.5, 1.7), (0.25, 1.7, 1.7), (0.25, -1.0, 1.7)])
+@pytest.mark.parametrize(
+    "walker", [(0.0, 0.5, 1.7), (0.25, 1.7, 1.7), (0.25, 0.0, 1.7), (0.25, 0.5)]
+)
 def test_nobody_is_like_that(walker: tuple[float, float, float]) -> None:
     with pytest.raises(InputError, match="nobody"):
         SubdivideOptions(walker=walker)
@@ -139,13 +142,55 @@ def test_what_the_flood_does_not_reach(
         assert located(subdivide(scene, options), HALL, point) == [False, True]
 
 
-def test_a_solid_is_no_room_but_a_hollow_box_is(quads, room_faces) -> None:
-    crate = [face[::-1] for face in room_faces((4, 0.5, -1.5), (7, 3.5, 1.5))]
-    scene = quads([*room_faces((0, 0, -4), (20, 4, 4)), *crate])
-    inside = (5.5, 2.0, 0.0)
-    assert located(subdivide(scene), HALL, inside) == [True, True]
-    solid = replace(scene, two_sided=np.zeros(len(scene.triangles), dtype=bool))
-    assert located(subdivide(solid), HALL, inside) == [True, False]
+@pytest.mark.parametrize("two_sided", [True, False])
+def test_a_solid_is_no_room_but_a_cabin_is(quads, room_faces, two_sided: bool) -> None:
+    # A column on the floor, all of whose sides face outwards, and a cabin with walls of 10 cm.
+    column = [face[::-1] for face in room_faces((2, 0, -1), (4, 3, 1), "-y")]
+    cabin = [face[::-1] for face in room_faces((9.9, 0, -1.1), (14.1, 3.1, 1.1), "-y")]
+    cabin += room_faces((10, 0, -1), (14, 3, 1), "-y")
+    scene = quads([*room_faces((0, 0, -4), (20, 4, 4)), *column, *cabin])
+    scene = replace(scene, two_sided=np.full(len(scene.triangles), two_sided))
+    cells = subdivide(scene)
+    assert located(cells, (7, 1, 0), (3, 1, 0), (12, 1, 0)) == [True, False, True]
+    # Of a model wound the other way nothing can be said.
+    if two_sided:
+        turned = replace(scene, triangles=scene.triangles[:, ::-1])
+        assert located(subdivide(turned), (7, 1, 0), (3, 1, 0)) == [True, True]
+
+
+def test_a_house_that_is_open_beside_a_closed_one_is_told(quads, room_faces) -> None:
+    hall = room_faces((0, 0, -4), (20, 4, 4))
+    door = [(0, 4, -4, -1), (0, 4, 1, 4), (3, 4, -1, 1)]
+    house = room_faces((30, 0, -4), (40, 4, 4), "-x")
+    house += [[[30, y0, z0], [30, y1, z0], [30, y1, z1], [30, y0, z1]] for y0, y1, z0, z1 in door]
+    cells = subdivide(quads(hall + house))
+    assert cells.closed
+    assert located(cells, HALL, (35, 1, 0)) == [True, False]
+    (told,) = [note for note in cells.notes if "open to the outside" in note]
+    assert isinstance(told, Warned)
+    there = tuple(float(c) for c in told.split("--viewpoint ")[1].split(" ")[0].split(","))
+    both = subdivide(quads(hall + house), SubdivideOptions(viewpoints=(there,)))  # type: ignore[arg-type]
+    assert located(both, HALL, (35, 1, 0)) == [True, True]
+
+
+def test_a_floor_of_many_facets_is_a_place(quads, room_faces) -> None:
+    # Each triangle of the gravel is a region of its own, smaller than a foot.
+    rooms = room_faces((0, 0, -4), (20, 4, 4)) + room_faces((30, 0, -2), (34, 4, 2))
+    gravel = subdivided(quads([floor_of(30, 34, -2, 2, 0.02)]), 60).corners
+    gravel[..., 1] += 0.003 * np.random.default_rng(1).random(gravel.shape[:2])
+    cells = subdivide(scene_of(np.concatenate([quads(rooms).corners, gravel])))
+    assert located(cells, HALL, (32, 1, 0)) == [True, True]
+    (said,) = [note for note in cells.notes if "to stand on" in note]
+    assert float(said.split(" ")[0]) == pytest.approx(3.5 * 3.5, abs=0.5)
+
+
+def test_the_ground_costs_nothing_however_large(quads, room_faces) -> None:
+    ground = floor_of(-2e3, 2e3, -2e3, 2e3, -0.3)
+    rooms = room_faces((0, 0, -4), (20, 4, 4)) + room_faces((30, 0, -2), (34, 4, 2))
+    cells = subdivide(quads([*rooms, ground]))
+    assert located(cells, HALL, (32, 1, 0)) == [True, True]
+    (said,) = [note for note in cells.notes if "to stand on" in note]
+    assert float(said.split(" ")[0]) == pytest.approx(3.5 * 3.5, abs=0.3)
 
 
 def test_the_outside_of_a_closed_building_is_not_kept(quads, room_faces) -> None:
@@ -168,4 +213,4 @@ def test_many_rooms_are_counted_after_the_largest(quads, room_faces) -> None:
     assert len(said) == 3
     size = [float(note.split(" ")[0]) for note in said]
     assert size == pytest.approx([33.25, 26.25, 19.25], abs=0.06)
-    assert any("2 more places" in note for note in cells.notes)
+    assert any("2 more such places" in note for note in cells.notes)

@@ -1,0 +1,68 @@
+"""What the subdivision has to say of detail that it recognised, and of what it did not reach."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ptmtools.arrays import Ints
+from ptmtools.cells.cut_off import CutOff, Unreached
+from ptmtools.notes import Warned
+from ptmtools.quantities import count
+from ptmtools.scene.model import Scene
+
+#: So many objects, or places, are named.
+NAMED = 3
+#: A greater share of all places is much to leave out.
+MUCH = 0.1
+
+
+def of_detail(scene: Scene, detail: Ints) -> list[str]:
+    """What is said of triangles that were taken for detail because of their shape."""
+    if not len(detail):
+        return []
+    owners, size = np.unique(scene.triangle_object[detail], return_counts=True)
+    names = [scene.objects[i] for i in owners[np.argsort(-size, kind="stable")][:NAMED]]
+    more = ", …" if len(owners) > NAMED else ""
+    return [
+        f"{len(detail):,} triangles of {count(len(owners), 'object')} ({', '.join(names)}{more}) "
+        "are small, dense and round: detail, which neither divides nor hides; --structural NAME, "
+        "or --no-detail-by-shape, says otherwise"
+    ]
+
+
+def of_unreached(unreached: Unreached, kept: bool, place: float) -> list[str]:
+    """What is said of places that the flood did not come to, which are ``kept`` or left out; of
+    ``place`` m² that it did come to if they are not."""
+    rooms, outside = unreached.rooms, unreached.outside
+    fate = "kept as rooms of its own" if kept else "left out"
+    notes = [
+        f"{_place(room)} cannot be reached from the start and is {fate}; "
+        f"--viewpoint {_position(room)} starts there"
+        for room in rooms[:NAMED]
+    ]
+    if rest := rooms[NAMED:]:
+        area = sum(room.place for room in rest)
+        fate = "kept as rooms of their own" if kept else "left out"
+        notes.append(f"{count(len(rest), 'more such place')}, {area:.1f} m² in all, are {fate}")
+    if rooms and kept:
+        notes[0] += "; --reach main leaves out all that cannot be reached"
+    left = sum(room.place for room in rooms)
+    if not kept and left > MUCH * (left + place):
+        share = f"{left / (left + place):.0%} of all that one can stand on"
+        notes.append(Warned(f"{share} is left out; --reach all keeps it"))
+    if outside:
+        notes.append(
+            Warned(
+                f"{_place(outside)}, under a roof but open to the outside, is left out; "
+                f"--viewpoint {_position(outside)} includes it"
+            )
+        )
+    return notes
+
+
+def _place(room: CutOff) -> str:
+    return f"{room.place:.1f} m² to stand on around {_position(room)}"
+
+
+def _position(room: CutOff) -> str:
+    return ",".join(f"{c:.2f}" for c in room.eye)
