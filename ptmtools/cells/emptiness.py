@@ -22,8 +22,8 @@ def check_seen(scene: Scene, cells: Cells) -> None:
         )
     raise InputError(
         "PTM-I304",
-        "nothing of the model is seen from inside: its faces have no backs, and all are turned "
-        "away from its rooms",
+        "nothing of the model is seen from inside: no face around its cells is turned towards "
+        "them or has a back",
         remedy="give --two-sided to draw every face from both sides, or turn the normals",
     )
 

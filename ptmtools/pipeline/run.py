@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-from ptmtools.errors import DatabaseError
+from ptmtools.errors import DatabaseError, naming
 from ptmtools.notes import warnings_in
 from ptmtools.pipeline.changes import reasons
 from ptmtools.pipeline.report import StageReport
@@ -285,7 +285,8 @@ class ArraysJob(Job):
         assert stage.counts
         reads = [run[read] for read in stage.read_with(options)]
         executor = run.workers.alone if stage.one_thread else run.workers.executor
-        artifact = stage.compute.load()(*reads, options, run.progress, executor)
+        with naming(run.model if stage.from_model else None):
+            artifact = stage.compute.load()(*reads, options, run.progress, executor)
         run.keep(stage, artifact)
         transaction.put_arrays(stage.name, artifact.to_arrays())
         said = tuple(stage.notes(artifact, options))

@@ -29,7 +29,7 @@ PRIOR = {"m": 0.0, "cm": 0.1, "mm": 0.1, "in": 0.5, "ft": 0.5}
 HEIGHTS = (2.0, 15.0)
 #: Widths of buildings, and free heights of their rooms, in metres.
 WIDTHS, ROOMS = (3.0, 500.0), (2.2, 6.0)
-#: A model lower than this share of its width is a plan, and nobody lives in it.
+#: A model lower than this share of the width of its rooms is a plan, and nobody lives in it.
 FLAT = 0.003
 #: The height of a door in metres, and the share by which doors differ.
 DOOR, DOORS_DIFFER = 2.1, 0.2
@@ -38,6 +38,9 @@ _MOST = 10.0
 #: A reading that costs less than this more is close to the cheapest: with another axis, or with
 #: another unit.
 CLOSE_AXIS, CLOSE_UNIT = 0.5, 0.4
+#: A format that says which axis is up is doubted where the other axis costs this much less: more
+#: than a corridor or a cube that is right may be cheaper lying on its side.
+DOUBT_AXIS = 0.35
 #: A sign that costs another reading this much more is named as a reason.
 _TELLING = 0.1
 
@@ -69,7 +72,7 @@ class Reading:
     @property
     def flat(self) -> bool:
         """Whether it is a plan rather than a building."""
-        return self.look.height <= FLAT * self.look.width
+        return self.look.height <= FLAT * self.look.built
 
     @property
     def size(self) -> str:
@@ -115,7 +118,7 @@ def _costs(look: Look, other: Look, unit: str, metres: float) -> dict[str, float
         "fewer slanting faces": 1 - look.upright,
         "rooms of one height": 1 - look.alike,
         "faces lie and stand as they are called": 2 * (1 - look.named),
-        "a usual size": _of_size(look.width * metres, look.height * metres),
+        "a usual size": _of_size(look, metres),
         "rooms of a usual height": look.alike * _of_room(look.room * metres),
         "doors of a usual height": _of_door(look.door * metres),
         "a usual unit": PRIOR.get(unit, 0.0),
@@ -129,13 +132,17 @@ def _higher(height: float, other: float) -> float:
     return 0.5 + max(-2.0, min(2.0, _orders(height, other) / math.log(2))) / 4
 
 
-def _of_size(width: float, height: float) -> float:
+def _of_size(look: Look, metres: float) -> float:
+    # In units of the model, so that no length becomes 0 in metres.
     cost = 0.0
-    if width > 0:
-        cost += min(_MOST, 2 * max(0.0, _orders(WIDTHS[0], width), _orders(width, WIDTHS[1])))
-    if height > FLAT * width:
-        low = min(3.0, 4 * _orders(HEIGHTS[0], height))
-        cost += min(_MOST, max(0.0, low, 0.25 * _orders(height, HEIGHTS[1])))
+    if look.width > 0:
+        narrow, wide = WIDTHS[0] / metres, WIDTHS[1] / metres
+        too = max(0.0, _orders(narrow, look.width), _orders(look.built, wide))
+        cost += min(_MOST, 2 * too)
+    if look.height > FLAT * look.built:
+        low, high = HEIGHTS[0] / metres, HEIGHTS[1] / metres
+        too = max(0.0, min(3.0, 4 * _orders(low, look.height)), 0.25 * _orders(look.height, high))
+        cost += min(_MOST, too)
     return cost
 
 

@@ -80,6 +80,7 @@ class Look:
     Attributes
     ----------
     width, height: of the bounding box, the greater of its level sides first.
+    built: the width of what has rooms, without the ground around it; all of it if nothing has.
     room: the free height that most space has; 0 if nothing lies over anything.
     alike: how much of the height rooms of this height take up, on average.
     level: area of level faces, as a share of all.
@@ -92,6 +93,7 @@ class Look:
 
     width: float
     height: float
+    built: float
     room: float
     alike: float
     level: float
@@ -119,11 +121,13 @@ def looks(points: Floats, triangles: NDArray[np.integer], named: Named) -> dict[
         lies, stands = slope > _LEVEL, slope < _UPRIGHT
         wall = area * stands
         room, alike = _free_height(crossed[axis], float(side[axis]) / scale)
+        width = float(side[[u, v]].max())
         as_called = float(area @ ((level & lies) | (upright & stands)))
         doors = [np.ptp(local[triangles[each], axis]) for each in named.doors]
         found[up] = Look(
-            width=float(side[[u, v]].max()),
+            width=width,
             height=float(side[axis]),
+            built=_built(lines, crossed[axis], axis, room) * scale or width,
             room=room * scale,
             alike=alike,
             level=float(area @ lies) / total,
@@ -160,6 +164,15 @@ def _least_of_greatest(a: float, b: float, mixed: float) -> float:
     """The ratio of the eigenvalues of [[a, mixed], [mixed, b]], positive semidefinite."""
     mean, apart = (a + b) / 2, np.hypot((a - b) / 2, mixed)
     return max(0.0, float((mean - apart) / (mean + apart))) if mean > 0 else 0.0
+
+
+def _built(lines: SampleLines, crossed: Crossings, axis: int, room: float) -> float:
+    """The width of what has rooms: of where the lines stand that cross one of this height or, at
+    least, half of it, which the ground beside a building has not under it."""
+    before, gaps = crossed.gaps()
+    u, v = (lines.rows(k) for k in range(3) if k != axis)
+    at = np.divmod(np.unique(crossed.line[before[gaps >= room / 2]]), len(v))
+    return max(float(np.ptp(row[i])) if len(i) else 0.0 for row, i in zip((u, v), at, strict=True))
 
 
 def _free_height(crossed: Crossings, height: float) -> tuple[float, float]:

@@ -18,7 +18,14 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError, LimitError
 from ptmtools.scene.model import Space
-from ptmtools.scene.readings import CLOSE_AXIS, CLOSE_UNIT, UNITS, Reading, readings
+from ptmtools.scene.readings import (
+    CLOSE_AXIS,
+    CLOSE_UNIT,
+    DOUBT_AXIS,
+    UNITS,
+    Reading,
+    readings,
+)
 from ptmtools.scene.signs import Named, Up, looks
 from ptmtools.scene.source import Findings
 
@@ -112,14 +119,22 @@ def _judge_axis(ranked: list[Reading], by_format: Up | None, findings: Findings)
     for_best, for_rival = _because(best, rival), _because(rival, best)
     if by_format:
         # What is flat has no rooms that could lie on their side.
-        if best.up == by_format or ahead < CLOSE_AXIS or best.flat:
+        if best.up == by_format or ahead < DOUBT_AXIS or best.flat:
             return by_format
-        findings.say(
-            "PTM-N234",
-            f"the format has {by_format} up, but the model seems to lie on its side: with "
-            f"{by_format} up it is {rival.size}, with {best.up} up {best.size}{for_best}; give "
-            f"--up {best.up} to turn it",
-        )
+        if ahead < CLOSE_AXIS:
+            findings.say(
+                "PTM-N232",
+                f"the up axis is uncertain: the format has {by_format} up, {rival.size}"
+                f"{for_rival}, but {best.up} is rather more likely, {best.size}{for_best}; give "
+                f"--up {by_format} or --up {best.up}",
+            )
+        else:
+            findings.say(
+                "PTM-N234",
+                f"the format has {by_format} up, but the model seems to lie on its side: with "
+                f"{by_format} up it is {rival.size}, with {best.up} up {best.size}{for_best}; give "
+                f"--up {best.up} to turn it",
+            )
     elif ahead < CLOSE_AXIS:
         findings.say(
             "PTM-N232",

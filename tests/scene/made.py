@@ -156,6 +156,31 @@ def mezzanine() -> Floats:
     )
 
 
+def castle(rooms: int = 1, *, slabs: bool = True) -> Floats:
+    """Rooms of 5 m between walls, floors and ceilings that are all 1.8 m thick."""
+    t, inner, deep, high = 1.8, 5.0, 6.4, 5.0
+    w, d = t + rooms * (inner + t), deep + 2 * t
+    parts = [box((0, 0, 0), (w, t, high)), box((0, d - t, 0), (w, d, high))]
+    parts += [
+        box((x, t, 0), (x + t, d - t, high)) for x in (np.arange(rooms + 1) * (inner + t)).tolist()
+    ]
+    if slabs:
+        parts += [box((0, 0, -t), (w, d, 0)), box((0, 0, high), (w, d, high + t))]
+    return np.concatenate(parts)
+
+
+def tower() -> Floats:
+    """21 floors 3.2 m apart within four walls, 8 m wide and 64.2 m high."""
+    floors = [box((0, 0, z * 3.2 - 0.2), (8, 8, z * 3.2)) for z in range(21)]
+    walls = [
+        box((0, 0, 0), (0.2, 8, 64)),
+        box((7.8, 0, 0), (8, 8, 64)),
+        box((0, 0, 0), (8, 0.2, 64)),
+        box((0, 7.8, 0), (8, 8, 64)),
+    ]
+    return np.concatenate([*floors, *walls])
+
+
 def meadow(building: Floats, size: float = 480) -> Floats:
     """On a level ground of this width."""
     s = size / 2

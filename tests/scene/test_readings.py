@@ -59,6 +59,9 @@ SURE = {
     "mezzanine": mezzanine(),
     "room of 5 × 4 × 3 m": box((0, 0, 0), (5, 4, 3)),
     "on a meadow": meadow(house()),
+    "on a meadow of 1.2 km": meadow(house(), 1200),
+    "on a meadow of 3 km": meadow(house(), 3000),
+    "on a meadow of 20 km, without a floor": meadow(house(floor=False), 20_000),
     "site plan": site_plan(),
 }
 #: Nobody can tell which axis is up without being told.
@@ -94,6 +97,17 @@ def test_what_is_up(name: str, up: Up) -> None:
     assert (ranked[0].up, ranked[0].unit) == (up, "m")
     assert axis_ahead(ranked) >= CLOSE_AXIS
     assert unit_ahead(ranked) >= CLOSE_UNIT
+
+
+def test_the_width_that_counts_is_that_of_rooms() -> None:
+    """Not of the ground around them, nor of a thin slab that is the ground."""
+    slab = box((-400, -400, -0.6), (400, 400, -0.3))
+    for site in (meadow(house(), 3000), np.concatenate([house(), slab])):
+        best = read(site)[0]
+        assert best.look.width >= 800
+        assert 15 < best.look.built < 20
+        assert best.costs["a usual size"] == 0
+        assert not best.flat
 
 
 @pytest.mark.parametrize("name", UNSURE)
@@ -168,7 +182,7 @@ def test_words_in_names() -> None:
     assert [leaf.tolist() for leaf in named.doors] == [[5]]
 
 
-PLAIN = Look(20, 6, 3, 0.5, 0.5, 1.0, 0.5, 1.0, 0.0)
+PLAIN = Look(20, 6, 20, 3, 0.5, 0.5, 1.0, 0.5, 1.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -188,13 +202,13 @@ PLAIN = Look(20, 6, 3, 0.5, 0.5, 1.0, 0.5, 1.0, 0.0)
     ],
 )
 def test_units_by_size_alone(width: float, height: float, unit: str) -> None:
-    look = replace(PLAIN, width=width, height=height, room=0.0, alike=0.0)
+    look = replace(PLAIN, width=width, height=height, built=width, room=0.0, alike=0.0)
     assert readings({"y": look, "z": look})[0].unit == unit
 
 
 @pytest.mark.parametrize("size", [0.0, 5e-324, 1e-300, 1e300, 1.7e308])
 def test_sizes_at_the_ends_of_numbers_have_a_reading(size: float) -> None:
-    look = replace(PLAIN, width=size, height=size, room=size, door=size)
+    look = replace(PLAIN, width=size, height=size, built=size, room=size, door=size)
     for other in (look, PLAIN):
         ranked = readings({"y": look, "z": other})
         assert len(ranked) == 2 * len(UNITS)

@@ -14,7 +14,7 @@ from ptmtools.scene.signs import Named
 from ptmtools.scene.source import Findings
 from ptmtools.scene.space import UNITS, Said, parse_unit, settle, turned
 
-from .made import box, house, site_plan, welded, y_up
+from .made import box, corridor, house, site_plan, tower, welded, y_up
 
 
 @pytest.mark.parametrize(
@@ -99,6 +99,21 @@ def test_a_format_is_believed_and_doubted() -> None:
     space, notes = told(y_up(house()) * 100, by_format=gltf)
     assert (space.metres, list(notes)) == (1.0, ["PTM-N227"])
     assert "cm would be more likely" in notes["PTM-N227"]
+
+
+def test_a_format_is_doubted_where_the_other_axis_is_somewhat_likelier() -> None:
+    """As of a tower that lies on its side, and may be a hall of many bays; but not of a cube or a
+    corridor, of which little can be told."""
+    gltf = Said(1.0, "y")
+    space, notes = told(tower(), by_format=gltf)
+    assert (space.up, space.up_guessed, list(notes)) == ("y", False, ["PTM-N232"])
+    assert "the format has y up, 64.2 m wide and 8 m high" in notes["PTM-N232"]
+    assert "z is rather more likely, 8 m wide and 64.2 m high" in notes["PTM-N232"]
+    assert notes["PTM-N232"].endswith("give --up y or --up z")
+    assert told(y_up(tower()), by_format=gltf)[1] == {}
+    assert told(tower(), Said(up="y"), gltf)[1] == {}
+    for plain in (box((0, 0, 0), (3, 3, 3)), corridor(40, 2, 3, rooms=False)):
+        assert told(y_up(plain), by_format=gltf)[1] == {}
 
 
 def test_a_plan_does_not_lie_on_its_side() -> None:

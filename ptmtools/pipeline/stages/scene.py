@@ -45,7 +45,7 @@ def _summary(n: Mapping[str, Any]) -> str:
 SCENE: Stage[Scene] = Stage(
     name="scene",
     about="Read a model.",
-    recipe=4,
+    recipe=5,
     options=IngestOptions,
     artifact=Lazy("ptmtools.scene.model:Scene"),
     counts=_counts,
