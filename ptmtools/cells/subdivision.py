@@ -245,7 +245,7 @@ def _cut_off_notes(space: _Space, options: SubdivideOptions) -> list[str]:
         area = sum(other.place for other in rest)
         notes.append(f"so {does} what is around {len(rest)} more places, {area:.1f} m² in all")
     if kept:
-        notes.append("--reach main leaves out what cannot be reached from the start")
+        notes[0] += "; --reach main leaves out all that cannot be reached"
     if space.left_out > MUCH:
         share = f"{space.left_out:.0%} of all that one can stand on"
         notes.append(Warned(f"{share} is left out; --reach all keeps it"))
