@@ -235,15 +235,15 @@ def _cut_off_notes(space: _Space, options: SubdivideOptions) -> list[str]:
     others, kept = space.cut_off, options.reach == "all"
     if not others:
         return []
-    does = "is kept as rooms of its own" if kept else "is left out"
+    becomes = "it is kept as rooms of its own" if kept else "it is left out"
     notes = [
         f"{other.place:.1f} m² to stand on around {_position(other)} cannot be reached from the "
-        f"start and {does}; --viewpoint {_position(other)} starts there"
+        f"start; {becomes}; --viewpoint {_position(other)} starts there"
         for other in others[:NAMED]
     ]
     if rest := others[NAMED:]:
         area = sum(other.place for other in rest)
-        notes.append(f"so {does} what is around {len(rest)} more places, {area:.1f} m² in all")
+        notes.append(f"so it is with {len(rest)} more places, {area:.1f} m² in all")
     if kept:
         notes[0] += "; --reach main leaves out all that cannot be reached"
     if space.left_out > MUCH:
