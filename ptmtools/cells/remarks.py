@@ -34,9 +34,9 @@ def of_unreached(unreached: Unreached, kept: bool, place: float) -> list[str]:
     """What is said of places that the flood did not come to, which are ``kept`` or left out; of
     ``place`` m² that it did come to if they are not."""
     rooms, outside = unreached.rooms, unreached.outside
-    fate = "kept as rooms of its own" if kept else "left out"
+    fate = "it is kept as rooms of its own" if kept else "it is left out"
     notes = [
-        f"{_place(room)} cannot be reached from the start and is {fate}; "
+        f"{_place(room)} cannot be reached from the start; {fate}; "
         f"--viewpoint {_position(room)} starts there"
         for room in rooms[:NAMED]
     ]

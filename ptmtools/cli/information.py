@@ -43,14 +43,13 @@ def info(voice: Voice, target: str, as_json: bool) -> None:
 
 
 def _info_database(voice: Voice, target: str, as_json: bool) -> None:
-    from ptmtools.cli.parameters import words
     from ptmtools.cli.stages import print_visitor
-    from ptmtools.cli.status import build_command
+    from ptmtools.pipeline.command import build_command, open_database
     from ptmtools.pipeline.stages import STAGES
     from ptmtools.pipeline.visitor import Visitor
-    from ptmtools.store.folder import DatabaseFolder
+    from ptmtools.pipeline.words import words
 
-    db = DatabaseFolder.open(target)
+    db = open_database(target)
     stages = db.manifest.stages
     visitor = Visitor.of(db.manifest)
     old = [n for n, s in STAGES.items() if n in stages and stages[n].recipe != s.recipe]
@@ -90,7 +89,7 @@ def _info_database(voice: Voice, target: str, as_json: bool) -> None:
         if voice.verbose:
             for key, value in record.parameters.items():
                 voice.say(f"{'':<9}   {key} = {value}")
-            for note in record.notes:
+            for note in [note for note in record.notes if note not in record.warnings]:
                 voice.say(f"{'':<9}   note: {note}")
     if visitor:
         print_visitor(voice, visitor)

@@ -1,4 +1,5 @@
-"""Command-line options made from the fields of an options dataclass, and back.
+"""Command-line options made from the fields of an options dataclass; `ptmtools.pipeline.words` is
+the way back.
 
 The dataclass stays the one home of names, defaults and their explanation: a field `wall_area:
 float = 2.0` with the line ``wall_area: the least area …`` under "Attributes" of the docstring
@@ -22,14 +23,16 @@ from __future__ import annotations
 import inspect
 import re
 import typing
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import MISSING, Field, fields
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import Field, fields
 from functools import wraps
 from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 
 import click
 from click.core import ParameterSource
+
+from ptmtools.pipeline.words import default_of, option_name
 
 T = TypeVar("T")
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
@@ -117,11 +120,11 @@ def options_of(*classes: type) -> Decorator:
     for cls in classes:
         hints, texts = typing.get_type_hints(cls), descriptions(cls)
         for field in fields(cls):
-            name = _option_name(field)
+            name = option_name(field)
             if name not in found:
                 found[name] = _option(field, hints[field.name], texts.get(field.name))
                 if reason := field.metadata.get("deprecated"):
-                    deprecated[name] = _default(field), reason
+                    deprecated[name] = default_of(field), reason
                 for old in field.metadata.get("was", ()):
                     found[old] = _option(field, hints[field.name], None, former=old)
                     former[old] = name
@@ -156,47 +159,11 @@ def take(cls: type[T], values: dict[str, Any]) -> T:
     keeps its default."""
     found = {}
     for field in fields(cls):  # type: ignore[arg-type]
-        name = _variable(_option_name(field))
+        name = _variable(option_name(field))
         if name in values:
             parse = field.metadata.get("parse", lambda value: value)
             found[field.name] = parse(values[name])
     return cls(**found)
-
-
-def words(options: Iterable[Any]) -> list[str]:
-    """The command-line words that give these instances of options classes; defaults are left out.
-    Where several share an option the last one counts."""
-    found: dict[str, list[str]] = {}
-    for each in options:
-        for field in fields(each):
-            value, name = getattr(each, field.name), _option_name(field)
-            if value == _default(field) or "deprecated" in field.metadata:
-                continue
-            value = field.metadata.get("print", lambda value: value)(value)
-            if isinstance(value, bool):
-                found[name] = [f"--{name}" if value else f"--no-{name}"]
-            else:
-                many = isinstance(value, (list, tuple)) and _repeated(type(each), field)
-                each_value = value if many else [value]
-                found[name] = [w for one in each_value for w in (f"--{name}", _text(one))]
-    return [word for given in found.values() for word in given]
-
-
-def _repeated(cls: type, field: Field[Any]) -> bool:
-    """Whether the option of a field may be given several times."""
-    hint = typing.get_type_hints(cls)[field.name]
-    return get_origin(hint) is tuple and get_args(hint)[-1] is Ellipsis
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, (list, tuple)):
-        return ",".join(map(_text, value))
-    return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
-
-
-def _option_name(field: Field[Any]) -> str:
-    name: str = field.metadata.get("option", field.name.replace("_", "-"))
-    return name
 
 
 def _variable(option: str) -> str:
@@ -204,21 +171,17 @@ def _variable(option: str) -> str:
     return option.replace("-", "_")
 
 
-def _default(field: Field[Any]) -> Any:
-    return field.default if field.default_factory is MISSING else field.default_factory()
-
-
 def _option(field: Field[Any], hint: Any, text: str | None, former: str = "") -> Decorator:
     """The option of a field; with ``former`` the hidden one of that name, without a default."""
-    default = None if former else _default(field)
-    name = former or _option_name(field)
+    default = None if former else default_of(field)
+    name = former or option_name(field)
     settings: dict[str, Any] = {
         "default": default,
         "help": text and text[:1].upper() + text[1:],
         "hidden": bool(former or field.metadata.get("deprecated")),
     }
     if former:
-        settings["help"] = f"Now --{_option_name(field)}."
+        settings["help"] = f"Now --{option_name(field)}."
     if get_origin(hint) in (Union, UnionType):  # X | None
         hint = next(part for part in get_args(hint) if part is not NoneType)
     if default not in (None, (), ""):

@@ -18,9 +18,9 @@ from ptmtools.database import PlotOptions, ValidationReport
 from ptmtools.database.validation.findings import NOT_BUILT, SEEN_BY_BUILD
 from ptmtools.errors import CheckError
 from ptmtools.pipeline import Artifacts, shoot_segments, validate as check
+from ptmtools.pipeline.command import build_command, open_database
 from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE
 from ptmtools.quantities import count, size
-from ptmtools.store.folder import DatabaseFolder
 from ptmtools.texture.model import Limits
 from ptmtools.visibility import SegmentReport
 
@@ -108,7 +108,7 @@ def plot(voice: Voice, db: str, output: str, force: bool, **values: Any) -> None
     from ptmtools.database import plot_plan
 
     options = take(PlotOptions, values)
-    artifacts = Artifacts(DatabaseFolder.open(db))
+    artifacts = Artifacts(open_database(db))
     report = plot_plan(
         artifacts[SCENE],
         artifacts[CELLS],
@@ -183,8 +183,6 @@ def _print_findings(
 
 def _repair(target: str, report: ValidationReport) -> str | None:
     """The command that makes good what was found, if one does."""
-    from ptmtools.cli.status import build_command
-
     codes = {issue.code for issue in report.issues}
     if not codes - NOT_BUILT:
         return None

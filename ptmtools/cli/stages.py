@@ -26,16 +26,18 @@ from ptmtools.cli.common import (
 )
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
+from ptmtools.database.emitters import EMITTERS
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.build import build_scene as build, run_stage
 from ptmtools.pipeline.changes import NEVER_RUN
+from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.report import BuildReport, StageReport
 from ptmtools.pipeline.run import Artifacts
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import EMIT, PVS, STAGES
 from ptmtools.pipeline.visitor import Visitor
 from ptmtools.quantities import count, size
-from ptmtools.store.folder import DatabaseFolder
+from ptmtools.store.layout import SERVED
 
 #: What ``ptm STAGE DB --report`` prints besides: what that is, and a function of the artifacts that
 #: returns it as a document and as lines.
@@ -150,9 +152,7 @@ def _of_database(stage: Stage[Any]) -> Callable[..., None]:
         if not wanted:
             print_report(voice, report, as_json)
             return
-        document, lines = REPORTS[stage][1].load()(
-            Artifacts(DatabaseFolder.open(db)), voice.verbose
-        )
+        document, lines = REPORTS[stage][1].load()(Artifacts(open_database(db)), voice.verbose)
         if as_json:
             voice.emit_json(document)
             return
@@ -201,8 +201,11 @@ def print_report(voice: Voice, report: BuildReport, as_json: bool) -> None:
         commands = {
             f"{ptm} plot {db} -o plan.png": "draw its floor plan",
             f"{ptm} validate {db}": "check every file",
-            f"python3 -m http.server -d {db}/www": "look at it on this machine: open root.wrl",
         }
+        www = Path(report.database) / SERVED
+        for entry in [e.entry for e in EMITTERS.values() if e.entry and (www / e.entry).exists()]:
+            look = f"look at it on this machine: open {entry}"
+            commands[f"python3 -m http.server -d {db}/{SERVED}"] = look
         width = max(map(len, commands))
         for command, purpose in commands.items():
             voice.say(f"  {command:<{width}}  {purpose}")

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from ptmtools.cli.common import as_json, database, voiced
 from ptmtools.cli.output import Voice
-from ptmtools.cli.parameters import words
-from ptmtools.errors import DatabaseError
+from ptmtools.pipeline.command import build_command
 from ptmtools.pipeline.stages import STAGES
 from ptmtools.quantities import count, size
-from ptmtools.store.folder import read_manifest
-from ptmtools.store.manifest import Manifest
 
 if TYPE_CHECKING:
     from ptmtools.pipeline.plan import StagePlan
@@ -54,21 +48,6 @@ def status(voice: Voice, db: str, as_json: bool) -> None:
         voice.say(f"a run was interrupted{waiting if found.waiting else ''}")
     if not found.finished and not found.writer:
         voice.say(f"not finished: run `{build_command(db)}`")
-
-
-def build_command(db: str) -> str:
-    """The command that brings a database up to date, with the options that it was built with."""
-    manifest = Manifest("")
-    with suppress(DatabaseError):
-        manifest = read_manifest(Path(db)) or manifest
-    recorded = []
-    for name, stage in STAGES.items():
-        with suppress(KeyError, ValueError):
-            recorded.append(stage.recorded(manifest.stages[name]))
-    model = shlex.quote(manifest.model) if manifest.model else "MODEL"
-    return " ".join(
-        ["ptm build-scene", model, "-o", shlex.quote(db), *map(shlex.quote, words(recorded))]
-    )
 
 
 def print_plan(voice: Voice, plans: Sequence[StagePlan], as_json: bool) -> None:

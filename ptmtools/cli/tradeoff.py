@@ -16,7 +16,7 @@ from ptmtools.coverage.options import MAX_SAMPLES
 from ptmtools.errors import OutputError
 from ptmtools.files import refuse_existing, write_bytes, writing
 from ptmtools.pipeline import Artifacts
-from ptmtools.store.folder import DatabaseFolder
+from ptmtools.pipeline.command import open_database
 from ptmtools.tradeoff.experiment import Trade, run
 from ptmtools.tradeoff.experiments import EXPERIMENTS, Subject
 from ptmtools.tradeoff.figure import picture, require
@@ -85,7 +85,7 @@ def tradeoff(
             _writable(file, force)
     if plot_file:
         require()
-    subject = Subject(Artifacts(DatabaseFolder.open(db)), cells_tried, reference)
+    subject = Subject(Artifacts(open_database(db)), cells_tried, reference)
     trades = []
     with voice.progress() as progress:
         for stage in stages or EXPERIMENTS:

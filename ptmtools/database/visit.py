@@ -4,11 +4,12 @@ All are bytes as they lie on the disk, textures losslessly and whole unless said
 
 A *plain browser* opens the VRML root and loads everything that this leads to: all cells, and the
 fallback image of every texture. A client of the *hints* fetches the index, the record of the cell
-that it is in, and of what that cell sees the geometry (in the lightest form that there is) and the
-textures. For it **the first room is complete** when the index, the record of the first viewpoint's
-cell, the geometry of all cells that it sees and the textures of the cell itself are there, and of
-the textures of the other cells the coarsest level: nothing is missing, and the room is as fine as
-the model. **At hand** is what it holds in a cell once everything it sees is whole. Means are over
+that it is in, and of what that cell sees the geometry and the textures; the geometry in a form
+that has no entry of its own, and so is there for such clients, if one was written. For it **the
+first room is complete** when the index, the record of the first viewpoint's cell, the geometry of
+all cells that it sees and the textures of the cell itself are there, and of the textures of the
+other cells the coarsest level: nothing is missing, and the room is as fine as the model. **At
+hand** is what it holds in a cell once everything it sees is whole. Means are over
 places, not over cells: a cell counts by its volume.
 """
 
@@ -60,7 +61,8 @@ def visit_of(content: Content, sizes: Mapping[str, int]) -> Visit:
     pvs, records = content.pvs, content.textures
     forms = [e for e in chosen_emitters(content.options.format) if e.cell_files]
     nothing = np.zeros(pvs.cell_count, np.int64)
-    geometry = min((_geometry(content, f, sizes) for f in forms), key=_total, default=nothing)
+    fetched = [f for f in forms if not f.entry] or forms
+    geometry = _geometry(content, fetched[0], sizes) if fetched else nothing
     paints = np.zeros((pvs.cell_count, len(records)), dtype=np.bool_)
     for cell, places in enumerate(content.painted):
         paints[cell, places] = True

@@ -16,6 +16,7 @@ from typing import Any
 from ptmtools.ahead import Task, compile_ahead
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.background import Workers
+from ptmtools.pipeline.command import naming_command
 from ptmtools.pipeline.report import BuildReport, StageReport, peak_memory
 from ptmtools.pipeline.run import Run
 from ptmtools.pipeline.stage import Options, Stage
@@ -95,7 +96,9 @@ def run_stage(
     start = time.perf_counter()
     chosen = chosen_options([options])
     stages = [stage for stage in STAGES.values() if isinstance(options, stage.options)]
-    with DatabaseWriter.open_for_stage(db) as writer, Workers(workers, scheduler) as used:
+    with naming_command(db):
+        opened = DatabaseWriter.open_for_stage(db)
+    with opened as writer, Workers(workers, scheduler) as used:
         return _run(Run(writer, used, progress), stages, chosen, start, tell)
 
 

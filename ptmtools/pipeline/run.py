@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 from ptmtools.errors import DatabaseError, naming
 from ptmtools.notes import warnings_in
 from ptmtools.pipeline.changes import reasons
+from ptmtools.pipeline.command import build_command, naming_command
 from ptmtools.pipeline.report import StageReport
 from ptmtools.pipeline.stage import Options, Stage, parameters
 from ptmtools.progress import Progress, silent
@@ -54,9 +55,10 @@ class Artifacts:
                     "PTM-D008",
                     f"the {stage.name} stage was run by another release of ptmtools",
                     file=self.db.path,
-                    remedy=f"run `{self.db.build_command}` to bring the database up to date",
+                    remedy=f"run `{build_command(self.db.path)}` to bring the database up to date",
                 )
-            arrays = self.db.read_arrays(stage.name)
+            with naming_command(self.db.path):
+                arrays = self.db.read_arrays(stage.name)
             kind = stage.artifact.load()
             with self.reading(arrays_of(stage.name)):
                 made = stage.load.load()(self, arrays) if stage.load else kind.from_arrays(arrays)
@@ -81,7 +83,8 @@ class Artifacts:
 
     def record(self, stage: Stage[Any]) -> StageRecord:
         """The record of a stage's last run; raises PTM-D004 if there was none."""
-        return self.db.record(stage.name)
+        with naming_command(self.db.path):
+            return self.db.record(stage.name)
 
     def before(self, stage: Stage[Any]) -> StageRecord | None:
         """The record of a stage as the database has it, or None."""
@@ -185,7 +188,7 @@ class Run(Artifacts):
                     "PTM-D008",
                     f"the {read.name} stage was made from an earlier {earlier}",
                     file=self.db.path,
-                    remedy=f"run `{self.db.build_command}` first",
+                    remedy=f"run `{build_command(self.db.path)}` first",
                 )
         return work_of(stage, options, inputs)
 

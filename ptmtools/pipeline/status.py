@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from ptmtools.pipeline.command import naming_command
 from ptmtools.pipeline.run import Artifacts
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import STAGES
@@ -76,7 +77,8 @@ def database_status(path: str | os.PathLike[str]) -> DatabaseStatus:
         another version.
     """
     folder = Path(path)
-    manifest = read_manifest(folder)
+    with naming_command(path):
+        manifest = read_manifest(folder)
     begun = (folder / STAGING).is_dir()
     if manifest is None and not begun and not (folder / LOCK).exists():
         DatabaseFolder.open(folder)  # says what is wrong

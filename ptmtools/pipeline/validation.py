@@ -13,11 +13,11 @@ from ptmtools.cells import Cells, structural_triangles
 from ptmtools.database import ValidationReport, validate_database, validate_ptm
 from ptmtools.database.validation.findings import worst_first
 from ptmtools.errors import DatabaseError
+from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.run import Artifacts
 from ptmtools.pipeline.stagecheck import check_stages
 from ptmtools.pipeline.stages import CELLS, PVS, SCENE
 from ptmtools.progress import Progress, silent
-from ptmtools.store.folder import DatabaseFolder
 from ptmtools.texture.model import Limits
 from ptmtools.visibility import Pvs, SegmentReport, check_conservative
 
@@ -45,7 +45,7 @@ def validate(
         return validate_ptm(target, limits=limits)
     db = None
     try:
-        db = DatabaseFolder.open(target)
+        db = open_database(target)
     except DatabaseError as fault:
         if fault.code != "PTM-D002":  # a damaged manifest is a finding among others
             raise
@@ -74,7 +74,7 @@ def structure_of(db: str | os.PathLike[str]) -> tuple[NDArray[np.float64], Cells
 
     Raises as `shoot_segments`.
     """
-    artifacts = Artifacts(DatabaseFolder.open(db))
+    artifacts = Artifacts(open_database(db))
     options, scene = artifacts.recorded(CELLS), artifacts[SCENE]
     corners = scene.corners[structural_triangles(scene, options)]
     return corners, artifacts[CELLS], artifacts[PVS]

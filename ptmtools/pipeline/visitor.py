@@ -11,6 +11,9 @@ from ptmtools.pipeline.stages import EMIT, SCENE
 from ptmtools.quantities import size
 from ptmtools.store.manifest import Manifest
 
+#: What takes at least this many times the bytes of the model is called heavier.
+HEAVIER = 1.05
+
 
 @dataclass(frozen=True)
 class Visitor:
@@ -18,7 +21,7 @@ class Visitor:
     Attributes
     ----------
     model: bytes of the model's files but for its images; None where they were not recorded.
-    images: bytes of the files of its images; likewise.
+    images: bytes of the files of its images, not of those inside the model's; likewise.
     visit: the fields of `ptmtools.database.visit.Visit`.
     """
 
@@ -48,11 +51,12 @@ class Visitor:
         lines = []
         if self.model is not None and self.images is not None:
             whole = self.model + self.images
-            parts = f"{size(self.model)}, and {size(self.images)} of images"
-            lines.append(f"the model as it was: {size(whole)} ({parts})")
+            parts = f" ({size(self.model)}, and {size(self.images)} of image files)"
+            lines.append(f"the model as it was: {size(whole)}{parts if self.images else ''}")
 
         def told(count: int) -> str:
-            return size(count) + (", heavier than the model" if whole and count > whole else "")
+            heavier = whole and count > HEAVIER * whole
+            return size(count) + (", heavier than the model" if heavier else "")
 
         if visit["browser"] is not None:
             lines.append(f"a plain browser fetches {told(visit['browser'])}")

@@ -11,7 +11,7 @@ from ptmtools.errors import DatabaseError
 from ptmtools.files import open_regular
 from ptmtools.store.digests import Digests
 from ptmtools.store.layout import MANIFEST, arrays_of, sha256
-from ptmtools.store.manifest import Manifest, StageRecord, build_command, damaged_manifest
+from ptmtools.store.manifest import BUILD, Manifest, StageRecord, damaged_manifest
 
 if TYPE_CHECKING:
     import numpy as np
@@ -53,11 +53,6 @@ class DatabaseFolder:
             )
         return DatabaseFolder(folder, manifest)
 
-    @property
-    def build_command(self) -> str:
-        """The command that brings it up to date."""
-        return build_command(self.manifest.model, self.path / MANIFEST)
-
     def record(self, stage: str) -> StageRecord:
         """The record of a stage.
 
@@ -71,7 +66,7 @@ class DatabaseFolder:
                 "PTM-D004",
                 f"the {stage} stage has not been run, this command needs it",
                 file=self.path,
-                remedy=f"run `{self.build_command}` first",
+                remedy=f"run {BUILD} first",
             )
         return record
 
@@ -129,7 +124,7 @@ def damaged(file: Path, what: str) -> DatabaseError:
 
 
 def _unusable(code: str, message: str, file: Path) -> DatabaseError:
-    remedy = "run `ptm build-scene` again to rebuild it"
+    remedy = f"run {BUILD} again to rebuild it"
     return DatabaseError(code, message, file=file, remedy=remedy)
 
 

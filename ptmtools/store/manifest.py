@@ -22,11 +22,9 @@ by the same recipe with the same parameters on the same inputs, and its outputs 
 from __future__ import annotations
 
 import json
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from os import PathLike
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from ptmtools import schemas
@@ -36,6 +34,9 @@ from ptmtools.store.layout import WRITTEN
 
 FORMAT = "ptmtools database"
 SCHEMA = 2
+#: What the remedies of the store's errors call the command that builds a database; who knows the
+#: options puts the whole of it in its place.
+BUILD = "`ptm build-scene`"
 
 #: Lists and objects may be nested this deep at most.
 _DEEPEST = 16
@@ -109,13 +110,12 @@ class Manifest:
                 "PTM-D001", "not a ptmtools database", file=file, remedy="give a database folder"
             )
         if document.get("schema") != SCHEMA:
-            earlier = listed_before(data)
-            anew = earlier and f"build it again with `{build_command(earlier.model, file)}`, or "
+            anew = f"build it again with {BUILD}, or " if listed_before(data) else ""
             raise DatabaseError(
                 "PTM-D003",
                 f"schema version {document.get('schema')!r}, this ptmtools reads {SCHEMA}",
                 file=file,
-                remedy=f"{anew or ''}use the ptmtools that wrote it",
+                remedy=f"{anew}use the ptmtools that wrote it",
             )
         try:
             schemas.check(document, schemas.MANIFEST)
@@ -131,24 +131,21 @@ class Manifest:
         )
 
 
-def build_command(model: str, manifest: str | PathLike[str]) -> str:
-    """The command that brings the database of a model up to date, by the path of its manifest."""
-    folder = Path(manifest).parent
-    return f"ptm build-scene {shlex.quote(model)} -o {shlex.quote(str(folder))}"
-
-
 class Earlier(NamedTuple):
-    """A manifest of an earlier schema: its number, the model, and the files that are listed."""
+    """A manifest of an earlier schema: its number, the model, the files that are listed, and the
+    stages, of whose records only recipe and parameters are kept and may be anything."""
 
     schema: int
     model: str
     outputs: set[str]
+    stages: Mapping[str, StageRecord]
 
 
 def listed_before(data: bytes) -> Earlier | None:
     """What a manifest of an earlier schema says; None if it is no such manifest.
 
-    Of such a database nothing can be used but the knowledge of what is ours in its folder.
+    Of such a database nothing can be used but the knowledge of what is ours in its folder, and how
+    it was built.
     """
     try:
         document = json.loads(data)
@@ -156,9 +153,14 @@ def listed_before(data: bytes) -> Earlier | None:
         earlier = type(schema) is int and 0 < schema < SCHEMA
         if document["format"] != FORMAT or not earlier or not isinstance(model, str):
             return None
-        listed = [path for stage in document["stages"].values() for path in stage["outputs"]]
+        stages = document["stages"]
+        listed = [path for stage in stages.values() for path in stage["outputs"]]
         outputs = {path for path in listed if isinstance(path, str) and _is_output(path)}
-        return Earlier(schema, model, outputs)
+        ran = {
+            name: StageRecord(stage.get("recipe"), stage.get("parameters"), {}, {})
+            for name, stage in stages.items()
+        }
+        return Earlier(schema, model, outputs, ran)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
 

@@ -48,10 +48,9 @@ class Client:
         names = [cell["name"] for cell in self.index["cells"]]
         self.paths = [self.index["record"].replace("{name}", name) for name in names]
         self.records = [json.loads((www / path).read_text()) for path in self.paths]
-        self.geometry = min(
-            ([t.replace("{name}", n) for n in names] for t in self.index["geometry"].values()),
-            key=lambda files: sum(map(self.size, files)),
-        )
+        forms = self.index["geometry"]
+        template = forms.get("gltf") or forms["vrml"]
+        self.geometry = [template.replace("{name}", name) for name in names]
 
     def size(self, path: str) -> int:
         return (self.www / path).stat().st_size

@@ -71,6 +71,15 @@ def test_two_rooms(tmp_path: Path) -> None:
     assert str(TWO_ROOMS) not in manifest
 
 
+def test_what_is_not_there_is_not_to_be_opened(ptm: Ptm, database: Path) -> None:
+    for format in ("vrml", "gltf", "vrml,gltf"):
+        done = ptm("emit", database, "--format", format)
+        assert done.status == 0
+        assert "ptm validate" in done.out
+        root = database / "www" / "root.wrl"
+        assert ("open root.wrl" in done.out) == root.exists() == ("vrml" in format)
+
+
 def test_the_same_bytes_anywhere_and_with_any_number_of_workers(
     tmp_path: Path, build: Build
 ) -> None:

@@ -42,7 +42,9 @@ def test_warnings_come_with_their_stage_and_notes_are_counted(ptm: Ptm, lying: P
     assert again[1] == lines[1]
     notes = [line for line in again if line.startswith("note: ")]
     assert f"{len(notes)} further notes; -v lists them" == lines[-1]
-    assert lines[1].removeprefix("warning: ") in ptm("info", lying.with_suffix(".db")).out
+    for verbose in ([], ["-v"]):
+        told = ptm("info", lying.with_suffix(".db"), *verbose).out
+        assert told.count(lines[1].removeprefix("warning: ")) == 1
 
     turned = ptm("cells", lying, "--up", "z").out
     assert "warning: " not in turned

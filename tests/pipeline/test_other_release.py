@@ -76,6 +76,7 @@ def aged(db: Path) -> None:
 
 
 COMMAND = "ptm build-scene two_rooms.obj -o"
+OPTIONS = "--max-leaves 99 --samples 8 --backend embree"
 
 
 @pytest.mark.parametrize(
@@ -98,12 +99,14 @@ def test_every_command_names_what_brings_it_up_to_date(
     name, *options = command.split()
     assert main([name, str(db), *options]) == status
     said = capsys.readouterr()
-    assert f"`{COMMAND} {db}" in said.out + said.err
-    assert "--format" not in said.out + said.err, "what was the default is not asked for"
+    whole = f"`{COMMAND} {db} {OPTIONS}"  # and no --format: what was the default is not asked for
+    assert any(f"{whole}{end}" in said.out + said.err for end in ("`", " --rebuild`"))
     assert "make no sense" not in said.out
 
 
-@pytest.mark.parametrize("command", ["info", "status", "validate", "plot -o plan.png", "emit"])
+@pytest.mark.parametrize(
+    "command", ["info", "status", "validate", "plot -o plan.png", "emit", "tradeoff"]
+)
 def test_of_an_earlier_schema_too(
     db: Path, capsys: pytest.CaptureFixture[str], monkeypatch, command: str
 ) -> None:
@@ -114,7 +117,33 @@ def test_of_an_earlier_schema_too(
     assert main([name, str(db), *options]) == 5
     err = capsys.readouterr().err
     assert "PTM-D003" in err
-    assert f"`{COMMAND} {db}`" in err
+    assert f"`{COMMAND} {db} {OPTIONS}`" in err
+
+
+def test_so_do_errors_of_what_is_missing(db: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (db / "stages/cells.npz").unlink()
+    assert main(["ach", str(db)]) == 5
+    err = capsys.readouterr().err
+    assert "PTM-D005" in err
+    assert f"run `{COMMAND} {db} {OPTIONS}` again" in err
+    manifest = json.loads((db / "manifest.json").read_bytes())
+    del manifest["stages"][PVS.name]
+    (db / "manifest.json").write_text(json.dumps(manifest))
+    assert main(["ach", str(db)]) == 5
+    err = capsys.readouterr().err
+    assert "PTM-D004" in err
+    assert f"run `{COMMAND} {db} {OPTIONS}` first" in err
+
+
+def test_a_manifest_of_an_earlier_schema_may_say_anything(
+    db: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    manifest = json.loads((db / "manifest.json").read_bytes())
+    manifest["stages"][CELLS.name] |= {"recipe": None, "parameters": 7}
+    del manifest["stages"][PVS.name]["recipe"]
+    (db / "manifest.json").write_text(json.dumps(manifest | {"schema": 1}))
+    assert main(["ach", str(db)]) == 5
+    assert f"`{COMMAND} {db} --samples 8 --backend embree`" in capsys.readouterr().err
 
 
 def test_the_first_build_says_what_is_rebuilt_and_why(

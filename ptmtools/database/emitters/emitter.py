@@ -26,8 +26,8 @@ class Emitter:
     about: what it is, in a few words, for help.
     owns: files and folders in the served folder that are its own; a folder ends in a slash. The
         files must be there once it has been written.
-    entry: the one of its files that leads to the others, if any; written when those are on the
-        disk.
+    entry: the one of its files that leads to the others, if any, and that a browser opens; written
+        when those are on the disk. A form without one is for clients of the hints.
     cell_files: template of the paths of the cells' geometry (`names.path_of`), if it writes that.
     writer: function from a `Content` to the files, as (path in the served folder, str or bytes);
         what it can refuse, it refuses before it gives the first.

@@ -19,7 +19,7 @@ from ptmtools.quantities import count, size
 def _summary(n: Mapping[str, Any]) -> str:
     of = ""
     if "owners" in n:  # not in databases of former versions
-        of = f" ({n['visible']:,} of the model, {n['owners']:,} by cell)"
+        of = f" from {n['visible']:,} of the model (uncut they would be {n['owners']:,})"
     return (
         f"{count(n['files'], 'file')}, {size(n['bytes'])}; "
         f"{count(n['triangles'], 'triangle')}{of}, {count(n['viewpoints'], 'viewpoint')}"

@@ -1,0 +1,58 @@
+"""The command that brings a database up to date, with the options that it was built with."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from os import PathLike
+from pathlib import Path
+
+from ptmtools.errors import DatabaseError
+from ptmtools.files import open_regular
+from ptmtools.pipeline.stages import STAGES
+from ptmtools.pipeline.words import words
+from ptmtools.store.folder import DatabaseFolder, read_manifest
+from ptmtools.store.layout import MANIFEST
+from ptmtools.store.manifest import BUILD, StageRecord, listed_before
+
+
+def build_command(db: str | PathLike[str]) -> str:
+    """The command for a database, also for one of an earlier schema; what cannot be read of its
+    options is left out."""
+    model, stages = _recorded(Path(db))
+    options = []
+    for name, stage in STAGES.items():
+        with suppress(KeyError, ValueError):
+            options.append(stage.recorded(stages[name]))
+    parts = ["ptm", "build-scene", model or "MODEL", "-o", str(db), *words(options)]
+    return shlex.join(parts)
+
+
+@contextmanager
+def naming_command(db: str | PathLike[str]) -> Iterator[None]:
+    """Errors of the store know a database but not what its options mean: where one advises to
+    build, this puts the whole command in."""
+    try:
+        yield
+    except DatabaseError as fault:
+        if fault.remedy and BUILD in fault.remedy:
+            fault.remedy = fault.remedy.replace(BUILD, f"`{build_command(db)}`")
+        raise
+
+
+def open_database(db: str | PathLike[str]) -> DatabaseFolder:
+    """As `DatabaseFolder.open`; errors name the whole command."""
+    with naming_command(db):
+        return DatabaseFolder.open(db)
+
+
+def _recorded(folder: Path) -> tuple[str, Mapping[str, StageRecord]]:
+    """The model of a database, "" if it is not known, and the records of its stages."""
+    with suppress(DatabaseError):
+        manifest = read_manifest(folder)
+        return (manifest.model, manifest.stages) if manifest else ("", {})
+    with suppress(OSError), open_regular(folder / MANIFEST) as stream:
+        if earlier := listed_before(stream.read()):
+            return earlier.model, earlier.stages
+    return "", {}
