@@ -291,7 +291,7 @@ class _Plan:
             f"{count(len(self._doors()), 'portal')} between them",
         ]
         if self._pvs is not None:
-            parts.append(f"{100 * self._pvs.volume_at_hand[0]:.1f} % of the volume at hand")
+            parts.append(f"{100 * self._pvs.volume_at_hand[0]:.1f} % of volume at hand")
         if len(self._floors) > 1:
             parts.append(f"{len(self._floors)} storeys")
         place = {"ha": "left", "va": "center", "color": _INK}
@@ -300,7 +300,7 @@ class _Plan:
             _MARGIN / self._options.width,
             y,
             "  ·  ".join(parts),
-            fontsize=12,
+            fontsize=11,
             weight="bold",
             **place,
         )
