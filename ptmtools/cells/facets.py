@@ -91,13 +91,12 @@ class Facets:
         area = summed(self.region, self.areas * which, len(self.area))[chosen]
         corners, of = self._retriangulated(chosen, area, outline, tolerance)
         # Wound as most of the region is.
-        way = summed(self.region, self.areas * which * (1 - 2 * self.turned), len(self.area))[
-            chosen
-        ]
-        back = np.einsum("ij,ij->i", normals(corners), self.normal[chosen[of]]) * way[of] < 0
+        facing = self.areas * which * np.where(self.turned, -1.0, 1.0)
+        facing = summed(self.region, facing, len(self.area))[chosen]
+        back = np.einsum("ij,ij->i", normals(corners), self.normal[chosen[of]]) * facing[of] < 0
         corners[back] = corners[back][:, ::-1]
-        saved = np.bincount(of, minlength=len(chosen)) <= (1 - _SAVED) * size[chosen]
-        saved &= np.bincount(of, minlength=len(chosen)) > 0
+        count = np.bincount(of, minlength=len(chosen))
+        saved = (count > 0) & (count <= (1 - _SAVED) * size[chosen])
         kept = which.copy()
         replaced = np.zeros(len(self.area), dtype=bool)
         replaced[chosen[saved]] = True
