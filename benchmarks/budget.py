@@ -22,9 +22,9 @@ from at_hand import TWO_ROOMS, model_file
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.cells.grouping import grouped
+from ptmtools.portal_flow.near_ties import Searched
 from ptmtools.scene import ingest
 from ptmtools.visibility import Pvs, PvsOptions, compute_pvs, searching
-from ptmtools.visibility.near_ties import Searched
 
 BUDGETS = (0, 2_000, 20_000, PvsOptions().budget, 1_000_000)
 
@@ -33,7 +33,7 @@ def all_count_as(visible: bool) -> Callable[..., Searched]:
     """A search that takes every near tie for visible, or for hidden."""
 
     def searched(g, s, test, known, source, budget, seen) -> Searched:  # type: ignore[no-untyped-def]
-        from ptmtools.visibility.flow_kernels import flow
+        from ptmtools.portal_flow.flow_kernels import flow
 
         none = np.zeros(0, np.uint64)
         work, cut, ties, _ = flow(g, s, known, source, budget, none, visible, seen)

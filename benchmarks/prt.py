@@ -3,7 +3,7 @@
     python benchmarks/prt.py MAP.prt -o OUT.npz [--reference MAP.visible.npz] [--exact]
 
 Reads PRT2 (N A B then N points in brackets per portal, then one line of leafs per cluster), runs
-`ptmtools.visibility.flow.portal_flow` over the clusters, lifts the result to leafs and writes
+`ptmtools.portal_flow.flow.portal_flow` over the clusters, lifts the result to leafs and writes
 ``shape`` and ``visible`` (rows of big-endian bits). The reference is taken as the AND with its
 transpose, which is still conservative. Leafs that only the reference joins are put to the test
 twice: ``--lines`` random lines from a portal of one to a portal of the other are walked through the
@@ -24,11 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.executors import open_executor
+from ptmtools.portal_flow.double_double import SequenceTest
+from ptmtools.portal_flow.flow import PortalFlow, Portals, geometry, leaf_matrix, portal_flow
 from ptmtools.tolerance import Tolerance
-from ptmtools.visibility.double_double import SequenceTest
-from ptmtools.visibility.flow import PortalFlow, Portals, geometry, portal_flow
 from ptmtools.visibility.options import PvsOptions
-from ptmtools.visibility.pvs import leaf_matrix
 
 
 def read_prt(path: Path) -> tuple[Portals, NDArray[np.int64]]:

@@ -58,10 +58,10 @@ from ptmtools.files import write_bytes
 from ptmtools.pipeline import TextureOptions, background, build_scene, run_stage
 from ptmtools.pipeline.encoding import encoded_image
 from ptmtools.pipeline.stages import CELLS
+from ptmtools.portal_flow.flow import portal_flow
 from ptmtools.scene import ingest
 from ptmtools.texture import read_image
 from ptmtools.visibility import PvsOptions, compute_pvs
-from ptmtools.visibility.flow import portal_flow
 
 ROOT = Path(__file__).resolve().parent.parent
 SMALL = ROOT / "sample_data/two_rooms/two_rooms.obj"

@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 from prt import arriving
 
 from ptmtools.cells.model import Cells
+from ptmtools.cells.seen import portals_of
 from ptmtools.cells.vectors import volumes
 from ptmtools.pipeline.validation import structure_of
-from ptmtools.visibility.pvs import portals_of
 from ptmtools.visibility.sampled import sampled_leaves
 from ptmtools.visibility.segments import Blockers
 

@@ -41,7 +41,7 @@ def sampled_sight(cells: Cells) -> Bools:
     seen[ends, ends[:, ::-1]] = True
     if len(ends) == 0:
         return seen
-    from ptmtools.cells.line_kernels import Openings, sight_lines
+    from ptmtools.portal_flow.line_kernels import Openings, sight_lines
 
     count = min(max(LINES // len(ends), LEAST_LINES), MOST_LINES) // 8 * 8
     share = _even(count)

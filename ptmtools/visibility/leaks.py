@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools
 from ptmtools.cells.model import Cells
-from ptmtools.visibility.flow import PortalFlow
+from ptmtools.portal_flow.flow import PortalFlow
 
 #: A cell is looked at if it sees more than this times the median of all cells.
 SUSPICIOUS = 3.0

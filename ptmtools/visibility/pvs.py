@@ -10,10 +10,11 @@ import numpy as np
 
 from ptmtools.arrays import Bools
 from ptmtools.cells.model import Cells
+from ptmtools.cells.seen import portals_of
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
+from ptmtools.portal_flow.flow import leaf_matrix, portal_flow
 from ptmtools.progress import Progress, silent
-from ptmtools.visibility.flow import PortalFlow, Portals, portal_flow
 from ptmtools.visibility.leaks import find_leaks
 from ptmtools.visibility.model import Pvs
 from ptmtools.visibility.options import PvsOptions
@@ -61,26 +62,4 @@ def _lifted(cells: Cells, leaves: Bools) -> Bools:
     rows, columns = np.nonzero(leaves)
     matrix = np.zeros((cells.cell_count, cells.cell_count), dtype=np.bool_)
     matrix[cells.leaf_cell[rows], cells.leaf_cell[columns]] = True
-    return matrix
-
-
-def portals_of(cells: Cells) -> Portals:
-    """The portals between the leaves of a subdivision."""
-    return Portals(
-        leaf_count=cells.leaf_count,
-        leaf=cells.portal_leaf.reshape(-1, 2),
-        normal=cells.portal_plane.reshape(-1, 4)[:, :3],
-        point=cells.portal_point.reshape(-1, 3),
-        start=cells.portal_start,
-        tolerance=cells.tolerance,
-    )
-
-
-def leaf_matrix(portals: Portals, flow: PortalFlow) -> Bools:
-    """(L, L) which leaf may see which: itself, its neighbours, and what its portals see."""
-    enters, leaves = portals.leaf[:, ::-1].reshape(-1), portals.leaf.reshape(-1)
-    matrix = np.eye(portals.leaf_count, dtype=np.bool_)
-    matrix[leaves, enters] = True
-    for leaf, row in zip(leaves, flow.sees, strict=True):
-        matrix[leaf, enters[flow.portals_in(row)]] = True
     return matrix

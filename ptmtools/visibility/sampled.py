@@ -15,8 +15,8 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.sight import LONGEST
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
-from ptmtools.visibility.flow import Portals, check, geometry
-from ptmtools.visibility.storage import Geometry
+from ptmtools.portal_flow.flow import Portals, check, geometry
+from ptmtools.portal_flow.storage import Geometry
 
 #: Tasks that the lines are shared out to.
 SPANS = 64
@@ -56,7 +56,7 @@ def sampled_leaves(
 
 def _shoot(shared: Shooting, span: tuple[int, int]) -> NDArray[np.uint8]:
     """As a task: (L, ⌈L / 8⌉) bits, who sees whom by lines of the portals ``span``."""
-    from ptmtools.cells.line_kernels import Openings, sight_lines
+    from ptmtools.portal_flow.line_kernels import Openings, sight_lines
 
     g, leaves, lines, seed = shared
     openings = Openings(g.point, g.start, g.leaf, g.out_start, g.out)

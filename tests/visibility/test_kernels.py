@@ -7,14 +7,14 @@ import pytest
 import shapely
 from hypothesis import given, settings, strategies as st
 
-from ptmtools.visibility import (
+from ptmtools.portal_flow import (
     bit_kernels as bits,
     clipping_kernels as clipping,
     flow_kernels,
     prepass_kernels as prepass,
 )
-from ptmtools.visibility.flow import Portals, geometry
-from ptmtools.visibility.searching import GROWTH, scratch
+from ptmtools.portal_flow.flow import Portals, geometry
+from ptmtools.portal_flow.searching import GROWTH, scratch
 
 SLACK = 1e-12
 Z = np.array([[0.0, 0, 1]])

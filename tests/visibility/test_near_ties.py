@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from ptmtools.cells.seen import portals_of
 from ptmtools.executors import Local
-from ptmtools.tolerance import Tolerance
-from ptmtools.visibility import (
-    compute_pvs,
+from ptmtools.portal_flow import (
     double_double,
     double_double_kernels as kernels,
     near_ties,
     searching,
 )
-from ptmtools.visibility.double_double import SequenceTest
-from ptmtools.visibility.flow import Portals, geometry, portal_flow
-from ptmtools.visibility.pvs import portals_of
+from ptmtools.portal_flow.double_double import SequenceTest
+from ptmtools.portal_flow.flow import Portals, geometry, portal_flow
+from ptmtools.tolerance import Tolerance
+from ptmtools.visibility import compute_pvs
 
 #: What edges of doors are moved by: nothing, noise, a little more, what doubles would notice.
 SHIFTS = (0.0, 0.0, 3e-15, -3e-15, 4e-14, -4e-14, 1e-12, -1e-12, 1e-9, -1e-9)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from ptmtools.executors import Local
-from ptmtools.visibility import PvsOptions, near_ties
-from ptmtools.visibility.flow import portal_flow
-from ptmtools.visibility.pvs import leaf_matrix
+from ptmtools.portal_flow import near_ties
+from ptmtools.portal_flow.flow import leaf_matrix, portal_flow
+from ptmtools.visibility import PvsOptions
 
 BENCHMARK = Path(__file__).resolve().parents[2] / "benchmarks" / "prt.py"
 

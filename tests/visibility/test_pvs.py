@@ -12,8 +12,8 @@ from ptmtools.cells.model import Cells
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
 from ptmtools.executors import Local
+from ptmtools.portal_flow.flow import Portals, portal_flow
 from ptmtools.visibility import Pvs, PvsOptions, check_conservative, compute_pvs
-from ptmtools.visibility.flow import Portals, portal_flow
 
 # Four rooms in a row along x; doors at z 0-1, 3-4, 0-1: a line through the first two rises by at
 # least 1/2 and passes x = 12 at z >= 5.

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ptmtools.cells.seen import portals_of
 from ptmtools.executors import Local
-from ptmtools.visibility.flow import Portals, portal_flow
-from ptmtools.visibility.pvs import leaf_matrix, portals_of
+from ptmtools.portal_flow.flow import Portals, leaf_matrix, portal_flow
 from ptmtools.visibility.sampled import sampled_leaves
 from tests.visibility.test_pvs import ROW, ZIGZAG
 

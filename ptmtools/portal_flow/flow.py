@@ -42,9 +42,9 @@ from ptmtools.arrays import Bits, Bools, Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
+from ptmtools.portal_flow.storage import Geometry
 from ptmtools.progress import Progress, silent
 from ptmtools.tolerance import Tolerance
-from ptmtools.visibility.storage import Geometry
 
 #: Portals whose results appear to the others at once.
 BATCH = 64
@@ -133,7 +133,7 @@ def portal_flow(
     if count == 0:
         return PortalFlow(np.zeros((0, words), dtype=np.uint64), cut, *counts)
 
-    from ptmtools.visibility.searching import Searching, search_from, settle
+    from ptmtools.portal_flow.searching import Searching, search_from, settle
 
     g = geometry(portals)
     together = BATCH // 8
@@ -153,14 +153,24 @@ def portal_flow(
     return PortalFlow(searching.known, cut[0::2] | cut[1::2], *(counts[:, 0::2] + counts[:, 1::2]))
 
 
+def leaf_matrix(portals: Portals, flow: PortalFlow) -> Bools:
+    """(L, L) which leaf may see which: itself, its neighbours, and what its portals see."""
+    enters, leaves = portals.leaf[:, ::-1].reshape(-1), portals.leaf.reshape(-1)
+    matrix = np.eye(portals.leaf_count, dtype=np.bool_)
+    matrix[leaves, enters] = True
+    for leaf, row in zip(leaves, flow.sees, strict=True):
+        matrix[leaf, enters[flow.portals_in(row)]] = True
+    return matrix
+
+
 def _prepass(g: Geometry, executor: Executor) -> Bits:
     """(2K, W) a first upper bound of what each directed portal sees, from planes and floods.
 
     The rounds of bits take a hundredth of the time of the floods: they are not shared out.
     """
-    from ptmtools.visibility.bit_kernels import return_sight
-    from ptmtools.visibility.prepass_kernels import tighten
-    from ptmtools.visibility.searching import Searching, flood_from
+    from ptmtools.portal_flow.bit_kernels import return_sight
+    from ptmtools.portal_flow.prepass_kernels import tighten
+    from ptmtools.portal_flow.searching import Searching, flood_from
 
     count = len(g.leaf)
     words = (count + 63) // 64

@@ -13,8 +13,8 @@ import numpy as np
 
 from ptmtools.arrays import Bits, Ints
 from ptmtools.compiled import plain_kernel
-from ptmtools.visibility.bit_kernels import ONE, ZERO, has, lowest
-from ptmtools.visibility.clipping_kernels import (
+from ptmtools.portal_flow.bit_kernels import ONE, ZERO, has, lowest
+from ptmtools.portal_flow.clipping_kernels import (
     CUT,
     EMPTY,
     NEAR_TIE,
@@ -26,8 +26,8 @@ from ptmtools.visibility.clipping_kernels import (
     load,
     separate,
 )
-from ptmtools.visibility.line_kernels import glance
-from ptmtools.visibility.storage import Geometry, Scratch
+from ptmtools.portal_flow.glance_kernels import glance
+from ptmtools.portal_flow.storage import Geometry, Scratch
 
 #: Operations after which a search glances, which costs about as much again.
 GLANCE_AFTER = 12_500

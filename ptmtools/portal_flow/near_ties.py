@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ptmtools.arrays import Bits, Ints
-from ptmtools.visibility.double_double import SequenceTest
-from ptmtools.visibility.storage import Geometry, Scratch
+from ptmtools.portal_flow.double_double import SequenceTest
+from ptmtools.portal_flow.storage import Geometry, Scratch
 
 #: Sequences tested in double-double for one directed portal, at most.
 DECIDED = 64
@@ -39,7 +39,7 @@ def searched(
 ) -> Searched:
     """Fills the zeroed row ``seen`` (W,) with what a directed portal sees; the arguments are those
     of `flow_kernels.flow`."""
-    from ptmtools.visibility import flow_kernels as kernels
+    from ptmtools.portal_flow import flow_kernels as kernels
 
     none = np.zeros(0, np.uint64)
     work, cut, ties, used = kernels.flow(g, s, known, source, budget, none, False, seen)
@@ -70,7 +70,7 @@ def searched(
 
 
 def _mark(sequence: tuple[int, ...]) -> np.uint64:
-    from ptmtools.visibility import flow_kernels as kernels
+    from ptmtools.portal_flow import flow_kernels as kernels
 
     return np.uint64(kernels.mark(np.array(sequence, np.int64), 0, len(sequence)))
 

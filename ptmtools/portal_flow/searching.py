@@ -11,9 +11,9 @@ from contextlib import contextmanager
 import numpy as np
 
 from ptmtools.arrays import Bits, Ints
-from ptmtools.visibility.double_double import SequenceTest
-from ptmtools.visibility.near_ties import Searched, searched
-from ptmtools.visibility.storage import Geometry, Scratch
+from ptmtools.portal_flow.double_double import SequenceTest
+from ptmtools.portal_flow.near_ties import Searched, searched
+from ptmtools.portal_flow.storage import Geometry, Scratch
 
 #: A sequence longer than this is not followed further (its possible set counts as seen).
 DEPTH = 1024
@@ -57,7 +57,7 @@ class Searching:
 def flood_from(shared: Searching, span: tuple[int, int]) -> Bits:
     """As a task: (last - first, W) what floods reach from the directed portals ``span`` (first,
     last)."""
-    from ptmtools.visibility.prepass_kernels import flood
+    from ptmtools.portal_flow.prepass_kernels import flood
 
     first, last = span
     rows = np.zeros((last - first, shared.words), np.uint64)
@@ -76,7 +76,7 @@ def search_from(shared: Searching, source: int) -> tuple[Bits, Searched]:
 
 def settle(shared: Searching, done: tuple[Ints, Bits]) -> None:
     """As a change: the (B, W) rows that a batch of (B,) directed portals has found."""
-    from ptmtools.visibility.bit_kernels import drop_unreturned
+    from ptmtools.portal_flow.bit_kernels import drop_unreturned
 
     batch, seen = done
     dropped = shared.known[batch] & ~seen

@@ -6,9 +6,9 @@ import numpy as np
 
 from ptmtools.arrays import Bits, Floats
 from ptmtools.compiled import kernel, plain_kernel
-from ptmtools.visibility.bit_kernels import ONE, ZERO, has
-from ptmtools.visibility.clipping_kernels import EMPTY, beyond, load, separate
-from ptmtools.visibility.storage import Geometry, Scratch
+from ptmtools.portal_flow.bit_kernels import ONE, ZERO, has
+from ptmtools.portal_flow.clipping_kernels import EMPTY, beyond, load, separate
+from ptmtools.portal_flow.storage import Geometry, Scratch
 
 
 @plain_kernel

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ptmtools.arrays import Bits, Floats
-from ptmtools.cells.line_kernels import passes
 from ptmtools.compiled import plain_kernel as kernel
-from ptmtools.visibility.bit_kernels import ONE, ZERO, has, lowest
-from ptmtools.visibility.storage import Geometry
+from ptmtools.portal_flow.bit_kernels import ONE, ZERO, has, lowest
+from ptmtools.portal_flow.line_kernels import passes
+from ptmtools.portal_flow.storage import Geometry
 
 
 @kernel

@@ -25,7 +25,7 @@ import numpy as np
 
 from ptmtools.arrays import Ints
 from ptmtools.compiled import plain_kernel as kernel
-from ptmtools.visibility.storage import DoubleDoublePortals, DoubleDoubleScratch
+from ptmtools.portal_flow.storage import DoubleDoublePortals, DoubleDoubleScratch
 
 #: More than a product of vectors and a vertex newly cut may be wrong by.
 ERROR = 2.0**-99

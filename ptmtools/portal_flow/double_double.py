@@ -16,8 +16,8 @@ from fractions import Fraction
 
 import numpy as np
 
+from ptmtools.portal_flow.storage import DoubleDoublePortals, DoubleDoubleScratch, Geometry
 from ptmtools.tolerance import Tolerance
-from ptmtools.visibility.storage import DoubleDoublePortals, DoubleDoubleScratch, Geometry
 
 #: Vertices that clipping may add to a portal before it is left unclipped.
 GROWTH = 72
@@ -47,7 +47,7 @@ class SequenceTest:
     def passes(self, sequence: tuple[int, ...]) -> bool:
         """Whether something is left when a sequence of directed portals is clipped as the flow does
         it; False proves that no line passes the interiors of all of them in turn."""
-        from ptmtools.visibility.double_double_kernels import something_left
+        from ptmtools.portal_flow.double_double_kernels import something_left
 
         for q in sequence:
             if not self._loaded[q >> 1]:
