@@ -57,7 +57,7 @@ def _fits_scene(ach: Ach, scene: Scene) -> str:
 ACH: Stage[Ach] = Stage(
     name="ach",
     about="Measure how much of the view each visible cell covers.",
-    recipe=2,
+    recipe=3,
     options=AchOptions,
     reads=(SCENE, CELLS, PVS),
     artifact=Lazy("ptmtools.coverage.model:Ach"),
