@@ -34,8 +34,8 @@ class Walker(NamedTuple):
 
     @property
     def reach(self) -> float:
-        """How high above the floor eyes are at most: somebody may be taller."""
-        return self.height + 0.5
+        """How high above the floor eyes are at most: somebody may be taller, 2.2 m to the 1.7."""
+        return self.height * (2.2 / 1.7)
 
 
 #: Whoever walks unless another is asked for.
@@ -68,7 +68,7 @@ class SubdivideOptions:
     walker: radius, highest step and height, in metres, of whoever walks. Where such a body fits
         is not left out, even if it cannot be reached; see --reach.
     standing: where visitors are: at "places", on floors where the body of --walker fits, their eyes
-        up to half a metre above its height; or "anywhere" in the cells, as cameras that fly are.
+        up to 1.3 times its height; or "anywhere" in the cells, as cameras that fly are.
     viewpoints: a starting point inside the building: metres, Y up, and the yaw in degrees,
         counter-clockwise from -Z. By default one is chosen. May be given several times.
     reach: what becomes of space that cannot be reached from the start, behind closed doors or in

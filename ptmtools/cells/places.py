@@ -33,10 +33,11 @@ from ptmtools.cells.vectors import areas, normals, ranges
 from ptmtools.cells.welding import Welded
 from ptmtools.scene.model import Scene
 
-#: Floors so near to each other in height, in metres, are looked at together.
-_STOREY = 0.25
-#: A shape of less area than this for its length, in metres, is a line.
-_THIN = 1e-3
+#: Floors so near to each other in height, as a share of the band that is looked at, are looked at
+#: together.
+_STOREY = 0.2
+#: A shape of less area for its length than this share of a radius is a line.
+_THIN = 4e-3
 #: Corners of a quarter of a circle.
 QUARTER = 4
 #: Places are sampled once in this area, m², and so often at most.
@@ -153,7 +154,7 @@ def _taken(
     low, high = corners.min(axis=1), corners.max(axis=1)
     boxes = shapely.box(*low[:, PLAN].T, *high[:, PLAN].T)
     least, most = heights(plan, slope)
-    storey = np.floor(least / _STOREY)
+    storey = np.floor(least / (_STOREY * (band[1] - band[0])))
     taken = np.full(len(plan), shapely.Polygon())
     # Storey by storey, so that a floor is held against what is as high only.
     for name in np.unique(storey):
@@ -169,17 +170,17 @@ def _taken(
         meets = (height.min(axis=1) <= band[1]) & (height.max(axis=1) >= band[0])
         row, obstacle, height = row[meets], obstacle[meets], height[meets]
         each, shadow = shadows(corners[obstacle][:, :, PLAN], height, band, np.arange(len(row)))
-        shadow, row = _merged(shadow, row[each])
+        shadow, row = _merged(shadow, row[each], radius)
         # One by one: GEOS 3.14 buffers many lines at once with holes where they meet.
         names, widened = _joined_by(row, shapely.buffer(shadow, radius, quad_segs=QUARTER))
         taken[here[names]] = widened
     return taken
 
 
-def _merged(shapes: Geometry, row: Ints) -> tuple[Geometry, Ints]:
+def _merged(shapes: Geometry, row: Ints, radius: float) -> tuple[Geometry, Ints]:
     """Shapes and the (n,) row of each, those with an area united row by row: fewer to widen. Of
     thin ones, such as a wall's, nothing would be left."""
-    flat = shapely.area(shapes) > _THIN * shapely.length(shapes)
+    flat = shapely.area(shapes) > _THIN * radius * shapely.length(shapes)
     names, united = _joined_by(row[flat], shapes[flat])
     parts, which = shapely.get_parts(united, return_index=True)
     return np.append(shapes[~flat], parts), np.append(row[~flat], names[which])

@@ -147,12 +147,12 @@ def subdivide(
     pieces = cut_to_leaves(scene, space.tree, tolerance)
     owner = _named(space.reached)[pieces.leaf]
     cells = _assemble(scene, model, space, pieces, owner, notes)
-    name = _named(seen_from_places(cells, executor))
-    owned = np.append(name, np.int32(-1))[cells.triangle_cell]
-    cells = grouped(replace(cells, leaf_cell=name, triangle_cell=owned), options)
+    name = np.append(_named(seen_from_places(cells, executor)), np.int32(-1))
+    cells = replace(cells, leaf_cell=name[:-1], triangle_cell=name[cells.triangle_cell])
+    said = [*of_leaves(cells, space.reached), *of_triangles(scene, pieces, name[owner])]
+    cells = grouped(replace(cells, notes=(*cells.notes, *said)), options)
     owner = np.append(cells.leaf_cell, np.int32(-1))[owner]
-    notes = [*cells.notes, *of_leaves(cells, space.reached), *of_triangles(scene, pieces, owner)]
-    cells = replace(cells, **vars(joined(scene, pieces, owner, tolerance)), notes=tuple(notes))
+    cells = replace(cells, **vars(joined(scene, pieces, owner, tolerance)))
     check_seen(scene, cells)
     return cells
 

@@ -33,7 +33,7 @@ class Pvs:
     leak: (n, 4) int32 cells that see suspiciously much: the cell, how many cells it sees, the
         smallest portal that shows it half of them, and how many that one shows.
     volume: (C,) float64 m³ of each cell, for shares of the building; empty if it is not known.
-    standing: (C,) float64 of it, where somebody can stand.
+    standing: (C,) float64 of it, where somebody can stand; empty if it is not known.
     conservative: False if the sets are of what random lines happened to show.
     """
 
@@ -80,7 +80,12 @@ class Pvs:
         no volume is known, of the cells."""
         volume = self.volume if self.volume.any() else np.ones(self.cell_count)
         share = self.at_hand(volume) / max(volume.sum(), np.finfo(float).tiny)
-        return over_places(share, self.standing)
+        return over_places(share, self.viewers)
+
+    @property
+    def viewers(self) -> NDArray[np.float64]:
+        """(C,) m³ in which somebody can stand, of each cell; all if it is not known."""
+        return self.standing if len(self.standing) else self.volume
 
     def to_matrix(self) -> NDArray[np.bool_]:
         """(C, C) dense matrix."""

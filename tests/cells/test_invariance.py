@@ -6,7 +6,8 @@ the flow has counted near-ties. Rooms must hold the same leaves.
 
 Rooms are distinguished from doors in plan, so up must be where it was, or be given (``--up``, as
 ``--unit``). Laid on its side without ``--up``, a building has the same leaves and the same PVS, but
-other rooms; upside down it has the same rooms.
+other rooms; upside down it has the same rooms. One stands elsewhere as well, so these are compared
+with ``--standing anywhere``.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +32,7 @@ from ptmtools.visibility import Pvs, compute_pvs
 
 ROOT = Path(__file__).resolve().parents[2]
 ROOMS = SubdivideOptions()
+ANYWHERE = SubdivideOptions(standing="anywhere")
 #: Share of the extent by which matched cells may differ in place and in the side of a cube of
 #: their size; three times that in the input's own digits are lost to a move by 1e6 extents, and
 #: walls that meet under a flat angle multiply it.
@@ -52,6 +55,12 @@ class Model:
     def extent(self) -> float:
         return self.scene.tolerance.extent
 
+    @cached_property
+    def flown_through(self) -> Model:
+        """The same for cameras that fly."""
+        cells = subdivide(self.scene, ANYWHERE)
+        return replace(self, cells=cells, pvs=leaf_pvs(cells))
+
 
 METRES = IngestOptions(unit="m", up="y")
 
@@ -60,6 +69,17 @@ def read(path: Path, options: IngestOptions = METRES) -> Model:
     scene = ingest(path, options)
     cells = subdivide(scene, ROOMS)
     return Model(path, scene, cells, leaf_pvs(cells))
+
+
+def scaled(scale: float) -> SubdivideOptions:
+    """For a building so many times as large, the metric options with it."""
+    radius, step, height = ROOMS.walker
+    return replace(
+        ROOMS,
+        wall_area=ROOMS.wall_area * scale**2,
+        wall_thickness=ROOMS.wall_thickness * scale,
+        walker=(radius * scale, step * scale, height * scale),
+    )
 
 
 def leaf_pvs(cells: Cells) -> Pvs:
@@ -121,6 +141,8 @@ def assert_same(
     areas = [np.sort(model.cells.portal_area) * scale**2, np.sort(cells.portal_area)]
     assert np.allclose(*areas, rtol=place, atol=place * (scale * model.extent) ** 2)
 
+    stands = model.cells.leaf_standing, cells.leaf_standing[match]
+    assert np.array_equal(*stands)
     if upright:
         room, other_room = model.cells.leaf_cell, cells.leaf_cell[match]
         assert np.array_equal(room[:, None] == room, other_room[:, None] == other_room)
@@ -161,13 +183,8 @@ def test_another_unit(models: dict[str, Model], tmp_path: Path, name: str, facto
 def test_another_size(models: dict[str, Model], name: str, scale: float) -> None:
     """The building so many times as large, and the metric knobs with it."""
     model = models[name]
-    options = replace(
-        ROOMS,
-        wall_area=ROOMS.wall_area * scale**2,
-        wall_thickness=ROOMS.wall_thickness * scale,
-    )
     scene = model.scene.with_points(model.scene.points * scale)
-    assert_same(model, subdivide(scene, options), lambda p: p * scale, scale)
+    assert_same(model, subdivide(scene, scaled(scale)), lambda p: p * scale, scale)
 
 
 @pytest.mark.parametrize("name", ["two_rooms", "museum"])
@@ -195,7 +212,7 @@ def quarter_turns(axis: int, turns: int) -> np.ndarray:
 @pytest.mark.parametrize("name", ["two_rooms", "museum"])
 @pytest.mark.parametrize(("axis", "turns"), [(0, 1), (0, 2), (1, 1), (1, 2), (2, 1)])
 def test_quarter_turns(models: dict[str, Model], name: str, axis: int, turns: int) -> None:
-    turned(models[name], quarter_turns(axis, turns), upright=axis == 1 or turns == 2)
+    turned(models[name], quarter_turns(axis, turns), axis == 1, upright=axis == 1 or turns == 2)
 
 
 @pytest.mark.parametrize("name", ["two_rooms", "museum"])
@@ -212,23 +229,27 @@ def test_closed_models_about_the_vertical(
     models: dict[str, Model], name: str, angle: float
 ) -> None:
     c, s = np.cos(angle), np.sin(angle)
-    turned(models[name], np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]))
+    turned(models[name], np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]), True)
 
 
 @pytest.mark.parametrize("name", ["two_rooms", "museum"])
 @pytest.mark.parametrize("seed", [0])
 def test_closed_models_by_any_angle(models: dict[str, Model], name: str, seed: int) -> None:
     axes, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
-    turned(models[name], axes * np.linalg.det(axes), upright=False)
+    turned(models[name], axes * np.linalg.det(axes), False, upright=False)
 
 
-def turned(model: Model, turn: np.ndarray, upright: bool = True) -> None:
+def turned(model: Model, turn: np.ndarray, level: bool, upright: bool = True) -> None:
+    """A model turned about the vertical, ``level``, or otherwise."""
+
     def there(points: np.ndarray) -> np.ndarray:
         return points @ turn.T
 
     scene = model.scene.with_points(there(model.scene.points))
-    assert model.cells.closed
-    assert_same(model, subdivide(scene, ROOMS), there, upright=upright)
+    if not level:
+        model = model.flown_through
+    cells = subdivide(scene, ROOMS if level else ANYWHERE)
+    assert_same(model, cells, there, upright=upright)
 
 
 @pytest.mark.parametrize(
@@ -252,9 +273,8 @@ def test_a_real_model_that_is_open(shared: Path, name: str, change: str) -> None
     points = model.scene.points
     if change == "unit":
         scale = 1e-6 if name == "hospital" else 0.3048
-        options = replace(ROOMS, wall_area=2 * scale**2, wall_thickness=0.5 * scale)
         scene = model.scene.with_points(points * scale)
-        assert_same(model, subdivide(scene, options), lambda p: p * scale, scale)
+        assert_same(model, subdivide(scene, scaled(scale)), lambda p: p * scale, scale)
     elif change.startswith("far"):
         extents = 1e4 if (name, change) == ("hospital", "far") else 1e6
         shift = extents * model.extent * np.array([1.0, 0.9, -1.1])
@@ -263,9 +283,7 @@ def test_a_real_model_that_is_open(shared: Path, name: str, change: str) -> None
     else:
         axis, turns = change.split()
         turn = quarter_turns("xyz".index(axis), int(turns))
-        upright = axis == "y" or turns == "2"
-        scene = model.scene.with_points(points @ turn.T)
-        assert_same(model, subdivide(scene, ROOMS), lambda p: p @ turn.T, upright=upright)
+        turned(model, turn, axis == "y", upright=axis == "y" or turns == "2")
 
 
 _REAL: dict[Path, Model] = {}

@@ -9,12 +9,12 @@ import pytest
 
 from ptmtools import compiled, machine_code
 from ptmtools.ahead import compile_now
-from ptmtools.cells import line_kernels
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
 from ptmtools.pipeline.build import WARM_UP, build_scene
 from ptmtools.pipeline.stages import CELLS
 from ptmtools.pipeline.warm_up import warm_up, write_building
+from ptmtools.portal_flow import line_kernels
 
 
 @pytest.fixture
