@@ -133,7 +133,7 @@ class EmitOptions:
     )
     viewpoint_count: int = 32
     avatar_size: Vector | None = field(
-        default=None, metadata={"default_before": (6, [0.25, 1.6, 0.75])}
+        default=None, metadata={"default_before": (6, (0.25, 1.6, 0.75))}
     )
     field_of_view: float = 1.1
     gzip: bool = False

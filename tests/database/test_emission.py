@@ -280,7 +280,7 @@ def test_viewpoints_stand_on_the_floor(artifacts, finished: Path) -> None:
     views = {v.name: v.fields["position"] for v in document.of_type("Viewpoint")}
     assert list(views) == ["VP_0", "VP_1", "VP_2"]
     (info,) = document.of_type("NavigationInfo")
-    assert info.fields["avatarSize"].tolist() == [0.25, 1.6, 0.75]
+    assert info.fields["avatarSize"].tolist() == [0.25, 1.6, 0.5]
     for node in document.of_type("PTMViewpointCell"):
         position = views.pop(node.fields["viewpoint"])
         assert position[1] == 1.6

@@ -63,7 +63,8 @@ def aged(db: Path) -> None:
     for name in ("model_bytes", "image_bytes"):
         del stages[SCENE.name]["counts"][name]
     emitted = stages[EMIT.name]
-    emitted["parameters"]["format"] = "vrml"
+    emitted |= {"recipe": 4}
+    emitted["parameters"] |= {"format": "vrml", "avatar_size": [0.25, 1.6, 0.75]}
     del emitted["counts"]["visit"]
     for path in [p for p in emitted["outputs"] if p.startswith(("www/hints/", "www/gltf/"))]:
         del emitted["outputs"][path]
