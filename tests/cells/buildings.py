@@ -29,7 +29,8 @@ def carved(
 ) -> Floats:
     """(T, 3, 3) triangles of a block that ends ``wall`` beyond all rooms, less rooms and holes,
     with solids put into them; each faces the air."""
-    every = np.array([*rooms, *holes, *solids], dtype=np.float64)
+    # Rounded, or walls of 1e-16 m part what is to touch.
+    every = np.round(np.array([*rooms, *holes, *solids], dtype=np.float64), 9)
     hollow, kept = every[: len(rooms) + len(holes)], every[len(rooms) + len(holes) :]
     inner = every[: len(rooms)]
     block = np.array([[inner[:, 0].min(axis=0) - wall, inner[:, 1].max(axis=0) + wall]])

@@ -105,6 +105,11 @@ ROOMS = {
         closed=False,
         said=("open",),
     ),
+    "a room on ground that is a block 6 m thick": Made(
+        {"ground": box((-10, -10, -6), (15, 15, -0.2)), "building": carved([A])},
+        {"a": IN_A},
+        gone=((2, 2.5, -3), (-5, -5, -3), BEFORE_THE_HOUSE),
+    ),
     "a tent": Made(
         prism([(0, 0), (4, 0), (2, 3)], 0, 5), {"inside": (2, 2.5, 1.6)}, gone=((0.2, 2.5, 2),)
     ),
@@ -115,13 +120,13 @@ ROOMS = {
 
 UPSTAIRS = room(0, 0, 8, 5, 3.1, 5.9)
 STOREYS = {"lower": (4, 3.5, 1.6), "upper": (4, 3.5, 4.7)}
-#: A well 2.88 m wide, seen through a window; its bottom is what differs.
-WELL = carved([A, room(5.2, 0, 8.08, 5, -2, 4)], [((5, 1.5, 0.9), (5.2, 3.5, 2.1))])
+#: A well 1.6 m wide, seen through a window; its bottom is what differs. Nobody fits below that.
+WELL = carved([A, room(5.2, 0, 6.8, 5, -2, 4)], [((5, 1.5, 0.9), (5.2, 3.5, 2.1))])
 
 
 def sloping(degrees: float) -> Floats:
-    end = -2 + 2.88 * np.tan(np.radians(degrees))
-    return prism([(5.2, -2), (8.08, -2), (8.08, end)], 0, 5)
+    end = -2 + 1.6 * np.tan(np.radians(degrees))
+    return prism([(5.2, -2), (6.8, -2), (6.8, end)], 0, 5)
 
 
 HEIGHTS = {
@@ -175,15 +180,15 @@ HEIGHTS = {
     ),
     "a bottom sloping by 40° is a place": Made(
         {"building": WELL, "bottom": sloping(40)},
-        {"a": IN_A, "well": (6.64, 2.5, 0.8)},
+        {"a": IN_A, "well": (6, 2.5, 0.27)},
         sees=("a well",),
     ),
     "a bottom sloping by 50° is none": Made(
-        {"building": WELL, "bottom": sloping(50)}, {"a": IN_A}, seen={(6.64, 2.5, 1.3): None}
+        {"building": WELL, "bottom": sloping(50)}, {"a": IN_A}, seen={(6, 2.5, 0.55): None}
     ),
     "the treads of a stair of 48° are places": Made(
-        {"building": WELL, "stair": flight((5.2, 8.08), (0, 5), -2, 0.2, 16, -2)},
-        {"a": IN_A, "stair": (6.6, 2.5, 1.4)},
+        {"building": WELL, "stair": flight((5.2, 6.8), (0, 5), -2, 0.22, 8, -2)},
+        {"a": IN_A, "stair": (6.05, 2.5, 0.7)},
         more=True,
         sees=("a stair",),
     ),
@@ -214,7 +219,7 @@ NO_PLACES = {
         carved([A, room(5.2, 0, 5.6, 0.4)]), {"a": IN_A}, gone=((5.4, 0.2, 1.4),)
     ),
     "a lift shaft, in which one can stand": Made(
-        carved([A, room(5.2, 0, 6.8, 1.6, high=8.4)]),
+        carved([room(0, 0, 5, 5, high=5.6), room(5.2, 0, 6.8, 1.6, high=5.6)]),
         {"a": IN_A, "shaft": (6, 0.8, 1.6)},
         blind=("a shaft",),
         cut_off=1,
@@ -265,7 +270,10 @@ NO_PLACES = {
         sees=("a b",),
     ),
     "a fireplace and its flue": Made(
-        carved([A, ((5.1, 2.3, 0.8), (5.5, 2.7, 5.5))], [((5, 2, 0), (5.6, 3, 0.8))]),
+        carved(
+            [room(0, 0, 5, 5, high=5.5), ((5.1, 2.3, 0.8), (5.5, 2.7, 5.5))],
+            [((5, 2, 0), (5.6, 3, 0.8))],
+        ),
         {"a": IN_A},
         seen={(5.3, 2.5, 0.4): "a", (5.3, 2.5, 1.2): "a"},
     ),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
-from ptmtools.cells import SubdivideOptions, subdivide
+from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.errors import InputError
 from ptmtools.scene import ingest
 from ptmtools.scene.notes import line
@@ -26,36 +26,42 @@ def test_what_comes_of_it(name: str, tmp_path: Path) -> None:
     assert cells.closed == made.closed
     notes = [*map(line, scene.notes), *cells.notes]
     assert [word for word in made.said if not any(word in note for note in notes)] == []
-    assert sum("to stand on around" in note for note in notes) == made.cut_off
+    cut_off = [note for note in notes if "to stand on around" in note]
+    assert len(cut_off) == made.cut_off, cut_off
 
-    eyes = made.in_world(scene, made.eyes.values())
-    cell = dict(zip(made.eyes, cells.locate(eyes).tolist(), strict=True))
-    leaf = dict(zip(made.eyes, cells.locate_leaf(eyes).tolist(), strict=True))
-    lost = [eye for eye in made.eyes if leaf[eye] < 0 or not cells.leaf_standing[leaf[eye]]]
-    assert lost == []
+    where = {eye: made.in_world(scene, [at]) for eye, at in made.eyes.items()}
+    cell = {eye: int(cells.locate(at)[0]) for eye, at in where.items()}
+    assert [eye for eye, at in where.items() if not stood_at(cells, at)] == []
     assert cells.standing[list(cell.values())].all()
-    rooms = [{cell[eye] for eye in room.split()} for room in made.rooms or ()]
-    rooms = [{each} for each in cell.values()] if made.rooms is None else rooms
-    assert [len(each) for each in rooms] == [1] * len(rooms)
-    assert len(set.union(set(), *rooms)) == len(rooms)
+    rooms = tuple(made.eyes) if made.rooms is None else made.rooms
+    together = {room: {cell[eye] for eye in room.split()} for room in rooms}
+    assert [room for room, owners in together.items() if len(owners) > 1] == []
+    assert len(set().union(*together.values())) == len(rooms), cell
     if not made.more:
-        assert np.count_nonzero(cells.standing) == len(rooms)
+        assert np.flatnonzero(cells.standing).tolist() == sorted(set(cell.values()))
         if None not in made.seen.values():
-            assert cells.cell_count == len(rooms)
+            assert cells.standing.all()
 
-    assert cells.locate(made.in_world(scene, made.gone)).tolist() == [-1] * len(made.gone)
-    there = made.in_world(scene, made.seen)
-    assert not cells.leaf_standing[cells.locate_leaf(there)].any()
-    for at, eye in zip(cells.locate(there).tolist(), made.seen.values(), strict=True):
-        assert at >= 0
-        assert eye is None or at == cell[eye]
+    for place, eye in made.seen.items():
+        at = made.in_world(scene, [place])
+        assert not stood_at(cells, at), place
+        assert cells.locate(at)[0] in ([cell[eye]] if eye else range(cells.cell_count)), place
+    gone = [at for at in made.gone if cells.locate(made.in_world(scene, [at]))[0] >= 0]
+    assert gone == []
 
     pvs = compute_pvs(cells).to_matrix()
     assert np.array_equal(pvs, pvs.T)
     assert pvs[cells.standing].any(axis=0).all()
-    for pairs, seen in ((made.sees, True), (made.blind, False)):
-        ends = [[cell[eye] for eye in pair.split()] for pair in pairs]
-        assert [bool(pvs[a, b]) for a, b in ends] == [seen] * len(pairs)
+    for pairs, expected in ((made.sees, True), (made.blind, False)):
+        for pair in pairs:
+            a, b = (cell[eye] for eye in pair.split())
+            assert pvs[a, b] == expected, pair
+
+
+def stood_at(cells: Cells, point: Floats) -> bool:
+    """Whether a (1, 3) point is in a leaf that stands."""
+    leaf = cells.locate_leaf(point)[0]
+    return bool(leaf >= 0 and cells.leaf_cell[leaf] >= 0 and cells.leaf_standing[leaf])
 
 
 @pytest.mark.parametrize("name", NO_PLACES)
