@@ -160,6 +160,7 @@ def make_room_row(n: int) -> tuple[Scene, Cells]:
         node_child=node_child,
         root_box=np.array([[0.0, 0, -2], [e, 4, 2]]),
         leaf_cell=np.arange(n, dtype=np.int32),
+        leaf_standing=np.ones(n, dtype=np.bool_),
         leaf_point=leaf_point,
         leaf_point_start=8 * np.arange(n + 1),
         face_index=face_index.astype(np.int32),

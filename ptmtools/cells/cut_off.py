@@ -68,7 +68,7 @@ class Standing:
         """Whoever stands in these (L,) leaves, at least one."""
         bodies = [tree.leaves[leaf].points for leaf in np.flatnonzero(leaves)]
         boxes = np.array([(points.min(axis=0), points.max(axis=0)) for points in bodies])
-        points, place = spread(find_places(floors, structure, walker, boxes))
+        points, place = spread(find_places(floors, structure, walker, boxes).triangles())
         points = points + [0.0, walker.middle, 0.0]
         every = np.concatenate([body.points for body in tree.leaves])
         within = ((points >= every.min(axis=0)) & (points <= every.max(axis=0))).all(axis=1)

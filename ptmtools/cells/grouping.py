@@ -18,6 +18,7 @@ from ptmtools.cells.gain import join_by_gain
 from ptmtools.cells.model import Cells
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.rooms import room_of_leaf
+from ptmtools.cells.seen import from_places
 from ptmtools.cells.sight import sampled_sight
 from ptmtools.cells.vectors import areas
 from ptmtools.notes import Warned
@@ -34,13 +35,20 @@ def grouped(cells: Cells, options: SubdivideOptions) -> Cells:
     Cells are numbered in the order of their first leaves; geometry in a boundary between two
     leaves of one cell lies inside that cell.
     """
-    if options.cells == "room":
-        group, owner = numbered(_groups(cells, options.gain)), cells.triangle_cell
-        owner = np.where(owner >= 0, group[owner], -1).astype(np.int32)
-        cells = replace(cells, leaf_cell=group, triangle_cell=owner)
+    leaf = leaf_of_cell(cells)
+    group = _groups(cells, options.gain)[leaf] if options.cells == "room" else leaf
+    name = np.append(numbered(group), np.int32(-1))
+    leaf_cell = np.full(cells.leaf_count, -1, dtype=np.int32)
+    leaf_cell[leaf] = name[:-1]
+    cells = replace(cells, leaf_cell=leaf_cell, triangle_cell=name[cells.triangle_cell])
     if cells.cell_count == 1:
         cells = replace(cells, notes=(*cells.notes, ONE_HALL))
     return cells
+
+
+def leaf_of_cell(cells: Cells) -> Ints:
+    """(C,) the leaves that are cells, of cells that are single leaves."""
+    return np.flatnonzero(cells.leaf_cell >= 0)
 
 
 def numbered(group: NDArray[np.integer]) -> NDArray[np.int32]:
@@ -100,19 +108,20 @@ def _groups(cells: Cells, gain: float) -> NDArray[np.integer]:
     if gain >= 1 or len(np.unique(room)) == len(room):
         return room
     inner = cells.portal_leaf[room[cells.portal_leaf[:, 0]] == room[cells.portal_leaf[:, 1]]]
+    inner = inner[(cells.leaf_cell[inner] >= 0).all(axis=1)]
     order = np.argsort(rank)
-    sees = sampled_sight(cells)[np.ix_(order, order)]
+    sees = from_places(sampled_sight(cells), cells.leaf_standing)[np.ix_(order, order)]
     leaf, piece, area = _sides(cells)
     surface = np.bincount(leaf, area[piece], cells.leaf_count).astype(np.float64)
-    weights = cells.leaf_volumes()[order], surface[order]
-    return join_by_gain(sees, *weights, rank[inner], gain)[rank]
+    viewers = cells.leaf_volumes() * cells.leaf_standing
+    return join_by_gain(sees, viewers[order], surface[order], rank[inner], gain)[rank]
 
 
 def _sides(cells: Cells) -> tuple[Ints, Ints, Floats]:
     """(n,) leaves and (n,) pieces of geometry that belong to them, of cells that are single leaves;
     what lies in a boundary counts on both sides. And (M,) the areas of the pieces, m²."""
-    front, back = cells.triangle_cell.T
+    front, back = np.append(leaf_of_cell(cells), -1)[cells.triangle_cell].T
     behind = (back >= 0) & (back != front)
-    leaf = np.concatenate([front[front >= 0], back[behind]]).astype(np.int64)
+    leaf = np.concatenate([front[front >= 0], back[behind]])
     piece = np.concatenate([np.flatnonzero(front >= 0), np.flatnonzero(behind)])
     return leaf, piece, areas(cells.vertex[cells.triangle])

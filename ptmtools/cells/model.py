@@ -2,7 +2,7 @@
 
 A *leaf* is a convex polyhedron, a leaf of the BSP tree that somebody can reach; a *cell* is a
 union of leaves, one each or as many as make up a room (`leaf_cell`). Index -1 means "no cell":
-solids, the outside of a closed model, or what nobody can reach.
+solids, the outside of a closed model, what nobody can reach or see.
 
 Lists of varying length are CSR: row i of ``x`` is ``x[x_start[i]:x_start[i + 1]]``.
 """
@@ -11,11 +11,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.cells.eyes import EyeRegion
+from ptmtools.cells.options import WALKER, Walker
 from ptmtools.cells.vectors import fans, volumes
 from ptmtools.store.checked import Stored, texts
 from ptmtools.tolerance import Tolerance
@@ -34,7 +36,9 @@ class Cells:
     node_child: (N, 2) int32, (front, back): a node index >= 0, `OUTSIDE`, or leaf i as -2 - i.
         Node 0 is the root; a tree without nodes has the single leaf 0.
     root_box: (2, 3) least and greatest corner of the box that was subdivided.
-    leaf_cell: (L,) int32 the cell of each leaf.
+    leaf_cell: (L,) int32 the cell of each leaf; -1 of one that can be reached, but not be seen
+        from where one can stand.
+    leaf_standing: (L,) bool whether somebody can stand in it, or his head be there.
     leaf_point, leaf_point_start: (P, 3) vertices of the leaves; (L + 1,) CSR over leaves.
     face_index, face_start, leaf_face_start: faces as loops of indices into `leaf_point`,
         counter-clockwise seen from outside the leaf; `face_start` (F + 1,) is CSR over faces into
@@ -55,6 +59,9 @@ class Cells:
     visible: how many of the scene's triangles some cell emits.
     owners: how many cells emit each of these, in all: as many triangles as there would be if
         cutting made none.
+    eye_floor: (E, 3, 3) triangles above which eyes can be, see `EyeRegion`; none if they may be
+        anywhere.
+    walker: who walks.
     tolerance: that of the scene.
     closed: whether the flood of the reachable never met the root box.
     notes: what the subdivision has to say, one line each ("open above: …").
@@ -64,6 +71,7 @@ class Cells:
     node_child: NDArray[np.int32]
     root_box: NDArray[np.float64]
     leaf_cell: NDArray[np.int32]
+    leaf_standing: NDArray[np.bool_]
     leaf_point: NDArray[np.float64]
     leaf_point_start: NDArray[np.int64]
     face_index: NDArray[np.int32]
@@ -80,6 +88,8 @@ class Cells:
     triangle_source: NDArray[np.int32]
     triangle_cell: NDArray[np.int32]
     tolerance: Tolerance
+    eye_floor: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3, 3)))
+    walker: Walker = WALKER
     closed: bool = True
     notes: tuple[str, ...] = ()
     visible: int = 0
@@ -92,6 +102,23 @@ class Cells:
     @property
     def cell_count(self) -> int:
         return int(self.leaf_cell.max()) + 1 if len(self.leaf_cell) else 0
+
+    @property
+    def standing(self) -> NDArray[np.bool_]:
+        """(C,) in which cells somebody can stand; of the others one has the view only."""
+        found = np.zeros(self.cell_count, dtype=np.bool_)
+        found[self.leaf_cell[self.leaf_standing & (self.leaf_cell >= 0)]] = True
+        return found
+
+    @property
+    def eyes(self) -> EyeRegion:
+        """Where eyes can be."""
+        return EyeRegion(self.eye_floor, self.walker)
+
+    @property
+    def portal_cell(self) -> NDArray[np.int32]:
+        """(K, 2) the cells that each portal joins, equal within one; -1 where there is none."""
+        return self.leaf_cell[self.portal_leaf].reshape(-1, 2)
 
     @property
     def portal_count(self) -> int:
@@ -122,11 +149,18 @@ class Cells:
         corners, leaf = self.tetrahedra()
         return np.bincount(leaf, volumes(corners), self.leaf_count).astype(np.float64)
 
+    def cell_volumes(self, *, standing: bool = False) -> NDArray[np.float64]:
+        """(C,) m³, of leaves in which somebody can stand if asked for these."""
+        counts = self.leaf_cell >= 0
+        counts &= self.leaf_standing | (not standing)
+        volume = self.leaf_volumes()[counts]
+        return np.bincount(self.leaf_cell[counts], volume, self.cell_count).astype(np.float64)
+
     def adjacent(self) -> list[NDArray[np.int32]]:
         """For every cell the other cells with which it shares a portal, ascending."""
-        ends = self.leaf_cell[self.portal_leaf].reshape(-1, 2)
+        ends = self.portal_cell
         both = np.unique(np.concatenate([ends, ends[:, ::-1]]), axis=0)
-        both = both[both[:, 0] != both[:, 1]]
+        both = both[(both[:, 0] != both[:, 1]) & (both >= 0).all(axis=1)]
         cut = np.searchsorted(both[:, 0], np.arange(1, self.cell_count))
         return np.split(both[:, 1].astype(np.int32), cut) if self.cell_count else []
 
@@ -166,7 +200,8 @@ class Cells:
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
         """The subdivision as plain arrays."""
         arrays = {f.name: getattr(self, f.name) for f in fields(self)}
-        about = {name: arrays.pop(name) for name in ("closed", "notes", "visible", "owners")}
+        names = ("walker", "closed", "notes", "visible", "owners")
+        about = {name: arrays.pop(name) for name in names}
         text = json.dumps(about, sort_keys=True, ensure_ascii=False)
         extent = np.array(arrays.pop("tolerance").extent)
         return {**arrays, "extent": extent, "about": np.frombuffer(text.encode(), dtype=np.uint8)}
@@ -214,6 +249,7 @@ class Cells:
             node_child=node_child,
             root_box=stored.array("root_box", np.float64, 2, 3, finite=True),
             leaf_cell=leaf_cell,
+            leaf_standing=stored.array("leaf_standing", np.bool_, leaves),
             leaf_point=leaf_point,
             leaf_point_start=leaf_point_start,
             face_index=face_index,
@@ -230,6 +266,8 @@ class Cells:
             triangle_source=stored.indices("triangle_source", np.int32, n, high=1 << 31),
             triangle_cell=stored.indices("triangle_cell", np.int32, n, 2, low=-1, high=cells),
             tolerance=Tolerance.for_extent(stored.array("extent", np.float64, finite=True).item()),
+            eye_floor=stored.array("eye_floor", np.float64, None, 3, 3, finite=True),
+            walker=Walker(*map(float, about["walker"])),
             closed=bool(about["closed"]),
             notes=texts(about["notes"], "notes"),
             visible=int(about["visible"]),

@@ -10,6 +10,7 @@ from ptmtools.errors import InputError
 
 CellKind = Literal["leaf", "room"]
 Reach = Literal["all", "main"]
+Standing = Literal["places", "anywhere"]
 Position = tuple[float, float, float]
 
 
@@ -30,6 +31,15 @@ class Walker(NamedTuple):
     def middle(self) -> float:
         """How high above the floor the body's middle is."""
         return (self.step + self.height) / 2
+
+    @property
+    def reach(self) -> float:
+        """How high above the floor eyes are at most: somebody may be taller."""
+        return self.height + 0.5
+
+
+#: Whoever walks unless another is asked for.
+WALKER = Walker(0.25, 0.5, 1.7)
 
 
 @dataclass(frozen=True)
@@ -57,6 +67,8 @@ class SubdivideOptions:
         what they download; 0 keeps all of them apart, 1 makes every room one cell.
     walker: radius, highest step and height, in metres, of whoever walks. Where such a body fits
         is not left out, even if it cannot be reached; see --reach.
+    standing: where visitors are: at "places", on floors where the body of --walker fits, their eyes
+        up to half a metre above its height; or "anywhere" in the cells, as cameras that fly are.
     viewpoints: a starting point inside the building: metres, Y up, and the yaw in degrees,
         counter-clockwise from -Z. By default one is chosen. May be given several times.
     reach: what becomes of space that cannot be reached from the start, behind closed doors or in
@@ -71,8 +83,9 @@ class SubdivideOptions:
     detail_by_shape: bool = True
     cells: CellKind = "room"
     gain: float = 0.1
-    walker: tuple[float, float, float] = Walker(0.25, 0.5, 1.7)
+    walker: tuple[float, float, float] = WALKER
     reach: Reach = "all"
+    standing: Standing = "places"
     viewpoints: tuple[Position, ...] = field(
         default=(), metadata={"option": "viewpoint", "numbers": (3, 4), "parse": _positions}
     )
@@ -84,6 +97,11 @@ class SubdivideOptions:
             (thickness >= 0, f"wall thickness {thickness:g} m is negative", "try 0.5"),
             (0 <= gain <= 1, f"a gain of {gain:g} is not between 0 and 1", "try 0.1"),
             (self.reach in get_args(Reach), f"unknown reach {self.reach!r}", "all or main"),
+            (
+                self.standing in get_args(Standing),
+                f"unknown standing {self.standing!r}",
+                "places or anywhere",
+            ),
             (
                 len(self.walker) == 3
                 and all(0 < length < float("inf") for length in self.walker)

@@ -35,13 +35,16 @@ from ptmtools.scene.model import Scene
 
 #: Floors so near to each other in height, in metres, are looked at together.
 _STOREY = 0.25
+#: A shape of less area than this for its length, in metres, is a line.
+_THIN = 1e-3
 #: Corners of a quarter of a circle.
-_QUARTER = 4
+QUARTER = 4
 #: Places are sampled once in this area, m², and so often at most.
 _SAMPLE_AREA, _MOST_SAMPLES = 0.05, 500_000
 #: 1/g and 1/g², where g³ = g + 1 (Roberts' sequence): where in a triangle.
 _STEPS = np.array([0.7548776662466927, 0.5698402909980532])
-_PLAN = [0, 2]
+#: Axes of the plan.
+PLAN = [0, 2]
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,7 @@ class Floors:
     def within(self, boxes: Floats, above: float) -> tuple[Geometry, Ints]:
         """(k,) pieces of floor in plan, what is ``above`` metres over which lies in one of
         (m, 2, 3) boxes, and (k,) the region of each, ascending."""
-        plan = shapely.polygons(self.corners[:, :, _PLAN])
+        plan = shapely.polygons(self.corners[:, :, PLAN])
         (x0, y0, z0), (x1, y1, z1) = boxes.transpose(1, 2, 0)
         areas = shapely.box(x0, z0, x1, z1)
         box, row = shapely.STRtree(plan).query(areas, "intersects")
@@ -83,18 +86,27 @@ class Floors:
         return pieces[order], self.region[row[order]]
 
 
-def find_places(floors: Floors, structure: Structure, walker: Walker, boxes: Floats) -> Floats:
-    """(n, 3, 3) triangles, metres, on which somebody can stand, the middle of whose body is in one
-    of (m, 2, 3) boxes."""
+@dataclass(frozen=True)
+class Places:
+    """Flat regions of floor."""
+
+    plan: Geometry  # (r,) seen from above, x and z in metres
+    slope: Floats  # (r, 3): the height is a·x + b·z + c
+
+    def triangles(self) -> Floats:
+        """(n, 3, 3) corners, metres."""
+        return _triangles(self.plan, self.slope)
+
+
+def find_places(floors: Floors, structure: Structure, walker: Walker, boxes: Floats) -> Places:
+    """Where somebody can stand, the middle of whose body is in one of (m, 2, 3) boxes, metres."""
     pieces, region = floors.within(boxes, walker.middle)
-    if not len(pieces):
-        return np.zeros((0, 3, 3))
-    names, group = np.unique(region, return_inverse=True)
-    plan, slope = _joined(pieces, group.reshape(-1)), _slopes(floors)[names]
+    names, plan = _joined_by(region, pieces)
+    slope = _slopes(floors)[names]
     body = _taken(structure.corners, plan, slope, (walker.step, walker.height), walker.radius)
     # A foot is on the uppermost of surfaces one step apart: not on the underside of a slab.
     foot = _taken(floors.corners, plan, slope, (2 * structure.tolerance.plane, walker.step), 0.0)
-    return _triangles(shapely.difference(shapely.difference(plan, body), foot), slope)
+    return Places(shapely.difference(shapely.difference(plan, body), foot), slope)
 
 
 def spread(corners: Floats) -> tuple[Floats, Floats]:
@@ -116,18 +128,20 @@ def _slopes(floors: Floors) -> Floats:
     order = np.lexsort((-size, region))
     largest = order[np.unique(region[order], return_index=True)[1]]
     normal = normals(corners[largest])
-    slope = -normal[:, _PLAN] / normal[:, 1:2]
+    slope = -normal[:, PLAN] / normal[:, 1:2]
     at = corners[largest].mean(axis=1)
-    return np.column_stack([slope, at[:, 1] - np.einsum("ij,ij->i", slope, at[:, _PLAN])])
+    return np.column_stack([slope, at[:, 1] - np.einsum("ij,ij->i", slope, at[:, PLAN])])
 
 
-def _joined(shapes: Geometry, group: Ints) -> Geometry:
-    """(g,) the union of each group of shapes, (n,) ascending from 0."""
+def _joined_by(row: Ints, shapes: Geometry) -> tuple[Ints, Geometry]:
+    """(g,) the rows, (n,), that shapes have, ascending, and the union of those of each."""
     if not len(shapes):
-        return shapes
-    cuts = np.flatnonzero(np.diff(group)) + 1
-    return np.array(
-        [part[0] if len(part) == 1 else shapely.union_all(part) for part in np.split(shapes, cuts)]
+        return row, shapes
+    order = np.argsort(row, kind="stable")
+    names, first = np.unique(row[order], return_index=True)
+    parts = np.split(shapes[order], first[1:])
+    return names, np.array(
+        [part[0] if len(part) == 1 else shapely.union_all(part) for part in parts]
     )
 
 
@@ -137,8 +151,8 @@ def _taken(
     """(r,) what of regions of floor is less than a radius from triangles, (n, 3, 3), that are as
     high above it as a ``band``; in plan."""
     low, high = corners.min(axis=1), corners.max(axis=1)
-    boxes = shapely.box(*low[:, _PLAN].T, *high[:, _PLAN].T)
-    least, most = _heights(plan, slope)
+    boxes = shapely.box(*low[:, PLAN].T, *high[:, PLAN].T)
+    least, most = heights(plan, slope)
     storey = np.floor(least / _STOREY)
     taken = np.full(len(plan), shapely.Polygon())
     # Storey by storey, so that a floor is held against what is as high only.
@@ -151,19 +165,27 @@ def _taken(
         tree = shapely.STRtree(boxes[about])
         row, obstacle = tree.query(plan[here], "dwithin", distance=radius)
         obstacle = about[obstacle]
-        height = _above(corners[obstacle], slope[here[row]])
+        height = above(corners[obstacle], slope[here[row]])
         meets = (height.min(axis=1) <= band[1]) & (height.max(axis=1) >= band[0])
         row, obstacle, height = row[meets], obstacle[meets], height[meets]
-        shadow = _shadows(corners[obstacle][:, :, _PLAN], height, band)
+        each, shadow = shadows(corners[obstacle][:, :, PLAN], height, band, np.arange(len(row)))
+        shadow, row = _merged(shadow, row[each])
         # One by one: GEOS 3.14 buffers many lines at once with holes where they meet.
-        shadow = shapely.buffer(shadow, radius, quad_segs=_QUARTER)
-        order = np.argsort(row, kind="stable")
-        names, group = np.unique(row[order], return_inverse=True)
-        taken[here[names]] = _joined(shadow[order], group.reshape(-1))
+        names, widened = _joined_by(row, shapely.buffer(shadow, radius, quad_segs=QUARTER))
+        taken[here[names]] = widened
     return taken
 
 
-def _heights(plan: Geometry, slope: Floats) -> tuple[Floats, Floats]:
+def _merged(shapes: Geometry, row: Ints) -> tuple[Geometry, Ints]:
+    """Shapes and the (n,) row of each, those with an area united row by row: fewer to widen. Of
+    thin ones, such as a wall's, nothing would be left."""
+    flat = shapely.area(shapes) > _THIN * shapely.length(shapes)
+    names, united = _joined_by(row[flat], shapes[flat])
+    parts, which = shapely.get_parts(united, return_index=True)
+    return np.append(shapes[~flat], parts), np.append(row[~flat], names[which])
+
+
+def heights(plan: Geometry, slope: Floats) -> tuple[Floats, Floats]:
     """(r,) and (r,): the least and the greatest height, or a little beyond, of regions in plan."""
     x0, z0, x1, z1 = shapely.bounds(plan).reshape(-1, 4).T
     middle = slope[:, 0] * (x0 + x1) / 2 + slope[:, 1] * (z0 + z1) / 2 + slope[:, 2]
@@ -171,16 +193,18 @@ def _heights(plan: Geometry, slope: Floats) -> tuple[Floats, Floats]:
     return middle - half, middle + half
 
 
-def _above(corners: Floats, slope: Floats) -> Floats:
-    """(n, 3) heights of the corners of triangles above the slope of each."""
-    plan = np.einsum("ncx,nx->nc", corners[:, :, _PLAN], slope[:, :2])
-    above: Floats = corners[:, :, 1] - plan - slope[:, 2:]
-    return above
+def above(corners: Floats, slope: Floats) -> Floats:
+    """(n, k) heights of the corners of shapes, (n, k, 3), above the slope of each, (n, 3)."""
+    plan = np.einsum("ncx,nx->nc", corners[:, :, PLAN], slope[:, :2])
+    found: Floats = corners[:, :, 1] - plan - slope[:, 2:]
+    return found
 
 
-def _shadows(plan: Floats, height: Floats, band: tuple[float, float]) -> Geometry:
-    """(n,) what of triangles, (n, 3, 2) in plan and (n, 3) high, is in a band of heights, in
-    plan."""
+def shadows(
+    plan: Floats, height: Floats, band: tuple[float, float], whose: Ints
+) -> tuple[Ints, Geometry]:
+    """What of convex things is in a band of heights, in plan: their names, ascending, and shapes.
+    They are given by polygons or edges, (n, k, 2) in plan and (n, k) high, and (n,) names."""
     points, valid = [plan], [(height >= band[0]) & (height <= band[1])]
     following, after = np.roll(plan, -1, axis=1), np.roll(height, -1, axis=1)
     for level in band:
@@ -190,12 +214,10 @@ def _shadows(plan: Floats, height: Floats, band: tuple[float, float]) -> Geometr
         valid.append(crosses)
     every, which = np.concatenate(points, axis=1), np.concatenate(valid, axis=1)
     row, _ = np.nonzero(which)
-    found = np.full(len(plan), shapely.Polygon())
-    if len(row):
-        names, group = np.unique(row, return_inverse=True)
-        clouds = shapely.multipoints(every[which], indices=group.reshape(-1))
-        found[names] = shapely.convex_hull(clouds)
-    return found
+    order = np.argsort(whose[row], kind="stable")
+    names, group = np.unique(whose[row][order], return_inverse=True)
+    clouds = shapely.multipoints(every[which][order], indices=group.reshape(-1))
+    return names, np.asarray(shapely.convex_hull(clouds))
 
 
 def _triangles(free: Geometry, slope: Floats) -> Floats:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ptmtools.arrays import Ints
+from ptmtools.arrays import Bools, Ints
 from ptmtools.cells.cut_off import CutOff, Unreached
+from ptmtools.cells.model import Cells
+from ptmtools.cells.ownership import Pieces
 from ptmtools.notes import Warned
 from ptmtools.quantities import count
 from ptmtools.scene.model import Scene
@@ -14,6 +17,11 @@ from ptmtools.scene.model import Scene
 NAMED = 3
 #: A greater share of all places is much to leave out.
 MUCH = 0.1
+#: What is said where there is nothing to stand on.
+NO_PLACES = Warned(
+    "there is no floor on which somebody could stand, so visitors may be anywhere in the cells; "
+    "if floors face down, --two-sided helps"
+)
 
 
 def of_detail(scene: Scene, detail: Ints) -> list[str]:
@@ -58,6 +66,30 @@ def of_unreached(unreached: Unreached, kept: bool, place: float) -> list[str]:
             )
         )
     return notes
+
+
+def of_leaves(cells: Cells, reached: Bools) -> list[str]:
+    """What is said of leaves that are in no cell, of the (n,) that there were."""
+    notes = []
+    if dropped := int(np.count_nonzero(~reached)):
+        leaves = f"{dropped} of {len(reached)} leaves (convex pieces of space)"
+        notes.append(f"{leaves} cannot be reached from inside and were dropped")
+    unseen = cells.leaf_cell < 0
+    if unseen.any():
+        volume, leaves = cells.leaf_volumes(), count(int(unseen.sum()), "leaf", "leaves")
+        notes.append(
+            f"{leaves} ({volume[unseen].sum() / volume.sum():.1%} of the volume) cannot be seen "
+            "from where one can stand; dropped, as --standing anywhere would not"
+        )
+    return notes
+
+
+def of_triangles(scene: Scene, pieces: Pieces, owner: NDArray[np.int32]) -> list[str]:
+    """What is said of triangles of which no cell has a piece."""
+    nowhere = np.ones(len(scene.triangles), dtype=bool)
+    nowhere[pieces.source[np.any(owner >= 0, axis=1)]] = False
+    lost = int(np.count_nonzero(nowhere))
+    return [f"{lost} triangles lie outside all cells, where nobody can see them"] * (lost > 0)
 
 
 def _place(room: CutOff) -> str:

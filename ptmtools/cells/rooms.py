@@ -14,6 +14,9 @@ most: one room, since as part of that room it is narrow no more.
 The opening between two regions is the largest group of touching portals, by true area: two doors
 into one corridor are two openings, a wide arch that planes have cut up is one.
 
+A region in which nobody can stand, such as the space above a ceiling with holes, is no room. Leaf
+by leaf it joins the rooms around it, through the largest opening first.
+
 Tried and rejected: the share of the common boundary that is open (two rooms joined by a doorway as
 deep as its wall share nothing but the doorway); the volume of the convex hull that two regions
 fill together (splits every room with a pillar, and joins small rooms through their doors); the
@@ -23,12 +26,13 @@ the same).
 
 from __future__ import annotations
 
+import heapq
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.merging import Groups
 from ptmtools.cells.model import Cells
 
@@ -50,14 +54,39 @@ def room_of_leaf(cells: Cells, rank: Ints) -> Ints:
     Of equally open pairs the one whose leaves come first by (L,) ``rank`` is joined first: a
     doorway between two equal rooms.
     """
-    return _Regions(cells, rank).grown(lambda closed: -closed >= OPEN)[rank]
+    regions = _Regions(cells, rank)
+    openings = regions.openings()
+    room = regions.grown(lambda closed: -closed >= OPEN)
+    standing = np.zeros(cells.leaf_count, dtype=np.bool_)
+    standing[room[rank[cells.leaf_standing]]] = True
+    return _adopted(room, standing[room], openings)[rank]
+
+
+def _adopted(room: Ints, held: Bools, openings: dict[tuple[int, int], float]) -> Ints:
+    """(L,) rooms, those that are not ``held``, (L,), divided among the rooms around them: from
+    these on, the largest opening first."""
+    beside: list[list[tuple[float, int]]] = [[] for _ in room]
+    for (a, b), area in openings.items():
+        beside[a].append((-float(f"{area:.{DIGITS}g}"), b))
+        beside[b].append((-float(f"{area:.{DIGITS}g}"), a))
+    waiting = [(area, b, int(room[a])) for a in np.flatnonzero(held) for area, b in beside[a]]
+    heapq.heapify(waiting)
+    found, left = room.copy(), ~held
+    while waiting:
+        _, leaf, name = heapq.heappop(waiting)
+        if left[leaf]:
+            found[leaf], left[leaf] = name, False
+            for area, b in beside[leaf]:
+                heapq.heappush(waiting, (area, b, name))
+    return found
 
 
 class _Regions(Groups):
     """Groups of leaves, by rank, that cost little where the opening between them is large."""
 
     def __init__(self, cells: Cells, rank: Ints) -> None:
-        super().__init__(cells.leaf_count, rank[cells.portal_leaf])
+        kept = (cells.leaf_cell[cells.portal_leaf] >= 0).all(axis=1, keepdims=True)
+        super().__init__(cells.leaf_count, np.where(kept, rank[cells.portal_leaf], 0))
         order = np.argsort(rank)
         self._volume = cells.leaf_volumes()[order]
         plan = cells.leaf_point[:, [0, 2]]
@@ -68,6 +97,11 @@ class _Regions(Groups):
         self._area = cells.portal_area.tolist()
         self._touching = _touching(cells, cells.tolerance.plane)
         self._opening: dict[tuple[int, int], float] = {}
+
+    def openings(self) -> dict[tuple[int, int], float]:
+        """m² between two regions, the lower one first."""
+        pairs = ((a, b) for a, near in enumerate(self.near) for b in near if a < b)
+        return {(a, b): self._largest_opening(self.near[a][b]) for a, b in pairs}
 
     def cost(self, a: int, b: int) -> float:
         """Less the opening between them, as a share of the narrower one's cross-section."""

@@ -7,7 +7,8 @@
    If it does, the model is open; the root box is then clipped to the walls and the subdivision done
    again, so that the open space over low walls does not join everything to everything.
 3. The geometry is cut to the leaves, and each piece gets its owners (`ownership`).
-4. Each reachable leaf is a cell, or the leaves of a room are (`grouping`).
+4. What cannot be seen from where one can stand (`standing`) is left out (`seen`). Each of the
+   other leaves is a cell, or the leaves of a room are (`grouping`).
 5. Pieces of the geometry with the same owners are joined again (`joining`).
 """
 
@@ -29,13 +30,21 @@ from ptmtools.cells.model import OUTSIDE, Cells, sunk
 from ptmtools.cells.naming import matches
 from ptmtools.cells.options import SubdivideOptions, Walker
 from ptmtools.cells.ownership import Pieces, cut_to_leaves
-from ptmtools.cells.places import Floors
+from ptmtools.cells.places import Floors, find_places
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import Portal, find_portals, portals_rejoined
 from ptmtools.cells.reach import at_box, flood, largest_leaf, roofed_share
 from ptmtools.cells.rejoin import rejoined
-from ptmtools.cells.remarks import of_detail, of_unreached
+from ptmtools.cells.remarks import (
+    NO_PLACES,
+    of_detail,
+    of_leaves,
+    of_triangles,
+    of_unreached,
+)
 from ptmtools.cells.reveals import Reveals
+from ptmtools.cells.seen import seen_from_places
+from ptmtools.cells.standing import eye_region, meets
 from ptmtools.cells.structure import Structure, WallPlane, find_walls
 from ptmtools.errors import InputError
 from ptmtools.executors.model import Executor
@@ -82,6 +91,7 @@ class _Space:
     tree: Tree
     portals: list[Portal]
     reached: Bools  # (L,) which leaves somebody can reach
+    viewers: tuple[int, ...]  # those with a viewpoint that was asked for
     closed: bool  # whether they do not touch the root box
     beyond: Unreached  # where the flood did not come to; reached all the same if asked for
     place: float  # m² to stand on where it did, known if something is left out
@@ -136,9 +146,13 @@ def subdivide(
         )
     pieces = cut_to_leaves(scene, space.tree, tolerance)
     owner = _named(space.reached)[pieces.leaf]
-    cells = grouped(_assemble(scene, space, pieces, owner, notes), options)
+    cells = _assemble(scene, model, space, pieces, owner, notes)
+    name = _named(seen_from_places(cells, executor))
+    owned = np.append(name, np.int32(-1))[cells.triangle_cell]
+    cells = grouped(replace(cells, leaf_cell=name, triangle_cell=owned), options)
     owner = np.append(cells.leaf_cell, np.int32(-1))[owner]
-    cells = replace(cells, **vars(joined(scene, pieces, owner, tolerance)))
+    notes = [*cells.notes, *of_leaves(cells, space.reached), *of_triangles(scene, pieces, owner)]
+    cells = replace(cells, **vars(joined(scene, pieces, owner, tolerance)), notes=tuple(notes))
     check_seen(scene, cells)
     return cells
 
@@ -174,9 +188,9 @@ def _divide(
     tree = build_tree(root, structure, model.walls, model.reveals, options, progress)
     portals = find_portals(tree, structure.tolerance)
     outer = at_box(tree)
-    start = _viewpoint_leaves(tree, box, options)
+    viewers = _viewpoint_leaves(tree, box, options)
     walker = Walker(*options.walker)
-    start = start or largest_leaf(tree, outer <= inside, structure.corners, walker)
+    start = viewers or largest_leaf(tree, outer <= inside, structure.corners, walker)
     reached = flood(len(tree.leaves), portals, start)
     closed = bool(start) and not bool(np.any(reached & outer))
     beyond, place = Unreached([]), 0.0
@@ -192,7 +206,8 @@ def _divide(
         joint = rejoined(tree, reached)
         portals = portals_rejoined(portals, tree, joint, structure.tolerance)
         tree, reached = joint.tree, np.bincount(joint.leaf, reached) > 0
-    return _Space(box, tree, portals, reached, closed, beyond, place)
+        viewers = tuple(joint.leaf[list(viewers)].tolist())
+    return _Space(box, tree, portals, reached, viewers, closed, beyond, place)
 
 
 def _viewpoint_leaves(tree: Tree, box: Floats, options: SubdivideOptions) -> tuple[int, ...]:
@@ -239,14 +254,35 @@ def _named(keep: Bools) -> NDArray[np.int32]:
     return np.where(keep, np.cumsum(keep) - 1, -1).astype(np.int32)
 
 
+def _standing(model: _Model, bodies: list[Polyhedron]) -> tuple[Bools, Floats]:
+    """(L,) in which leaves somebody can stand, and `Cells.eye_floor`."""
+    walker, tolerance = Walker(*model.options.walker), model.structure.tolerance
+    if model.options.standing == "anywhere":
+        return np.ones(len(bodies), dtype=np.bool_), np.zeros((0, 3, 3))
+    boxes = np.array([_bounds(body.points) for body in bodies]).reshape(-1, 2, 3)
+    places = find_places(model.floors, model.structure, walker, boxes)
+    eyes = eye_region(places, walker, tolerance)
+    return meets(eyes, bodies, walker, tolerance), eyes.triangles()
+
+
 def _assemble(
-    scene: Scene, space: _Space, pieces: Pieces, owner: NDArray[np.int32], notes: list[str]
+    scene: Scene,
+    model: _Model,
+    space: _Space,
+    pieces: Pieces,
+    owner: NDArray[np.int32],
+    notes: list[str],
 ) -> Cells:
     """Cells that are single leaves, with the pieces of the geometry as they were cut."""
     tree = space.tree
     keep = space.reached
     rename = _named(keep)
     bodies = [tree.leaves[i] for i in np.flatnonzero(keep)]
+    standing, eye_floor = _standing(model, bodies)
+    standing[rename[list(space.viewers)]] = True
+    if not standing.any():
+        standing[:], eye_floor = True, eye_floor[:0]
+        notes = [*notes, NO_PLACES]
     portals = [portal for portal in space.portals if keep[[*portal.leaves]].all()]
     ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
     children = tree.children.copy()
@@ -255,15 +291,6 @@ def _assemble(
     children[is_leaf] = np.where(leaf >= 0, -2 - leaf, OUTSIDE)
 
     owned = np.any(owner >= 0, axis=1)
-    nowhere = np.ones(len(scene.triangles), dtype=bool)
-    nowhere[pieces.source[owned]] = False
-    lost = int(np.count_nonzero(nowhere))
-    if lost:
-        notes = [*notes, f"{lost} triangles lie outside all cells, where nobody can see them"]
-    dropped = int(np.count_nonzero(~keep))
-    if dropped:
-        unreached = f"{dropped} of {len(keep)} leaves (convex pieces of space)"
-        notes = [*notes, f"{unreached} cannot be reached from inside and were dropped"]
     corners = scene.corners[pieces.source]
     corners[pieces.cut] = pieces.corner[..., :3]
     vertex = corners[owned].reshape(-1, 3)
@@ -275,6 +302,7 @@ def _assemble(
         node_child=children,
         root_box=space.box,
         leaf_cell=np.arange(len(bodies), dtype=np.int32),
+        leaf_standing=standing,
         leaf_point=np.concatenate([b.points for b in bodies]),
         leaf_point_start=point_start,
         face_index=np.concatenate(loops).astype(np.int32),
@@ -291,6 +319,8 @@ def _assemble(
         triangle_source=pieces.source[owned].astype(np.int32),
         triangle_cell=owner[owned],
         tolerance=scene.tolerance,
+        eye_floor=eye_floor,
+        walker=Walker(*model.options.walker),
         closed=space.closed,
         notes=tuple(notes),
     )

@@ -83,8 +83,8 @@ def visit_of(content: Content, sizes: Mapping[str, int]) -> Visit:
     texels = np.array([r.width * r.height for r in records], np.float64)
     shares: tuple[float, float] | tuple[None, None] = (None, None)
     if len(used):
-        shares = over_places(sees @ texels / texels[used].sum(), pvs.volume)
-    mean, most = over_places(at_hand, pvs.volume)
+        shares = over_places(sees @ texels / texels[used].sum(), pvs.standing)
+    mean, most = over_places(at_hand, pvs.standing)
     volume = pvs.volume_at_hand
     images = sum(records[i].fallback_bytes for i in used.tolist() if content.options.fallback)
     browsed = [sizes[f.entry] + _total(_geometry(content, f, sizes)) for f in forms if f.entry]

@@ -33,6 +33,7 @@ class Pvs:
     leak: (n, 4) int32 cells that see suspiciously much: the cell, how many cells it sees, the
         smallest portal that shows it half of them, and how many that one shows.
     volume: (C,) float64 m³ of each cell, for shares of the building; empty if it is not known.
+    standing: (C,) float64 of it, where somebody can stand.
     conservative: False if the sets are of what random lines happened to show.
     """
 
@@ -45,6 +46,7 @@ class Pvs:
     opened: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     leak: NDArray[np.int32] = field(default_factory=lambda: np.zeros((0, 4), np.int32))
     volume: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    standing: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     conservative: bool = True
 
     @property
@@ -77,7 +79,8 @@ class Pvs:
         """Share of the building that is at hand, in [0, 1]: on average over places, and at most. If
         no volume is known, of the cells."""
         volume = self.volume if self.volume.any() else np.ones(self.cell_count)
-        return over_places(self.at_hand(volume) / max(volume.sum(), np.finfo(float).tiny), volume)
+        share = self.at_hand(volume) / max(volume.sum(), np.finfo(float).tiny)
+        return over_places(share, self.standing)
 
     def to_matrix(self) -> NDArray[np.bool_]:
         """(C, C) dense matrix."""
@@ -116,24 +119,25 @@ class Pvs:
         leak = stored.array("leak", np.int32, None, 4)
         if len(leak) and not 0 <= int(leak[:, 0].min()) <= int(leak[:, 0].max()) < cells:
             raise ValueError("leak has an index out of range")
-        volume = stored.array("volume", np.float64, None)
-        if len(volume) not in (0, cells) or not ((volume >= 0) & (volume < np.inf)).all():
-            raise ValueError("volume is not that of the cells")
+        volumes = {name: stored.array(name, np.float64, None) for name in ("volume", "standing")}
+        for name, volume in volumes.items():
+            if len(volume) not in (0, cells) or not ((volume >= 0) & (volume < np.inf)).all():
+                raise ValueError(f"{name} is not that of the cells")
         return Pvs(
             start,
             entries,
             **{name: stored.array(name, np.int64, None) for name in COUNTED},
             cut=stored.array("cut", np.bool_, None),
             leak=leak,
-            volume=volume,
+            **volumes,
             conservative=bool(stored.array("conservative", np.bool_, 1)[0]),
         )
 
 
 def over_places(values: NDArray[np.float64], volume: NDArray[np.float64]) -> tuple[float, float]:
-    """The mean of (C,) values of cells over all places, so that a cell counts by its (C,)
-    ``volume``, and the greatest; (0, 0) of no cells."""
+    """The mean of (C,) values of cells over all places, so that a cell counts by the (C,)
+    ``volume`` where somebody can stand, and the greatest; (0, 0) of no cells."""
     if not len(values):
         return 0.0, 0.0
     weight = volume if volume.any() else np.ones(len(values))
-    return float(np.average(values, weights=weight)), float(values.max())
+    return float(np.average(values, weights=weight)), float(values[weight > 0].max())

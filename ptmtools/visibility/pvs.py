@@ -10,7 +10,7 @@ import numpy as np
 
 from ptmtools.arrays import Bools
 from ptmtools.cells.model import Cells
-from ptmtools.cells.seen import portals_of
+from ptmtools.cells.seen import from_places, portals_of
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
 from ptmtools.portal_flow.flow import leaf_matrix, portal_flow
@@ -30,18 +30,18 @@ def compute_pvs(
     """Cell-to-cell visibility, symmetric (paper §3; Teller & Séquin).
 
     Unless it is sampled, a pair of cells is left out only if no straight line, but for hairlines
-    thinner than the rounding of the coordinates (`Tolerance.rounding`), leads from one to the other
-    through portals. Cells that share a portal always see each other. `Pvs.fallbacks` counts the
-    portals whose search was cut short. ``executor`` does the searches; the result is the same for
-    any.
+    thinner than the rounding of the coordinates (`Tolerance.rounding`), leads through portals from
+    a leaf of one in which somebody can stand to the other, or the other way round. Cells that share
+    a portal see each other if somebody can stand in one of them. `Pvs.fallbacks` counts the portals
+    whose search was cut short. ``executor`` does the searches; the result is the same for any.
 
     Raises what `portal_flow` raises.
     """
     portals = portals_of(cells)
-    volume = np.bincount(cells.leaf_cell, cells.leaf_volumes(), cells.cell_count)
+    volumes = {"volume": cells.cell_volumes(), "standing": cells.cell_volumes(standing=True)}
     if options.method == "sampled":
         leaves = sampled_leaves(portals, options.lines, executor)
-        return Pvs.from_matrix(_lifted(cells, leaves), volume=volume, conservative=False)
+        return Pvs.from_matrix(_lifted(cells, leaves), **volumes, conservative=False)
     budget = options.budget if options.method == "full" else 0
     flow = portal_flow(portals, budget, progress, executor)
     matrix = _lifted(cells, leaf_matrix(portals, flow))
@@ -53,13 +53,17 @@ def compute_pvs(
         decided=flow.decided,
         opened=flow.opened,
         leak=find_leaks(cells, flow, matrix),
-        volume=volume,
+        **volumes,
     )
 
 
 def _lifted(cells: Cells, leaves: Bools) -> Bools:
-    """(C, C) from (L, L): a cell sees what its leaves see."""
-    rows, columns = np.nonzero(leaves)
+    """(C, C) from (L, L): a cell sees what is seen from its leaves in which somebody can stand,
+    and is seen in turn."""
+    owned = cells.leaf_cell >= 0
+    rows, columns = np.nonzero(from_places(leaves, cells.leaf_standing) & owned[:, None] & owned)
     matrix = np.zeros((cells.cell_count, cells.cell_count), dtype=np.bool_)
     matrix[cells.leaf_cell[rows], cells.leaf_cell[columns]] = True
+    for cell, beside in enumerate(cells.adjacent()):
+        matrix[cell, beside] |= cells.standing[cell] | cells.standing[beside]
     return matrix

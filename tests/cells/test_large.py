@@ -97,6 +97,7 @@ def as_cells(side: int) -> Cells:
         node_child=np.array(children, dtype=np.int32),
         root_box=np.array([[0, 0, 0], [side * WIDTH, HEIGHT, side * WIDTH]]),
         leaf_cell=np.arange(count, dtype=np.int32),
+        leaf_standing=np.ones(count, dtype=np.bool_),
         leaf_point=(corner[:, None] + box.points).reshape(-1, 3),
         leaf_point_start=8 * np.arange(count + 1),
         face_index=(8 * np.arange(count)[:, None] + loops.ravel()).ravel().astype(np.int32),

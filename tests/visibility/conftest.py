@@ -112,6 +112,7 @@ def make_rooms(
         node_child=np.array([c for _, c in nodes], dtype=np.int32).reshape(-1, 2),
         root_box=np.stack([points.min(axis=0), points.max(axis=0)]),
         leaf_cell=np.arange(count, dtype=np.int32),
+        leaf_standing=np.ones(count, dtype=np.bool_),
         leaf_point=points,
         leaf_point_start=8 * np.arange(count + 1),
         face_index=np.concatenate([np.ravel(loops) + 8 * i for i in range(count)]).astype(np.int32),
