@@ -44,6 +44,14 @@ DOORS = {
         {"a": IN_A},
         gone=(BEFORE_THE_HOUSE,),
     ),
+    "an entrance 1.2 m wide, whose leaf is as large as a wall": Made(
+        {
+            "building": carved([A], [((-0.2, 2, 0), (0, 3.2, 2.1))]),
+            "front door": box((-0.15, 2, 0), (-0.1, 3.2, 2.1)),
+        },
+        {"a": IN_A},
+        gone=(BEFORE_THE_HOUSE,),
+    ),
     "an entrance that stays shut, and a door leaf that does not": Made(
         {"building": ENTRANCE, "front door": AJAR, "door": LEAF},
         BOTH,
@@ -55,6 +63,16 @@ DOORS = {
     ),
     "a door leaf, and doors are closed": Made(
         {"building": TWO_ROOMS, "door": LEAF},
+        BOTH,
+        blind=("a b",),
+        cut_off=1,
+        options=WHOLE | {"doors": "closed"},
+    ),
+    "a door leaf 1.2 m wide, and doors are closed": Made(
+        {
+            "building": carved([A, B], [((5, 2, 0), (5.2, 3.2, 2.1))]),
+            "door": box((5.05, 2, 0), (5.1, 3.2, 2.1)),
+        },
         BOTH,
         blind=("a b",),
         cut_off=1,
