@@ -12,10 +12,21 @@ import numpy as np
 
 from ptmtools.arrays import Floats
 from tests.cells.buildings import SAID, WHOLE, Made, carved, flight, moved, prism, room, turned
-from tests.scene.made import box, house, inside_out, mezzanine, sheet
+from tests.scene.made import (
+    Point,
+    box,
+    castle,
+    divided,
+    furnished,
+    house,
+    inside_out,
+    mezzanine,
+    sheet,
+    turned_in_plan,
+)
 
-A, B = room(0, 0, 5, 5), room(5.2, 0, 10.2, 5)
-DOORWAY = (5, 2, 0), (5.2, 2.9, 2.1)
+A, B, C = (room(x, 0, x + 5, 5) for x in (0, 5.2, 10.4))
+DOORWAY, NEXT = (((x, 2, 0), (x + 0.2, 2.9, 2.1)) for x in (5, 10.2))
 IN_A, IN_B = (2, 2.5, 1.6), (8, 2.5, 1.6)
 BOTH = {"a": IN_A, "b": IN_B}
 TWO_ROOMS = carved([A, B], [DOORWAY])
@@ -219,6 +230,7 @@ THROUGH = (5, 2, 0), (5.45, 2.9, 2.1)
 #: A ceiling of 5 cm under a plenum.
 PLENUM = [room(0, 0, 6, 5, 0, 2.6), room(0, 0, 6, 5, 2.65, 3.2)]
 LAMPS = [((x, x, 2.6), (x + 0.6, x + 0.6, 2.65)) for x in (1.2, 3.6)]
+TUNNEL = carved([A, room(11, 0, 16, 5)], [((5, 2, 0), (11, 3, 1.4))])
 #: Behind the room's wall a gap, and behind that another.
 GAPS = [room(0, 0, 6, 5), room(6.2, 0, 6.5, 5), room(6.7, 0, 7, 5)]
 CHINKS = [((6, 0.1, 1), (6.2, 0.3, 1.2)), ((6.5, 4.7, 1), (6.7, 4.9, 1.2))]
@@ -254,6 +266,15 @@ NO_PLACES = {
     "a suspended ceiling with openings for lamps": Made(
         carved(PLENUM, LAMPS), {"room": IN_A}, seen={(1.5, 1.5, 3): None}
     ),
+    "a plenum over three rooms, open to each at a lamp": Made(
+        carved(
+            [A, B, C, room(0, 0, 15.4, 5, 2.85, 3.4)],
+            [DOORWAY, NEXT] + [((x, 1, 2.8), (x + 0.6, 1.6, 2.85)) for x in (1, 6, 11)],
+        ),
+        BOTH | {"c": (13, 2.5, 1.6)},
+        seen={(x + 0.3, 1.3, 3.1): None for x in (1, 6, 11)},
+        sees=("a b", "b c"),
+    ),
     "a raised floor": Made(
         carved([A, room(0, 0, 5, 5, -0.5, -0.1)]), {"a": IN_A}, gone=((2, 2, -0.3),)
     ),
@@ -263,10 +284,18 @@ NO_PLACES = {
         seen={(8, 2.5, 0.6): None},
     ),
     "a tunnel 1.4 m high between two rooms": Made(
-        carved([A, room(11, 0, 16, 5)], [((5, 2, 0), (11, 3, 1.4))]),
+        TUNNEL,
         {"a": IN_A, "b": (14, 2.5, 1.6)},
         seen={(8, 2.5, 0.7): None},
         sees=("a b",),
+    ),
+    "the tunnel, for somebody 1.3 m tall": Made(
+        TUNNEL,
+        {"a": IN_A, "tunnel": (8, 2.5, 0.7), "b": (14, 2.5, 1.6)},
+        rooms=("a", "b"),
+        more=True,
+        sees=("a tunnel", "tunnel b"),
+        options=WHOLE | {"walker": (0.25, 0.4, 1.3)},
     ),
     "a niche 20 cm deep": Made(
         carved([room(0, 0, 6, 5)], [((6, 2, 0.8), (6.2, 2.6, 1.8))], wall=0.4),
@@ -312,9 +341,12 @@ FIVE = {"sw": (3, 2.5, 1.6), "nw": (3, 8.5, 1.6), "hall": (10, 5, 1.6)}
 FIVE |= {"se": (16, 3, 1.6), "ne": (16, 9, 1.6)}
 
 
-def five(model: Floats, **more: Any) -> Made:
+TURNED = {eye: tuple(turned_in_plan(np.array(at), 30).tolist()) for eye, at in FIVE.items()}
+
+
+def five(model: Floats, eyes: dict[str, Point] = FIVE, **more: Any) -> Made:
     seen = {"sees": ("sw nw", "sw hall", "hall ne", "se ne"), "blind": ("nw ne",)}
-    return Made(model, FIVE, closed=False, said=("open",), **seen | more)
+    return Made(model, eyes, closed=False, said=("open",), **seen | more)
 
 
 HALL = carved([room(0, 0, 10.2, 5)])
@@ -325,7 +357,17 @@ MODELS = {
     "in map coordinates": five(house(), ingest={}, offset=(500_000, 5_400_000, 250)),
     "in inches": five(house(), ingest={}, scale=1 / 0.0254),
     "a lying GLB, set upright": five(house(), ingest={"up": "z"}, file="model.glb"),
+    "turned by 30°": five(turned_in_plan(house(), 30), eyes=TURNED, more=True),
+    "of 3,840 triangles": five(divided(house())),
+    "with tables": five(furnished(house())),
     "without a floor": five(house(floor=False)),
+    "two rooms between walls 1.8 m thick": Made(
+        castle(2),
+        {"a": (4, 5, 1.6), "b": (11, 5, 1.6)},
+        gone=((0.9, 5, 1.6), (7.7, 5, 1.6)),
+        blind=("a b",),
+        cut_off=1,
+    ),
     "rooms whose faces have no backs": Made(TWO_ROOMS, BOTH, sees=("a b",), backs=False),
     "a sheet without a back blocks from both sides": Made(
         {"building": HALL, "screen": SCREEN}, BOTH, blind=("a b",), cut_off=1, backs=False

@@ -3,13 +3,22 @@
 
 from __future__ import annotations
 
-from tests.cells.buildings import WHOLE, Made, carved, moved, room
-from tests.cells.made_buildings import BEFORE_THE_HOUSE, BOTH, DOORWAY, IN_A, TWO_ROOMS, A, B
+from tests.cells.buildings import WHOLE, Made, carved, moved
+from tests.cells.made_buildings import (
+    BEFORE_THE_HOUSE,
+    BOTH,
+    DOORWAY,
+    IN_A,
+    NEXT,
+    TWO_ROOMS,
+    A,
+    B,
+    C,
+)
 from tests.scene.made import box
 
 LEAF = box((5.05, 2, 0), (5.1, 2.9, 2.1))
 SHUTTER = carved([A, B], [((5, 2, 0.9), (5.2, 3.2, 2.1))]), box((5.05, 2, 0.9), (5.1, 3.2, 2.1))
-C, NEXT = room(10.4, 0, 15.4, 5), ((10.2, 2, 0), (10.4, 2.9, 2.1))
 ENTRANCE = carved([A, B], [DOORWAY, ((-0.2, 2, 0), (0, 2.9, 2.1))])
 AJAR = box((-0.15, 2, 0), (-0.1, 2.9, 2.1))
 
