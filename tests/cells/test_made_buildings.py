@@ -19,15 +19,12 @@ from tests.cells.made_doors import DOORS
 from tests.scene.made import house, inside_out, y_up
 
 EVERY = ROOMS | HEIGHTS | NO_PLACES | DOORS | MODELS
-BESIDE_A_LEAF = "a leaf of 2 m² splits the wall, in whose halves jambs part nothing"
 #: Of which something else comes, so far, and why.
 WRONG = {
     "a room on ground that is a block 6 m thick": "the flood starts in the ground",
     "two rooms between walls 1.8 m thick": "the flood starts in a slab",
     "a niche in a wall 80 cm thick": "the flood gets into the wall, where a body fits",
     "a platform 2 m high along three walls": "the walls that it touches make a room of it",
-    "an entrance 1.2 m wide, whose leaf is as large as a wall": BESIDE_A_LEAF,
-    "a door leaf 1.2 m wide, and doors are closed": BESIDE_A_LEAF,
 }
 
 
