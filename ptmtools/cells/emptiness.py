@@ -36,8 +36,10 @@ def _something_seen(scene: Scene, cells: Cells) -> bool:
         return len(piece) > 0
     low, high = np.full((2, cells.cell_count, 3), [[[np.inf]], [[-np.inf]]])
     starts = cells.leaf_point_start[:-1]
-    np.minimum.at(low, cells.leaf_cell, np.minimum.reduceat(cells.leaf_point, starts))
-    np.maximum.at(high, cells.leaf_cell, np.maximum.reduceat(cells.leaf_point, starts))
+    kept = cells.leaf_cell >= 0
+    of = cells.leaf_cell[kept]
+    np.minimum.at(low, of, np.minimum.reduceat(cells.leaf_point, starts)[kept])
+    np.maximum.at(high, of, np.maximum.reduceat(cells.leaf_point, starts)[kept])
     corners = cells.vertex[cells.triangle[piece]]
     facing = normals(corners)
     furthest = np.where(facing > 0, high[cell], low[cell])

@@ -27,6 +27,17 @@ class EyeRegion:
         """Whether eyes may be anywhere."""
         return not len(self._floor)
 
+    def clipped(self, low: Floats, high: Floats) -> tuple[Floats, Floats]:
+        """What of the box between two corners eyes can be in, as a box; as it is if it is flat or
+        they can be nowhere in it."""
+        over = self._nearby.meeting(low - [0, self._reach, 0], high)
+        height = self._floor[over][:, :, 1]
+        least, most = height.min(initial=np.inf), height.max(initial=-np.inf) + self._reach
+        bottom, top = max(low[1], least), min(high[1], most)
+        if bottom >= top:
+            return low, high
+        return np.array([low[0], bottom, low[2]]), np.array([high[0], top, high[2]])
+
     def contains(self, points: Floats) -> Bools:
         """(n,) whether it contains each of the (n, 3) points."""
         from ptmtools.cells.eye_kernels import above_floor

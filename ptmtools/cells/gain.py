@@ -12,6 +12,11 @@ It is 0 in a hall, whatever the size of the rest of the building, and says the s
 Groups are joined in the order of what parting the two together would gain, the lower numbered
 leaves first where it is the same, as long as that is less than the threshold.
 
+Leaves in which nobody can stand have no viewers, and nothing is gained by parting them from one
+another. They come last: what adds least to the cost of all groups is joined first, until half of
+the threshold has been added. So slivers and what few can see join whatever they are part of, and
+the top of a hall that the whole building sees stays by itself.
+
 Who sees whom is estimated (`sight`), not computed: the subdivision comes before visibility, and
 the estimate decides only where cells end, never what they see.
 
@@ -30,6 +35,8 @@ from ptmtools.cells.merging import Groups
 #: Gains that differ by less are equal, in digits: symmetrical buildings have many, which rounding
 #: must not put in order.
 DIGITS = 4
+#: Joining what has no viewers may add this share of the threshold to all that is fetched.
+ATTACHED = 0.5
 
 
 def join_by_gain(
@@ -40,35 +47,82 @@ def join_by_gain(
     Parameters
     ----------
     sees: (L, L) symmetric, which leaf sees which.
-    volume, area: (L,) of a leaf, m³, and of the surfaces in it, m².
+    volume, area: (L,) of a leaf, m³ in which viewers are, and of the surfaces in it, m².
     pairs: (n, 2) leaves through whose portals groups may grow.
     gain: no group of which parting gains as much is made; 0 to 1.
     """
-    return _Parted(sees, volume, area, pairs).grown(lambda gained: gained < gain)
+    groups = _Parted(sees, volume, area, pairs)
+    groups.grown(lambda gained: gained < gain)
+    return _Attached(groups).grown_by(ATTACHED * gain)
 
 
-class _Parted(Groups):
-    """Groups that cost what parting them gains."""
+class _Costs(Groups):
+    """Groups, and what they cost."""
+
+    def __init__(self, sees: Bools, own: Floats, every: Floats) -> None:
+        """``sees``: (L, L); ``own``: (L, 2) volume and area of groups, ``every`` of leaves."""
+        self.sees, self.own, self.every = sees, own, every
+
+    def together(self, a: int, b: int) -> float:
+        """Of two groups as one."""
+        return self.of(self.sees[a] | self.sees[b], self.own[a] + self.own[b])
+
+    def of(self, seen: Bools, own: Floats) -> float:
+        """Of a group that sees leaves, (L,), and has a volume and an area."""
+        volume, area = self.every[seen].sum(axis=0)
+        return float(own[0] * area + own[1] * volume)
+
+    def join(self, a: int, b: int) -> list[tuple[int, int]]:
+        self.sees[a] |= self.sees[b]
+        self.own[a] += self.own[b]
+        super().join(a, b)
+        return [(a, c) for c in self.near[a]]
+
+
+class _Parted(_Costs):
+    """Groups with viewers, that cost what parting them gains."""
 
     def __init__(self, sees: Bools, volume: Floats, area: Floats, pairs: NDArray[np.int32]) -> None:
-        super().__init__(len(sees), pairs)
-        self._all = np.stack([volume, area], axis=1)
-        self._sees = sees.copy()
-        self._own = self._all.copy()
-        self._apart = [self._cost(row, own) for row, own in zip(sees, self._own, strict=True)]
+        Groups.__init__(self, len(sees), pairs)
+        every = np.stack([volume, area], axis=1)
+        super().__init__(sees.copy(), every.copy(), every)
+        self._apart = [self.of(row, own) for row, own in zip(sees, every, strict=True)]
 
     def cost(self, a: int, b: int) -> float:
-        together = self._cost(self._sees[a] | self._sees[b], self._own[a] + self._own[b])
+        if not (self.own[a][0] and self.own[b][0]):
+            return np.inf
+        together = self.together(a, b)
         gain = 1 - (self._apart[a] + self._apart[b]) / together if together > 0 else 0.0
         return round(gain, DIGITS)
 
     def join(self, a: int, b: int) -> list[tuple[int, int]]:
-        self._sees[a] |= self._sees[b]
-        self._own[a] += self._own[b]
         self._apart[a] += self._apart[b]
-        super().join(a, b)
-        return [(a, c) for c in self.near[a]]
+        return super().join(a, b)
 
-    def _cost(self, seen: Bools, own: Floats) -> float:
-        volume, area = self._all[seen].sum(axis=0)
-        return float(own[0] * area + own[1] * volume)
+
+class _Attached(_Costs):
+    """Groups one of which has no viewers, that cost what joining them adds to all costs, as a
+    share."""
+
+    def __init__(self, groups: _Parted) -> None:
+        self.near, self._parent = groups.near, groups._parent
+        super().__init__(groups.sees, groups.own, groups.every)
+        self._alone = [self.of(row, own) for row, own in zip(self.sees, self.own, strict=True)]
+        whole = np.unique(self.ends())
+        self._all = sum(self._alone[group] for group in whole.tolist())
+        self._added = 0.0
+
+    def grown_by(self, share: float) -> Ints:
+        """(L,) the groups, once joining them has added so much."""
+        return self.grown(lambda added: self._added + added <= share)
+
+    def cost(self, a: int, b: int) -> float:
+        if self.own[a][0] and self.own[b][0]:
+            return np.inf
+        added = self.together(a, b) - self._alone[a] - self._alone[b]
+        return round(added / self._all, 2 * DIGITS) if self._all else 0.0
+
+    def join(self, a: int, b: int) -> list[tuple[int, int]]:
+        self._added += self.cost(a, b)
+        self._alone[a] = self.together(a, b)
+        return super().join(a, b)

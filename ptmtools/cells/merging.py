@@ -73,6 +73,10 @@ class Groups(ABC):
                 continue
             for pair in self.join(a, b):
                 put(*pair)
+        return self.ends()
+
+    def ends(self) -> Ints:
+        """(L,) the group of each leaf."""
         found = self._parent
         while not np.array_equal(found, found[found]):
             found = found[found]

@@ -18,15 +18,18 @@ Position matters far more than resolution (docs/coverage.md), so there is a choi
 All come with a shift of their views' pixels by less than half a pixel, spread as evenly: with the
 same few pixel centres at every point no number of points would be enough.
 
-A cell is a union of disjoint convex leaves. Points depend on nothing but its shape and the seed:
-not on other cells, the unit, the number of workers or the version of a library.
+A cell is a union of disjoint convex leaves. Points are where eyes can be: in those of its leaves in
+which somebody can stand, and there in the eye region (`ptmtools.cells.eyes`). They depend on
+nothing but its shape and the seed: not on other cells, the unit, the number of workers or the
+version of a library.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.eyes import EyeRegion
 from ptmtools.cells.model import Cells
 from ptmtools.cells.vectors import volumes
 from ptmtools.coverage.sobol import sobol, uniform
@@ -38,6 +41,8 @@ CLOUD = 256
 TRIES = 32
 #: A cell that fills less than this share of its bounding box is filled by tetrahedra.
 FILLED = 1 / 32
+#: The (n, 4, 3) tetrahedra of a cell, and their (n,) volumes.
+Room = tuple[Floats, Floats]
 
 
 def filling(tetra: Floats, volume: Floats, unit: Floats) -> Floats:
@@ -64,48 +69,72 @@ class Volume:
     boxed: whether enough of its bounding box is cell.
     """
 
-    def __init__(self, cells: Cells, cell: int, tetrahedra: Floats, volume: Floats) -> None:
-        self._cells, self._cell = cells, cell
-        self.tetrahedra, self.volume = tetrahedra, volume
-        self.empty = len(tetrahedra) == 0
+    def __init__(self, cells: Cells, eyes: EyeRegion, leaves: Bools, room: Room) -> None:
+        self._cells, self._eyes, self._leaves = cells, eyes, leaves
+        self.tetrahedra, self.volume = room
+        self.empty = len(self.tetrahedra) == 0
         if not self.empty:
-            points = tetrahedra.reshape(-1, 3)
-            self._low, self._size = points.min(axis=0), np.ptp(points, axis=0)
-            self.boxed = float(volume.sum()) / float(np.prod(self._size)) >= FILLED
+            points = self.tetrahedra.reshape(-1, 3)
+            low, high = eyes.clipped(points.min(axis=0), points.max(axis=0))
+            self._low, self._size = low, np.maximum(high - low, 0.0)
+            size = float(np.prod(np.ptp(points, axis=0)))
+            self.boxed = float(self.volume.sum()) / size >= FILLED
 
     @staticmethod
     def of_cells(cells: Cells) -> list[Volume]:
-        """All cells."""
+        """All cells; those in which nobody can stand are empty."""
         tetrahedra, leaf = cells.tetrahedra()
-        volume, cell = volumes(tetrahedra), cells.leaf_cell[leaf]
+        volume = volumes(tetrahedra)
+        cell = np.where(cells.leaf_standing, cells.leaf_cell, -1)[leaf]
         order = np.argsort(cell, kind="stable")
         order = order[volume[order] > 0]
-        rows = np.split(order, np.searchsorted(cell[order], np.arange(1, cells.cell_count)))
+        rows = np.split(order, np.searchsorted(cell[order], np.arange(cells.cell_count)))[1:]
+        eyes = cells.eyes
         return [
-            Volume(cells, c, tetrahedra[rows[c]], volume[rows[c]]) for c in range(cells.cell_count)
+            Volume(
+                cells,
+                eyes,
+                (cells.leaf_cell == c) & cells.leaf_standing,
+                (tetrahedra[rows[c]], volume[rows[c]]),
+            )
+            for c in range(cells.cell_count)
         ]
 
+    def anywhere(self) -> Volume:
+        """The same leaves, with eyes anywhere in them."""
+        everywhere = EyeRegion(np.zeros((0, 3, 3)), self._cells.walker)
+        return Volume(self._cells, everywhere, self._leaves, (self.tetrahedra, self.volume))
+
     def random(self, first: int, count: int, seed: int) -> Floats:
-        """(count, 5) independent points ``first`` …: positions in metres, and two more coordinates
-        in (0, 1)."""
-        unit = uniform(first, count, seed)
-        return np.hstack([filling(self.tetrahedra, self.volume, unit), unit[:, 4:]])
+        """(at most count, 5) independent points ``first`` …: positions in metres, and two more
+        coordinates in (0, 1)."""
+        return self._filled(uniform(first, count, seed))
 
     def sobol(self, first: int, count: int, seed: int) -> Floats:
         """(at most count, 5) points ``first`` … of a scrambled sequence, those in the cell: their
         positions in metres, and two more coordinates in (0, 1)."""
         unit = sobol(first, count, seed)
-        if not self.boxed:
-            return np.hstack([filling(self.tetrahedra, self.volume, unit), unit[:, 4:]])
+        if self.empty or not self.boxed:
+            return self._filled(unit)
         points = self._low + unit[:, :3] * self._size
-        inside = self._cells.locate(points) == self._cell
+        leaf = self._cells.locate_leaf(points)
+        inside = (leaf >= 0) & self._leaves[leaf]
+        inside[inside] = self._eyes.contains(points[inside])
         return np.hstack([points[inside], unit[inside, 4:]])
 
     def parts(self, count: int, seed: int) -> list[Floats]:
         """For each of ``count`` equal parts of the cell (TRIES, 3) points, from its centroid
         outwards."""
-        points = filling(self.tetrahedra, self.volume, sobol(0, CLOUD * count, seed))
-        return [points[group[:: CLOUD // TRIES]] for group in strata(points, count)]
+        points = self._filled(sobol(0, CLOUD * count, seed))[:, :3]
+        groups = strata(points, count) if len(points) >= count else []
+        return [points[group[:: -(-len(group) // TRIES)]] for group in groups]
+
+    def _filled(self, unit: Floats) -> Floats:
+        if self.empty:
+            return np.zeros((0, 5))
+        points = filling(self.tetrahedra, self.volume, unit)
+        inside = self._eyes.contains(points)
+        return np.hstack([points[inside], unit[inside, 4:]])
 
 
 def strata(points: Floats, parts: int) -> list[Ints]:

@@ -25,6 +25,8 @@ from ptmtools.visibility.model import Pvs
 #: The default clearance as a share of the thinnest that a cell may be, so that even such a cell
 #: has usable points.
 CLEARANCE = 0.25
+#: Points of a sequence among which one is to be where eyes can be.
+PROBE = 1 << 12
 #: Points of each of the groups that a tolerance is first tried with.
 FIRST = 8
 #: What a bound falls by, about, as the points are doubled (K^-0.6): one that falls faster has luck,
@@ -75,7 +77,7 @@ class Sampler:
 
     def of_cell(self, cell: int) -> CellHints:
         """The hints of one cell."""
-        finder = PointFinder(self._volumes[cell], self._obstacles, self._clearance)
+        finder = PointFinder(self._volume(cell), self._obstacles, self._clearance)
         owners = self._counter.owners
         wanted, begin = owners.in_cells(self.pvs.row(cell))
 
@@ -102,6 +104,11 @@ class Sampler:
             texture=owners.image[wanted[met]],
             texture_value=owned[met],
         )
+
+    def _volume(self, cell: int) -> Volume:
+        """Where eyes can be in a cell; anywhere in its leaves if that is too little to be found."""
+        volume = self._volumes[cell]
+        return volume if len(volume.sobol(0, PROBE, self.options.seed)) else volume.anywhere()
 
     def _points(self, finder: PointFinder) -> SamplePoints:
         options = self.options

@@ -48,8 +48,8 @@ class Content:
     def leaves(self) -> list[list[int]]:
         """The leaves of each cell, ascending."""
         order, count = np.argsort(self.cells.leaf_cell, kind="stable"), self.cells.cell_count
-        first = np.searchsorted(self.cells.leaf_cell[order], np.arange(1, count))
-        return [leaves.tolist() for leaves in np.split(order, first)]
+        first = np.searchsorted(self.cells.leaf_cell[order], np.arange(count))
+        return [leaves.tolist() for leaves in np.split(order, first)[1:]]
 
     @cached_property
     def records(self) -> Mapping[int, tuple[int, TextureRecord]]:

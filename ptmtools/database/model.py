@@ -15,10 +15,13 @@ from ptmtools.database.emitters import EMITTERS, chosen_emitters
 from ptmtools.errors import InputError
 
 if TYPE_CHECKING:
+    from ptmtools.cells.options import Walker
     from ptmtools.database.visit import Visit
     from ptmtools.texture.model import Level
 
 Vector = tuple[float, float, float]
+#: From the eyes to the top of the head, metres.
+BROW = 0.1
 
 
 @dataclass(frozen=True)
@@ -114,7 +117,8 @@ class EmitOptions:
     viewpoint_count: give viewpoints to at most this many further rooms, the largest first. They are
         listed in the order of a walk through them.
     avatar_size: the visitor: distance kept from walls, eye height above the floor, and highest step
-        climbed, all in metres.
+        climbed, all in metres. By default those of the --walker of the cells, with the eyes 0.1 m
+        below its height.
     field_of_view: field of view of viewpoints that are not cameras of the model, in radians.
     gzip: also write a gzip copy of each VRML and JSON file, such as root.wrl.gz, for servers that
         send precompressed files.
@@ -128,7 +132,9 @@ class EmitOptions:
         metadata={"option": "viewpoint", "numbers": (3, 4), "parse": _given, "print": _numbers},
     )
     viewpoint_count: int = 32
-    avatar_size: Vector = (0.25, 1.6, 0.75)
+    avatar_size: Vector | None = field(
+        default=None, metadata={"default_before": (6, [0.25, 1.6, 0.75])}
+    )
     field_of_view: float = 1.1
     gzip: bool = False
     format: str = field(
@@ -146,12 +152,17 @@ class EmitOptions:
             wrong = f"--format: {fault}"
         if not 0 < self.field_of_view < math.pi:
             wrong = f"a field of view of {self.field_of_view:g} is not between 0 and pi radians"
-        elif not all(0 <= size < math.inf for size in self.avatar_size):
+        elif not all(0 <= size < math.inf for size in self.avatar_size or ()):
             wrong = "the sizes of --avatar-size must be 0 or more"
         elif self.viewpoint_count < 0:
             wrong = f"--viewpoint-count {self.viewpoint_count} is below 0"
         if wrong:
             raise InputError("PTM-I603", wrong, remedy="leave the option out for its default")
+
+    def avatar(self, walker: Walker) -> Vector:
+        """``avatar_size``, if need be that of whoever walks in the cells."""
+        eye = round(walker.height - BROW, 6)
+        return self.avatar_size or (walker.radius, eye, walker.step)
 
 
 @dataclass(frozen=True)

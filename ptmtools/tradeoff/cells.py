@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from ptmtools.cells import SubdivideOptions, subdivide
 from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.scene.model import Scene
@@ -58,13 +56,11 @@ class CellsTrade:
         """See `Experiment.measure`."""
         options = replace(self._options, **setting.knobs)
         cells, seconds = timed(lambda: subdivide(self._scene, options))
-        seen = compute_pvs(cells, PvsOptions(method="fast")).to_matrix()
-        volume = np.bincount(cells.leaf_cell, cells.leaf_volumes(), cells.cell_count)
-        share = seen @ volume / max(float(volume.sum()), np.finfo(float).tiny)
+        mean, worst = compute_pvs(cells, PvsOptions(method="fast")).volume_at_hand
         return Measured(
             seconds=seconds,
             work=float(cells.leaf_count),
-            error=float(np.average(share, weights=volume)) if volume.sum() else 0.0,
-            worst=float(share.max(initial=0.0)),
+            error=mean,
+            worst=worst,
             more={"cells": float(cells.cell_count), "portals": float(cells.portal_count)},
         )

@@ -40,15 +40,18 @@ def find_leaks(cells: Cells, flow: PortalFlow, matrix: Bools) -> NDArray[np.int3
 
 
 def _leak(cells: Cells, flow: PortalFlow, cell: int, sees: int) -> tuple[int, ...]:
-    enters = cells.leaf_cell[cells.portal_leaf[:, ::-1]].reshape(-1)
-    leaves = cells.leaf_cell[cells.portal_leaf].reshape(-1)
-    out = np.flatnonzero(leaves == cell)
+    enters, leaves = cells.portal_cell[:, ::-1].reshape(-1), cells.portal_cell.reshape(-1)
+    standing = cells.leaf_standing[cells.portal_leaf].reshape(-1)
+    out = np.flatnonzero((leaves == cell) & standing)
+    if not len(out):
+        return ()
     seen = np.bitwise_or.reduce(flow.sees[out], axis=0)
     reached = np.union1d(flow.portals_in(seen), out)
     found = []
     for q in reached[enters[reached] != leaves[reached]].tolist():
         behind = enters[flow.portals_in(flow.sees[q] & seen)]
-        through = len(np.unique(np.append(behind, enters[q])))
+        behind = np.append(behind, enters[q])
+        through = len(np.unique(behind[behind >= 0]))
         if through >= SHARE * sees:
             found.append((float(cells.portal_area[q >> 1]), q >> 1, through))
     return (cell, sees, *min(found)[1:]) if found else ()

@@ -32,7 +32,7 @@ def compute_pvs(
     Unless it is sampled, a pair of cells is left out only if no straight line, but for hairlines
     thinner than the rounding of the coordinates (`Tolerance.rounding`), leads through portals from
     a leaf of one in which somebody can stand to the other, or the other way round. Cells that share
-    a portal see each other if somebody can stand in one of them. `Pvs.fallbacks` counts the portals
+    a portal always see each other. `Pvs.fallbacks` counts the portals
     whose search was cut short. ``executor`` does the searches; the result is the same for any.
 
     Raises what `portal_flow` raises.
@@ -65,5 +65,5 @@ def _lifted(cells: Cells, leaves: Bools) -> Bools:
     matrix = np.zeros((cells.cell_count, cells.cell_count), dtype=np.bool_)
     matrix[cells.leaf_cell[rows], cells.leaf_cell[columns]] = True
     for cell, beside in enumerate(cells.adjacent()):
-        matrix[cell, beside] |= cells.standing[cell] | cells.standing[beside]
+        matrix[cell, beside] = True
     return matrix

@@ -79,11 +79,11 @@ def report(cells: Cells, pvs: Pvs) -> PvsReport:
     count = len(sees)
     at = [min(count - 1, int(np.ceil(q * count)) - 1) if q else 0 for q in QUANTILES]
     order = np.lexsort((np.arange(len(pvs.work)), -pvs.work))[:COSTLIEST]
-    ends = cells.portal_leaf.reshape(-1, 2)
+    ends = cells.portal_cell
     return PvsReport(
         cells=count,
         portals=cells.portal_count,
-        doors=int(np.count_nonzero(np.ptp(cells.leaf_cell[ends], axis=1))),
+        doors=int(np.count_nonzero((ends[:, 0] != ends[:, 1]) & (ends >= 0).all(axis=1))),
         sizes=tuple((q, int(sees[i])) for q, i in zip(QUANTILES, at, strict=True) if count),
         average=float(sees.mean()) if count else 0.0,
         operations=int(pvs.work.sum()),

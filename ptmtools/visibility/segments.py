@@ -1,8 +1,9 @@
 """Is a PVS conservative? Random segments against Embree, which knows nothing of portals.
 
-A segment with both ends in cells that no structural triangle blocks is a proof that the two cells
-see each other, so the pair must be in the PVS. The converse proves nothing: the check finds what
-is missing, never what is too much.
+A segment that begins where an eye can be, ends in a leaf, and that no structural triangle blocks is
+a proof that the cell of the one sees that of the other, so the pair must be in the PVS; and that
+the leaf must not have been dropped. The converse proves nothing: the check finds what is missing,
+never what is too much.
 
 Segments come in four kinds, a quarter each, because segments uniform in volume are nearly all
 blocked and say most about the largest cells: ends uniform in volume; ends in leaves drawn with
@@ -40,8 +41,9 @@ COPIES = 16
 JITTER = 2.5
 #: Lengths of short segments and of those through portals, as shares of the extent.
 SHORTEST, LONGEST = 1e-3, 0.5
-#: Draws for each segment asked for before giving up: ends outside all cells do not count.
-PATIENCE = 8
+#: Draws for each segment asked for before giving up: those that begin where no eye can be, or end
+#: in no leaf, do not count.
+PATIENCE = 64
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class MissedPair:
 
     Attributes
     ----------
-    cells: the two, the lower first.
+    cells: the two, the lower first; -1 for a leaf that was dropped.
     start, end: (x, y, z) in metres, the ends of an example, in `cells`' order.
     segments: how many segments showed it.
     """
@@ -67,7 +69,7 @@ class SegmentReport:
 
     Attributes
     ----------
-    tried: segments with both ends in cells.
+    tried: segments that begin where an eye can be and end in a leaf.
     unoccluded: how many of those nothing blocks.
     missed: the pairs of cells that the PVS misses, ascending; empty if it is conservative.
     hairlines: unoccluded segments outside the PVS that did not survive the jitter.
@@ -114,8 +116,9 @@ def check_conservative(
     if cells.cell_count == 0:
         return SegmentReport(0, 0, (), 0)
 
-    visible = pvs.to_matrix()
-    draw = Sampler(cells)
+    visible = np.zeros((cells.cell_count + 1,) * 2, dtype=np.bool_)  # the last one was dropped
+    visible[:-1, :-1] = pvs.to_matrix()
+    draw, stands = Sampler(cells), _Eyes(cells)
     blockers = Blockers(structural, cells.root_box)
     jitter = JITTER * cells.tolerance.hairline
     tried = unoccluded = hairlines = drawn = batch = 0
@@ -125,10 +128,9 @@ def check_conservative(
         size = min(BATCH, segments - tried)
         start, end = draw.segments(rng, size)
         drawn, batch = drawn + size, batch + 1
+        start, end = stands.first(start, end)
+        tried += len(start)
         a, b = cells.locate(start), cells.locate(end)
-        both = np.flatnonzero((a >= 0) & (b >= 0))
-        start, end, a, b = start[both], end[both], a[both], b[both]
-        tried += len(both)
         clear = ~blockers.between(start, end)
         unoccluded += int(clear.sum())
         missed = np.flatnonzero(clear & ~visible[a, b])
@@ -137,8 +139,8 @@ def check_conservative(
             shift = rng.normal(size=(len(missed), 3))
             shift *= jitter / np.linalg.norm(shift, axis=1, keepdims=True)
             p, q = start[missed] + shift, end[missed] + shift
-            i, j = cells.locate(p), cells.locate(q)
-            counts_as_miss = (i >= 0) & (j >= 0) & ~visible[i, j]
+            seen = visible[cells.locate(p), cells.locate(q)]
+            counts_as_miss = stands.within(p) & (cells.locate_leaf(q) >= 0) & ~seen
             counts_as_miss &= ~blockers.between(p, q)
             share += counts_as_miss / COPIES
         hairlines += int((share < 0.5).sum())
@@ -150,6 +152,30 @@ def check_conservative(
         progress(tried, segments, "segments")
     missing = tuple(found[pair] for pair in sorted(found))
     return SegmentReport(tried, unoccluded, missing, hairlines)
+
+
+class _Eyes:
+    """Where an eye can be."""
+
+    def __init__(self, cells: Cells) -> None:
+        self._cells, self._eyes = cells, cells.eyes
+
+    def within(self, points: Floats) -> Bools:
+        """(n,) which of the (n, 3) points are in a leaf in which somebody can stand."""
+        leaf = self._cells.locate_leaf(points)
+        return (leaf >= 0) & self._cells.leaf_standing[leaf]
+
+    def first(self, start: Floats, end: Floats) -> tuple[Floats, Floats]:
+        """Of segments between (n, 3) points those that begin where an eye can be and end in a leaf;
+        turned round where only the end is such a place."""
+        in_leaf = [self._cells.locate_leaf(points) >= 0 for points in (start, end)]
+        eye = [self.within(points) for points in (start, end)]
+        for points, sees in zip((start, end), eye, strict=True):
+            sees[sees] = self._eyes.contains(points[sees])
+        kept = in_leaf[0] & in_leaf[1] & (eye[0] | eye[1])
+        turned = ~eye[0][kept, None]
+        start, end = start[kept], end[kept]
+        return np.where(turned, end, start), np.where(turned, start, end)
 
 
 class Sampler:

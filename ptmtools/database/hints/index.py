@@ -44,7 +44,7 @@ def index_text(content: Content) -> str:
         "unit": space.metres,
         "up": space.up,
         "closed": cells.closed,
-        "avatarSize": list(content.options.avatar_size),
+        "avatarSize": list(content.options.avatar(cells.walker)),
         "record": RECORD_FILES,
         "geometry": {e.name: e.cell_files for e in emitters if e.cell_files},
         "statistics": STATISTICS,
@@ -54,7 +54,12 @@ def index_text(content: Content) -> str:
         {
             "viewpoints": [_viewpoint(v) for v in content.viewpoints],
             "textures": [_texture(r, content.options.fallback) for r in content.textures],
-            "cells": [{"name": cell_name(c), "box": box} for c, box in enumerate(_boxes(content))],
+            "cells": [
+                {"name": cell_name(c), "box": box} | ({} if standing else {"standing": False})
+                for c, (box, standing) in enumerate(
+                    zip(_boxes(content), cells.standing.tolist(), strict=True)
+                )
+            ],
         },
     )
 

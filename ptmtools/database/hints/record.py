@@ -66,9 +66,10 @@ def _portals(cells: Cells) -> list[list[dict[str, Any]]]:
     """For every cell its portals to other cells, each counter-clockwise seen from inside it."""
     rows: list[list[dict[str, Any]]] = [[] for _ in range(cells.cell_count)]
     area = coordinates(cells.portal_area, "portals") if cells.portal_count else []
+    ends = cells.portal_cell
     for k in range(cells.portal_count):
-        behind, ahead = cells.leaf_cell[cells.portal_leaf[k]].tolist()
-        if behind == ahead:
+        behind, ahead = ends[k].tolist()
+        if behind == ahead or min(behind, ahead) < 0:
             continue
         polygon = coordinates(cells.portal(k), "portals")
         for cell, neighbour, loop in ((behind, ahead, polygon[::-1]), (ahead, behind, polygon)):

@@ -207,14 +207,15 @@ class _Plan:
 
     def _sections(self, height: float) -> Iterator[tuple[int, NDArray[np.float64]]]:
         for leaf in range(self._cells.leaf_count):
+            cell = int(self._cells.leaf_cell[leaf])
             polygon = leaf_section(self._cells, leaf, height)
-            if len(polygon) >= 3:
-                yield int(self._cells.leaf_cell[leaf]), polygon
+            if len(polygon) >= 3 and cell >= 0:
+                yield cell, polygon
 
     def _doors(self) -> list[int]:
         """Portals between cells; those between the leaves of one cell are not drawn."""
-        ends = self._cells.leaf_cell[self._cells.portal_leaf].reshape(-1, 2)
-        return np.flatnonzero(ends[:, 0] != ends[:, 1]).tolist()
+        ends = self._cells.portal_cell
+        return np.flatnonzero((ends[:, 0] != ends[:, 1]) & (ends >= 0).all(axis=1)).tolist()
 
     def _portals(self, height: float) -> list[NDArray[np.float64]]:
         cuts = (polygon_section(self._cells.portal(k), height) for k in self._doors())

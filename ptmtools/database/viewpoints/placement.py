@@ -117,7 +117,7 @@ def _standing(
 ) -> tuple[NDArray[np.float64], int]:
     """A place and its cell; on the floor below if one is in reach and the eye there is in a
     cell."""
-    eye = options.avatar_size[1]
+    eye = options.avatar(cells.walker)[1]
     floor = float(ground.below(position[None])[0])
     if position[1] - floor <= _REACH * eye:
         stood = np.array([position[0], floor + eye, position[2]])
@@ -168,13 +168,13 @@ def _touring(
     """One for each room that has none yet, in the order of a walk from the first."""
     taken = {v.cell for v in begun}
     count = max(options.viewpoint_count, not begun)
-    found = places(cells, ground, walls, options.avatar_size, count + len(taken))
+    found = places(cells, ground, walls, options.avatar(cells.walker), count + len(taken))
     found = [place for place in found if place.cell not in taken][:count]
     if not found:
         return [] if begun else [_anywhere(cells, walls, options)]
     leaf = cells.locate_leaf(np.array([place.position for place in found])).tolist()
     start = int(cells.locate_leaf(np.array(begun[0].position))[0]) if begun else leaf[0]
-    eye = options.avatar_size[1]
+    eye = options.avatar(cells.walker)[1]
     order = walk(cells, start, leaf, eye)
     storey = storey_numbers([place.floor for place in found], eye)
     first = list(dict.fromkeys(storey[i] for i in order))

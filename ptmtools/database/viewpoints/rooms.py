@@ -95,13 +95,14 @@ def places(
 
 
 def largest_leaves(cells: Cells, count: int) -> list[int]:
-    """At most so many leaves, by the volume of their boxes; of a cell the largest few."""
+    """At most so many leaves in which one can stand, by the volume of their boxes; of a cell the
+    largest few."""
     boxes = [np.ptp(cells.leaf_points(i), axis=0).prod() for i in range(cells.leaf_count)]
     taken = np.zeros(cells.cell_count, dtype=np.int64)
     found = []
     for leaf in np.argsort(-np.array(boxes), kind="stable").tolist():
         cell = cells.leaf_cell[leaf]
-        if taken[cell] < _OF_A_CELL:
+        if cells.leaf_standing[leaf] and taken[cell] < _OF_A_CELL:
             taken[cell] += 1
             found.append(leaf)
         if len(found) == count:

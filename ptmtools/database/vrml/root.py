@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ptmtools.database.content import Content
 from ptmtools.database.floats import decimal, row_texts, single
-from ptmtools.database.model import EmitOptions, Viewpoint
 from ptmtools.database.names import ROOT, VRML_FILES, path_of
 from ptmtools.database.vrml.cell import CellWriter
 from ptmtools.database.vrml.pattern import HEADER, PATTERN, VIEWPOINT_CELL, declaration
@@ -33,19 +32,18 @@ def _files(content: Content, writer: CellWriter) -> Iterator[tuple[str, str]]:
         boxes.append(box)
         yield path_of(c, VRML_FILES), text
     content.progress(count, count, "cells")
-    yield ROOT, _root_text(content.viewpoints, boxes, content.options)
+    yield ROOT, _root_text(content, boxes)
 
 
-def _root_text(
-    viewpoints: Sequence[Viewpoint], boxes: Sequence[NDArray[np.float32]], options: EmitOptions
-) -> str:
+def _root_text(content: Content, boxes: Sequence[NDArray[np.float32]]) -> str:
     """The root file; ``boxes`` are the (2, 3) bounds of every cell's contents."""
+    viewpoints, options = content.viewpoints, content.options
     info = [quoted(f"ptm:database {PATTERN}")]
     entered = [path_of(v.cell, VRML_FILES) for v in viewpoints]
     info += [
         quoted(f"ptm:viewpoint {v.name} {url}") for v, url in zip(viewpoints, entered, strict=True)
     ]
-    avatar = ", ".join(decimal(x) for x in options.avatar_size)
+    avatar = ", ".join(decimal(x) for x in options.avatar(content.cells.walker))
     parts = [
         HEADER,
         declaration(*VIEWPOINT_CELL),

@@ -33,7 +33,7 @@ def _counts(ach: Ach) -> Mapping[str, Any]:
 
 
 def _notes(ach: Ach, options: AchOptions) -> Iterator[str]:
-    if blind := int((ach.samples == 0).sum()):
+    if blind := int(((ach.samples == 0) & (ach.rejected > 0)).sum()):
         yield f"no sample point was found in {blind:,} cells"
     if options.tolerance is not None:
         short = int((~(ach.uncertain <= options.tolerance)).sum())
@@ -57,7 +57,7 @@ def _fits_scene(ach: Ach, scene: Scene) -> str:
 ACH: Stage[Ach] = Stage(
     name="ach",
     about="Measure how much of the view each visible cell covers.",
-    recipe=2,
+    recipe=3,
     options=AchOptions,
     reads=(SCENE, CELLS, PVS),
     artifact=Lazy("ptmtools.coverage.model:Ach"),

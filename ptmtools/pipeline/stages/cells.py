@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 def _counts(cells: Cells) -> Mapping[str, Any]:
     return {
         "cells": cells.cell_count,
+        "view_only": int((~cells.standing).sum()),
         "leaves": cells.leaf_count,
+        "dropped": int((cells.leaf_cell < 0).sum()),
         "portals": cells.portal_count,
         "pieces": len(cells.triangle),
         "closed": cells.closed,
@@ -29,7 +31,8 @@ def _counts(cells: Cells) -> Mapping[str, Any]:
 def _summary(n: Mapping[str, Any]) -> str:
     leaves = f" of {count(n['leaves'], 'leaf', 'leaves')}" if n["leaves"] != n["cells"] else ""
     state = "closed" if n["closed"] else "open"
-    return f"{count(n['cells'], 'cell')}{leaves}, {count(n['portals'], 'portal')}; {state}"
+    view = f" ({n['view_only']:,} view-only)" if n.get("view_only") else ""
+    return f"{count(n['cells'], 'cell')}{view}{leaves}, {count(n['portals'], 'portal')}; {state}"
 
 
 def _fits_scene(cells: Cells, scene: Scene) -> str:
@@ -40,9 +43,10 @@ def _fits_scene(cells: Cells, scene: Scene) -> str:
 CELLS: Stage[Cells] = Stage(
     name="cells",
     about="Read a model and cut it into cells and portals.",
-    recipe=4,
+    recipe=5,
     options=SubdivideOptions,
     reads=(SCENE,),
+    changed="a cell is a place where one can stand, or what is seen from there",
     artifact=Lazy("ptmtools.cells.model:Cells"),
     compute=Lazy("ptmtools.cells:subdivide"),
     counts=_counts,

@@ -29,8 +29,9 @@ def _summary(n: Mapping[str, Any]) -> str:
 EMIT: Stage[None] = Stage(
     name="emit",
     about="Write the served files: cells and hints.",
-    recipe=5,
-    changed="hints.json is an index, with a record for each cell in hints/",
+    recipe=6,
+    changed="hints.json is an index, with a record for each cell in hints/; it says which cells "
+    "are only seen",
     options=EmitOptions,
     reads=(SCENE, CELLS, PVS, ACH, TEXTURES),
     job=Lazy("ptmtools.pipeline.emission:EmissionJob"),

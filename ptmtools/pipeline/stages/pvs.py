@@ -61,7 +61,7 @@ def _fits_cells(pvs: Pvs, cells: Cells) -> str:
 PVS: Stage[Pvs] = Stage(
     name="pvs",
     about="Find which cells may see each other.",
-    recipe=3,
+    recipe=4,
     options=PvsOptions,
     reads=(CELLS,),
     artifact=Lazy("ptmtools.visibility.model:Pvs"),
