@@ -360,7 +360,7 @@ MODELS = {
     "turned by 30°": five(turned_in_plan(house(), 30), eyes=TURNED, more=True),
     "of 3,840 triangles": five(divided(house())),
     "with tables": five(furnished(house())),
-    "without a floor": five(house(floor=False)),
+    "without a floor": five(house(floor=False), said=("open", "no floor")),
     "two rooms between walls 1.8 m thick": Made(
         castle(2),
         {"a": (4, 5, 1.6), "b": (11, 5, 1.6)},
