@@ -345,8 +345,8 @@ TURNED = {eye: tuple(turned_in_plan(np.array(at), 30).tolist()) for eye, at in F
 
 
 def five(model: Floats, eyes: dict[str, Point] = FIVE, **more: Any) -> Made:
-    seen = {"sees": ("sw nw", "sw hall", "hall ne", "se ne"), "blind": ("nw ne",)}
-    return Made(model, eyes, closed=False, said=("open",), **seen | more)
+    fixed = {"sees": ("sw nw", "sw hall", "hall ne", "se ne"), "blind": ("nw ne",)}
+    return Made(model, eyes, closed=False, **fixed | {"said": ("open",)} | more)
 
 
 HALL = carved([room(0, 0, 10.2, 5)])
