@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.eyes import EyeRegion
 from ptmtools.cells.model import Cells
 from ptmtools.cells.vectors import volumes
@@ -69,8 +69,8 @@ class Volume:
     boxed: whether enough of its bounding box is cell.
     """
 
-    def __init__(self, cells: Cells, eyes: EyeRegion, leaves: Bools, room: Room) -> None:
-        self._cells, self._eyes, self._leaves = cells, eyes, leaves
+    def __init__(self, cells: Cells, cell: int, eyes: EyeRegion, room: Room) -> None:
+        self._cells, self._cell, self._eyes = cells, cell, eyes
         self.tetrahedra, self.volume = room
         self.empty = len(self.tetrahedra) == 0
         if not self.empty:
@@ -91,19 +91,14 @@ class Volume:
         rows = np.split(order, np.searchsorted(cell[order], np.arange(cells.cell_count)))[1:]
         eyes = cells.eyes
         return [
-            Volume(
-                cells,
-                eyes,
-                (cells.leaf_cell == c) & cells.leaf_standing,
-                (tetrahedra[rows[c]], volume[rows[c]]),
-            )
+            Volume(cells, c, eyes, (tetrahedra[rows[c]], volume[rows[c]]))
             for c in range(cells.cell_count)
         ]
 
     def anywhere(self) -> Volume:
         """The same leaves, with eyes anywhere in them."""
         everywhere = EyeRegion(np.zeros((0, 3, 3)), self._cells.walker)
-        return Volume(self._cells, everywhere, self._leaves, (self.tetrahedra, self.volume))
+        return Volume(self._cells, self._cell, everywhere, (self.tetrahedra, self.volume))
 
     def random(self, first: int, count: int, seed: int) -> Floats:
         """(at most count, 5) independent points ``first`` …: positions in metres, and two more
@@ -118,7 +113,8 @@ class Volume:
             return self._filled(unit)
         points = self._low + unit[:, :3] * self._size
         leaf = self._cells.locate_leaf(points)
-        inside = (leaf >= 0) & self._leaves[leaf]
+        inside = (leaf >= 0) & (self._cells.leaf_cell[leaf] == self._cell)
+        inside &= self._cells.leaf_standing[leaf]
         inside[inside] = self._eyes.contains(points[inside])
         return np.hstack([points[inside], unit[inside, 4:]])
 
