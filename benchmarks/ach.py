@@ -250,7 +250,7 @@ def speed(report: Report, subjects: dict[str, Subject]) -> None:
         "Speed, one process: wall seconds of the whole over those of the bare loop", columns
     )
     for name, (scene, cells, pvs) in subjects.items():
-        volumes = np.bincount(cells.leaf_cell, cells.leaf_volumes())
+        volumes = cells.cell_volumes(standing=True)
         largest = np.argsort(-volumes, kind="stable")[:LARGEST].tolist()
         for face, count in ((4, 512), (8, 256), (64, 8), (256, 2)):
             for backend in ("embree", "gl") if has_gl() else ("embree",):

@@ -21,7 +21,7 @@ import numpy as np
 from at_hand import TWO_ROOMS, model_file
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
-from ptmtools.cells.grouping import grouped
+from ptmtools.cells.grouping import grouped, leaf_of_cell
 from ptmtools.portal_flow.near_ties import Searched
 from ptmtools.scene import ingest
 from ptmtools.visibility import Pvs, PvsOptions, compute_pvs, searching
@@ -49,10 +49,10 @@ def timed(cells: Cells, budget: int = PvsOptions().budget) -> tuple[Pvs, float]:
     return pvs, time.process_time() - begun
 
 
-def pairs(pvs: Pvs, leaf_cell: np.ndarray) -> str:
+def pairs(pvs: Pvs, room: np.ndarray) -> str:
     """Pairs of leaves that see each other, and pairs of the cells that they make up."""
     one, other = np.nonzero(np.triu(pvs.to_matrix(), 1))
-    ends = np.sort(leaf_cell[np.stack([one, other], axis=1)], axis=1)
+    ends = np.sort(room[np.stack([one, other], axis=1)], axis=1)
     between = np.unique(ends[ends[:, 0] != ends[:, 1]], axis=0)
     return f"{len(one):,}, {len(between):,}"
 
@@ -80,13 +80,14 @@ def main(arguments: list[str] | None = None) -> int:
         size = f"{cells.leaf_count:,} / {cells.portal_count:,}"
         print(f"| {model.stem} | {size} |{''.join(shown)}", flush=True)
         rooms = grouped(cells, SubdivideOptions(wall_area=given.wall_area))
+        room = rooms.leaf_cell[leaf_of_cell(cells)]
         pvs, seconds = timed(cells)
         row = [f"{int(n.sum()):,}" for n in (pvs.ties, pvs.decided, pvs.opened)]
-        row.append(f"{pairs(pvs, rooms.leaf_cell)}, {seconds:.1f} s")
+        row.append(f"{pairs(pvs, room)}, {seconds:.1f} s")
         for visible in (True, False):
             with patch.object(searching, "searched", all_count_as(visible)):
                 pvs, seconds = timed(cells)
-            row.append(f"{pairs(pvs, rooms.leaf_cell)}, {seconds:.1f} s")
+            row.append(f"{pairs(pvs, room)}, {seconds:.1f} s")
         ties.append(f"| {model.stem} | {' | '.join(row)} |")
     print(f"\n| {head} | near ties | decided | open | decided | all visible | all hidden |")
     print(f"|{'---|' * 7}")

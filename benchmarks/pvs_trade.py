@@ -167,6 +167,7 @@ def flow(folder: Path, method: Any) -> dict[str, float]:
     import numpy as np
     from memory import with_peak
 
+    from ptmtools.cells.grouping import leaf_of_cell
     from ptmtools.visibility import Pvs, PvsOptions, compute_pvs
 
     compute_pvs(stored(folder, "small"), PvsOptions(method=method))
@@ -177,7 +178,8 @@ def flow(folder: Path, method: Any) -> dict[str, float]:
     stored(folder, f"leaf-{method}", pvs)
     rooms = stored(folder, "room")
     matrix = np.zeros((rooms.cell_count, rooms.cell_count), dtype=np.bool_)
-    one, other = (rooms.leaf_cell[ends] for ends in np.nonzero(pvs.to_matrix()))
+    room = rooms.leaf_cell[leaf_of_cell(leaves)]
+    one, other = (room[ends] for ends in np.nonzero(pvs.to_matrix()))
     matrix[one, other] = True
     lifted = Pvs.from_matrix(matrix, cut=pvs.cut, conservative=pvs.conservative)
     stored(folder, f"room-{method}", lifted)
@@ -194,7 +196,7 @@ def weigh(folder: Path, model: Path, kind: str) -> dict[str, dict[str, Any]]:
     scene, cells = ingest(model), stored(folder, kind)
     walk = stored(folder, "walk")
     way = passed(cells, walk.corner)
-    volume = np.bincount(cells.leaf_cell, cells.leaf_volumes())
+    volume = cells.cell_volumes()
     full = stored(folder, f"{kind}-full").to_matrix()
     found = {}
     for method in METHODS:

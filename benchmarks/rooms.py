@@ -1,9 +1,10 @@
 """Leaves or rooms as cells: what each costs a client. ``python benchmarks/rooms.py [MODEL…]``
 
-For every model, and for leaves, rooms parted at several `--gain`s and whole rooms:
+For every model, and for leaves, rooms parted at several `--gain`s, whole rooms, and rooms for
+cameras that fly (`--standing anywhere`):
 
-cells         cell files
-PVS           mean share of all cells that a cell may see
+cells         cell files, and how many of them are view-only
+volume        share of the volume that the walker's PVS holds, on average over the way
 walk          cell files fetched along a walk, and their megabytes
 at hand       megabytes of cell files that the walker's PVS holds, on average over the way
 texels        share of all texels in use that the walker's PVS holds, on average over the way
@@ -27,10 +28,10 @@ from dataclasses import replace
 import numpy as np
 from at_hand import MODELS, model_file
 from numpy.typing import NDArray
-from walk import cell_texts, load, passed, standard_walk, texels_at_hand
+from walk import at_hand, cell_texts, load, passed, standard_walk, texels_at_hand
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
-from ptmtools.cells.grouping import grouped
+from ptmtools.cells.grouping import grouped, leaf_of_cell
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.backends.embree import EmbreeRenderer
 from ptmtools.coverage.item_buffer import Surfaces
@@ -44,15 +45,18 @@ from ptmtools.scene import Scene, ingest
 from ptmtools.visibility import Pvs, compute_pvs
 
 LEAF = SubdivideOptions(cells="leaf")
+ANYWHERE = SubdivideOptions(cells="leaf", standing="anywhere")
 WHOLE = SubdivideOptions(cells="room", gain=1.0)
 GAINS = (0.02, 0.05, 0.1, 0.2)
+#: Rooms as they are for cameras that fly.
+FLYING = "room, standing anywhere"
 #: Random places at which the hints are held against the view, and pixels a side of that view.
 PLACES, FACE = 300, 64
 
 
 def views(scene: Scene, leaves: Cells, seed: int) -> list[tuple[int, NDArray[np.int64]]]:
-    """For random places, uniform over the volume and outside solids, the leaf and (L,) the pixels
-    that each leaf covers, seen from there."""
+    """For random places, uniform over where eyes can be, the leaf and (L,) the pixels that each
+    leaf covers, seen from there."""
     obstacles, surfaces = Obstacles.of(scene, leaves), Surfaces.of(scene, leaves)
     clearance = CLEARANCE * scene.tolerance.thin
     random = np.random.default_rng(seed)
@@ -60,18 +64,21 @@ def views(scene: Scene, leaves: Cells, seed: int) -> list[tuple[int, NDArray[np.
     points = np.zeros((0, 3))
     while len(points) < PLACES:
         tried = random.uniform(low, high, (PLACES, 3))
-        tried = tried[leaves.locate_leaf(tried) >= 0]
+        leaf = leaves.locate_leaf(tried)
+        tried = tried[(leaf >= 0) & leaves.leaf_standing[leaf]]
+        tried = tried[leaves.eyes.contains(tried)]
         clear = obstacles.clearance(tried, clearance) >= clearance
         points = np.concatenate([points, tried[clear & ~obstacles.in_solid(tried)]])
     points = points[:PLACES]
     viewers = SamplePoints(points, np.full(PLACES, clearance), np.zeros((PLACES, 2)))
     counter = PixelCounter(EmbreeRenderer(surfaces, FACE), surfaces, leaves, FACE)
-    every = np.arange(leaves.cell_count)
-    of_leaf = leaves.locate_leaf(points).tolist()
-    return [
-        (leaf, counter.count(viewers.part(slice(i, i + 1)), every).in_views.sum(axis=0))
-        for i, leaf in enumerate(of_leaf)
-    ]
+    every, kept = np.arange(leaves.cell_count), leaf_of_cell(leaves)
+    found = []
+    for i, leaf in enumerate(leaves.locate_leaf(points).tolist()):
+        pixels = np.zeros(leaves.leaf_count, dtype=np.int64)
+        pixels[kept] = counter.count(viewers.part(slice(i, i + 1)), every).in_views.sum(axis=0)
+        found.append((leaf, pixels))
+    return found
 
 
 def hint_error(
@@ -79,11 +86,11 @@ def hint_error(
 ) -> tuple[float, float]:
     """Mean total variation between hints and views, room by room, and its standard error."""
     count = rooms.cell_count
-    room_of_cell = np.zeros(cells.cell_count, dtype=np.int64)
-    room_of_cell[cells.leaf_cell] = rooms.leaf_cell
+    room_of_cell, kept = np.zeros(cells.cell_count, dtype=np.int64), rooms.leaf_cell >= 0
+    room_of_cell[cells.leaf_cell[kept]] = rooms.leaf_cell[kept]
     errors = []
     for leaf, pixels in seen:
-        view = np.bincount(rooms.leaf_cell, pixels, count)
+        view = np.bincount(rooms.leaf_cell[kept], pixels[kept], count)
         if view.sum() == 0:
             continue
         cell = int(cells.leaf_cell[leaf])
@@ -101,9 +108,10 @@ def main() -> None:
         "leaf": LEAF,
         **{f"room, gain {g:g}": replace(WHOLE, gain=g) for g in GAINS},
         "room, whole": WHOLE,
+        FLYING: SubdivideOptions(),
     }
     print(
-        "| model | cells are | cells | PVS | walk: files | MB | at hand MB | texels "
+        "| model | cells are | cells, view-only | walk: volume | files | MB | at hand MB | texels "
         "| ACH error | CPU s |"
     )
     print("|---|---|---|---|---|---|---|---|---|---|")
@@ -113,9 +121,10 @@ def main() -> None:
         rooms = grouped(leaves, WHOLE)
         way = passed(leaves, standard_walk(rooms).corner)
         seen = views(scene, leaves, seed=1)
+        everywhere = grouped(subdivide(scene, ANYWHERE), SubdivideOptions())
         for name, options in kinds.items():
             start = time.process_time()
-            cells = grouped(leaves, options)
+            cells = everywhere if name == FLYING else grouped(leaves, options)
             pvs = compute_pvs(cells)
             ach = compute_ach(scene, cells, pvs, AchOptions(backend="embree"))
             seconds = time.process_time() - start
@@ -124,9 +133,10 @@ def main() -> None:
             walked = load(cells, pvs, way, np.array([len(t.text.encode()) for t in texts]))
             texels = texels_at_hand(scene, cells, pvs, way, texts)
             error, spread = hint_error(cells, pvs, ach, rooms, seen)
+            share = at_hand(cells, pvs, way, cells.cell_volumes()) / cells.leaf_volumes().sum()
             print(
-                f"| {file.stem} | {name} | {cells.cell_count} | {pvs.average_share:.1%} "
-                f"| {walked.files} | {walked.megabytes:.2f} | {walked.at_hand:.2f} | {texels:.0%} "
+                f"| {file.stem} | {name} | {cells.cell_count}, {int((~cells.standing).sum())} "
+                f"| {share:.1%} | {walked.files} | {walked.megabytes:.2f} | {walked.at_hand:.2f} | {texels:.0%} "
                 f"| {error:.3f} ± {spread:.3f} | {seconds:.1f} |",
                 flush=True,
             )

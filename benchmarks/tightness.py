@@ -28,6 +28,7 @@ from ptmtools.cells.model import Cells
 from ptmtools.cells.seen import portals_of
 from ptmtools.cells.vectors import volumes
 from ptmtools.pipeline.validation import structure_of
+from ptmtools.visibility.pvs import lifted
 from ptmtools.visibility.sampled import sampled_leaves
 from ptmtools.visibility.segments import Blockers
 
@@ -106,20 +107,13 @@ def by_portals(cells: Cells, visible: NDArray[np.bool_], lines: int, aimed: int)
     # Open is what no pair of leaves of the two cells showed; any of them may.
     one, other = np.nonzero(np.triu(~leaves, 1))
     a, b = cells.leaf_cell[one], cells.leaf_cell[other]
-    open_ = visible[a, b] & ~seen[a, b]
+    stands = cells.leaf_standing[one] | cells.leaf_standing[other]
+    open_ = (a >= 0) & (b >= 0) & stands & visible[a, b] & ~seen[a, b]
     pairs = np.stack([one[open_], other[open_]], axis=1).astype(np.int32)
     shown = pairs[arriving(portals, pairs, aimed) > 0]
     seen[cells.leaf_cell[shown[:, 0]], cells.leaf_cell[shown[:, 1]]] = True
     seen |= seen.T
     return int(np.count_nonzero(np.triu(seen & visible, 1))), outside
-
-
-def lifted(cells: Cells, leaves: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(C, C) from (L, L)."""
-    matrix = np.zeros((cells.cell_count, cells.cell_count), dtype=np.bool_)
-    one, other = np.nonzero(leaves)
-    matrix[cells.leaf_cell[one], cells.leaf_cell[other]] = True
-    return matrix
 
 
 def by_geometry(
@@ -142,7 +136,8 @@ def by_geometry(
                 for side, place, ends in ((0, start, kind & 1), (1, end, kind >> 1)):
                     source = at_portals if ends else inside
                     place[kind::4] = source.points(rng, pairs[kind::4, side])
-            free = ~blockers.between(start, end)
+            stands = [cells.leaf_standing[cells.locate_leaf(points)] for points in (start, end)]
+            free = (stands[0] | stands[1]) & ~blockers.between(start, end)
             clear[first : first + step] = free.reshape(-1, EACH).any(axis=1)
             shot += len(pairs)
         shown += int(clear.sum())

@@ -1,8 +1,9 @@
 """A standard walk through a model, and what it makes a client fetch.
 
-The walk goes through the middle of the twelve largest rooms, always on to the nearest one left,
-through portals of at least 1 m². It is a line in space, so that subdivisions of other cell sizes
-are held against the same one; the rooms are those of the subdivision it is made from.
+The walk goes through the middle of the twelve largest rooms, at the height of eyes, always on to
+the nearest one left, through leaves in which one can stand and portals of at least 1 m². It is a
+line in space, so that subdivisions of other cell sizes are held against the same one; the rooms are
+those of the subdivision it is made from.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ from ptmtools.visibility import Pvs
 
 #: Rooms that the walk leads through, and the least portal that it passes (m²).
 STOPS, DOOR = 12, 1.0
+#: Height of the eyes above the floor, metres.
+EYE = 1.6
 
 
 @dataclass(frozen=True)
@@ -68,9 +71,9 @@ class Load:
 
 def standard_walk(cells: Cells) -> Walk:
     """The walk that the module describes; ``cells`` are whole rooms."""
-    middle = np.array([cells.leaf_points(i).mean(axis=0) for i in range(cells.leaf_count)])
-    volume = cells.leaf_volumes()
-    rooms = np.argsort(-np.bincount(cells.leaf_cell, volume), kind="stable")[:STOPS]
+    middle = np.array([_eye(cells.leaf_points(i)) for i in range(cells.leaf_count)])
+    volume = cells.leaf_volumes() * cells.leaf_standing
+    rooms = np.argsort(-cells.cell_volumes(standing=True), kind="stable")[:STOPS]
     stops = {
         int(max(np.flatnonzero(cells.leaf_cell == r), key=lambda leaf: (volume[leaf], -leaf)))
         for r in rooms
@@ -79,7 +82,9 @@ def standard_walk(cells: Cells) -> Walk:
     portal: dict[tuple[int, int], tuple[float, int]] = {}
     for k in np.flatnonzero(cells.portal_area >= DOOR).tolist():
         a, b = cells.portal_leaf[k].tolist()
-        at = cells.portal(k).mean(axis=0)
+        if not (cells.leaf_standing[a] and cells.leaf_standing[b]):
+            continue
+        at = _eye(cells.portal(k))
         metres = float(np.linalg.norm(middle[a] - at) + np.linalg.norm(middle[b] - at))
         doors[a].append((b, metres))
         doors[b].append((a, metres))
@@ -99,9 +104,15 @@ def standard_walk(cells: Cells) -> Walk:
         while leg[-1] != here:
             leg.append(before[leg[-1]])
         for a, b in pairwise(reversed(leg)):
-            corners += [cells.portal(portal[a, b][1]).mean(axis=0), middle[b]]
+            corners += [_eye(cells.portal(portal[a, b][1])), middle[b]]
         here = following
     return Walk(np.array(corners), asked, asked - len(stops))
+
+
+def _eye(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The middle of (n, 3) points, no higher than an eye above the lowest."""
+    x, y, z = points.mean(axis=0)
+    return np.array([x, min(y, points[:, 1].min() + EYE), z])
 
 
 def _distances(
@@ -124,18 +135,19 @@ def _distances(
 def passed(cells: Cells, walk: NDArray[np.float64]) -> Way:
     """Where a walk with these (n, 3) corners leads in a subdivision, which need not be its own.
 
-    What lies in no leaf, or for less than a hairline in one, is left out. A walk of one point is
+    What lies in no cell, or for less than a hairline in a leaf, is left out. A walk of one point is
     one metre where it stands.
     """
     if len(walk) == 1:
         leaf = cells.locate_leaf(walk)
-        return Way(leaf[leaf >= 0].astype(np.int64), np.ones(int((leaf >= 0).sum())))
+        leaf = leaf[cells.locate(walk) >= 0]
+        return Way(leaf.astype(np.int64), np.ones(len(leaf)))
     least = cells.tolerance.hairline
     found = [
         (leaf, metres)
         for a, b in pairwise(walk)
         for leaf, metres in _stretches(cells, a, b)
-        if metres >= least
+        if metres >= least and cells.leaf_cell[leaf] >= 0
     ]
     return Way(
         np.array([leaf for leaf, _ in found], dtype=np.int64),

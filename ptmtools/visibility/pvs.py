@@ -41,10 +41,10 @@ def compute_pvs(
     volumes = {"volume": cells.cell_volumes(), "standing": cells.cell_volumes(standing=True)}
     if options.method == "sampled":
         leaves = sampled_leaves(portals, options.lines, executor)
-        return Pvs.from_matrix(_lifted(cells, leaves), **volumes, conservative=False)
+        return Pvs.from_matrix(lifted(cells, leaves), **volumes, conservative=False)
     budget = options.budget if options.method == "full" else 0
     flow = portal_flow(portals, budget, progress, executor)
-    matrix = _lifted(cells, leaf_matrix(portals, flow))
+    matrix = lifted(cells, leaf_matrix(portals, flow))
     return Pvs.from_matrix(
         matrix,
         work=flow.work,
@@ -57,7 +57,7 @@ def compute_pvs(
     )
 
 
-def _lifted(cells: Cells, leaves: Bools) -> Bools:
+def lifted(cells: Cells, leaves: Bools) -> Bools:
     """(C, C) from (L, L): a cell sees what is seen from its leaves in which somebody can stand,
     and is seen in turn."""
     owned = cells.leaf_cell >= 0
