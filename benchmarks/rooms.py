@@ -136,7 +136,8 @@ def main() -> None:
             share = at_hand(cells, pvs, way, cells.cell_volumes()) / cells.leaf_volumes().sum()
             print(
                 f"| {file.stem} | {name} | {cells.cell_count}, {int((~cells.standing).sum())} "
-                f"| {share:.1%} | {walked.files} | {walked.megabytes:.2f} | {walked.at_hand:.2f} | {texels:.0%} "
+                f"| {share:.1%} | {walked.files} | {walked.megabytes:.2f} | {walked.at_hand:.2f} "
+                f"| {texels:.0%} "
                 f"| {error:.3f} ± {spread:.3f} | {seconds:.1f} |",
                 flush=True,
             )
