@@ -100,7 +100,7 @@ def unreached(
 ) -> Unreached:
     """Where somebody could be that the flood did not reach. ``reached``, ``outer``: (L,) leaves;
     groups with one of the latter are the outside."""
-    group = _groups(len(tree.leaves), portals)
+    group = groups(len(tree.leaves), portals)
     outside = np.isin(group, group[outer]) & ~reached
     waiting = ~reached & ~outside & ~np.isin(group, group[reached])
     beyond = outside & ~outer
@@ -137,7 +137,7 @@ def _rooms(group: Ints, standing: Standing) -> Iterator[Standing]:
         yield standing.only(order[start[name] : start[name + 1]])
 
 
-def _groups(leaves: int, portals: list[Portal]) -> Ints:
+def groups(leaves: int, portals: list[Portal]) -> Ints:
     """(leaves,) the least leaf that each hangs together with through portals."""
     ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
     return connected(leaves, np.concatenate(ends.T), np.concatenate(ends[:, ::-1].T))

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +58,7 @@ class Cells:
     tolerance: that of the scene.
     closed: whether the flood of the reachable never met the root box.
     notes: what the subdivision has to say, one line each ("open above: …").
+    opened: (n,) int32 the scene's triangles, ascending, of door leaves that do not block.
     """
 
     node_plane: NDArray[np.float64]
@@ -84,6 +85,7 @@ class Cells:
     notes: tuple[str, ...] = ()
     visible: int = 0
     owners: int = 0
+    opened: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
 
     @property
     def leaf_count(self) -> int:
@@ -234,6 +236,7 @@ class Cells:
             notes=texts(about["notes"], "notes"),
             visible=int(about["visible"]),
             owners=int(about["owners"]),
+            opened=stored.indices("opened", np.int32, None, high=1 << 31),
         )
 
 

@@ -10,6 +10,7 @@ from ptmtools.errors import InputError
 
 CellKind = Literal["leaf", "room"]
 Reach = Literal["all", "main"]
+DoorState = Literal["open", "closed", "hidden"]
 Position = tuple[float, float, float]
 
 
@@ -61,6 +62,12 @@ class SubdivideOptions:
         counter-clockwise from -Z. By default one is chosen. May be given several times.
     reach: what becomes of space that cannot be reached from the start, behind closed doors or in
         another building: "all" keeps what has a place in it, "main" drops everything.
+    doors: "open" lets everybody see through the leaves of doors between rooms, though they are
+        drawn; "hidden" does not draw them either; to "closed" ones they are walls. Entrances, with
+        nothing but the outside beyond, stay shut.
+    door: objects or materials (names, with * and ?) that are door leaves, whatever their shape;
+        --structural takes precedence. Others are recognised by name and shape. May be given
+        several times.
     """
 
     wall_area: float = 2.0
@@ -73,6 +80,8 @@ class SubdivideOptions:
     gain: float = 0.1
     walker: tuple[float, float, float] = Walker(0.25, 0.5, 1.7)
     reach: Reach = "all"
+    doors: DoorState = "open"
+    door: tuple[str, ...] = ()
     viewpoints: tuple[Position, ...] = field(
         default=(), metadata={"option": "viewpoint", "numbers": (3, 4), "parse": _positions}
     )
@@ -84,6 +93,11 @@ class SubdivideOptions:
             (thickness >= 0, f"wall thickness {thickness:g} m is negative", "try 0.5"),
             (0 <= gain <= 1, f"a gain of {gain:g} is not between 0 and 1", "try 0.1"),
             (self.reach in get_args(Reach), f"unknown reach {self.reach!r}", "all or main"),
+            (
+                self.doors in get_args(DoorState),
+                f"doors are not {self.doors!r}",
+                "open, closed or hidden",
+            ),
             (
                 len(self.walker) == 3
                 and all(0 < length < float("inf") for length in self.walker)
