@@ -8,6 +8,7 @@ their size. Like caps (`rejoin`) they are taken back where both sides are reache
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,7 +42,7 @@ class DoorPlanes:
         order = own[np.argsort(leaf[own], kind="stable")]
         bounds = np.searchsorted(leaf[order], np.arange(len(across) + 1))
         found: list[tuple[WallPlane, Ints]] = []
-        for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+        for first, last in itertools.pairwise(bounds):
             found += _planes(structure, order[first:last])
         boxes = [structure.corners[flat].reshape(-1, 3) for _, flat in found]
         low = np.array([points.min(axis=0) for points in boxes]).reshape(-1, 3)
@@ -67,11 +68,10 @@ def _planes(structure: Structure, triangles: Ints) -> list[tuple[WallPlane, Ints
     least = _SHARE * max((area for area, *_ in layers), default=0.0)
     near = structure.tolerance.plane
     found = []
-    for area, plane, flat in layers:
+    for area, plane, own in layers:
         if area >= least:
             frame = Frame.of(plane)
             every = structure.nearby.between(plane, -near, near)
-            every = every[structure.lie_in(plane, every)]
-            blocking = structure.united(frame, every)
-            found.append((WallPlane(frame, structure.united(frame, flat), blocking), flat))
+            blocking = structure.united(frame, every[structure.lie_in(plane, every)])
+            found.append((WallPlane(frame, structure.united(frame, own), blocking), own))
     return found

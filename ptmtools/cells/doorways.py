@@ -22,9 +22,9 @@ WIDE = (0.6, 2.4)
 _BESIDE = 0.05
 #: The leaf may stand proud of it by so much, and the reveals are at least as deep, metres.
 _PROUD, _REVEAL = 0.03, 0.02
-#: A leaf ends so near to the jambs and the lintel, and on one of its sides to the floor, metres;
-#: on the other may be a step.
-_GAP, _STEP = 0.05, 0.25
+#: A leaf ends so near to the jambs and the lintel, and on one of its sides to the floor, metres: on
+#: the other may be a step, or no ground.
+_GAP = 0.05
 #: Panels and handles stand off a leaf by less than this, and so far is free on both sides, metres.
 RELIEF, _FREE = 0.06, 0.75
 #: Where along a side rays begin, as shares of it, and how many of three must agree.
@@ -62,7 +62,7 @@ def _closing(rays: _Rays, wall_thickness: float) -> Bools:
         ahead = rays.at(turn * (half + RELIEF), *_GRID)
         free = rays.meet(ahead, (turn, 0, 0))[0] >= _FREE
         found &= free.mean(axis=1) >= _MOST
-    found &= revealed & (np.minimum(*floors) <= _GAP) & (np.maximum(*floors) <= _STEP)
+    found &= revealed & (np.minimum(*floors) <= _GAP)
     return found
 
 

@@ -103,21 +103,26 @@ class Structure:
     def made(opaque: Opaque, tolerance: Tolerance, doors: Bools | None = None) -> Structure:
         """Of what is opaque in a scene; ``doors``: (T,) the triangles of door leaves."""
         facets, source, detail, forced, file = opaque
-        door = np.zeros(len(source), dtype=bool) if doors is None else doors[source] & ~detail
-        wall = ~detail & ~door
-        parts = [facets.fewer(wall & (forced == value), file) for value in (False, True)]
-        parts.append((facets.mesh.corners[door], np.flatnonzero(door)))
-        first = np.concatenate([first for _, first in parts])
+        mesh = facets.mesh
+        door = np.zeros(len(source), dtype=bool) if doors is None else doors[source]
+        leaf, rest = np.flatnonzero(door & ~detail), np.flatnonzero(~door)
+        if len(rest) < len(door):  # the edge of a leaf must not part the jamb that it touches
+            facets = Facets.of(Welded(mesh.point, mesh.triangle[rest], rest), file)
+        parts = [
+            facets.fewer(~detail[rest] & (forced[rest] == value), file) for value in (False, True)
+        ]
+        first = np.concatenate([*(rest[one] for _, one in parts), leaf])
         order = np.argsort(first, kind="stable")
-        regions = facets.region[first]
-        corners = np.concatenate([corners for corners, _ in parts])[order]
+        regions = np.arange(len(source)) + len(facets.area)
+        regions[rest] = facets.region
+        corners = np.concatenate([*(corners for corners, _ in parts), mesh.corners[leaf]])[order]
         planes, areas = planes_of(corners)
         return Structure(
             corners=corners,
             forced=forced[first[order]],
             planes=planes,
             areas=areas,
-            region=regions[order],
+            region=regions[first[order]],
             nearby=Nearby(corners, tolerance.rounding),
             bins=Bins(planes, tolerance),
             tolerance=tolerance,

@@ -244,10 +244,14 @@ def test_without_ceilings_walls_tell_what_is_inside() -> None:
     [
         pytest.param(None, {"cupboard_front": leaf(3.95)}, id="on a wall"),
         pytest.param(
-            (0, 3.9, -1.9, 1.9), {"partition": leaf(4.05, (0, 3.9, -1.9, 1.9))}, id="too large"
+            (0, 3.9, -1.9, 1.9),
+            {"infill": leaf(4.0, (0, 3.9, -1.9, 1.9), thickness=0.2)},
+            id="too large",
         ),
         pytest.param(
-            (0.9, 2.9, -0.5, 0.5), {"shutter": leaf(4.05, (0.9, 2.9, -0.5, 0.5))}, id="a window's"
+            (0.9, 2.9, -0.45, 0.45),
+            {"shutter": leaf(4.05, (0.9, 2.9, -0.45, 0.45))},
+            id="a window's",
         ),
         pytest.param(
             (0, 2.1, -0.5, 0.5), {"infill": leaf(4.0, thickness=0.2)}, id="as thick as the wall"
