@@ -8,7 +8,7 @@ Pieces and rectangles that are the two faces, the edge or the panels of one slab
 so is what lies within it.
 
 A name alone is not enough: a wall of 6 m called `wall_with_door`, a frame, a mat and a hatch in the
-floor are no slabs of such a size.
+floor are no slabs of such a size, and what hangs on a wall or stands open against it parts nothing.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.detail import connected_pieces
-from ptmtools.cells.doorways import RELIEF, closing
+from ptmtools.cells.doorways import RELIEF, closing, parting
 from ptmtools.cells.facets import Facets
 from ptmtools.cells.merging import connected
 from ptmtools.cells.naming import called, named, says_door
@@ -85,6 +85,8 @@ def find_doors(
     slack = structure.tolerance.plane
     told = _pieces(scene, np.flatnonzero(asked))
     by_name = _called_so(scene, np.flatnonzero(so_called), slack)
+    leaf = _one_leaf(by_name, slack)
+    by_name = by_name.only(parting(by_name.merged(leaf), structure)[leaf])
     flat = _flat(scene, structure, np.flatnonzero((free & ~asked)[structure.source]))
     by_shape = _closing(flat, structure, options)
     every = told.joined(by_name).joined(by_shape)

@@ -26,7 +26,7 @@ _PROUD, _REVEAL = 0.03, 0.02
 #: the other may be a step, or no ground.
 _GAP = 0.05
 #: Panels and handles stand off a leaf by less than this, and so far is free on both sides, metres.
-RELIEF, _FREE = 0.06, 0.75
+RELIEF, _FREE = 0.06, 0.5
 #: Where along a side rays begin, as shares of it, and how many of three must agree.
 _SHARES, _MOST = np.array([0.2, 0.5, 0.8]), 2 / 3
 #: What a ray meets is square to it if its cosine is at least this.
@@ -46,6 +46,14 @@ def closing(slabs: Slabs, structure: Structure, wall_thickness: float) -> Bools:
     return found
 
 
+def parting(slabs: Slabs, structure: Structure) -> Bools:
+    """(k,) which slabs have room on both sides: a door on a wall, or one that stands open against
+    it, parts nothing."""
+    if not len(slabs):
+        return np.zeros(0, dtype=bool)
+    return _Rays(slabs, Surroundings(structure.corners)).free()
+
+
 def _closing(rays: _Rays, wall_thickness: float) -> Bools:
     half = rays.size[:, 0] / 2
     walls = [_wall(rays, *side, half, wall_thickness) for side in _SIDES]
@@ -59,10 +67,7 @@ def _closing(rays: _Rays, wall_thickness: float) -> Bools:
         room = np.where(np.isfinite(room), room, 0.0) + 2 * _GAP
         below = rays.at(turn * room, _SHARES, np.zeros(3), above=2 * _GAP)
         floors.append(np.median(rays.meet(below, (0, 0, -1))[0], axis=1) - 2 * _GAP)
-        ahead = rays.at(turn * (half + RELIEF), *_GRID)
-        free = rays.meet(ahead, (turn, 0, 0))[0] >= _FREE
-        found &= free.mean(axis=1) >= _MOST
-    found &= revealed & (np.minimum(*floors) <= _GAP)
+    found &= revealed & (np.minimum(*floors) <= _GAP) & rays.free()
     return found
 
 
@@ -121,6 +126,14 @@ class _Rays:
         across = low[..., 0] + size[..., 0] / 2 + depth[:, None] + 0 * along
         along = low[..., 1] + along * size[..., 1] + aside
         return np.stack([across, along, low[..., 2] + up * size[..., 2] + above], axis=2)
+
+    def free(self) -> Bools:
+        """(k,) which slabs have room in front of them and behind."""
+        found = np.ones(len(self.size), dtype=bool)
+        for turn in (1, -1):
+            ahead = self.at(turn * (self.size[:, 0] / 2 + RELIEF), *_GRID)
+            found &= (self.meet(ahead, (turn, 0, 0))[0] >= _FREE).mean(axis=1) >= _MOST
+        return found
 
     def meet(self, start: Floats, to: tuple[float, float, float]) -> tuple[Floats, Bools]:
         """(k, p) how far away it is what rays from (k, p, 3) points meet first, and whether that

@@ -345,16 +345,24 @@ def test_a_door_that_is_ajar_opens() -> None:
 
 
 def test_a_closet_in_which_nobody_can_stand_stays_shut() -> None:
-    shaft = box((4.2, 0, -0.5), (4.5, 4, 0.5), "-x")
-    hole = HOLE
-    side = [
-        [[4.2, 0, 0.5], [4.2, 4, 0.5], [4.2, 4, 2], [4.2, 0, 2]],
-    ]
-    made = scene(box((0, 0, -2), (4, 4, 2), "+x"), wall(4, 4.2, hole), shaft, side, Door=leaf(4.05))
+    shelf = [[[4.2, 1.2, -0.5], [4.2, 1.2, 0.5], [4.9, 1.2, 0.5], [4.9, 1.2, -0.5]]]
+    closet = box((4.2, 0, -0.5), (4.9, 4, 0.5), "-x") + shelf
+    room = box((0, 0, -2), (4, 4, 2), "+x")
+    made = scene(room, wall(4, 4.2, HOLE), closet, Door=leaf(4.05))
+    assert found(made) == ["Door"]
     cells = subdivide(made)
     assert cells.closed
     assert not len(cells.opened)
     assert ["shut" in note for note in said(cells)] == [True]
+    without = scene(room, wall(4, 4.2, HOLE), closet[:-1], Door=leaf(4.05))
+    assert len(subdivide(without).opened) == 12
+
+
+def test_a_door_on_a_wall_or_open_against_it_is_none() -> None:
+    against, on_it = leaf(4.205, (0, 2.1, 0.6, 1.6)), leaf(3.955, (0, 2, -1.6, -0.7))
+    made = scene(rooms(), Door=against, Cupboard_door=on_it)
+    assert found(made) == []
+    assert together(subdivide(made), A, B)
 
 
 @pytest.mark.parametrize("times", [1, 6])

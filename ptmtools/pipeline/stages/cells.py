@@ -40,7 +40,7 @@ def _fits_scene(cells: Cells, scene: Scene) -> str:
 CELLS: Stage[Cells] = Stage(
     name="cells",
     about="Read a model and cut it into cells and portals.",
-    recipe=4,
+    recipe=5,
     options=SubdivideOptions,
     reads=(SCENE,),
     artifact=Lazy("ptmtools.cells.model:Cells"),
