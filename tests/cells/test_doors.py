@@ -345,16 +345,18 @@ def test_a_door_that_is_ajar_opens() -> None:
 
 
 def test_a_closet_in_which_nobody_can_stand_stays_shut() -> None:
-    shelf = [[[4.2, 1.2, -0.5], [4.2, 1.2, 0.5], [4.9, 1.2, 0.5], [4.9, 1.2, -0.5]]]
-    closet = box((4.2, 0, -0.5), (4.9, 4, 0.5), "-x") + shelf
+    shelves = [
+        [[4.2, y, -0.5], [4.2, y, 0.5], [4.9, y, 0.5], [4.9, y, -0.5]] for y in (0.9, 1.8, 2.7, 3.6)
+    ]
+    closet = box((4.2, 0, -0.5), (4.9, 4, 0.5), "-x")
     room = box((0, 0, -2), (4, 4, 2), "+x")
-    made = scene(room, wall(4, 4.2, HOLE), closet, Door=leaf(4.05))
+    made = scene(room, wall(4, 4.2, HOLE), closet, shelves, Door=leaf(4.05))
     assert found(made) == ["Door"]
     cells = subdivide(made)
     assert cells.closed
     assert not len(cells.opened)
     assert ["shut" in note for note in said(cells)] == [True]
-    without = scene(room, wall(4, 4.2, HOLE), closet[:-1], Door=leaf(4.05))
+    without = scene(room, wall(4, 4.2, HOLE), closet, Door=leaf(4.05))
     assert len(subdivide(without).opened) == 12
 
 
