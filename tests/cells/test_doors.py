@@ -171,6 +171,15 @@ def test_a_door_parts_no_building(name: str, hole: Hole, door: Faces, leaves: in
     assert report.missed == ()
 
 
+def test_the_check_sees_through_doors_that_are_open() -> None:
+    made = scene(rooms(), Door=leaf(4.05))
+    opened = subdivide(made).opened
+    shut = subdivide(made, SubdivideOptions(doors="closed"))
+    structural = structural_triangles(made, SubdivideOptions(), opened)
+    report = check_conservative(made.corners[structural], shut, compute_pvs(shut), 20_000)
+    assert report.missed
+
+
 @pytest.mark.parametrize("door", [leaf(4.05), sheet(4.1), leaf(4.05, WIDE)])
 def test_doors_that_are_closed_part_rooms(door: Faces) -> None:
     made = scene(rooms(WIDE if door == leaf(4.05, WIDE) else HOLE), Door=door)
