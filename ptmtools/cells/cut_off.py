@@ -88,6 +88,20 @@ class Unreached:
     rooms: list[CutOff]  # the largest first
     outside: CutOff | None = None  # what is outside a closed model, but in a building
 
+    def without(self, reached: Bools, portals: list[Portal]) -> Unreached:
+        """What is left of it if the flood gets further, to the (L,) leaves ``reached``, through
+        more ``portals``: rooms that now hang together are one."""
+        group = groups(len(reached), portals)
+        joined: dict[int, list[CutOff]] = {}
+        for room in self.rooms:
+            if not reached[room.leaves[0]]:
+                joined.setdefault(int(group[room.leaves[0]]), []).append(room)
+        rooms = [
+            CutOff(np.flatnonzero(group == name), sum(room.place for room in parts), parts[0].eye)
+            for name, parts in joined.items()
+        ]
+        return Unreached(sorted(rooms, key=lambda room: -room.place), self.outside)
+
 
 def unreached(
     tree: Tree,

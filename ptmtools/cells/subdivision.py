@@ -199,7 +199,7 @@ def _divide(
         if way:
             doors, tree, portals = way.doors, way.tree, way.portals
             reached = flood(len(tree.leaves), portals, start)
-            beyond = unreached(tree, portals, reached, outside, *surfaces)
+            beyond = beyond.without(reached, portals)
         if options.reach == "all":
             for room in beyond.rooms:
                 reached[room.leaves] = True

@@ -440,6 +440,19 @@ def test_rooms_behind_rooms_open_in_one_go() -> None:
     assert "2 door leaves" in said(cells)[0]
 
 
+def test_another_building_is_one_too() -> None:
+    far = [[[x + 40, y, z] for x, y, z in face] for face in rooms() + leaf(4.05)]
+    hall = box((-30, 0, -6), (-6, 4, 6))
+    made = scene(hall, far[:-6], Door=far[-6:])
+    cells = subdivide(made)
+    assert cells.closed
+    assert together(cells, (41.0, 1.0, 1.2), (47.0, 1.0, 1.2))
+    (told,) = [note for note in cells.notes if "cannot be reached from the start" in note]
+    assert float(told.split(" ")[0]) == pytest.approx(2 * 3.5 * 3.5, abs=0.5)
+    # Nobody is in the leaf of the door only.
+    assert cells.leaf_count == 1 + 3
+
+
 @pytest.mark.parametrize("state", ["ajar", ""])
 def test_doors_are_open_closed_or_hidden(state: DoorState) -> None:
     with pytest.raises(InputError, match="open, closed or hidden"):
