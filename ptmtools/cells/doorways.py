@@ -49,8 +49,8 @@ def closing(slabs: Slabs, structure: Structure, wall_thickness: float) -> Bools:
 def parting(slabs: Slabs, structure: Structure) -> Bools:
     """(k,) which slabs have room on both sides: a door on a wall, or one that stands open against
     it, parts nothing."""
-    if not len(slabs):
-        return np.zeros(0, dtype=bool)
+    if not (len(slabs) and len(structure.corners)):
+        return np.ones(len(slabs), dtype=bool)
     return _Rays(slabs, Surroundings(structure.corners)).free()
 
 
