@@ -392,13 +392,26 @@ def test_a_leaf_that_shares_its_corners_with_the_wall_and_lies_in_its_plane() ->
     assert len(cells.opened) == 2 * 36
 
 
-def test_a_leaf_as_thick_as_its_wall_leaves_the_jambs() -> None:
-    thin = panel(4.1, HOLE) + panel(4.0, HOLE) + reveals(4.0, 4.1, HOLE)
+def test_jambs_of_many_triangles_stay_beside_a_leaf_of_the_same_object() -> None:
+    # Of the strips of the jambs some are no wider than the leaf is thick.
+    made = subdivided(scene(rooms() + leaf(4.043, thickness=0.047)), 12)
+    cells = subdivide(made)
+    assert cells.closed
+    assert together(cells, A, B)
+    assert len(cells.opened) == 12 * 12**2
+
+
+@pytest.mark.parametrize("first", ["leaf", "wall"])
+def test_a_leaf_as_thick_as_its_wall_leaves_the_jambs(first: str) -> None:
+    door = leaf(4.0, thickness=0.1)
+    edges = [face for face in door if len({x for x, _, _ in face}) > 1]
+    thin = panel(4.1, HOLE) + panel(4.0, HOLE) + edges
     a, b = box((0, 0, -2), (4, 4, 2), "+x"), box((4.1, 0, -2), (8.2, 4, 2), "-x")
-    made = scene(a, b, thin, Door=leaf(4.0, thickness=0.1))
+    things = {"Door": door, "masonry": a + b + thin}
+    made = scene(**(things if first == "leaf" else dict(reversed(things.items()))))
     cells = subdivide(made)
     assert together(cells, A, B)
-    assert set(made.triangle_object[cells.opened]) == {1}
+    assert {made.objects[i] for i in made.triangle_object[cells.opened]} == {"Door"}
     # The hollow of the wall is still nobody's.
     assert cells.locate(np.array([[4.05, 1.0, 1.5]])) == [-1]
 
