@@ -144,10 +144,11 @@ def open_doors(
     which = doors.between(tree, within)
     if which.any() and not outer.any():
         which &= doors.sheltered(structure)
-    outside = flood(len(tree.leaves), portals, tuple(np.flatnonzero(outer)))
+    rooms = tuple(np.flatnonzero(within).tolist())
+    outside = flood(len(tree.leaves), portals, tuple(np.flatnonzero(outer).tolist()))
     while which.any():
         way = _opened(doors, which, structure, tree, portals)
-        if not (flood(len(tree.leaves), way.portals, start) & outer).any():
+        if not (flood(len(tree.leaves), way.portals, rooms) & outer).any():
             return way
         out = doors.lead_out(way.portals, outside) & which
         which = which & ~out & out.any()

@@ -470,11 +470,14 @@ def test_a_door_whose_frame_would_let_the_outside_in_stays_shut() -> None:
     assert together(cells, A, B)
     assert np.abs(made.corners[cells.opened][:, :, 2]).max() == pytest.approx(0.5)  # the leaf
     assert ["shut:" in note for note in said(cells)] == [False, True]
-    stopper = scene(walls, Gate=leaf(4.0, hole, thickness=0.2))
-    cells = subdivide(stopper, asked)
-    assert cells.closed
-    assert not together(cells, A, B)
-    assert not len(cells.opened)
+    stopper = leaf(4.0, hole, thickness=0.2)
+    elsewhere = box((-30, 0, -6), (-6, 4, 6))  # the start, from which nothing leads here
+    for more in ([], elsewhere):
+        cells = subdivide(scene(walls, more, Gate=stopper), asked)
+        assert cells.closed
+        assert not together(cells, A, B)
+        assert not len(cells.opened)
+        assert cells.locate(np.array([[4.1, 1.0, 3.0]])) == [-1]  # the outside
 
 
 def test_nothing_but_doors() -> None:
