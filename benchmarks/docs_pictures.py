@@ -6,7 +6,7 @@ plan.png     both floors, with what the middle room sees shaded by its coverage 
 levels.jpg   a painting, as its levels show it while the `.ptm` arrives
 view.jpg     the view from a viewpoint with the first levels of all textures, and with all of them:
              rays cast at the model, no browser
-door-*.png   two rooms with a door leaf in the doorway: one is lost, unless the leaf is detail
+door-*.png   two rooms with a door leaf in the doorway: with the door closed one is lost
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ def main() -> None:
         shutil.copytree(TWO_ROOMS, f"{folder}/model")
         model = Path(folder, "model", "two_rooms.obj")
         model.write_text(model.read_text("utf-8") + DOOR_LEAF, "utf-8")
-        for name, options in (("shut", []), ("open", ["--detail", "door_leaf*"])):
+        for name, options in (("shut", ["--doors", "closed", "--reach", "main"]), ("open", [])):
             ptm("cells", str(model), "-o", f"{folder}/{name}", *options)
             picture = str(PICTURES / f"door-{name}.png")
             ptm("plot", f"{folder}/{name}", "-o", picture, "--force", "--width", "6", "--dpi", "60")

@@ -10,7 +10,8 @@ node's cross-section that the wall covers, *balance* the smaller over the larger
 fragments on the two sides, *splits* the share of the other fragments that the plane cuts. Nodes
 are split in the order of the wall area that their best plane brings, so that a limit on the number
 of leaves keeps the best splits. Where no wall is left, the reveals of a thick wall may still split
-(`reveals`), and last of all what closes the node's whole cross-section (`caps`).
+(`reveals`), then the leaves of doors (`door_planes`), and last of all what closes the node's whole
+cross-section (`caps`).
 
 A split that would leave a side thinner than a leaf may be is refused: no leaf is flat after
 rounding to float32. Where it would leave a side thinner than the cluster distance (a picture on a
@@ -32,6 +33,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats
 from ptmtools.cells import caps
+from ptmtools.cells.door_planes import DoorPlanes
 from ptmtools.cells.model import OUTSIDE
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, difference, intersection
@@ -50,7 +52,7 @@ FRAGMENT_SHARE = 0.01
 #: Up to so many fragments of a node are asked by their corners, more by their boxes first.
 _FEW = 64
 #: What may split a node, in this order.
-_WALLS, _REVEALS, _CAPS = range(3)
+_WALLS, _REVEALS, _DOORS, _CAPS = range(4)
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,8 @@ class Tree:
     children: NDArray[np.int32]  # (N, 2) as in `Cells.node_child`
     leaves: tuple[Polyhedron, ...]  # face tags are node indices
     unsplit: int = 0  # leaves that hold walls that the limit left in one piece
-    capped: Mapping[int, Polyhedron] = field(default_factory=dict)  # nodes that caps split
+    # What caps split, and doors.
+    capped: Mapping[int, Polyhedron] = field(default_factory=dict)
 
     @cached_property
     def planes(self) -> Floats:
@@ -82,8 +85,8 @@ class _Fragment:
 
 
 class _Task(NamedTuple):
-    """A node that waits for its split, and what its fragments are of: walls, reveals or caps. No
-    two have one ``priority``."""
+    """A node that waits for its split, and what its fragments are of: walls, reveals, doors or
+    caps. No two have one ``priority``."""
 
     priority: tuple[bool, int, int, int]
     body: Polyhedron
@@ -98,13 +101,14 @@ def build_tree(
     structure: Structure,
     walls: list[WallPlane],
     reveals: Reveals,
+    doors: DoorPlanes,
     options: SubdivideOptions,
     progress: Progress,
 ) -> Tree:
-    """Split ``box`` by the planes of ``walls``, then of ``reveals``, then of the caps that are in
-    the ``structure``; in the order that the module describes."""
+    """Split ``box`` by the planes of ``walls``, then of ``reveals``, of ``doors`` and of the caps
+    that are in the ``structure``; in the order that the module describes."""
     tolerance = structure.tolerance
-    least = (FRAGMENT_SHARE * options.wall_area, 0.0, 0.0)
+    least = (FRAGMENT_SHARE * options.wall_area, 0.0, 0.0, 0.0)
     taken: list[WallPlane] = []
     children: list[list[int]] = []
     leaves: list[Polyhedron] = []
@@ -128,6 +132,8 @@ def build_tree(
             source += 1
             if source == _REVEALS:
                 fragments = _sections(body, reveals.within(body, taken), tolerance)
+            elif source == _DOORS:
+                fragments = _sections(body, doors.within(body), tolerance)
             else:
                 fragments = _sections(body, caps.closing(structure, body), tolerance, whole=True)
             best = _best_split(body, fragments, least[source], taken, tolerance)
@@ -135,7 +141,7 @@ def build_tree(
             finish(body, parent)
             return
         share = fragments[best].area / tolerance.extent**2
-        priority = (source == _CAPS, -round(share / TIE_SHARE), len(taken), parent[1])
+        priority = (source > _REVEALS, -round(share / TIE_SHARE), len(taken), parent[1])
         heapq.heappush(queue, _Task(priority, body, fragments, best, parent, source))
 
     push(box, _sections(box, walls, tolerance), (-1, 0), _WALLS)
@@ -143,14 +149,14 @@ def build_tree(
         task = heapq.heappop(queue)
         if len(leaves) + len(queue) + 2 > options.max_leaves:
             finish(task.body, task.parent)
-            unsplit += task.source != _CAPS
+            unsplit += task.source <= _REVEALS
             continue
         wall = task.fragments[task.best].wall
         plane = wall.frame.plane
         node = len(taken)
         taken.append(wall)
         children.append([OUTSIDE, OUTSIDE])
-        if task.source == _CAPS:
+        if task.source > _REVEALS:
             capped[node] = task.body
         place(task.parent, node)
         extents = _Extents(task.fragments)
@@ -164,8 +170,8 @@ def build_tree(
                 for i, f in enumerate(task.fragments)
                 if ahead[i] and i != task.best
             ]
-            # A part of what a cap closed may have other caps, so it is asked again.
-            if task.source == _CAPS:
+            # A part of what a door or a cap closed may have others, so it is asked again.
+            if task.source > _REVEALS:
                 push(body, [], (node, side), _REVEALS)
             else:
                 push(body, _fragments(inherited, tolerance), (node, side), task.source)

@@ -88,6 +88,20 @@ class Unreached:
     rooms: list[CutOff]  # the largest first
     outside: CutOff | None = None  # what is outside a closed model, but in a building
 
+    def without(self, reached: Bools, portals: list[Portal]) -> Unreached:
+        """What is left of it if the flood gets further, to the (L,) leaves ``reached``, through
+        more ``portals``: rooms that now hang together are one."""
+        group = groups(len(reached), portals)
+        joined: dict[int, list[CutOff]] = {}
+        for room in self.rooms:
+            if not reached[room.leaves[0]]:
+                joined.setdefault(int(group[room.leaves[0]]), []).append(room)
+        rooms = [
+            CutOff(np.flatnonzero(group == name), sum(room.place for room in parts), parts[0].eye)
+            for name, parts in joined.items()
+        ]
+        return Unreached(sorted(rooms, key=lambda room: -room.place), self.outside)
+
 
 def unreached(
     tree: Tree,
@@ -100,7 +114,7 @@ def unreached(
 ) -> Unreached:
     """Where somebody could be that the flood did not reach. ``reached``, ``outer``: (L,) leaves;
     groups with one of the latter are the outside."""
-    group = _groups(len(tree.leaves), portals)
+    group = groups(len(tree.leaves), portals)
     outside = np.isin(group, group[outer]) & ~reached
     waiting = ~reached & ~outside & ~np.isin(group, group[reached])
     beyond = outside & ~outer
@@ -137,7 +151,7 @@ def _rooms(group: Ints, standing: Standing) -> Iterator[Standing]:
         yield standing.only(order[start[name] : start[name + 1]])
 
 
-def _groups(leaves: int, portals: list[Portal]) -> Ints:
+def groups(leaves: int, portals: list[Portal]) -> Ints:
     """(leaves,) the least leaf that each hangs together with through portals."""
     ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
     return connected(leaves, np.concatenate(ends.T), np.concatenate(ends[:, ::-1].T))

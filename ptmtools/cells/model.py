@@ -65,6 +65,7 @@ class Cells:
     tolerance: that of the scene.
     closed: whether the flood of the reachable never met the root box.
     notes: what the subdivision has to say, one line each ("open above: …").
+    opened: (n,) int32 the scene's triangles, ascending, of door leaves that do not block.
     """
 
     node_plane: NDArray[np.float64]
@@ -94,6 +95,7 @@ class Cells:
     notes: tuple[str, ...] = ()
     visible: int = 0
     owners: int = 0
+    opened: NDArray[np.int32] = field(default_factory=lambda: np.zeros(0, dtype=np.int32))
 
     @property
     def leaf_count(self) -> int:
@@ -272,6 +274,7 @@ class Cells:
             notes=texts(about["notes"], "notes"),
             visible=int(about["visible"]),
             owners=int(about["owners"]),
+            opened=stored.indices("opened", np.int32, None, high=1 << 31),
         )
 
 

@@ -1,8 +1,11 @@
-"""Which triangles may bound a leaf, by the names of their objects and materials."""
+"""Which triangles may bound a leaf, and which are of doors, by the names of their objects and
+materials."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+import unicodedata
+from collections.abc import Callable, Sequence
 from fnmatch import fnmatchcase
 
 import numpy as np
@@ -10,6 +13,25 @@ import numpy as np
 from ptmtools.arrays import Bools
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.scene.model import Scene
+
+#: What a door is called: a word of a name, in lower case.
+_DOOR = re.compile(
+    r"doors?|port[ea]s?|puertas?|tür(en)?|tuer(en)?|deur(en)?|dörr(ar)?|døre?r?|drzwi|dv[eě]ře|ajtó|"
+    r"двер[ьи]"
+)
+#: Words like Haustür, where what is before it says which door it is, and like doorleaf.
+_COMPOUND = re.compile(
+    r".*(doors?|tür|tuer|deur|dörr|dør)|"
+    r"(door|tür|tuer|deur|dörr|dør)(leaf|panel|slab|wing|blatt|flügel|fluegel|blad)"
+)
+#: Words that only end like one, and what a thing is whose name says that it is at a door.
+_NO_DOOR = re.compile(
+    r"(out|in)doors?|way|frame|jamb|lintel|casing|handle|knob|mat|walls?|wand|mur[ao]?|pared|"
+    r"pare[td]e|muur|vägg|væg|ściana|стена|rahmen|zarge|griff|cadre|dormant|marco|telaio|kozijn|karm"
+)
+#: Words of a name: runs of letters, each beginning where a capital follows a small letter.
+_WORD = re.compile(r"[^\W\d_]+")
+_HUMP = re.compile(r"(?<=[^\W\d_A-ZÀ-ÖØ-Þ])(?=[A-ZÀ-ÖØ-Þ])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
 def may_occlude(scene: Scene, options: SubdivideOptions) -> Bools:
@@ -20,11 +42,26 @@ def may_occlude(scene: Scene, options: SubdivideOptions) -> Bools:
 
 def named(scene: Scene, patterns: Sequence[str]) -> Bools:
     """(T,) which triangles have an object or a material of such a name."""
-    objects = np.array([matches(name, patterns) for name in scene.objects], dtype=bool)
-    materials = np.array([matches(m.name, patterns) for m in scene.materials], dtype=bool)
+    return called(scene, lambda name: matches(name, patterns))
+
+
+def called(scene: Scene, says: Callable[[str], bool]) -> Bools:
+    """(T,) which triangles have an object or a material whose name says something."""
+    objects = np.array([says(name) for name in scene.objects], dtype=bool)
+    materials = np.array([says(material.name) for material in scene.materials], dtype=bool)
     return np.asarray(objects[scene.triangle_object] | materials[scene.triangle_material])
 
 
 def matches(name: str, patterns: Sequence[str]) -> bool:
     """Whether one of the patterns, with * and ?, is a name's."""
     return any(fnmatchcase(name, pattern) for pattern in patterns)
+
+
+def says_door(name: str) -> bool:
+    """Whether a name is that of a door: `door_leaf_03`, `IfcDoor`, `Haustür`, but not `doorway`,
+    `door_frame` or `outdoor_wall`."""
+    composed = unicodedata.normalize("NFC", name)
+    words = [word.lower() for word in _WORD.findall(_HUMP.sub(" ", composed))]
+    if any(map(_NO_DOOR.fullmatch, words)):
+        return False
+    return any(_DOOR.fullmatch(word) or _COMPOUND.fullmatch(word) for word in words)

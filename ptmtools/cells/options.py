@@ -11,6 +11,7 @@ from ptmtools.errors import InputError
 CellKind = Literal["leaf", "room"]
 Reach = Literal["all", "main"]
 Standing = Literal["places", "anywhere"]
+DoorState = Literal["open", "closed", "hidden"]
 Position = tuple[float, float, float]
 
 
@@ -73,6 +74,12 @@ class SubdivideOptions:
         counter-clockwise from -Z. By default one is chosen. May be given several times.
     reach: what becomes of space that cannot be reached from the start, behind closed doors or in
         another building: "all" keeps what has a place in it, "main" drops everything.
+    doors: "open" lets everybody see through the leaves of doors between rooms, though they are
+        drawn; "hidden" does not draw them either; to "closed" ones they are walls. Entrances, with
+        nothing but the outside beyond, stay shut.
+    door: objects or materials (names, with * and ?) that are door leaves, whatever their shape;
+        --structural takes precedence. Others are recognised by name and shape. May be given
+        several times.
     """
 
     wall_area: float = 2.0
@@ -86,6 +93,8 @@ class SubdivideOptions:
     walker: tuple[float, float, float] = WALKER
     reach: Reach = "all"
     standing: Standing = "places"
+    doors: DoorState = "open"
+    door: tuple[str, ...] = ()
     viewpoints: tuple[Position, ...] = field(
         default=(), metadata={"option": "viewpoint", "numbers": (3, 4), "parse": _positions}
     )
@@ -101,6 +110,11 @@ class SubdivideOptions:
                 self.standing in get_args(Standing),
                 f"unknown standing {self.standing!r}",
                 "places or anywhere",
+            ),
+            (
+                self.doors in get_args(DoorState),
+                f"doors are not {self.doors!r}",
+                "open, closed or hidden",
             ),
             (
                 len(self.walker) == 3

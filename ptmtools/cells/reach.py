@@ -24,6 +24,8 @@ FLOOR_COSINE = 0.7
 FLOOR_SAMPLES = 400
 #: Surfaces nearer to one another than this share of the model's height are one surface.
 FLOOR_SHARE = 0.05
+#: A model is open above if less than this share of its floor has something over it.
+ROOFED = 0.5
 
 
 def flood(leaves: int, portals: list[Portal], start: tuple[int, ...]) -> Bools:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ptmtools.arrays import Bools, Ints
+from ptmtools.arrays import Ints
 from ptmtools.cells.bsp import Tree
 from ptmtools.cells.polyhedron import Polyhedron
 
@@ -28,14 +28,15 @@ class Rejoined:
     node: Ints  # (N,) which node each is, or -1
 
 
-def rejoined(tree: Tree, reached: Bools) -> Rejoined:
-    """The tree less the caps that cut nothing off; ``reached``: (L,) what the flood met."""
+def rejoined(tree: Tree, group: Ints) -> Rejoined:
+    """The tree less the caps that cut nothing off; ``group``: (L,) for leaves that are kept any of
+    those that hang together, -1 for others."""
     bodies, children = list(tree.leaves), tree.children.copy()
     part_of = np.arange(len(bodies))
     kept = np.ones(len(children), dtype=bool)
     for node in sorted(tree.capped, reverse=True):  # parts before wholes
         first, second = sorted(-2 - children[node])
-        if first >= 0 and reached[first] == reached[second]:
+        if first >= 0 and group[first] == group[second]:
             bodies[first] = tree.capped[node]
             part_of[part_of == second] = first
             children[children == node] = -2 - first

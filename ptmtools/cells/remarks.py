@@ -1,12 +1,16 @@
-"""What the subdivision has to say of detail that it recognised, and of what it did not reach."""
+"""What the subdivision has to say of detail and doors that it recognised, and of what it did not
+reach."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Ints
 from ptmtools.cells.cut_off import CutOff, Unreached
+from ptmtools.cells.doors import DoorLeaf
 from ptmtools.cells.model import Cells
 from ptmtools.cells.ownership import Pieces
 from ptmtools.notes import Warned
@@ -36,6 +40,25 @@ def of_detail(scene: Scene, detail: Ints) -> list[str]:
         "are small, dense and round: detail, which neither divides nor hides; --structural NAME, "
         "or --no-detail-by-shape, says otherwise"
     ]
+
+
+def of_doors(leaves: list[DoorLeaf], opened: Bools) -> list[str]:
+    """What is said of door leaves, of which those ``opened``, (d,), do not block."""
+    notes = []
+    for which, fate in (
+        (opened, "open: drawn, but never in the way; --doors closed shuts them"),
+        (
+            ~opened,
+            "shut: beyond is nothing but the outside, or no place to stand; --detail NAME opens it",
+        ),
+    ):
+        chosen = [leaves[i] for i in np.flatnonzero(which)]
+        if chosen:
+            named = ", ".join(f"{leaf.name} at {_triple(leaf.middle)}" for leaf in chosen[:NAMED])
+            more = ", …" if len(chosen) > NAMED else ""
+            leaf = count(len(chosen), "door leaf", "door leaves")
+            notes.append(f"{leaf} ({named}{more}) {'is' if len(chosen) == 1 else 'are'} {fate}")
+    return notes
 
 
 def of_unreached(unreached: Unreached, kept: bool, place: float) -> list[str]:
@@ -97,4 +120,8 @@ def _place(room: CutOff) -> str:
 
 
 def _position(room: CutOff) -> str:
-    return ",".join(f"{c:.2f}" for c in room.eye)
+    return _triple(room.eye)
+
+
+def _triple(point: Iterable[float]) -> str:
+    return ",".join(f"{c:.2f}" for c in point)

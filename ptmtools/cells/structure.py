@@ -17,9 +17,11 @@ triangle there, whatever its size.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bins import Bins, Tries
@@ -88,31 +90,45 @@ class Structure:
     bins: Bins
     tolerance: Tolerance
     detail: Ints  # (d,) triangles of the scene that are detail by their shape
+    source: Ints  # (T,) the triangle of the scene that each is, or that its region begins with
+    door: Bools  # (T,) whether it is of a door leaf, which is no wall but may block
 
     @staticmethod
     def of(scene: Scene, options: SubdivideOptions, tolerance: Tolerance) -> Structure:
         """The structural triangles of a scene, without repetitions and in the order of the file,
         flat regions of many in as few as their outlines need (`facets`)."""
-        facets, source, detail = _opaque(scene, options)
-        forced = named(scene, options.structural)[source]
+        return Structure.made(Opaque.of(scene, options), tolerance)
+
+    @staticmethod
+    def made(opaque: Opaque, tolerance: Tolerance, doors: Bools | None = None) -> Structure:
+        """Of what is opaque in a scene; ``doors``: (T,) the triangles of door leaves."""
+        facets, source, detail, forced, file = opaque
+        mesh = facets.mesh
+        door = np.zeros(len(source), dtype=bool) if doors is None else doors[source]
+        leaf, rest = np.flatnonzero(door & ~detail), np.flatnonzero(~door)
+        if len(rest) < len(door):  # the edge of a leaf must not part the jamb that it touches
+            facets = Facets.of(Welded(mesh.point, mesh.triangle[rest], rest), file)
         parts = [
-            facets.fewer(~detail & (forced == value), scene.tolerance) for value in (False, True)
+            facets.fewer(~detail[rest] & (forced[rest] == value), file) for value in (False, True)
         ]
-        first = np.concatenate([first for _, first in parts])
+        first = np.concatenate([*(rest[one] for _, one in parts), leaf])
         order = np.argsort(first, kind="stable")
-        regions = facets.region[first]
-        corners = np.concatenate([corners for corners, _ in parts])[order]
+        regions = np.arange(len(source)) + len(facets.area)
+        regions[rest] = facets.region
+        corners = np.concatenate([*(corners for corners, _ in parts), mesh.corners[leaf]])[order]
         planes, areas = planes_of(corners)
         return Structure(
             corners=corners,
             forced=forced[first[order]],
             planes=planes,
             areas=areas,
-            region=regions[order],
+            region=regions[first[order]],
             nearby=Nearby(corners, tolerance.rounding),
             bins=Bins(planes, tolerance),
             tolerance=tolerance,
             detail=source[detail],
+            source=source[first[order]],
+            door=door[first[order]],
         )
 
     def lie_in(self, plane: Floats, triangles: Ints) -> Bools:
@@ -126,27 +142,42 @@ class Structure:
         return unite(frame.to_plane(self.corners[triangles]), self.tolerance.grid)
 
 
-def structural_triangles(scene: Scene, options: SubdivideOptions) -> Bools:
-    """(T,) which triangles occlude: opaque, and detail neither by name nor by shape. Of triangles
-    that are the same, the first may stand for all."""
-    _, source, detail = _opaque(scene, options)
+def structural_triangles(
+    scene: Scene, options: SubdivideOptions, opened: NDArray[np.integer] | None = None
+) -> Bools:
+    """(T,) which triangles occlude: opaque, detail neither by name nor by shape, and none of the
+    door leaves that are ``opened`` (see `Cells.opened`). Of triangles that are the same, the first
+    may stand for all."""
+    opaque = Opaque.of(scene, options)
     found = np.zeros(len(scene.triangles), dtype=bool)
-    found[source[~detail]] = True
+    found[opaque.source[~opaque.detail]] = True
+    if opened is not None:
+        found[opened] = False
     return found
 
 
-def _opaque(scene: Scene, options: SubdivideOptions) -> tuple[Facets, Ints, Bools]:
-    """The mesh of what is opaque and not called detail; the scene's triangles that it consists of;
-    and which of them are detail by their shape."""
-    candidates = np.flatnonzero(may_occlude(scene, options))
-    mesh = Welded.of(scene.points, scene.triangles[candidates])
-    source = candidates[mesh.source]
-    facets = Facets.of(mesh, scene.tolerance)
-    detail = np.zeros(len(source), dtype=bool)
-    if options.detail_by_shape:
-        detail = recognised(facets, scene.triangle_object[source], options.wall_area)
-        detail &= ~named(scene, options.structural)[source]
-    return facets, source, detail
+class Opaque(NamedTuple):
+    """What is opaque in a scene and not called detail."""
+
+    facets: Facets
+    source: Ints  # (n,) the triangles of the scene that its mesh consists of, ascending
+    detail: Bools  # (n,) which of them are detail by their shape
+    forced: Bools  # (n,) which `SubdivideOptions.structural` names
+    tolerance: Tolerance  # the scene's
+
+    @staticmethod
+    def of(scene: Scene, options: SubdivideOptions) -> Opaque:
+        """Of a scene."""
+        candidates = np.flatnonzero(may_occlude(scene, options))
+        mesh = Welded.of(scene.points, scene.triangles[candidates])
+        source = candidates[mesh.source]
+        facets = Facets.of(mesh, scene.tolerance)
+        forced = named(scene, options.structural)[source]
+        detail = np.zeros(len(source), dtype=bool)
+        if options.detail_by_shape:
+            detail = recognised(facets, scene.triangle_object[source], options.wall_area)
+            detail &= ~forced
+        return Opaque(facets, source, detail, forced, scene.tolerance)
 
 
 def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
@@ -160,7 +191,9 @@ def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:
         flat = near[structure.lie_in(plane, near)]
         blocking = structure.united(frame, flat)
         shapely.prepare(blocking)
-        parts = shapely.get_parts(blocking)
+        masonry = flat[~structure.door[flat]]
+        alone = len(masonry) < len(flat)
+        parts = shapely.get_parts(structure.united(frame, masonry) if alone else blocking)
         group = neighbours(parts, tolerance.hairline)
         large = np.bincount(group, weights=shapely.area(parts))[group] >= least
         if np.any(forced[flat]):
@@ -192,10 +225,10 @@ def _layers(structure: Structure, wall_area: float) -> list[Floats]:
     planes, areas, forced = structure.planes, structure.areas, structure.forced
     bins = structure.bins
     # A bin with a triangle that is forced is never left for want of area.
-    weights = areas + 2 * wall_area * forced
+    weights = np.where(structure.door, 0.0, areas + 2 * wall_area * forced)
     waiting = bins.weights(weights)
     start, members_of = bins.members()
-    free = areas > 0
+    free = (areas > 0) & ~structure.door
     layers: list[tuple[float, Floats]] = []
     promising = free & (waiting[bins.own] >= wall_area)
     tries = Tries(bins.own, areas)

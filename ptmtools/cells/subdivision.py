@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree, build_tree
-from ptmtools.cells.cut_off import Standing, Unreached, unreached
+from ptmtools.cells.cut_off import Standing, Unreached, groups, unreached
 from ptmtools.cells.emptiness import check_seen
+from ptmtools.cells.entrances import Doors, open_doors
 from ptmtools.cells.grouping import grouped
 from ptmtools.cells.joining import joined
 from ptmtools.cells.model import OUTSIDE, Cells, sunk
@@ -33,11 +34,12 @@ from ptmtools.cells.ownership import Pieces, cut_to_leaves
 from ptmtools.cells.places import Floors, find_places
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import Portal, find_portals, portals_rejoined
-from ptmtools.cells.reach import at_box, flood, largest_leaf, roofed_share
+from ptmtools.cells.reach import ROOFED, at_box, flood, largest_leaf, roofed_share
 from ptmtools.cells.rejoin import rejoined
 from ptmtools.cells.remarks import (
     NO_PLACES,
     of_detail,
+    of_doors,
     of_leaves,
     of_triangles,
     of_unreached,
@@ -45,7 +47,7 @@ from ptmtools.cells.remarks import (
 from ptmtools.cells.reveals import Reveals
 from ptmtools.cells.seen import seen_from_places
 from ptmtools.cells.standing import eye_region, meets
-from ptmtools.cells.structure import Structure, WallPlane, find_walls
+from ptmtools.cells.structure import Opaque, Structure, WallPlane, find_walls
 from ptmtools.errors import InputError
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
@@ -59,8 +61,6 @@ from ptmtools.tolerance import Tolerance
 BOX_MARGIN = 0.01
 #: So many triangles take as long to subdivide as two processes to start.
 LARGE = 4000
-#: A model is open above if less than this share of its floor has something over it.
-ROOFED = 0.5
 
 
 @dataclass(frozen=True)
@@ -71,16 +71,19 @@ class _Model:
     walls: list[WallPlane]
     reveals: Reveals
     floors: Floors
+    doors: Doors
     options: SubdivideOptions
 
     @staticmethod
     def of(scene: Scene, options: SubdivideOptions) -> _Model:
         tolerance = scene.tolerance.for_walls(options.wall_thickness)
-        structure = Structure.of(scene, options, tolerance)
+        opaque = Opaque.of(scene, options)
+        structure = Structure.made(opaque, tolerance)
+        doors, structure = Doors.found(scene, opaque, structure, options)
         walls = find_walls(structure, options.wall_area)
         reveals = Reveals(structure, options.wall_thickness)
         floors = Floors.of(scene, structure, options)
-        return _Model(structure, walls, reveals, floors, options)
+        return _Model(structure, walls, reveals, floors, doors, options)
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,7 @@ class _Space:
     closed: bool  # whether they do not touch the root box
     beyond: Unreached  # where the flood did not come to; reached all the same if asked for
     place: float  # m² to stand on where it did, known if something is left out
+    doors: Bools  # (d,) which door leaves are open
 
 
 def subdivide(
@@ -135,6 +139,9 @@ def subdivide(
             space = clipped.result()
     finally:
         clipped.cancel()
+    opened = model.doors.triangles(space.doors)
+    if options.doors != "closed":
+        notes += of_doors(model.doors.leaves, space.doors)
     notes += of_unreached(space.beyond, options.reach == "all", space.place)
     if space.tree.unsplit:
         notes.append(
@@ -152,7 +159,9 @@ def subdivide(
     said = [*of_leaves(cells, space.reached), *of_triangles(scene, pieces, name[owner])]
     cells = grouped(replace(cells, notes=(*cells.notes, *said)), options)
     owner = np.append(cells.leaf_cell, np.int32(-1))[owner]
-    cells = replace(cells, **vars(joined(scene, pieces, owner, tolerance)))
+    if options.doors == "hidden":
+        owner[np.isin(pieces.source, opened)] = -1
+    cells = replace(cells, **vars(joined(scene, pieces, owner, tolerance)), opened=opened)
     check_seen(scene, cells)
     return cells
 
@@ -165,7 +174,7 @@ def _check(scene: Scene, options: SubdivideOptions) -> None:
             remedy="give a model with floors and walls",
         )
     names = (*scene.objects, *(material.name for material in scene.materials))
-    for pattern in (*options.structural, *options.detail):
+    for pattern in (*options.structural, *options.detail, *options.door):
         if not any(matches(name, (pattern,)) for name in names):
             raise InputError(
                 "PTM-I302",
@@ -185,7 +194,8 @@ def _divide(
     """Subdivide a root box and flood it."""
     structure, options = model.structure, model.options
     box = np.stack(_bounds(root.points))
-    tree = build_tree(root, structure, model.walls, model.reveals, options, progress)
+    planes = model.doors.planes
+    tree = build_tree(root, structure, model.walls, model.reveals, planes, options, progress)
     portals = find_portals(tree, structure.tolerance)
     outer = at_box(tree)
     viewers = _viewpoint_leaves(tree, box, options)
@@ -194,20 +204,29 @@ def _divide(
     reached = flood(len(tree.leaves), portals, start)
     closed = bool(start) and not bool(np.any(reached & outer))
     beyond, place = Unreached([]), 0.0
+    doors = np.zeros(len(model.doors.leaves), dtype=bool)
     if inside or closed:  # else it is thrown away
-        surfaces = model.floors, structure, walker
-        beyond = unreached(tree, portals, reached, outer & (not inside), *surfaces)
+        surfaces, outside = (model.floors, structure, walker), outer & (not inside)
+        beyond = unreached(tree, portals, reached, outside, *surfaces)
+        way = None
+        if options.doors != "closed":
+            way = open_doors(model.doors, structure, tree, portals, start, beyond, outside)
+        if way:
+            doors, tree, portals = way.doors, way.tree, way.portals
+            reached = flood(len(tree.leaves), portals, start)
+            beyond = beyond.without(reached, portals)
         if options.reach == "all":
             for room in beyond.rooms:
                 reached[room.leaves] = True
         elif beyond.rooms and reached.any():
             place = float(Standing.of(tree, reached, *surfaces).place.sum())
     if tree.capped and (inside or closed):
-        joint = rejoined(tree, reached)
+        group = np.where(reached, groups(len(tree.leaves), portals), -1)
+        joint = rejoined(tree, group)
         portals = portals_rejoined(portals, tree, joint, structure.tolerance)
         tree, reached = joint.tree, np.bincount(joint.leaf, reached) > 0
         viewers = tuple(joint.leaf[list(viewers)].tolist())
-    return _Space(box, tree, portals, reached, viewers, closed, beyond, place)
+    return _Space(box, tree, portals, reached, viewers, closed, beyond, place, doors)
 
 
 def _viewpoint_leaves(tree: Tree, box: Floats, options: SubdivideOptions) -> tuple[int, ...]:
@@ -254,13 +273,15 @@ def _named(keep: Bools) -> NDArray[np.int32]:
     return np.where(keep, np.cumsum(keep) - 1, -1).astype(np.int32)
 
 
-def _standing(model: _Model, bodies: list[Polyhedron]) -> tuple[Bools, Floats]:
-    """(L,) in which leaves somebody can stand, and `Cells.eye_floor`."""
+def _standing(model: _Model, bodies: list[Polyhedron], opened: Bools) -> tuple[Bools, Floats]:
+    """(L,) in which leaves somebody can stand, and `Cells.eye_floor`; ``opened``: (d,) doors."""
     walker, tolerance = Walker(*model.options.walker), model.structure.tolerance
     if model.options.standing == "anywhere":
         return np.ones(len(bodies), dtype=np.bool_), np.zeros((0, 3, 3))
     boxes = np.array([_bounds(body.points) for body in bodies]).reshape(-1, 2, 3)
-    places = find_places(model.floors, model.structure, walker, boxes)
+    in_the_way = ~np.append(opened, False)[model.doors.of]
+    structure = replace(model.structure, corners=model.structure.corners[in_the_way])
+    places = find_places(model.floors, structure, walker, boxes)
     eyes = eye_region(places, walker, tolerance)
     return meets(eyes, bodies, walker, tolerance), eyes.triangles()
 
@@ -278,7 +299,7 @@ def _assemble(
     keep = space.reached
     rename = _named(keep)
     bodies = [tree.leaves[i] for i in np.flatnonzero(keep)]
-    standing, eye_floor = _standing(model, bodies)
+    standing, eye_floor = _standing(model, bodies, space.doors)
     standing[rename[list(space.viewers)]] = True
     if not standing.any():
         standing[:], eye_floor = True, eye_floor[:0]

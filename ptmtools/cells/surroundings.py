@@ -43,9 +43,25 @@ class Surroundings:
         away = np.einsum("ij,ij->i", normals(self._corners[hit[met]]), along[met]) > 0
         return float(away.mean()) if len(away) else 0.0
 
-    def inside(self, points: Floats) -> Bools:
-        """(n,) which of (n, 3) points are under a roof and between walls."""
+    def first(self, points: Floats, along: Floats) -> tuple[Floats, Floats]:
+        """What rays from (n, 3) points along (n, 3) unit vectors meet first: (n,) how far away,
+        metres, infinite where there is nothing, and (n, 3) its unit normal."""
+        hit = self._hit(points, along)
+        far, facing = np.full(len(points), np.inf), np.zeros((len(points), 3))
+        met = np.flatnonzero(hit >= 0)
+        normal = normals(self._corners[hit[met]])
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        to = np.einsum("ij,ij->i", self._corners[hit[met], 0] - points[met], normal)
+        turn = np.einsum("ij,ij->i", along[met], normal)
+        far[met] = np.divide(to, turn, out=np.zeros(len(met)), where=turn != 0)
+        facing[met] = normal
+        return far, facing
+
+    def inside(self, points: Floats, roofed: bool = True) -> Bools:
+        """(n,) which of (n, 3) points are between walls, and under a roof if there are ``roofed``
+        ones."""
         found: Bools = self._hit(points, np.tile([0.0, 1.0, 0.0], (len(points), 1))) >= 0
+        found |= not roofed
         under = np.flatnonzero(found)
         along = np.tile(self._level, (len(under), 1))
         met = self._hit(np.repeat(points[under], _RAYS, axis=0), along) >= 0

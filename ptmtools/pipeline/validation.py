@@ -75,6 +75,6 @@ def structure_of(db: str | os.PathLike[str]) -> tuple[NDArray[np.float64], Cells
     Raises as `shoot_segments`.
     """
     artifacts = Artifacts(open_database(db))
-    options, scene = artifacts.recorded(CELLS), artifacts[SCENE]
-    corners = scene.corners[structural_triangles(scene, options)]
-    return corners, artifacts[CELLS], artifacts[PVS]
+    options, scene, cells = artifacts.recorded(CELLS), artifacts[SCENE], artifacts[CELLS]
+    corners = scene.corners[structural_triangles(scene, options, cells.opened)]
+    return corners, cells, artifacts[PVS]

@@ -1,0 +1,146 @@
+"""Which slabs close an opening in a wall, told by rays from around them.
+
+Beside a door leaf and above it stands a wall, which rays across the leaf find in both directions,
+as far apart as walls are thick. In front of the leaf, or behind it, are the reveals of the opening,
+below it is floor, and on both sides somebody has room to stand. A panel in a wall has no reveals,
+one between two pillars no wall above, a cupboard door no wall beside it, a shutter no floor below,
+and behind the back of a niche or a door on a wall is no room.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Floats
+from ptmtools.cells.slabs import Slabs
+from ptmtools.cells.structure import Structure
+from ptmtools.cells.surroundings import Surroundings
+
+#: An opening is so wide, metres.
+WIDE = (0.6, 2.4)
+#: The wall, or the frame, is looked for this far beside the leaf, metres.
+_BESIDE = 0.05
+#: The leaf may stand proud of it by so much, and the reveals are at least as deep, metres.
+_PROUD, _REVEAL = 0.03, 0.02
+#: A leaf ends so near to the jambs and the lintel, and on one of its sides to the floor, metres: on
+#: the other may be a step, or no ground.
+_GAP = 0.05
+#: Panels and handles stand off a leaf by less than this, and so far is free on both sides, metres.
+RELIEF, _FREE = 0.06, 0.5
+#: Where along a side rays begin, as shares of it, and how many of three must agree.
+_SHARES, _MOST = np.array([0.2, 0.5, 0.8]), 2 / 3
+#: What a ray meets is square to it if its cosine is at least this.
+_SQUARE = 0.9
+
+
+def closing(slabs: Slabs, structure: Structure, wall_thickness: float) -> Bools:
+    """(k,) which slabs, each a leaf or a pair of them, close an opening in a wall of at most this
+    thickness, metres."""
+    slack = structure.tolerance.plane
+    wide = slabs.size[:, 1]
+    fits = (wide >= WIDE[0] - slack) & (wide <= WIDE[1] + slack)
+    found = np.zeros(len(slabs), dtype=bool)
+    if fits.any():
+        rays = _Rays(slabs.only(fits), Surroundings(structure.corners))
+        found[fits] = _closing(rays, wall_thickness)
+    return found
+
+
+def parting(slabs: Slabs, structure: Structure) -> Bools:
+    """(k,) which slabs have room on both sides: a door on a wall, or one that stands open against
+    it, parts nothing."""
+    if not (len(slabs) and len(structure.corners)):
+        return np.ones(len(slabs), dtype=bool)
+    return _Rays(slabs, Surroundings(structure.corners)).free()
+
+
+def _closing(rays: _Rays, wall_thickness: float) -> Bools:
+    half = rays.size[:, 0] / 2
+    walls = [_wall(rays, *side, half, wall_thickness) for side in _SIDES]
+    found: Bools = np.all([np.isfinite(ahead) for ahead, _ in walls], axis=0)
+    revealed, floors = np.zeros(len(found), dtype=bool), []
+    for k, turn in ((0, 1.0), (1, -1.0)):
+        depth = np.minimum(walls[0][k], walls[1][k]) - half
+        depth = np.where(np.isfinite(depth), depth, 0.0)
+        revealed |= (depth >= _REVEAL) & _revealed(rays, turn * (half + depth / 2))
+        room = np.maximum(walls[0][k], walls[1][k])
+        room = np.where(np.isfinite(room), room, 0.0) + 2 * _GAP
+        below = rays.at(turn * room, _SHARES, np.zeros(3), above=2 * _GAP)
+        floors.append(np.median(rays.meet(below, (0, 0, -1))[0], axis=1) - 2 * _GAP)
+    found &= revealed & (np.minimum(*floors) <= _GAP) & rays.free()
+    return found
+
+
+def _wall(
+    rays: _Rays, along: Floats, up: Floats, aside: float, above: float, half: Floats, limit: float
+) -> tuple[Floats, Floats]:
+    """(k,) and (k,): how far ahead of the middle of the leaf, and how far behind, the faces of the
+    wall at one side of it are; infinite where no wall is."""
+    start = rays.at(np.zeros(len(half)), along, up, aside, above)
+    (ahead, square), (behind, squared) = (rays.meet(start, (turn, 0, 0)) for turn in (1, -1))
+    within = np.minimum(ahead, behind) >= half[:, None] - _PROUD
+    wall = within & square & squared & (ahead + behind <= limit)
+    stands = wall.mean(axis=1) >= _MOST
+    first, second = (np.where(wall, far, 0.0).max(axis=1) for far in (ahead, behind))
+    return np.where(stands, first, np.inf), np.where(stands, second, np.inf)
+
+
+def _revealed(rays: _Rays, depth: Floats) -> Bools:
+    """(k,) which leaves have the sides and the top of an opening in front of them, (k,) metres
+    from the middle of each."""
+    found = np.ones(len(depth), dtype=bool)
+    middle = rays.at(depth, np.full(3, 0.5), _SHARES)
+    for turn in (1, -1):
+        far, square = rays.meet(middle, (0, turn, 0))
+        jamb = square & (np.abs(far - rays.size[:, 1, None] / 2) <= _GAP)
+        found &= jamb.mean(axis=1) >= _MOST
+    top = rays.at(depth, _SHARES, np.ones(3), above=-2 * _GAP)
+    far, square = rays.meet(top, (0, 0, 1))
+    found &= (square & (far <= 3 * _GAP)).mean(axis=1) >= _MOST
+    return found
+
+
+#: Where beside a leaf the wall is looked for: shares along and up, and metres beyond them.
+_SIDES: tuple[tuple[Floats, Floats, float, float], ...] = (
+    (np.zeros(3), _SHARES, -_BESIDE, 0.0),
+    (np.ones(3), _SHARES, _BESIDE, 0.0),
+    (_SHARES, np.ones(3), 0.0, _BESIDE),
+)
+#: Points all over a leaf: shares along and up.
+_GRID = np.repeat(_SHARES, 3), np.tile(_SHARES, 3)
+
+
+class _Rays:
+    """Rays from around slabs, in the axes of each."""
+
+    def __init__(self, slabs: Slabs, around: Surroundings) -> None:
+        self._slabs, self._around = slabs, around
+        self.size = slabs.size
+
+    def at(
+        self, depth: Floats, along: Floats, up: Floats, aside: float = 0.0, above: float = 0.0
+    ) -> Floats:
+        """(k, p, 3) points (k,) metres across from the middle of each, at (p,) shares of what it
+        is along and up, and metres beyond these."""
+        low, size = self._slabs.low[:, None], self.size[:, None]
+        across = low[..., 0] + size[..., 0] / 2 + depth[:, None] + 0 * along
+        along = low[..., 1] + along * size[..., 1] + aside
+        return np.stack([across, along, low[..., 2] + up * size[..., 2] + above], axis=2)
+
+    def free(self) -> Bools:
+        """(k,) which slabs have room in front of them and behind."""
+        found = np.ones(len(self.size), dtype=bool)
+        for turn in (1, -1):
+            ahead = self.at(turn * (self.size[:, 0] / 2 + RELIEF), *_GRID)
+            found &= (self.meet(ahead, (turn, 0, 0))[0] >= _FREE).mean(axis=1) >= _MOST
+        return found
+
+    def meet(self, start: Floats, to: tuple[float, float, float]) -> tuple[Floats, Bools]:
+        """(k, p) how far away it is what rays from (k, p, 3) points meet first, and whether that
+        is square to them."""
+        axes = self._slabs.axes
+        points = np.einsum("kpa,kac->kpc", start, axes)
+        along = np.broadcast_to((np.array(to) @ axes)[:, None], points.shape)
+        far, facing = self._around.first(points.reshape(-1, 3), along.reshape(-1, 3))
+        square = np.abs(np.einsum("pc,pc->p", facing, along.reshape(-1, 3))) >= _SQUARE
+        return far.reshape(start.shape[:2]), square.reshape(start.shape[:2])

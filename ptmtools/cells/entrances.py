@@ -1,0 +1,177 @@
+"""Which doors open, and the portals that this brings.
+
+The building is divided as if all doors were shut. A door opens if both its sides are inside: if
+the flood came there, or if somebody could be there that it did not come to (`cut_off`). Then its
+leaves no longer block: what they covered in the planes of the tree becomes portals, and nothing
+need be divided again. An entrance has nothing but the outside on one side, and stays shut, as does
+the door of a cupboard in which nobody can stand. So a closed model stays closed.
+
+Of an open model the outside may be reached like any room: through a window. There somebody inside
+has walls around, glass included, and a roof over the head, if the building has any.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.bsp import Tree
+from ptmtools.cells.cut_off import Unreached
+from ptmtools.cells.door_planes import DoorPlanes
+from ptmtools.cells.doors import DoorLeaf, find_doors
+from ptmtools.cells.doorways import RELIEF
+from ptmtools.cells.model import sunk
+from ptmtools.cells.options import SubdivideOptions
+from ptmtools.cells.portals import Portal, find_portals
+from ptmtools.cells.reach import ROOFED, flood, roofed_share
+from ptmtools.cells.structure import Opaque, Structure
+from ptmtools.cells.surroundings import Surroundings
+from ptmtools.scene.model import Scene
+
+#: What is so far from a leaf, in front and behind, metres, is beyond it.
+_BEYOND = 0.1
+#: Somebody who comes through an open door has so much, metres, of the way before and behind it
+#: inside: under a porch one soon is not.
+_WAY = (0.5, 1.0, 2.0)
+#: Most of the points over a side of a leaf say where that side is.
+_MOST = 0.5
+
+
+@dataclass(frozen=True)
+class Doors:
+    """The door leaves of a building, and what there is to tell its inside from the outside."""
+
+    leaves: list[DoorLeaf]
+    of: Ints  # (T,) the leaf that each triangle of the structure is of, or -1
+    glass: Floats  # (n, 3, 3) what is transparent, metres
+    roofed: bool  # whether the building has roofs or ceilings
+    planes: DoorPlanes
+
+    @staticmethod
+    def found(
+        scene: Scene, opaque: Opaque, structure: Structure, options: SubdivideOptions
+    ) -> tuple[Doors, Structure]:
+        """The doors of a scene, and its structure with every triangle of theirs as it was."""
+        leaves = find_doors(scene, opaque, structure, options)
+        leaf = np.full(len(scene.triangles), -1)
+        for i, door in enumerate(leaves):
+            leaf[door.triangles] = i
+        glass, roofed = np.zeros((0, 3, 3)), True
+        if leaves:
+            structure = Structure.made(opaque, structure.tolerance, leaf >= 0)
+            glass = scene.corners[~scene.opaque]
+            roofed = roofed_share(structure.corners, options.wall_area) >= ROOFED
+        of = leaf[structure.source]
+        across = np.array([door.axes[0] for door in leaves]).reshape(-1, 3)
+        return Doors(leaves, of, glass, roofed, DoorPlanes.of(structure, of, across)), structure
+
+    def triangles(self, which: Bools) -> NDArray[np.int32]:
+        """The triangles of the scene, ascending, that some of the (d,) leaves consist of."""
+        each = [self.leaves[i].triangles for i in np.flatnonzero(which)]
+        return np.unique(np.concatenate([np.zeros(0, np.int64), *each])).astype(np.int32)
+
+    def between(self, tree: Tree, within: Bools) -> Bools:
+        """(d,) which leaves have insides, the (L,) leaves of the tree ``within``, on both sides."""
+        found = np.zeros(len(self.leaves), dtype=bool)
+        for i, door in enumerate(self.leaves):
+            sides = (sunk(tree.planes, tree.children, side) for side in door.grid(_BEYOND))
+            found[i] = all(within[-2 - at].mean() > _MOST for at in sides)
+        return found
+
+    def sheltered(self, structure: Structure) -> Bools:
+        """(d,) which leaves have, on both sides, walls around whoever goes there, and a roof."""
+        around = Surroundings(np.concatenate([structure.corners, self.glass]))
+        found = np.zeros(len(self.leaves), dtype=bool)
+        for i, door in enumerate(self.leaves):
+            found[i] = all(
+                around.inside(points, self.roofed).all() for points in _ways(door, around)
+            )
+        return found
+
+    def lead_out(self, portals: list[Portal], outside: Bools) -> Bools:
+        """(d,) which leaves have portals around them that lead ``outside``, (L,): the frames of
+        some leave a gap into the wall."""
+        out = [p.polygon for p in portals if outside[p.leaves[0]] != outside[p.leaves[1]]]
+        reach = np.array([RELIEF, _BEYOND, _BEYOND])
+        found = np.zeros(len(self.leaves), dtype=bool)
+        for i, door in enumerate(self.leaves):
+            for local in (polygon @ door.axes.T for polygon in out):
+                low, high = local.min(axis=0), local.max(axis=0)
+                found[i] |= ((high >= door.low - reach) & (low <= door.high + reach)).all()
+        return found
+
+
+def _ways(door: DoorLeaf, around: Surroundings) -> Iterator[Floats]:
+    """The points on the way through a door, in front of it and behind."""
+    for side, turn in zip(door.grid(RELIEF), (1.0, -1.0), strict=True):
+        start, to = side.mean(axis=0), turn * door.axes[0]
+        free = around.first(start[None], to[None])[0][0]
+        far = [d for d in _WAY if d < free] or [free / 2]
+        yield start + np.array(far)[:, None] * to
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A tree and its portals when doors are open."""
+
+    doors: Bools  # (d,) which leaves do not block
+    tree: Tree
+    portals: list[Portal]
+
+
+def open_doors(
+    doors: Doors,
+    structure: Structure,
+    tree: Tree,
+    portals: list[Portal],
+    start: tuple[int, ...],
+    beyond: Unreached,
+    outer: Bools,
+) -> Opened | None:
+    """What becomes of a tree when all doors open that lead from inside to inside; None if none
+    does.
+
+    ``start``, ``beyond``: where the flood began, and where it did not come to. ``outer``: (L,) the
+    leaves at the box around a closed model, in which the flood must not end.
+    """
+    within = flood(len(tree.leaves), portals, start)
+    for room in beyond.rooms:
+        within[room.leaves] = True
+    which = doors.between(tree, within)
+    if which.any() and not outer.any():
+        which &= doors.sheltered(structure)
+    rooms = tuple(np.flatnonzero(within).tolist())
+    outside = flood(len(tree.leaves), portals, tuple(np.flatnonzero(outer).tolist()))
+    while which.any():
+        way = _opened(doors, which, structure, tree, portals)
+        if not (flood(len(tree.leaves), way.portals, rooms) & outer).any():
+            return way
+        out = doors.lead_out(way.portals, outside) & which
+        which = which & ~out & out.any()
+    return None
+
+
+def _opened(
+    doors: Doors, which: Bools, structure: Structure, tree: Tree, portals: list[Portal]
+) -> Opened:
+    """With ``which``, (d,), of the doors open."""
+    free = np.append(which, False)[doors.of]
+    near = structure.tolerance.plane
+    walls, fresh = list(tree.walls), []
+    for node, wall in enumerate(tree.walls):
+        flat = structure.nearby.between(wall.frame.plane, -near, near)
+        if free[flat].any():
+            flat = flat[structure.lie_in(wall.frame.plane, flat)]
+        if free[flat].any():
+            blocking = structure.united(wall.frame, flat[~free[flat]])
+            walls[node] = replace(wall, blocking=blocking)
+            fresh.append(node)
+    tree = replace(tree, walls=tuple(walls))
+    stale = set(fresh)
+    found = [portal for portal in portals if portal.node not in stale]
+    found += find_portals(tree, structure.tolerance, fresh)
+    return Opened(which, tree, sorted(found, key=lambda portal: portal.node))
