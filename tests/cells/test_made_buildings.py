@@ -104,6 +104,17 @@ def test_door_leaves_are_drawn_unless_hidden(doors: str, drawn: bool, tmp_path: 
     assert (scene.objects.index("Zimmertür") in shown) == drawn
 
 
+@pytest.mark.parametrize(("doors", "walks"), [("open", True), ("closed", False)])
+def test_one_walks_through_a_door_leaf_that_is_open(
+    doors: str, walks: bool, tmp_path: Path
+) -> None:
+    made = DOORS["two rooms and a door leaf, by its name"]
+    scene = made.scene(tmp_path)
+    cells = subdivide(scene, SubdivideOptions(doors=doors))
+    in_the_leaf = made.in_world(scene, [(5.075, 2.45, 1.6)])
+    assert cells.eyes.contains(in_the_leaf).tolist() == [walks]
+
+
 @pytest.mark.parametrize("name", EMPTY)
 def test_an_empty_world_is_an_error_with_a_remedy(name: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"--two-sided.*PTM-I304"):
