@@ -75,9 +75,8 @@ def places(
     """At most ``count``, those with the largest floors first."""
     eye = avatar_size[1]
     rooms = []
-    leaves = largest_leaves(cells, max(_LEAVES, _PER_ROOM * count))
-    middle = np.array([cells.leaf_points(leaf).mean(axis=0) for leaf in leaves])
-    for leaf, floor in zip(leaves, ground.below(middle).tolist(), strict=True):
+    for leaf in largest_leaves(cells, max(_LEAVES, _PER_ROOM * count)):
+        floor = _floor(cells, leaf, ground)
         section = leaf_section(cells, leaf, floor + eye)
         if len(section) >= 3:
             rooms.append(_Room(leaf, floor, section))
@@ -108,6 +107,16 @@ def largest_leaves(cells: Cells, count: int) -> list[int]:
         if len(found) == count:
             break
     return found
+
+
+def _floor(cells: Cells, leaf: int, ground: Ground) -> float:
+    """The height of the floor of a leaf, and not of the table in its middle: half of it is no
+    higher."""
+    middle = cells.leaf_points(leaf).mean(axis=0)
+    section = leaf_section(cells, leaf, float(middle[1]))
+    plan = _grid(section) if len(section) >= 3 else middle[None, [0, 2]]
+    below = np.sort(ground.below(np.insert(plan, 1, middle[1], axis=1)))
+    return float(below[len(below) // 2])
 
 
 def _place_in(
