@@ -30,13 +30,12 @@ class EyeRegion:
     def clipped(self, low: Floats, high: Floats) -> tuple[Floats, Floats]:
         """What of the box between two corners eyes can be in, as a box; as it is if it is flat or
         they can be nowhere in it."""
-        over = self._nearby.meeting(low - [0, self._reach, 0], high)
-        height = self._floor[over][:, :, 1]
-        least, most = height.min(initial=np.inf), height.max(initial=-np.inf) + self._reach
-        bottom, top = max(low[1], least), min(high[1], most)
-        if bottom >= top:
+        corners = self._floor[self._nearby.meeting(low - [0, self._reach, 0], high)].reshape(-1, 3)
+        if not len(corners):
             return low, high
-        return np.array([low[0], bottom, low[2]]), np.array([high[0], top, high[2]])
+        bottom = np.maximum(low, corners.min(axis=0))
+        top = np.minimum(high, corners.max(axis=0) + [0, self._reach, 0])
+        return (bottom, top) if (bottom < top).all() else (low, high)
 
     def contains(self, points: Floats) -> Bools:
         """(n,) whether it contains each of the (n, 3) points."""

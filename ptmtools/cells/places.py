@@ -50,19 +50,21 @@ PLAN = [0, 2]
 
 @dataclass(frozen=True)
 class Floors:
-    """The flat regions of all that is nearly level and no detail; one-sided faces from their front
-    only, or the inside of a solid would be a room."""
+    """The flat regions of all that is nearly level and no detail."""
 
     corners: Floats  # (n, 3, 3) metres
     region: Ints  # (n,) ascending from 0
 
     @staticmethod
-    def of(scene: Scene, structure: Structure, options: SubdivideOptions) -> Floors:
-        """The floors of a scene."""
+    def of(
+        scene: Scene, structure: Structure, options: SubdivideOptions, *, backs: bool = False
+    ) -> Floors:
+        """The floors of a scene, of one-sided faces the fronts only, or the inside of a solid would
+        be a room; or their ``backs`` as well."""
         detail = named(scene, options.detail) & ~named(scene, options.structural)
         detail[structure.detail] = True
         normal = normals(scene.corners)
-        up = np.where(scene.two_sided, np.abs(normal[:, 1]), normal[:, 1])
+        up = np.where(scene.two_sided | backs, np.abs(normal[:, 1]), normal[:, 1])
         level = up > FLOOR_COSINE * np.linalg.norm(normal, axis=1)
         mesh = Welded.of(scene.points, scene.triangles[np.flatnonzero(level & ~detail)])
         facets = Facets.of(mesh, scene.tolerance)

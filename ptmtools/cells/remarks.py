@@ -21,10 +21,11 @@ from ptmtools.scene.model import Scene
 NAMED = 3
 #: A greater share of all places is much to leave out.
 MUCH = 0.1
+#: And of the volume, of what nobody sees.
+MUCH_UNSEEN = 0.02
 #: What is said where there is nothing to stand on.
 NO_PLACES = Warned(
-    "there is no floor on which somebody could stand, so visitors may be anywhere in the cells; "
-    "if floors face down, --two-sided helps"
+    "there is no floor on which somebody could stand, so visitors may be anywhere in the cells"
 )
 
 
@@ -100,10 +101,12 @@ def of_leaves(cells: Cells, reached: Bools) -> list[str]:
     unseen = cells.leaf_cell < 0
     if unseen.any():
         volume, leaves = cells.leaf_volumes(), count(int(unseen.sum()), "leaf", "leaves")
-        notes.append(
-            f"{leaves} ({volume[unseen].sum() / volume.sum():.1%} of the volume) cannot be seen "
-            "from where one can stand; dropped, as --standing anywhere would not"
+        share = volume[unseen].sum() / volume.sum()
+        note = (
+            f"{leaves} ({share:.1%} of the volume) cannot be seen from where one can stand; "
+            "dropped, as --standing anywhere would not"
         )
+        notes.append(Warned(note) if share > MUCH_UNSEEN else note)
     return notes
 
 

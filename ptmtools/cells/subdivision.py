@@ -70,7 +70,8 @@ class _Model:
     structure: Structure
     walls: list[WallPlane]
     reveals: Reveals
-    floors: Floors
+    floors: Floors  # from their fronts
+    footing: Floors  # from either side: in space that is reached, one may stand on both
     doors: Doors
     options: SubdivideOptions
 
@@ -83,7 +84,10 @@ class _Model:
         walls = find_walls(structure, options.wall_area)
         reveals = Reveals(structure, options.wall_thickness)
         floors = Floors.of(scene, structure, options)
-        return _Model(structure, walls, reveals, floors, doors, options)
+        footing = floors
+        if not scene.two_sided.all():
+            footing = Floors.of(scene, structure, options, backs=True)
+        return _Model(structure, walls, reveals, floors, footing, doors, options)
 
 
 @dataclass(frozen=True)
@@ -94,7 +98,6 @@ class _Space:
     tree: Tree
     portals: list[Portal]
     reached: Bools  # (L,) which leaves somebody can reach
-    viewers: tuple[int, ...]  # those with a viewpoint that was asked for
     closed: bool  # whether they do not touch the root box
     beyond: Unreached  # where the flood did not come to; reached all the same if asked for
     place: float  # m² to stand on where it did, known if something is left out
@@ -198,9 +201,9 @@ def _divide(
     tree = build_tree(root, structure, model.walls, model.reveals, planes, options, progress)
     portals = find_portals(tree, structure.tolerance)
     outer = at_box(tree)
-    viewers = _viewpoint_leaves(tree, box, options)
+    start = _viewpoint_leaves(tree, box, options)
     walker = Walker(*options.walker)
-    start = viewers or largest_leaf(tree, outer <= inside, structure.corners, walker)
+    start = start or largest_leaf(tree, outer <= inside, structure.corners, walker)
     reached = flood(len(tree.leaves), portals, start)
     closed = bool(start) and not bool(np.any(reached & outer))
     beyond, place = Unreached([]), 0.0
@@ -225,8 +228,7 @@ def _divide(
         joint = rejoined(tree, group)
         portals = portals_rejoined(portals, tree, joint, structure.tolerance)
         tree, reached = joint.tree, np.bincount(joint.leaf, reached) > 0
-        viewers = tuple(joint.leaf[list(viewers)].tolist())
-    return _Space(box, tree, portals, reached, viewers, closed, beyond, place, doors)
+    return _Space(box, tree, portals, reached, closed, beyond, place, doors)
 
 
 def _viewpoint_leaves(tree: Tree, box: Floats, options: SubdivideOptions) -> tuple[int, ...]:
@@ -281,9 +283,20 @@ def _standing(model: _Model, bodies: list[Polyhedron], opened: Bools) -> tuple[B
     boxes = np.array([_bounds(body.points) for body in bodies]).reshape(-1, 2, 3)
     in_the_way = ~np.append(opened, False)[model.doors.of]
     structure = replace(model.structure, corners=model.structure.corners[in_the_way])
-    places = find_places(model.floors, structure, walker, boxes)
+    places = find_places(model.footing, structure, walker, boxes)
     eyes = eye_region(places, walker, tolerance)
     return meets(eyes, bodies, walker, tolerance), eyes.triangles()
+
+
+def _with_a_view(
+    scene: Scene, model: _Model, space: _Space, rename: NDArray[np.int32]
+) -> NDArray[np.int32]:
+    """The leaves, renamed, in which there is a viewpoint that was asked for, or a camera."""
+    eyes = np.array([*model.options.viewpoints, *(camera.position for camera in scene.cameras)])
+    eyes = eyes.reshape(-1, 3)
+    eyes = eyes[((eyes >= space.box[0]) & (eyes <= space.box[1])).all(axis=1)]
+    leaf: NDArray[np.int32] = rename[-2 - sunk(space.tree.planes, space.tree.children, eyes)]
+    return leaf[leaf >= 0]
 
 
 def _assemble(
@@ -300,10 +313,10 @@ def _assemble(
     rename = _named(keep)
     bodies = [tree.leaves[i] for i in np.flatnonzero(keep)]
     standing, eye_floor = _standing(model, bodies, space.doors)
-    standing[rename[list(space.viewers)]] = True
     if not standing.any():
         standing[:], eye_floor = True, eye_floor[:0]
         notes = [*notes, NO_PLACES]
+    standing[_with_a_view(scene, model, space, rename)] = True
     portals = [portal for portal in space.portals if keep[[*portal.leaves]].all()]
     ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
     children = tree.children.copy()

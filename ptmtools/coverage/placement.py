@@ -95,6 +95,11 @@ class Volume:
             for c in range(cells.cell_count)
         ]
 
+    @property
+    def everywhere(self) -> bool:
+        """Whether eyes may be anywhere in it."""
+        return self.empty or self._eyes.everywhere
+
     def anywhere(self) -> Volume:
         """The same leaves, with eyes anywhere in them."""
         everywhere = EyeRegion(np.zeros((0, 3, 3)), self._cells.walker)

@@ -25,8 +25,6 @@ from ptmtools.visibility.model import Pvs
 #: The default clearance as a share of the thinnest that a cell may be, so that even such a cell
 #: has usable points.
 CLEARANCE = 0.25
-#: Points of a sequence among which one is to be where eyes can be.
-PROBE = 1 << 12
 #: Points of each of the groups that a tolerance is first tried with.
 FIRST = 8
 #: What a bound falls by, about, as the points are doubled (K^-0.6): one that falls faster has luck,
@@ -77,19 +75,21 @@ class Sampler:
 
     def of_cell(self, cell: int) -> CellHints:
         """The hints of one cell."""
-        finder = PointFinder(self._volume(cell), self._obstacles, self._clearance)
+        finder = PointFinder(self._volumes[cell], self._obstacles, self._clearance)
         owners = self._counter.owners
         wanted, begin = owners.in_cells(self.pvs.row(cell))
 
         def count(points: SamplePoints) -> Tally:
             return self._counter.count(points, wanted)
 
-        if self.options.tolerance is None:
-            points = self._points(finder)
-            points = points if len(points) else finder.least_bad()
-            tally, group = count(points), grouped(len(points), self.options.placed != "kd")
-        else:
-            tally, group = self._until_certain(finder, count, begin, self.options.tolerance)
+        found = self._tallied(finder, count, begin)
+        if found is None and not finder.volume.everywhere:  # hardly anywhere in it eyes can be
+            finder = replace(finder, volume=finder.volume.anywhere())
+            found = self._tallied(finder, count, begin)
+        if found is None:
+            points = finder.least_bad()
+            found = count(points), np.zeros(len(points), dtype=np.int64)
+        tally, group = found
         owned = shares(tally.in_views.sum(axis=0))
         met = np.flatnonzero(owned)
         entry = np.searchsorted(begin, met, "right") - 1
@@ -105,10 +105,16 @@ class Sampler:
             texture_value=owned[met],
         )
 
-    def _volume(self, cell: int) -> Volume:
-        """Where eyes can be in a cell; anywhere in its leaves if that is too little to be found."""
-        volume = self._volumes[cell]
-        return volume if len(volume.sobol(0, PROBE, self.options.seed)) else volume.anywhere()
+    def _tallied(
+        self, finder: PointFinder, count: Callable[[SamplePoints], Tally], begin: Ints
+    ) -> tuple[Tally, Ints] | None:
+        """What is seen, and the (K,) group of each point; None if there is none."""
+        if self.options.tolerance is not None:
+            return self._until_certain(finder, count, begin, self.options.tolerance)
+        points = self._points(finder)
+        if not len(points):
+            return None
+        return count(points), grouped(len(points), self.options.placed != "kd")
 
     def _points(self, finder: PointFinder) -> SamplePoints:
         options = self.options
@@ -122,9 +128,9 @@ class Sampler:
         count: Callable[[SamplePoints], Tally],
         begin: Ints,
         tolerance: float,
-    ) -> tuple[Tally, Ints]:
-        """What is seen, and the (K,) group of each point: of eight independent sequences as many
-        points as make the hints certain, doubled until they are."""
+    ) -> tuple[Tally, Ints] | None:
+        """`_tallied` at points of eight independent sequences, as many as make the hints certain,
+        doubled until they are."""
         options = self.options
         seeds = ((options.seed << 3) + g + (1 << 35) for g in range(GROUPS))
         sequences = [PointSequence(finder, options.placed, seed) for seed in seeds]
@@ -137,8 +143,7 @@ class Sampler:
             added = np.repeat(np.arange(GROUPS), [len(part) for part in parts])
             points = SamplePoints.join(parts)
             if not len(added) and not found:
-                points = finder.least_bad()
-                return count(points), np.zeros(len(points), dtype=np.int64)
+                return None
             found = [Tally.join([*found, count(points)])]
             group = np.concatenate([group, added])
             by_cell = found[0].grouped(begin).at_points

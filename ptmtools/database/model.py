@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from ptmtools.texture.model import Level
 
 Vector = tuple[float, float, float]
-#: From the eyes to the top of the head, metres.
-BROW = 0.1
+#: Height of the eyes as a share of somebody's own: 1.6 m of 1.7.
+EYE = 1.6 / 1.7
 
 
 @dataclass(frozen=True)
@@ -117,8 +117,8 @@ class EmitOptions:
     viewpoint_count: give viewpoints to at most this many further rooms, the largest first. They are
         listed in the order of a walk through them.
     avatar_size: the visitor: distance kept from walls, eye height above the floor, and highest step
-        climbed, all in metres. By default those of the --walker of the cells, with the eyes 0.1 m
-        below its height.
+        climbed, all in metres. By default those of the --walker of the cells, with the eyes at
+        0.94 of its height.
     field_of_view: field of view of viewpoints that are not cameras of the model, in radians.
     gzip: also write a gzip copy of each VRML and JSON file, such as root.wrl.gz, for servers that
         send precompressed files.
@@ -161,7 +161,7 @@ class EmitOptions:
 
     def avatar(self, walker: Walker) -> Vector:
         """``avatar_size``, if need be that of whoever walks in the cells."""
-        eye = round(walker.height - BROW, 6)
+        eye = round(walker.height * EYE, 6)
         return self.avatar_size or (walker.radius, eye, walker.step)
 
 

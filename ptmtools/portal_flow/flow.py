@@ -119,25 +119,18 @@ def portal_flow(
     Raises InputError PTM-I400 (arrays that do not fit together), PTM-I401 (a coordinate
     that is not finite); LimitError PTM-L400 (more portals than fit into memory).
     """
-    check(portals)
-    count = 2 * len(portals.leaf)
-    words = (count + 63) // 64
-    if 2 * count * words * 8 > MATRIX_BYTES:
-        raise LimitError(
-            "PTM-L400",
-            f"{count // 2:,} portals are too many for the portal flow",
-            remedy="subdivide less finely (a larger --wall-area, or --max-leaves)",
-        )
-    cut = np.zeros(count, dtype=np.bool_)
+    bound = upper_bound(portals, executor)
+    known, cut = bound.sees, bound.cut.repeat(2)
+    count = len(known)
     counts = np.zeros((4, count), dtype=np.int64)
     if count == 0:
-        return PortalFlow(np.zeros((0, words), dtype=np.uint64), cut, *counts)
+        return bound
 
     from ptmtools.portal_flow.searching import Searching, search_from, settle
 
     g = geometry(portals)
     together = BATCH // 8
-    searching = Searching(g, _prepass(g, executor), budget)
+    searching = Searching(g, known, budget)
     sizes = BITS_OF_BYTE[searching.known.view(np.uint8)].sum(axis=1)
     order = np.argsort(sizes, kind="stable")
     with executor.sharing(searching, releases_lock=True) as shared:
@@ -151,6 +144,27 @@ def portal_flow(
             shared.change(settle, (batch, np.stack([seen for seen, _ in found])))
             progress(min(first + BATCH, count), count, "portals")
     return PortalFlow(searching.known, cut[0::2] | cut[1::2], *(counts[:, 0::2] + counts[:, 1::2]))
+
+
+def upper_bound(
+    portals: Portals,
+    executor: Executor = Serial(),  # noqa: B008 - has no state
+) -> PortalFlow:
+    """What `portal_flow` begins with: its sets before any search. Raises what it raises."""
+    check(portals)
+    count = 2 * len(portals.leaf)
+    words = (count + 63) // 64
+    if 2 * count * words * 8 > MATRIX_BYTES:
+        raise LimitError(
+            "PTM-L400",
+            f"{count // 2:,} portals are too many for the portal flow",
+            remedy="subdivide less finely (a larger --wall-area, or --max-leaves)",
+        )
+    known = np.zeros((count, words), dtype=np.uint64)
+    if count:
+        known = _prepass(geometry(portals), executor)
+    none = np.zeros(count // 2, dtype=np.int64)
+    return PortalFlow(known, none.astype(np.bool_), none, none, none, none)
 
 
 def leaf_matrix(portals: Portals, flow: PortalFlow) -> Bools:

@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.cells.model import Cells
@@ -118,7 +119,7 @@ def check_conservative(
 
     visible = np.zeros((cells.cell_count + 1,) * 2, dtype=np.bool_)  # the last one was dropped
     visible[:-1, :-1] = pvs.to_matrix()
-    draw, stands = Sampler(cells), _Eyes(cells)
+    draw, eyes = Sampler(cells), _Eyes(cells)
     blockers = Blockers(structural, cells.root_box)
     jitter = JITTER * cells.tolerance.hairline
     tried = unoccluded = hairlines = drawn = batch = 0
@@ -128,7 +129,7 @@ def check_conservative(
         size = min(BATCH, segments - tried)
         start, end = draw.segments(rng, size)
         drawn, batch = drawn + size, batch + 1
-        start, end = stands.first(start, end)
+        start, end = eyes.first(start, end)
         tried += len(start)
         a, b = cells.locate(start), cells.locate(end)
         clear = ~blockers.between(start, end)
@@ -140,7 +141,7 @@ def check_conservative(
             shift *= jitter / np.linalg.norm(shift, axis=1, keepdims=True)
             p, q = start[missed] + shift, end[missed] + shift
             seen = visible[cells.locate(p), cells.locate(q)]
-            counts_as_miss = stands.within(p) & (cells.locate_leaf(q) >= 0) & ~seen
+            counts_as_miss = (cells.locate_leaf(p) >= 0) & (cells.locate_leaf(q) >= 0) & ~seen
             counts_as_miss &= ~blockers.between(p, q)
             share += counts_as_miss / COPIES
         hairlines += int((share < 0.5).sum())
@@ -155,26 +156,27 @@ def check_conservative(
 
 
 class _Eyes:
-    """Where an eye can be."""
+    """Where an eye can be: in the eye region, whatever is said of leaves, or else in those in which
+    somebody can stand."""
 
     def __init__(self, cells: Cells) -> None:
         self._cells, self._eyes = cells, cells.eyes
 
-    def within(self, points: Floats) -> Bools:
-        """(n,) which of the (n, 3) points are in a leaf in which somebody can stand."""
-        leaf = self._cells.locate_leaf(points)
-        return (leaf >= 0) & self._cells.leaf_standing[leaf]
+    def at(self, points: Floats, leaf: NDArray[np.int32]) -> Bools:
+        """(n,) whether one can be at the (n, 3) points, in (n,) leaves or -1."""
+        found = leaf >= 0
+        if self._eyes.everywhere:
+            return np.asarray(found & self._cells.leaf_standing[leaf])
+        found[found] = self._eyes.contains(points[found])
+        return found
 
     def first(self, start: Floats, end: Floats) -> tuple[Floats, Floats]:
         """Of segments between (n, 3) points those that begin where an eye can be and end in a leaf;
         turned round where only the end is such a place."""
-        in_leaf = [self._cells.locate_leaf(points) >= 0 for points in (start, end)]
-        eye = [self.within(points) for points in (start, end)]
-        for points, sees in zip((start, end), eye, strict=True):
-            sees[sees] = self._eyes.contains(points[sees])
-        kept = in_leaf[0] & in_leaf[1] & (eye[0] | eye[1])
-        turned = ~eye[0][kept, None]
-        start, end = start[kept], end[kept]
+        leaf, other = self._cells.locate_leaf(start), self._cells.locate_leaf(end)
+        eye = self.at(start, leaf)
+        kept = (leaf >= 0) & (other >= 0) & (eye | self.at(end, other))
+        start, end, turned = start[kept], end[kept], ~eye[kept, None]
         return np.where(turned, end, start), np.where(turned, start, end)
 
 

@@ -13,7 +13,7 @@ from ptmtools.cells.gain import join_by_gain
 from ptmtools.cells.options import WALKER
 from ptmtools.coverage.placement import Volume
 from ptmtools.notes import Warned
-from ptmtools.scene.model import Scene
+from ptmtools.scene.model import Camera, Scene
 from ptmtools.visibility import check_conservative, compute_pvs
 from tests.cells.test_places import floor_of
 
@@ -97,16 +97,34 @@ def test_only_what_somebody_stands_at_one_end_of_is_promised(attic: Scene) -> No
     assert (seen == seen.T).all()
 
 
-def test_without_floors_one_may_be_anywhere_and_is_told(quads, room_faces) -> None:
-    walls = room_faces((0, 0, -4), (20, 4, 4), "-y")
-    ground = level(0, 20, -4, 4, 0)[::-1]  # which faces down
-    scene = quads([*walls, ground])
-    scene = replace(scene, two_sided=np.zeros(len(scene.triangles), dtype=np.bool_))
-    cells = subdivide(scene)
+@pytest.mark.parametrize("viewpoints", [(), ((10.0, 1.0, 0.0),)])
+def test_without_floors_one_may_be_anywhere_and_is_told(quads, room_faces, viewpoints) -> None:
+    rooms = []
+    for x in (0, 20, 40):
+        rooms += room_faces((x, 0, -4), (x + 18, 4, 4), "-y")
+    cells = subdivide(quads(rooms), SubdivideOptions(viewpoints=viewpoints))
     assert cells.leaf_standing.all()
+    assert (cells.leaf_cell >= 0).all()
     assert not len(cells.eye_floor)
     (said,) = [note for note in cells.notes if "no floor on which" in note]
     assert isinstance(said, Warned)
+
+
+@pytest.mark.parametrize("two_sided", [True, False])
+def test_a_floor_that_faces_down_is_stood_on_where_one_can_come(
+    quads, room_faces, two_sided: bool
+) -> None:
+    scene = quads([*room_faces((0, 0, -4), (20, 4, 4), "-y"), level(0, 20, -4, 4, 0)[::-1]])
+    scene = replace(scene, two_sided=np.full(len(scene.triangles), two_sided))
+    cells = subdivide(scene)
+    assert cells.closed
+    assert cells.eyes.contains(np.array([[10, 1.6, 0], [10, 3, 0]])).tolist() == [True, False]
+
+
+def test_where_the_model_has_a_camera_one_stands(attic: Scene) -> None:
+    camera = Camera("above", (5.0, 3.5, 0.0), (1.0, 0.0, 0.0), 1.0)
+    cells = subdivide(replace(attic, cameras=(camera,)), LEAVES)
+    assert cells.leaf_standing[leaf_at(cells, 5, 3.5, 0)]
 
 
 def test_where_a_viewpoint_was_asked_for_one_stands(attic: Scene) -> None:
@@ -146,6 +164,16 @@ def test_the_check_begins_where_eyes_are_and_misses_what_was_dropped(attic: Scen
     assert leaf[0] == plenum
     assert cells.leaf_standing[leaf[1]]
     assert cells.eyes.contains(np.array([first.end])).all()
+
+
+def test_the_check_finds_a_leaf_that_is_wrongly_said_not_to_stand(attic: Scene) -> None:
+    cells = subdivide(attic, LEAVES)
+    walls = attic.corners[structural_triangles(attic, LEAVES)]
+    wrong = replace(cells, leaf_standing=np.zeros_like(cells.leaf_standing))
+    assert len(cells.eye_floor)
+    pvs = compute_pvs(wrong)
+    assert (pvs.to_matrix() < compute_pvs(cells).to_matrix()).any()
+    assert check_conservative(walls, wrong, pvs, 50_000).missed
 
 
 def test_slivers_join_and_what_many_see_stays_apart() -> None:

@@ -154,6 +154,10 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
     _check_statistics(hints, database)
     _check_forms(hints, database)
     check_space(hints.records, hints.index["viewpoints"], places, at)
+    for i, view in enumerate(hints.index["viewpoints"]):
+        if not hints.index["cells"][view["cell"]].get("standing", True):
+            message = f"nobody can stand in cell {view['cell']}"
+            at.add("PTM-D706", message, f"viewpoints[{i}]")
     return {}
 
 

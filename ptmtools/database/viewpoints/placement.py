@@ -115,16 +115,22 @@ def _heading(yaw: float) -> NDArray[np.float64]:
 def _standing(
     cells: Cells, ground: Ground, position: NDArray[np.float64], options: EmitOptions
 ) -> tuple[NDArray[np.float64], int]:
-    """A place and its cell; on the floor below if one is in reach and the eye there is in a
-    cell."""
+    """A place and its cell, -1 if nobody can stand there; on the floor below if one is in reach
+    and one can stand there."""
     eye = options.avatar(cells.walker)[1]
     floor = float(ground.below(position[None])[0])
     if position[1] - floor <= _REACH * eye:
         stood = np.array([position[0], floor + eye, position[2]])
-        cell = int(cells.locate(stood)[0])
+        cell = _cell_to_stand_in(cells, stood)
         if cell >= 0:
             return stood, cell
-    return position, int(cells.locate(position)[0])
+    return position, _cell_to_stand_in(cells, position)
+
+
+def _cell_to_stand_in(cells: Cells, position: NDArray[np.float64]) -> int:
+    """The cell of the leaf at a place, -1 if nobody can stand in it."""
+    leaf = int(cells.locate_leaf(position)[0])
+    return int(cells.leaf_cell[leaf]) if leaf >= 0 and cells.leaf_standing[leaf] else -1
 
 
 def _cameras(
@@ -148,10 +154,14 @@ def _given(cells: Cells, ground: Ground, walls: Walls, options: EmitOptions) -> 
         position, cell = _standing(cells, ground, np.array(wanted.position), options)
         if cell < 0:
             x, y, z = wanted.position
+            where, remedy = "not inside any cell", "with the origin at the centre of the floor"
+            if cells.locate_leaf(np.array(wanted.position))[0] >= 0:
+                where = "where nobody can stand"
+                remedy = "or divide the model again with this --viewpoint"
             raise InputError(
                 "PTM-I600",
-                f"the viewpoint {x:g},{y:g},{z:g} is not inside any cell",
-                remedy="give world metres, Y up, with the origin at the centre of the floor",
+                f"the viewpoint {x:g},{y:g},{z:g} is {where}",
+                remedy=f"give world metres, Y up, {remedy}",
             )
         if wanted.yaw is None:
             yaw = _along_the_longest_view(position, walls)
