@@ -73,6 +73,7 @@ class SubdivideOptions:
         counter-clockwise from -Z. By default one is chosen. May be given several times.
     reach: what becomes of space that cannot be reached from the start, behind closed doors or in
         another building: "all" keeps what has a place in it, "main" drops everything.
+    strict: stop the build if more than a tenth of where one could stand is left out.
     """
 
     wall_area: float = 2.0
@@ -89,6 +90,7 @@ class SubdivideOptions:
     viewpoints: tuple[Position, ...] = field(
         default=(), metadata={"option": "viewpoint", "numbers": (3, 4), "parse": _positions}
     )
+    strict: bool = False
 
     def __post_init__(self) -> None:
         area, thickness, gain = self.wall_area, self.wall_thickness, self.gain

@@ -94,7 +94,7 @@ class _Space:
     viewers: tuple[int, ...]  # those with a viewpoint that was asked for
     closed: bool  # whether they do not touch the root box
     beyond: Unreached  # where the flood did not come to; reached all the same if asked for
-    place: float  # m² to stand on where it did, known if something is left out
+    place: float  # m² to stand on in all that is reached, known if something is left out
 
 
 def subdivide(
@@ -112,7 +112,7 @@ def subdivide(
     ------
     InputError: PTM-I300 if an option is out of range, PTM-I301 if a viewpoint lies in no leaf,
         PTM-I302 if a name pattern matches nothing, PTM-I303 if the scene is a single triangle,
-        PTM-I304 if nothing of it would be seen.
+        PTM-I304 if nothing of it would be seen, PTM-I305 if much is left out and must not be.
     """
     options = options or SubdivideOptions()
     _check(scene, options)
@@ -135,7 +135,7 @@ def subdivide(
             space = clipped.result()
     finally:
         clipped.cancel()
-    notes += of_unreached(space.beyond, options.reach == "all", space.place)
+    notes += of_unreached(space.beyond, options.reach == "all", space.place, options.strict)
     if space.tree.unsplit:
         notes.append(
             Warned(
@@ -200,7 +200,7 @@ def _divide(
         if options.reach == "all":
             for room in beyond.rooms:
                 reached[room.leaves] = True
-        elif beyond.rooms and reached.any():
+        if (beyond.outside or (beyond.rooms and options.reach == "main")) and reached.any():
             place = float(Standing.of(tree, reached, *surfaces).place.sum())
     if tree.capped and (inside or closed):
         joint = rejoined(tree, reached)
