@@ -30,8 +30,6 @@ from ptmtools.tolerance import ranked
 LEAST_PLACE = 0.05
 #: And outside, where bus shelters are, less than this.
 LEAST_INSIDE = 2.0
-#: If as large a share of the walls around faces away, it is the inside of a solid.
-AWAY = 0.9
 #: From so many points walls are looked at.
 _LOOKS = 16
 
@@ -109,7 +107,7 @@ def unreached(
     standing = Standing.of(tree, waiting | beyond, floors, structure, walker)
     if not len(standing.leaf):
         return Unreached([])
-    around = Surroundings(structure.corners)
+    around = Surroundings(structure.corners, structure.tolerance)
     here = standing.only(beyond[standing.leaf])
     here = here.only(around.inside(here.points))
     found = None
@@ -118,11 +116,11 @@ def unreached(
     # Of a model whose rooms face away themselves nothing can be said.
     volumes = np.array([body.volume for body in tree.leaves]) * reached
     looks = np.array([tree.leaves[i].points.mean(axis=0) for i in ranked(volumes)[:_LOOKS]])
-    sound = around.turned_away(looks) < AWAY
+    sound = not around.solid(looks)
     rooms = []
     for room in _rooms(group, standing.only(waiting[standing.leaf])):
         looks = room.points[:: -(-len(room.points) // _LOOKS)]
-        if not (sound and around.turned_away(looks) >= AWAY):
+        if not (sound and around.solid(looks)):
             rooms.append(CutOff.of(np.flatnonzero(group == group[room.leaf[0]]), room))
     return Unreached(rooms, found)
 

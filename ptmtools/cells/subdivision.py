@@ -190,7 +190,7 @@ def _divide(
     outer = at_box(tree)
     viewers = _viewpoint_leaves(tree, box, options)
     walker = Walker(*options.walker)
-    start = viewers or largest_leaf(tree, outer <= inside, structure.corners, walker)
+    start = viewers or largest_leaf(tree, outer <= inside, structure, walker)
     reached = flood(len(tree.leaves), portals, start)
     closed = bool(start) and not bool(np.any(reached & outer))
     beyond, place = Unreached([]), 0.0
