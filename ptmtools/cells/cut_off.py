@@ -64,14 +64,9 @@ class Standing:
         tree: Tree, leaves: Bools, floors: Floors, structure: Structure, walker: Walker
     ) -> Standing:
         """Whoever stands in these (L,) leaves, at least one."""
-        bodies = [tree.leaves[leaf].points for leaf in np.flatnonzero(leaves)]
-        boxes = np.array([(points.min(axis=0), points.max(axis=0)) for points in bodies])
-        points, place = spread(find_places(floors, structure, walker, boxes).triangles())
+        points, place = spread(_floor_about(tree, leaves, floors, structure, walker))
         points = points + [0.0, walker.middle, 0.0]
-        every = np.concatenate([body.points for body in tree.leaves])
-        within = ((points >= every.min(axis=0)) & (points <= every.max(axis=0))).all(axis=1)
-        leaf = np.asarray(-2 - sunk(tree.planes, tree.children, points))
-        inside = within & leaves[leaf]
+        inside, leaf = _within(tree, leaves, points)
         return Standing(points[inside], place[inside], leaf[inside])
 
     def only(self, which: Bools | Ints) -> Standing:
@@ -85,6 +80,10 @@ class Unreached:
 
     rooms: list[CutOff]  # the largest first
     outside: CutOff | None = None  # what is outside a closed model, but in a building
+
+    def left_out(self, rooms_kept: bool) -> list[CutOff]:
+        """What of it comes into no cell."""
+        return [*([] if rooms_kept else self.rooms), *([self.outside] if self.outside else [])]
 
 
 def unreached(
@@ -123,6 +122,35 @@ def unreached(
         if not (sound and around.solid(looks)):
             rooms.append(CutOff.of(np.flatnonzero(group == group[room.leaf[0]]), room))
     return Unreached(rooms, found)
+
+
+def floor_of(
+    cut_off: list[CutOff], tree: Tree, floors: Floors, structure: Structure, walker: Walker
+) -> Floats:
+    """(n, 3, 3) triangles of floor, metres, on which one can stand in any of these, at least one;
+    those whose middles are there count whole."""
+    leaves = np.zeros(len(tree.leaves), dtype=bool)
+    leaves[np.concatenate([each.leaves for each in cut_off])] = True
+    found = _floor_about(tree, leaves, floors, structure, walker)
+    inside, _ = _within(tree, leaves, found.mean(axis=1) + [0.0, walker.middle, 0.0])
+    return found[inside]
+
+
+def _floor_about(
+    tree: Tree, leaves: Bools, floors: Floors, structure: Structure, walker: Walker
+) -> Floats:
+    """(n, 3, 3) triangles of floor on which one can stand, in the boxes around (L,) leaves."""
+    bodies = [tree.leaves[leaf].points for leaf in np.flatnonzero(leaves)]
+    boxes = np.array([(points.min(axis=0), points.max(axis=0)) for points in bodies])
+    return find_places(floors, structure, walker, boxes).triangles()
+
+
+def _within(tree: Tree, leaves: Bools, points: Floats) -> tuple[Bools, Ints]:
+    """(n,) which of (n, 3) points are in any of the (L,) leaves, and (n,) in which."""
+    every = np.concatenate([body.points for body in tree.leaves])
+    within = ((points >= every.min(axis=0)) & (points <= every.max(axis=0))).all(axis=1)
+    leaf = np.asarray(-2 - sunk(tree.planes, tree.children, points))
+    return within & leaves[leaf], leaf
 
 
 def _rooms(group: Ints, standing: Standing) -> Iterator[Standing]:

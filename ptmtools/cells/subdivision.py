@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree, build_tree
-from ptmtools.cells.cut_off import Standing, Unreached, unreached
+from ptmtools.cells.cut_off import Standing, Unreached, floor_of, unreached
 from ptmtools.cells.emptiness import check_seen
 from ptmtools.cells.grouping import grouped
 from ptmtools.cells.joining import joined
@@ -94,6 +94,7 @@ class _Space:
     viewers: tuple[int, ...]  # those with a viewpoint that was asked for
     closed: bool  # whether they do not touch the root box
     beyond: Unreached  # where the flood did not come to; reached all the same if asked for
+    left_out: Floats  # `Cells.left_out`
     place: float  # m² to stand on in all that is reached, known if something is left out
 
 
@@ -193,21 +194,22 @@ def _divide(
     start = viewers or largest_leaf(tree, outer <= inside, structure, walker)
     reached = flood(len(tree.leaves), portals, start)
     closed = bool(start) and not bool(np.any(reached & outer))
-    beyond, place = Unreached([]), 0.0
+    beyond, left_out, place = Unreached([]), np.zeros((0, 3, 3)), 0.0
     if inside or closed:  # else it is thrown away
         surfaces = model.floors, structure, walker
         beyond = unreached(tree, portals, reached, outer & (not inside), *surfaces)
         if options.reach == "all":
             for room in beyond.rooms:
                 reached[room.leaves] = True
-        if (beyond.outside or (beyond.rooms and options.reach == "main")) and reached.any():
+        if (left := beyond.left_out(options.reach == "all")) and reached.any():
+            left_out = floor_of(left, tree, *surfaces)
             place = float(Standing.of(tree, reached, *surfaces).place.sum())
     if tree.capped and (inside or closed):
         joint = rejoined(tree, reached)
         portals = portals_rejoined(portals, tree, joint, structure.tolerance)
         tree, reached = joint.tree, np.bincount(joint.leaf, reached) > 0
         viewers = tuple(joint.leaf[list(viewers)].tolist())
-    return _Space(box, tree, portals, reached, viewers, closed, beyond, place)
+    return _Space(box, tree, portals, reached, viewers, closed, beyond, left_out, place)
 
 
 def _viewpoint_leaves(tree: Tree, box: Floats, options: SubdivideOptions) -> tuple[int, ...]:
@@ -320,6 +322,7 @@ def _assemble(
         triangle_cell=owner[owned],
         tolerance=scene.tolerance,
         eye_floor=eye_floor,
+        left_out=space.left_out,
         walker=Walker(*model.options.walker),
         closed=space.closed,
         notes=tuple(notes),
