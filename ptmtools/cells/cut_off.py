@@ -30,8 +30,6 @@ from ptmtools.tolerance import ranked
 LEAST_PLACE = 0.05
 #: And outside, where bus shelters are, less than this.
 LEAST_INSIDE = 2.0
-#: If as large a share of the walls around faces away, it is the inside of a solid.
-AWAY = 0.9
 #: From so many points walls are looked at.
 _LOOKS = 16
 
@@ -66,14 +64,9 @@ class Standing:
         tree: Tree, leaves: Bools, floors: Floors, structure: Structure, walker: Walker
     ) -> Standing:
         """Whoever stands in these (L,) leaves, at least one."""
-        bodies = [tree.leaves[leaf].points for leaf in np.flatnonzero(leaves)]
-        boxes = np.array([(points.min(axis=0), points.max(axis=0)) for points in bodies])
-        points, place = spread(find_places(floors, structure, walker, boxes).triangles())
+        points, place = spread(_floor_about(tree, leaves, floors, structure, walker))
         points = points + [0.0, walker.middle, 0.0]
-        every = np.concatenate([body.points for body in tree.leaves])
-        within = ((points >= every.min(axis=0)) & (points <= every.max(axis=0))).all(axis=1)
-        leaf = np.asarray(-2 - sunk(tree.planes, tree.children, points))
-        inside = within & leaves[leaf]
+        inside, leaf = _within(tree, leaves, points)
         return Standing(points[inside], place[inside], leaf[inside])
 
     def only(self, which: Bools | Ints) -> Standing:
@@ -102,6 +95,10 @@ class Unreached:
         ]
         return Unreached(sorted(rooms, key=lambda room: -room.place), self.outside)
 
+    def left_out(self, rooms_kept: bool) -> list[CutOff]:
+        """What of it comes into no cell."""
+        return [*([] if rooms_kept else self.rooms), *([self.outside] if self.outside else [])]
+
 
 def unreached(
     tree: Tree,
@@ -123,7 +120,7 @@ def unreached(
     standing = Standing.of(tree, waiting | beyond, floors, structure, walker)
     if not len(standing.leaf):
         return Unreached([])
-    around = Surroundings(structure.corners)
+    around = Surroundings(structure.corners, structure.tolerance)
     here = standing.only(beyond[standing.leaf])
     here = here.only(around.inside(here.points))
     found = None
@@ -132,13 +129,42 @@ def unreached(
     # Of a model whose rooms face away themselves nothing can be said.
     volumes = np.array([body.volume for body in tree.leaves]) * reached
     looks = np.array([tree.leaves[i].points.mean(axis=0) for i in ranked(volumes)[:_LOOKS]])
-    sound = around.turned_away(looks) < AWAY
+    sound = not around.solid(looks)
     rooms = []
     for room in _rooms(group, standing.only(waiting[standing.leaf])):
         looks = room.points[:: -(-len(room.points) // _LOOKS)]
-        if not (sound and around.turned_away(looks) >= AWAY):
+        if not (sound and around.solid(looks)):
             rooms.append(CutOff.of(np.flatnonzero(group == group[room.leaf[0]]), room))
     return Unreached(rooms, found)
+
+
+def floor_of(
+    cut_off: list[CutOff], tree: Tree, floors: Floors, structure: Structure, walker: Walker
+) -> Floats:
+    """(n, 3, 3) triangles of floor, metres, on which one can stand in any of these, at least one;
+    those whose middles are there count whole."""
+    leaves = np.zeros(len(tree.leaves), dtype=bool)
+    leaves[np.concatenate([each.leaves for each in cut_off])] = True
+    found = _floor_about(tree, leaves, floors, structure, walker)
+    inside, _ = _within(tree, leaves, found.mean(axis=1) + [0.0, walker.middle, 0.0])
+    return found[inside]
+
+
+def _floor_about(
+    tree: Tree, leaves: Bools, floors: Floors, structure: Structure, walker: Walker
+) -> Floats:
+    """(n, 3, 3) triangles of floor on which one can stand, in the boxes around (L,) leaves."""
+    bodies = [tree.leaves[leaf].points for leaf in np.flatnonzero(leaves)]
+    boxes = np.array([(points.min(axis=0), points.max(axis=0)) for points in bodies])
+    return find_places(floors, structure, walker, boxes).triangles()
+
+
+def _within(tree: Tree, leaves: Bools, points: Floats) -> tuple[Bools, Ints]:
+    """(n,) which of (n, 3) points are in any of the (L,) leaves, and (n,) in which."""
+    every = np.concatenate([body.points for body in tree.leaves])
+    within = ((points >= every.min(axis=0)) & (points <= every.max(axis=0))).all(axis=1)
+    leaf = np.asarray(-2 - sunk(tree.planes, tree.children, points))
+    return within & leaves[leaf], leaf
 
 
 def _rooms(group: Ints, standing: Standing) -> Iterator[Standing]:

@@ -41,7 +41,7 @@ def closing(slabs: Slabs, structure: Structure, wall_thickness: float) -> Bools:
     fits = (wide >= WIDE[0] - slack) & (wide <= WIDE[1] + slack)
     found = np.zeros(len(slabs), dtype=bool)
     if fits.any():
-        rays = _Rays(slabs.only(fits), Surroundings(structure.corners))
+        rays = _Rays(slabs.only(fits), Surroundings(structure.corners, structure.tolerance))
         found[fits] = _closing(rays, wall_thickness)
     return found
 
@@ -51,7 +51,7 @@ def parting(slabs: Slabs, structure: Structure) -> Bools:
     it, parts nothing."""
     if not (len(slabs) and len(structure.corners)):
         return np.ones(len(slabs), dtype=bool)
-    return _Rays(slabs, Surroundings(structure.corners)).free()
+    return _Rays(slabs, Surroundings(structure.corners, structure.tolerance)).free()
 
 
 def _closing(rays: _Rays, wall_thickness: float) -> Bools:

@@ -84,7 +84,7 @@ class Doors:
 
     def sheltered(self, structure: Structure) -> Bools:
         """(d,) which leaves have, on both sides, walls around whoever goes there, and a roof."""
-        around = Surroundings(np.concatenate([structure.corners, self.glass]))
+        around = Surroundings(np.concatenate([structure.corners, self.glass]), structure.tolerance)
         found = np.zeros(len(self.leaves), dtype=bool)
         for i, door in enumerate(self.leaves):
             found[i] = all(

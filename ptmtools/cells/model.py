@@ -61,6 +61,8 @@ class Cells:
         cutting made none.
     eye_floor: (E, 3, 3) triangles above which eyes can be, see `EyeRegion`; none if they may be
         anywhere.
+    left_out: (Z, 3, 3) triangles of floor on which one can stand, but in no cell: it cannot be
+        reached, and was not to be kept.
     walker: who walks.
     tolerance: that of the scene.
     closed: whether the flood of the reachable never met the root box.
@@ -90,6 +92,7 @@ class Cells:
     triangle_cell: NDArray[np.int32]
     tolerance: Tolerance
     eye_floor: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3, 3)))
+    left_out: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 3, 3)))
     walker: Walker = WALKER
     closed: bool = True
     notes: tuple[str, ...] = ()
@@ -269,6 +272,7 @@ class Cells:
             triangle_cell=stored.indices("triangle_cell", np.int32, n, 2, low=-1, high=cells),
             tolerance=Tolerance.for_extent(stored.array("extent", np.float64, finite=True).item()),
             eye_floor=stored.array("eye_floor", np.float64, None, 3, 3, finite=True),
+            left_out=stored.array("left_out", np.float64, None, 3, 3, finite=True),
             walker=Walker(*map(float, about["walker"])),
             closed=bool(about["closed"]),
             notes=texts(about["notes"], "notes"),

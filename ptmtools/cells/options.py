@@ -80,6 +80,7 @@ class SubdivideOptions:
     door: objects or materials (names, with * and ?) that are door leaves, whatever their shape;
         --structural takes precedence. Others are recognised by name and shape. May be given
         several times.
+    strict: stop the build if more than a tenth of where one could stand is left out.
     """
 
     wall_area: float = 2.0
@@ -98,6 +99,7 @@ class SubdivideOptions:
     viewpoints: tuple[Position, ...] = field(
         default=(), metadata={"option": "viewpoint", "numbers": (3, 4), "parse": _positions}
     )
+    strict: bool = False
 
     def __post_init__(self) -> None:
         area, thickness, gain = self.wall_area, self.wall_thickness, self.gain

@@ -1,12 +1,15 @@
 """Which leaves somebody can reach, and whether the model is closed.
 
-The flood starts from the viewpoints, else from the largest leaf that has floor below it and does
-not touch the root box, and runs through the portals. The model is closed if it never meets the
-root box; what it does not reach is a solid, a sealed void or the outside (design,
-"Reachable").
+The flood starts from the viewpoints, else from the largest leaf that has floor below it, is not
+the inside of a solid and does not touch the root box, and runs through the portals. The model is
+closed if it never meets the root box; what it does not reach is a solid, a sealed void or the
+outside (design, "Reachable").
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import chain, compress
 
 import numpy as np
 
@@ -15,7 +18,9 @@ from ptmtools.cells.bsp import Tree
 from ptmtools.cells.options import Walker
 from ptmtools.cells.polyhedron import BOX_FACE
 from ptmtools.cells.portals import Portal
-from ptmtools.cells.vectors import normals
+from ptmtools.cells.structure import Structure
+from ptmtools.cells.surroundings import Surroundings
+from ptmtools.cells.vectors import cross, normals
 from ptmtools.tolerance import ranked
 
 #: A surface whose normal leans less than this from the vertical can be stood on (cosine of 45°).
@@ -43,16 +48,26 @@ def at_box(tree: Tree) -> Bools:
     return np.array([BOX_FACE in body.tags for body in tree.leaves], dtype=bool)
 
 
-def largest_leaf(tree: Tree, allowed: Bools, corners: Floats, walker: Walker) -> tuple[int, ...]:
+def largest_leaf(
+    tree: Tree, allowed: Bools, structure: Structure, walker: Walker
+) -> tuple[int, ...]:
     """The largest of the (L,) allowed leaves that has floor below its middle, or if none has the
     largest, as a tuple of one; () if none is allowed. Leaves too thin for a walker, such as the
-    hollow of a wall, are none unless all are. The floor is looked for in the (T, 3, 3) structural
-    triangles ``corners``."""
+    hollow of a wall, are none unless all are. Where faces are turned out of solids, leaves whose
+    walls and floor face into them come first, and the inside of the ground or of a thick wall is
+    none of them."""
+    corners = structure.corners
     roomy = np.array([body.width >= 2 * walker.radius for body in tree.leaves])
     leaves = np.flatnonzero(allowed & roomy if roomy.any() else allowed)
     order = leaves[ranked(np.array([tree.leaves[leaf].volume for leaf in leaves]))].tolist()
-    for leaf in order:
-        if np.any(_plumb(tree.leaves[leaf].points.mean(axis=0), corners) < 0):
+    middle = {leaf: tree.leaves[leaf].points.mean(axis=0) for leaf in order}
+    hollow: Iterable[int] = ()
+    if order and _outwards(corners):
+        around = Surroundings(corners, structure.tolerance)
+        floored = around.floored(np.array(list(middle.values())))
+        hollow = (leaf for leaf in compress(order, floored) if not around.solid(middle[leaf][None]))
+    for leaf in chain(hollow, order):
+        if np.any(_plumb(middle[leaf], corners) < 0):
             return (leaf,)
     return tuple(order[:1])
 
@@ -80,6 +95,15 @@ def roofed_share(corners: Floats, floor_area: float) -> float:
             total += area[triangle]
             covered += area[triangle] * bool(np.any(heights > apart))
     return float(covered / total) if total else 1.0
+
+
+def _outwards(corners: Floats) -> bool:
+    """Whether (T, 3, 3) triangles face out of what they enclose, by volume: those of solids do,
+    those of walls without thickness face into the rooms."""
+    if not len(corners):
+        return False
+    a, b, c = (corners - corners.mean(axis=(0, 1))).transpose(1, 0, 2)
+    return bool(np.einsum("ij,ij->", a, cross(b, c)) > 0)
 
 
 def _plumb(eye: Floats, corners: Floats) -> Floats:

@@ -13,6 +13,7 @@ from ptmtools.cells.cut_off import CutOff, Unreached
 from ptmtools.cells.doors import DoorLeaf
 from ptmtools.cells.model import Cells
 from ptmtools.cells.ownership import Pieces
+from ptmtools.errors import InputError
 from ptmtools.notes import Warned
 from ptmtools.quantities import count
 from ptmtools.scene.model import Scene
@@ -62,9 +63,10 @@ def of_doors(leaves: list[DoorLeaf], opened: Bools) -> list[str]:
     return notes
 
 
-def of_unreached(unreached: Unreached, kept: bool, place: float) -> list[str]:
-    """What is said of places that the flood did not come to, which are ``kept`` or left out; of
-    ``place`` m² that it did come to if they are not."""
+def of_unreached(unreached: Unreached, kept: bool, place: float, strict: bool) -> list[str]:
+    """What is said of places that the flood did not come to, whose rooms are ``kept`` or left out,
+    beside ``place`` m² that are in the cells. Under ``strict`` it is InputError PTM-I305 to leave
+    out much."""
     rooms, outside = unreached.rooms, unreached.outside
     fate = "it is kept as rooms of its own" if kept else "it is left out"
     notes = [
@@ -78,10 +80,6 @@ def of_unreached(unreached: Unreached, kept: bool, place: float) -> list[str]:
         notes.append(f"{count(len(rest), 'more such place')}, {area:.1f} m² in all, are {fate}")
     if rooms and kept:
         notes[0] += "; --reach main leaves out all that cannot be reached"
-    left = sum(room.place for room in rooms)
-    if not kept and left > MUCH * (left + place):
-        share = f"{left / (left + place):.0%} of all that one can stand on"
-        notes.append(Warned(f"{share} is left out; --reach all keeps it"))
     if outside:
         notes.append(
             Warned(
@@ -89,6 +87,16 @@ def of_unreached(unreached: Unreached, kept: bool, place: float) -> list[str]:
                 f"--viewpoint {_position(outside)} includes it"
             )
         )
+    ways = {f"--viewpoint {_position(outside)}": outside.place} if outside else {}
+    if rooms and not kept:
+        ways = {"--reach all": sum(room.place for room in rooms), **ways}
+    left = sum(ways.values())
+    if left > MUCH * (left + place):
+        much = f"{left / (left + place):.0%} of all that one can stand on is left out"
+        remedy = f"{' and '.join(ways)} {'keep' if len(ways) > 1 else 'keeps'} it"
+        if strict:
+            raise InputError("PTM-I305", much, remedy=f"{remedy}; or build without --strict")
+        notes.append(Warned(f"{much}; {remedy}"))
     return notes
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree, build_tree
-from ptmtools.cells.cut_off import Standing, Unreached, groups, unreached
+from ptmtools.cells.cut_off import Standing, Unreached, floor_of, groups, unreached
 from ptmtools.cells.emptiness import check_seen
 from ptmtools.cells.entrances import Doors, open_doors
 from ptmtools.cells.grouping import grouped
@@ -100,7 +100,8 @@ class _Space:
     reached: Bools  # (L,) which leaves somebody can reach
     closed: bool  # whether they do not touch the root box
     beyond: Unreached  # where the flood did not come to; reached all the same if asked for
-    place: float  # m² to stand on where it did, known if something is left out
+    left_out: Floats  # `Cells.left_out`
+    place: float  # m² to stand on in all that is reached, known if something is left out
     doors: Bools  # (d,) which door leaves are open
 
 
@@ -119,7 +120,7 @@ def subdivide(
     ------
     InputError: PTM-I300 if an option is out of range, PTM-I301 if a viewpoint lies in no leaf,
         PTM-I302 if a name pattern matches nothing, PTM-I303 if the scene is a single triangle,
-        PTM-I304 if nothing of it would be seen.
+        PTM-I304 if nothing of it would be seen, PTM-I305 if much is left out and must not be.
     """
     options = options or SubdivideOptions()
     _check(scene, options)
@@ -145,7 +146,7 @@ def subdivide(
     opened = model.doors.triangles(space.doors)
     if options.doors != "closed":
         notes += of_doors(model.doors.leaves, space.doors)
-    notes += of_unreached(space.beyond, options.reach == "all", space.place)
+    notes += of_unreached(space.beyond, options.reach == "all", space.place, options.strict)
     if space.tree.unsplit:
         notes.append(
             Warned(
@@ -203,10 +204,10 @@ def _divide(
     outer = at_box(tree)
     start = _viewpoint_leaves(tree, box, options)
     walker = Walker(*options.walker)
-    start = start or largest_leaf(tree, outer <= inside, structure.corners, walker)
+    start = start or largest_leaf(tree, outer <= inside, structure, walker)
     reached = flood(len(tree.leaves), portals, start)
     closed = bool(start) and not bool(np.any(reached & outer))
-    beyond, place = Unreached([]), 0.0
+    beyond, left_out, place = Unreached([]), np.zeros((0, 3, 3)), 0.0
     doors = np.zeros(len(model.doors.leaves), dtype=bool)
     if inside or closed:  # else it is thrown away
         surfaces, outside = (model.floors, structure, walker), outer & (not inside)
@@ -221,14 +222,15 @@ def _divide(
         if options.reach == "all":
             for room in beyond.rooms:
                 reached[room.leaves] = True
-        elif beyond.rooms and reached.any():
+        if (left := beyond.left_out(options.reach == "all")) and reached.any():
+            left_out = floor_of(left, tree, *surfaces)
             place = float(Standing.of(tree, reached, *surfaces).place.sum())
     if tree.capped and (inside or closed):
         group = np.where(reached, groups(len(tree.leaves), portals), -1)
         joint = rejoined(tree, group)
         portals = portals_rejoined(portals, tree, joint, structure.tolerance)
         tree, reached = joint.tree, np.bincount(joint.leaf, reached) > 0
-    return _Space(box, tree, portals, reached, closed, beyond, place, doors)
+    return _Space(box, tree, portals, reached, closed, beyond, left_out, place, doors)
 
 
 def _viewpoint_leaves(tree: Tree, box: Floats, options: SubdivideOptions) -> tuple[int, ...]:
@@ -354,6 +356,7 @@ def _assemble(
         triangle_cell=owner[owned],
         tolerance=scene.tolerance,
         eye_floor=eye_floor,
+        left_out=space.left_out,
         walker=Walker(*model.options.walker),
         closed=space.closed,
         notes=tuple(notes),

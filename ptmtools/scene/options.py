@@ -19,7 +19,8 @@ class IngestOptions:
     up: the model's up axis, "y" or "z". By default it is what the format says (glTF: y), or guessed
         from the rooms, walls and floors.
     two_sided: draw every face from both sides, whatever the model says.
-    strict: stop the build at missing files, unknown materials, unreadable images and dropped faces.
+    strict: stop the build at missing files, unknown materials, unreadable images and dropped faces,
+        and if more than a tenth of where one could stand is left out.
     allow_outside: also read files outside the model's folder that the model refers to.
     limit: refuse an image that takes more memory than this once decoded, in MiB.
     max_triangles: refuse a model with more triangles than this.

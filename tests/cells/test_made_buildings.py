@@ -21,10 +21,7 @@ from tests.scene.made import house, inside_out, y_up
 EVERY = ROOMS | HEIGHTS | NO_PLACES | DOORS | MODELS
 #: Of which something else comes, so far, and why.
 WRONG = {
-    "a room on ground that is a block 6 m thick": "the flood starts in the ground",
-    "two rooms between walls 1.8 m thick": "it starts in a slab, and walls that touch make rooms",
     "a niche in a wall 80 cm thick": "the flood gets into the wall, where a body fits",
-    "a platform 2 m high along three walls": "the walls that it touches make a room of it",
 }
 
 

@@ -3,6 +3,7 @@ definitions in docs/cells.md; it was written before the first run."""
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -136,6 +137,11 @@ def test_what_the_flood_does_not_reach(
     assert located(main, HALL, point) == [True, False]
     left_out = [note for note in main.notes if "is left out; --reach all" in note]
     assert [isinstance(note, Warned) for note in left_out] == [True] * (kept and share > 0.1)
+    assert not len(cells.left_out)
+    width, _, depth = np.subtract(other[1], other[0]) - 2 * WALKER.radius
+    assert areas(main.left_out).sum() == pytest.approx(kept * width * depth)
+    with pytest.raises(InputError, match="PTM-I305") if left_out else nullcontext():
+        subdivide(scene, SubdivideOptions(reach="main", strict=True))
     for note in said:  # the viewpoint that is named leads there
         there = tuple(float(c) for c in note.split("around ")[1].split(" ")[0].split(","))
         options = SubdivideOptions(reach="main", viewpoints=(there,))  # type: ignore[arg-type]
@@ -171,6 +177,11 @@ def test_a_house_that_is_open_beside_a_closed_one_is_told(quads, room_faces) -> 
     there = tuple(float(c) for c in told.split("--viewpoint ")[1].split(" ")[0].split(","))
     both = subdivide(quads(hall + house), SubdivideOptions(viewpoints=(there,)))  # type: ignore[arg-type]
     assert located(both, HALL, (35, 1, 0)) == [True, True]
+    assert areas(cells.left_out).sum() == pytest.approx(9.5 * 7.5, abs=1), "and half the doorway"
+    # It is a third of all.
+    assert any(note.startswith("33% of all that one can stand on") for note in cells.notes)
+    with pytest.raises(InputError, match=r"--viewpoint.*without --strict.*PTM-I305"):
+        subdivide(quads(hall + house), SubdivideOptions(strict=True))
 
 
 def test_a_floor_of_many_facets_is_a_place(quads, room_faces) -> None:

@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 
 from ptmtools.database import PlotOptions, plot_plan
+from ptmtools.database.plans.hatched import LEFT_OUT, VIEW_ONLY
 from ptmtools.database.plans.leaks import LEAK
 from ptmtools.errors import InputError, MissingComponentError, OutputError
 
@@ -77,6 +78,35 @@ def test_faults(artifacts, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setitem(sys.modules, "matplotlib.backends.backend_agg", None)
     with pytest.raises(MissingComponentError, match=r"pip install 'ptmtools\[plot\]'.*PTM-M600"):
         draw(a, tmp_path / "b.png")
+
+
+FINE = PlotOptions(width=6, dpi=240)
+
+
+def test_what_was_left_out_is_hatched(artifacts, tmp_path: Path) -> None:
+    """A floor beside the row of rooms, and one that makes a storey of its own."""
+    low, high = artifacts.cells.leaf_point.min(axis=0), artifacts.cells.leaf_point.max(axis=0)
+    beside = np.array([[1, 0, 0], [1, 0, 3], [4, 0, 3]]) + [high[0], low[1], low[2]]
+    above = np.array([[0, 9, 0], [0, 9, 4], [12, 9, 4]]) + low
+    cells, hatched = artifacts.cells, []
+    for left_out in (np.zeros((0, 3, 3)), beside[None], above[None]):
+        changed = replace(artifacts, cells=replace(cells, left_out=left_out))
+        hatched.append(draw(changed, tmp_path / "a.png", FINE))
+    plain, wide, tall = ([pixels(p, LEFT_OUT[0]), p.shape[0] / p.shape[1]] for p in hatched)
+    assert plain[0] == 0
+    assert min(wide[0], tall[0]) > 500
+    assert wide[1] < plain[1] < tall[1], "they are on the paper"
+
+
+def test_view_only_cells_are_dotted(artifacts, tmp_path: Path) -> None:
+    cells = artifacts.cells
+    found = []
+    for standing in ([True] * 3, [True, False, True], [False] * 3):
+        changed = replace(cells, leaf_standing=np.array(standing)[cells.leaf_cell])
+        picture = draw(replace(artifacts, cells=changed), tmp_path / "a.png", FINE)
+        found.append(pixels(picture, VIEW_ONLY[0]))
+    assert found[0] == 0
+    assert 300 < found[1] < 0.6 * found[2]
 
 
 def test_leaks_are_ringed(artifacts, tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.cells.buildings import carved, moved, room, write
 from tests.e2e.conftest import Ptm, listing
 
 Prepare = Callable[[Path], None]
@@ -42,6 +43,11 @@ def file(name: str, data: bytes) -> Prepare:
         (folder / name).write_bytes(data)
 
     return prepare
+
+
+def two_buildings(folder: Path) -> None:
+    one, other = carved([room(0, 0, 5, 5)]), carved([room(0, 0, 4, 4)])
+    write(folder / "a.obj", [("one", one), ("other", moved(other, 9))])
 
 
 def without(name: str) -> Prepare:
@@ -200,6 +206,9 @@ CASES: dict[str, tuple[Prepare, str, int, str]] = {
     "texture missing, strict": (without("model/floor.png"), BUILD + " --strict", 3, "I204"),
     "texture empty, strict": (file("model/floor.png", b""), BUILD + " --strict", 3, "I206"),
     "texture outside the folder, strict": (outside, BUILD + " --strict", 3, "I205"),
+    "half of it left out, strict": (
+        two_buildings, BUILD_A + " --up z --unit m --reach main --strict", 3, "I305"
+    ),
     "texture that promises the moon": (
         file("model/floor.png", png(60_000)), BUILD, 7, "L104"
     ),
@@ -342,6 +351,19 @@ def test_a_missing_texture_is_a_note_unless_strict(folder: Path, ptm: Ptm) -> No
     assert "floor.png" in outcome.out
     assert "two_rooms.mtl" in outcome.out
     assert not list((folder / "new/www/textures").glob("floor*"))
+
+
+def test_what_was_built_without_strict_is_no_excuse(folder: Path, ptm: Ptm) -> None:
+    two_buildings(folder)
+    command = ("cells", folder / "a.obj", "-o", folder / "new", "--up", "z", "--unit", "m")
+    assert ptm(*command, "--strict").status == 0, "both are kept"
+    outcome = ptm(*command, "--reach", "main")
+    assert (outcome.status, outcome.err) == (0, "")
+    assert "warning: 38% of all that one can stand on is left out" in outcome.out
+    before = listing(folder)
+    outcome = ptm(*command, "--reach", "main", "--strict")
+    assert (outcome.status, "PTM-I305" in outcome.err) == (3, True)
+    assert listing(folder) == before
 
 
 def test_spaces_and_umlauts_are_no_obstacle(folder: Path, ptm: Ptm) -> None:

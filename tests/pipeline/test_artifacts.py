@@ -181,6 +181,9 @@ CHANGES: dict[str, list[Change]] = {
         flat("root_box"),
         typed("vertex", "<i4"),
         without("leaf_point"),
+        without("left_out"),
+        lambda arrays: arrays.update(left_out=np.full((1, 3, 3), np.nan)),
+        lambda arrays: arrays.update(left_out=np.zeros((1, 3, 2))),
         about(lambda d: d.update(notes=5)),
     ],
     "pvs": [

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
+from ptmtools.database.plans.storeys import storey_of
 from ptmtools.visibility.model import Pvs
 
 LEAK = "#e09400"
@@ -46,7 +47,7 @@ def draw_leaks(
     for portal, seeing in sorted(leaks.items()):
         polygon = cells.portal(portal)
         x, y, z = polygon.mean(axis=0)
-        if max(0, int(np.searchsorted(floors, y, side="right")) - 1) != storey:
+        if storey_of(floors, y) != storey:
             continue
         outline = shown(polygon[:, [0, 2]])
         axis.plot(*outline[[*range(len(outline)), 0]].T, color=LEAK, linewidth=3, zorder=6)

@@ -1,4 +1,5 @@
-"""A floor plan per storey: cells, walls, portals, leaks, and how much of the view others cover.
+"""A floor plan per storey: cells, walls, portals, leaks, what was left out, and how much of the
+view others cover.
 
 Everything drawn is a true section at one height, so a plan shows what the stages computed and
 nothing that an artist would add. Without matplotlib the plan cannot be drawn (extra `plot`).
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
 from ptmtools.database.model import PlotOptions, PlotReport
+from ptmtools.database.plans.hatched import draw_left_out, draw_view_only, hatches
 from ptmtools.database.plans.leaks import LEAK, draw_leaks, leaks_by_portal
 from ptmtools.database.plans.storeys import cut_height, storeys
 from ptmtools.database.section import area, leaf_section, polygon_section, triangle_section
@@ -124,7 +126,7 @@ class _Plan:
             share = np.full(len(row), _EVEN) if ach is None else ach.row(options.cell)
             self._shade = dict(zip(row.tolist(), share.tolist(), strict=True))
         # Seen from above with X to the right and Z down, or Z to the right and X up.
-        plan = cells.leaf_point[:, [0, 2]]
+        plan = np.concatenate([cells.leaf_point, *cells.left_out])[:, [0, 2]]
         width, depth = np.ptp(plan, axis=0)
         self._turned = bool(depth > _DEEP * width)
         shown = self._shown(plan)
@@ -157,6 +159,7 @@ class _Plan:
             axis.set_axis_off()
             axis.set(xlim=(self._low[0], self._high[0]), ylim=(self._high[1], self._low[1]))
             self._storey(axis, floor, shades, panel)
+            draw_left_out(axis, self._cells, self._floors, i, self._shown)
             draw_leaks(axis, self._cells, self._leaks, self._floors, i, self._shown)
         if barred:
             long = min(0.8 * (height - _HEAD), 4.0)
@@ -181,6 +184,7 @@ class _Plan:
         axis.add_collection(
             PolyCollection(polygons, facecolors=fills, edgecolors=fills, linewidths=0.5)
         )
+        draw_view_only(axis, self._cells, sections, self._shown)
         edges = _outlines(sections)
         for zorder, colour, width, segments in (
             (2, _CELL_EDGE, 0.5, [e for outline in edges.values() for e in outline]),
@@ -312,11 +316,13 @@ class _Plan:
             lines.append((LEAK, "leak, and cells that see too much by it"))
         if chosen is not None and self._shade is not None:
             lines.append((_CHOSEN, f"cell {chosen}, sees {len(self._shade)} cells"))
+        handles = [Line2D([], [], color=c, linewidth=2.5, label=label) for c, label in lines]
+        handles += hatches(cells)
         figure.legend(
-            handles=[Line2D([], [], color=c, linewidth=2.5, label=label) for c, label in lines],
+            handles=handles,
             loc="center right",
             bbox_to_anchor=(1 - _MARGIN / self._options.width, y),
-            ncols=len(lines),
+            ncols=len(handles),
             frameon=False,
             fontsize=9,
             labelcolor=_INK,

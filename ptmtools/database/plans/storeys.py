@@ -3,10 +3,12 @@
 A storey's floor is a cluster of the leaves' lowest heights, weighted by the area that lies on
 them: heights within a storey gap of one another belong together, the lowest of a cluster first.
 Leaves that hang above (the space over a cupboard, a lintel's slab) begin between the storeys and
-found none; every storey shows all the leaves that its section cuts.
+found none; every storey shows all the leaves that its section cuts. What was left out counts too.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -32,6 +34,9 @@ def storeys(cells: Cells, height: float, gap: float) -> list[float]:
         cut = min(low + height, (low + high) / 2)
         if high - low >= height:
             floors[low] = floors.get(low, 0.0) + area(leaf_section(cells, leaf, cut))
+    plan = np.abs([area(triangle) for triangle in cells.left_out[:, :, [0, 2]]])
+    for low, size in zip(cells.left_out[:, :, 1].min(axis=1).tolist(), plan.tolist(), strict=True):
+        floors[low] = floors.get(low, 0.0) + size
     if not floors:
         return [float(cells.leaf_point[:, 1].min())] if cells.leaf_count else []
     clusters: list[list[float]] = []
@@ -45,6 +50,11 @@ def storeys(cells: Cells, height: float, gap: float) -> list[float]:
     heights = [max(cluster, key=lambda low: floors[low]) for cluster in clusters]
     most = max(areas)
     return [h for h, a in zip(heights, areas, strict=True) if a >= _LEAST_SHARE * most]
+
+
+def storey_of(floors: Sequence[float], height: float) -> int:
+    """The storey, of those with these ``floors``, that something is in: the nearest below."""
+    return max(0, int(np.searchsorted(floors, height, side="right")) - 1)
 
 
 def cut_height(cells: Cells, floor: float, height: float) -> float:
