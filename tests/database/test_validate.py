@@ -526,10 +526,16 @@ def test_symmetry_in_the_hints_alone(database: Path, seal: Damage) -> None:
 
 def test_fields_of_later_releases_are_passed_over(database: Path, seal: Damage) -> None:
     for name in (HINTS, R0, STATISTICS):
-        hinted(lambda d: d.update(standing=False, more={"a": [1]}), name)(database)
-    hinted(lambda d: [c.update(standing=False) for c in d["cells"]])(database)
+        hinted(lambda d: d.update(crowded=False, more={"a": [1]}), name)(database)
+    hinted(lambda d: [c.update(crowded=False) for c in d["cells"]])(database)
     seal(database)
     assert findings(database) == []
+
+
+def test_a_viewpoint_is_where_one_can_stand(database: Path, seal: Damage) -> None:
+    hinted(lambda d: d["cells"][d["viewpoints"][0]["cell"]].update(standing=False))(database)
+    seal(database)
+    assert {issue.code for issue in validate_database(database).issues} == {"PTM-D706"}
 
 
 def test_hints_of_another_schema_name_the_command(database: Path, seal: Damage) -> None:
