@@ -1,7 +1,8 @@
 """The test models in cells: ``python benchmarks/cells.py [MODEL…] [OPTION]``
 
-Prints a Markdown table with a row for each model at the default options: triangles, cells, leaves,
-portals, and the average share of all cells that a cell may see. With ``--wall-area 8 4 2 1`` a row
+Prints a Markdown table with a row for each model at the default options: triangles, cells, how many
+of them are view-only, leaves, how many of them are dropped, portals, and the share of the volume
+that is at hand, on average over where one can stand and at most. With ``--wall-area 8 4 2 1`` a row
 for each least wall area, where each leaf is a cell. With ``--joined`` how many triangles of each
 model some cell emits; how many that are if each counts once for every cell that emits some of it;
 and how many triangles are emitted, as cut to the leaves and joined again.
@@ -23,7 +24,7 @@ from unittest.mock import patch
 import numpy as np
 from at_hand import MODELS, MUSEUM, ROOT
 
-from ptmtools.cells import SubdivideOptions, subdivide, subdivision
+from ptmtools.cells import Cells, SubdivideOptions, subdivide, subdivision
 from ptmtools.scene import Scene, ingest
 from ptmtools.visibility import compute_pvs
 
@@ -44,18 +45,26 @@ def opened(name: str) -> Scene:
 def row(name: str, scene: Scene) -> str:
     """A model at the default options."""
     cells = subdivide(scene)
-    counts = len(scene.triangles), cells.cell_count, cells.leaf_count, cells.portal_count
-    share = compute_pvs(cells).average_share
+    view_only = int(np.count_nonzero(~cells.standing))
+    dropped = int(np.count_nonzero(cells.leaf_cell < 0))
+    leaves = cells.leaf_count, dropped, cells.portal_count
+    counts = len(scene.triangles), cells.cell_count, view_only, *leaves
     closed = "closed" if cells.closed else "open"
-    return f"| {name} | {closed} | {' | '.join(f'{n:,}' for n in counts)} | {share:.1%} |"
+    return f"| {name} | {closed} | {' | '.join(f'{n:,}' for n in counts)} | {at_hand(cells)} |"
+
+
+def at_hand(cells: Cells) -> str:
+    """The share of the volume at hand: mean and worst."""
+    mean, most = compute_pvs(cells).volume_at_hand
+    return f"{mean:.1%} | {most:.1%}"
 
 
 def area_row(name: str, scene: Scene, area: float) -> str:
     """A model cut by walls of at least that many m²."""
     cells = subdivide(scene, SubdivideOptions(cells="leaf", wall_area=area))
-    share = compute_pvs(cells).average_share
     shown = f"**{area:g}**" if area == AREA else f"{area:g}"
-    return f"| {name} | {shown} | {cells.leaf_count:,} | {cells.portal_count:,} | {share:.1%} |"
+    counts = f"{cells.leaf_count:,} | {cells.portal_count:,}"
+    return f"| {name} | {shown} | {counts} | {at_hand(cells)} |"
 
 
 def joined_row(name: str, scene: Scene) -> str:
@@ -74,8 +83,8 @@ def joined_row(name: str, scene: Scene) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    at_hand = [name for name in MODELS if name == MUSEUM or MODELS[name].is_file()]
-    parser.add_argument("models", nargs="*", default=at_hand, help=f"of {' '.join(MODELS)}")
+    there = [name for name in MODELS if name == MUSEUM or MODELS[name].is_file()]
+    parser.add_argument("models", nargs="*", default=there, help=f"of {' '.join(MODELS)}")
     parser.add_argument("--wall-area", nargs="+", type=float, metavar="M2")
     parser.add_argument("--joined", action="store_true")
     given = parser.parse_args()
@@ -92,11 +101,12 @@ def main() -> None:
         print(f"| model | {' | '.join(columns)} |")
         print("|---|---|---|---|---|---|---|---|")
     elif given.wall_area:
-        print("| model | wall area, m² | leaves | portals | average PVS of leaves |")
-        print("|---|---|---|---|---|")
+        print("| model | wall area, m² | leaves | portals | volume at hand | at most |")
+        print("|---|---|---|---|---|---|")
     else:
-        print("| model | | triangles | cells | leaves | portals | average PVS |")
-        print("|---|---|---|---|---|---|---|")
+        columns = "cells | view-only | leaves | dropped | portals | volume at hand | at most"
+        print(f"| model | | triangles | {columns} |")
+        print("|---|---|---|---|---|---|---|---|---|---|")
     for name in given.models:
         scene = opened(name)
         if given.joined:
