@@ -27,7 +27,7 @@ def seen_from_places(cells: Cells, executor: Executor) -> Bools:
     """(L,) which leaves may be seen from a leaf in which somebody can stand, themselves included.
 
     The first bound of the flow decides, without its search: of the leaves of five real models the
-    search would not have dropped one more. Where there are too many portals for it nothing is
+    search would have dropped two more. Where there are too many portals for it nothing is
     dropped.
     """
     standing = cells.leaf_standing
