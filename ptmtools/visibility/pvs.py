@@ -32,7 +32,8 @@ def compute_pvs(
     Unless it is sampled, a pair of cells is left out only if no straight line, but for hairlines
     thinner than the rounding of the coordinates (`Tolerance.rounding`), leads through portals from
     a leaf of one in which somebody can stand to the other, or the other way round. Cells that share
-    a portal always see each other. `Pvs.fallbacks` counts the portals
+    a portal always see each other, also such in which nobody can stand. Leaves of no cell are left
+    out. `Pvs.fallbacks` counts the portals
     whose search was cut short. ``executor`` does the searches; the result is the same for any.
 
     Raises what `portal_flow` raises.
