@@ -39,7 +39,7 @@ _STOREY = 0.2
 #: A shape of less area for its length than this share of a radius is a line.
 _THIN = 4e-3
 #: A region is first held against one of the triangles about it, then against so many times more.
-_GROWTH = 1.5
+_GROWTH = 1.25
 #: Regions with more triangles about them, and shapes of more corners, are cut in two,
 _CROWD, _CORNERS = 256, 256
 #: unless they are no longer than this, metres.
@@ -160,33 +160,42 @@ def _left(
 ) -> tuple[Geometry, Ints]:
     """(k,) pieces of regions of floor that are no less than a radius from triangles, (n, 3, 3), as
     high above them as a ``band``; in plan. And (k,) the region of each."""
+    left, whose, region = [plan[:0]], [np.zeros(0, dtype=np.int64)], np.arange(len(plan))
+    while len(region):
+        row, near = _about(corners, plan, slope, band, radius)
+        crowded = (np.bincount(row, minlength=len(plan)) > _CROWD) & _long(plan)
+        some = ~crowded[row]
+        free = _less(plan, slope, corners[near[some]], row[some], band, radius)
+        kept = ~crowded & ~shapely.is_empty(free)
+        left.append(free[kept])
+        whose.append(region[kept])
+        plan, half = halves(plan[crowded])
+        slope, region = slope[crowded][half], region[crowded][half]
+    return np.concatenate(left), np.concatenate(whose)
+
+
+def _about(
+    corners: Floats, plan: Geometry, slope: Floats, band: tuple[float, float], radius: float
+) -> tuple[Ints, Ints]:
+    """(p,) and (p,): pairs of a region of floor and a triangle, (n, 3, 3), as high above it as a
+    ``band``, whose box in plan is no more than a radius away."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     boxes = shapely.box(*low[:, PLAN].T, *high[:, PLAN].T)
     least, most = heights(plan, slope)
     storey = np.floor(least / (_STOREY * (band[1] - band[0])))
-    left, whose = [plan[:0]], [np.zeros(0, dtype=np.int64)]
+    rows, found = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
     # Storey by storey, so that a floor is held against what is as high only.
     for name in np.unique(storey):
-        region = np.flatnonzero(storey == name)
-        lowest, highest = least[region].min() + band[0], most[region].max() + band[1]
+        here = np.flatnonzero(storey == name)
+        lowest, highest = least[here].min() + band[0], most[here].max() + band[1]
         about = np.flatnonzero((high[:, 1] >= lowest) & (low[:, 1] <= highest))
-        tree, pieces = shapely.STRtree(boxes[about]), plan[region]
-        while len(pieces):
-            row, near = tree.query(pieces, "dwithin", distance=radius)
-            near = about[near]
-            height = above(corners[near], slope[region[row]])
-            meets = (height.min(axis=1) <= band[1]) & (height.max(axis=1) >= band[0])
-            row, near = row[meets], near[meets]
-            crowded = np.bincount(row, minlength=len(pieces)) > _CROWD
-            crowded &= _long(pieces)
-            some = ~crowded[row]
-            free = _less(pieces, slope[region], corners[near[some]], row[some], band, radius)
-            kept = ~crowded & ~shapely.is_empty(free)
-            left.append(free[kept])
-            whose.append(region[kept])
-            pieces, which = halves(pieces[crowded])
-            region = region[crowded][which]
-    return np.concatenate(left), np.concatenate(whose)
+        row, near = shapely.STRtree(boxes[about]).query(plan[here], "dwithin", distance=radius)
+        row, near = here[row], about[near]
+        height = above(corners[near], slope[row])
+        meets = (height.min(axis=1) <= band[1]) & (height.max(axis=1) >= band[0])
+        rows.append(row[meets])
+        found.append(near[meets])
+    return np.concatenate(rows), np.concatenate(found)
 
 
 def _less(
