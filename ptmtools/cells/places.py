@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.facets import Facets
 from ptmtools.cells.naming import named
 from ptmtools.cells.options import SubdivideOptions, Walker
@@ -38,6 +38,12 @@ from ptmtools.scene.model import Scene
 _STOREY = 0.2
 #: A shape of less area for its length than this share of a radius is a line.
 _THIN = 4e-3
+#: A region is first held against one of the triangles about it, then against so many times more.
+_GROWTH = 1.25
+#: Regions with more triangles about them, and shapes of more corners, are cut in two,
+_CROWD, _CORNERS = 256, 256
+#: unless they are no longer than this, metres.
+_SHORT = 2.0
 #: Corners of a quarter of a circle.
 QUARTER = 4
 #: Places are sampled once in this area, m², and so often at most.
@@ -106,10 +112,13 @@ def find_places(floors: Floors, structure: Structure, walker: Walker, boxes: Flo
     pieces, region = floors.within(boxes, walker.middle)
     names, plan = _joined_by(region, pieces)
     slope = _slopes(floors)[names]
-    body = _taken(structure.corners, plan, slope, (walker.step, walker.height), walker.radius)
+    body = (walker.step, walker.height)
+    plan, whose = _left(structure.corners, plan, slope, body, walker.radius)
     # A foot is on the uppermost of surfaces one step apart: not on the underside of a slab.
-    foot = _taken(floors.corners, plan, slope, (2 * structure.tolerance.plane, walker.step), 0.0)
-    return Places(shapely.difference(shapely.difference(plan, body), foot), slope)
+    foot = (2 * structure.tolerance.plane, walker.step)
+    plan, which = _left(floors.corners, plan, slope[whose], foot, 0.0)
+    names, plan = _joined_by(whose[which], plan)
+    return Places(plan, slope[names])
 
 
 def spread(corners: Floats) -> tuple[Floats, Floats]:
@@ -148,35 +157,85 @@ def _joined_by(row: Ints, shapes: Geometry) -> tuple[Ints, Geometry]:
     )
 
 
-def _taken(
+def _left(
     corners: Floats, plan: Geometry, slope: Floats, band: tuple[float, float], radius: float
-) -> Geometry:
-    """(r,) what of regions of floor is less than a radius from triangles, (n, 3, 3), that are as
-    high above it as a ``band``; in plan."""
+) -> tuple[Geometry, Ints]:
+    """(k,) pieces of regions of floor that are no less than a radius from triangles, (n, 3, 3), as
+    high above them as a ``band``; in plan. And (k,) the region of each."""
+    left, whose, region = [plan[:0]], [np.zeros(0, dtype=np.int64)], np.arange(len(plan))
+    while len(region):
+        row, near = _about(corners, plan, slope, band, radius)
+        crowded = (np.bincount(row, minlength=len(plan)) > _CROWD) & _long(plan)
+        some = ~crowded[row]
+        free = _less(plan, slope, corners[near[some]], row[some], band, radius)
+        kept = ~crowded & ~shapely.is_empty(free)
+        left.append(free[kept])
+        whose.append(region[kept])
+        plan, half = halves(plan[crowded])
+        slope, region = slope[crowded][half], region[crowded][half]
+    return np.concatenate(left), np.concatenate(whose)
+
+
+def _about(
+    corners: Floats, plan: Geometry, slope: Floats, band: tuple[float, float], radius: float
+) -> tuple[Ints, Ints]:
+    """(p,) and (p,): pairs of a region of floor and a triangle, (n, 3, 3), as high above it as a
+    ``band``, whose box in plan is no more than a radius away."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     boxes = shapely.box(*low[:, PLAN].T, *high[:, PLAN].T)
     least, most = heights(plan, slope)
     storey = np.floor(least / (_STOREY * (band[1] - band[0])))
-    taken = np.full(len(plan), shapely.Polygon())
+    rows, found = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
     # Storey by storey, so that a floor is held against what is as high only.
     for name in np.unique(storey):
         here = np.flatnonzero(storey == name)
         lowest, highest = least[here].min() + band[0], most[here].max() + band[1]
         about = np.flatnonzero((high[:, 1] >= lowest) & (low[:, 1] <= highest))
-        if not len(about):
-            continue
-        tree = shapely.STRtree(boxes[about])
-        row, obstacle = tree.query(plan[here], "dwithin", distance=radius)
-        obstacle = about[obstacle]
-        height = above(corners[obstacle], slope[here[row]])
+        row, near = shapely.STRtree(boxes[about]).query(plan[here], "dwithin", distance=radius)
+        row, near = here[row], about[near]
+        height = above(corners[near], slope[row])
         meets = (height.min(axis=1) <= band[1]) & (height.max(axis=1) >= band[0])
-        row, obstacle, height = row[meets], obstacle[meets], height[meets]
-        each, shadow = shadows(corners[obstacle][:, :, PLAN], height, band, np.arange(len(row)))
-        shadow, row = _merged(shadow, row[each], radius)
+        rows.append(row[meets])
+        found.append(near[meets])
+    return np.concatenate(rows), np.concatenate(found)
+
+
+def _less(
+    plan: Geometry,
+    slope: Floats,
+    corners: Floats,
+    row: Ints,
+    band: tuple[float, float],
+    radius: float,
+) -> Geometry:
+    """(r,) regions less what is less than a radius from triangles, (n, 3, 3), each of which stands
+    about the region of its ``row``.
+
+    Of most regions, such as the tops of mouldings, the first few leave nothing, and of a wall of
+    many triangles, a few take what all do. So they are tried by turns, those first that may take
+    most, and only the ones that still come near to what is left."""
+    low, high = corners.min(axis=1)[:, PLAN] - radius, corners.max(axis=1)[:, PLAN] + radius
+    x0, z0, x1, z1 = shapely.bounds(plan).reshape(-1, 4)[row].T
+    across = np.minimum(high[:, 0], x1) - np.maximum(low[:, 0], x0)
+    along = np.minimum(high[:, 1], z1) - np.maximum(low[:, 1], z0)
+    order = np.lexsort((-across * along, row))
+    row, corners = row[order], corners[order]
+    turn = np.arange(len(row)) - np.searchsorted(row, row)
+    left = plan.copy()
+    first, end = 0, 1
+    while (turn >= first).any():
+        at = np.flatnonzero((turn >= first) & (turn < end))
+        at = at[~shapely.is_empty(left[row[at]])]
+        height = above(corners[at], slope[row[at]])
+        each, shadow = shadows(corners[at][:, :, PLAN], height, band, at)
+        # A radius away is not near, but for rounding.
+        near = shapely.dwithin(shadow, left[row[each]], (1 - 1e-6) * radius)
+        shadow, whose = _merged(shadow[near], row[each[near]], radius)
         # One by one: GEOS 3.14 buffers many lines at once with holes where they meet.
-        names, widened = _joined_by(row, shapely.buffer(shadow, radius, quad_segs=QUARTER))
-        taken[here[names]] = widened
-    return taken
+        names, taken = _joined_by(whose, shapely.buffer(shadow, radius, quad_segs=QUARTER))
+        left[names] = shapely.difference(left[names], taken)
+        first, end = end, int(_GROWTH * end) + 1
+    return left
 
 
 def _merged(shapes: Geometry, row: Ints, radius: float) -> tuple[Geometry, Ints]:
@@ -186,6 +245,13 @@ def _merged(shapes: Geometry, row: Ints, radius: float) -> tuple[Geometry, Ints]
     names, united = _joined_by(row[flat], shapes[flat])
     parts, which = shapely.get_parts(united, return_index=True)
     return np.append(shapes[~flat], parts), np.append(row[~flat], names[which])
+
+
+def _long(shapes: Geometry) -> Bools:
+    """(n,) whether shapes may be cut in two."""
+    x0, y0, x1, y1 = shapely.bounds(shapes).reshape(-1, 4).T
+    found: Bools = np.maximum(x1 - x0, y1 - y0) > _SHORT
+    return found
 
 
 def heights(plan: Geometry, slope: Floats) -> tuple[Floats, Floats]:
@@ -223,6 +289,26 @@ def shadows(
     return names, np.asarray(shapely.convex_hull(clouds))
 
 
+def tiled(shapes: Geometry, margin: float) -> tuple[Geometry, Geometry, Ints]:
+    """(m,) boxes that share out what is up to a margin from each of (n,) shapes, (m,) what of the
+    shape is up to a margin from each box, of few corners each, and (m,) its shape: what is done to
+    corners one by one is in proportion to their number."""
+    x0, y0, x1, y1 = shapely.bounds(shapes).reshape(-1, 4).T
+    own = shapely.box(x0 - margin, y0 - margin, x1 + margin, y1 + margin)
+    which = np.arange(len(shapes))
+    found: list[tuple[Geometry, Geometry, Ints]] = []
+    while True:
+        large = (shapely.get_num_coordinates(shapes) > _CORNERS) & _long(own)
+        found.append((own[~large], shapes[~large], which[~large]))
+        if not large.any():
+            boxes, pieces, names = zip(*found, strict=True)
+            return np.concatenate(boxes), np.concatenate(pieces), np.concatenate(names)
+        own, half = halves(own[large])
+        x0, y0, x1, y1 = shapely.bounds(own).T
+        about = shapely.box(x0 - margin, y0 - margin, x1 + margin, y1 + margin)
+        shapes, which = shapely.intersection(shapes[large][half], about), which[large][half]
+
+
 def _triangles(free: Geometry, slope: Floats) -> Floats:
     """(n, 3, 3) triangles of regions in plan, on their slopes."""
     parts, region = shapely.get_parts(free, return_index=True)
@@ -230,20 +316,21 @@ def _triangles(free: Geometry, slope: Floats) -> Floats:
     parts, region = parts[flat], region[flat]
     found, of = [np.zeros((0, 3, 2))], [np.zeros(0, dtype=np.int64)]
     while len(parts):
-        triangles = delaunay(parts)
+        # Of many corners, or none that GEOS can divide: cut in two, and tried again.
+        large = (shapely.get_num_coordinates(parts) > _CORNERS) & _long(parts)
+        triangles = delaunay(np.where(large, shapely.Polygon(), parts))
         pieces, part = shapely.get_parts(triangles, return_index=True)
         found.append(shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3])
         of.append(region[part])
-        # What GEOS cannot divide is cut in two, and tried again.
         left = shapely.is_empty(triangles)
-        parts, which = _halves(parts[left])
+        parts, which = halves(parts[left])
         region = region[left][which]
     plan, slope = np.concatenate(found), slope[np.concatenate(of)]
     height = np.einsum("ncx,nx->nc", plan, slope[:, :2]) + slope[:, 2:]
     return np.stack([plan[..., 0], height, plan[..., 1]], axis=2)
 
 
-def _halves(shapes: Geometry) -> tuple[Geometry, Ints]:
+def halves(shapes: Geometry) -> tuple[Geometry, Ints]:
     """(m,) the polygons to both sides of the middles of (n,) shapes, and (m,) the shape of each."""
     x0, y0, x1, y1 = shapely.bounds(shapes).reshape(-1, 4).T
     middle = np.where(x1 - x0 > y1 - y0, (x0 + x1) / 2, x1)

@@ -13,7 +13,7 @@ import shapely
 
 from ptmtools.arrays import Bools
 from ptmtools.cells.options import Walker
-from ptmtools.cells.places import PLAN, QUARTER, Places, above, heights, shadows
+from ptmtools.cells.places import PLAN, QUARTER, Places, above, heights, shadows, tiled
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.tolerance import Tolerance
 
@@ -25,10 +25,12 @@ def eye_region(places: Places, walker: Walker, tolerance: Tolerance) -> Places:
     """What eyes can be above: the places as wide as the body, but not into what it touches."""
     inside = np.cos(np.pi / (4 * QUARTER))  # of a circle that is a polygon
     slack = 2 * tolerance.plane
-    sound = shapely.buffer(places.plan, -slack, quad_segs=QUARTER)
+    box, plan, which = tiled(places.plan, walker.radius + 2 * slack)
+    sound = shapely.buffer(plan, -slack, quad_segs=QUARTER)
     wide = shapely.buffer(sound, walker.radius * inside, quad_segs=QUARTER)
-    some = ~shapely.is_empty(wide)
-    return Places(wide[some], places.slope[some])
+    eyes = shapely.intersection(wide, box)
+    some = shapely.get_dimensions(eyes) == 2
+    return Places(eyes[some], places.slope[which[some]])
 
 
 def meets(
