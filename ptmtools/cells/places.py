@@ -118,6 +118,8 @@ def find_places(floors: Floors, structure: Structure, walker: Walker, boxes: Flo
     foot = (2 * structure.tolerance.plane, walker.step)
     plan, which = _left(floors.corners, plan, slope[whose], foot, 0.0)
     names, plan = _joined_by(whose[which], plan)
+    # Less corners on straight edges, and with the rest in an order that does not depend on the way.
+    plan = shapely.simplify(shapely.normalize(plan), structure.tolerance.grid)
     return Places(plan, slope[names])
 
 
