@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.facets import Facets
 from ptmtools.cells.naming import named
 from ptmtools.cells.options import SubdivideOptions, Walker
@@ -42,8 +42,8 @@ _THIN = 4e-3
 _GROWTH = 1.25
 #: Regions with more triangles about them, and shapes of more corners, are cut in two,
 _CROWD, _CORNERS = 256, 256
-#: unless they are no longer than this, metres.
-_SHORT = 2.0
+#: unless they are no longer than this many times what they are held against is high, or wide.
+_SHORT, _NARROW = 1.2, 8.0
 #: Corners of a quarter of a circle.
 QUARTER = 4
 #: Places are sampled once in this area, m², and so often at most.
@@ -167,7 +167,9 @@ def _left(
     left, whose, region = [plan[:0]], [np.zeros(0, dtype=np.int64)], np.arange(len(plan))
     while len(region):
         row, near = _about(corners, plan, slope, band, radius)
-        crowded = (np.bincount(row, minlength=len(plan)) > _CROWD) & _long(plan)
+        crowded = (np.bincount(row, minlength=len(plan)) > _CROWD) & (
+            _length(plan) > _SHORT * band[1]
+        )
         some = ~crowded[row]
         free = _less(plan, slope, corners[near[some]], row[some], band, radius)
         kept = ~crowded & ~shapely.is_empty(free)
@@ -249,11 +251,11 @@ def _merged(shapes: Geometry, row: Ints, radius: float) -> tuple[Geometry, Ints]
     return np.append(shapes[~flat], parts), np.append(row[~flat], names[which])
 
 
-def _long(shapes: Geometry) -> Bools:
-    """(n,) whether shapes may be cut in two."""
+def _length(shapes: Geometry) -> Floats:
+    """(n,) the longer sides of the boxes around shapes."""
     x0, y0, x1, y1 = shapely.bounds(shapes).reshape(-1, 4).T
-    found: Bools = np.maximum(x1 - x0, y1 - y0) > _SHORT
-    return found
+    longer: Floats = np.maximum(x1 - x0, y1 - y0)
+    return longer
 
 
 def heights(plan: Geometry, slope: Floats) -> tuple[Floats, Floats]:
@@ -300,7 +302,7 @@ def tiled(shapes: Geometry, margin: float) -> tuple[Geometry, Geometry, Ints]:
     which = np.arange(len(shapes))
     found: list[tuple[Geometry, Geometry, Ints]] = []
     while True:
-        large = (shapely.get_num_coordinates(shapes) > _CORNERS) & _long(own)
+        large = (shapely.get_num_coordinates(shapes) > _CORNERS) & (_length(own) > _NARROW * margin)
         found.append((own[~large], shapes[~large], which[~large]))
         if not large.any():
             boxes, pieces, names = zip(*found, strict=True)
@@ -319,7 +321,7 @@ def _triangles(free: Geometry, slope: Floats) -> Floats:
     found, of = [np.zeros((0, 3, 2))], [np.zeros(0, dtype=np.int64)]
     while len(parts):
         # Of many corners, or none that GEOS can divide: cut in two, and tried again.
-        large = (shapely.get_num_coordinates(parts) > _CORNERS) & _long(parts)
+        large = shapely.get_num_coordinates(parts) > _CORNERS
         triangles = delaunay(np.where(large, shapely.Polygon(), parts))
         pieces, part = shapely.get_parts(triangles, return_index=True)
         found.append(shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3])
