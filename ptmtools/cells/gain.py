@@ -113,8 +113,8 @@ class _Attached(_Costs):
         self._added = 0.0
 
     def grown_by(self, share: float) -> Ints:
-        """(L,) the groups, once joining them has added so much."""
-        return self.grown(lambda added: self._added + added <= share)
+        """(L,) the groups, before joining them has added so much; none is joined for 0."""
+        return self.grown(lambda added: self._added + added < share)
 
     def cost(self, a: int, b: int) -> float:
         if self.own[a][0] and self.own[b][0]:

@@ -189,3 +189,10 @@ def test_slivers_join_and_what_many_see_stays_apart() -> None:
     assert group[2] == group[0]
     assert group[3] != group[0]
     assert join_by_gain(sees, volume, area, np.array([[0, 3]], np.int32), 1.0)[3] == 0
+
+
+def test_a_gain_of_nothing_keeps_slivers_apart_even_if_they_cost_nothing() -> None:
+    sees, pairs = np.eye(3, dtype=np.bool_), np.array([[0, 1], [1, 2]], np.int32)
+    volume, area = np.array([50.0, 0, 0]), np.array([100.0, 0, 0])
+    assert join_by_gain(sees, volume, area, pairs, 0.0).tolist() == [0, 1, 2]
+    assert len(set(join_by_gain(sees, volume, area, pairs, 0.1).tolist())) == 1
