@@ -51,17 +51,23 @@ def join_by_gain(
     pairs: (n, 2) leaves through whose portals groups may grow.
     gain: no group of which parting gains as much is made; 0 to 1.
     """
-    groups = _Parted(sees, volume, area, pairs)
-    groups.grown(lambda gained: gained < gain)
-    return _Attached(groups).grown_by(ATTACHED * gain)
+    every = np.stack([volume, area], axis=1)
+    parted = _Parted(sees.copy(), every.copy(), every, pairs)
+    group = parted.grown(lambda gained: gained < gain)
+    attached = _Attached(parted.sees, parted.own, every, group[pairs])
+    return attached.grown_by(ATTACHED * gain)[group]
 
 
 class _Costs(Groups):
     """Groups, and what they cost."""
 
-    def __init__(self, sees: Bools, own: Floats, every: Floats) -> None:
-        """``sees``: (L, L); ``own``: (L, 2) volume and area of groups, ``every`` of leaves."""
+    def __init__(self, sees: Bools, own: Floats, every: Floats, pairs: NDArray[np.integer]) -> None:
+        """``sees``: (L, L) which leaves a group sees; ``own``: (L, 2) its volume and area,
+        ``every``: those of the leaves. The first two change as groups grow, and a group that
+        has joined another has nothing."""
+        super().__init__(len(sees), pairs)
         self.sees, self.own, self.every = sees, own, every
+        self.before = [self.of(row, each) for row, each in zip(sees, own, strict=True)]
 
     def together(self, a: int, b: int) -> float:
         """Of two groups as one."""
@@ -75,6 +81,7 @@ class _Costs(Groups):
     def join(self, a: int, b: int) -> list[tuple[int, int]]:
         self.sees[a] |= self.sees[b]
         self.own[a] += self.own[b]
+        self.own[b] = 0.0
         super().join(a, b)
         return [(a, c) for c in self.near[a]]
 
@@ -82,21 +89,15 @@ class _Costs(Groups):
 class _Parted(_Costs):
     """Groups with viewers, that cost what parting them gains."""
 
-    def __init__(self, sees: Bools, volume: Floats, area: Floats, pairs: NDArray[np.int32]) -> None:
-        Groups.__init__(self, len(sees), pairs)
-        every = np.stack([volume, area], axis=1)
-        super().__init__(sees.copy(), every.copy(), every)
-        self._apart = [self.of(row, own) for row, own in zip(sees, every, strict=True)]
-
     def cost(self, a: int, b: int) -> float:
         if not (self.own[a][0] and self.own[b][0]):
             return np.inf
         together = self.together(a, b)
-        gain = 1 - (self._apart[a] + self._apart[b]) / together if together > 0 else 0.0
+        gain = 1 - (self.before[a] + self.before[b]) / together if together > 0 else 0.0
         return round(gain, DIGITS)
 
     def join(self, a: int, b: int) -> list[tuple[int, int]]:
-        self._apart[a] += self._apart[b]
+        self.before[a] += self.before[b]  # of all its leaves apart
         return super().join(a, b)
 
 
@@ -104,12 +105,9 @@ class _Attached(_Costs):
     """Groups one of which has no viewers, that cost what joining them adds to all costs, as a
     share."""
 
-    def __init__(self, groups: _Parted) -> None:
-        self.near, self._parent = groups.near, groups._parent
-        super().__init__(groups.sees, groups.own, groups.every)
-        self._alone = [self.of(row, own) for row, own in zip(self.sees, self.own, strict=True)]
-        whole = np.unique(self.ends())
-        self._all = sum(self._alone[group] for group in whole.tolist())
+    def __init__(self, sees: Bools, own: Floats, every: Floats, pairs: NDArray[np.integer]) -> None:
+        super().__init__(sees, own, every, pairs)
+        self._all = sum(self.before)
         self._added = 0.0
 
     def grown_by(self, share: float) -> Ints:
@@ -119,10 +117,10 @@ class _Attached(_Costs):
     def cost(self, a: int, b: int) -> float:
         if self.own[a][0] and self.own[b][0]:
             return np.inf
-        added = self.together(a, b) - self._alone[a] - self._alone[b]
+        added = self.together(a, b) - self.before[a] - self.before[b]
         return round(added / self._all, 2 * DIGITS) if self._all else 0.0
 
     def join(self, a: int, b: int) -> list[tuple[int, int]]:
         self._added += self.cost(a, b)
-        self._alone[a] = self.together(a, b)
+        self.before[a] = self.together(a, b)
         return super().join(a, b)
