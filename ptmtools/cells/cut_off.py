@@ -95,6 +95,13 @@ class Unreached:
         ]
         return Unreached(sorted(rooms, key=lambda room: -room.place), self.outside)
 
+    def or_kept(self, reached: Bools) -> Bools:
+        """(L,) the leaves that are ``reached``, (L,), or in a room that is not."""
+        found = reached.copy()
+        for room in self.rooms:
+            found[room.leaves] = True
+        return found
+
     def left_out(self, rooms_kept: bool) -> list[CutOff]:
         """What of it comes into no cell."""
         return [*([] if rooms_kept else self.rooms), *([self.outside] if self.outside else [])]
@@ -108,9 +115,11 @@ def unreached(
     floors: Floors,
     structure: Structure,
     walker: Walker,
+    glass: Floats,
 ) -> Unreached:
     """Where somebody could be that the flood did not reach. ``reached``, ``outer``: (L,) leaves;
-    groups with one of the latter are the outside."""
+    groups with one of the latter are the outside. ``glass``: (n, 3, 3) triangles that are walls
+    there, metres."""
     group = groups(len(tree.leaves), portals)
     outside = np.isin(group, group[outer]) & ~reached
     waiting = ~reached & ~outside & ~np.isin(group, group[reached])
@@ -122,7 +131,9 @@ def unreached(
         return Unreached([])
     around = Surroundings(structure.corners, structure.tolerance)
     here = standing.only(beyond[standing.leaf])
-    here = here.only(around.inside(here.points))
+    if len(here.leaf):
+        walls = np.concatenate([structure.corners, glass])
+        here = here.only(Surroundings(walls, structure.tolerance).inside(here.points))
     found = None
     if here.place.sum() >= LEAST_INSIDE:
         found = CutOff.of(np.unique(here.leaf), here)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from ptmtools.cells.structure import Opaque, Structure, WallPlane, find_walls
 from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
+from ptmtools.tolerance import Tolerance
 
 
 @dataclass(frozen=True)
@@ -59,11 +60,13 @@ class Space:
     tree: Tree
     portals: list[Portal]
     reached: Bools  # (L,) which leaves somebody can reach
-    closed: bool  # whether they do not touch the root box
-    beyond: Unreached  # where the flood did not come to; reached all the same if asked for
-    left_out: Floats  # `Cells.left_out`
-    place: float  # m² to stand on in all that is reached, known if something is left out
+    closed: bool  # whether they do not touch the root box; nobody knows of one that is clipped
     doors: Bools  # (d,) which door leaves are open
+    # Where the flood did not come to; reached all the same if asked for.
+    beyond: Unreached = field(default_factory=lambda: Unreached([]))
+    # `Cells.left_out`
+    left_out: Floats = field(default_factory=lambda: np.zeros((0, 3, 3)))
+    place: float = 0.0  # m² to stand on in all that is reached, known if something is left out
 
 
 def divide_inside(building: Building, box: Floats) -> Space:
@@ -87,41 +90,63 @@ def divide(
     portals = find_portals(tree, structure.tolerance)
     outer = at_box(tree)
     start = _viewpoint_leaves(tree, box, options)
-    walker = Walker(*options.walker)
-    start = start or largest_leaf(tree, outer <= inside, structure, walker)
+    start = start or largest_leaf(tree, outer <= inside, structure, Walker(*options.walker))
     reached = flood(len(tree.leaves), portals, start)
     closed = bool(start) and not bool(np.any(reached & outer))
-    beyond, left_out, place = Unreached([]), np.zeros((0, 3, 3)), 0.0
-    doors = np.zeros(len(building.doors.leaves), dtype=bool)
-    if inside or closed:  # else it is thrown away
-        surfaces, outside = (building.floors, structure, walker), outer & (not inside)
-        beyond = unreached(tree, portals, reached, outside, *surfaces)
-        way = None
-        if options.doors != "closed":
-            way = open_doors(building.doors, structure, tree, portals, start, beyond, outside)
+    shut = np.zeros(len(building.doors.leaves), dtype=bool)
+    space = Space(box, tree, portals, reached, closed, shut)
+    if inside or closed:
+        space = _complete(building, space, outer & (not inside))
+    if inside or space.closed:
+        space = _rejoined(space, structure.tolerance)
+    return space
+
+
+def _complete(building: Building, space: Space, outer: Bools) -> Space:
+    """With doors open, and what the flood did not come to. ``outer``: (L,) the leaves at the box
+    around a closed model, which proves to be open if a door leads into rooms that are."""
+    structure, options = building.structure, building.options
+    tree, portals, reached, doors = space.tree, space.portals, space.reached, space.doors
+    surfaces = building.floors, structure, Walker(*options.walker)
+    beyond = unreached(tree, portals, reached, outer, *surfaces, building.doors.glass)
+    if options.doors != "closed":
+        within = beyond.or_kept(reached)
+        outside = flood(len(tree.leaves), portals, tuple(np.flatnonzero(outer).tolist()))
+        if building.doors.lead_to_open_rooms(structure, tree, within, outside):
+            return replace(space, closed=False)
+        way = open_doors(building.doors, structure, tree, portals, within, outer)
         if way:
             doors, tree, portals = way.doors, way.tree, way.portals
-            reached = flood(len(tree.leaves), portals, start)
+            seeds = tuple(np.flatnonzero(reached).tolist())
+            reached = flood(len(tree.leaves), portals, seeds)
             beyond = beyond.without(reached, portals)
-        if options.reach == "all":
-            for room in beyond.rooms:
-                reached[room.leaves] = True
-        if (left := beyond.left_out(options.reach == "all")) and reached.any():
-            left_out = floor_of(left, tree, *surfaces)
-            place = float(Standing.of(tree, reached, *surfaces).place.sum())
-    if tree.capped and (inside or closed):
-        group = np.where(reached, groups(len(tree.leaves), portals), -1)
-        joint = rejoined(tree, group)
-        portals = portals_rejoined(portals, tree, joint, structure.tolerance)
-        tree, reached = joint.tree, np.bincount(joint.leaf, reached) > 0
-    return Space(box, tree, portals, reached, closed, beyond, left_out, place, doors)
+    if options.reach == "all":
+        reached = beyond.or_kept(reached)
+    space = replace(space, tree=tree, portals=portals, reached=reached, doors=doors, beyond=beyond)
+    if (left := beyond.left_out(options.reach == "all")) and reached.any():
+        left_out = floor_of(left, tree, *surfaces)
+        place = float(Standing.of(tree, reached, *surfaces).place.sum())
+        space = replace(space, left_out=left_out, place=place)
+    return space
+
+
+def _rejoined(space: Space, tolerance: Tolerance) -> Space:
+    """With the leaves together that caps and doors split for nothing."""
+    tree, portals = space.tree, space.portals
+    if not tree.capped:
+        return space
+    group = np.where(space.reached, groups(len(tree.leaves), portals), -1)
+    joint = rejoined(tree, group)
+    portals = portals_rejoined(portals, tree, joint, tolerance)
+    reached = np.bincount(joint.leaf, space.reached) > 0
+    return replace(space, tree=joint.tree, portals=portals, reached=reached)
 
 
 def _viewpoint_leaves(tree: Tree, box: Floats, options: SubdivideOptions) -> tuple[int, ...]:
     if not options.viewpoints:
         return ()
     places = np.array(options.viewpoints, dtype=np.float64)
-    outside = np.flatnonzero(np.any((places < box[0]) | (places > box[1]), axis=1))
+    outside = np.flatnonzero(~np.all((places >= box[0]) & (places <= box[1]), axis=1))
     if len(outside):
         x, y, z = places[outside[0]]
         raise InputError(

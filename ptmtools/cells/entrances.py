@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bsp import Tree
-from ptmtools.cells.cut_off import Unreached
 from ptmtools.cells.door_planes import DoorPlanes
 from ptmtools.cells.doors import DoorLeaf, find_doors
 from ptmtools.cells.doorways import RELIEF
@@ -60,10 +59,9 @@ class Doors:
         leaf = np.full(len(scene.triangles), -1)
         for i, door in enumerate(leaves):
             leaf[door.triangles] = i
-        glass, roofed = np.zeros((0, 3, 3)), True
+        glass, roofed = scene.corners[~scene.opaque], True
         if leaves:
             structure = Structure.made(opaque, structure.tolerance, leaf >= 0)
-            glass = scene.corners[~scene.opaque]
             roofed = roofed_share(structure.corners, options.wall_area) >= ROOFED
         of = leaf[structure.source]
         across = np.array([door.axes[0] for door in leaves]).reshape(-1, 3)
@@ -74,13 +72,21 @@ class Doors:
         each = [self.leaves[i].triangles for i in np.flatnonzero(which)]
         return np.unique(np.concatenate([np.zeros(0, np.int64), *each])).astype(np.int32)
 
-    def between(self, tree: Tree, within: Bools) -> Bools:
-        """(d,) which leaves have insides, the (L,) leaves of the tree ``within``, on both sides."""
-        found = np.zeros(len(self.leaves), dtype=bool)
+    def sides(self, tree: Tree, within: Bools) -> Bools:
+        """(d, 2) which sides of leaves are in the (L,) leaves of the tree ``within``."""
+        found = np.zeros((len(self.leaves), 2), dtype=bool)
         for i, door in enumerate(self.leaves):
-            sides = (sunk(tree.planes, tree.children, side) for side in door.grid(_BEYOND))
-            found[i] = all(within[-2 - at].mean() > _MOST for at in sides)
+            at = np.array([sunk(tree.planes, tree.children, side) for side in door.grid(_BEYOND)])
+            found[i] = within[-2 - at].mean(axis=1) > _MOST
         return found
+
+    def lead_to_open_rooms(
+        self, structure: Structure, tree: Tree, inside: Bools, outside: Bools
+    ) -> bool:
+        """Whether one leads from ``inside``, (L,) leaves of the tree, into a room that the
+        ``outside``, (L,), comes into too, such as through a window."""
+        which = self.sides(tree, inside).any(axis=1) & self.sides(tree, outside).any(axis=1)
+        return bool(which.any()) and bool((which & self.sheltered(structure)).any())
 
     def sheltered(self, structure: Structure) -> Bools:
         """(d,) which leaves have, on both sides, walls around whoever goes there, and a roof."""
@@ -128,20 +134,16 @@ def open_doors(
     structure: Structure,
     tree: Tree,
     portals: list[Portal],
-    start: tuple[int, ...],
-    beyond: Unreached,
+    within: Bools,
     outer: Bools,
 ) -> Opened | None:
     """What becomes of a tree when all doors open that lead from inside to inside; None if none
     does.
 
-    ``start``, ``beyond``: where the flood began, and where it did not come to. ``outer``: (L,) the
-    leaves at the box around a closed model, in which the flood must not end.
+    ``within``: (L,) the leaves where somebody can be. ``outer``: (L,) those at the box around a
+    closed model, in which the flood must not end.
     """
-    within = flood(len(tree.leaves), portals, start)
-    for room in beyond.rooms:
-        within[room.leaves] = True
-    which = doors.between(tree, within)
+    which = np.asarray(doors.sides(tree, within).all(axis=1))
     if which.any() and not outer.any():
         which &= doors.sheltered(structure)
     rooms = tuple(np.flatnonzero(within).tolist())

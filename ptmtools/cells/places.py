@@ -148,15 +148,16 @@ def _slopes(floors: Floors) -> Floats:
 
 
 def _joined_by(row: Ints, shapes: Geometry) -> tuple[Ints, Geometry]:
-    """(g,) the rows, (n,), that shapes have, ascending, and the union of those of each."""
+    """(g,) the rows, (n,), that shapes have, ascending, and the union of those of each; none of
+    those only that are as wide as rounding, whose union is empty."""
     if not len(shapes):
         return row, shapes
     order = np.argsort(row, kind="stable")
     names, first = np.unique(row[order], return_index=True)
     parts = np.split(shapes[order], first[1:])
-    return names, np.array(
-        [part[0] if len(part) == 1 else shapely.union_all(part) for part in parts]
-    )
+    united = np.array([part[0] if len(part) == 1 else shapely.union_all(part) for part in parts])
+    some = ~shapely.is_empty(united)
+    return names[some], united[some]
 
 
 def _left(

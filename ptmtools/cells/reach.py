@@ -27,8 +27,9 @@ from ptmtools.tolerance import ranked
 FLOOR_COSINE = 0.7
 #: The largest floor triangles, this many, stand for the whole floor.
 FLOOR_SAMPLES = 400
-#: Surfaces nearer to one another than this share of the model's height are one surface.
-FLOOR_SHARE = 0.05
+#: Surfaces nearer to one another than head room, metres, or this share of the model's height, are
+#: the two sides of a slab, or furniture.
+HEAD_ROOM, SLAB_SHARE = 1.5, 1 / 3
 #: A model is open above if less than this share of its floor has something over it.
 ROOFED = 0.5
 
@@ -83,7 +84,8 @@ def roofed_share(corners: Floats, floor_area: float) -> float:
     level = np.abs(normal[:, 1]) >= FLOOR_COSINE * 2 * area
     floor = np.flatnonzero(level & (area >= floor_area / 10))
     order = floor[ranked(area[floor])][:FLOOR_SAMPLES]
-    apart = FLOOR_SHARE * float(np.ptp(corners[:, :, 1])) if len(corners) else 0.0
+    height = float(np.ptp(corners[:, :, 1])) if len(corners) else 0.0
+    apart = min(HEAD_ROOM, SLAB_SHARE * height)
     stood_on = corners[level]
     low, high = stood_on.min(axis=1), stood_on.max(axis=1)
     covered = total = 0.0

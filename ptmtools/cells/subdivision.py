@@ -84,7 +84,7 @@ def subdivide(
         if not space.closed:
             roofed = roofed_share(corners, options.wall_area)
             notes.append(_open_note(space, roofed, tight))
-            space = clipped.result()
+            space = replace(clipped.result(), closed=False)
     finally:
         clipped.cancel()
     opened = building.doors.triangles(space.doors)
