@@ -97,7 +97,7 @@ def _standing(building: Building, bodies: list[Polyhedron], opened: Bools) -> tu
     structure = replace(building.structure, corners=building.structure.corners[in_the_way])
     places = find_places(building.footing, structure, walker, boxes)
     eyes = eye_region(places, walker, tolerance)
-    return meets(eyes, bodies, walker, tolerance), eyes.triangles()
+    return meets(eyes, bodies, walker, tolerance), eyes.triangles(tolerance)
 
 
 def _with_a_view(

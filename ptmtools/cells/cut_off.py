@@ -167,7 +167,7 @@ def _floor_about(
     """(n, 3, 3) triangles of floor on which one can stand, in the boxes around (L,) leaves."""
     bodies = [tree.leaves[leaf].points for leaf in np.flatnonzero(leaves)]
     boxes = np.array([(points.min(axis=0), points.max(axis=0)) for points in bodies])
-    return find_places(floors, structure, walker, boxes).triangles()
+    return find_places(floors, structure, walker, boxes).triangles(structure.tolerance)
 
 
 def _within(tree: Tree, leaves: Bools, points: Floats) -> tuple[Bools, Ints]:

@@ -12,23 +12,25 @@ import numpy as np
 import shapely
 
 from ptmtools.arrays import Bools
+from ptmtools.cells.clearance import PLAN, QUARTER, above, heights, shadows, tiled
 from ptmtools.cells.options import Walker
-from ptmtools.cells.places import PLAN, QUARTER, Places, above, heights, shadows, tiled
+from ptmtools.cells.places import Places
+from ptmtools.cells.planar import intersection
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.tolerance import Tolerance
 
+#: Eyes stay farther from what the body touches than rounding, but by no more of its radius.
+_SLACK = 0.1
 #: Pairs of leaf and floor that are compared at a time.
 _AT_ONCE = 1 << 16
 
 
 def eye_region(places: Places, walker: Walker, tolerance: Tolerance) -> Places:
     """What eyes can be above: the places as wide as the body, but not into what it touches."""
-    inside = np.cos(np.pi / (4 * QUARTER))  # of a circle that is a polygon
-    slack = 2 * tolerance.plane
-    box, plan, which = tiled(places.plan, walker.radius + 2 * slack)
-    sound = shapely.buffer(plan, -slack, quad_segs=QUARTER)
-    wide = shapely.buffer(sound, walker.radius * inside, quad_segs=QUARTER)
-    eyes = shapely.intersection(wide, box)
+    inside = walker.radius * np.cos(np.pi / (4 * QUARTER))  # of a circle that is a polygon
+    reach = inside - min(2 * tolerance.plane, _SLACK * walker.radius)
+    box, plan, which = tiled(places.plan, walker.radius, tolerance.grid)
+    eyes = intersection(shapely.buffer(plan, reach, quad_segs=QUARTER), box, tolerance.grid)
     some = shapely.get_dimensions(eyes) == 2
     return Places(eyes[some], places.slope[which[some]])
 

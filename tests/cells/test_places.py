@@ -28,7 +28,7 @@ def place_area(scene: Scene, options: SubdivideOptions = SubdivideOptions()) -> 
     structure = Structure.of(scene, options, scene.tolerance)
     floors = Floors.of(scene, structure, options)
     places = find_places(floors, structure, Walker(*options.walker), EVERYWHERE)
-    return float(areas(places.triangles()).sum())
+    return float(areas(places.triangles(scene.tolerance)).sum())
 
 
 def floor_of(x0: float, x1: float, z0: float, z1: float, y: float = 0.0, rise: float = 0.0) -> list:
@@ -75,7 +75,7 @@ def test_a_ramp_under_a_sloping_ceiling_has_its_head_room_along_the_slope() -> N
         scene = scene_of([ramp, ceiling])
         structure = Structure.of(scene, options, scene.tolerance)
         floors = Floors.of(scene, structure, options)
-        found = find_places(floors, structure, WALKER, EVERYWHERE).triangles()
+        found = find_places(floors, structure, WALKER, EVERYWHERE).triangles(scene.tolerance)
         below = found[:, :, 1].mean(axis=1) < found[:, :, 0].mean(axis=1) / 2 + above / 2
         assert areas(found[below]).sum() == pytest.approx(area, abs=0.3)
 
