@@ -15,8 +15,9 @@ from ptmtools.cells.options import Walker
 from ptmtools.cells.ownership import Pieces
 from ptmtools.cells.places import find_places
 from ptmtools.cells.polyhedron import Polyhedron
-from ptmtools.cells.remarks import NO_PLACES
+from ptmtools.cells.remarks import NO_PLACES, of_viewpoints
 from ptmtools.cells.standing import eye_region, meets
+from ptmtools.cells.surroundings import LOOKS, Surroundings, spread_over
 from ptmtools.scene.model import Scene
 
 
@@ -37,7 +38,15 @@ def assembled(
     if not standing.any():
         standing[:], eye_floor = True, eye_floor[:0]
         notes = [*notes, NO_PLACES]
-    standing[_with_a_view(scene, building, space, rename)] = True
+    asked, cameras = (
+        np.array(points, dtype=np.float64).reshape(-1, 3)
+        for points in (building.options.viewpoints, [camera.position for camera in scene.cameras])
+    )
+    leaf = _leaf_at(space, rename, asked)
+    notes = [*notes, *of_viewpoints(_buried(building, asked, eye_floor))]
+    # From where somebody wants to look, somebody looks.
+    leaf = np.append(leaf, _leaf_at(space, rename, cameras))
+    standing[leaf[leaf >= 0]] = True
     portals = [portal for portal in space.portals if keep[[*portal.leaves]].all()]
     ends = np.array([portal.leaves for portal in portals], dtype=np.int64).reshape(-1, 2)
     children = tree.children.copy()
@@ -100,15 +109,24 @@ def _standing(building: Building, bodies: list[Polyhedron], opened: Bools) -> tu
     return meets(eyes, bodies, walker, tolerance), eyes.triangles(tolerance)
 
 
-def _with_a_view(
-    scene: Scene, building: Building, space: Space, rename: NDArray[np.int32]
-) -> NDArray[np.int32]:
-    """The leaves, renamed, in which there is a viewpoint that was asked for, or a camera."""
-    eyes = np.array([*building.options.viewpoints, *(camera.position for camera in scene.cameras)])
-    eyes = eyes.reshape(-1, 3)
-    eyes = eyes[((eyes >= space.box[0]) & (eyes <= space.box[1])).all(axis=1)]
-    leaf: NDArray[np.int32] = rename[-2 - sunk(space.tree.planes, space.tree.children, eyes)]
-    return leaf[leaf >= 0]
+def _leaf_at(space: Space, rename: NDArray[np.int32], points: Floats) -> NDArray[np.int32]:
+    """(n,) the leaf, renamed, that each of (n, 3) points is in, or -1."""
+    leaf = rename[-2 - sunk(space.tree.planes, space.tree.children, points)]
+    inside = ((points >= space.box[0]) & (points <= space.box[1])).all(axis=1)
+    return np.where(inside, leaf, -1).astype(np.int32)
+
+
+def _buried(building: Building, points: Floats, eye_floor: Floats) -> Floats:
+    """Those of (n, 3) points that are inside of something solid, if those who stand on the
+    ``eye_floor`` are not: of a model whose rooms face away nothing can be said."""
+    structure = building.structure
+    if not (len(points) and len(eye_floor)):
+        return points[:0]
+    around = Surroundings(structure.corners, structure.tolerance)
+    body = eye_floor.mean(axis=1) + [0.0, Walker(*building.options.walker).middle, 0.0]
+    if around.solid(spread_over(body, LOOKS)):
+        return points[:0]
+    return points[[around.solid(point[None]) for point in points]]
 
 
 def _starts(lengths: Iterable[int]) -> Ints:

@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 
 from ptmtools.arrays import Floats, Ints
+from ptmtools.cells.by_height import ByHeight
 from ptmtools.cells.planar import Geometry, difference, intersection
 from ptmtools.tolerance import Tolerance
 
@@ -48,9 +49,9 @@ def clear_of(
     The regions are (r,) polygons in ``plan``, whose heights are a·x + b·z + c by (r, 3) ``slope``.
     """
     left, whose, region = [plan[:0]], [np.zeros(0, dtype=np.int64)], np.arange(len(plan))
-    by_height = _ByHeight(corners)
+    by_height = ByHeight(corners[:, :, 1].min(axis=1), corners[:, :, 1].max(axis=1))
     while len(region):
-        row, near = _about(by_height, plan, slope, band, radius)
+        row, near = _about(corners, by_height, plan, slope, band, radius)
         crowded = (np.bincount(row, minlength=len(plan)) > _CROWD) & (
             _length(plan) > _SHORT * band[1]
         )
@@ -75,42 +76,20 @@ def united_by(row: Ints, shapes: Geometry, grid: float) -> tuple[Ints, Geometry]
     united = shapes[first]
     for i in np.flatnonzero(count > 1):
         united[i] = shapely.union_all(shapes[first[i] : first[i] + count[i]], grid_size=grid)
-    some = shapely.get_dimensions(united) == 2
+    some = ~shapely.is_empty(united)
     return names[some], united[some]
 
 
-class _ByHeight:
-    """(n, 3, 3) triangles, to be found by their heights: sorted by their lowest points among those
-    that are about as high."""
-
-    def __init__(self, corners: Floats) -> None:
-        self.corners = corners
-        self._low, self._high = corners[:, :, 1].min(axis=1), corners[:, :, 1].max(axis=1)
-        size = np.frexp(self._high - self._low)[1]
-        order = np.lexsort((self._low, size))
-        self._sizes, start = np.unique(size[order], return_index=True)
-        self._groups = np.split(order, start[1:]) if len(start) else []
-
-    def between(self, lowest: float, highest: float) -> Ints:
-        """Those, ascending, that reach between two heights, metres."""
-        found = [np.zeros(0, dtype=np.int64)]
-        for size, group in zip(self._sizes.tolist(), self._groups, strict=True):
-            reach = np.searchsorted(self._low[group], [lowest - 2.0**size, highest])
-            found.append(group[slice(*reach)])
-        about: Ints = np.sort(np.concatenate(found))
-        about = about[(self._high[about] >= lowest) & (self._low[about] <= highest)]
-        return about
-
-
 def _about(
-    triangles: _ByHeight,
+    corners: Floats,
+    by_height: ByHeight,
     plan: Geometry,
     slope: Floats,
     band: tuple[float, float],
     radius: float,
 ) -> tuple[Ints, Ints]:
-    """(p,) and (p,): pairs of a region of floor and a triangle as high above it as a ``band``,
-    whose box in plan is no more than a radius away."""
+    """(p,) and (p,): pairs of a region of floor and a triangle, (n, 3, 3), as high above it as a
+    ``band``, whose box in plan is no more than a radius away."""
     least, most = heights(plan, slope)
     beside = radius * np.linalg.norm(slope[:, :2], axis=1)  # the slope goes on beyond the region
     least, most = least - beside, most + beside
@@ -119,12 +98,12 @@ def _about(
     # Storey by storey, so that a floor is held against what is as high only.
     for name in np.unique(storey):
         here = np.flatnonzero(storey == name)
-        about = triangles.between(least[here].min() + band[0], most[here].max() + band[1])
-        corners = triangles.corners[about][:, :, PLAN]
-        boxes = shapely.box(*corners.min(axis=1).T, *corners.max(axis=1).T)
+        about = by_height.between(least[here].min() + band[0], most[here].max() + band[1])
+        flat = corners[about][:, :, PLAN]
+        boxes = shapely.box(*flat.min(axis=1).T, *flat.max(axis=1).T)
         row, near = shapely.STRtree(boxes).query(plan[here], "dwithin", distance=radius)
         row, near = here[row], about[near]
-        height = above(triangles.corners[near], slope[row])
+        height = above(corners[near], slope[row])
         meets = (height.min(axis=1) <= band[1]) & (height.max(axis=1) >= band[0])
         rows.append(row[meets])
         found.append(near[meets])
@@ -268,5 +247,5 @@ def halves(shapes: Geometry, grid: float) -> tuple[Geometry, Ints]:
     )
     both = np.concatenate([intersection(shapes, side, grid) for side in sides])
     parts, which = shapely.get_parts(both, return_index=True)
-    flat = (shapely.get_dimensions(parts) == 2) & (shapely.area(parts) > 0)
+    flat = shapely.area(parts) > 0
     return parts[flat], which[flat] % max(len(shapes), 1)

@@ -22,7 +22,7 @@ from ptmtools.cells.options import Walker
 from ptmtools.cells.places import Floors, find_places, spread
 from ptmtools.cells.portals import Portal
 from ptmtools.cells.structure import Structure
-from ptmtools.cells.surroundings import Surroundings
+from ptmtools.cells.surroundings import LOOKS, Surroundings, spread_over
 from ptmtools.cells.vectors import summed
 from ptmtools.tolerance import ranked
 
@@ -30,8 +30,8 @@ from ptmtools.tolerance import ranked
 LEAST_PLACE = 0.05
 #: And outside, where bus shelters are, less than this.
 LEAST_INSIDE = 2.0
-#: From so many points walls are looked at.
-_LOOKS = 16
+#: Where walls are looked at from is chosen among so many points.
+_CHOICE = 256
 
 
 @dataclass(frozen=True)
@@ -63,11 +63,19 @@ class Standing:
     def of(
         tree: Tree, leaves: Bools, floors: Floors, structure: Structure, walker: Walker
     ) -> Standing:
-        """Whoever stands in these (L,) leaves, at least one."""
+        """Whoever stands in these (L,) leaves."""
         points, place = spread(_floor_about(tree, leaves, floors, structure, walker))
         points = points + [0.0, walker.middle, 0.0]
         inside, leaf = _within(tree, leaves, points)
         return Standing(points[inside], place[inside], leaf[inside])
+
+    def joined(self, other: Standing) -> Standing:
+        """These and those."""
+        return Standing(
+            np.concatenate([self.points, other.points]),
+            np.concatenate([self.place, other.place]),
+            np.concatenate([self.leaf, other.leaf]),
+        )
 
     def only(self, which: Bools | Ints) -> Standing:
         """Some of them."""
@@ -102,10 +110,6 @@ class Unreached:
             found[room.leaves] = True
         return found
 
-    def left_out(self, rooms_kept: bool) -> list[CutOff]:
-        """What of it comes into no cell."""
-        return [*([] if rooms_kept else self.rooms), *([self.outside] if self.outside else [])]
-
 
 def unreached(
     tree: Tree,
@@ -123,14 +127,13 @@ def unreached(
     group = groups(len(tree.leaves), portals)
     outside = np.isin(group, group[outer]) & ~reached
     waiting = ~reached & ~outside & ~np.isin(group, group[reached])
-    beyond = outside & ~outer
-    if not ((waiting | beyond).any() and len(structure.corners)):
+    if not ((waiting | outside).any() and len(structure.corners)):
         return Unreached([])
-    standing = Standing.of(tree, waiting | beyond, floors, structure, walker)
-    if not len(standing.leaf):
-        return Unreached([])
+    standing = Standing.of(tree, waiting, floors, structure, walker)
     around = Surroundings(structure.corners, structure.tolerance)
-    here = standing.only(beyond[standing.leaf])
+    # The ground may be so large that few who stand there are in a building.
+    here = Standing.of(tree, outside & ~outer, floors, structure, walker)
+    here = here.joined(Standing.of(tree, outside & outer, floors, structure, walker))
     if len(here.leaf):
         walls = np.concatenate([structure.corners, glass])
         here = here.only(Surroundings(walls, structure.tolerance).inside(here.points))
@@ -139,26 +142,41 @@ def unreached(
         found = CutOff.of(np.unique(here.leaf), here)
     # Of a model whose rooms face away themselves nothing can be said.
     volumes = np.array([body.volume for body in tree.leaves]) * reached
-    looks = np.array([tree.leaves[i].points.mean(axis=0) for i in ranked(volumes)[:_LOOKS]])
+    looks = np.array([tree.leaves[i].points.mean(axis=0) for i in ranked(volumes)[:LOOKS]])
     sound = not around.solid(looks)
     rooms = []
     for room in _rooms(group, standing.only(waiting[standing.leaf])):
-        looks = room.points[:: -(-len(room.points) // _LOOKS)]
+        looks = spread_over(room.points, _CHOICE)
+        sheltered = looks[around.inside(looks)]  # outside, walls without a back face away
+        looks = spread_over(sheltered if len(sheltered) else looks, LOOKS)
         if not (sound and around.solid(looks)):
             rooms.append(CutOff.of(np.flatnonzero(group == group[room.leaf[0]]), room))
     return Unreached(rooms, found)
 
 
 def floor_of(
-    cut_off: list[CutOff], tree: Tree, floors: Floors, structure: Structure, walker: Walker
+    rooms: list[CutOff],
+    outside: CutOff | None,
+    tree: Tree,
+    floors: Floors,
+    structure: Structure,
+    walker: Walker,
+    glass: Floats,
 ) -> Floats:
-    """(n, 3, 3) triangles of floor, metres, on which one can stand in any of these, at least one;
-    those whose middles are there count whole."""
+    """(n, 3, 3) triangles of floor, metres, on which one can stand in any of these rooms, or what
+    is ``outside`` but in a building; those whose middles are there count whole."""
+    if not (rooms or outside):
+        return np.zeros((0, 3, 3))
     leaves = np.zeros(len(tree.leaves), dtype=bool)
-    leaves[np.concatenate([each.leaves for each in cut_off])] = True
+    for each in [*rooms, *([outside] if outside else [])]:
+        leaves[each.leaves] = True
     found = _floor_about(tree, leaves, floors, structure, walker)
-    inside, _ = _within(tree, leaves, found.mean(axis=1) + [0.0, walker.middle, 0.0])
-    return found[inside]
+    middle = found.mean(axis=1) + [0.0, walker.middle, 0.0]
+    kept, leaf = _within(tree, leaves, middle)
+    if outside:
+        around = Surroundings(np.concatenate([structure.corners, glass]), structure.tolerance)
+        kept &= ~np.isin(leaf, outside.leaves) | around.inside(middle)
+    return found[kept]
 
 
 def _floor_about(
@@ -167,6 +185,7 @@ def _floor_about(
     """(n, 3, 3) triangles of floor on which one can stand, in the boxes around (L,) leaves."""
     bodies = [tree.leaves[leaf].points for leaf in np.flatnonzero(leaves)]
     boxes = np.array([(points.min(axis=0), points.max(axis=0)) for points in bodies])
+    boxes = boxes.reshape(-1, 2, 3)
     return find_places(floors, structure, walker, boxes).triangles(structure.tolerance)
 
 

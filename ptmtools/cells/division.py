@@ -123,8 +123,9 @@ def _complete(building: Building, space: Space, outer: Bools) -> Space:
     if options.reach == "all":
         reached = beyond.or_kept(reached)
     space = replace(space, tree=tree, portals=portals, reached=reached, doors=doors, beyond=beyond)
-    if (left := beyond.left_out(options.reach == "all")) and reached.any():
-        left_out = floor_of(left, tree, *surfaces)
+    rooms = [] if options.reach == "all" else beyond.rooms
+    left_out = floor_of(rooms, beyond.outside, tree, *surfaces, building.doors.glass)
+    if len(left_out) and reached.any():
         place = float(Standing.of(tree, reached, *surfaces).place.sum())
         space = replace(space, left_out=left_out, place=place)
     return space

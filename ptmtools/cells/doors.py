@@ -25,6 +25,7 @@ from ptmtools.cells.doorways import RELIEF, closing, parting
 from ptmtools.cells.facets import Facets
 from ptmtools.cells.merging import connected
 from ptmtools.cells.naming import called, named, says_door
+from ptmtools.cells.nearby import Nearby
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.slabs import Slabs
 from ptmtools.cells.structure import Opaque, Structure
@@ -79,8 +80,8 @@ def find_doors(
     scene: Scene, opaque: Opaque, structure: Structure, options: SubdivideOptions
 ) -> list[DoorLeaf]:
     """The door leaves of a scene, in the order in which its file begins them."""
-    free = ~named(scene, options.structural)
-    asked = named(scene, options.door) & free
+    asked = named(scene, options.door) & ~named(scene, options.structural)
+    free = asked | ~named(scene, (*options.structural, *options.detail))
     so_called = called(scene, says_door) & free
     slack = structure.tolerance.plane
     told = _pieces(scene, np.flatnonzero(asked))
@@ -206,18 +207,18 @@ def _leaves(
     tells, and ``so_called``: (T,) which triangles; these may stand off the slab, as handles do.
     Others in the rim of a slab that a name tells are the jambs of a wall as thin as the leaf.
     """
+    if not len(slabs):
+        return
     corners, of = scene.corners, opaque.source
     region = np.zeros(len(corners), dtype=np.int64)
     owner = scene.triangle_object[of], scene.triangle_material[of]
     region[of] = 1 + _crossed(opaque.facets.region, *owner)
     size = np.bincount(region)
-    middle = corners[:, :, 0].mean(axis=1)
-    order = np.argsort(middle, kind="stable")
-    middle = middle[order]
+    nearby = Nearby(corners, slack)
     reach = np.array([RELIEF, slack, slack])
     for axes, low, high, told in zip(slabs.axes, slabs.low, slabs.high, named_so, strict=True):
-        ends = np.sort(np.stack([low - reach, high + reach]) * axes[:, 0], axis=0).sum(axis=1)
-        about = np.sort(order[slice(*np.searchsorted(middle, ends))])
+        ends = np.stack([low - reach, high + reach])[:, :, None] * axes
+        about = nearby.meeting(ends.min(axis=0).sum(axis=0), ends.max(axis=0).sum(axis=0))
         local = corners[about] @ axes.T
         off = np.maximum(low - local, local - high).max(axis=1)
         inside = (off <= reach).all(axis=1) & free[about]

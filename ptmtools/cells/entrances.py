@@ -104,10 +104,14 @@ class Doors:
         out = [p.polygon for p in portals if outside[p.leaves[0]] != outside[p.leaves[1]]]
         reach = np.array([RELIEF, _BEYOND, _BEYOND])
         found = np.zeros(len(self.leaves), dtype=bool)
-        for i, door in enumerate(self.leaves):
-            for local in (polygon @ door.axes.T for polygon in out):
-                low, high = local.min(axis=0), local.max(axis=0)
-                found[i] |= ((high >= door.low - reach) & (low <= door.high + reach)).all()
+        if out:
+            points = np.concatenate(out)
+            first = np.cumsum([0, *(len(polygon) for polygon in out[:-1])])
+            for i, door in enumerate(self.leaves):
+                local = points @ door.axes.T
+                low, high = (f.reduceat(local, first) for f in (np.minimum, np.maximum))
+                meets = (high >= door.low - reach) & (low <= door.high + reach)
+                found[i] = meets.all(axis=1).any()
         return found
 
 

@@ -27,6 +27,10 @@ class EyeRegion:
         """Whether eyes may be anywhere."""
         return not len(self._floor)
 
+    def about(self, low: Floats, high: Floats) -> bool:
+        """Whether any floor of it is near the box between two corners."""
+        return len(self._nearby.meeting(low - [0, self._reach, 0], high)) > 0
+
     def clipped(self, low: Floats, high: Floats) -> tuple[Floats, Floats]:
         """What of the box between two corners eyes can be in, as a box; as it is if it is flat or
         they can be nowhere in it."""

@@ -41,6 +41,8 @@ class Walker(NamedTuple):
 
 #: Whoever walks unless another is asked for.
 WALKER = Walker(0.25, 0.5, 1.7)
+#: Nobody is wider or taller, metres.
+GIANT = 100.0
 
 
 @dataclass(frozen=True)
@@ -120,9 +122,9 @@ class SubdivideOptions:
             ),
             (
                 len(self.walker) == 3
-                and all(0 < length < float("inf") for length in self.walker)
+                and all(0 < length <= GIANT for length in self.walker)
                 and self.walker[1] < self.walker[2],
-                f"nobody's radius, step and height are {self.walker}",
+                f"nobody's radius, step and height are {self.walker} metres",
                 "try 0.25,0.5,1.7",
             ),
             (self.cells in get_args(CellKind), f"unknown cells {self.cells!r}", "leaf or room"),

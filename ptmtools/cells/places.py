@@ -75,7 +75,7 @@ class Floors:
         meets = (height.min(axis=1) <= y1[box]) & (height.max(axis=1) >= y0[box])
         box, row = box[meets], row[meets]
         pieces = intersection(plan[row], areas[box], grid)
-        flat = np.flatnonzero(shapely.get_dimensions(pieces) == 2)
+        flat = np.flatnonzero(~shapely.is_empty(pieces))
         order = flat[np.argsort(self.region[row[flat]], kind="stable")]
         return pieces[order], self.region[row[order]]
 

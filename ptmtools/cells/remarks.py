@@ -8,10 +8,11 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Ints
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.cut_off import CutOff, Unreached
 from ptmtools.cells.doors import DoorLeaf
 from ptmtools.cells.model import Cells
+from ptmtools.cells.naming import called, says_door
 from ptmtools.cells.ownership import Pieces
 from ptmtools.errors import InputError
 from ptmtools.notes import Warned
@@ -26,7 +27,7 @@ MUCH = 0.1
 MUCH_UNSEEN = 0.02
 #: What is said where there is nothing to stand on.
 NO_PLACES = Warned(
-    "there is no floor on which somebody could stand, so visitors may be anywhere in the cells"
+    "there is no floor on which the body of --walker fits, so visitors may be anywhere in the cells"
 )
 
 
@@ -44,11 +45,13 @@ def of_detail(scene: Scene, detail: Ints) -> list[str]:
     ]
 
 
-def of_doors(leaves: list[DoorLeaf], opened: Bools) -> list[str]:
-    """What is said of door leaves, of which those ``opened``, (d,), do not block."""
+def of_doors(leaves: list[DoorLeaf], opened: Bools, hidden: bool) -> list[str]:
+    """What is said of door leaves, of which those ``opened``, (d,), do not block, and are not drawn
+    if they are ``hidden``."""
     notes = []
+    drawn = "not drawn" if hidden else "drawn, but never in the way"
     for which, fate in (
-        (opened, "open: drawn, but never in the way; --doors closed shuts them"),
+        (opened, f"open: {drawn}; --doors closed shuts all doors"),
         (
             ~opened,
             "shut: beyond is nothing but the outside, or no place to stand; --detail NAME opens it",
@@ -61,6 +64,32 @@ def of_doors(leaves: list[DoorLeaf], opened: Bools) -> list[str]:
             leaf = count(len(chosen), "door leaf", "door leaves")
             notes.append(f"{leaf} ({named}{more}) {'is' if len(chosen) == 1 else 'are'} {fate}")
     return notes
+
+
+def of_viewpoints(solid: Floats) -> list[str]:
+    """What is said of viewpoints that somebody asked for, (n, 3), inside of something."""
+    return [
+        Warned(
+            f"viewpoint {_triple(point)} is inside a wall or another solid, of which a cell is made"
+        )
+        for point in solid
+    ]
+
+
+def of_no_doors(scene: Scene, leaves: list[DoorLeaf]) -> list[str]:
+    """What is said, where something cannot be reached, of objects and materials that are called
+    doors, though no leaf of a door has any of their triangles."""
+    so_called = called(scene, says_door)
+    taken = np.concatenate([np.zeros(0, dtype=np.int64), *(leaf.triangles for leaf in leaves)])
+    left = np.setdiff1d(scene.triangle_object[so_called], scene.triangle_object[taken])
+    if not len(left):
+        return []
+    names = ", ".join(scene.objects[i] for i in left[:NAMED])
+    more = ", …" if len(left) > NAMED else ""
+    return [
+        f"called a door, but taken for a wall, being of another size or without room on both "
+        f"sides: {names}{more}; --door NAME says that it is one"
+    ]
 
 
 def of_unreached(unreached: Unreached, kept: bool, place: float, strict: bool) -> list[str]:

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 
 from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.by_height import ByHeight
 from ptmtools.cells.vectors import cross, normals, summed
 
 _UP = np.array([0.0, 1.0, 0.0])
@@ -17,6 +18,8 @@ _ASIDE = np.array([1.0, 0.0, 0.0])
 _LEANS = 0.02
 #: Slabs whose axes across have a dot product of at least this are parallel.
 _PARALLEL = 0.99
+#: Slabs so near to each other in height, metres, are looked at together.
+_STOREY = 1.0
 
 
 @dataclass(frozen=True)
@@ -101,21 +104,30 @@ class Slabs:
         return Slabs._along(self.axes[first], self.corners[row], group[row])
 
     def near(self, gap: float) -> Ints:
-        """(p, 2) pairs, each once, of parallel slabs whose boxes in plan, if those stood along the
-        axes of the world, are less than a gap apart."""
+        """(p, 2) pairs, each once, of parallel slabs whose boxes in plan, which stand along the
+        axes of the world, and whose heights, are less than a gap apart."""
         if not len(self):
             return np.zeros((0, 2), dtype=np.int64)
         begin = np.searchsorted(self.group, np.arange(len(self)))
         low = np.minimum.reduceat(self.corners.min(axis=1), begin)
         high = np.maximum.reduceat(self.corners.max(axis=1), begin)
         plan = shapely.box(low[:, 0], low[:, 2], high[:, 0], high[:, 2])
-        pair = shapely.STRtree(plan).query(plan, "dwithin", distance=gap).T
-        pair = pair[pair[:, 0] < pair[:, 1]]
+        by_height, storey = ByHeight(low[:, 1], high[:, 1]), np.floor(low[:, 1] / _STOREY)
+        pairs = []
+        for name in np.unique(storey):
+            here = np.flatnonzero(storey == name)
+            about = by_height.between(low[here, 1].min() - gap, high[here, 1].max() + gap)
+            one, other = shapely.STRtree(plan[about]).query(plan[here], "dwithin", distance=gap)
+            pairs.append(np.stack([here[one], about[other]], axis=1))
+        pair = np.concatenate(pairs)
+        pair = np.unique(np.sort(pair[pair[:, 0] != pair[:, 1]], axis=1), axis=0)
+        apart = np.maximum(low[pair[:, 0], 1], low[pair[:, 1], 1]) - np.minimum(
+            high[pair[:, 0], 1], high[pair[:, 1], 1]
+        )
+        pair = pair[apart <= gap]
         across = self.axes[pair, 0]
         turn = np.abs(np.einsum("pk,pk->p", across[:, 0], across[:, 1]))
-        pair = pair[turn >= _PARALLEL]
-        found: Ints = pair[np.lexsort(pair.T[::-1])]
-        return found
+        return np.asarray(pair[turn >= _PARALLEL])
 
     def overlaps(self, one: Ints, other: Ints) -> Floats:
         """(p, 3) how far the boxes of parallel slabs overlap across, along and up, metres, both in

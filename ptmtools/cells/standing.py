@@ -31,7 +31,7 @@ def eye_region(places: Places, walker: Walker, tolerance: Tolerance) -> Places:
     reach = inside - min(2 * tolerance.plane, _SLACK * walker.radius)
     box, plan, which = tiled(places.plan, walker.radius, tolerance.grid)
     eyes = intersection(shapely.buffer(plan, reach, quad_segs=QUARTER), box, tolerance.grid)
-    some = shapely.get_dimensions(eyes) == 2
+    some = ~shapely.is_empty(eyes)
     return Places(eyes[some], places.slope[which[some]])
 
 

@@ -32,7 +32,14 @@ from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.ownership import cut_to_leaves
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.reach import ROOFED, roofed_share
-from ptmtools.cells.remarks import of_detail, of_doors, of_leaves, of_triangles, of_unreached
+from ptmtools.cells.remarks import (
+    of_detail,
+    of_doors,
+    of_leaves,
+    of_no_doors,
+    of_triangles,
+    of_unreached,
+)
 from ptmtools.cells.seen import seen_from_places
 from ptmtools.errors import InputError
 from ptmtools.executors.model import Executor
@@ -89,7 +96,9 @@ def subdivide(
         clipped.cancel()
     opened = building.doors.triangles(space.doors)
     if options.doors != "closed":
-        notes += of_doors(building.doors.leaves, space.doors)
+        notes += of_doors(building.doors.leaves, space.doors, options.doors == "hidden")
+        if space.beyond.rooms or space.beyond.outside:
+            notes += of_no_doors(scene, building.doors.leaves)
     notes += of_unreached(space.beyond, options.reach == "all", space.place, options.strict)
     if space.tree.unsplit:
         notes.append(

@@ -25,6 +25,15 @@ _INSIDE = 0.75
 _AWAY = 0.9
 
 
+#: From so many points walls are looked at.
+LOOKS = 16
+
+
+def spread_over(points: Floats, count: int) -> Floats:
+    """About so many of (n, 3) points."""
+    return points[:: -(-len(points) // count)] if len(points) else points
+
+
 class Surroundings:
     """(T, 3, 3) triangles, counter-clockwise as seen from their front."""
 

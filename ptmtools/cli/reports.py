@@ -87,6 +87,11 @@ def validate(
         voice.emit_json(_document(target, report, shot, failed == 0))
     else:
         _print_findings(voice, target, report, shot)
+        if shot and shot.tried < segments:
+            voice.warn(
+                f"{segments:,} segments were asked for, but few begin where eyes can be and end in "
+                "a cell"
+            )
     if failed:
         repair = _repair(target, report)
         raise CheckError(

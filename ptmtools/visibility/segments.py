@@ -156,19 +156,22 @@ def check_conservative(
 
 
 class _Eyes:
-    """Where an eye can be: in the eye region, whatever is said of leaves, or else in those in which
-    somebody can stand."""
+    """Where an eye can be: in the eye region, whatever is said of leaves; and anywhere in a leaf
+    that stands though there is no floor about, because of a camera or a viewpoint."""
 
     def __init__(self, cells: Cells) -> None:
         self._cells, self._eyes = cells, cells.eyes
+        bodies = [cells.leaf_points(leaf) for leaf in range(cells.leaf_count)]
+        floored = [self._eyes.about(body.min(axis=0), body.max(axis=0)) for body in bodies]
+        self._whole = cells.leaf_standing & ~np.array(floored, dtype=np.bool_)
 
     def at(self, points: Floats, leaf: NDArray[np.int32]) -> Bools:
         """(n,) whether one can be at the (n, 3) points, in (n,) leaves or -1."""
-        found = leaf >= 0
-        if self._eyes.everywhere:
-            return np.asarray(found & self._cells.leaf_standing[leaf])
-        found[found] = self._eyes.contains(points[found])
-        return found
+        inside = leaf >= 0
+        found = inside & self._whole[leaf]
+        if not self._eyes.everywhere:
+            found[inside] |= self._eyes.contains(points[inside])
+        return np.asarray(found)
 
     def first(self, start: Floats, end: Floats) -> tuple[Floats, Floats]:
         """Of segments between (n, 3) points those that begin where an eye can be and end in a leaf;

@@ -19,6 +19,7 @@ from ptmtools.cells.naming import says_door
 from ptmtools.cells.options import DoorState
 from ptmtools.cells.structure import Opaque, Structure
 from ptmtools.errors import InputError
+from ptmtools.notes import Warned
 from ptmtools.scene.model import Material, Scene
 from ptmtools.visibility import check_conservative, compute_pvs
 from tests.cells.conftest import box, panel
@@ -201,7 +202,10 @@ def test_hidden_doors_are_not_drawn() -> None:
     assert drawn["open"] >= inner
     assert drawn["hidden"] & set(np.flatnonzero(made.triangle_object == 2).tolist())
     np.testing.assert_array_equal(cells["open"].opened, cells["hidden"].opened)
-    assert cells["open"].notes == cells["hidden"].notes
+    opened, hidden = (said(cells[state]) for state in ("open", "hidden"))
+    assert "open: drawn" in opened[0]
+    assert "open: not drawn" in hidden[0]
+    assert opened[1:] == hidden[1:]
 
 
 @pytest.mark.parametrize("name", ["Door_front", "thing"])
@@ -237,6 +241,96 @@ def test_an_entrance_of_an_open_building_stays_shut() -> None:
     assert together(cells, A, B)
     inner = np.flatnonzero(made.triangle_object == made.objects.index("Door"))
     np.testing.assert_array_equal(cells.opened, inner)
+
+
+WINDOW: Hole = (1.0, 2.0, -1.0, 1.0)
+SLIT: Hole = (0.2, 0.4, -0.2, 0.2)
+
+
+def hall(far: Faces) -> Faces:
+    """A room A without windows, larger than the room B behind its door, whose far wall is given."""
+    a, b = box((-3, 0, -2), (4, 4, 2), "+x"), box((4.2, 0, -2), (8.2, 4, 2), "-x +x")
+    return a + b + wall(4, 4.2, HOLE) + far
+
+
+@pytest.mark.parametrize("name", ["Door", "thing"])
+@pytest.mark.parametrize(
+    "far",
+    [
+        pytest.param(wall(8.2, 8.4, WINDOW), id="a window"),
+        pytest.param(wall(8.2, 8.4, HOLE), id="an entrance without a leaf"),
+        pytest.param(wall(8.2, 8.4, HOLE) + leaf(8.25, gap=0.01), id="an entrance with a gap"),
+        pytest.param(wall(8.2, 8.4, SLIT), id="a hole"),
+    ],
+)
+@pytest.mark.parametrize("ground", [False, True])
+def test_a_room_behind_a_door_is_kept_wherever_the_flood_starts(
+    far: Faces, name: str, ground: bool
+) -> None:
+    # A by itself is closed; B may be reached from outside, and is a room all the same.
+    around = solid((-30, -0.3, -30), (30, -0.1, 30)) if ground else []
+    made = scene(hall(far), around, **{name: leaf(4.05)})
+    for viewpoints in ((), (A,), (B,)):
+        cells = subdivide(made, SubdivideOptions(viewpoints=viewpoints))
+        assert together(cells, A, B)
+        assert not cells.closed
+        assert not len(cells.left_out)
+
+
+def test_a_facade_of_glass_is_a_wall_of_the_room_behind_it() -> None:
+    a, b = box((-3, 0, -2), (4, 4, 2), "+x"), box((4.2, 0, -2), (8.2, 4, 2), "-x +x -z")
+    glass = box((4.2, 0, -2), (8.2, 4, 2), "-x -y +y +z")
+    made = scene(a + b + wall(4, 4.2, HOLE), panes=glass, Door=leaf(4.05))
+    panes = np.flatnonzero(made.triangle_object == made.objects.index("panes"))
+    material = Material("glass", opacity=0.4, transparent=True)
+    of = made.triangle_material.copy()
+    of[panes] = len(made.materials)
+    made = replace(made, materials=(*made.materials, material), triangle_material=of)
+    cells = subdivide(made)
+    assert together(cells, A, B)
+    main = subdivide(made, SubdivideOptions(doors="closed"))
+    assert main.locate(np.array([B])) == [-1]
+    (told,) = [note for note in main.notes if "open to the outside" in note]
+    assert isinstance(told, Warned)
+
+
+def test_an_entrance_that_is_detail_is_no_door() -> None:
+    made = scene(rooms(entrance=HOLE), inner_door=leaf(4.05), front_door=leaf(-0.1))
+    cells = subdivide(made, SubdivideOptions(detail=("front*",)))
+    assert not cells.closed
+    assert together(cells, A, B)
+    assert not any("front_door" in note for note in said(cells))
+    # Asked for as a door, it is one.
+    asked = subdivide(made, SubdivideOptions(detail=("front*",), door=("front*",)))
+    assert any("front_door" in note for note in said(asked))
+
+
+@pytest.mark.parametrize(("low", "told"), [(1.7, True), (2.1, False)])
+def test_what_is_called_door_and_is_none_is_told_if_something_cannot_be_reached(
+    low: float, told: bool
+) -> None:
+    hole: Hole = (0, low, -0.5, 0.5)
+    cells = subdivide(scene(rooms(hole), hobbit_door=leaf(4.05, hole)))
+    notes = [note for note in cells.notes if note.startswith("called a door")]
+    assert ["hobbit_door; --door NAME" in note for note in notes] == [True] * told
+    assert together(cells, A, B) != told
+
+
+def test_a_viewpoint_inside_a_wall_is_told() -> None:
+    made = scene(rooms(), solid((2, 0, 0.5), (2.6, 3, 1.1)), inner_door=leaf(4.05))
+    for point, told in (((2.3, 1.5, 0.8), True), (A, False)):
+        cells = subdivide(made, SubdivideOptions(viewpoints=(point,)))
+        notes = [note for note in cells.notes if note.endswith("of which a cell is made")]
+        assert [isinstance(note, Warned) for note in notes] == [True] * told
+
+
+@pytest.mark.parametrize("slab", [0.1, 0.3])
+def test_a_thick_floor_is_no_roof(slab: float) -> None:
+    faces = [f for f in rooms() if not all(y == 4 for _, y, _ in f)]
+    made = scene(faces, solid((-0.2, -slab, -2.2), (8.4, -0.001, 2.2)), Door=leaf(4.05))
+    cells = subdivide(made)
+    assert any("open above" in note for note in cells.notes)
+    assert together(cells, A, B)
 
 
 def test_without_ceilings_walls_tell_what_is_inside() -> None:
