@@ -24,6 +24,7 @@ def _counts(cells: Cells) -> Mapping[str, Any]:
         "dropped": int((cells.leaf_cell < 0).sum()),
         "portals": cells.portal_count,
         "pieces": len(cells.triangle),
+        "owners": cells.owners,
         "closed": cells.closed,
     }
 
@@ -43,7 +44,7 @@ def _fits_scene(cells: Cells, scene: Scene) -> str:
 CELLS: Stage[Cells] = Stage(
     name="cells",
     about="Read a model and cut it into cells and portals.",
-    recipe=5,
+    recipe=6,
     options=SubdivideOptions,
     reads=(SCENE,),
     changed="a cell is a place where one can stand, or what is seen from there",
