@@ -41,8 +41,8 @@ class Walker(NamedTuple):
 
 #: Whoever walks unless another is asked for.
 WALKER = Walker(0.25, 0.5, 1.7)
-#: Nobody is wider or taller, metres.
-GIANT = 100.0
+#: Nobody is wider or taller, metres: in a model in another unit neither.
+GIANT = 1e9
 
 
 @dataclass(frozen=True)
