@@ -12,7 +12,7 @@ from ptmtools.cells.cut_off import Standing, Unreached, floor_of, groups, unreac
 from ptmtools.cells.entrances import Doors, open_doors
 from ptmtools.cells.model import sunk
 from ptmtools.cells.options import SubdivideOptions, Walker
-from ptmtools.cells.places import Floors
+from ptmtools.cells.places import Floors, detail_of
 from ptmtools.cells.polyhedron import Polyhedron
 from ptmtools.cells.portals import Portal, find_portals, portals_rejoined
 from ptmtools.cells.reach import at_box, flood, largest_leaf
@@ -45,10 +45,11 @@ class Building:
         doors, structure = Doors.found(scene, opaque, structure, options)
         walls = find_walls(structure, options.wall_area)
         reveals = Reveals(structure, options.wall_thickness)
-        floors = Floors.of(scene, structure, options)
+        detail = detail_of(scene, structure, options)
+        floors = Floors.of(scene, detail)
         footing = floors
         if not scene.two_sided.all():
-            footing = Floors.of(scene, structure, options, backs=True)
+            footing = Floors.of(scene, detail, backs=True)
         return Building(structure, walls, reveals, floors, footing, doors, options)
 
 

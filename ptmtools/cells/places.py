@@ -20,8 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.clearance import CORNERS, PLAN, clear_of, halves, united_by
+from ptmtools.cells.detail import recognised
 from ptmtools.cells.facets import Facets
 from ptmtools.cells.naming import named
 from ptmtools.cells.options import SubdivideOptions, Walker
@@ -47,13 +48,9 @@ class Floors:
     region: Ints  # (n,) ascending from 0
 
     @staticmethod
-    def of(
-        scene: Scene, structure: Structure, options: SubdivideOptions, *, backs: bool = False
-    ) -> Floors:
-        """The floors of a scene, of one-sided faces the fronts only, or the inside of a solid would
-        be a room; or their ``backs`` as well."""
-        detail = named(scene, options.detail) & ~named(scene, options.structural)
-        detail[structure.detail] = True
+    def of(scene: Scene, detail: Bools, *, backs: bool = False) -> Floors:
+        """The floors of a scene but for its ``detail``, (T,); of one-sided faces the fronts only,
+        or the inside of a solid would be a room; or their ``backs`` as well."""
         normal = normals(scene.corners)
         up = np.where(scene.two_sided | backs, np.abs(normal[:, 1]), normal[:, 1])
         level = up > FLOOR_COSINE * np.linalg.norm(normal, axis=1)
@@ -78,6 +75,19 @@ class Floors:
         flat = np.flatnonzero(~shapely.is_empty(pieces))
         order = flat[np.argsort(self.region[row[flat]], kind="stable")]
         return pieces[order], self.region[row[order]]
+
+
+def detail_of(scene: Scene, structure: Structure, options: SubdivideOptions) -> Bools:
+    """(T,) which triangles are detail, of glass as well."""
+    structural = named(scene, options.structural)
+    detail = named(scene, options.detail) & ~structural
+    detail[structure.detail] = True
+    glass = np.flatnonzero(~(scene.opaque | detail | structural))
+    if options.detail_by_shape and len(glass):
+        mesh = Welded.of(scene.points, scene.triangles[glass])
+        source, facets = glass[mesh.source], Facets.of(mesh, scene.tolerance)
+        detail[source] = recognised(facets, scene.triangle_object[source], options.wall_area)
+    return detail
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import shapely
 from ptmtools.arrays import Floats
 from ptmtools.cells import SubdivideOptions, clearance
 from ptmtools.cells.options import Walker
-from ptmtools.cells.places import Floors, find_places
+from ptmtools.cells.places import Floors, detail_of, find_places
 from ptmtools.cells.standing import eye_region
 from ptmtools.cells.structure import Structure
 from ptmtools.tolerance import Tolerance
@@ -48,7 +48,7 @@ def areas_of(faces: Floats, walker: Walker = WALKER, times: int = 1) -> tuple[fl
     scene = subdivided(scene_of(faces.tolist()), times)
     options = SubdivideOptions(detail_by_shape=False)
     structure = Structure.of(scene, options, scene.tolerance)
-    floors = Floors.of(scene, structure, options, backs=True)
+    floors = Floors.of(scene, detail_of(scene, structure, options), backs=True)
     places = find_places(floors, structure, walker, EVERYWHERE)
     eyes = eye_region(places, walker, structure.tolerance)
     return float(shapely.area(places.plan).sum()), float(shapely.area(shapely.union_all(eyes.plan)))

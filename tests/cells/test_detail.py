@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from ptmtools.cells import SubdivideOptions, structural_triangles, subdivide
+from ptmtools.cells.places import Floors, detail_of
+from ptmtools.cells.structure import Structure
 from ptmtools.cells.vectors import areas
-from ptmtools.scene.model import Scene
+from ptmtools.scene.model import Material, Scene
 from tests.conftest import scene_of, subdivided
 
 
@@ -93,3 +95,16 @@ def test_names_and_the_switch_come_first(room_faces) -> None:
     assert taken(scene, structural=(statue,)) == 0
     assert taken(scene, detail_by_shape=False) == 0
     assert taken(scene, detail=(statue,)) == 528
+
+
+def test_nobody_stands_on_a_ball_of_glass(room_faces) -> None:
+    scene = furnished(ball(20), room_faces)
+    of = scene.triangle_material.copy()
+    of[12:] = len(scene.materials)
+    glass = Material("glass", opacity=0.4, transparent=True)
+    scene = replace(scene, materials=(*scene.materials, glass), triangle_material=of)
+    for by_shape in (True, False):
+        options = SubdivideOptions(detail_by_shape=by_shape)
+        structure = Structure.of(scene, options, scene.tolerance)
+        floors = Floors.of(scene, detail_of(scene, structure, options))
+        assert (len(floors.corners) > 2) != by_shape

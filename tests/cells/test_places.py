@@ -11,7 +11,7 @@ import pytest
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.cells.options import Walker
-from ptmtools.cells.places import Floors, find_places
+from ptmtools.cells.places import Floors, detail_of, find_places
 from ptmtools.cells.structure import Structure
 from ptmtools.cells.vectors import areas
 from ptmtools.errors import InputError
@@ -26,7 +26,7 @@ SLACK = 0.02  # m², for circles that are polygons
 
 def place_area(scene: Scene, options: SubdivideOptions = SubdivideOptions()) -> float:  # noqa: B008
     structure = Structure.of(scene, options, scene.tolerance)
-    floors = Floors.of(scene, structure, options)
+    floors = Floors.of(scene, detail_of(scene, structure, options))
     places = find_places(floors, structure, Walker(*options.walker), EVERYWHERE)
     return float(areas(places.triangles(scene.tolerance)).sum())
 
@@ -74,7 +74,7 @@ def test_a_ramp_under_a_sloping_ceiling_has_its_head_room_along_the_slope() -> N
         options = SubdivideOptions()
         scene = scene_of([ramp, ceiling])
         structure = Structure.of(scene, options, scene.tolerance)
-        floors = Floors.of(scene, structure, options)
+        floors = Floors.of(scene, detail_of(scene, structure, options))
         found = find_places(floors, structure, WALKER, EVERYWHERE).triangles(scene.tolerance)
         below = found[:, :, 1].mean(axis=1) < found[:, :, 0].mean(axis=1) / 2 + above / 2
         assert areas(found[below]).sum() == pytest.approx(area, abs=0.3)
