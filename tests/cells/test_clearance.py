@@ -126,3 +126,12 @@ def test_eyes_are_where_they_are_however_large_the_rest(far: float) -> None:
     place, eyes = areas_of(np.concatenate([room, triangles]))
     assert place == pytest.approx(2.5 * 2.5, abs=0.1)
     assert eyes == pytest.approx(3 * 3, abs=0.35)
+
+
+def test_slivers_as_wide_as_rounding_have_no_union() -> None:
+    shapes = np.array(
+        [shapely.box(0, 0, 1e-17, 1), shapely.box(0, 1, 1e-17, 2), shapely.box(0, 0, 1, 1)]
+    )
+    names, united = clearance.united_by(np.array([7, 7, 9]), shapes, 1e-12)
+    assert names.tolist() == [9]
+    assert shapely.area(united).tolist() == [1.0]
