@@ -316,6 +316,11 @@ def test_what_is_called_door_and_is_none_is_told_if_something_cannot_be_reached(
     assert together(cells, A, B) != told
 
 
+def test_a_viewpoint_that_is_no_number_is_outside() -> None:
+    with pytest.raises(InputError, match="PTM-I301"):
+        subdivide(scene(rooms()), SubdivideOptions(viewpoints=((float("nan"), 1.0, 1.0),)))
+
+
 def test_a_viewpoint_inside_a_wall_is_told() -> None:
     made = scene(rooms(), solid((2, 0, 0.5), (2.6, 3, 1.1)), inner_door=leaf(4.05))
     for point, told in (((2.3, 1.5, 0.8), True), (A, False)):
