@@ -164,9 +164,7 @@ def floor_of(
     glass: Floats,
 ) -> Floats:
     """(n, 3, 3) triangles of floor, metres, on which one can stand in any of these rooms, or what
-    is ``outside`` but in a building; those whose middles are there count whole."""
-    if not (rooms or outside):
-        return np.zeros((0, 3, 3))
+    is ``outside`` but in a building, at least one; those whose middles are there count whole."""
     leaves = np.zeros(len(tree.leaves), dtype=bool)
     for each in [*rooms, *([outside] if outside else [])]:
         leaves[each.leaves] = True

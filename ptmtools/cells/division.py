@@ -125,8 +125,8 @@ def _complete(building: Building, space: Space, outer: Bools) -> Space:
         reached = beyond.or_kept(reached)
     space = replace(space, tree=tree, portals=portals, reached=reached, doors=doors, beyond=beyond)
     rooms = [] if options.reach == "all" else beyond.rooms
-    left_out = floor_of(rooms, beyond.outside, tree, *surfaces, building.doors.glass)
-    if len(left_out) and reached.any():
+    if (rooms or beyond.outside) and reached.any():
+        left_out = floor_of(rooms, beyond.outside, tree, *surfaces, building.doors.glass)
         place = float(Standing.of(tree, reached, *surfaces).place.sum())
         space = replace(space, left_out=left_out, place=place)
     return space

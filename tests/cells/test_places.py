@@ -184,6 +184,21 @@ def test_a_house_that_is_open_beside_a_closed_one_is_told(quads, room_faces) -> 
         subdivide(quads(hall + house), SubdivideOptions(strict=True))
 
 
+def test_a_house_on_the_ground_is_a_part_of_all_places(quads, room_faces) -> None:
+    # The ground is its floor; what is left out is a share of all places, not of none.
+    hall = room_faces((0, 0, -4), (20, 4, 4))
+    house = room_faces((30, -0.3, -2), (33, 4, 2), "-x -y")
+    door = [(-0.3, 4, -2, -0.6), (-0.3, 4, 0.6, 2), (2, 4, -0.6, 0.6)]
+    house += [[[30, y0, z0], [30, y1, z0], [30, y1, z1], [30, y0, z1]] for y0, y1, z0, z1 in door]
+    ground = floor_of(-20, 60, -20, 20, -0.3)
+    options = SubdivideOptions(strict=True)
+    cells = subdivide(quads([*hall, *house, ground]), options)
+    assert cells.closed
+    (told,) = [note for note in cells.notes if "open to the outside" in note]
+    assert 5 < float(told.split(" ")[0]) < 12
+    assert not any("of all that one can stand on" in note for note in cells.notes)
+
+
 def test_a_floor_of_many_facets_is_a_place(quads, room_faces) -> None:
     # Each triangle of the gravel is a region of its own, smaller than a foot.
     rooms = room_faces((0, 0, -4), (20, 4, 4)) + room_faces((30, 0, -2), (34, 4, 2))
