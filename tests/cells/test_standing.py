@@ -15,6 +15,7 @@ from ptmtools.coverage.placement import Volume
 from ptmtools.notes import Warned
 from ptmtools.scene.model import Camera, Scene
 from ptmtools.visibility import check_conservative, compute_pvs
+from ptmtools.visibility.segments import _Eyes
 from tests.cells.test_places import floor_of
 
 LEAVES = SubdivideOptions(cells="leaf")
@@ -196,3 +197,16 @@ def test_a_gain_of_nothing_keeps_slivers_apart_even_if_they_cost_nothing() -> No
     volume, area = np.array([50.0, 0, 0]), np.array([100.0, 0, 0])
     assert join_by_gain(sees, volume, area, pairs, 0.0).tolist() == [0, 1, 2]
     assert len(set(join_by_gain(sees, volume, area, pairs, 0.1).tolist())) == 1
+
+
+@pytest.mark.parametrize("camera", [True, False])
+def test_the_check_begins_where_a_camera_makes_a_leaf_stand(quads, room_faces, camera) -> None:
+    rooms = room_faces((0, 0, -4), (20, 4, 4)) + room_faces((30, 0, -2), (34, 4, 2))
+    cells = subdivide(quads(rooms))
+    there = np.array([[32.0, 3.9, 0.0]])  # above all eyes
+    leaf = cells.locate_leaf(there)
+    standing = cells.leaf_standing.copy()
+    standing[leaf] = camera
+    here = cells.eye_floor[cells.eye_floor[:, :, 0].max(axis=1) < 25]
+    cells = replace(cells, eye_floor=here, leaf_standing=standing)
+    assert _Eyes(cells).at(there, leaf).tolist() == [camera]
