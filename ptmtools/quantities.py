@@ -1,6 +1,23 @@
-"""Numbers as people read them."""
+"""Numbers as people read and write them."""
 
 from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from ptmtools.errors import InputError
+
+_BYTES = {"": 1, "B": 1}
+_BYTES |= {f"{prefix}B": 1000**n for n, prefix in enumerate(("k", "M", "G"), 1)}
+_BYTES |= {f"{prefix}iB": 1024**n for n, prefix in enumerate(("K", "M", "G"), 1)}
+_BITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}
+_SECONDS: dict[str, int | Fraction] = {"": 1, "s": 1, "ms": Fraction(1, 1000)}
+#: A number of so many digits is a slip.
+_DIGITS = 18
+_QUANTITY = re.compile(rf"(\d{{1,{_DIGITS}}}(?:\.\d{{0,{_DIGITS}}})?) *([a-zA-Z]*|%)", re.ASCII)
 
 
 def size(count: int) -> str:
@@ -14,3 +31,68 @@ def size(count: int) -> str:
 def count(number: int, one: str, many: str | None = None) -> str:
     """``1 portal``, ``2 portals``."""
     return f"{number:,} {one if number == 1 else many or one + 's'}"
+
+
+def parse_bandwidth(text: str) -> int | None:
+    """bit/s in ``56k``, ``4M``, ``9600`` (powers of ten); None for ``inf``, no limit.
+
+    Raises InputError PTM-I712 for anything else, and for less than 1 bit/s.
+    """
+    if text.strip() == "inf":
+        return None
+    bits = _quantity(text, _BITS)
+    if bits is None or bits < 1:
+        raise _refused(text, "bandwidth", "bit/s, such as 56k, 4M or inf")
+    return round(bits)
+
+
+def parse_duration(text: str) -> float:
+    """Seconds in ``100ms``, ``0.1s``, ``0.1``; InputError PTM-I712 for anything else."""
+    seconds = _quantity(text, _SECONDS)
+    if seconds is None:
+        raise _refused(text, "duration", "seconds or milliseconds, such as 0.1 or 100ms")
+    return float(seconds)
+
+
+@dataclass(frozen=True)
+class MemorySize:
+    """So many bytes, a share of all there is, or, if both are None, no limit; as ``text`` says."""
+
+    text: str
+    bytes: int | None = None
+    share: Fraction | None = None
+
+    def of(self, whole: int) -> int | None:
+        """Bytes, rounded down, where all there is takes ``whole``; None for no limit."""
+        return self.bytes if self.share is None else math.floor(self.share * whole)
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def parse_memory(text: str) -> MemorySize:
+    """What ``4MiB`` (2²² B), ``4MB`` (4·10⁶ B), ``4096``, ``10%`` or ``inf`` stands for.
+
+    Raises InputError PTM-I712 for anything else, and for nothing at all.
+    """
+    text = text.strip()
+    if text == "inf":
+        return MemorySize(text)
+    if share := _quantity(text, {"%": Fraction(1, 100)}):
+        return MemorySize(text, share=share)
+    held = math.floor(_quantity(text, _BYTES) or 0)
+    if not held:
+        raise _refused(text, "amount of memory", "bytes or a share, such as 4MiB, 4MB, 10% or inf")
+    return MemorySize(text, held)
+
+
+def _quantity(text: str, units: Mapping[str, int | Fraction]) -> Fraction | None:
+    """A number with one of some units, exactly; None if it is none."""
+    found = _QUANTITY.fullmatch(text.strip())
+    if not found or found[2] not in units:
+        return None
+    return Fraction(found[1]) * units[found[2]]
+
+
+def _refused(text: str, what: str, remedy: str) -> InputError:
+    return InputError("PTM-I712", f"{text[:40]!r} is no {what}", remedy=f"give {remedy}")

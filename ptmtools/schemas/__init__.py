@@ -1,4 +1,4 @@
-"""The shapes of the JSON documents that ptmtools writes, and the strict reading of them.
+"""The shapes of the JSON documents that ptmtools writes or reads, and the strict reading of them.
 
 The schemas beside this file are published (docs/schemas.md), and they are the only description of
 the shapes: whoever reads a document here reads the schema with it. They are JSON Schema, draft
@@ -28,6 +28,7 @@ from typing import Any
 #: Names of the schemas.
 HINTS, CELL, STATISTICS = "hints", "cell", "statistics"
 MANIFEST, VALIDATION, GLB, SCENE = "manifest", "validation", "glb", "scene"
+TRACE = "trace"
 #: So many lists and objects lie in each other at most, where anything may stand.
 DEEPEST = 16
 #: How the message of a number ends that is beyond float64.

@@ -30,7 +30,7 @@ SERVED = {
     schemas.CELL: "hints/c0001.json",
     schemas.STATISTICS: "hints/statistics.json",
 }
-NAMES = (*SERVED, schemas.MANIFEST, schemas.VALIDATION)
+NAMES = (*SERVED, schemas.MANIFEST, schemas.VALIDATION, schemas.TRACE)
 
 
 def validator(name: str) -> jsonschema.Draft202012Validator:
@@ -88,6 +88,13 @@ def report() -> dict[str, Any]:
     }
 
 
+TRACE = {
+    "format": "ptmtools trace",
+    "schema": 1,
+    "steps": [{"seconds": 2, "bandwidth": 5e5, "latency": 0.1, "loss": 0.01}, {"seconds": 0.5}],
+}
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_schemas_are_schemas(name: str) -> None:
     schema = json.loads(schemas.schema_text(name))
@@ -117,7 +124,7 @@ def shape_fault(document: object, name: str) -> str:
 
 
 def test_what_we_write_satisfies_them(served, manifest, report) -> None:
-    for name, document in zip(NAMES, (*served.values(), manifest, report), strict=True):
+    for name, document in zip(NAMES, (*served.values(), manifest, report, TRACE), strict=True):
         validator(name).validate(document)
         assert shape_fault(document, name) == ""
 
@@ -197,7 +204,7 @@ def shortened(value: Any) -> Any:
 @pytest.mark.parametrize("name", NAMES)
 def test_our_reader_and_jsonschema_agree(name: str, served, manifest, report) -> None:
     hints = map(shortened, served.values())
-    document = dict(zip(NAMES, (*hints, manifest, report), strict=True))[name]
+    document = dict(zip(NAMES, (*hints, manifest, report, TRACE), strict=True))[name]
     theirs = validator(name)
     refused = tried = 0
     for changed, what in mutations(document):

@@ -1,0 +1,1 @@
+"""The walk, simulated: what a client sees that has to fetch what it draws."""

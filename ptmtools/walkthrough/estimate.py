@@ -1,0 +1,70 @@
+"""What a client believes of its link, from what it has downloaded lately (§6.2: "network bandwidth
+and latency analysis performed for some recent downloadings").
+
+Bandwidth is bytes over the time during which any were arriving, both forgotten with a half-life of
+such time: so a pause, in which nothing was asked for, neither lowers the estimate nor ages it, and
+parallel requests are not counted against each other. Latency is the least of the last few: on a
+connection that serves by priority, the others have waited for more than the network.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from ptmtools.walkthrough.network import Link
+from ptmtools.walkthrough.request import Request
+
+#: After so many s of arriving bytes they count half.
+HALF_LIFE = 1.0
+#: With fewer bytes and less time than these, B and s, the prior is believed.
+ENOUGH_BYTES, ENOUGH_SECONDS = 16_384, 0.25
+#: So many latencies are remembered.
+LATENCIES = 8
+
+
+class Estimate:
+    """Bandwidth and latency as a client of ``link`` believes them.
+
+    Parameters
+    ----------
+    link: whose bytes and whose time of arrivals are observed; nothing else of it is looked at.
+    bandwidth, latency: the prior, bit/s and s: what is believed until enough is known.
+    """
+
+    def __init__(self, link: Link, bandwidth: float, latency: float) -> None:
+        self._link, self._prior = link, bandwidth
+        self._seen = (link.carried, link.busy)
+        self._bytes = self._seconds = 0.0
+        self._latencies: deque[float] = deque([latency], LATENCIES)
+        self._guessed = True
+
+    def observe(self, finished: Request | None = None) -> None:
+        """To be called after each `Link.advance`, with what that returned."""
+        carried, busy = self._link.carried, self._link.busy
+        seconds = busy - self._seen[1]
+        fading = 0.5 ** (seconds / HALF_LIFE)
+        self._bytes = self._bytes * fading + carried - self._seen[0]
+        self._seconds = self._seconds * fading + seconds
+        self._seen = (carried, busy)
+        if finished and finished.sent is not None and finished.first_byte is not None:
+            if self._guessed:
+                self._latencies.clear()
+                self._guessed = False
+            self._latencies.append(finished.first_byte - finished.sent)
+
+    @property
+    def bandwidth(self) -> float:
+        """Bit/s; infinite if bytes took no time."""
+        if self._bytes < ENOUGH_BYTES and self._seconds < ENOUGH_SECONDS:
+            return self._prior
+        return 8 * self._bytes / self._seconds if self._seconds else math.inf
+
+    @property
+    def latency(self) -> float:
+        """s to the first byte."""
+        return min(self._latencies)
+
+    def duration(self, size: float) -> float:
+        """s until a request of ``size`` bytes would be finished, if it had the link for itself."""
+        return self.latency + 8 * size / self.bandwidth if self.bandwidth else math.inf
