@@ -41,17 +41,32 @@ def over_floors(cells: Cells, obstacles: Obstacles, eye_height: float) -> Ground
     """Places an eye's height above floors, metres, and the steps between them."""
     eyes, walker = cells.eyes, cells.walker
     point = _supported(cells.eye_floor, GRID, eyes, obstacles, walker, eye_height)
-    cell = cells.locate(point)
+    cell = cells.locate(point).astype(np.int64)
     missed = cells.standing
     missed[cell[cell >= 0]] = False
-    if missed.any():
-        fine = _supported(cells.eye_floor, _FINE * GRID, eyes, obstacles, walker, eye_height)
+    floor = cells.eye_floor[_below(cells, missed, eye_height)]
+    if len(floor):
+        fine = _supported(floor, _FINE * GRID, eyes, obstacles, walker, eye_height)
         within = cells.locate(fine)
         extra = (within >= 0) & missed[within]
         point, cell = np.concatenate([point, fine[extra]]), np.append(cell, within[extra])
     steps = _steps(point, walker, eyes, obstacles)
     space = _space(point, obstacles, eye_height)
-    return Ground.of(point, cell, space, steps, _cost(point, space, steps, obstacles, cells.walker))
+    return Ground.of(
+        point, cell, space, steps, _cost(point, space, steps, obstacles, walker, eye_height)
+    )
+
+
+def _below(cells: Cells, missed: Bools, eye_height: float) -> Bools:
+    """(n,) which triangles of floor some eye is above in a leaf of the (C,) cells marked."""
+    corner = cells.eye_floor + [0, eye_height, 0]
+    low, high = corner.min(axis=1), corner.max(axis=1)
+    found = np.zeros(len(corner), dtype=np.bool_)
+    leaves = np.flatnonzero(cells.leaf_standing & (cells.leaf_cell >= 0))
+    for leaf in leaves[missed[cells.leaf_cell[leaves]]]:
+        point = cells.leaf_points(leaf)
+        found |= ((low <= point.max(axis=0)) & (high >= point.min(axis=0))).all(axis=1)
+    return found
 
 
 def _supported(
@@ -83,18 +98,18 @@ def grid_points(floor: Floats, grid: float) -> tuple[Ints, Floats]:
     # Along each line of the grid that a triangle meets, from the least to the greatest crossing.
     first = np.ceil(plan[row, :, 0].min(axis=1)).astype(np.int64)
     count = np.floor(plan[row, :, 0].max(axis=1)).astype(np.int64) - first + 1
-    row, x = np.repeat(row, count), ranges(first, count)
+    row, across = np.repeat(row, count), ranges(first, count)
     turn = np.where(edge[row, :, 0] != 0, edge[row, :, 0], 1.0)
-    share = (x[:, None] - plan[row, :, 0]) / turn
+    share = (across[:, None] - plan[row, :, 0]) / turn
     meets = (edge[row, :, 0] != 0) & (share >= 0) & (share <= 1)
-    z = plan[row, :, 1] + share * edge[row, :, 1]
-    low = np.ceil(np.where(meets, z, np.inf).min(axis=1))
-    high = np.floor(np.where(meets, z, -np.inf).max(axis=1))
-    some = high >= low
-    row, x, low = row[some], x[some], low[some].astype(np.int64)
-    count = high[some].astype(np.int64) - low + 1
-    row, x, z = np.repeat(row, count), np.repeat(x, count), ranges(low, count)
-    column = np.column_stack([x, z])
+    crossing = plan[row, :, 1] + share * edge[row, :, 1]
+    least = np.ceil(np.where(meets, crossing, np.inf).min(axis=1))
+    most = np.floor(np.where(meets, crossing, -np.inf).max(axis=1))
+    some = most >= least
+    row, across, first = row[some], across[some], least[some].astype(np.int64)
+    count = most[some].astype(np.int64) - first + 1
+    column = np.column_stack([np.repeat(across, count), ranges(first, count)])
+    row = np.repeat(row, count)
     # By the shares of the corners.
     away = column[:, None] - plan[row]
     beside = edge[row][:, :, 0] * away[:, :, 1] - edge[row][:, :, 1] * away[:, :, 0]
@@ -155,7 +170,12 @@ def _space(point: Floats, obstacles: Obstacles, eye_height: float) -> Floats:
 
 
 def _cost(
-    point: Floats, space: Floats, steps: Ints, obstacles: Obstacles, walker: Walker
+    point: Floats,
+    space: Floats,
+    steps: Ints,
+    obstacles: Obstacles,
+    walker: Walker,
+    eye_height: float,
 ) -> Floats:
     """(k,) what steps cost."""
     start, end = point[steps[:, 0]], point[steps[:, 1]]
@@ -164,6 +184,6 @@ def _cost(
     cost += _STEEP * (abs(end[:, 1] - start[:, 1]) > walker.step / 2)
     through = np.zeros(len(steps), dtype=np.bool_)
     for height in BODY[:-1]:
-        below = [0, (1 - height) * walker.height, 0]
+        below = [0, (1 - height) * eye_height, 0]
         through |= obstacles.crossed(start - below, end - below)
     return np.asarray((cost + _THROUGH * through) * np.linalg.norm(end - start, axis=1))

@@ -113,7 +113,8 @@ class _Way:
         way = _position(self.point, self.along, ahead) - _position(self.point, self.along, behind)
         way[:, 1] = 0.0
         length = np.linalg.norm(way, axis=1, keepdims=True)
-        return np.divide(way, length, out=np.zeros_like(way), where=length > 0)
+        level: Floats = np.divide(way, length, out=np.zeros_like(way), where=length > 0)
+        return level
 
 
 def _position(point: Floats, known: Floats, along: Floats) -> Floats:

@@ -53,4 +53,4 @@ def _in_portal(cells: Cells, portal: int, leaf: Floats) -> Floats:
         beside = np.einsum("ij,ij->i", tried - corner, side)
         if (beside >= 0).all() or (beside <= 0).all():
             return np.asarray(tried)
-    return middle
+    return np.asarray(middle)
