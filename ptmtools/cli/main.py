@@ -32,6 +32,7 @@ COMMANDS = {
     "info": ("information", "info", "Show what is in a database or a .ptm file."),
     "plot": ("reports", "plot", "Draw the floor plan of a database."),
     "tradeoff": ("tradeoff", "tradeoff", "Measure what settings cost, and how accurate they are."),
+    "path": ("path", "path", "Make a walk through every room of a database."),
     "encode": ("images", "encode", "Encode images as .ptm files."),
     "decode": ("images", "decode", "Decode .ptm files to images."),
     "warm-up": ("warm_up", "warm_up", "Compile for this machine, before the first run."),

@@ -1,1 +1,1 @@
-"""The walk, simulated: what a client sees that has to fetch what it draws."""
+"""A walk over a modelled link, and what the walker sees of it (docs/walkthrough.md)."""

@@ -1,0 +1,69 @@
+"""`ptm path`: a walk through every room of a database."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from ptmtools.cli.common import as_json, database, forced, voiced
+from ptmtools.cli.output import Voice
+from ptmtools.cli.parameters import options_of, take
+from ptmtools.files import refuse_existing, write_bytes
+from ptmtools.pipeline import Artifacts
+from ptmtools.pipeline.command import open_database
+from ptmtools.pipeline.stages import CELLS, SCENE
+from ptmtools.quantities import count
+from ptmtools.walkthrough.path.making import Path, make_path
+from ptmtools.walkthrough.path.options import PathOptions
+from ptmtools.walkthrough.walk import walk_text
+
+#: Rooms that are named without ``-v``.
+SHOWN = 12
+
+
+@click.command("path")
+@database
+@click.option("-o", "--output", type=click.Path(), required=True, help="The walk, a JSON file.")
+@options_of(PathOptions)
+@forced
+@as_json
+@voiced
+def path(voice: Voice, db: str, output: str, force: bool, as_json: bool, **values: Any) -> None:
+    """Make a walk through every room of DB: on floors and through doors, with stops at pictures.
+
+    The same seed makes the same walk.
+    """
+    options = take(PathOptions, values)
+    if not force:
+        refuse_existing(output)
+    artifacts = Artifacts(open_database(db))
+    made = make_path(artifacts[SCENE], artifacts[CELLS], options)
+    write_bytes(output, walk_text(made.walk).encode(), force=force)
+    if as_json:
+        voice.emit_json(_document(made))
+        return
+    voice.say(
+        f"{output}: {len(made.visited):,} of {count(made.rooms, 'room')}, "
+        f"{made.walk.length:.0f} m in {made.walk.duration:.0f} s, {count(made.stops, 'stop')}"
+    )
+    if made.unreachable:
+        named = made.unreachable if voice.verbose else made.unreachable[:SHOWN]
+        more = ", …; -v names all" if len(named) < len(made.unreachable) else ""
+        rooms = count(len(made.unreachable), "room")
+        voice.say(
+            f"no way on foot, at the height of eyes, to {rooms}: cell "
+            f"{', '.join(map(str, named))}{more}"
+        )
+
+
+def _document(made: Path) -> dict[str, Any]:
+    return {
+        "rooms": made.rooms,
+        "visited": list(made.visited),
+        "unreachable": list(made.unreachable),
+        "stops": made.stops,
+        "length": round(made.walk.length, 3),
+        "duration": made.walk.duration,
+        "samples": len(made.walk.time),
+    }

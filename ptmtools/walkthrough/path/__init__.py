@@ -1,0 +1,1 @@
+"""How a walk is made from a database."""

@@ -1,0 +1,142 @@
+"""What is worth stopping for: places from which much of an image is seen, near and from the front.
+
+From places in each room rays are cast all around. A ray counts if what it meets is as far away as
+one stands before a picture, and is faced; it counts for as many bytes as the image's file has for
+what the ray covers. So a painting of a megabyte counts for more than plaster of a megabyte that
+covers all walls. No ray counts for more than a screen can show.
+
+What was looked at is remembered by image and by where it hangs, in boxes of about a metre, so that
+the next stop is at another picture, of the same image or of another.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.vectors import areas, normals
+from ptmtools.scene.model import Scene
+from ptmtools.walkthrough.path.ground import Ground
+from ptmtools.walkthrough.path.obstacles import Obstacles
+
+#: How far away a picture is looked at, metres, and how much it is faced, as a cosine.
+NEAR, FAR, FACED = 0.8, 3.0, 0.75
+#: Directions of rays around, and how much the rows of them are up, as a slope.
+_AROUND, _SLOPES = 36, (-0.25, 0.0, 0.25)
+#: So many directions to each side belong to a view.
+_BESIDE = 2
+#: From so many places in a room views are tried.
+_TRIED = 48
+#: Metres that a place to stand has around it.
+_SPACE = 0.35
+#: The side of a box by which what was looked at is remembered, metres.
+_BOX = 1.2
+#: A pixel of a screen of 1080 rows, as an angle.
+_PIXEL = 1e-3
+#: A view is worth a stop if it shows at least this share of what the best one of all does, and of
+#: what the first one in the room does.
+_LEAST, _LEAST_IN_ROOM = 0.05, 0.35
+#: Stops in a room each time round.
+_STOPS = 3
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Somewhere to stand, by its place on the ground, and the unit vector to look along."""
+
+    place: int
+    direction: tuple[float, float, float]
+
+
+class Views:
+    """The views of a building, and what of them a visitor has not looked at yet."""
+
+    def __init__(
+        self, scene: Scene, ground: Ground, obstacles: Obstacles, random: np.random.Generator
+    ) -> None:
+        self._place = _tried(ground, random)
+        self._cell = ground.cell[self._place]
+        angle = 2 * np.pi * np.arange(_AROUND) / _AROUND
+        level = np.stack([np.cos(angle), np.zeros(_AROUND), np.sin(angle)], axis=1)
+        along = level[:, None] + np.array(_SLOPES)[:, None] * np.array([0.0, 1.0, 0.0])
+        self._along = along / np.linalg.norm(along, axis=2, keepdims=True)  # (around, slopes, 3)
+        shape = (len(self._place), _AROUND, len(_SLOPES))
+        eye = np.repeat(ground.eye[self._place], _AROUND * len(_SLOPES), axis=0)
+        ray = np.tile(self._along.reshape(-1, 3), (len(self._place), 1))
+        worth, self._box, self._boxes = _worth(scene, obstacles, eye, ray)
+        self._worth, self._box = worth.reshape(shape), self._box.reshape(shape)
+        self._new = np.ones(self._boxes)
+        self._best = float(self._shown().max(initial=0.0))
+
+    def round(self) -> dict[int, list[Stop]]:
+        """By cell, the stops of one time round: at what was not looked at before, and once all was,
+        again at all of it."""
+        if self._shown().max(initial=0.0) < _LEAST * self._best:
+            self._new[:] = 1.0
+        return {int(cell): stops for cell in np.unique(self._cell) if (stops := self._in(cell))}
+
+    def _in(self, cell: int) -> list[Stop]:
+        rows = np.flatnonzero(self._cell == cell)
+        stops: list[Stop] = []
+        least = _LEAST * self._best
+        while len(stops) < _STOPS:
+            shown = self._shown(rows)
+            row, ahead = np.unravel_index(shown.argmax(), shown.shape)
+            if shown[row, ahead] <= 0 or shown[row, ahead] < least:
+                break
+            least = max(least, _LEAST_IN_ROOM * float(shown[row, ahead]))
+            place, window = rows[row], (ahead + np.arange(-_BESIDE, _BESIDE + 1)) % _AROUND
+            box = self._box[place, window]
+            weight = self._worth[place, window] * self._new[box]
+            middle = (weight[..., None] * self._along[window]).sum(axis=(0, 1))
+            x, y, z = (middle / np.linalg.norm(middle)).tolist()
+            stops.append(Stop(int(self._place[place]), (x, y, z)))
+            self._new[box] = 0.0
+        return stops
+
+    def _shown(self, rows: Ints | slice = slice(None)) -> Floats:
+        """(n, around) what views that have not been looked at show, in bytes."""
+        ray = (self._worth[rows] * self._new[self._box[rows]]).sum(axis=2)
+        return np.asarray(sum(np.roll(ray, k, axis=1) for k in range(-_BESIDE, _BESIDE + 1)))
+
+
+def _tried(ground: Ground, random: np.random.Generator) -> Ints:
+    """Places to look from: in each cell some of those with space around, evenly among them."""
+    spacious: Bools = ground.space >= _SPACE
+    order = np.flatnonzero(spacious & (ground.cell >= 0))
+    order = order[np.argsort(ground.cell[order], kind="stable")]
+    _, first, count = np.unique(ground.cell[order], return_index=True, return_counts=True)
+    found = [order[:0]]
+    for begin, many in zip(first, count, strict=True):
+        chosen = (np.arange(min(many, _TRIED)) + random.random()) * many / min(many, _TRIED)
+        found.append(order[begin + chosen.astype(np.int64)])
+    return np.concatenate(found)
+
+
+def _worth(
+    scene: Scene, obstacles: Obstacles, eye: Floats, along: Floats
+) -> tuple[Floats, Ints, int]:
+    """(n,) the bytes that each ray, from (n, 3) along (n, 3), counts for; (n,) the box of what it
+    meets; and how many boxes there are."""
+    image = np.array([material.image for material in scene.materials])[scene.triangle_material]
+    corners = scene.corners
+    length = np.array([len(one.load()) for one in scene.images] + [0], dtype=np.float64)
+    size = areas(corners)
+    shown = np.bincount(image + 1, size, len(length))
+    density = np.divide(length, np.roll(shown, -1), out=np.zeros(len(length)), where=length > 0)
+    met, far = obstacles.first(eye, along, FAR)
+    front = normals(corners[met])
+    width = np.linalg.norm(front, axis=1)
+    faced = np.abs(np.einsum("ij,ij->i", front, along))
+    faced = np.divide(faced, width, out=np.zeros(len(met)), where=width > 0)
+    counts = (met >= 0) & (far >= NEAR) & (faced >= FACED)
+    # What of a surface a ray covers, by its solid angle, which is the same for all.
+    bytes_seen = density[image[met]] * far**2 / np.maximum(faced, FACED)
+    worth = np.where(counts, np.minimum(bytes_seen, _PIXEL**-2), 0.0)
+    at = np.floor((eye + far[:, None] * along) / _BOX).astype(np.int64)
+    key = np.column_stack([image[met], at])
+    key[~counts] = -1
+    boxes, box = np.unique(key, axis=0, return_inverse=True)
+    return worth, box.reshape(-1).astype(np.int64), len(boxes)

@@ -1,0 +1,172 @@
+"""A walk: where a visitor's eye was, and where it looked, over time.
+
+Walks are made (`ptmtools.walkthrough.path`) or recorded from visitors, at any rate and not always
+evenly. Both are the same JSON document, whose schema is published (docs/walkthrough.md).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ptmtools import schemas
+from ptmtools.arrays import Floats
+from ptmtools.errors import InputError, LimitError, naming
+from ptmtools.files import open_regular
+
+FORMAT, SCHEMA = "ptmtools walk", 1
+#: A larger file is no walk, bytes: this is a day at 60 samples a second.
+LARGEST = 1 << 30
+#: Digits after the point in a file: 0.1 µm and 0.1 µs.
+DIGITS = 7
+#: How far the length of a direction may be from 1 to be kept as it is, and to be put right.
+_UNIT, _NEARLY = 1e-6, 1e-3
+
+
+@dataclass(frozen=True)
+class Walk:
+    """What a visitor's eye did.
+
+    Attributes
+    ----------
+    time: (n,) seconds, from 0, strictly increasing; n >= 2.
+    eye: (n, 3) world metres, Y up.
+    direction: (n, 3) unit vectors, where the eye looks.
+    field_of_view: vertical, radians.
+    aspect: width of the picture by its height.
+
+    Raises
+    ------
+    InputError: PTM-I802 a number is not finite, or the arrays do not fit together; PTM-I803 fewer
+        than two samples; PTM-I804 times do not increase from 0; PTM-I805 a direction is no unit
+        vector (up to 1e-3 it is put right); PTM-I806 field of view or aspect are out of range.
+    """
+
+    time: Floats
+    eye: Floats
+    direction: Floats
+    field_of_view: float
+    aspect: float
+
+    def __post_init__(self) -> None:
+        count = len(self.time)
+        if self.eye.shape != (count, 3) or self.direction.shape != (count, 3):
+            raise InputError("PTM-I802", "times, eyes and directions do not fit together")
+        rows = np.column_stack([self.time, self.eye, self.direction])
+        _refuse(~np.isfinite(rows).all(axis=1), "PTM-I802", "a number is not finite")
+        if count < 2:
+            raise InputError("PTM-I803", f"a walk of {count} samples", remedy="record at least two")
+        early = np.diff(self.time, prepend=-1.0) <= 0
+        early[0] = self.time[0] != 0
+        _refuse(early, "PTM-I804", "times do not increase from 0")
+        length = np.linalg.norm(self.direction, axis=1)
+        _refuse(abs(length - 1) > _NEARLY, "PTM-I805", "the direction is no unit vector")
+        whole = np.where(abs(length - 1) > _UNIT, length, 1.0)
+        object.__setattr__(self, "direction", self.direction / whole[:, None])
+        if not 0 < self.field_of_view < math.pi:
+            raise InputError(
+                "PTM-I806",
+                f"a field of view of {self.field_of_view:g} is not between 0 and pi radians",
+            )
+        if not 0 < self.aspect < math.inf:
+            raise InputError("PTM-I806", f"an aspect of {self.aspect:g} is not above 0")
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return float(self.time[-1])
+
+    @property
+    def length(self) -> float:
+        """Metres that the eye moved."""
+        return float(np.linalg.norm(np.diff(self.eye, axis=0), axis=1).sum())
+
+    def at(self, times: Floats) -> tuple[Floats, Floats]:
+        """(m, 3) eyes and (m, 3) unit directions at (m,) times, seconds; beyond the ends as there.
+
+        Half-way between opposite directions it still looks in the first.
+        """
+        times = np.clip(times, 0.0, self.duration)
+        row = np.clip(np.searchsorted(self.time, times, "right") - 1, 0, len(self.time) - 2)
+        share = ((times - self.time[row]) / (self.time[row + 1] - self.time[row]))[:, None]
+        eye = (1 - share) * self.eye[row] + share * self.eye[row + 1]
+        direction = (1 - share) * self.direction[row] + share * self.direction[row + 1]
+        length = np.linalg.norm(direction, axis=1, keepdims=True)
+        turned = np.divide(direction, length, out=self.direction[row], where=length > _UNIT)
+        return eye, turned
+
+
+def walk_text(walk: Walk) -> str:
+    """The document of a walk, a line for each sample, with `DIGITS` digits after the point."""
+    rows = np.column_stack([walk.time, walk.eye, walk.direction]).round(DIGITS) + 0.0  # no -0
+    head = json.dumps(
+        {
+            "format": FORMAT,
+            "schema": SCHEMA,
+            "fieldOfView": walk.field_of_view,
+            "aspect": walk.aspect,
+        }
+    )
+    samples = ",\n".join(json.dumps(row) for row in rows.tolist())
+    return f'{head[:-1]}, "samples": [\n{samples}\n]}}\n'
+
+
+def read_walk(path: str | os.PathLike[str]) -> Walk:
+    """The walk in a file.
+
+    Raises InputError: PTM-I800 the file cannot be read; PTM-I801 it is no walk; PTM-I802 it has
+    another schema number, or is not as the schema says; PTM-I803 to PTM-I806 as `Walk`. LimitError
+    PTM-L800: it is larger than any walk.
+    """
+    try:
+        with open_regular(Path(path)) as stream:
+            data = stream.read(LARGEST + 1)
+    except (OSError, ValueError) as fault:
+        reason = getattr(fault, "strerror", None) or fault
+        raise InputError("PTM-I800", f"cannot be read ({reason})", file=path) from fault
+    with naming(path):
+        if len(data) > LARGEST:
+            raise LimitError("PTM-L800", f"more than {LARGEST >> 20} MiB, which is no walk")
+        return parse_walk(data)
+
+
+def parse_walk(data: bytes) -> Walk:
+    """The walk in a document; raises as `read_walk`."""
+    try:
+        document = schemas.parse(data)
+    except schemas.ShapeError as fault:
+        raise _no_walk(str(fault)) from None
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        raise _no_walk(f'its format is not "{FORMAT}"')
+    if document.get("schema") != SCHEMA:
+        raise InputError(
+            "PTM-I802",
+            f"a walk of schema {json.dumps(document.get('schema'))[:40]}, not {SCHEMA}",
+            remedy="record it anew, or update ptmtools",
+        )
+    try:
+        schemas.check(document, schemas.WALK)
+    except schemas.ShapeError as fault:
+        raise InputError("PTM-I802", fault.message, place=fault.place) from None
+    rows = np.array(document["samples"], dtype=np.float64).reshape(-1, 7)
+    view = float(document["fieldOfView"]), float(document["aspect"])
+    return Walk(rows[:, 0], rows[:, 1:4], rows[:, 4:], *view)
+
+
+def _no_walk(what: str) -> InputError:
+    return InputError(
+        "PTM-I801", f"is no walk: {what}", remedy="make one with `ptm path DB -o walk.json`"
+    )
+
+
+def _refuse(wrong: Any, code: str, message: str) -> None:
+    """Raises for the first sample that is wrong, if any is."""
+    if wrong.any():
+        place = f"samples[{int(wrong.argmax())}]"
+        raise InputError(code, message, place=place)
