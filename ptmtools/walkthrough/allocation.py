@@ -1,0 +1,151 @@
+"""Compiled choices: the levels that are worth most for their bytes.
+
+What a level is worth is given one by one, but a coarse level that adds nothing may lead to a fine
+one that does: a step is therefore any number of levels, and the best is the one of the greatest
+worth per byte. Steps of all textures in the order of that worth, as long as they fit, are the
+greedy solution of a knapsack whose items are chains.
+"""
+
+from __future__ import annotations
+
+import heapq
+
+import numpy as np
+
+from ptmtools.arrays import Floats, Ints
+from ptmtools.compiled import kernel, plain_kernel
+
+
+@plain_kernel
+def best_step(worth: Floats, cost: Ints, column: int, paid: int, last: int) -> tuple[float, int]:
+    """The worth per byte of the best step from ``column`` up to at most ``last``, and where it
+    leads; (0, column) if none is worth anything.
+
+    Parameters
+    ----------
+    worth: (K,) of each column beside those before it. cost: (K,) bytes up to each column.
+    paid: bytes already paid, at least those of ``column``.
+    """
+    best, to, total = 0.0, column, 0.0
+    for k in range(column + 1, last + 1):
+        total += worth[k]
+        density = total / max(cost[k] - paid, 1)
+        if total > 0.0 and density >= best:
+            best, to = density, k
+    return best, to
+
+
+@kernel
+def allocate(worth: Floats, cost: Ints, last: Ints, budget: int, column: Ints) -> int:
+    """Writes to ``column`` (T,) what each texture should hold; returns the bytes, at most
+    ``budget``.
+
+    Parameters
+    ----------
+    worth, cost: (T, K) see `best_step`. last: (T,) the last column that each may have.
+    """
+    used = 0
+    heap = [(0.0, 0, 0) for _ in range(0)]
+    limit = last.copy()
+    for t in range(len(last)):
+        column[t] = 0
+        density, to = best_step(worth[t], cost[t], 0, 0, limit[t])
+        if to > 0:
+            heap.append((-density, t, to))
+    heapq.heapify(heap)
+    while len(heap) > 0:
+        _, t, to = heapq.heappop(heap)
+        here = column[t]
+        more = cost[t, to] - cost[t, here]
+        if used + more <= budget:
+            used += more
+            column[t] = to
+            here = to
+        else:
+            limit[t] = to - 1
+        if here < limit[t]:
+            density, to = best_step(worth[t], cost[t], here, cost[t, here], limit[t])
+            if to > here:
+                heapq.heappush(heap, (-density, t, to))
+    return used
+
+
+@plain_kernel
+def next_fetch(worth: Floats, ends: Ints, requested: Ints, last: Ints) -> tuple[float, int, int]:
+    """The texture whose next bytes are worth most: worth per byte, texture, and the column that
+    they lead to; (0, -1, 0) if there is none.
+
+    Parameters
+    ----------
+    worth, ends: (T, K). requested: (T,) bytes asked for already. last: (T,) wanted columns.
+    """
+    best, texture, column = 0.0, -1, 0
+    for t in range(len(requested)):
+        asked = requested[t]
+        if asked >= ends[t, last[t]]:
+            continue
+        here = 0
+        while here < last[t] and ends[t, here + 1] <= asked:
+            here += 1
+        density, to = best_step(worth[t], ends[t], here, asked, last[t])
+        if density > best:
+            best, texture, column = density, t, to
+    return best, texture, column
+
+
+@plain_kernel
+def gather(
+    start: int, end: int, cell: np.ndarray, texture: np.ndarray, table: np.ndarray,
+    there: np.ndarray, worth: Floats,
+) -> None:  # fmt: skip
+    """Adds rows of a table (R, L) of pairs to their textures' worth (T, L + 1), from its second
+    column on, for the cells that are there (C,)."""
+    for r in range(start, end):
+        t = texture[r]
+        if t < 0 or not there[cell[r]]:
+            continue
+        for k in range(table.shape[1]):
+            worth[t, k + 1] += table[r, k]
+
+
+@plain_kernel
+def picture(
+    start: int, end: int, cell: np.ndarray, texture: np.ndarray, error: np.ndarray,
+    square: np.ndarray, need: np.ndarray, there: np.ndarray, column: Ints, colored: bool,
+    shown: np.ndarray, drawn: np.ndarray,
+) -> tuple[float, float, float]:  # fmt: skip
+    """The mean error, the mean of its square, and the share of wanted levels that is missing, of
+    the rows of a frame; marks what was on the screen.
+
+    Parameters
+    ----------
+    cell, texture, error, square, need: see `Views`. there: (C,) geometry. column: (T,) resident.
+    colored: whether mean colours are known.
+    shown: (T, K) becomes true for columns that were wanted and there. drawn: (C,) the same for
+        geometry.
+    """
+    mean, squared, missing, wanted = 0.0, 0.0, 0.0, 0.0
+    for r in range(start, end):
+        t = texture[r]
+        if not there[cell[r]]:
+            mean += error[r, 0]
+            squared += square[r, 0]
+            if t >= 0:
+                for k in range(need.shape[1]):
+                    wanted += need[r, k]
+                    missing += need[r, k]
+            continue
+        drawn[cell[r]] = True
+        if t < 0:
+            continue
+        held = column[t]
+        at = held + 1 if held > 0 else (1 if colored else 0)
+        mean += error[r, at]
+        squared += square[r, at]
+        for k in range(need.shape[1]):
+            wanted += need[r, k]
+            if k >= held:
+                missing += need[r, k]
+            elif need[r, k] > 0.0:
+                shown[t, k + 1] = True
+    return mean, squared, missing / wanted if wanted > 0.0 else 0.0

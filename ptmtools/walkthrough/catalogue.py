@@ -1,0 +1,193 @@
+"""What a client knows once it has the index, a record or the geometry of a cell, as arrays.
+
+Which of it a client may use at a moment depends on what has arrived; that is the client's part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ptmtools.arrays import Floats, Ints
+from ptmtools.walkthrough.memory import columns_of
+from ptmtools.walkthrough.served import Document, Served, Surfaces
+from ptmtools.walkthrough.view.tables import gradients
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """The shapes of all cells.
+
+    Attributes
+    ----------
+    cell, texture: (n,) int64, ascending by cell; the texture is -1 without.
+    low, high: (n, 3) corners of their boxes, metres.
+    area: (n,) m². density: (n,) texels per metre of the finest level, on average over the area.
+    """
+
+    cell: Ints
+    texture: Ints
+    low: Floats
+    high: Floats
+    area: Floats
+    density: Floats
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """What can be fetched, and what is said of it. K columns: nothing, then the levels.
+
+    Attributes
+    ----------
+    levels: (T,) of each texture.
+    ends: (T, K) bytes of the `.ptm` that hold each column. memory: (T, K) of texture memory.
+    rms: (T, K) what each column adds to the one before it, root mean square, 0 to 255; of the
+        first level 0, of what lies behind the last 0.
+    colors: (T, 3) mean colour, 0 to 255.
+    index_bytes, statistics_bytes, record_bytes, geometry_bytes: on the link; (C,) the latter two.
+    records, statistics: of each cell.
+    shapes: see `Shapes`.
+    """
+
+    levels: Ints
+    ends: Ints
+    memory: Ints
+    rms: Floats
+    colors: Floats
+    index_bytes: int
+    statistics_bytes: int
+    record_bytes: Ints
+    geometry_bytes: Ints
+    records: tuple[Document, ...]
+    statistics: Sequence[Document]
+    shapes: Shapes
+
+    @property
+    def texture_count(self) -> int:
+        """How many there are."""
+        return len(self.levels)
+
+    @property
+    def cell_count(self) -> int:
+        """How many there are."""
+        return len(self.records)
+
+    @property
+    def whole(self) -> int:
+        """Bytes of texture memory that all textures take, whole."""
+        return int(self.memory[:, -1].sum())
+
+    @cached_property
+    def first_shape(self) -> Ints:
+        """(C + 1,) where the shapes of each cell begin."""
+        return np.searchsorted(self.shapes.cell, np.arange(self.cell_count + 1))
+
+    @cached_property
+    def drops(self) -> Floats:
+        """(T, K, K) by how much the error of a pixel that wants column n falls with column k, by
+        `rms`: [t, k, n]; 0 for k = 0 and for n < k."""
+        squared = np.cumsum(self.rms**2, axis=1)
+        # Of who wants n and has k.
+        error = np.sqrt(np.maximum(squared[:, None, :] - squared[:, :, None], 0.0))
+        found = np.zeros(error.shape)
+        found[:, 1:] = error[:, :-1] - error[:, 1:]
+        return found
+
+    @cached_property
+    def visible(self) -> tuple[Ints, ...]:
+        """Of each cell those that it may see, itself first."""
+        return tuple(np.array(record["visible"], dtype=np.int64) for record in self.records)
+
+    @cached_property
+    def coverage(self) -> tuple[Floats, ...]:
+        """Of each cell its average coverage hints, aligned with `visible`; none is 0."""
+        return tuple(
+            np.maximum(np.array(record["ach"], dtype=np.float64), record["floor"])
+            for record in self.records
+        )
+
+    @cached_property
+    def adjacent(self) -> tuple[Ints, ...]:
+        """Of each cell those beyond its portals."""
+        return tuple(np.array(record["adjacent"], dtype=np.int64) for record in self.records)
+
+    @cached_property
+    def in_sight(self) -> tuple[Ints, ...]:
+        """Of each cell the textures of all that it may see."""
+        empty = np.zeros(0, np.int64)
+        return tuple(
+            np.unique(np.concatenate([empty, *(self.painted[c] for c in cells.tolist())]))
+            for cells in self.visible
+        )
+
+    @cached_property
+    def boxes(self) -> tuple[Floats, Floats]:
+        """(C, 3) least and greatest coordinates of what each cell consists of, metres."""
+        points = [np.concatenate([leaf["points"] for leaf in r["leaves"]]) for r in self.records]
+        low, high = ([end(p, axis=0) for p in points] for end in (np.min, np.max))
+        return np.array(low), np.array(high)
+
+    @cached_property
+    def painted(self) -> tuple[Ints, ...]:
+        """Of each cell the textures that it uses."""
+        textures = self.shapes.texture
+        return tuple(
+            np.setdiff1d(textures[a:b], [-1])
+            for a, b in zip(self.first_shape[:-1], self.first_shape[1:], strict=True)
+        )
+
+    def counted_by_paper(self, served: Served) -> Catalogue:
+        """The same with RGB of three bytes in texture memory."""
+        _, _, memory = columns_of(served.index["textures"], paper=True)
+        return replace(self, memory=memory)
+
+
+def catalogue_of(served: Served, rms: Floats, colors: Floats) -> Catalogue:
+    """The catalogue of a served folder; ``rms`` (T, L) and ``colors`` (T, 3) as `Pyramids` has
+    them, for hints that do not say them."""
+    levels, ends, memory = columns_of(served.index["textures"])
+    beside = np.zeros(ends.shape)
+    beside[:, 1:] = rms[:, : ends.shape[1] - 1]
+    return Catalogue(
+        levels=levels,
+        ends=ends,
+        memory=memory,
+        rms=beside,
+        colors=colors,
+        index_bytes=served.index_bytes,
+        statistics_bytes=served.statistics_bytes,
+        record_bytes=served.record_bytes,
+        geometry_bytes=served.geometry_bytes,
+        records=served.records,
+        statistics=served.statistics["cells"],
+        shapes=_shapes(served),
+    )
+
+
+def _shapes(served: Served) -> Shapes:
+    surfaces = served.surfaces
+    count = int(surfaces.shape.max(initial=-1)) + 1
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    np.minimum.at(low, surfaces.shape, surfaces.corner.min(axis=1))
+    np.maximum.at(high, surfaces.shape, surfaces.corner.max(axis=1))
+    cell, texture = (np.zeros(count, np.int64) for _ in range(2))
+    cell[surfaces.shape], texture[surfaces.shape] = surfaces.cell, surfaces.texture
+    area, texels = _measures(surfaces, served.index["textures"])
+    whole = np.bincount(surfaces.shape, area, count)
+    density = np.bincount(surfaces.shape, area * texels, count)
+    drawn = np.isfinite(low[:, 0])
+    fields = (cell, texture, low, high, whole, density / np.maximum(whole, 1e-30))
+    return Shapes(*(field[drawn] for field in fields))
+
+
+def _measures(surfaces: Surfaces, textures: Sequence[Document]) -> tuple[Floats, Floats]:
+    """(n,) m² of each triangle, and texels per metre along the axis that has more of them."""
+    ab, ac = (surfaces.corner[:, k] - surfaces.corner[:, 0] for k in (1, 2))
+    normal = np.cross(ab, ac)
+    gradient = gradients(surfaces.corner, surfaces.uv, normal)
+    sides = np.array([[t["width"], t["height"]] for t in textures] + [[0, 0]], dtype=np.float64)
+    gradient = gradient * sides[surfaces.texture][:, :, None]
+    return np.linalg.norm(normal, axis=1) / 2, np.linalg.norm(gradient, axis=2).max(axis=1)

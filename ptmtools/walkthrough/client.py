@@ -1,0 +1,171 @@
+"""What every client does: it asks for files, keeps what arrives, and knows what it may use.
+
+A client sees the index once it is there, then the record of the cell that it is in and the geometry
+of what that cell sees; of a texture it asks for ranges of the `.ptm` from its beginning on. What
+has been downloaded stays in main memory; texture memory is what is short.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import deque
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Ints
+from ptmtools.walkthrough.estimate import Estimate
+from ptmtools.walkthrough.network import Link
+from ptmtools.walkthrough.request import Request
+from ptmtools.walkthrough.world import World
+
+#: What a client believes of a link before it knows any better: bit/s and s.
+PRIOR = (1e6, 0.1)
+
+
+class Kind(IntEnum):
+    """What is asked for."""
+
+    INDEX = 0
+    RECORD = 1
+    GEOMETRY = 2
+    TEXTURE = 3
+    STATISTICS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """Bytes ``begin`` to ``end`` of the file number ``number`` of a kind."""
+
+    kind: Kind
+    number: int
+    begin: int
+    end: int
+
+
+class Files:
+    """The files of one kind: how much of each was asked for, and how much is there.
+
+    Attributes
+    ----------
+    size: (n,) bytes. asked, there: (n,) bytes from the beginning that were asked for, that are
+        there without a gap.
+    """
+
+    def __init__(self, kind: Kind, size: Ints) -> None:
+        self.kind, self.size = kind, size
+        self.asked, self.there = np.zeros(len(size), np.int64), np.zeros(len(size), np.int64)
+        self._waiting: dict[int, deque[list[int]]] = {}
+
+    @property
+    def whole(self) -> Bools:
+        """(n,) which are there from beginning to end."""
+        found: Bools = self.there >= self.size
+        return found
+
+    def ask(self, number: int, end: int) -> Range:
+        """The range that leads to ``end``; it counts as asked for."""
+        found = Range(self.kind, number, int(self.asked[number]), end)
+        self.asked[number] = end
+        self._waiting.setdefault(number, deque()).append([end, 0])
+        return found
+
+    def arrived(self, part: Range) -> None:
+        """A range is there; others before it may not be."""
+        waiting = self._waiting[part.number]
+        for entry in waiting:
+            if entry[0] == part.end:
+                entry[1] = 1
+        while waiting and waiting[0][1]:
+            self.there[part.number] = waiting.popleft()[0]
+
+    def given_up(self, part: Range, received: int) -> bool:
+        """The last range of a file is given up, of which so much has arrived; False if it was not
+        the last, and nothing is changed."""
+        waiting = self._waiting[part.number]
+        if waiting[-1][0] != part.end:
+            return False
+        waiting[-1][0] = part.begin + received
+        self.asked[part.number] = part.begin + received
+        self.arrived(Range(part.kind, part.number, part.begin, part.begin + received))
+        return True
+
+
+class Client(ABC):
+    """A client on a walk.
+
+    Attributes
+    ----------
+    world, link, budget: where it is, what it asks, bytes of texture memory that it may use.
+    frame: at which it is.
+    index: whether it has the index. records, geometry, textures: see `Files`.
+    column: (T,) what of each texture is in texture memory.
+    estimate: of the link.
+    ticks: how often `tick` is called from one frame to the next, the frames not counted.
+    """
+
+    ticks = 1
+
+    def __init__(self, world: World, link: Link, budget: int) -> None:
+        self.world, self.link, self.budget = world, link, budget
+        stock = world.catalogue
+        self.frame = 0
+        self.files = {
+            Kind.INDEX: Files(Kind.INDEX, np.array([stock.index_bytes])),
+            Kind.RECORD: Files(Kind.RECORD, stock.record_bytes),
+            Kind.GEOMETRY: Files(Kind.GEOMETRY, stock.geometry_bytes),
+            Kind.TEXTURE: Files(Kind.TEXTURE, stock.ends[:, -1]),
+            Kind.STATISTICS: Files(Kind.STATISTICS, np.array([stock.statistics_bytes])),
+        }
+        self.records, self.geometry = self.files[Kind.RECORD], self.files[Kind.GEOMETRY]
+        self.textures = self.files[Kind.TEXTURE]
+        self.column = np.zeros(stock.texture_count, np.int64)
+        self.estimate = Estimate(link, *PRIOR)
+        self.waiting: list[Request] = []
+        #: The cell whose record the client goes by: that it is in, once its record is there.
+        self.cell = -1
+
+    @property
+    def index(self) -> bool:
+        """Whether the index is there."""
+        return bool(self.files[Kind.INDEX].whole[0])
+
+    @property
+    def have(self) -> Ints:
+        """(T,) columns that are downloaded whole."""
+        stock = self.world.catalogue
+        held = (stock.ends <= self.textures.there[:, None]).sum(axis=1) - 1
+        columns: Ints = np.minimum(held, stock.levels)
+        return columns
+
+    def look(self, frame: int) -> None:
+        """The walker is at a frame."""
+        self.frame = frame
+        here = int(self.world.cell[frame])
+        if self.records.whole[here]:
+            self.cell = here
+        self.settle()
+
+    def ask(self, kind: Kind, number: int, end: int, priority: float) -> None:
+        """Asks for a file up to a byte."""
+        part = self.files[kind].ask(number, end)
+        self.waiting.append(self.link.request(part.end - part.begin, priority, part))
+
+    def arrived(self, request: Request) -> None:
+        """A request is finished."""
+        assert isinstance(request.tag, Range)
+        self.waiting.remove(request)
+        self.files[request.tag.kind].arrived(request.tag)
+
+    def tick(self) -> None:  # noqa: B027 - most have nothing to do then
+        """Some time has passed, and no frame yet."""
+
+    @abstractmethod
+    def settle(self) -> None:
+        """Decides what is in texture memory in this frame: sets `column`."""
+
+    @abstractmethod
+    def fetch(self) -> None:
+        """Asks for what is wanted next, or for nothing; called in every frame, and whenever
+        something has arrived."""

@@ -1,0 +1,53 @@
+"""In which cell an eye is: the one of whose leaves it is behind all planes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ptmtools.arrays import Floats, Ints
+from ptmtools.walkthrough.served import Document
+
+#: Metres that an eye may be in front of a plane: leaves that touch then overlap (docs/hints.md).
+SLACK = 1e-3
+
+
+class Locator:
+    """The leaves of all cells."""
+
+    def __init__(self, records: Sequence[Document]) -> None:
+        self._planes = [[_planes(leaf) for leaf in record["leaves"]] for record in records]
+        points = [np.concatenate([leaf["points"] for leaf in r["leaves"]]) for r in records]
+        self._low = np.array([p.min(axis=0) for p in points]) - SLACK
+        self._high = np.array([p.max(axis=0) for p in points]) + SLACK
+
+    def along(self, eye: Floats) -> Ints:
+        """(F,) the cell of each of (F, 3) eyes along a walk: the one before, if it is there still;
+        -1 for none."""
+        found = np.full(len(eye), -1, np.int64)
+        cell = -1
+        for f, point in enumerate(eye):
+            if cell < 0 or not self._holds(cell, point):
+                near = ((self._low <= point) & (point <= self._high)).all(axis=1)
+                cell = next((c for c in np.flatnonzero(near).tolist() if self._holds(c, point)), -1)
+            found[f] = cell
+        return found
+
+    def _holds(self, cell: int, point: Floats) -> bool:
+        return any(
+            bool((planes[:, :3] @ point + planes[:, 3] <= SLACK).all())
+            for planes in self._planes[cell]
+        )
+
+
+def _planes(leaf: Document) -> Floats:
+    """(n, 4) outward unit normals and offsets of a leaf's faces."""
+    point = np.array(leaf["points"], dtype=np.float64)
+    rows = []
+    for loop in leaf["faces"]:
+        corner = point[loop]
+        turned = np.cross(corner, np.roll(corner, -1, axis=0)).sum(axis=0)
+        normal = turned / max(float(np.linalg.norm(turned)), np.finfo(np.float64).tiny)
+        rows.append([*normal, -float((corner @ normal).mean())])
+    return np.array(rows).reshape(-1, 4)

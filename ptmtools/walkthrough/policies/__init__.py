@@ -1,0 +1,120 @@
+"""What clients there are, as a table: what each goes by, and what it needs to know.
+
+To add one: a module with a `Client`, or a policy of the `engine`, and a line here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+from ptmtools.walkthrough.client import Client
+from ptmtools.walkthrough.network import Link
+from ptmtools.walkthrough.policies import around, coverage
+from ptmtools.walkthrough.policies.engine import EngineClient, Policy
+from ptmtools.walkthrough.policies.lru import LruClient
+from ptmtools.walkthrough.policies.oracle import Oracle
+from ptmtools.walkthrough.policies.paper import PaperClient
+from ptmtools.walkthrough.policies.screen import Screen
+from ptmtools.walkthrough.weighing import by_error
+from ptmtools.walkthrough.world import World
+
+
+class Knows(Enum):
+    """What a client must know, each beside what comes before it."""
+
+    HINTS = "hints"
+    CAMERA = "hints and camera"
+    SCREEN = "hints, camera and an item buffer"
+    FUTURE = "the future"
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A policy.
+
+    Attributes
+    ----------
+    name, about: for `--policy`.
+    knows: what it needs.
+    client: makes a client of it, in a world, on a link, with a budget.
+    """
+
+    name: str
+    about: str
+    knows: Knows
+    client: Callable[[World, Link, int], Client]
+
+
+def _engine(
+    make: Callable[[World], Policy], *, statistics: bool = False
+) -> Callable[[World, Link, int], Client]:
+    def client(world: World, link: Link, budget: int) -> Client:
+        return EngineClient(world, link, budget, make(world), statistics=statistics)
+
+    return client
+
+
+def _same(policy: Policy, *, statistics: bool = False) -> Callable[[World, Link, int], Client]:
+    return _engine(lambda _: policy, statistics=statistics)
+
+
+_LIST = (
+    Declared("paper", "Marvie & Bouatouch, §6.1 and §6.2, as written", Knows.CAMERA, PaperClient),
+    Declared("lru", "files in the order met, and a cache", Knows.CAMERA, LruClient),
+    Declared(
+        "ach",
+        "the paper's weights, average coverage, in the common engine",
+        Knows.CAMERA,
+        _same(coverage.Weighted(coverage.by_coverage)),
+    ),
+    Declared(
+        "ach-views",
+        "the same by the six views",
+        Knows.CAMERA,
+        _same(coverage.Weighted(coverage.by_views), statistics=True),
+    ),
+    Declared(
+        "ach-texture",
+        "the same by texture, of hints with `--per-texture`",
+        Knows.CAMERA,
+        _same(coverage.Weighted(coverage.by_texture)),
+    ),
+    Declared(
+        "distance",
+        "the nearest first",
+        Knows.CAMERA,
+        _same(coverage.Weighted(coverage.by_distance)),
+    ),
+    Declared(
+        "bbox",
+        "projected boxes, without occlusion",
+        Knows.CAMERA,
+        _same(coverage.Weighted(coverage.by_box)),
+    ),
+    Declared("screen", "what an item buffer shows", Knows.SCREEN, _same(Screen())),
+    Declared(
+        "screen+distance",
+        "screen, and what is near",
+        Knows.SCREEN,
+        _same(Screen(around.by_distance)),
+    ),
+    Declared(
+        "screen+ach",
+        "screen, and what covers the view on average",
+        Knows.SCREEN,
+        _same(Screen(around.by_coverage)),
+    ),
+    Declared(
+        "xe",
+        "screen, and what covers the view on average",
+        Knows.SCREEN,
+        _same(Screen(around.by_distance, by_error)),
+    ),
+    Declared("oracle", "knows the walk", Knows.FUTURE, _engine(Oracle)),
+)
+#: By name.
+POLICIES = {policy.name: policy for policy in _LIST}
+
+__all__ = ["POLICIES", "Declared", "Knows"]

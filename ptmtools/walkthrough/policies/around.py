@@ -1,0 +1,82 @@
+"""What lies around a client, as shares of pixels by texture and level: by distance, by coverage, by
+need; and what the geometry of cells is worth."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ptmtools.arrays import Floats
+from ptmtools.walkthrough.policies.engine import NOTHING, EngineClient
+from ptmtools.walkthrough.view.tables import LINES
+
+#: What is nearer counts as being as far as this, metres.
+NEAREST = 0.5
+#: What a cell counts that is out of sight, or is seen from a neighbouring cell only, beside one in
+#: view.
+BEHIND, BEYOND = 0.2, 0.05
+
+
+def geometry_worth(client: EngineClient) -> Floats:
+    """(C,) the worth of the geometry of cells: what a grey cell is wrong by."""
+    stock = client.world.catalogue
+    share = np.zeros(stock.cell_count)
+    for neighbour in stock.adjacent[client.cell].tolist():
+        if client.records.whole[neighbour]:
+            cells = stock.visible[neighbour]
+            share[cells] = np.maximum(share[cells], BEYOND * stock.coverage[neighbour])
+    known = client.known()
+    low, high = stock.boxes
+    ahead = client.frustum.meets_boxes(low[known], high[known])
+    coverage = client.coverage()
+    share[known] = np.maximum(share[known], np.where(ahead, 1.0, BEHIND) * coverage)
+    return NOTHING * share
+
+
+def by_coverage(client: EngineClient) -> Floats:
+    """(T, K) shares by average coverage: that of a cell is split equally among its shapes."""
+    stock = client.world.catalogue
+    share = np.zeros(stock.texture_count)
+    for cell, covers in zip(client.known().tolist(), client.coverage().tolist(), strict=True):
+        own = stock.shapes.texture[stock.first_shape[cell] : stock.first_shape[cell + 1]]
+        np.add.at(share, own[own >= 0], covers / max(len(own), 1))
+    return every_level(client, share)
+
+
+def by_distance(client: EngineClient) -> Floats:
+    """(T, K) shares that fall with the square of the distance of the nearest shape; they sum to
+    1."""
+    stock = client.world.catalogue
+    shapes, here = stock.shapes, client.shapes_there()
+    far = client.frustum.distance(shapes.low[here], shapes.high[here])
+    share = np.zeros(stock.texture_count)
+    np.maximum.at(share, shapes.texture[here], 1 / np.maximum(far, NEAREST) ** 2)
+    return every_level(client, share / max(float(share.sum()), 1e-12))
+
+
+def by_need(client: EngineClient) -> Floats:
+    """(T, K) the shares that the record of the cell has as its need."""
+    stock = client.world.catalogue
+    found = np.zeros(stock.ends.shape)
+    for texture, first, *shares in stock.records[client.cell]["need"]:
+        found[texture, 1 : first + 1] = shares[0]
+        found[texture, first + 1 : first + 1 + len(shares)] = shares
+    return found
+
+
+def every_level(client: EngineClient, share: Floats) -> Floats:
+    """(T, K) the same share (T,) for all levels that there are."""
+    stock = client.world.catalogue
+    column = np.arange(stock.ends.shape[1])
+    return share[:, None] * ((column > 0) & (column <= stock.levels[:, None]))
+
+
+def wanted_levels(client: EngineClient, texture: Floats, density: Floats, far: Floats) -> Floats:
+    """(n, K) how much each column is wanted, 0 to 1, by surfaces of (n,) textures with (n,) texels
+    per metre, seen head-on from (n,) metres."""
+    stock = client.world.catalogue
+    pixel = 2 * np.tan(client.world.camera.field_of_view / 2) / LINES
+    detail = np.log2(np.maximum(density * far * pixel, 1e-9))
+    column = np.arange(stock.ends.shape[1])
+    coarser = stock.levels[texture][:, None] - column
+    wanted: Floats = np.clip(coarser + 1 - detail[:, None], 0, 1) * (column > 0) * (coarser >= 0)
+    return wanted

@@ -1,0 +1,204 @@
+"""The engine that all policies but the paper's share: it fetches what is worth most for its bytes.
+
+A policy says what each level of each texture, and the geometry of each cell, is worth now. The
+engine chooses what should be in texture memory, to the last level that fits, and asks for what of
+that is missing, the greatest worth per byte first, in ranges of a fraction of a second, so that
+little is under way that may not be wanted any more. When nothing is missing it goes on with what is
+worth most beyond the budget, which stays in main memory.
+
+Records and geometry compete with textures by the same measure: a cell whose geometry is missing is
+grey, and worth the error of that.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.walkthrough.allocation import allocate, gather, next_fetch
+from ptmtools.walkthrough.client import Client, Kind
+from ptmtools.walkthrough.network import Link
+from ptmtools.walkthrough.request import Request
+from ptmtools.walkthrough.world import World
+
+#: A range takes so many seconds of the link, and at least so many bytes.
+RANGE_SECONDS, RANGE_BYTES = 0.2, 8000
+#: Requests at a time.
+CONNECTIONS = 6
+#: What a pixel is wrong by where there is nothing: the mean of what was measured, 0 to 255.
+NOTHING = 64.0
+#: The record of a neighbouring cell is worth as much as so large a share of the screen.
+RECORD_SHARE = 0.02
+#: A level that is not wanted any more is held on to, at so small a share of its worth, which
+#: halves in so many seconds.
+HELD_ON, HELD_SECONDS = 1e-3, 7.0
+
+
+@dataclass(frozen=True)
+class Worth:
+    """What a policy says.
+
+    Attributes
+    ----------
+    hold: (T, K) what each column adds on the screen now, beside those before it.
+    fetch: (T, K) what it adds now and soon.
+    geometry: (C,) what the geometry of a cell adds.
+    ahead: (T, K) what may be fetched beyond the budget; None: nothing.
+    """
+
+    hold: Floats
+    fetch: Floats
+    geometry: Floats
+    ahead: Floats | None = None
+
+
+class Policy(Protocol):
+    """What a policy of the engine is."""
+
+    def __call__(self, client: EngineClient) -> Worth:
+        """What things are worth at the client's frame, by what the client may know."""
+
+
+class EngineClient(Client):
+    """A client that goes by a policy, which may need the statistics."""
+
+    def __init__(
+        self, world: World, link: Link, budget: int, policy: Policy, *, statistics: bool = False
+    ) -> None:
+        super().__init__(world, link, budget)
+        self._policy, self._statistics = policy, statistics
+        stock = world.catalogue
+        self._target: Ints = np.zeros(stock.texture_count, np.int64)
+        self._kept = np.zeros(stock.ends.shape)
+        self._worth: Worth | None = None
+        self._there: list[Bools] = []
+        self.frustum = world.frustum(0)
+
+    # What policies look at.
+
+    def sight(self, age: int) -> Floats:
+        """(T, K) the share of the item buffer that wants each level, in columns, as it was drawn
+        so many frames ago: with the geometry that was there."""
+        frame = max(0, self.frame - age)
+        found = np.zeros(self.world.catalogue.ends.shape)
+        views = self.world.views
+        rows = views.rows(int(self.world.view[frame]))
+        gather(
+            rows.start, rows.stop, views.cell, views.texture, views.sight, self._there[frame], found
+        )
+        return found
+
+    def known(self) -> Ints:
+        """The cells that the one the client is in may see, itself first."""
+        return self.world.catalogue.visible[self.cell]
+
+    def coverage(self) -> Floats:
+        """Average coverage hints, aligned with `known`."""
+        return self.world.catalogue.coverage[self.cell]
+
+    def shapes_there(self) -> Ints:
+        """The shapes with a texture of the cells whose geometry is there."""
+        stock = self.world.catalogue
+        there = self.geometry.whole[stock.shapes.cell] & (stock.shapes.texture >= 0)
+        return np.flatnonzero(there)
+
+    # What the engine does.
+
+    def look(self, frame: int) -> None:
+        """See `Client.look`."""
+        self.frustum = self.world.frustum(frame)
+        self._there.append(self.geometry.whole)
+        super().look(frame)
+
+    def settle(self) -> None:
+        """See `Client.settle`."""
+        self._weigh()
+        if self._worth is None:
+            return
+        hold = self._worth.hold
+        fading = 0.5 ** (1 / (self.world.rate * HELD_SECONDS))
+        self._kept = np.maximum(self._kept * fading, hold)
+        stock = self.world.catalogue
+        worth = hold + HELD_ON * self._kept + HELD_ON**2 * stock.rms
+        allocate(worth, stock.memory, self.have, self.budget, self.column)
+
+    def arrived(self, request: Request) -> None:
+        """See `Client.arrived`."""
+        super().arrived(request)
+        if request.tag.kind != Kind.TEXTURE:  # type: ignore[attr-defined]
+            if self.cell < 0 and self.records.whole[self.world.cell[self.frame]]:
+                self.cell = int(self.world.cell[self.frame])
+            self._weigh()
+
+    def _weigh(self) -> None:
+        if self.cell >= 0 and (self.files[Kind.STATISTICS].whole[0] or not self._statistics):
+            stock = self.world.catalogue
+            self._worth = self._policy(self)
+            allocate(self._worth.fetch, stock.memory, stock.levels, self.budget, self._target)
+
+    def fetch(self) -> None:
+        """See `Client.fetch`."""
+        while self._room() and self._fetch_one():
+            pass
+
+    def _room(self) -> bool:
+        """Whether the link would run dry before a request made later could be answered."""
+        if len(self.waiting) >= CONNECTIONS:
+            return False
+        left = sum(request.left for request in self.waiting)
+        ahead = self.estimate.latency + RANGE_SECONDS / 2
+        return left == 0 or 8 * left / self.estimate.bandwidth < ahead
+
+    def _fetch_one(self) -> bool:
+        """Asks for the range that is worth most; False if there is none."""
+        if not self.index:
+            return self._whole(Kind.INDEX, 0, math.inf)
+        if self._statistics and self._whole(Kind.STATISTICS, 0, math.inf):
+            return True
+        if self._whole(Kind.RECORD, int(self.world.cell[self.frame]), math.inf):
+            return True
+        if self._worth is None:
+            return False
+        stock, worth = self.world.catalogue, self._worth
+        best, texture, column = next_fetch(
+            worth.fetch, stock.ends, self.textures.asked, self._target
+        )
+        left = self.geometry.size - self.geometry.asked
+        density = np.where(left > 0, worth.geometry / np.maximum(left, 1), 0.0)
+        cell = int(density.argmax())
+        records = [c for c in stock.adjacent[self.cell].tolist() if not self.records.asked[c]]
+        if records:
+            size = self.records.size[records]
+            record = NOTHING * RECORD_SHARE / float(size.min())
+            if record > max(best, float(density[cell])):
+                return self._whole(Kind.RECORD, records[int(size.argmin())], record)
+        if density[cell] > best:
+            return self._range(
+                Kind.GEOMETRY, cell, int(self.geometry.size[cell]), float(density[cell])
+            )
+        if texture < 0 and worth.ahead is not None:
+            best, texture, column = next_fetch(
+                worth.ahead, stock.ends, self.textures.asked, stock.levels
+            )
+        if texture < 0:
+            return False
+        return self._range(Kind.TEXTURE, texture, int(stock.ends[texture, column]), best)
+
+    def _whole(self, kind: Kind, number: int, priority: float) -> bool:
+        files = self.files[kind]
+        if files.asked[number]:
+            return False
+        self.ask(kind, number, int(files.size[number]), priority)
+        return True
+
+    def _range(self, kind: Kind, number: int, end: int, priority: float) -> bool:
+        most = max(RANGE_BYTES, RANGE_SECONDS * self.estimate.bandwidth / 8)
+        asked = int(self.files[kind].asked[number])
+        if end - asked > most:
+            end = asked + int(most)
+        self.ask(kind, number, end, priority)
+        return True

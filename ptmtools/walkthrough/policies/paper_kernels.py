@@ -1,0 +1,91 @@
+"""Compiled steps of the paper's client: memory is shared out (§6.1), levels come and go (§6.2)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.compiled import kernel, plain_kernel
+
+
+@plain_kernel
+def share_out(
+    cells: Ints,
+    weight: Floats,
+    first_shape: Ints,
+    texture: Ints,
+    shown: Bools,
+    memory: Ints,
+    levels: Ints,
+    column: Ints,
+    budget: float,
+    share: Floats,
+) -> None:
+    """Adds to ``share`` (T,) the bytes that each texture keeps.
+
+    Parameters
+    ----------
+    cells, weight: (n,) those in the frustum by descending hint, and their hints.
+    first_shape, texture, shown: (C + 1,), (S,), (S,) the shapes of cells; whether they have a
+        texture and are in the frustum.
+    memory, levels, column: (T, K), (T,), (T,): columns count from nothing.
+    """
+    left, total = budget, weight.sum()
+    for i in range(len(cells)):
+        begin, end = first_shape[cells[i]], first_shape[cells[i] + 1]
+        mine = left * weight[i] / total if total > 0.0 else 0.0
+        total -= weight[i]
+        waiting = 0
+        for s in range(begin, end):
+            waiting += shown[s]
+        rest = mine
+        for s in range(begin, end):
+            if not shown[s]:
+                continue
+            offer = rest / waiting
+            waiting -= 1
+            t = texture[s]
+            wanted = float(memory[t, min(column[t] + 1, levels[t])])
+            if wanted > share[t] + offer:
+                share[t] += offer
+                rest -= offer
+            else:
+                rest -= max(0.0, wanted - share[t])
+                share[t] = max(share[t], wanted)
+        left -= mine - rest
+
+
+@kernel
+def refresh(
+    share: Floats,
+    memory: Ints,
+    levels: Ints,
+    have: Ints,
+    pending: Bools,
+    budget: int,
+    column: Ints,
+) -> Ints:
+    """Removes and adds a level of each texture, by what it keeps and has downloaded; returns the
+    textures that ask for their next level. ``column`` (T,) changes."""
+    asks = np.zeros(len(share), np.int64)
+    count, used = 0, 0
+    before = column.copy()
+    for t in range(len(share)):
+        here = column[t]
+        # A level that can be added or asked for is no reason to remove one.
+        if here > 0 and memory[t, here] > share[t]:
+            column[t] = here - 1
+        used += memory[t, column[t]]
+    for t in range(len(share)):
+        here = column[t]
+        if here < before[t] or here >= levels[t] or memory[t, here + 1] > share[t]:
+            continue
+        if here + 1 <= have[t]:
+            more = memory[t, here + 1] - memory[t, here]
+            if used + more <= budget:
+                used += more
+                column[t] = here + 1
+        elif not pending[t]:
+            asks[count] = t
+            count += 1
+    return asks[:count]

@@ -1,0 +1,237 @@
+"""What is served of a database, as its clients fetch it: the index, records, geometry, textures.
+
+Nothing but the served folder is read, so that whatever a client knows is on the link, and a
+published database can be simulated like one just built.
+"""
+
+from __future__ import annotations
+
+import os
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools import schemas
+from ptmtools.arrays import Bools, Floats
+from ptmtools.database.fault import FileError
+from ptmtools.database.gltf.material import WRAPS
+from ptmtools.database.gltf.reader import ReadGlb, ReadPrimitive, read_glb
+from ptmtools.database.names import HINTS
+from ptmtools.errors import DatabaseError
+from ptmtools.files import open_regular
+from ptmtools.store.layout import SERVED
+
+#: The form of the geometry that clients of the hints fetch.
+FORM = "gltf"
+_BUILD = "build it again with `ptm build-scene`"
+
+Document = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """All triangles that are drawn, in the order of their cells.
+
+    Attributes
+    ----------
+    corner: (n, 3, 3) float64 world metres. uv: (n, 3, 2) float64, origin at the upper left.
+    cell, shape, texture: (n,) int32; the shape counts over all cells, the texture is -1 without.
+    color: (n, 3) what multiplies the texel, encoded as sRGB, 0 to 1.
+    two_sided, glass: (n,) seen from both sides; without texture and not opaque.
+    clamped: (n, 2) whether u and v stop at the edge of the texture instead of repeating it.
+    """
+
+    corner: Floats
+    uv: Floats
+    cell: NDArray[np.int32]
+    shape: NDArray[np.int32]
+    texture: NDArray[np.int32]
+    color: Floats
+    two_sided: Bools
+    glass: Bools
+    clamped: Bools
+
+
+@dataclass(frozen=True)
+class Served:
+    """A served folder.
+
+    Attributes
+    ----------
+    folder: it.
+    index: `hints.json`. records: of each cell. statistics: of all of them.
+    index_bytes, statistics_bytes: on the link, and record_bytes, geometry_bytes: (C,). JSON counts
+        compressed, as any server sends it; geometry as it lies.
+    surfaces: the geometry of all cells.
+    """
+
+    folder: Path
+    index: Document
+    records: tuple[Document, ...]
+    statistics: Document
+    index_bytes: int
+    statistics_bytes: int
+    record_bytes: NDArray[np.int64]
+    geometry_bytes: NDArray[np.int64]
+    surfaces: Surfaces
+
+    @property
+    def cell_count(self) -> int:
+        """How many cells there are."""
+        return len(self.records)
+
+    def texture_file(self, texture: int) -> Path:
+        """The `.ptm` of a texture."""
+        return _inside(self.folder, self.index["textures"][texture]["file"])
+
+
+def read_served(database: str | os.PathLike[str]) -> Served:
+    """What a database serves; the folder of the database, or the served one itself.
+
+    Raises
+    ------
+    DatabaseError: PTM-D001 there is no `hints.json`; PTM-D005 a file is missing; PTM-D006 one is
+        damaged; PTM-D606 there is no geometry in glTF.
+    """
+    folder = Path(database)
+    if not (folder / HINTS).exists():
+        folder /= SERVED
+    if not (folder / HINTS).exists():
+        raise DatabaseError(
+            "PTM-D001", f"there is no {HINTS}", file=database, remedy="build a database first"
+        )
+    index, index_bytes = _document(folder / HINTS, schemas.HINTS)
+    if FORM not in index["geometry"]:
+        raise DatabaseError(
+            "PTM-D606",
+            "has no geometry in glTF, which is what clients of the hints fetch",
+            file=database,
+            remedy="write it with `ptm emit DB --format both`",
+        )
+    names = [cell["name"] for cell in index["cells"]]
+    found = [_document(_of(folder, index["record"], name), schemas.CELL) for name in names]
+    records = tuple(document for document, _ in found)
+    for name, record in zip(names, records, strict=True):
+        _check_record(_of(folder, index["record"], name), record, len(names), index["textures"])
+    statistics, statistics_bytes = _document(
+        _inside(folder, index["statistics"]), schemas.STATISTICS
+    )
+    geometry, sizes = [], []
+    for cell, name in enumerate(names):
+        file = _of(folder, index["geometry"][FORM], name)
+        data = _bytes(file)
+        geometry.append(_glb(file, data, cell, len(index["textures"])))
+        sizes.append(len(data))
+    return Served(
+        folder,
+        index,
+        records,
+        statistics,
+        index_bytes,
+        statistics_bytes,
+        np.array([size for _, size in found], dtype=np.int64),
+        np.array(sizes, dtype=np.int64),
+        _surfaces(geometry),
+    )
+
+
+def _of(folder: Path, template: str, name: str) -> Path:
+    return _inside(folder, template.replace("{name}", name))
+
+
+def _inside(folder: Path, url: str) -> Path:
+    path = Path(os.path.normpath(folder / unquote(url)))
+    if not path.is_relative_to(folder):
+        raise DatabaseError(
+            "PTM-D006", f"names {url!r}, outside the served folder", file=folder, remedy=_BUILD
+        )
+    return path
+
+
+def _bytes(file: Path) -> bytes:
+    try:
+        with open_regular(file) as stream:
+            return stream.read()
+    except OSError as fault:
+        raise DatabaseError(
+            "PTM-D005", f"cannot be read ({fault.strerror or fault})", file=file, remedy=_BUILD
+        ) from None
+
+
+def _document(file: Path, schema: str) -> tuple[Document, int]:
+    """A document, and its bytes on the link."""
+    data = _bytes(file)
+    try:
+        document: Document = schemas.read(data, schema)
+    except schemas.ShapeError as fault:
+        raise DatabaseError(
+            "PTM-D006", fault.message, file=file, place=fault.place or None, remedy=_BUILD
+        ) from None
+    return document, min(len(data), len(zlib.compress(data, 6)) + 12)
+
+
+def _check_record(file: Path, record: Document, cells: int, textures: list[Document]) -> None:
+    others = [*record["visible"], *record["adjacent"], *(p["neighbour"] for p in record["portals"])]
+    used = [t for row in record["textures"] for t in row]
+    rows = {len(record["visible"]), len(record["ach"]), len(record["textures"])}
+    if len(rows) > 1 or max(others, default=0) >= cells or max(used, default=-1) >= len(textures):
+        raise DatabaseError("PTM-D006", "an index is out of range", file=file, remedy=_BUILD)
+
+
+def _glb(file: Path, data: bytes, cell: int, textures: int) -> ReadGlb:
+    try:
+        read = read_glb(data)
+    except FileError as fault:
+        raise DatabaseError(
+            "PTM-D006", fault.message, file=file, place=fault.place, remedy=_BUILD
+        ) from None
+    used = [p.material.texture for p in read.primitives if p.material.texture is not None]
+    if read.cell != cell or max(used, default=-1) >= textures:
+        raise DatabaseError("PTM-D006", "is not that of its cell", file=file, remedy=_BUILD)
+    return read
+
+
+def _surfaces(geometry: list[ReadGlb]) -> Surfaces:
+    shapes = [(glb.cell, p) for glb in geometry for p in glb.primitives]
+    count = [len(p.triangle) for _, p in shapes]
+
+    def spread(values: list[Any], kind: type[np.generic], *shape: int) -> NDArray[Any]:
+        rows = np.array(values, dtype=kind).reshape(len(shapes), *shape)
+        return np.repeat(rows, count, axis=0)
+
+    def joined(rows: list[NDArray[Any]], width: int) -> Floats:
+        return np.concatenate([np.zeros((0, 3, width)), *rows])
+
+    looks = [p.material for _, p in shapes]
+    texture = [
+        -1 if p.uv is None or p.material.texture is None else p.material.texture for _, p in shapes
+    ]
+    clamp = WRAPS["clamp"]
+    return Surfaces(
+        corner=joined([p.point.astype(np.float64)[p.triangle] for _, p in shapes], 3),
+        uv=joined([_texture_points(p) for _, p in shapes], 2),
+        cell=spread([cell for cell, _ in shapes], np.int32),
+        shape=np.repeat(np.arange(len(shapes), dtype=np.int32), count),
+        texture=spread(texture, np.int32),
+        color=spread([[_encoded(c) for c in m.factor[:3]] for m in looks], np.float64, 3),
+        two_sided=spread([m.two_sided for m in looks], np.bool_),
+        glass=spread([m.blends and t < 0 for m, t in zip(looks, texture, strict=True)], np.bool_),
+        clamped=spread([[w == clamp for w in m.wrap] for m in looks], np.bool_, 2),
+    )
+
+
+def _texture_points(primitive: ReadPrimitive) -> Floats:
+    if primitive.uv is None:
+        return np.zeros((len(primitive.triangle), 3, 2))
+    return primitive.uv.astype(np.float64)[primitive.triangle]
+
+
+def _encoded(light: float) -> float:
+    """A component of linear light as sRGB encodes it (IEC 61966-2-1)."""
+    return 12.92 * light if light <= 0.0031308 else 1.055 * light ** (1 / 2.4) - 0.055

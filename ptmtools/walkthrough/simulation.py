@@ -1,0 +1,143 @@
+"""One run: a client with a policy walks through a world over a link.
+
+Time goes from frame to frame. What arrives in between is handed to the client at once, and may make
+it ask for more; what is in texture memory changes only with a frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.walkthrough.allocation import picture
+from ptmtools.walkthrough.client import Client
+from ptmtools.walkthrough.network import Conditions, Link
+from ptmtools.walkthrough.policies import Declared
+from ptmtools.walkthrough.world import World
+
+
+@dataclass(frozen=True)
+class Run:
+    """What came of a run; F frames.
+
+    Attributes
+    ----------
+    policy, conditions, budget: what was run; the budget is bytes of texture memory.
+    time: (F,) s. still: (F,).
+    error: (F,) e, the mean over the pixels of the root mean square over R, G and B, 0 to 255.
+    square: (F,) the mean of its square.
+    missing: (F,) share of the wanted levels on the screen that are not there.
+    quality: (F,) the paper's: levels downloaded over levels existing, of the textures of the
+        visible set.
+    memory: (F,) bytes of texture memory in use. fetched: (F,) bytes of bodies received so far.
+    column: (F, T) what of each texture is in texture memory. there: (F, C) whose geometry is there.
+    body, overhead, cancelled: bytes received: bodies, headers, what came after a cancellation.
+    useful: bytes of textures and geometry that were on the screen.
+    uploads: bytes that went to texture memory. switches: changes of a texture's finest level.
+    requests: how many. stalls: frames in which the cell the walker is in was not there.
+    overruns: frames above the budget.
+    """
+
+    policy: str
+    conditions: Conditions
+    budget: int
+    time: Floats
+    still: Bools
+    error: Floats
+    square: Floats
+    missing: Floats
+    quality: Floats
+    memory: Ints
+    fetched: Floats
+    column: Ints
+    there: Bools
+    body: float
+    overhead: float
+    cancelled: float
+    useful: float
+    uploads: int
+    switches: int
+    requests: int
+    stalls: int
+    overruns: int
+
+
+def simulate(world: World, policy: Declared, conditions: Conditions, budget: int) -> Run:
+    """Walks. The same arguments give the same run, bit for bit."""
+    link = Link(conditions)
+    client = policy.client(world, link, budget)
+    frames, stock, views = world.frames, world.catalogue, world.views
+    error, square, missing, quality, fetched = (np.zeros(frames) for _ in range(5))
+    memory = np.zeros(frames, np.int64)
+    column = np.zeros((frames, stock.texture_count), np.int64)
+    there = np.zeros((frames, stock.cell_count), dtype=bool)
+    shown = np.zeros(stock.ends.shape, dtype=bool)
+    drawn = np.zeros(stock.cell_count, dtype=bool)
+    each = np.arange(stock.texture_count)
+    for f in range(frames):
+        for tick in range(1, client.ticks if f else 0):
+            part = tick / client.ticks
+            _pass(client, link, float((1 - part) * world.time[f - 1] + part * world.time[f]))
+            client.tick()
+        _pass(client, link, float(world.time[f]))
+        client.look(f)
+        column[f], there[f] = client.column, client.geometry.whole
+        memory[f] = stock.memory[each, client.column].sum()
+        rows = views.rows(int(world.view[f]))
+        error[f], square[f], missing[f] = picture(
+            rows.start, rows.stop, views.cell, views.texture, views.error, views.square, views.need,
+            there[f], client.column, True, shown, drawn,
+        )  # fmt: skip
+        quality[f] = _quality(client)
+        fetched[f] = link.bytes
+        client.fetch()
+    steps = np.diff(column, axis=0, prepend=0)
+    before = column - steps
+    held = [stock.memory[each, columns] for columns in (column, before)]
+    textures = int((np.diff(stock.ends, axis=1) * shown[:, 1:]).sum())
+    return Run(
+        policy=policy.name,
+        conditions=conditions,
+        budget=budget,
+        time=world.time,
+        still=world.still,
+        error=error,
+        square=square,
+        missing=missing,
+        quality=quality,
+        memory=memory,
+        fetched=fetched,
+        column=column,
+        there=there,
+        body=link.bytes,
+        overhead=link.overhead_bytes,
+        cancelled=link.wasted,
+        useful=textures + float(stock.geometry_bytes[drawn].sum()),
+        uploads=int(np.maximum(held[0] - held[1], 0).sum()),
+        switches=int(np.count_nonzero(steps)),
+        requests=link.requests,
+        stalls=int((~there[np.arange(frames), world.cell]).sum()),
+        overruns=int((memory > budget).sum()),
+    )
+
+
+def _pass(client: Client, link: Link, until: float) -> None:
+    """Time passes."""
+    while True:
+        finished = link.advance(until)
+        client.estimate.observe(finished)
+        if finished is None:
+            return
+        client.arrived(finished)
+        client.fetch()
+
+
+def _quality(client: Client) -> float:
+    """Levels downloaded over levels existing, of the textures that the visible set uses."""
+    if client.cell < 0:
+        return 0.0
+    textures = client.world.catalogue.in_sight[client.cell]
+    existing = client.world.catalogue.levels[textures].sum()
+    return float(client.have[textures].sum() / existing) if existing else 1.0

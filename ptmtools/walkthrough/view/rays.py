@@ -1,0 +1,102 @@
+"""What the pixels of a camera show: the first surface along each ray, by Embree.
+
+One-sided surfaces are passed through from behind, and glass always: it shows what is behind it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ptmtools.arrays import Floats, Ints
+from ptmtools.walkthrough.served import Surfaces
+
+#: Surfaces that a ray passes through before it is given up.
+_LAYERS = 16
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera with Y up.
+
+    Attributes
+    ----------
+    width, height: pixels. field_of_view: vertical, radians. aspect: width over height of the view,
+        whatever its pixels are.
+    """
+
+    width: int
+    height: int
+    field_of_view: float
+    aspect: float
+
+    def rays(self, direction: Floats) -> tuple[Floats, Floats]:
+        """(F, height, width, 3) rays of which the component along the view is 1, from the top left,
+        and (F, 2, 3) right and up, for (F, 3) unit directions of view."""
+        right, up = axes(direction)
+        tall = np.tan(self.field_of_view / 2)
+        across = ((np.arange(self.width) + 0.5) / self.width * 2 - 1) * tall * self.aspect
+        down = (1 - (np.arange(self.height) + 0.5) / self.height * 2) * tall
+        rays = (
+            direction[:, None, None]
+            + across[None, None, :, None] * right[:, None, None]
+            + down[None, :, None, None] * up[:, None, None]
+        )
+        return rays, np.stack([right, up], axis=1)
+
+
+def axes(direction: Floats) -> tuple[Floats, Floats]:
+    """(F, 3) right and up of (F, 3) unit directions of view; who looks straight up or down has x to
+    the right."""
+    right = np.stack([-direction[:, 2], np.zeros(len(direction)), direction[:, 0]], axis=1)
+    length = np.linalg.norm(right, axis=1, keepdims=True)
+    right = np.where(length > 1e-9, right / np.maximum(length, 1e-9), [1.0, 0.0, 0.0])
+    return right, np.cross(right, direction)
+
+
+class Caster:
+    """Casts rays at surfaces."""
+
+    def __init__(self, surfaces: Surfaces) -> None:
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
+        corner = surfaces.corner
+        self._which = np.flatnonzero(~surfaces.glass)
+        self._corner = corner
+        self._normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        self._one_sided = ~surfaces.two_sided
+        low, high = corner.min(axis=(0, 1), initial=0), corner.max(axis=(0, 1), initial=0)
+        self._middle = (low + high) / 2
+        #: Metres by which a ray goes on behind what it passed through.
+        self._step = 1e-6 * max(1.0, float((high - low).max()))
+        self._tree: Any = None
+        if len(self._which):
+            self._tree = EmbreeScene(robust=True)
+            local = (corner[self._which] - self._middle).astype(np.float32)
+            TriangleMesh(self._tree, np.ascontiguousarray(local))
+
+    def first(self, eye: Floats, along: Floats) -> Ints:
+        """(n,) the triangle that each of (n, 3) rays from (n, 3) points shows, or -1."""
+        found = np.full(len(eye), -1, np.int64)
+        if self._tree is None:
+            return found
+        start, waiting = eye - self._middle, np.arange(len(eye))
+        for _ in range(_LAYERS):
+            origin = start[waiting].astype(np.float32)
+            hit = self._tree.run(origin, along[waiting].astype(np.float32), query="INTERSECT")
+            met = hit >= 0
+            waiting, triangle = waiting[met], self._which[hit[met]]
+            turn = np.einsum("ij,ij->i", self._normal[triangle], along[waiting])
+            passed = self._one_sided[triangle] & (turn > 0)
+            found[waiting[~passed]] = triangle[~passed]
+            waiting, triangle, turn = waiting[passed], triangle[passed], turn[passed]
+            if not len(waiting):
+                break
+            to = self._corner[triangle, 0] - self._middle - start[waiting]
+            far = np.einsum("ij,ij->i", to, self._normal[triangle]) / turn
+            length = np.linalg.norm(along[waiting], axis=1)
+            start[waiting] += along[waiting] * (np.maximum(far, 0) + self._step / length)[:, None]
+        return found

@@ -1,0 +1,133 @@
+"""Tables along a walk: what each pair of cell and texture covers, and its error at each level.
+
+For every pixel of a frame the texture is sampled as OpenGL would, trilinearly, once with all of its
+levels and once for each level as the finest that is there. The difference, root mean square over R,
+G and B (0 to 255), is summed up by the pair. A run then only looks up: the error of a frame is the
+sum over its pairs, each at the level that the client holds. Nothing that is no texture is wrong
+once its cell is there; what is not there is grey.
+
+The level of detail is that of a screen of 1080 lines, whatever the item buffer has: a coarser
+buffer samples fewer pixels of the same picture.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Floats, Ints, Singles
+from ptmtools.progress import Progress, silent
+from ptmtools.walkthrough.served import Surfaces
+from ptmtools.walkthrough.view.pyramids import Pyramids
+from ptmtools.walkthrough.view.rays import Camera, Caster
+
+#: Lines of the screen that pictures are made for.
+LINES = 1080
+#: Rays that are cast at a time.
+_RAYS = 1 << 17
+
+
+@dataclass(frozen=True)
+class Views:
+    """What is on the screen, frame by frame; the rows of a frame are its pairs.
+
+    Attributes
+    ----------
+    start: (F + 1,) where the rows of each frame begin.
+    cell, texture: (R,) int32 of each row; the texture is -1 for surfaces without.
+    error, square: (R, L + 2) its part of the frame's mean of errors, and of squared errors, with as
+        the finest that is there: nothing, the mean colour, level 0, level 1, …
+    need: (R, L) the share of the pixels for which a level is wanted, beside the coarser ones; for
+        surfaces without texture the first is the share that they cover.
+    sight: (R, L) the same in the item buffer that a client draws, with half as many pixels each
+        way.
+    """
+
+    start: Ints
+    cell: NDArray[np.int32]
+    texture: NDArray[np.int32]
+    error: Singles
+    square: Singles
+    need: Singles
+    sight: Singles
+
+    @property
+    def frames(self) -> int:
+        """How many there are."""
+        return len(self.start) - 1
+
+    def rows(self, frame: int) -> slice:
+        """Those of a frame."""
+        return slice(int(self.start[frame]), int(self.start[frame + 1]))
+
+
+def look(
+    surfaces: Surfaces,
+    pyramids: Pyramids,
+    camera: Camera,
+    eye: Floats,
+    direction: Floats,
+    progress: Progress = silent,
+) -> Views:
+    """The tables of (F, 3) eyes and unit directions of view."""
+    from ptmtools.walkthrough.view.kernels import add_frame
+
+    corner = surfaces.corner
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    gradient = gradients(corner, surfaces.uv, normal)
+    pairs, pair = np.unique(
+        np.stack([surfaces.cell, surfaces.texture], axis=1).reshape(-1, 2),
+        axis=0, return_inverse=True,
+    )  # fmt: skip
+    pair = pair.reshape(-1).astype(np.int64)
+    deepest = pyramids.start.shape[1]
+    wide = (deepest + 2, deepest + 2, deepest, deepest)
+    sums = [np.zeros((len(pairs), columns)) for columns in wide]
+    parts: list[list[Floats]] = [[] for _ in wide]
+    found: list[Ints] = []
+    caster = Caster(surfaces)
+    pixel = 2 * np.tan(camera.field_of_view / 2) / LINES
+    odd = [np.arange(side) % 2 == 1 for side in (camera.height, camera.width)]
+    seen = np.outer(*odd).ravel()
+    shares = np.array([1, 1, 1, max(int(seen.sum()), 1) / len(seen)]) * len(seen)
+    at_once = max(1, _RAYS // len(seen))
+    for begin in range(0, len(eye), at_once):
+        progress(begin, len(eye), "looking along the walk")
+        batch = slice(begin, begin + at_once)
+        rays, axes = camera.rays(direction[batch])
+        rays = rays.reshape(len(rays), -1, 3)
+        origin = np.repeat(eye[batch], len(seen), axis=0)
+        shown = caster.first(origin, rays.reshape(-1, 3)).reshape(len(rays), -1)
+        for k in range(len(rays)):
+            add_frame(
+                shown[k], rays[k], axes[k], eye[begin + k], pixel, corner, normal, gradient,
+                surfaces.uv, surfaces.texture, pair, surfaces.color, surfaces.clamped,
+                pyramids.texel, pyramids.start, pyramids.size, pyramids.count, pyramids.mean, seen,
+                *sums,
+            )  # fmt: skip
+            there = np.flatnonzero(sums[2][:, 0])
+            found.append(there)
+            for table, part, share in zip(sums, parts, shares.tolist(), strict=True):
+                part.append(table[there] / share)
+                table[there] = 0.0
+    progress(len(eye), len(eye), "looking along the walk")
+    rows = np.concatenate([np.zeros(0, np.int64), *found])
+    tables = [
+        np.concatenate([np.zeros((0, columns)), *part]).astype(np.float32)
+        for columns, part in zip(wide, parts, strict=True)
+    ]
+    start = np.concatenate([[0], np.cumsum([len(r) for r in found])]).astype(np.int64)
+    return Views(start, pairs[rows, 0].astype(np.int32), pairs[rows, 1].astype(np.int32), *tables)
+
+
+def gradients(corner: Floats, uv: Floats, normal: Floats) -> Floats:
+    """(n, 2, 3) of u and v along each triangle's plane, per metre; 0 for triangles without area."""
+    area = np.maximum((normal**2).sum(axis=1), np.finfo(np.float64).tiny)[:, None]
+    ab, ac = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    along_b = np.cross(ac, normal) / area
+    along_c = np.cross(normal, ab) / area
+    b, c = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    found: Floats = b[:, :, None] * along_b[:, None] + c[:, :, None] * along_c[:, None]
+    return found

@@ -1,0 +1,151 @@
+"""All that the runs of a walk share: what is served, what is on the screen, where the walker is.
+
+Made once, which takes most of the time; a run then takes a second.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.errors import InputError
+from ptmtools.progress import Progress, silent
+from ptmtools.walkthrough.catalogue import Catalogue, catalogue_of
+from ptmtools.walkthrough.locating import Locator
+from ptmtools.walkthrough.served import Served
+from ptmtools.walkthrough.view.frustum import Frustum
+from ptmtools.walkthrough.view.pyramids import Pyramids, read_pyramids
+from ptmtools.walkthrough.view.rays import Camera
+from ptmtools.walkthrough.view.tables import Views, look
+
+if TYPE_CHECKING:
+    from ptmtools.walkthrough.walk import Walk
+
+#: Frames a second that are looked at.
+RATE = 5.0
+#: Pixels of the item buffer that errors are summed over.
+PIXELS = (160, 90)
+#: Share of the walk that may lie in no cell.
+_ASTRAY = 0.05
+#: A viewpoint that in the last second moved less (metres) and turned less (cosine) is still.
+STILL_SECONDS, _STILL_METRES, _STILL_COSINE = 1.0, 1e-3, np.cos(np.radians(1.0))
+
+
+@dataclass(frozen=True)
+class World:
+    """A walk through a database.
+
+    Attributes
+    ----------
+    served, pyramids: what is shown.
+    catalogue: what clients know.
+    views, view: what is on the screen, and (F,) which of the views each frame has.
+    camera: of the item buffer.
+    time: (F,) s. eye, direction: (F, 3).
+    cell: (F,) that the eye is in; where it is in none, the one before.
+    still: (F,) whether the viewpoint has not moved for a second.
+    rate: frames a second.
+    """
+
+    served: Served
+    pyramids: Pyramids
+    catalogue: Catalogue
+    views: Views
+    view: Ints
+    camera: Camera
+    time: Floats
+    eye: Floats
+    direction: Floats
+    cell: Ints
+    still: Bools
+    rate: float = RATE
+
+    @property
+    def frames(self) -> int:
+        """How many there are."""
+        return len(self.time)
+
+    def frustum(self, frame: int) -> Frustum:
+        """What the camera of a frame takes in."""
+        aspect, angle = self.camera.aspect, self.camera.field_of_view
+        return Frustum(self.eye[frame], self.direction[frame], angle, aspect)
+
+    def standing(self, seconds: float) -> World:
+        """Who stays at the first frame of this, so long."""
+        count = int(np.ceil(seconds * self.rate)) + 1
+        first = np.zeros(count, np.int64)
+        time = np.arange(count) / self.rate
+        return replace(
+            self,
+            view=self.view[first],
+            time=time,
+            eye=self.eye[first],
+            direction=self.direction[first],
+            cell=self.cell[first],
+            still=time >= STILL_SECONDS,
+        )
+
+
+def prepare(
+    served: Served,
+    walk: Walk,
+    pyramids: Pyramids | None = None,
+    *,
+    rate: float = RATE,
+    pixels: tuple[int, int] = PIXELS,
+    progress: Progress = silent,
+) -> World:
+    """The world of a walk.
+
+    Parameters
+    ----------
+    pyramids: of this database, if they have been read already.
+    rate: frames a second. pixels: of the item buffer, across and down.
+
+    Raises
+    ------
+    InputError: PTM-I700 the walk does not lead through this database; those of `read_pyramids`.
+    """
+    time = np.arange(int(np.floor(walk.duration * rate + 1e-9)) + 1) / rate
+    eye, direction = walk.at(time)
+    cell = Locator(served.records).along(eye)
+    astray = cell < 0
+    if astray.mean() > _ASTRAY:
+        raise InputError(
+            "PTM-I700",
+            f"{astray.mean():.0%} of the walk lies in none of the cells",
+            remedy="give a walk through this very database, such as `ptm path DB` makes",
+        )
+    known = np.maximum.accumulate(np.where(astray, -1, np.arange(len(cell))))
+    cell = cell[np.where(known < 0, int(np.argmax(~astray)), known)]
+    textures = read_pyramids(served, progress) if pyramids is None else pyramids
+    camera = Camera(*pixels, walk.field_of_view, walk.aspect)
+    seen, view = np.unique(np.concatenate([eye, direction], axis=1), axis=0, return_inverse=True)
+    views = look(served.surfaces, textures, camera, seen[:, :3], seen[:, 3:], progress)
+    return World(
+        served=served,
+        pyramids=textures,
+        catalogue=catalogue_of(served, textures.rms, textures.mean),
+        views=views,
+        view=view.reshape(-1).astype(np.int64),
+        camera=camera,
+        time=time,
+        eye=eye,
+        direction=direction,
+        cell=cell,
+        still=_still(time, eye, direction),
+        rate=rate,
+    )
+
+
+def _still(time: Floats, eye: Floats, direction: Floats) -> Bools:
+    found = np.zeros(len(time), dtype=bool)
+    begin = np.searchsorted(time, time - STILL_SECONDS - 1e-9)
+    for f in np.flatnonzero(time >= STILL_SECONDS).tolist():
+        last = slice(int(begin[f]), f + 1)
+        moved = np.abs(eye[last] - eye[f]).max()
+        found[f] = moved < _STILL_METRES and (direction[last] @ direction[f]).min() > _STILL_COSINE
+    return found
