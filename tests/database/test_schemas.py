@@ -91,7 +91,10 @@ def report() -> dict[str, Any]:
 TRACE = {
     "format": "ptmtools trace",
     "schema": 1,
-    "steps": [{"seconds": 2, "bandwidth": 5e5, "latency": 0.1, "loss": 0.01}, {"seconds": 0.5}],
+    "steps": [
+        *({"seconds": 2, "bandwidth": 5e5 * i, "latency": 0.1, "loss": i / 9} for i in range(4)),
+        {"seconds": 0.5, "bandwidth": None},
+    ],
 }
 
 
