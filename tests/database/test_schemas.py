@@ -91,10 +91,7 @@ def report() -> dict[str, Any]:
 TRACE = {
     "format": "ptmtools trace",
     "schema": 1,
-    "steps": [
-        *({"seconds": 2, "bandwidth": 5e5 * i, "latency": 0.1, "loss": i / 9} for i in range(4)),
-        {"seconds": 0.5, "bandwidth": None},
-    ],
+    "steps": [{"seconds": 2, "bandwidth": 5e5, "latency": 0.1, "loss": 0.01}, {"seconds": 0.5}],
 }
 
 
@@ -214,7 +211,7 @@ def test_our_reader_and_jsonschema_agree(name: str, served, manifest, report) ->
         fault = shape_fault(changed, name)
         assert theirs.is_valid(changed) == (fault == ""), f"{what}: {fault or 'is let through'}"
         refused, tried = refused + (fault != ""), tried + 1
-    assert tried > 500
+    assert tried > 200
     assert refused > tried // 2
 
 
