@@ -3,8 +3,9 @@ and latency analysis performed for some recent downloadings").
 
 Bandwidth is bytes over the time during which any were arriving, both forgotten with a half-life of
 such time: so a pause, in which nothing was asked for, neither lowers the estimate nor ages it, and
-parallel requests are not counted against each other. Latency is the least of the last few: on a
-connection that serves by priority, the others have waited for more than the network.
+parallel requests are not counted against each other. Latency is the mean of the last few, of
+requests whose response did not have to wait for those of others: on `h2` the others tell nothing of
+the network. (A client sees it: another response ended as this one began.)
 """
 
 from __future__ import annotations
@@ -47,11 +48,11 @@ class Estimate:
         self._bytes = self._bytes * fading + carried - self._seen[0]
         self._seconds = self._seconds * fading + seconds
         self._seen = (carried, busy)
-        if finished and finished.sent is not None and finished.first_byte is not None:
+        if finished and finished.sent is not None and finished.first_byte == finished.starts:
             if self._guessed:
                 self._latencies.clear()
                 self._guessed = False
-            self._latencies.append(finished.first_byte - finished.sent)
+            self._latencies.append(finished.starts - finished.sent)
 
     @property
     def bandwidth(self) -> float:
@@ -63,7 +64,7 @@ class Estimate:
     @property
     def latency(self) -> float:
         """s to the first byte."""
-        return min(self._latencies)
+        return sum(self._latencies) / len(self._latencies)
 
     def duration(self, size: float) -> float:
         """s until a request of ``size`` bytes would be finished, if it had the link for itself."""

@@ -214,7 +214,7 @@ class Link:
         whole = self.now + seconds <= until
         if not whole:
             seconds = until - self.now
-            amount = min(amount, rate * seconds)
+            amount = min(amount, rate * seconds)  # which rounding may take beyond what is left
         for request in receivers:
             if amount and request.first_byte is None:
                 request.first_byte = self.now

@@ -211,7 +211,7 @@ def test_our_reader_and_jsonschema_agree(name: str, served, manifest, report) ->
         fault = shape_fault(changed, name)
         assert theirs.is_valid(changed) == (fault == ""), f"{what}: {fault or 'is let through'}"
         refused, tried = refused + (fault != ""), tried + 1
-    assert tried > 500
+    assert tried > 200
     assert refused > tried // 2
 
 

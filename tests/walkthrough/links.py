@@ -34,9 +34,7 @@ CONDITIONS = st.builds(
 
 #: What a client does: asks for bytes at a priority; waits; gives up, or finds more or less urgent,
 #: the n-th request.
-Ask = tuple[str, int, int]
-Wait = tuple[str, float]
-Act = Ask | Wait
+Act = tuple[str, int, int] | tuple[str, float]
 ACTS = st.lists(
     st.tuples(st.just("ask"), st.integers(0, 100_000), st.integers(0, 3))
     | st.tuples(st.just("wait"), st.floats(0, 2))
@@ -59,10 +57,10 @@ class Client:
             match act:
                 case "ask", size, priority:
                     self.asked.append(self.link.request(size, priority, len(self.asked)))
-                case "cancel", number if number < len(self.asked):
-                    self.link.cancel(self.asked[number])
-                case "rank", number, priority if number < len(self.asked):
-                    self.link.reprioritise(self.asked[number], priority)
+                case "cancel", number if self.asked:
+                    self.link.cancel(self.asked[number % len(self.asked)])
+                case "rank", number, priority if self.asked:
+                    self.link.reprioritise(self.asked[number % len(self.asked)], priority)
                 case "wait", seconds:
                     yield from self.wait(self.link.now + seconds)
             yield
@@ -86,7 +84,7 @@ def run(conditions: Conditions, acts: list[Act]) -> Client:
 
 @dataclass
 class Ticked:
-    """What has arrived of one request, by small steps."""
+    """What is left of one request, by small steps."""
 
     left: float
     priority: float

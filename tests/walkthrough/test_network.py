@@ -260,6 +260,20 @@ def test_cancelling_before_the_first_byte() -> None:
         assert link.busy == pytest.approx(wasted / 125_000)
 
 
+@pytest.mark.parametrize("protocol", ["h1", "h2"])
+def test_cancelling_what_is_all_under_way(protocol: str) -> None:
+    """It arrives to its end, and then leaves the link to the others."""
+    link = Link(Conditions(MEGABIT, 0.1, 0, protocol))
+    request, other = link.request(1250, 2.0), link.request(1250, 1.0)
+    assert link.advance(0.105) is None
+    link.cancel(request)
+    kept = request.received
+    assert link.advance(1.0) is other
+    assert link.now == pytest.approx(0.12)
+    assert link.wasted == pytest.approx(1250 - kept)
+    assert link.carried == pytest.approx(2500)
+
+
 def test_cancelling_what_waits_costs_nothing() -> None:
     link = Link(Conditions(MEGABIT, 0.1, 0, connections=1))
     first, second = link.request(12_500, 1.0), link.request(12_500, 1.0)
