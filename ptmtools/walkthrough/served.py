@@ -29,6 +29,8 @@ from ptmtools.store.layout import SERVED
 
 #: The form of the geometry that clients of the hints fetch.
 FORM = "gltf"
+#: Bytes that a gzip file has more than a zlib stream.
+_GZIP_MORE = 12
 _BUILD = "build it again with `ptm build-scene`"
 
 Document = Mapping[str, Any]
@@ -66,8 +68,8 @@ class Served:
     ----------
     folder: it.
     index: `hints.json`. records: of each cell. statistics: of all of them.
-    index_bytes, statistics_bytes: on the link, and record_bytes, geometry_bytes: (C,). JSON counts
-        compressed, as any server sends it; geometry as it lies.
+    index_bytes, statistics_bytes: on the link, and record_bytes, geometry_bytes: (C,). All of it
+        counts as gzip makes it: servers send it so (docs/walkthrough.md).
     surfaces: the geometry of all cells.
     """
 
@@ -127,7 +129,7 @@ def read_served(database: str | os.PathLike[str]) -> Served:
         file = _of(folder, index["geometry"][FORM], name)
         data = _bytes(file)
         geometry.append(_glb(file, data, cell, len(index["textures"])))
-        sizes.append(len(data))
+        sizes.append(_on_link(data))
     return Served(
         folder,
         index,
@@ -173,7 +175,12 @@ def _document(file: Path, schema: str) -> tuple[Document, int]:
         raise DatabaseError(
             "PTM-D006", fault.message, file=file, place=fault.place or None, remedy=_BUILD
         ) from None
-    return document, min(len(data), len(zlib.compress(data, 6)) + 12)
+    return document, _on_link(data)
+
+
+def _on_link(data: bytes) -> int:
+    """Bytes of a file that a server sends compressed (gzip), as it can all but textures."""
+    return min(len(data), len(zlib.compress(data, 6)) + _GZIP_MORE)
 
 
 def _check_record(file: Path, record: Document, cells: int, textures: list[Document]) -> None:

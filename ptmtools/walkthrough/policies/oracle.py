@@ -40,13 +40,13 @@ class Oracle:
 
 def _drops(world: World) -> tuple[Singles, Singles]:
     """(F, T, K) by how much each column lessens the error of each frame, and (F, C) each cell's
-    geometry, from grey to mean colours."""
+    geometry with all textures."""
     stock, views = world.catalogue, world.views
     count = views.frames
     columns = np.zeros((count, stock.texture_count, stock.ends.shape[1]), np.float32)
     cells = np.zeros((count, stock.cell_count), np.float32)
     frame = np.repeat(np.arange(count), np.diff(views.start))
-    np.add.at(cells, (frame, views.cell), views.error[:, 0] - views.error[:, 1])
+    np.add.at(cells, (frame, views.cell), views.error[:, 0])
     rows = np.flatnonzero(views.texture >= 0)
     drop = views.error[rows, 1:-1] - views.error[rows, 2:]
     np.add.at(columns[:, :, 1:], (frame[rows], views.texture[rows]), drop)
