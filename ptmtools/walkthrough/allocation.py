@@ -11,9 +11,12 @@ from __future__ import annotations
 import heapq
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.compiled import kernel, plain_kernel
+
+Numbers = NDArray[np.int32]
 
 
 @plain_kernel
@@ -95,8 +98,8 @@ def next_fetch(worth: Floats, ends: Ints, requested: Ints, last: Ints) -> tuple[
 
 @plain_kernel
 def gather(
-    start: int, end: int, cell: np.ndarray, texture: np.ndarray, table: np.ndarray,
-    there: np.ndarray, worth: Floats,
+    start: int, end: int, cell: Numbers, texture: Numbers, table: Singles,
+    there: Bools, worth: Floats,
 ) -> None:  # fmt: skip
     """Adds rows of a table (R, L) of pairs to their textures' worth (T, L + 1), from its second
     column on, for the cells that are there (C,)."""
@@ -109,10 +112,45 @@ def gather(
 
 
 @plain_kernel
+def holes(
+    ray: Floats, owner: Numbers, depth: Singles, eye: Floats,
+    low: Floats, high: Floats, there: Bools, missing: Ints, share: Floats,
+) -> None:  # fmt: skip
+    """Adds to ``share`` (C,) the pixels that would show placeholders of cells whose geometry is
+    missing: the far faces of their boxes, which are rooms.
+
+    Parameters
+    ----------
+    ray, owner, depth: (n, 3), (n,), (n,) of the pixels, as `Views` has them. eye: (3,).
+    low, high: (C, 3) boxes of the cells. there: (C,) whose geometry is there.
+    missing: cells whose placeholders are drawn.
+    """
+    for i in range(len(owner)):
+        nearest, found = np.inf, -1
+        if owner[i] >= 0 and there[owner[i]]:
+            nearest = depth[i]
+        for m in range(len(missing)):
+            cell = missing[m]
+            begin, end = 0.0, np.inf
+            for k in range(3):
+                a, b = low[cell, k] - eye[k], high[cell, k] - eye[k]
+                if ray[i, k] == 0.0:
+                    if a > 0.0 or b < 0.0:
+                        end = -1.0
+                    continue
+                a, b = a / ray[i, k], b / ray[i, k]
+                begin, end = max(begin, min(a, b)), min(end, max(a, b))
+            if begin <= end < nearest:
+                nearest, found = end, cell
+        if found >= 0:
+            share[found] += 1.0 / len(owner)
+
+
+@plain_kernel
 def picture(
-    start: int, end: int, cell: np.ndarray, texture: np.ndarray, error: np.ndarray,
-    square: np.ndarray, need: np.ndarray, there: np.ndarray, column: Ints, colored: bool,
-    shown: np.ndarray, drawn: np.ndarray,
+    start: int, end: int, cell: Numbers, texture: Numbers, error: Singles,
+    square: Singles, need: Singles, there: Bools, column: Ints, colored: bool,
+    shown: Bools, drawn: Bools,
 ) -> tuple[float, float, float]:  # fmt: skip
     """The mean error, the mean of its square, and the share of wanted levels that is missing, of
     the rows of a frame; marks what was on the screen.

@@ -19,7 +19,7 @@ from typing import Protocol
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.walkthrough.allocation import allocate, gather, next_fetch
+from ptmtools.walkthrough.allocation import allocate, gather, holes, next_fetch
 from ptmtools.walkthrough.client import Client, Kind
 from ptmtools.walkthrough.network import Link
 from ptmtools.walkthrough.request import Request
@@ -91,6 +91,24 @@ class EngineClient(Client):
             rows.start, rows.stop, views.cell, views.texture, views.sight, self._there[frame], found
         )
         return found
+
+    def placeholders(self, age: int) -> Floats:
+        """(C,) the share of the item buffer, so many frames old, that shows placeholders: of cells
+        that may be seen and whose geometry is not there, the far faces of their boxes."""
+        stock, world = self.world.catalogue, self.world
+        frame, there = max(0, self.frame - age), self.geometry.whole
+        share = np.zeros(stock.cell_count)
+        known = self.known()
+        missing = known[~there[known]]
+        if len(missing):
+            low, high = stock.boxes
+            view = int(world.view[frame])
+            rays, _ = world.camera.rays(world.direction[frame : frame + 1])
+            holes(
+                rays.reshape(-1, 3)[world.camera.sparse], world.views.owner[view],
+                world.views.depth[view], world.eye[frame], low, high, there, missing, share,
+            )  # fmt: skip
+        return share
 
     def known(self) -> Ints:
         """The cells that the one the client is in may see, itself first."""

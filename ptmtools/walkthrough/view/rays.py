@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.walkthrough.served import Surfaces
 
 #: Surfaces that a ray passes through before it is given up.
@@ -31,6 +31,14 @@ class Camera:
     height: int
     field_of_view: float
     aspect: float
+
+    @property
+    def sparse(self) -> Bools:
+        """(height * width,) which pixels a client's own item buffer has: every other one each way,
+        from the second on."""
+        odd = [np.arange(side) % 2 == 1 for side in (self.height, self.width)]
+        found: Bools = np.outer(*odd).ravel()
+        return found
 
     def rays(self, direction: Floats) -> tuple[Floats, Floats]:
         """(F, height, width, 3) rays of which the component along the view is 1, from the top left,

@@ -43,6 +43,8 @@ class Views:
         surfaces without texture the first is the share that they cover.
     sight: (R, L) the same in the item buffer that a client draws, with half as many pixels each
         way.
+    owner, depth: (V, n) int32, float32 of that item buffer's pixels: the cell that is on the
+        screen, -1 for none, and how far away it is along the view, metres.
     """
 
     start: Ints
@@ -52,6 +54,8 @@ class Views:
     square: Singles
     need: Singles
     sight: Singles
+    owner: NDArray[np.int32]
+    depth: Singles
 
     @property
     def frames(self) -> int:
@@ -89,9 +93,10 @@ def look(
     found: list[Ints] = []
     caster = Caster(surfaces)
     pixel = 2 * np.tan(camera.field_of_view / 2) / LINES
-    odd = [np.arange(side) % 2 == 1 for side in (camera.height, camera.width)]
-    seen = np.outer(*odd).ravel()
+    seen = camera.sparse
     shares = np.array([1, 1, 1, max(int(seen.sum()), 1) / len(seen)]) * len(seen)
+    owner = np.full((len(eye), int(seen.sum())), -1, np.int32)
+    depth = np.full(owner.shape, np.inf, np.float32)
     at_once = max(1, _RAYS // len(seen))
     for begin in range(0, len(eye), at_once):
         progress(begin, len(eye), "looking along the walk")
@@ -107,6 +112,13 @@ def look(
                 pyramids.texel, pyramids.start, pyramids.size, pyramids.count, pyramids.mean, seen,
                 *sums,
             )  # fmt: skip
+            shows = shown[k, seen]
+            hit = np.flatnonzero(shows >= 0)
+            shows = shows[hit]
+            owner[begin + k, hit] = surfaces.cell[shows]
+            offset = corner[shows, 0] - eye[begin + k]
+            facing = np.einsum("ij,ij->i", normal[shows], rays[k][seen][hit])
+            depth[begin + k, hit] = np.einsum("ij,ij->i", normal[shows], offset) / facing
             there = np.flatnonzero(sums[2][:, 0])
             found.append(there)
             for table, part, share in zip(sums, parts, shares.tolist(), strict=True):
@@ -119,7 +131,9 @@ def look(
         for columns, part in zip(wide, parts, strict=True)
     ]
     start = np.concatenate([[0], np.cumsum([len(r) for r in found])]).astype(np.int64)
-    return Views(start, pairs[rows, 0].astype(np.int32), pairs[rows, 1].astype(np.int32), *tables)
+    cell, texture = pairs[rows].T.astype(np.int32)
+    error, square, need, sight = tables
+    return Views(start, cell, texture, error, square, need, sight, owner, depth)
 
 
 def gradients(corner: Floats, uv: Floats, normal: Floats) -> Floats:
