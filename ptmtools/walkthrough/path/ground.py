@@ -21,7 +21,8 @@ class Ground:
     ----------
     eye: (n, 3) metres.
     cell: (n,) the cell that each is in, or -1.
-    space: (n,) metres to what stands about, at most `footing.ABOUT`.
+    space: (n,) metres to what stands about, at most `footing.ABOUT`; 0 where the foot is
+        on nothing.
     start, target, cost: steps as CSR over places: (n + 1,), (m,) where each leads to, and (m,)
         what it costs.
     """

@@ -19,7 +19,7 @@ from ptmtools.walkthrough.path.obstacles import Obstacles
 from ptmtools.walkthrough.path.options import PathOptions
 from ptmtools.walkthrough.path.portals import through_portals
 from ptmtools.walkthrough.path.smoothing import Smoother
-from ptmtools.walkthrough.path.tour import Leg, tour
+from ptmtools.walkthrough.path.tour import Leg, middles_of, tour
 from ptmtools.walkthrough.path.views import Views
 from ptmtools.walkthrough.walk import DIGITS, Walk
 
@@ -65,20 +65,19 @@ def make_path(
     else:
         ground = over_floors(cells, obstacles, eye_height)
     ground = ground.main_part(standing)
-    reached = np.unique(ground.cell[ground.cell >= 0])
-    reached = reached[standing[reached]]
-    if not len(reached):
+    middles = middles_of(ground, standing)
+    if not middles:
         raise InputError(
             "PTM-I811",
             "there is no way for a walker",
             remedy="build the cells with a smaller --walker, or with --standing anywhere",
         )
     views = Views(scene, ground, obstacles, random)
-    first = random.choice(np.flatnonzero(ground.cell == random.choice(reached)))
+    first = int(random.choice([*middles.values()]))
     smoother = Smoother(eyes, obstacles, eye_height, cells.walker.radius)
     legs: list[Floats] = []
     looks: list[Floats] = []
-    for some in tour(ground, standing, views, int(first)):
+    for some in tour(ground, middles, views, first):
         legs += _smoothed(ground.eye, some, smoother)
         looks += [leg.looks for leg in some]
         stands = options.stop * np.random.default_rng(options.seed).uniform(
@@ -95,7 +94,7 @@ def make_path(
         walk,
         int(standing.sum()),
         tuple(visited[standing[visited]].tolist()),
-        tuple(np.setdiff1d(np.flatnonzero(standing), reached).tolist()),
+        tuple(np.setdiff1d(np.flatnonzero(standing), [*middles]).tolist()),
         int(sum((until <= walk.duration).sum() for until in motion.until)),
     )
 
