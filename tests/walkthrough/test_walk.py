@@ -59,6 +59,7 @@ def test_a_recorded_walk_comes_back(seed: int) -> None:
 def test_the_document_is_as_the_schema_says() -> None:
     schema = json.loads(schemas.schema_text(schemas.WALK))
     jsonschema.Draft202012Validator.check_schema(schema)
+    assert schema["$id"] == f"urn:ptmtools:walk:{schema['properties']['schema']['const']}"
     validator = jsonschema.Draft202012Validator(schema)
     validator.validate(json.loads(walk_text(recorded(1))))
     assert not validator.is_valid(json.loads(document(schema=2)))

@@ -25,6 +25,8 @@ from ptmtools.walkthrough.walk import DIGITS, Walk
 
 #: The head is moved at least so often, in steps a second.
 _STEPS = 60
+#: He stands before a picture for so many times the average.
+_STANDS = (0.7, 1.3)
 
 
 @dataclass(frozen=True)
@@ -77,15 +79,15 @@ def make_path(
     smoother = Smoother(eyes, obstacles, eye_height, cells.walker.radius)
     legs: list[Floats] = []
     looks: list[Floats] = []
+    stands, spent = np.zeros(0), 0.0
     for some in tour(ground, middles, views, first):
-        legs += _smoothed(ground.eye, some, smoother)
-        looks += [leg.looks for leg in some]
-        stands = options.stop * np.random.default_rng(options.seed).uniform(
-            0.7, 1.3, sum(map(len, looks))
-        )
-        motion = Motion.of(legs, looks, stands, options.speed)
-        if options.duration is None or motion.duration >= options.duration:
+        ways, ahead = _smoothed(ground.eye, some, smoother), [leg.looks for leg in some]
+        stood = options.stop * random.uniform(*_STANDS, sum(map(len, ahead)))
+        legs, looks, stands = legs + ways, looks + ahead, np.append(stands, stood)
+        spent += Motion.of(ways, ahead, stood, options.speed).duration  # and turns between rounds
+        if options.duration is None or spent >= options.duration:
             break
+    motion = Motion.of(legs, looks, stands, options.speed)
     duration = motion.duration if options.duration is None else options.duration
     walk = _sampled(motion, duration, options, cells, random)
     visited = np.unique(cells.locate(walk.eye))
