@@ -100,3 +100,12 @@ def test_rooms_that_cannot_be_reached(
     first, second = capsys.readouterr().out.splitlines()
     assert "1 of 2 rooms" in first
     assert second.startswith("no way on foot, at the height of eyes, to 1 room: cell ")
+
+
+def test_a_walk_in_the_plan(db: Path, tmp_path: Path) -> None:
+    walk, plain, plan = (tmp_path / name for name in ("w.json", "plain.png", "plan.png"))
+    assert main(["-q", "path", str(db), "-o", str(walk)]) == 0
+    assert main(["-q", "plot", str(db), "-o", str(plain)]) == 0
+    assert main(["-q", "plot", str(db), "-o", str(plan), "--walk", str(walk)]) == 0
+    assert plan.read_bytes() != plain.read_bytes()
+    assert main(["plot", str(db), "-o", str(plan), "--force", "--walk", str(plain)]) == 3
