@@ -264,6 +264,28 @@ def test_a_door_of_the_subdivision(tmp_path: Path) -> None:
     assert shut.unreachable
 
 
+def test_a_child(subject: Subjects) -> None:
+    scene, cells = subject("stair")
+    floor = STAIR.in_world(scene, [(0, 0, 0)])[0, 1]
+    options = PathOptions(eye=1.1)
+    made = make_path(scene, cells, options)
+    check(made, scene, cells, options)
+    assert made.walk.eye[:, 1].min() == pytest.approx(floor + 1.1, abs=1e-3)
+    for eye in (0.4, 2.3):
+        with pytest.raises(InputError, match="PTM-I810"):
+            make_path(scene, cells, PathOptions(eye=eye))
+
+
+def test_the_gallery(shared: Path) -> None:
+    """A real one: a hall, and what stands in it."""
+    scene = ingest(shared / "scenes/gallery/gallery.obj")
+    cells = subdivide(scene)
+    options = PathOptions(duration=120)
+    made = make_path(scene, cells, options)
+    check(made, scene, cells, options)
+    assert made.stops > 5
+
+
 def test_where_eyes_may_be_anywhere(room_row: RoomRow) -> None:
     """From portal to portal, at the height of eyes."""
     scene, cells = room_row(5)

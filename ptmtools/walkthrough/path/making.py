@@ -9,7 +9,6 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats
 from ptmtools.cells.model import Cells
-from ptmtools.database.model import EmitOptions
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Scene
 from ptmtools.walkthrough.path.footing import over_floors
@@ -57,10 +56,10 @@ def make_path(
     """A walk through all rooms of a building, nearest next, with stops before pictures; the same
     for the same seed.
 
-    Raises InputError PTM-I811: nobody can walk there.
+    Raises InputError: PTM-I810 eyes cannot be as high as asked for; PTM-I811 nobody can walk there.
     """
     random = np.random.default_rng(options.seed)
-    eye_height = EmitOptions().avatar(cells.walker)[1]
+    eye_height = options.eye_height(cells.walker)
     obstacles, eyes, standing = Obstacles(scene, cells), cells.eyes, cells.standing
     if eyes.everywhere:
         ground = through_portals(cells, obstacles, eye_height)
