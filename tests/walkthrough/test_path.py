@@ -296,6 +296,16 @@ def test_where_eyes_may_be_anywhere(room_row: RoomRow) -> None:
     np.testing.assert_allclose(made.walk.eye[:, 1], 0.94 * 1.7, atol=0.01)
 
 
+@pytest.mark.parametrize(("duration", "samples"), [(None, 2), (5.0, 51)])
+def test_a_single_bare_room(room_row: RoomRow, duration: float | None, samples: int) -> None:
+    """There is nowhere to go."""
+    scene, cells = room_row(1)
+    made = make_path(scene, cells, PathOptions(duration=duration))
+    assert len(made.walk.time) == samples
+    assert made.visited == (0,)
+    assert made.walk.length == 0
+
+
 def test_nobody_can_walk(room_row: RoomRow) -> None:
     scene, cells = room_row(2)
     above = np.array([[[0, 9, 0], [1, 9, 0], [0, 9, 1]]], dtype=np.float64)

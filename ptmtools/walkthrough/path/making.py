@@ -83,8 +83,10 @@ def make_path(
         ways, ahead = _smoothed(ground.eye, some, smoother), [leg.looks for leg in some]
         stood = options.stop * random.uniform(*_STANDS, sum(map(len, ahead)))
         legs, looks, stands = legs + ways, looks + ahead, np.append(stands, stood)
-        spent += Motion.of(ways, ahead, stood, options.speed).duration  # and turns between rounds
-        if options.duration is None or spent >= options.duration:
+        took = Motion.of(ways, ahead, stood, options.speed).duration  # but for turns between rounds
+        spent += took
+        # In a single room without pictures he stands where he is.
+        if options.duration is None or spent >= options.duration or not took:
             break
     motion = Motion.of(legs, looks, stands, options.speed)
     duration = motion.duration if options.duration is None else options.duration
@@ -126,12 +128,13 @@ def _sampled(
     times = np.arange(last * each + 1) / (each * options.rate)
     direction = directions(motion, times, random)[::each]
     along, _ = motion.at(times[::each])
-    eye = motion.position(along)
+    eye = motion.way.position(along)
     # Between two points of the way that eyes can be at, they nearly always can be; else at one.
     outside = np.flatnonzero(~cells.eyes.contains(eye))
-    after = np.searchsorted(motion.along, along[outside]).clip(1, len(motion.along) - 1)
-    nearer = motion.along[after] - along[outside] < along[outside] - motion.along[after - 1]
-    eye[outside] = motion.point[np.where(nearer, after, after - 1)]
+    known = motion.way.along
+    after = np.searchsorted(known, along[outside]).clip(1, len(known) - 1)
+    nearer = known[after] - along[outside] < along[outside] - known[after - 1]
+    eye[outside] = motion.way.point[np.where(nearer, after, after - 1)]
     return Walk(
         times[::each].round(DIGITS),
         eye.round(DIGITS) + 0.0,
