@@ -9,6 +9,7 @@ import click
 from ptmtools.cli.common import as_json, database, forced, voiced
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
+from ptmtools.errors import naming
 from ptmtools.files import refuse_existing, write_bytes
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
@@ -38,7 +39,8 @@ def path(voice: Voice, db: str, output: str, force: bool, as_json: bool, **value
     if not force:
         refuse_existing(output)
     artifacts = Artifacts(open_database(db))
-    made = make_path(artifacts[SCENE], artifacts[CELLS], options)
+    with naming(db):
+        made = make_path(artifacts[SCENE], artifacts[CELLS], options)
     write_bytes(output, walk_text(made.walk).encode(), force=force)
     if as_json:
         voice.emit_json(_document(made))

@@ -106,12 +106,15 @@ def validate(
 @database
 @click.option("-o", "--output", type=click.Path(), required=True, help="The picture, a PNG.")
 @options_of(PlotOptions)
+@click.option("--walk", type=click.Path(), help="Also draw the way of this walk; see `ptm path`.")
 @forced
 @voiced
-def plot(voice: Voice, db: str, output: str, force: bool, **values: Any) -> None:
+def plot(voice: Voice, db: str, output: str, walk: str | None, force: bool, **values: Any) -> None:
     """Draw the floor plan of DB, storey by storey: cells, portals, and with --cell what it sees."""
     from ptmtools.database import plot_plan
+    from ptmtools.walkthrough.walk import read_walk
 
+    walked = read_walk(walk) if walk is not None else None
     options = take(PlotOptions, values)
     artifacts = Artifacts(open_database(db))
     report = plot_plan(
@@ -121,6 +124,7 @@ def plot(voice: Voice, db: str, output: str, force: bool, **values: Any) -> None
         artifacts[ACH] if artifacts.before(ACH) else None,
         output,
         options,
+        way=(walked.eye, walked.direction) if walked else None,
         force=force,
     )
     voice.say(f"{output}: the floor plan of {db}, {count(len(report.floors), 'storey')}")

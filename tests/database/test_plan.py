@@ -13,6 +13,7 @@ from PIL import Image
 from ptmtools.database import PlotOptions, plot_plan
 from ptmtools.database.plans.hatched import LEFT_OUT, VIEW_ONLY
 from ptmtools.database.plans.leaks import LEAK
+from ptmtools.database.plans.ways import WAY
 from ptmtools.errors import InputError, MissingComponentError, OutputError
 
 SMALL = PlotOptions(width=6, dpi=60)
@@ -48,6 +49,27 @@ def test_what_is_drawn(artifacts, tmp_path: Path) -> None:
     assert pixels(chosen, "#eaf0f4") < 500, "every cell is shaded"
     assert pixels(plain, "#b0125b") == 0
     assert pixels(chosen, "#b0125b") > 200, "the chosen cell's outline"
+
+
+def test_a_walk_is_drawn(artifacts, tmp_path: Path) -> None:
+    """Its line; and an arrow where the eye rests, beside the line."""
+    sharp = PlotOptions(width=6, dpi=200)
+    low, high = artifacts.cells.root_box
+    eye = np.linspace(low, high, 40)
+    eye[:, 1] = low[1] + 1.6
+    ahead = np.tile([1.0, 0.0, 0.0], (60, 1))
+    moving, resting = eye, np.append(eye, np.tile(eye[20], (20, 1)), axis=0)
+    counts = []
+    for name, points in (("moving", moving), ("resting", resting)):
+        out = tmp_path / f"{name}.png"
+        way = points, ahead[: len(points)]
+        plot_plan(artifacts.scene, artifacts.cells, None, None, out, sharp, way=way)
+        with Image.open(out) as image:
+            counts.append(pixels(np.asarray(image.convert("RGB")).astype(int), WAY))
+    plain = pixels(draw(artifacts, tmp_path / "plain.png", sharp), WAY)
+    assert plain == 0
+    assert counts[0] > 100
+    assert counts[1] > counts[0] + 5
 
 
 def test_shades_follow_the_coverage(artifacts, tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from ptmtools.database.model import PlotOptions, PlotReport
 from ptmtools.database.plans.hatched import draw_left_out, draw_view_only, hatches
 from ptmtools.database.plans.leaks import LEAK, draw_leaks, leaks_by_portal
 from ptmtools.database.plans.storeys import cut_height, storeys
+from ptmtools.database.plans.ways import WAY, Way, draw_way
 from ptmtools.database.section import area, leaf_section, polygon_section, triangle_section
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.files import write_bytes
@@ -59,6 +60,7 @@ def plot_plan(
     out: str | os.PathLike[str],
     options: PlotOptions = PlotOptions(),  # noqa: B008 - a frozen value
     *,
+    way: Way | None = None,
     force: bool = False,
 ) -> PlotReport:
     """Draws the plan as a PNG; the same input gives the same bytes with the same matplotlib.
@@ -67,6 +69,7 @@ def plot_plan(
     ----------
     pvs, ach: may be None while those stages have not run; a chosen cell needs the PVS, and is
         shaded evenly without ACH.
+    way: of a walk, to be drawn as well.
 
     Raises
     ------
@@ -93,7 +96,7 @@ def plot_plan(
             "PTM-D600", "there are no cells", remedy="subdivide a model that has rooms"
         )
     floors = storeys(cells, options.height, options.storey_gap)
-    figure = _Plan(scene, cells, pvs, ach, options, floors).draw()
+    figure = _Plan(scene, cells, pvs, ach, options, floors, way).draw()
     agg.FigureCanvasAgg(figure)
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None}, facecolor=_PAPER)
@@ -111,11 +114,13 @@ class _Plan:
         ach: Ach | None,
         options: PlotOptions,
         floors: Sequence[float],
+        way: Way | None,
     ) -> None:
         self._cells = cells
         self._pvs = pvs
         self._options = options
         self._floors = floors
+        self._way = way
         self._corners = cells.vertex[cells.triangle]
         self._opaque = scene.opaque[cells.triangle_source]
         self._leaks = leaks_by_portal(pvs)
@@ -161,6 +166,8 @@ class _Plan:
             self._storey(axis, floor, shades, panel)
             draw_left_out(axis, self._cells, self._floors, i, self._shown)
             draw_leaks(axis, self._cells, self._leaks, self._floors, i, self._shown)
+            if self._way is not None:
+                draw_way(axis, self._way, self._floors, i, self._shown)
         if barred:
             long = min(0.8 * (height - _HEAD), 4.0)
             low = height - _HEAD - _CAPTION - long
@@ -314,6 +321,8 @@ class _Plan:
             lines.insert(1, (_SEE_THROUGH, "transparent"))
         if self._leaks:
             lines.append((LEAK, "leak, and cells that see too much by it"))
+        if self._way is not None:
+            lines.append((WAY, "walk"))
         if chosen is not None and self._shade is not None:
             lines.append((_CHOSEN, f"cell {chosen}, sees {len(self._shade)} cells"))
         handles = [Line2D([], [], color=c, linewidth=2.5, label=label) for c, label in lines]

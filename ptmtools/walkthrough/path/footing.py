@@ -40,18 +40,19 @@ _RAYS = 8
 def over_floors(cells: Cells, obstacles: Obstacles, eye_height: float) -> Ground:
     """Places an eye's height above floors, metres, and the steps between them."""
     eyes, walker = cells.eyes, cells.walker
-    point = _supported(cells.eye_floor, GRID, eyes, obstacles, walker, eye_height)
+    point, firm = _surfaces(cells.eye_floor, GRID, eyes, obstacles, walker, eye_height)
     cell = cells.locate(point).astype(np.int64)
     missed = cells.standing
     missed[cell[cell >= 0]] = False
     floor = cells.eye_floor[_below(cells, missed, eye_height)]
     if len(floor):
-        fine = _supported(floor, _FINE * GRID, eyes, obstacles, walker, eye_height)
+        fine, there = _surfaces(floor, _FINE * GRID, eyes, obstacles, walker, eye_height)
         within = cells.locate(fine)
         extra = (within >= 0) & missed[within]
         point, cell = np.concatenate([point, fine[extra]]), np.append(cell, within[extra])
+        firm = np.append(firm, there[extra])
     steps = _steps(point, walker, eyes, obstacles)
-    space = _space(point, obstacles, eye_height)
+    space = np.where(firm, _space(point, obstacles, eye_height), 0.0)
     return Ground.of(
         point, cell, space, steps, _cost(point, space, steps, obstacles, walker, eye_height)
     )
@@ -69,15 +70,16 @@ def _below(cells: Cells, missed: Bools, eye_height: float) -> Bools:
     return found
 
 
-def _supported(
+def _surfaces(
     floor: Floats,
     grid: float,
     eyes: EyeRegion,
     obstacles: Obstacles,
     walker: Walker,
     eye_height: float,
-) -> Floats:
-    """(n, 3) eyes over columns of a grid, one for each surface that a foot can be on."""
+) -> tuple[Floats, Bools]:
+    """(n, 3) eyes over columns of a grid, one for each surface that a foot can be on, and (n,)
+    whether it is there: not over an edge, or within a table."""
     column, point = grid_points(floor, grid)
     eye = point + [0, eye_height, 0]
     inside = eyes.contains(eye)
@@ -85,7 +87,8 @@ def _supported(
     down = np.tile([0.0, -1.0, 0.0], (len(eye), 1))
     _, far = obstacles.first(eye, down, 2 * eye_height)
     there = abs(far - eye_height) <= _UNDERFOOT * walker.step
-    return eye[_footholds(column, eye[:, 1], there, walker.step)]
+    chosen = _footholds(column, eye[:, 1], there, walker.step)
+    return eye[chosen], there[chosen]
 
 
 def grid_points(floor: Floats, grid: float) -> tuple[Ints, Floats]:

@@ -38,7 +38,7 @@ def directions(motion: Motion, times: Floats, random: np.random.Generator) -> Fl
 def _aims(motion: Motion, times: Floats) -> Floats:
     """(n, 3) unit vectors to what is looked at, but for glances."""
     along, leg = motion.at(times)
-    aim = motion.heading(along, leg)
+    aim = motion.way.heading(along, leg)
     for number, (looks, until) in enumerate(zip(motion.looks, motion.until, strict=True)):
         arrive, leave = motion.arrive[number], motion.leave[number]
         early = max(arrive - _EARLY, motion.begin[number])
@@ -47,7 +47,7 @@ def _aims(motion: Motion, times: Floats) -> Floats:
             aim[slice(*np.searchsorted(times, [begin, end]))] = look
         if number + 1 < len(motion.looks):
             done = until[-1] if len(looks) else arrive
-            onward = motion.heading(motion.low[number + 1 :][:1], np.array([number + 1]))
+            onward = motion.way.heading(motion.way.low[number + 1 :][:1], np.array([number + 1]))
             aim[slice(*np.searchsorted(times, [done, leave]))] = onward
     # Where there is no way, and nothing to look at, he goes on looking as before.
     some = np.flatnonzero(aim.any(axis=1))

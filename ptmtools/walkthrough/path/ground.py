@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.walkthrough.path.ground_kernels import nearest_goal, spread_parts
 
 
 @dataclass(frozen=True)
@@ -22,7 +21,8 @@ class Ground:
     ----------
     eye: (n, 3) metres.
     cell: (n,) the cell that each is in, or -1.
-    space: (n,) metres to what stands about, at most `footing.ABOUT`.
+    space: (n,) metres to what stands about, at most `footing.ABOUT`; 0 where the foot is
+        on nothing.
     start, target, cost: steps as CSR over places: (n + 1,), (m,) where each leads to, and (m,)
         what it costs.
     """
@@ -45,6 +45,8 @@ class Ground:
     def main_part(self, standing: Bools) -> Ground:
         """What hangs together and reaches most of the (C,) cells that ``standing`` marks; of parts
         that reach as many, the one with most places."""
+        from ptmtools.walkthrough.path.ground_kernels import spread_parts
+
         if not len(self.eye):
             return self
         part = np.full(len(self.eye), -1, dtype=np.int64)
@@ -66,4 +68,6 @@ class Ground:
     def way_to_nearest(self, source: int, goal: Bools) -> Ints:
         """The places on the cheapest way from one to the nearest of those that (n,) ``goal`` marks,
         both ends included; none if no way leads to one."""
+        from ptmtools.walkthrough.path.ground_kernels import nearest_goal
+
         return np.asarray(nearest_goal(self.start, self.target, self.cost, source, goal))

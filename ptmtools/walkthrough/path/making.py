@@ -9,7 +9,6 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats
 from ptmtools.cells.model import Cells
-from ptmtools.database.model import EmitOptions
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Scene
 from ptmtools.walkthrough.path.footing import over_floors
@@ -19,12 +18,14 @@ from ptmtools.walkthrough.path.obstacles import Obstacles
 from ptmtools.walkthrough.path.options import PathOptions
 from ptmtools.walkthrough.path.portals import through_portals
 from ptmtools.walkthrough.path.smoothing import Smoother
-from ptmtools.walkthrough.path.tour import Leg, tour
+from ptmtools.walkthrough.path.tour import Leg, middles_of, tour
 from ptmtools.walkthrough.path.views import Views
 from ptmtools.walkthrough.walk import DIGITS, Walk
 
 #: The head is moved at least so often, in steps a second.
 _STEPS = 60
+#: He stands before a picture for so many times the average.
+_STANDS = (0.7, 1.3)
 
 
 @dataclass(frozen=True)
@@ -55,38 +56,39 @@ def make_path(
     """A walk through all rooms of a building, nearest next, with stops before pictures; the same
     for the same seed.
 
-    Raises InputError PTM-I811: nobody can walk there.
+    Raises InputError: PTM-I810 eyes cannot be as high as asked for; PTM-I811 nobody can walk there.
     """
     random = np.random.default_rng(options.seed)
-    eye_height = EmitOptions().avatar(cells.walker)[1]
+    eye_height = options.eye_height(cells.walker)
     obstacles, eyes, standing = Obstacles(scene, cells), cells.eyes, cells.standing
     if eyes.everywhere:
         ground = through_portals(cells, obstacles, eye_height)
     else:
         ground = over_floors(cells, obstacles, eye_height)
     ground = ground.main_part(standing)
-    reached = np.unique(ground.cell[ground.cell >= 0])
-    reached = reached[standing[reached]]
-    if not len(reached):
+    middles = middles_of(ground, standing)
+    if not middles:
         raise InputError(
             "PTM-I811",
             "there is no way for a walker",
             remedy="build the cells with a smaller --walker, or with --standing anywhere",
         )
     views = Views(scene, ground, obstacles, random)
-    first = random.choice(np.flatnonzero(ground.cell == random.choice(reached)))
+    first = int(random.choice([*middles.values()]))
     smoother = Smoother(eyes, obstacles, eye_height, cells.walker.radius)
     legs: list[Floats] = []
     looks: list[Floats] = []
-    for some in tour(ground, standing, views, int(first)):
-        legs += _smoothed(ground.eye, some, smoother)
-        looks += [leg.looks for leg in some]
-        stands = options.stop * np.random.default_rng(options.seed).uniform(
-            0.7, 1.3, sum(map(len, looks))
-        )
-        motion = Motion.of(legs, looks, stands, options.speed)
-        if options.duration is None or motion.duration >= options.duration:
+    stands, spent = np.zeros(0), 0.0
+    for some in tour(ground, middles, views, first):
+        ways, ahead = _smoothed(ground.eye, some, smoother), [leg.looks for leg in some]
+        stood = options.stop * random.uniform(*_STANDS, sum(map(len, ahead)))
+        legs, looks, stands = legs + ways, looks + ahead, np.append(stands, stood)
+        took = Motion.of(ways, ahead, stood, options.speed).duration  # but for turns between rounds
+        spent += took
+        # In a single room without pictures he stands where he is.
+        if options.duration is None or spent >= options.duration or not took:
             break
+    motion = Motion.of(legs, looks, stands, options.speed)
     duration = motion.duration if options.duration is None else options.duration
     walk = _sampled(motion, duration, options, cells, random)
     visited = np.unique(cells.locate(walk.eye))
@@ -95,7 +97,7 @@ def make_path(
         walk,
         int(standing.sum()),
         tuple(visited[standing[visited]].tolist()),
-        tuple(np.setdiff1d(np.flatnonzero(standing), reached).tolist()),
+        tuple(np.setdiff1d(np.flatnonzero(standing), [*middles]).tolist()),
         int(sum((until <= walk.duration).sum() for until in motion.until)),
     )
 
@@ -126,12 +128,13 @@ def _sampled(
     times = np.arange(last * each + 1) / (each * options.rate)
     direction = directions(motion, times, random)[::each]
     along, _ = motion.at(times[::each])
-    eye = motion.position(along)
+    eye = motion.way.position(along)
     # Between two points of the way that eyes can be at, they nearly always can be; else at one.
     outside = np.flatnonzero(~cells.eyes.contains(eye))
-    after = np.searchsorted(motion.along, along[outside]).clip(1, len(motion.along) - 1)
-    nearer = motion.along[after] - along[outside] < along[outside] - motion.along[after - 1]
-    eye[outside] = motion.point[np.where(nearer, after, after - 1)]
+    known = motion.way.along
+    after = np.searchsorted(known, along[outside]).clip(1, len(known) - 1)
+    nearer = known[after] - along[outside] < along[outside] - known[after - 1]
+    eye[outside] = motion.way.point[np.where(nearer, after, after - 1)]
     return Walk(
         times[::each].round(DIGITS),
         eye.round(DIGITS) + 0.0,

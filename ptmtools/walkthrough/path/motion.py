@@ -20,14 +20,53 @@ _WALKING, _TURNING = np.radians(45), np.radians(80)
 
 
 @dataclass(frozen=True)
-class Motion:
-    """Legs of a way, with times.
+class Way:
+    """Legs of a way, one after the other.
 
     Attributes
     ----------
-    point: (n, 3) the way, metres.
-    along: (n,) metres on it to each point.
+    point: (n, 3) metres.
+    along: (n,) metres on the way to each point.
     low, high: (l,) where on it each leg begins and ends.
+    """
+
+    point: Floats
+    along: Floats
+    low: Floats
+    high: Floats
+
+    @staticmethod
+    def of(legs: Sequence[Floats]) -> Way:
+        """Of (n, 3) points of each leg, which begins where the last one ended."""
+        point = np.concatenate(legs)
+        last = np.cumsum([len(leg) for leg in legs]) - 1
+        along = np.cumsum(np.linalg.norm(np.diff(point, axis=0, prepend=point[:1]), axis=1))
+        high = along[last]
+        return Way(point, along, np.append(0.0, high[:-1]), high)
+
+    def position(self, along: Floats) -> Floats:
+        """(n, 3) points at (n,) metres on the way."""
+        return np.column_stack([np.interp(along, self.along, axis) for axis in self.point.T])
+
+    def heading(self, along: Floats, leg: Ints) -> Floats:
+        """(n, 3) level unit vectors towards what is ahead at (n,) metres on the way, in (n,) legs;
+        0 in legs of no length."""
+        ahead = np.minimum(along + _AHEAD, self.high[leg])
+        behind = np.maximum(np.minimum(along, ahead - _LEAST), self.low[leg])
+        towards = self.position(ahead) - self.position(behind)
+        towards[:, 1] = 0.0
+        length = np.linalg.norm(towards, axis=1, keepdims=True)
+        level: Floats = np.divide(towards, length, out=np.zeros_like(towards), where=length > 0)
+        return level
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A way, with times.
+
+    Attributes
+    ----------
+    way: its (l,) legs.
     begin, arrive, leave: (l,) seconds: when each leg begins, when it ends, and when the stand at
         its end does.
     looks: for each leg (k, 3) unit vectors to look along at its end.
@@ -35,10 +74,7 @@ class Motion:
     speed: m/s.
     """
 
-    point: Floats
-    along: Floats
-    low: Floats
-    high: Floats
+    way: Way
     begin: Floats
     arrive: Floats
     leave: Floats
@@ -50,13 +86,8 @@ class Motion:
     def of(legs: Sequence[Floats], looks: Sequence[Floats], stands: Floats, speed: float) -> Motion:
         """Of legs, (n, 3) points each, at the ends of which something is looked along ``looks``,
         (k, 3) each, one after the other, for ``stands`` seconds, an element for each look."""
-        point = np.concatenate(legs)
-        last = np.cumsum([len(leg) for leg in legs]) - 1
-        pace = np.linalg.norm(np.diff(point, axis=0, prepend=point[:1]), axis=1)
-        along = np.cumsum(pace)
-        high = along[last]
-        low = np.append(0.0, high[:-1])
-        way = _Way(point, along, low, high)
+        way = Way.of(legs)
+        low, high = way.low, way.high
         number = np.arange(len(legs))
         out, back = way.heading(low, number), way.heading(high, number)
         moves = high > low
@@ -77,7 +108,7 @@ class Motion:
             if leg + 1 < len(legs) and moves[leg + 1]:
                 clock += max(0.0, _angle(facing, out[leg + 1]) - _WALKING) / _TURNING
             leave[leg] = clock
-        return Motion(point, along, low, high, begin, arrive, leave, looks, until, speed)
+        return Motion(way, begin, arrive, leave, looks, until, speed)
 
     @property
     def duration(self) -> float:
@@ -88,37 +119,8 @@ class Motion:
         """(n,) metres on the way at (n,) times, seconds, and (n,) the leg."""
         leg = np.maximum(np.searchsorted(self.begin, times, "right") - 1, 0)
         since = np.clip(times, None, self.arrive[leg]) - self.begin[leg]
-        return self.low[leg] + _walked(since, (self.high - self.low)[leg], self.speed), leg
-
-    def position(self, along: Floats) -> Floats:
-        """(n, 3) points of the way at (n,) metres on it."""
-        return _position(self.point, self.along, along)
-
-    def heading(self, along: Floats, leg: Ints) -> Floats:
-        """(n, 3) level unit vectors towards what is ahead at (n,) metres on the way, in (n,) legs;
-        0 in legs of no length."""
-        return _Way(self.point, self.along, self.low, self.high).heading(along, leg)
-
-
-@dataclass(frozen=True)
-class _Way:
-    point: Floats
-    along: Floats
-    low: Floats
-    high: Floats
-
-    def heading(self, along: Floats, leg: Ints) -> Floats:
-        ahead = np.minimum(along + _AHEAD, self.high[leg])
-        behind = np.maximum(np.minimum(along, ahead - _LEAST), self.low[leg])
-        way = _position(self.point, self.along, ahead) - _position(self.point, self.along, behind)
-        way[:, 1] = 0.0
-        length = np.linalg.norm(way, axis=1, keepdims=True)
-        level: Floats = np.divide(way, length, out=np.zeros_like(way), where=length > 0)
-        return level
-
-
-def _position(point: Floats, known: Floats, along: Floats) -> Floats:
-    return np.column_stack([np.interp(along, known, axis) for axis in point.T])
+        length = (self.way.high - self.way.low)[leg]
+        return self.way.low[leg] + _walked(since, length, self.speed), leg
 
 
 def _walking_time(length: Floats, speed: float) -> Floats:

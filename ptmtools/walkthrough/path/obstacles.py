@@ -37,15 +37,12 @@ class Obstacles:
 
     def crossed(self, start: Floats, end: Floats) -> Bools:
         """(n,) whether something is between (n, 3) points and (n, 3) others, metres."""
-        found: Bools = self._hits(start, end - start, 1.0)[0] >= 0
+        found: Bools = self.first(start, end - start, 1.0)[0] >= 0
         return found
 
     def first(self, points: Floats, along: Floats, reach: float = np.inf) -> tuple[Ints, Floats]:
-        """What rays from (n, 3) points along (n, 3) unit vectors meet first within a ``reach``,
-        metres: (n,) the scene's triangle, or -1, and (n,) how far away, or the reach."""
-        return self._hits(points, along, reach)
-
-    def _hits(self, points: Floats, along: Floats, reach: float) -> tuple[Ints, Floats]:
+        """What rays from (n, 3) points along (n, 3) vectors meet first within a ``reach``: (n,) the
+        scene's triangle, or -1, and (n,) how far away, or the reach; in lengths of the vectors."""
         met, far = np.full(len(points), -1, dtype=np.int64), np.full(len(points), reach)
         for row in range(0, len(points) if self._tree is not None else 0, _RAYS):
             some = slice(row, row + _RAYS)

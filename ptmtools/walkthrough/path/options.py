@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ptmtools.cells.options import Walker
+from ptmtools.database.model import EmitOptions
 from ptmtools.errors import InputError
 
 #: Nobody walks longer, seconds.
@@ -23,6 +25,8 @@ class PathOptions:
     speed: of walking, in m/s.
     rate: samples a second.
     stop: how long to stand before a picture, in seconds, on average.
+    eye: height of the eyes above the floor, in metres. By default 0.94 of the height of the
+        --walker of the cells, as in the hints.
     field_of_view: vertical, in radians.
     aspect: width of the picture by its height.
     """
@@ -32,6 +36,7 @@ class PathOptions:
     speed: float = 1.4
     rate: float = 10.0
     stop: float = 5.0
+    eye: float | None = None
     field_of_view: float = 1.0472
     aspect: float = 1.7778
 
@@ -52,4 +57,21 @@ class PathOptions:
         elif not 0 < self.aspect < math.inf:
             wrong = f"an aspect of {self.aspect:g} is not above 0"
         if wrong:
-            raise InputError("PTM-I810", wrong, remedy="leave the option out for its default")
+            raise _out_of_range(wrong)
+
+    def eye_height(self, walker: Walker) -> float:
+        """Metres above the floor, of whoever walks in the cells.
+
+        Raises InputError PTM-I810: his eyes cannot be there.
+        """
+        eye = EmitOptions().avatar(walker)[1] if self.eye is None else self.eye
+        if not walker.step < eye <= walker.reach:
+            raise _out_of_range(
+                f"--eye {eye:g} is not between a step, {walker.step:g} m, and the reach of eyes, "
+                f"{walker.reach:g} m"
+            )
+        return eye
+
+
+def _out_of_range(what: str) -> InputError:
+    return InputError("PTM-I810", what, remedy="leave the option out for its default")

@@ -35,12 +35,11 @@ class Leg:
     looks: Floats
 
 
-def tour(ground: Ground, standing: Bools, views: Views, first: int) -> Iterator[list[Leg]]:
+def tour(ground: Ground, middles: dict[int, int], views: Views, first: int) -> Iterator[list[Leg]]:
     """Round after round, without an end, from a ``first`` place on.
 
-    Each round visits all cells that ``standing``, (C,), marks and the ground reaches.
+    Each round visits all cells that have ``middles``, see `middles_of`.
     """
-    middles = _middles(ground, standing)
     at = first
     while True:
         legs = list(_round(ground, middles, views.round(), at))
@@ -48,8 +47,9 @@ def tour(ground: Ground, standing: Bools, views: Views, first: int) -> Iterator[
         at = int(legs[-1].places[-1])
 
 
-def _middles(ground: Ground, standing: Bools) -> dict[int, int]:
-    """By cell, a place in its middle: of those with most space around the nearest to all."""
+def middles_of(ground: Ground, standing: Bools) -> dict[int, int]:
+    """By each cell that (C,) ``standing`` marks and the ground reaches, a place in its middle: of
+    those with most space around the nearest to all."""
     found = {}
     for cell in np.unique(ground.cell[ground.cell >= 0]):
         if standing[cell]:

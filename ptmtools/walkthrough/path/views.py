@@ -63,7 +63,8 @@ class Views:
         along = level[:, None] + np.array(_SLOPES)[:, None] * np.array([0.0, 1.0, 0.0])
         self._along = along / np.linalg.norm(along, axis=2, keepdims=True)  # (around, slopes, 3)
         shape = (len(self._place), _AROUND, len(_SLOPES))
-        eye = np.repeat(ground.eye[self._place], _AROUND * len(_SLOPES), axis=0)
+        self._eye, self._obstacles = ground.eye[self._place], obstacles
+        eye = np.repeat(self._eye, _AROUND * len(_SLOPES), axis=0)
         ray = np.tile(self._along.reshape(-1, 3), (len(self._place), 1))
         worth, self._box, self._boxes = _worth(scene, obstacles, eye, ray)
         self._worth, self._box = worth.reshape(shape), self._box.reshape(shape)
@@ -90,11 +91,21 @@ class Views:
             place, window = rows[row], (ahead + np.arange(-_BESIDE, _BESIDE + 1)) % _AROUND
             box = self._box[place, window]
             weight = self._worth[place, window] * self._new[box]
-            middle = (weight[..., None] * self._along[window]).sum(axis=(0, 1))
-            x, y, z = (middle / np.linalg.norm(middle)).tolist()
+            x, y, z = self._middle(self._eye[place], self._along[window], weight).tolist()
             stops.append(Stop(int(self._place[place]), (x, y, z)))
             self._new[box] = 0.0
         return stops
+
+    def _middle(self, eye: Floats, along: Floats, weight: Floats) -> Floats:
+        """(3,) unit vector to the middle of what rays show, (…, 3) and (…) weights; if that is
+        farther away, as a door between two pictures is, along the ray nearest to it."""
+        middle = (weight[..., None] * along).sum(axis=(0, 1))
+        middle = middle / np.linalg.norm(middle)
+        _, far = self._obstacles.first(eye[None], middle[None], FAR)
+        if NEAR <= far[0] < FAR:
+            return np.asarray(middle)
+        counted = along[weight > 0]
+        return np.asarray(counted[(counted @ middle).argmax()])
 
     def _shown(self, rows: Ints | slice = slice(None)) -> Floats:
         """(n, around) what views that have not been looked at show, in bytes."""
