@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.compiled import kernel, plain_kernel
 
+#: Steps that are exchanged for others at most, in one choice.
+_EXCHANGES = 8
 Numbers = NDArray[np.int32]
 
 
@@ -39,13 +41,17 @@ def best_step(worth: Floats, cost: Ints, column: int, paid: int, last: int) -> t
 
 
 @kernel
-def allocate(worth: Floats, cost: Ints, last: Ints, budget: int, column: Ints) -> int:
+def allocate(
+    worth: Floats, cost: Ints, last: Ints, budget: int, column: Ints, exact: bool
+) -> int:
     """Writes to ``column`` (T,) what each texture should hold; returns the bytes, at most
     ``budget``.
 
     Parameters
     ----------
     worth, cost: (T, K) see `best_step`. last: (T,) the last column that each may have.
+    exact: whether worth is true to the last bit, and not a guess: then steps are exchanged, too. By
+        a guess that overrates the finest levels, exchanging makes pictures worse.
     """
     used = 0
     heap = [(0.0, 0, 0) for _ in range(0)]
@@ -70,7 +76,52 @@ def allocate(worth: Floats, cost: Ints, last: Ints, budget: int, column: Ints) -
             density, to = best_step(worth[t], cost[t], here, cost[t, here], limit[t])
             if to > here:
                 heapq.heappush(heap, (-density, t, to))
+    return exchange(worth, cost, last, budget, used, column) if exact else used
+
+
+@kernel
+def exchange(worth: Floats, cost: Ints, last: Ints, budget: int, used: int, column: Ints) -> int:
+    """Takes steps that did not fit, where what has to go for them is worth less: what a greedy
+    choice misses where steps are large beside the budget. Returns the bytes then used."""
+    tried, better = column.copy(), column.copy()
+    for _ in range(_EXCHANGES):
+        most, after = 0.0, used
+        for t in range(len(last)):
+            _, to = best_step(worth[t], cost[t], column[t], cost[t, column[t]], last[t])
+            if to == column[t] or cost[t, to] > budget:
+                continue
+            gain = worth[t, column[t] + 1 : to + 1].sum()
+            tried[:] = column
+            tried[t] = to
+            size = used + cost[t, to] - cost[t, column[t]]
+            while size > budget and gain > most:
+                other, down, loss = _least(worth, cost, tried, t)
+                gain -= loss
+                size -= cost[other, tried[other]] - cost[other, down]
+                tried[other] = down
+            if gain > most:
+                most, after = gain, size
+                better[:] = tried
+        if most <= 0.0:
+            break
+        column[:] = better
+        used = after
     return used
+
+
+@plain_kernel
+def _least(worth: Floats, cost: Ints, column: Ints, kept: int) -> tuple[int, int, float]:
+    """The texture but ``kept`` whose last levels are worth least per byte: which, down to what
+    column, and what is lost."""
+    texture, to, lost, least = -1, 0, 0.0, np.inf
+    for t in range(len(column)):
+        loss = 0.0
+        for k in range(column[t] - 1 if t != kept else -1, -1, -1):
+            loss += worth[t, k + 1]
+            density = loss / max(cost[t, column[t]] - cost[t, k], 1)
+            if density < least:
+                texture, to, lost, least = t, k, loss, density
+    return texture, to, lost
 
 
 @plain_kernel

@@ -48,12 +48,14 @@ class Worth:
     fetch: (T, K) what it adds now and soon.
     geometry: (C,) what the geometry of a cell adds.
     ahead: (T, K) what may be fetched beyond the budget; None: nothing.
+    exact: see `allocate`.
     """
 
     hold: Floats
     fetch: Floats
     geometry: Floats
     ahead: Floats | None = None
+    exact: bool = False
 
 
 class Policy(Protocol):
@@ -137,12 +139,12 @@ class EngineClient(Client):
         self._weigh()
         if self._worth is None:
             return
-        hold = self._worth.hold
+        hold, exact = self._worth.hold, self._worth.exact
         fading = 0.5 ** (1 / (self.world.rate * HELD_SECONDS))
         self._kept = np.maximum(self._kept * fading, hold)
         stock = self.world.catalogue
         worth = hold + HELD_ON * self._kept + HELD_ON**2 * stock.rms
-        allocate(worth, stock.memory, self.have, self.budget, self.column)
+        allocate(worth, stock.memory, self.have, self.budget, self.column, exact)
 
     def arrived(self, request: Request) -> None:
         """See `Client.arrived`."""
@@ -156,7 +158,8 @@ class EngineClient(Client):
         if self.cell >= 0 and (self.files[Kind.STATISTICS].whole[0] or not self._statistics):
             stock = self.world.catalogue
             self._worth = self._policy(self)
-            allocate(self._worth.fetch, stock.memory, stock.levels, self.budget, self._target)
+            fetch, exact = self._worth.fetch, self._worth.exact
+            allocate(fetch, stock.memory, stock.levels, self.budget, self._target, exact)
 
     def fetch(self) -> None:
         """See `Client.fetch`."""
