@@ -39,6 +39,7 @@ class TextureRecord:
     fallback_level: index into `levels` of the one that the fallback image holds; None if there is
         no image, or if it is the finest.
     fallback_bytes: of the fallback image; 0 without.
+    detail: how much there is to see in it, see `ptmtools.texture.detail`.
     """
 
     image: int
@@ -51,6 +52,7 @@ class TextureRecord:
     sha256: str
     fallback_level: int | None = None
     fallback_bytes: int = 0
+    detail: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -60,8 +62,8 @@ class GivenViewpoint:
     Attributes
     ----------
     position: world metres; put on the floor below where there is one within reach.
-    yaw: degrees, counter-clockwise seen from above, 0 looks along -Z; None looks along the
-        longest view.
+    yaw: degrees, counter-clockwise seen from above, 0 looks along -Z; None looks where there is
+        most to see.
     """
 
     position: Vector
