@@ -30,8 +30,8 @@ DIRECTIONS = 72
 _FINER = 2
 _COLUMNS = _FINER * DIRECTIONS
 _STEP = 2 * np.pi / _COLUMNS
-#: A view has 60° from top to bottom, and 16:9; what is nearer to its rim than this share of it is
-#: not whole, or might as well not be.
+#: A view has 60° from top to bottom, and 16:9. What lies outside of the middle share of it does not
+#: count: a picture is to be whole.
 _UP = np.tan(np.radians(30))
 _ASPECT = 16 / 9
 _WITHIN = 0.8
