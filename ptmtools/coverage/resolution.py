@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.model import Cells
-from ptmtools.cells.vectors import normals
+from ptmtools.cells.vectors import normals, ranges
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
 
@@ -40,6 +40,8 @@ ASPECT = 16 / 9
 ANISOTROPY = 16
 #: More levels than any image has.
 ALL = 64
+#: Pieces held against boxes at a time.
+_AT_ONCE = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -121,25 +123,29 @@ def _distances(
     ``owner`` (n,) ascends."""
     corners = cells.vertex[cells.triangle[piece]]
     low, high = corners.min(axis=1), corners.max(axis=1)
-    boxes = _eye_boxes(cells)
+    bottom, top, start = _eye_boxes(cells)
     everyone = np.arange(cells.cell_count, dtype=np.int32)
     nearest = np.full(len(piece), np.inf)
     first = np.searchsorted(owner, np.arange(cells.cell_count + 1))
     for cell in np.unique(owner).tolist():
-        some = slice(first[cell], first[cell + 1])
-        for viewer in pvs.row(cell) if pvs.conservative else everyone:
-            for bottom, top in boxes[viewer]:
-                gap = np.maximum(np.maximum(bottom - high[some], low[some] - top), 0.0)
-                nearest[some] = np.minimum(nearest[some], (gap * gap).sum(axis=1))
+        viewers = pvs.row(cell) if pvs.conservative else everyone
+        box = ranges(start[viewers], start[viewers + 1] - start[viewers])
+        step = max(1, _AT_ONCE // max(len(box), 1))
+        for begin in range(first[cell], first[cell + 1], step):
+            some = slice(begin, min(begin + step, first[cell + 1]))
+            gap = np.maximum(bottom[box] - high[some, None], low[some, None] - top[box])
+            square = (np.maximum(gap, 0.0) ** 2).sum(axis=2)
+            nearest[some] = square.min(axis=1, initial=np.inf)
     return np.asarray(np.sqrt(nearest))
 
 
-def _eye_boxes(cells: Cells) -> list[list[tuple[Floats, Floats]]]:
-    """Of each cell boxes, by two corners, that hold all places in it where eyes can be."""
-    eyes = cells.eyes
-    found: list[list[tuple[Floats, Floats]]] = [[] for _ in range(cells.cell_count)]
-    for leaf in np.flatnonzero(cells.leaf_standing & (cells.leaf_cell >= 0)).tolist():
-        points = cells.leaf_points(leaf)
-        box = eyes.clipped(points.min(axis=0), points.max(axis=0))
-        found[cells.leaf_cell[leaf]].append(box)
-    return found
+def _eye_boxes(cells: Cells) -> tuple[Floats, Floats, Ints]:
+    """(b, 3) and (b, 3) corners of boxes that hold all places where eyes can be, and (C + 1,) CSR
+    of those in each cell."""
+    eyes, leaf = cells.eyes, np.flatnonzero(cells.leaf_standing & (cells.leaf_cell >= 0))
+    leaf = leaf[np.argsort(cells.leaf_cell[leaf], kind="stable")]
+    boxes = np.empty((2, len(leaf), 3))
+    for i, points in enumerate(map(cells.leaf_points, leaf.tolist())):
+        boxes[:, i] = eyes.clipped(points.min(axis=0), points.max(axis=0))
+    start = np.searchsorted(cells.leaf_cell[leaf], np.arange(cells.cell_count + 1))
+    return boxes[0], boxes[1], start
