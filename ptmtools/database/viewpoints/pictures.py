@@ -4,8 +4,9 @@ Rays all around find what shows where. Each resolves as many texels as it has pi
 1080 lines, or fewer where a texel is larger than a pixel; of a texture that repeats, such as a
 tile of a floor, no more count than it has, as finely as it shows. A view is worth the cube root of
 what it shows of a texture, times its detail (`ptmtools.texture.detail`), summed up: four pictures
-are worth more than one that fills the view, and a plastered wall next to nothing. What is
-transparent and has no image is looked through.
+are worth more than one that fills the view, and a plastered wall next to nothing. It loses as much
+of that as it has of what is near: one wants to stand back. What is transparent and has no image is
+looked through.
 
 (Tried: the texels themselves. The best view of a room is then that of one picture which does not
 fit into it; with square roots it still is in a corridor. Texels counted in each 64th of a texture:
@@ -30,8 +31,8 @@ DIRECTIONS = 72
 _FINER = 2
 _COLUMNS = _FINER * DIRECTIONS
 _STEP = 2 * np.pi / _COLUMNS
-#: A view has 60° from top to bottom, and 16:9. What lies outside of the middle share of it does not
-#: count: a picture is to be whole.
+#: A view has 60° from top to bottom, and 16:9. What lies outside this share of it, in the middle,
+#: does not count: a picture is to be whole.
 _UP = np.tan(np.radians(30))
 _ASPECT = 16 / 9
 _WITHIN = 0.8
@@ -39,8 +40,8 @@ _ACROSS = int(_WITHIN * np.arctan(_ASPECT * _UP) / _STEP)
 _ROWS = int(_WITHIN * 2 * _UP / _STEP)
 #: Pixels of a screen of 1080 lines, for a radian up or across its middle.
 _PIXELS = 540 / _UP
-#: Half of what one sees is at least so far away, metres.
-_NEAR = 1.5
+#: What is nearer than this is near, metres; at most half of a view.
+_NEAR = 2.0
 
 
 class Pictures:
@@ -83,7 +84,8 @@ class Pictures:
         ways = np.tile(way.reshape(-1, 3), (len(places), 1))
         triangle, far = self._cast(np.repeat(places, _COLUMNS * _ROWS, axis=0), ways)
         near = (far < _NEAR) | (triangle < 0)
-        blind = _sectors(near.reshape(len(places), _COLUMNS, _ROWS).mean(axis=2))
+        free = _sectors(1 - near.reshape(len(places), _COLUMNS, _ROWS).mean(axis=2))
+        free /= 2 * _ACROSS + 1
         ray = np.flatnonzero((triangle >= 0) & (self._detail[self._image[triangle]] > 0))
         hit = triangle[ray]
         image, slant = self._image[hit], abs((self._normal[hit] * ways[ray]).sum(axis=1))
@@ -100,7 +102,7 @@ class Pictures:
         place, image = np.divmod(shows, len(self._texels))
         value = self._detail[image, None] * np.cbrt(np.minimum(seen, most[:, None]))
         np.add.at(worth, place, value)
-        return np.where(blind <= (2 * _ACROSS + 1) / 2, worth, 0.0)
+        return np.where(free >= 0.5, worth * free, 0.0)
 
     def _cast(
         self, origin: NDArray[np.float64], way: NDArray[np.float64]
