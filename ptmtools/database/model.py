@@ -114,8 +114,9 @@ class EmitOptions:
     title: title of the world, which browsers show in their title bar.
     fallback: refer to the PNG of each texture as well, for clients that cannot read `.ptm`;
         otherwise only to the `.ptm`.
-    viewpoints: where to begin. By default the model's cameras, or a place in the largest room if
-        there are none. May be given several times.
+    viewpoints: where to begin. By default the model's cameras, or if there are none, the place with
+        most to see in the largest rooms. Without YAW one looks where most is to be seen. May be
+        given several times.
     viewpoint_count: give viewpoints to at most this many further rooms, the largest first. They are
         listed in the order of a walk through them.
     avatar_size: the visitor: distance kept from walls, eye height above the floor, and highest step

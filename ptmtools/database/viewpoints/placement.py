@@ -2,7 +2,7 @@
 can start"), and those by which one comes from room to room.
 
 The user's own, else the model's cameras; then one in each of the largest rooms that have none, see
-`rooms`, in the order of a walk, see `tour`: a browser that knows nothing of cells has them in its
+`rooms` and `outlook`, in the order of a walk, see `tour`: a browser that knows nothing of cells has them in its
 menu and goes to the next one at a key. A browser in WALK mode drops the viewpoint onto the floor,
 so it is put there beforehand: at the height of the eye above the nearest upward-facing surface
 below.
