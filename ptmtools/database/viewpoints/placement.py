@@ -2,10 +2,10 @@
 can start"), and those by which one comes from room to room.
 
 The user's own, else the model's cameras; then one in each of the largest rooms that have none, see
-`rooms` and `outlook`, in the order of a walk, see `tour`: a browser that knows nothing of cells has them in its
-menu and goes to the next one at a key. A browser in WALK mode drops the viewpoint onto the floor,
-so it is put there beforehand: at the height of the eye above the nearest upward-facing surface
-below.
+`rooms` and `outlook`, in the order of a walk, see `tour`: a browser that knows nothing of cells has
+them in its menu and goes to the next one at a key. A browser in WALK mode drops the viewpoint onto
+the floor, so it is put there beforehand: at the height of the eye above the nearest upward-facing
+surface below.
 
 (Tried: an Anchor on every portal, with a transparent polygon to click on. view3dscene 4.2 and
 X_ITE 15 draw nothing of it, to the last pixel; but in X_ITE a drag that begins on it jumps instead
