@@ -61,7 +61,7 @@ def emit(
         if not force:
             remedy = "name another folder, or give --force to overwrite it"
             refuse_existing(folder / name, remedy)
-    viewpoints, notes = place_viewpoints(scene, cells, options)
+    viewpoints, notes = place_viewpoints(scene, cells, options, textures)
     content = Content(scene, cells, pvs, ach, textures, viewpoints, options, progress)
     written = [emitter.files(content) for emitter in emitters]
     for name in owned:

@@ -39,6 +39,7 @@ class TextureRecord:
     fallback_level: index into `levels` of the one that the fallback image holds; None if there is
         no image, or if it is the finest.
     fallback_bytes: of the fallback image; 0 without.
+    detail: how much there is to see in it, see `ptmtools.texture.detail`.
     """
 
     image: int
@@ -51,6 +52,7 @@ class TextureRecord:
     sha256: str
     fallback_level: int | None = None
     fallback_bytes: int = 0
+    detail: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -60,8 +62,8 @@ class GivenViewpoint:
     Attributes
     ----------
     position: world metres; put on the floor below where there is one within reach.
-    yaw: degrees, counter-clockwise seen from above, 0 looks along -Z; None looks along the
-        longest view.
+    yaw: degrees, counter-clockwise seen from above, 0 looks along -Z; None looks where there is
+        most to see.
     """
 
     position: Vector
@@ -112,8 +114,9 @@ class EmitOptions:
     title: title of the world, which browsers show in their title bar.
     fallback: refer to the PNG of each texture as well, for clients that cannot read `.ptm`;
         otherwise only to the `.ptm`.
-    viewpoints: where to begin. By default the model's cameras, or a place in the largest room if
-        there are none. May be given several times.
+    viewpoints: where to begin. By default the model's cameras, or if there are none, the place with
+        most to see in the largest rooms. Without YAW one looks where most is to be seen. May be
+        given several times.
     viewpoint_count: give viewpoints to at most this many further rooms, the largest first. They are
         listed in the order of a walk through them.
     avatar_size: the visitor: distance kept from walls, eye height above the floor, and highest step

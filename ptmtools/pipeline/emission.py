@@ -57,6 +57,7 @@ class EmissionJob(Job):
 def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
     """What the emitted files say of the textures of a database."""
     from ptmtools.database import TextureRecord
+    from ptmtools.texture.detail import detail
 
     record = run.record(TEXTURES)
     options, served = run.recorded(TEXTURES), run.db.path / SERVED
@@ -77,6 +78,7 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
                 sha256=run.db.output(TEXTURES.name, f"{SERVED}/{name}"),
                 fallback_level=fallback_level(header, options.fallback_size) if fallback else None,
                 fallback_bytes=(served / fallback).stat().st_size if fallback else 0,
+                detail=detail(served / name),
             )
         )
     return tuple(records)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ptmtools.errors import naming
@@ -13,19 +14,20 @@ if TYPE_CHECKING:
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 
 
-def encoded_image(options: TextureOptions, image: tuple[str, bytes]) -> list[bytes]:
-    """An image, (name, bytes of its file), as the bytes of a `.ptm` and, if there is to be one, of
-    its fallback image.
+def encoded_image(options: TextureOptions, image: tuple[str, bytes, int]) -> list[bytes]:
+    """An image, (name, bytes of its file, how many of its finest levels to leave out), as the bytes
+    of a `.ptm` and, if there is to be one, of its fallback image.
 
     Raises what `encode` and `read_image` raise.
     """
     from ptmtools.texture import Limits, decode, encode, read_header, read_image
     from ptmtools.texture.images import png_bytes
 
-    name, source = image
+    name, source, unresolved = image
     with naming(name):
         texels = read_image(source, Limits(options.limit << 20))
-        data = encode(texels, options)
+        height, width = texels.shape[:2]
+        data = encode(texels, without_finest(options, unresolved, width, height))
     if not options.fallback:
         return [data]
     header = read_header(data)
@@ -38,6 +40,19 @@ def encoded_image(options: TextureOptions, image: tuple[str, bytes]) -> list[byt
     else:
         png = png_bytes(texels)
     return [data, png]
+
+
+def without_finest(options: TextureOptions, count: int, width: int, height: int) -> TextureOptions:
+    """The options that leave out so many of the finest levels of an image besides, but for the
+    coarsest level that is kept without."""
+    from ptmtools.texture.options import kept_levels
+    from ptmtools.texture.pyramid import level_sizes
+
+    if not count:
+        return options
+    levels, kept = len(level_sizes(width, height)), kept_levels(width, height, options)
+    last = max(min(kept[-1], levels - 1 - count), kept[0])
+    return replace(options, min_level=kept[0], max_level=last)
 
 
 def fallback_level(header: PtmHeader, size: int) -> int:

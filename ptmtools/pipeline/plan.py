@@ -78,7 +78,7 @@ def _plan(
             outputs = record.outputs if record else {}
             inputs |= {name: outputs.get(name, "")} if read.artifact else outputs
     elif not anew:
-        inputs |= stage.inputs.load()(artifacts)
+        inputs |= stage.inputs.load()(artifacts, options)
     elif before:
         inputs |= before.inputs
     work = work_of(stage, options, inputs)

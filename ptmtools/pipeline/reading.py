@@ -23,9 +23,10 @@ from ptmtools.store.transaction import Transaction
 
 if TYPE_CHECKING:
     from ptmtools.scene.model import SourceImage
+    from ptmtools.scene.options import IngestOptions
 
 
-def inputs_of(artifacts: Artifacts) -> dict[str, str]:
+def inputs_of(artifacts: Artifacts, _: IngestOptions) -> dict[str, str]:
     """See `Stage.inputs`; as far as can be known without reading the model: the files that it was
     made of before."""
     assert artifacts.model

@@ -101,7 +101,7 @@ class Artifacts:
     def inputs(self, stage: Stage[Any], options: Options) -> dict[str, str]:
         """Name → SHA-256 of what the stage would read now; raises PTM-D004 and PTM-D002."""
         if stage.inputs:
-            return dict(stage.inputs.load()(self))
+            return dict(stage.inputs.load()(self, options))
         found: dict[str, str] = {}
         for read in stage.read_with(options):
             outputs, name = self.record(read).outputs, arrays_of(read.name)

@@ -43,11 +43,13 @@ class SharedDisk:
 
 @dataclass(frozen=True)
 class ImageTask:
-    """A task: an image of the database, and the name of what is made of it, without suffix."""
+    """A task: an image of the database, the name of what is made of it, without suffix, and how
+    many of its finest levels are left out."""
 
     name: str
     sha256: str
     made: str
+    unresolved: int = 0
 
 
 @contextmanager
@@ -78,7 +80,7 @@ def encoded_there(disk: SharedDisk, image: ImageTask) -> list[tuple[str, str]]:
 
     Raises what that raises; WorkerError PTM-W005 where the disk is not to be seen.
     """
-    results = encoded_image(disk.options, (image.name, _image(disk, image)))
+    results = encoded_image(disk.options, (image.name, _image(disk, image), image.unresolved))
     made = []
     for number, data in enumerate(results):
         file = Path(disk.out, f"{image.made}-{number}")

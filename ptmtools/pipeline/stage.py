@@ -56,8 +56,8 @@ class Stage(Generic[A]):
     summary: what was made, in one line, of the recorded counts.
     fits: for stages whose artifacts this one refers to: what is wrong with (own, other), or "".
     job: how it is run; the default computes the artifact and stores its arrays.
-    inputs: name → SHA-256 of what it reads; by default the arrays of the stages that it reads, or
-        all the files of one that has none.
+    inputs: ``inputs(artifacts, options)``: name → SHA-256 of what it reads; by default the arrays
+        of the stages that it reads, or all the files of one that has none.
     foresee: ``foresee(artifacts, work)``: whether what others read of it is known before a run
         that would do ``work``; ``artifacts`` then hold it.
     tasks: ``tasks(artifacts, work)``: of a stage that consists of tasks, the names of those that a
@@ -85,7 +85,7 @@ class Stage(Generic[A]):
     summary: Callable[[Counts], str] = field(default=lambda counts: "")
     fits: Mapping[Stage[Any], Callable[[A, Any], str]] = field(default_factory=dict)
     job: Lazy[type[Job]] = field(default=Lazy("ptmtools.pipeline.run:ArraysJob"))
-    inputs: Lazy[Callable[[Artifacts], Mapping[str, str]]] | None = None
+    inputs: Lazy[Callable[[Artifacts, Options], Mapping[str, str]]] | None = None
     foresee: Lazy[Callable[[Artifacts, StageRecord], bool]] | None = None
     tasks: Lazy[Callable[[Artifacts, StageRecord], list[str]]] | None = None
     load: Lazy[Callable[[Artifacts, Mapping[str, Any]], A]] | None = None

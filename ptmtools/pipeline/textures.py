@@ -17,7 +17,7 @@ from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ptmtools.errors import naming
 from ptmtools.executors.model import Executor
@@ -30,6 +30,7 @@ from ptmtools.pipeline.run import Artifacts, Job, Run
 from ptmtools.pipeline.shared_disk import ImageTask, encoded_there, shared_disk
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages.textures import TEXTURES
+from ptmtools.pipeline.trimming import notes_on_trim, unresolved, unresolved_counts
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import SERVED, sha256
 from ptmtools.store.manifest import StageRecord
@@ -70,16 +71,26 @@ def texture_files(images: Iterable[str]) -> list[str]:
     return [f"{FOLDER}/{name}.ptm" for name in texture_names(images)]
 
 
-def inputs_of(artifacts: Artifacts) -> dict[str, str]:
-    """See `Stage.inputs`: under the name of each `.ptm` the digest of its image."""
+def inputs_of(artifacts: Artifacts, options: TextureOptions) -> dict[str, str]:
+    """See `Stage.inputs`: under the name of each `.ptm` the digest of its image; where levels of it
+    are left out that no eye resolves, one of that and their number."""
     images = image_digests(artifacts)
-    return dict(zip(texture_files(images), images.values(), strict=True))
+    digests = [
+        sha256(f"{digest} - {fewer}".encode()) if fewer else digest
+        for digest, fewer in zip(images.values(), unresolved(artifacts, options), strict=True)
+    ]
+    return dict(zip(texture_files(images), digests, strict=True))
+
+
+def _coding(record: StageRecord) -> dict[str, Any]:
+    """The parameters that count for every texture; what ``--trim`` does to one is in its input."""
+    return {n: value for n, value in record.parameters.items() if not n.startswith("trim")}
 
 
 def stale_textures(before: StageRecord | None, work: StageRecord) -> list[str]:
     """The `.ptm`s, relative to the served folder, that the record does not hold as they would be
     encoded."""
-    if before is None or (before.recipe, before.parameters) != (work.recipe, work.parameters):
+    if before is None or (before.recipe, _coding(before)) != (work.recipe, _coding(work)):
         return list(work.inputs)
     return [name for name in work.inputs if before.inputs.get(name) != work.inputs[name]]
 
@@ -108,6 +119,7 @@ class TexturesJob(Job):
         self._transaction: Transaction | None = None
         self._left: deque[int] = deque()
         self._names: list[str] = []
+        self._fewer: list[int] = []
         self._prepared = False
         self._background: BackgroundLoop | None = None
 
@@ -146,8 +158,11 @@ class TexturesJob(Job):
             headers = list(self._headers(transaction))
             record = replace(
                 self._work,
-                counts=counts_of(headers),
-                notes=tuple(notes_on_size(self._names, headers, self.options.max_side)),
+                counts={**counts_of(headers), **unresolved_counts(headers, self.options)},
+                notes=(
+                    *notes_on_size(self._names, headers, self.options.max_side),
+                    *notes_on_trim(self._names, headers, self.options),
+                ),
             )
             self.run.settle(self.stage, transaction, record)
         self.run.commit(self.stage)
@@ -160,6 +175,7 @@ class TexturesJob(Job):
         self._prepared = True
         self._work, self._why = self.planned()
         self._names = list(self._work.inputs)
+        self._fewer = unresolved(self.run, self.options)
         self._tasks = (len(self._names), len(self._names), 0)
         if not self._why:
             return
@@ -203,7 +219,7 @@ class TexturesJob(Job):
     def _task(self, i: int) -> str:
         """A digest of all that the files of a texture depend on, their names included."""
         name = self._names[i]
-        depends = [self._work.recipe, self._work.parameters, name, self._work.inputs[name]]
+        depends = [self._work.recipe, _coding(self._work), name, self._work.inputs[name]]
         return sha256(json.dumps(depends, sort_keys=True).encode())
 
     def _staged(
@@ -211,10 +227,10 @@ class TexturesJob(Job):
     ) -> Iterator[list[str]]:
         """The names of the files of each image, once they are staged; in order, so it is always the
         first of what is left."""
-        images = images_of(self.run)
+        images, fewer = images_of(self.run), self._fewer
         with shared_disk(transaction, self.run.db.path, self.options, executor) as disk:
             if disk is None:
-                sources = ((images[i].name, images[i].load()) for i in wanted)
+                sources = ((images[i].name, images[i].load(), fewer[i]) for i in wanted)
                 for made in executor.each(encoded_image, self.options, sources, releases_lock=True):
                     files = self._files(self._names[self._left[0]])
                     for name, data in zip(files, made, strict=True):
@@ -222,7 +238,7 @@ class TexturesJob(Job):
                     yield files
                 return
             chunk = max(1, min(AT_ONCE, len(self._left) // (8 * executor.workers)))
-            tasks = (ImageTask(images[i].name, images[i].sha256, str(i)) for i in wanted)
+            tasks = (ImageTask(images[i].name, images[i].sha256, str(i), fewer[i]) for i in wanted)
             for left in executor.each(encoded_there, disk, tasks, releases_lock=True, chunk=chunk):
                 files = self._files(self._names[self._left[0]])
                 for name, (file, digest) in zip(files, left, strict=True):

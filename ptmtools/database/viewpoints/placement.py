@@ -2,10 +2,10 @@
 can start"), and those by which one comes from room to room.
 
 The user's own, else the model's cameras; then one in each of the largest rooms that have none, see
-`rooms`, in the order of a walk, see `tour`: a browser that knows nothing of cells has them in its
-menu and goes to the next one at a key. A browser in WALK mode drops the viewpoint onto the floor,
-so it is put there beforehand: at the height of the eye above the nearest upward-facing surface
-below.
+`rooms` and `outlook`, in the order of a walk, see `tour`: a browser that knows nothing of cells has
+them in its menu and goes to the next one at a key. A browser in WALK mode drops the viewpoint onto
+the floor, so it is put there beforehand: at the height of the eye above the nearest upward-facing
+surface below.
 
 (Tried: an Anchor on every portal, with a transparent polygon to click on. view3dscene 4.2 and
 X_ITE 15 draw nothing of it, to the last pixel; but in X_ITE a drag that begins on it jumps instead
@@ -18,17 +18,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
-from ptmtools.database.model import EmitOptions, Viewpoint
-from ptmtools.database.section import triangle_section
+from ptmtools.database.model import EmitOptions, TextureRecord, Viewpoint
 from ptmtools.database.viewpoints.ground import Ground
-from ptmtools.database.viewpoints.outlook import longest_views
-from ptmtools.database.viewpoints.rooms import Walls, largest_leaves, places
+from ptmtools.database.viewpoints.outlook import Outlook
+from ptmtools.database.viewpoints.rooms import largest_leaves, places
 from ptmtools.database.viewpoints.tour import storey_numbers, walk
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Scene
@@ -43,22 +41,21 @@ _WIDEST = 3.0
 
 
 def place_viewpoints(
-    scene: Scene, cells: Cells, options: EmitOptions
+    scene: Scene, cells: Cells, options: EmitOptions, textures: Sequence[TextureRecord] = ()
 ) -> tuple[tuple[Viewpoint, ...], tuple[str, ...]]:
     """The viewpoints of a database, the first the one to begin at, and notes on those that were
-    left out.
+    left out. They look where ``textures`` are; those that are not given show nothing.
 
     Raises InputError: PTM-I600 if a viewpoint that the user gave lies in no cell.
     """
-    ground = Ground(scene)
-    walls = cache(partial(triangle_section, scene.corners[scene.opaque]))
+    ground, outlook = Ground(scene), Outlook(scene, textures)
     notes: list[str] = []
     if options.viewpoints:
-        begun = _given(cells, ground, walls, options)
+        begun = _given(cells, ground, outlook, options)
     else:
         begun = _cameras(scene, cells, ground, options, notes)
     if options.viewpoint_count or not begun:
-        begun = [*begun, *_touring(cells, ground, walls, options, begun)]
+        begun = [*begun, *_touring(cells, ground, outlook, options, begun)]
     return tuple(replace(v, name=f"VP_{i}") for i, v in enumerate(begun)), tuple(notes)
 
 
@@ -148,7 +145,7 @@ def _cameras(
     return placed
 
 
-def _given(cells: Cells, ground: Ground, walls: Walls, options: EmitOptions) -> list[Viewpoint]:
+def _given(cells: Cells, ground: Ground, outlook: Outlook, options: EmitOptions) -> list[Viewpoint]:
     placed = []
     for i, wanted in enumerate(options.viewpoints):
         position, cell = _standing(cells, ground, np.array(wanted.position), options)
@@ -164,7 +161,7 @@ def _given(cells: Cells, ground: Ground, walls: Walls, options: EmitOptions) -> 
                 remedy=f"give world metres, Y up, {remedy}",
             )
         if wanted.yaw is None:
-            yaw = _along_the_longest_view(position, walls)
+            yaw = outlook.best(position[None], float(position[1])).yaw
         else:
             yaw = float(np.radians(wanted.yaw))
         name, field = f"Viewpoint {i + 1}", options.field_of_view
@@ -173,15 +170,15 @@ def _given(cells: Cells, ground: Ground, walls: Walls, options: EmitOptions) -> 
 
 
 def _touring(
-    cells: Cells, ground: Ground, walls: Walls, options: EmitOptions, begun: Sequence[Viewpoint]
+    cells: Cells, ground: Ground, outlook: Outlook, options: EmitOptions, begun: Sequence[Viewpoint]
 ) -> list[Viewpoint]:
     """One for each room that has none yet, in the order of a walk from the first."""
     taken = {v.cell for v in begun}
     count = max(options.viewpoint_count, not begun)
-    found = places(cells, ground, walls, options.avatar(cells.walker), count + len(taken))
+    found = places(cells, ground, outlook, options.avatar(cells.walker), count + len(taken))
     found = [place for place in found if place.cell not in taken][:count]
     if not found:
-        return [] if begun else [_anywhere(cells, walls, options)]
+        return [] if begun else [_anywhere(cells, outlook, options)]
     leaf = cells.locate_leaf(np.array([place.position for place in found])).tolist()
     start = int(cells.locate_leaf(np.array(begun[0].position))[0]) if begun else leaf[0]
     eye = options.avatar(cells.walker)[1]
@@ -201,14 +198,9 @@ def _touring(
     return views
 
 
-def _anywhere(cells: Cells, walls: Walls, options: EmitOptions) -> Viewpoint:
+def _anywhere(cells: Cells, outlook: Outlook, options: EmitOptions) -> Viewpoint:
     """In the middle of the largest leaf."""
     (leaf,) = largest_leaves(cells, 1)
     middle = cells.leaf_points(leaf).mean(axis=0)
-    yaw, cell = _along_the_longest_view(middle, walls), int(cells.leaf_cell[leaf])
-    return _viewpoint("Room 1", middle, _heading(yaw), options.field_of_view, cell)
-
-
-def _along_the_longest_view(position: NDArray[np.float64], walls: Walls) -> float:
-    yaw, _ = longest_views(position[None, [0, 2]], walls(float(position[1])))
-    return float(yaw[0])
+    view, cell = outlook.best(middle[None], float(middle[1])), int(cells.leaf_cell[leaf])
+    return _viewpoint("Room 1", middle, _heading(view.yaw), options.field_of_view, cell)

@@ -1,9 +1,8 @@
 """Places to stand in the rooms of a scene: one in each of the cells with the largest floors, at
-eye height, as far from the walls as the cell allows, with the longest view."""
+eye height, away from the walls, where there is most to see (`outlook`)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,7 @@ from ptmtools.cells.model import Cells
 from ptmtools.database.model import Vector
 from ptmtools.database.section import area, leaf_section
 from ptmtools.database.viewpoints.ground import Ground
-from ptmtools.database.viewpoints.outlook import longest_views
+from ptmtools.database.viewpoints.outlook import Outlook
 
 #: Leaves in which a place is looked for, the largest first: of one cell, and of all, at least and
 #: for every room that is wanted.
@@ -22,9 +21,10 @@ _LEAVES = 96
 _PER_ROOM = 4
 #: Places tried in a leaf, along each axis of its plan.
 _GRID = 7
-#: Places of a leaf whose view is measured, the freest first: where a walk begins, and elsewhere.
-_TRIES_FIRST = 24
-_TRIES = 8
+#: Places of a leaf whose views are compared, the freest first.
+_TRIES = 12
+#: A room is as good as the largest to begin in if its floor is at least this share of that one's.
+_AS_LARGE = 0.5
 #: A browser stands on what is highest around the eye: X_ITE in a square of half that side, turned
 #: with the view. A bench or a step beside the feet would lift the eye, by this or more, metres.
 _LIFT = 0.01
@@ -45,19 +45,16 @@ class Place:
     ----------
     cell: its index.
     position: (3,) of the eye.
-    yaw: radians, counter-clockwise from -Z, along the longest view.
+    yaw: radians, counter-clockwise from -Z, of the best view.
+    worth: of that view.
     floor: the height of what one stands on.
     """
 
     cell: int
     position: NDArray[np.float64]
     yaw: float
+    worth: float
     floor: float
-
-
-#: (m, 2, 2) segments in plan, the section of a scene's opaque triangles at a height; made once for
-#: each: rooms of a storey share one.
-Walls = Callable[[float], NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
@@ -70,9 +67,10 @@ class _Room:
 
 
 def places(
-    cells: Cells, ground: Ground, walls: Walls, avatar_size: Vector, count: int
+    cells: Cells, ground: Ground, outlook: Outlook, avatar_size: Vector, count: int
 ) -> list[Place]:
-    """At most ``count``, those with the largest floors first."""
+    """At most ``count``: of the largest rooms of a storey the one with most to see, then those with
+    the largest floors."""
     eye = avatar_size[1]
     rooms = []
     for leaf in largest_leaves(cells, max(_LEAVES, _PER_ROOM * count)):
@@ -81,16 +79,22 @@ def places(
         if len(section) >= 3:
             rooms.append(_Room(leaf, floor, section))
     found: dict[int, Place] = {}
+    begin: list[Place] = []
+    least = 0.0
     for room in sorted(rooms, key=lambda room: (-area(room.section), room.leaf)):
-        cell = int(cells.leaf_cell[room.leaf])
-        if len(found) == count:
+        cell, size = int(cells.leaf_cell[room.leaf]), area(room.section)
+        if len(found) >= count and size < least:
             break
         if cell not in found:
-            tries = _TRIES if found else _TRIES_FIRST
-            place = _place_in(room, cells, ground, walls(room.floor + eye), avatar_size, tries)
+            place = _place_in(room, cells, ground, outlook, avatar_size)
             if place is not None:
                 found[cell] = place
-    return list(found.values())
+                least = least or _AS_LARGE * size
+                if size >= least and abs(place.floor - (begin or [place])[0].floor) < eye:
+                    begin.append(place)
+    first = max(begin, key=lambda place: place.worth, default=None)
+    ordered = sorted(found.values(), key=lambda place: place is not first)
+    return ordered[:count]
 
 
 def largest_leaves(cells: Cells, count: int) -> list[int]:
@@ -123,12 +127,11 @@ def _place_in(
     room: _Room,
     cells: Cells,
     ground: Ground,
-    walls: NDArray[np.float64],
+    outlook: Outlook,
     avatar_size: Vector,
-    tries: int,
 ) -> Place | None:
     keep_off, eye, step = avatar_size
-    grid = _grid(room.section)
+    grid, walls = _grid(room.section), outlook.walls(room.floor + eye)
     # A wall outside of the section is farther off than the section's own sides.
     least, most = room.section.min(axis=0), room.section.max(axis=0)
     near = ((walls.max(axis=1) >= least) & (walls.min(axis=1) <= most)).all(axis=1)
@@ -140,16 +143,15 @@ def _place_in(
     position[:, 1] = floor + eye
     good = (abs(floor - room.floor) <= step) & (cells.locate_leaf(position) == room.leaf)
     left, tried = np.flatnonzero(good), np.zeros(0, dtype=np.int64)
-    while len(left) and len(tried) < tries:
-        some, left = left[:tries], left[tries:]
+    while len(left) and len(tried) < _TRIES:
+        some, left = left[:_TRIES], left[_TRIES:]
         level = _level(position[some], floor[some], ground, keep_off)
-        tried = np.append(tried, some[level])[:tries]
+        tried = np.append(tried, some[level])[:_TRIES]
     if len(tried) == 0:
         return None
-    yaw, view = longest_views(grid[tried], walls)
-    best = int(view.argmax())
-    cell, i = int(cells.leaf_cell[room.leaf]), tried[best]
-    return Place(cell, position[i], float(yaw[best]), float(floor[i]))
+    view = outlook.best(position[tried], room.floor + eye)
+    cell, i = int(cells.leaf_cell[room.leaf]), tried[view.place]
+    return Place(cell, position[i], view.yaw, view.worth, float(floor[i]))
 
 
 def _level(

@@ -8,6 +8,8 @@ from typing import Any
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.options import TextureOptions
 from ptmtools.pipeline.stage import Stage
+from ptmtools.pipeline.stages.cells import CELLS
+from ptmtools.pipeline.stages.pvs import PVS
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.quantities import count, size
 
@@ -15,7 +17,10 @@ from ptmtools.quantities import count, size
 def _summary(n: Mapping[str, Any]) -> str:
     raw, stored = n["raw_bytes"], n["ptm_bytes"]
     share = f" ({stored / raw:.1%})" if raw else ""
-    return f"{count(n['textures'], 'texture')}, {size(raw)} → {size(stored)}{share}"
+    trim = ""
+    if unresolved := n.get("unresolved"):
+        trim = f"; of {count(unresolved, 'texture')} {size(n['unresolved_bytes'])} left out"
+    return f"{count(n['textures'], 'texture')}, {size(raw)} → {size(stored)}{share}{trim}"
 
 
 TEXTURES: Stage[None] = Stage(
@@ -23,7 +28,7 @@ TEXTURES: Stage[None] = Stage(
     about="Encode the model's images as progressive textures.",
     recipe=2,
     options=TextureOptions,
-    reads=(SCENE,),
+    reads=lambda options: (SCENE, CELLS, PVS) if options.trim else (SCENE,),
     inputs=Lazy("ptmtools.pipeline.textures:inputs_of"),
     job=Lazy("ptmtools.pipeline.textures:TexturesJob"),
     tasks=Lazy("ptmtools.pipeline.textures:waiting_textures"),
