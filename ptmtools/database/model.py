@@ -17,6 +17,7 @@ from ptmtools.errors import InputError
 if TYPE_CHECKING:
     from ptmtools.cells.options import Walker
     from ptmtools.database.visit import Visit
+    from ptmtools.texture.detail import Detail
     from ptmtools.texture.model import Level
 
 Vector = tuple[float, float, float]
@@ -39,6 +40,7 @@ class TextureRecord:
     fallback_level: index into `levels` of the one that the fallback image holds; None if there is
         no image, or if it is the finest.
     fallback_bytes: of the fallback image; 0 without.
+    detail: what its levels show; None if that is not known.
     """
 
     image: int
@@ -51,6 +53,7 @@ class TextureRecord:
     sha256: str
     fallback_level: int | None = None
     fallback_bytes: int = 0
+    detail: Detail | None = None
 
 
 @dataclass(frozen=True)

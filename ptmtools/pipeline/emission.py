@@ -6,17 +6,18 @@ from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 from ptmtools.notes import warnings_in
-from ptmtools.pipeline.encoding import fallback_level
+from ptmtools.pipeline.encoding import fallback_level, read_detail
 from ptmtools.pipeline.images import image_digests
 from ptmtools.pipeline.run import Artifacts, Job
 from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE, TEXTURES
-from ptmtools.pipeline.textures import header_of, texture_files
+from ptmtools.pipeline.textures import detail_file, header_of, texture_files
 from ptmtools.store.layout import SERVED
 from ptmtools.store.manifest import StageRecord
 from ptmtools.store.transaction import Transaction
 
 if TYPE_CHECKING:
     from ptmtools.database.model import TextureRecord
+    from ptmtools.texture.detail import Detail
 
 
 class EmissionJob(Job):
@@ -58,6 +59,10 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
     """What the emitted files say of the textures of a database."""
     from ptmtools.database import TextureRecord
 
+    def detail(name: str) -> Detail:
+        kept = detail_file(name)
+        return run.held(kept, lambda: read_detail(run.db.read_output(TEXTURES.name, kept)))
+
     record = run.record(TEXTURES)
     options, served = run.recorded(TEXTURES), run.db.path / SERVED
     records = []
@@ -77,6 +82,7 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
                 sha256=run.db.output(TEXTURES.name, f"{SERVED}/{name}"),
                 fallback_level=fallback_level(header, options.fallback_size) if fallback else None,
                 fallback_bytes=(served / fallback).stat().st_size if fallback else 0,
+                detail=detail(name),
             )
         )
     return tuple(records)

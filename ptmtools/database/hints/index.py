@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.database.emitters import chosen_emitters
-from ptmtools.database.hints.numbers import coordinates, document_text
+from ptmtools.database.hints.numbers import coordinates, document_text, whole
 from ptmtools.database.model import TextureRecord, Viewpoint
 from ptmtools.database.names import RECORD_FILES, STATISTICS, cell_name
 
@@ -69,6 +69,12 @@ def texel_bytes(level: Level) -> int:
     return level.gpu_bytes // (level.width * level.height)
 
 
+def gpu_texel_bytes(texel: int, components: int) -> int:
+    """Bytes of a texel as GPUs hold it: they have no texels of three components, so RGB takes the
+    room of RGBA."""
+    return texel * (4 if components == 3 else components) // components
+
+
 def _viewpoint(viewpoint: Viewpoint) -> dict[str, Any]:
     return {
         "name": viewpoint.name,
@@ -83,16 +89,22 @@ def _viewpoint(viewpoint: Viewpoint) -> dict[str, Any]:
 def _texture(record: TextureRecord, fallback: bool) -> Mapping[str, Any]:
     png = record.fallback if fallback else None
     level = len(record.levels) - 1 if record.fallback_level is None else record.fallback_level
-    return {
+    texel = texel_bytes(record.levels[0]) if record.levels else record.components
+    row: dict[str, Any] = {
         "file": quote(record.file),
         "fallback": None if png is None else quote(png),
         "fallbackLevel": None if png is None else level,
         "width": record.width,
         "height": record.height,
         "components": record.components,
-        "texelBytes": texel_bytes(record.levels[0]) if record.levels else record.components,
+        "texelBytes": texel,
+        "gpuTexelBytes": gpu_texel_bytes(texel, record.components),
         "ends": [level.end for level in record.levels],
     }
+    if record.detail:
+        row["rms"] = [whole(value) for value in record.detail.rms]
+        row["color"] = list(record.detail.color)
+    return row
 
 
 def _boxes(content: Content) -> list[Any]:

@@ -75,14 +75,14 @@ def shares_of(row: NDArray[np.float64]) -> list[float]:
         carried = wanted - values[i]
     if order:
         rest = float(np.sum([values[i] for i in order[:-1]]))
-        values[order[-1]] = _whole(round(1 - rest, _SUM_DECIMALS))
+        values[order[-1]] = whole(round(1 - rest, _SUM_DECIMALS))
     return values
 
 
 def _short(value: float) -> float:
-    return _whole(float(f"{value:.{DIGITS}g}"))
+    return whole(float(f"{value:.{DIGITS}g}"))
 
 
-def _whole(value: float) -> float:
+def whole(value: float) -> float:
     """An int where that is the same, which JSON writes shorter."""
     return int(value) if value.is_integer() else value

@@ -29,9 +29,9 @@ def _summary(n: Mapping[str, Any]) -> str:
 EMIT: Stage[None] = Stage(
     name="emit",
     about="Write the served files: cells and hints.",
-    recipe=6,
-    changed="hints.json is an index, with a record for each cell in hints/; it says which cells "
-    "are only seen",
+    recipe=7,
+    changed="the hints say what each level of a texture adds, its mean colour, and what a texel "
+    "takes on a GPU",
     options=EmitOptions,
     reads=(SCENE, CELLS, PVS, ACH, TEXTURES),
     job=Lazy("ptmtools.pipeline.emission:EmissionJob"),
