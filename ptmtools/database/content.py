@@ -57,11 +57,16 @@ class Content:
         return {record.image: (place, record) for place, record in enumerate(self.textures)}
 
     @cached_property
+    def paint(self) -> NDArray[np.int64]:
+        """(S,) of each shape its texture's place in `textures`; -1 for none."""
+        place = [self.records[m.image][0] if m.image >= 0 else -1 for m in self.scene.materials]
+        paint: NDArray[np.int64] = np.array(place, dtype=np.int64)[self.geometry.material]
+        return paint
+
+    @cached_property
     def painted(self) -> list[NDArray[np.int64]]:
         """Of each cell the places in `textures` that its shapes use, ascending."""
-        place = [self.records[m.image][0] if m.image >= 0 else -1 for m in self.scene.materials]
-        of_shape = np.array(place, dtype=np.int64)[self.geometry.material]
-        cells = np.split(of_shape, self.geometry.cell_start[1:-1])
+        cells = np.split(self.paint, self.geometry.cell_start[1:-1])
         return [np.unique(used[used >= 0]) for used in cells]
 
     @cached_property

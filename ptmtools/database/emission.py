@@ -14,6 +14,7 @@ from ptmtools.coverage.model import Ach
 from ptmtools.database.content import Content
 from ptmtools.database.emitters import chosen_emitters
 from ptmtools.database.model import EmitOptions, EmitReport, TextureRecord
+from ptmtools.database.names import BUNDLE
 from ptmtools.database.served import write_files
 from ptmtools.database.viewpoints.placement import place_viewpoints
 from ptmtools.database.visit import visit_of
@@ -81,6 +82,7 @@ def emit(
         triangles=len(content.geometry.triangle),
         collapsed=content.geometry.collapsed,
         bytes=sum(sizes.values()),
+        first_look=sum(size for name, size in sizes.items() if name.endswith(BUNDLE)),
         visit=visit_of(content, sizes),
         notes=notes,
     )

@@ -44,6 +44,7 @@ class EmissionJob(Job):
         counts = {
             "files": len(report.files),
             "bytes": report.bytes,
+            "first_look": report.first_look,
             "shapes": report.shapes,
             "triangles": report.triangles,
             "visible": run[CELLS].visible,
@@ -83,6 +84,7 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
                 fallback_level=fallback_level(header, options.fallback_size) if fallback else None,
                 fallback_bytes=(served / fallback).stat().st_size if fallback else 0,
                 detail=detail(name),
+                stored=served / name,
             )
         )
     return tuple(records)

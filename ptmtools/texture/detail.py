@@ -6,7 +6,7 @@ from the block beside it). Level n-1 is the mean of level n, so these difference
 for rounding: who has level k is off by √(Σ rms[n]², n > k).
 
 The encoder has both levels at hand, a tile at a time, and the sums are taken there: 14 ms for a
-texture of 2048² RGB that takes 395 to encode (in numpy 260).
+texture of 2048² RGB that takes 395 to encode (in numpy 260), 0.07 s for the museum's 31 (3 s).
 """
 
 from __future__ import annotations

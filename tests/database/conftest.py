@@ -114,6 +114,7 @@ def write_textures(www: Path) -> tuple[TextureRecord, ...]:
                 header.levels,
                 digest,
                 detail=detail,
+                stored=www / f"textures/{name}.ptm",
             )
         )
     return tuple(records)
@@ -154,7 +155,15 @@ def finished(artifacts: Artifacts, tmp_path_factory: pytest.TempPathFactory) -> 
     """The database, with VRML alone; not to be changed."""
     db = tmp_path_factory.mktemp("finished") / "rooms"
     a, records = artifacts, write_textures(db / "www")
-    emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", EmitOptions(format="vrml"))
+    emit(
+        a.scene,
+        a.cells,
+        a.pvs,
+        a.ach,
+        records,
+        db / "www",
+        EmitOptions(format="vrml", first_look=8),
+    )
     write_manifest(db)
     return db
 

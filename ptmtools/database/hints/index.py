@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from ptmtools.database.emitters import chosen_emitters
 from ptmtools.database.hints.numbers import coordinates, document_text, whole
 from ptmtools.database.model import TextureRecord, Viewpoint
-from ptmtools.database.names import RECORD_FILES, STATISTICS, cell_name
+from ptmtools.database.names import FIRST_LOOK_FILES, RECORD_FILES, STATISTICS, cell_name
+from ptmtools.texture.model import gpu_texel_bytes
 
 if TYPE_CHECKING:
     from ptmtools.database.content import Content
@@ -37,7 +38,7 @@ def index_text(content: Content) -> str:
     """
     space, cells = content.scene.space, content.cells
     emitters = chosen_emitters(content.options.format)
-    head = {
+    head: dict[str, Any] = {
         "format": FORMAT,
         "schema": SCHEMA,
         "origin": list(space.origin),
@@ -49,6 +50,8 @@ def index_text(content: Content) -> str:
         "geometry": {e.name: e.cell_files for e in emitters if e.cell_files},
         "statistics": STATISTICS,
     }
+    if content.options.first_look:
+        head["firstLook"] = FIRST_LOOK_FILES
     return document_text(
         head,
         {
@@ -67,12 +70,6 @@ def index_text(content: Content) -> str:
 def texel_bytes(level: Level) -> int:
     """Bytes of a texel in texture memory, of the coarsest level."""
     return level.gpu_bytes // (level.width * level.height)
-
-
-def gpu_texel_bytes(texel: int, components: int) -> int:
-    """Bytes of a texel as GPUs hold it: they have no texels of three components, so RGB takes the
-    room of RGBA."""
-    return texel * (4 if components == 3 else components) // components
 
 
 def _viewpoint(viewpoint: Viewpoint) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from ptmtools.database.names import cell_name
 
 if TYPE_CHECKING:
     from ptmtools.database.content import Content
+    from ptmtools.database.hints.first_look import Piece
 
 FORMAT = "ptmtools cell"
 
@@ -24,8 +26,11 @@ class RecordWriter:
         self._adjacent = content.cells.adjacent()
         self._portals = _portals(content.cells)
 
-    def record(self, cell: int) -> str:
-        """The text of a cell's record; raises DatabaseError PTM-D601."""
+    def record(self, cell: int, first_look: Sequence[Piece] | None) -> str:
+        """The text of a cell's record; ``first_look`` is its bundle, None if there are none.
+
+        Raises DatabaseError PTM-D601.
+        """
         content = self._content
         seen = content.pvs.row(cell).tolist()
         rows = content.ach.entries(cell)
@@ -42,6 +47,8 @@ class RecordWriter:
         }
         if content.ach.by_texture:
             head["textureShares"] = [self._texture_shares(e) for e in range(rows.start, rows.stop)]
+        if first_look is not None:
+            head["firstLook"] = [[piece.texture, piece.level] for piece in first_look]
         leaves = [_leaf(content.cells, leaf) for leaf in content.leaves[cell]]
         return document_text(head, {"leaves": leaves, "portals": self._portals[cell]})
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.hints.index import gpu_texel_bytes
 from ptmtools.database.validation.findings import Place
 from ptmtools.errors import LimitError, PtmError
+from ptmtools.texture.model import gpu_texel_bytes
 
 if TYPE_CHECKING:
     from ptmtools.texture import Limits, PtmHeader
