@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
 
+if TYPE_CHECKING:
+    from ptmtools.coverage.need import Need
+
 
 @dataclass(frozen=True)
 class Content:
@@ -28,6 +32,7 @@ class Content:
     textures: in the order of the hints; one for every image that a material in use names.
     viewpoints: the places to start from.
     progress: is called for every cell.
+    need: how fine textures are needed, where that was measured.
     """
 
     scene: Scene
@@ -38,6 +43,7 @@ class Content:
     viewpoints: tuple[Viewpoint, ...] = ()
     options: EmitOptions = EmitOptions()  # noqa: RUF009 - a frozen value
     progress: Progress = silent
+    need: Need | None = None
 
     @cached_property
     def geometry(self) -> Geometry:

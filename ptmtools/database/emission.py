@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +25,9 @@ from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
 
+if TYPE_CHECKING:
+    from ptmtools.coverage.need import Need
+
 
 def emit(
     scene: Scene,
@@ -36,6 +40,7 @@ def emit(
     progress: Progress = silent,
     *,
     force: bool = False,
+    need: Need | None = None,
 ) -> EmitReport:
     """Writes the files of every emitter that ``options.format`` names into the folder ``out``. The
     textures themselves are written by the stage before.
@@ -44,6 +49,7 @@ def emit(
     ----------
     textures: one record for every image that a material in use names.
     force: overwrite files of these names, gzip copies included.
+    need: how fine the textures are needed, if that is to be written.
 
     Raises
     ------
@@ -63,7 +69,7 @@ def emit(
             remedy = "name another folder, or give --force to overwrite it"
             refuse_existing(folder / name, remedy)
     viewpoints, notes = place_viewpoints(scene, cells, options)
-    content = Content(scene, cells, pvs, ach, textures, viewpoints, options, progress)
+    content = Content(scene, cells, pvs, ach, textures, viewpoints, options, progress, need)
     written = [emitter.files(content) for emitter in emitters]
     for name in owned:
         if name.endswith("/"):

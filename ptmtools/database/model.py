@@ -128,6 +128,8 @@ class EmitOptions:
     field_of_view: field of view of viewpoints that are not cameras of the model, in radians.
     first_look: for each cell also write the levels of up to this many texels a side of all textures
         that can be seen from it, in one file; 0 does not.
+    need: for each cell also write how fine each texture is needed, measured from so many sample
+        points, such as 64; 0 does not.
     gzip: also write a gzip copy of each VRML and JSON file, such as root.wrl.gz, for servers that
         send precompressed files.
     format: what to write, one or more names separated by commas
@@ -145,6 +147,7 @@ class EmitOptions:
     )
     field_of_view: float = 1.1
     first_look: int = 64
+    need: int = 0
     gzip: bool = False
     format: str = field(
         default="vrml,gltf",
@@ -167,6 +170,8 @@ class EmitOptions:
             wrong = f"--viewpoint-count {self.viewpoint_count} is below 0"
         elif self.first_look < 0:
             wrong = f"--first-look {self.first_look} is below 0"
+        elif self.need < 0:
+            wrong = f"--need {self.need} is below 0"
         if wrong:
             raise InputError("PTM-I603", wrong, remedy="leave the option out for its default")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ from ptmtools.store.manifest import StageRecord
 from ptmtools.store.transaction import Transaction
 
 if TYPE_CHECKING:
+    from ptmtools.coverage.need import Need
     from ptmtools.database.model import TextureRecord
     from ptmtools.texture.detail import Detail
 
@@ -27,17 +29,18 @@ class EmissionJob(Job):
         """See `Job.make`."""
         from ptmtools.database import emit
 
-        run = self.run
+        run, textures = self.run, texture_records(self.run)
         report = emit(
             run[SCENE],
             run[CELLS],
             run[PVS],
             run[ACH],
-            texture_records(run),
+            textures,
             transaction.subfolder(SERVED),
             self.options,
             run.progress,
             force=True,
+            need=self._need(textures),
         )
         for name in report.files:
             transaction.take(f"{SERVED}/{name}", transaction.folder / SERVED / name)
@@ -54,6 +57,18 @@ class EmissionJob(Job):
             "visit": asdict(report.visit),
         }
         return replace(work, counts=counts, notes=report.notes, warnings=warnings_in(report.notes))
+
+    def _need(self, textures: Iterable[TextureRecord]) -> Need | None:
+        """How fine textures are needed, if that is asked for."""
+        if not self.options.need:
+            return None
+        from ptmtools.coverage.need import TextureSize, compute_need
+
+        run = self.run
+        sizes = {t.image: TextureSize(t.width, t.height, len(t.levels)) for t in textures}
+        return compute_need(
+            run[SCENE], run[CELLS], run[PVS], sizes, self.options.need, run.progress
+        )
 
 
 def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:

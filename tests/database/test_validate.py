@@ -227,6 +227,11 @@ def textured(shares: object) -> Damage:
     return cell(2, lambda c: c.update(textureShares=shares))
 
 
+def needed(rows: object) -> Damage:
+    """Says how fine a cell needs textures."""
+    return cell(1, lambda c: c.update(need=rows))
+
+
 def repainted(db: Path) -> None:
     Image.fromarray(np.zeros((16, 24, 3), np.uint8)).save(db / "www/textures/a.png")
 
@@ -499,6 +504,14 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D742", appended("hints/c0001.bin", b"x")),
     ("D742", rewritten("hints/c0001.bin", lambda data: data[:9] + b"x" + data[10:])),
     ("D671", removed("hints/c0001.bin")),
+    ("D743", needed([[1, 0, 0.2], [0, 0, 0.3]])),
+    ("D743", needed([[0, 0, 0.2], [0, 0, 0.3]])),
+    ("D743", needed([[0, 3, 0.2, 0.1, 0.1]])),
+    ("D743", needed([[0, 0, 0.1, 0.2]])),
+    ("D743", needed([[0, 0, 0.5], [1, 0, 0.52]])),
+    ("D700", needed([[2, 0, 0.1]])),
+    ("D700", needed([[0, 0, 0]])),
+    ("D700", needed([[0, 0]])),
     ("D741", cell(0, lambda c: c.update(cell=1))),
     ("D741", hinted(lambda d: d.update(record="cells/{name}.wrl"))),
     ("D674 D741", hinted(lambda d: d.update(record="hints/{name}/../statistics.json"))),

@@ -54,9 +54,9 @@ def coordinates(values: ArrayLike, what: str) -> Any:
     return json.loads(text.replace(".0,", ",").replace(".0]", "]"))
 
 
-def significant(values: NDArray[np.floating]) -> list[float | None]:
-    """Numbers with `DIGITS` significant digits; None for NaN."""
-    return [None if v != v else _short(v) for v in values.tolist()]
+def significant(values: NDArray[np.floating], digits: int = DIGITS) -> list[float | None]:
+    """Numbers with so many significant digits; None for NaN."""
+    return [None if v != v else _short(v, digits) for v in values.tolist()]
 
 
 def shares_of(row: NDArray[np.float64]) -> list[float]:
@@ -79,8 +79,8 @@ def shares_of(row: NDArray[np.float64]) -> list[float]:
     return values
 
 
-def _short(value: float) -> float:
-    return whole(float(f"{value:.{DIGITS}g}"))
+def _short(value: float, digits: int = DIGITS) -> float:
+    return whole(float(f"{value:.{digits}g}"))
 
 
 def whole(value: float) -> float:

@@ -19,6 +19,7 @@ from ptmtools.database.names import BUNDLE, HINTS, HINTS_FOLDER, STATISTICS, pat
 from ptmtools.database.validation.findings import Place
 from ptmtools.database.validation.first_look import check_first_looks
 from ptmtools.database.validation.lists import check_graph, check_list, check_shares
+from ptmtools.database.validation.need import impossible_need
 from ptmtools.database.validation.served import ServedDatabase
 from ptmtools.database.validation.space import check_space
 from ptmtools.database.validation.textures import check_record
@@ -188,6 +189,7 @@ def _misplaced(record: Any, i: int, cells: int, textures: int) -> FileError | No
             used = [texture for texture, _ in shares if texture is not None]
             _in_range(used, textures, f"textureShares[{k}]")
         _in_range([t for t, _ in record.get("firstLook", ())], textures, "firstLook")
+        _in_range([row[0] for row in record.get("need", ())], textures, "need")
     except FileError as fault:
         return fault
     return None
@@ -230,6 +232,10 @@ def _check_own_textures(
 
 
 def _check_textures(hints: ReadHints, used: set[int], database: ServedDatabase) -> None:
+    levels = [len(row["ends"]) for row in hints.index["textures"]]
+    for i, record in hints.known():
+        if wrong := impossible_need(record, levels):
+            database.at(hints.paths[i]).add("PTM-D743", wrong, "need")
     complete = all(record is not None for record in hints.records)
     for i, (row, files) in enumerate(zip(hints.index["textures"], hints.images, strict=True)):
         at = database.at(HINTS, f"textures[{i}]")
