@@ -1,8 +1,8 @@
 """How many bytes databases have for clients to fetch: ``python benchmarks/served_sizes.py DB…``
 
 First the hints: what is fetched before the first step (the index), at every new cell (a record),
-and never (the statistics); then the cells in both forms. In parentheses with ``gzip -9`` of each
-file.
+and never (the statistics), and the first-look bundles, which no server compresses; then the cells
+in both forms. In parentheses with ``gzip -9`` of each file.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ Size = tuple[int, int]
 def main() -> None:
     databases = [Path(name) for name in sys.argv[1:]]
     hints = "model|cells|index|record, mean|record, largest|all records|statistics"
+    hints += "|bundle, mean|all bundles"
     _print(hints, (_hints(database) for database in databases))
     print()
     _print("model|cells|triangles|VRML|GLB", (_cells(database) for database in databases))
@@ -38,7 +39,9 @@ def _hints(database: Path) -> list[str]:
     mean = every[0] // len(records), every[1] // len(records)
     statistics = _size(www / "hints" / "statistics.json")
     sizes = (_size(www / "hints.json"), mean, max(records), every, statistics)
-    return [database.stem, f"{len(records)}", *map(_told, sizes)]
+    bundles = [path.stat().st_size for path in www.glob("hints/c*.bin")]
+    looks = [f"{sum(bundles) // max(len(bundles), 1):,}", f"{sum(bundles):,}"]
+    return [database.stem, f"{len(records)}", *map(_told, sizes), *looks]
 
 
 def _cells(database: Path) -> list[str]:

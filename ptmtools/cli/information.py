@@ -16,10 +16,7 @@ from ptmtools.cli.common import as_json, voiced
 from ptmtools.cli.output import Voice
 from ptmtools.errors import InputError, naming
 from ptmtools.quantities import count, size
-from ptmtools.texture.model import Description, PtmHeader
-
-#: Components that a texel has in the memory of most graphics processors: RGB is filled up.
-_PADDED = {1: 1, 2: 2, 3: 4, 4: 4}
+from ptmtools.texture.model import Description, PtmHeader, gpu_texel_bytes
 
 #: Of a stage whose record has another recipe.
 _OLD = "made by another release of ptmtools"
@@ -150,7 +147,7 @@ def _info_ptm(voice: Voice, target: str, as_json: bool) -> None:
 
 def _levels(header: PtmHeader) -> list[dict[str, Any]]:
     """What is said of each level; bytes up to and including it are those of `end` and `gpu_…`."""
-    per_texel = _PADDED[header.components] * header.texel_bytes // header.components
+    per_texel = gpu_texel_bytes(header.texel_bytes, header.components)
     found, texels = [], 0
     for level in header.levels:
         here = level.width * level.height

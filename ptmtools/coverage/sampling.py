@@ -116,6 +116,20 @@ class Sampler:
             return None
         return count(points), grouped(len(points), self.options.placed != "kd")
 
+    def points_of(self, cell: int) -> SamplePoints:
+        """Where one cell is sampled, without a tolerance."""
+        finder = PointFinder(self._volumes[cell], self._obstacles, self._clearance)
+        points = self._points(finder)
+        if not len(points) and not finder.volume.everywhere:
+            finder = replace(finder, volume=finder.volume.anywhere())
+            points = self._points(finder)
+        return points if len(points) else finder.least_bad()
+
+    @property
+    def weight(self) -> Callable[[SamplePoints], Ints]:
+        """See `PixelCounter.weight`."""
+        return self._counter.weight
+
     def _points(self, finder: PointFinder) -> SamplePoints:
         options = self.options
         if options.placed == "kd":

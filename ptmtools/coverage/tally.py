@@ -153,7 +153,7 @@ class PixelCounter:
 
         layers = self._renderer.show(points, needed)
         position = self._surfaces.normalised(points.position)
-        weight = self._weight(points)
+        weight = self.weight(points)
         size = self._face**2
         doubt = np.empty(layers[0].size, dtype=np.int64)
         for layer, shows in enumerate(layers):
@@ -194,7 +194,7 @@ class PixelCounter:
             owner[lost] = np.where(column[nearer] >= 0, nearer, -1)
         return owner, hit
 
-    def _weight(self, points: SamplePoints) -> Ints:
+    def weight(self, points: SamplePoints) -> Ints:
         """(1 or K, face²) weights of the pixels of a view: alike, or by solid angle,
         (1 + x² + y²)^(-3/2) in `unit`-ths."""
         if self.unit == 1:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
 
+if TYPE_CHECKING:
+    from ptmtools.coverage.need import Need
+
 
 @dataclass(frozen=True)
 class Content:
@@ -28,6 +32,7 @@ class Content:
     textures: in the order of the hints; one for every image that a material in use names.
     viewpoints: the places to start from.
     progress: is called for every cell.
+    need: how fine textures are needed, where that was measured.
     """
 
     scene: Scene
@@ -38,6 +43,7 @@ class Content:
     viewpoints: tuple[Viewpoint, ...] = ()
     options: EmitOptions = EmitOptions()  # noqa: RUF009 - a frozen value
     progress: Progress = silent
+    need: Need | None = None
 
     @cached_property
     def geometry(self) -> Geometry:
@@ -57,11 +63,16 @@ class Content:
         return {record.image: (place, record) for place, record in enumerate(self.textures)}
 
     @cached_property
+    def paint(self) -> NDArray[np.int64]:
+        """(S,) of each shape its texture's place in `textures`; -1 for none."""
+        place = [self.records[m.image][0] if m.image >= 0 else -1 for m in self.scene.materials]
+        paint: NDArray[np.int64] = np.array(place, dtype=np.int64)[self.geometry.material]
+        return paint
+
+    @cached_property
     def painted(self) -> list[NDArray[np.int64]]:
         """Of each cell the places in `textures` that its shapes use, ascending."""
-        place = [self.records[m.image][0] if m.image >= 0 else -1 for m in self.scene.materials]
-        of_shape = np.array(place, dtype=np.int64)[self.geometry.material]
-        cells = np.split(of_shape, self.geometry.cell_start[1:-1])
+        cells = np.split(self.paint, self.geometry.cell_start[1:-1])
         return [np.unique(used[used >= 0]) for used in cells]
 
     @cached_property

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from ptmtools.coverage.model import Ach
 from ptmtools.database.content import Content
 from ptmtools.database.emitters import chosen_emitters
 from ptmtools.database.model import EmitOptions, EmitReport, TextureRecord
+from ptmtools.database.names import BUNDLE
 from ptmtools.database.served import write_files
 from ptmtools.database.viewpoints.placement import place_viewpoints
 from ptmtools.database.visit import visit_of
@@ -22,6 +24,9 @@ from ptmtools.files import real_folder, refuse_existing
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
+
+if TYPE_CHECKING:
+    from ptmtools.coverage.need import Need
 
 
 def emit(
@@ -35,6 +40,7 @@ def emit(
     progress: Progress = silent,
     *,
     force: bool = False,
+    need: Need | None = None,
 ) -> EmitReport:
     """Writes the files of every emitter that ``options.format`` names into the folder ``out``. The
     textures themselves are written by the stage before.
@@ -43,6 +49,7 @@ def emit(
     ----------
     textures: one record for every image that a material in use names.
     force: overwrite files of these names, gzip copies included.
+    need: how fine the textures are needed, if that is to be written.
 
     Raises
     ------
@@ -62,7 +69,7 @@ def emit(
             remedy = "name another folder, or give --force to overwrite it"
             refuse_existing(folder / name, remedy)
     viewpoints, notes = place_viewpoints(scene, cells, options, textures)
-    content = Content(scene, cells, pvs, ach, textures, viewpoints, options, progress)
+    content = Content(scene, cells, pvs, ach, textures, viewpoints, options, progress, need)
     written = [emitter.files(content) for emitter in emitters]
     for name in owned:
         if name.endswith("/"):
@@ -81,6 +88,7 @@ def emit(
         triangles=len(content.geometry.triangle),
         collapsed=content.geometry.collapsed,
         bytes=sum(sizes.values()),
+        first_look=sum(size for name, size in sizes.items() if name.endswith(BUNDLE)),
         visit=visit_of(content, sizes),
         notes=notes,
     )

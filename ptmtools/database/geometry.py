@@ -90,6 +90,17 @@ class Geometry:
             uv_corner, shape, len(first), len(self.uv)
         )
 
+    def areas(self) -> NDArray[np.float64]:
+        """(S,) m² of each shape."""
+        count = np.diff(self.triangle_start)
+        first = np.repeat(self.point_start[:-1], count)[:, None]
+        corners = self.point[self.shape_point[first + self.triangle]].astype(np.float64)
+        edge = corners[:, 1:] - corners[:, :1]
+        area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1) / 2
+        total = np.zeros(len(count))
+        np.add.at(total, np.repeat(np.arange(len(count)), count), area)
+        return total
+
     def shape(self, s: int) -> Shape:
         """One of them."""
         points, uvs, rows = (

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from ptmtools.database.emitters import EMITTERS, chosen_emitters
@@ -17,6 +18,7 @@ from ptmtools.errors import InputError
 if TYPE_CHECKING:
     from ptmtools.cells.options import Walker
     from ptmtools.database.visit import Visit
+    from ptmtools.texture.detail import Detail
     from ptmtools.texture.model import Level
 
 Vector = tuple[float, float, float]
@@ -39,7 +41,8 @@ class TextureRecord:
     fallback_level: index into `levels` of the one that the fallback image holds; None if there is
         no image, or if it is the finest.
     fallback_bytes: of the fallback image; 0 without.
-    detail: how much there is to see in it, see `ptmtools.texture.detail`.
+    detail: what its levels show; None if that is not known.
+    stored: where the `.ptm` lies on the disk; None if it is not at hand.
     """
 
     image: int
@@ -52,7 +55,8 @@ class TextureRecord:
     sha256: str
     fallback_level: int | None = None
     fallback_bytes: int = 0
-    detail: float = 0.0
+    detail: Detail | None = None
+    stored: Path | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True)
@@ -123,6 +127,10 @@ class EmitOptions:
         climbed, all in metres. By default those of the --walker of the cells, with the eyes at
         0.94 of its height.
     field_of_view: field of view of viewpoints that are not cameras of the model, in radians.
+    first_look: for each cell also write the levels of up to this many texels a side of all textures
+        that can be seen from it, in one file; 0 does not.
+    need: for each cell also write how fine each texture is needed, measured from so many sample
+        points, such as 64; 0 does not.
     gzip: also write a gzip copy of each VRML and JSON file, such as root.wrl.gz, for servers that
         send precompressed files.
     format: what to write, one or more names separated by commas
@@ -139,6 +147,8 @@ class EmitOptions:
         default=None, metadata={"default_before": (6, (0.25, 1.6, 0.75))}
     )
     field_of_view: float = 1.1
+    first_look: int = 64
+    need: int = 0
     gzip: bool = False
     format: str = field(
         default="vrml,gltf",
@@ -159,6 +169,10 @@ class EmitOptions:
             wrong = "the sizes of --avatar-size must be 0 or more"
         elif self.viewpoint_count < 0:
             wrong = f"--viewpoint-count {self.viewpoint_count} is below 0"
+        elif self.first_look < 0:
+            wrong = f"--first-look {self.first_look} is below 0"
+        elif self.need < 0:
+            wrong = f"--need {self.need} is below 0"
         if wrong:
             raise InputError("PTM-I603", wrong, remedy="leave the option out for its default")
 
@@ -179,6 +193,7 @@ class EmitReport:
     shapes, triangles: written, over all cells; a piece in a boundary counts once per cell.
     collapsed: pieces left out because two corners are one after rounding to float32.
     bytes: of all files together.
+    first_look: of these, bytes of first-look bundles.
     visit: what they mean for a visitor.
     notes: what there is to say, one line each.
     """
@@ -189,6 +204,7 @@ class EmitReport:
     triangles: int
     collapsed: int
     bytes: int
+    first_look: int
     visit: Visit
     notes: tuple[str, ...] = ()
 

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 from ptmtools.notes import warnings_in
-from ptmtools.pipeline.encoding import fallback_level
+from ptmtools.pipeline.encoding import fallback_level, read_detail
 from ptmtools.pipeline.images import image_digests
 from ptmtools.pipeline.run import Artifacts, Job
 from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE, TEXTURES
-from ptmtools.pipeline.textures import header_of, texture_files
+from ptmtools.pipeline.textures import detail_file, header_of, texture_files
 from ptmtools.store.layout import SERVED
 from ptmtools.store.manifest import StageRecord
 from ptmtools.store.transaction import Transaction
 
 if TYPE_CHECKING:
+    from ptmtools.coverage.need import Need
     from ptmtools.database.model import TextureRecord
+    from ptmtools.texture.detail import Detail
 
 
 class EmissionJob(Job):
@@ -26,23 +29,25 @@ class EmissionJob(Job):
         """See `Job.make`."""
         from ptmtools.database import emit
 
-        run = self.run
+        run, textures = self.run, texture_records(self.run)
         report = emit(
             run[SCENE],
             run[CELLS],
             run[PVS],
             run[ACH],
-            texture_records(run),
+            textures,
             transaction.subfolder(SERVED),
             self.options,
             run.progress,
             force=True,
+            need=self._need(textures),
         )
         for name in report.files:
             transaction.take(f"{SERVED}/{name}", transaction.folder / SERVED / name)
         counts = {
             "files": len(report.files),
             "bytes": report.bytes,
+            "first_look": report.first_look,
             "shapes": report.shapes,
             "triangles": report.triangles,
             "visible": run[CELLS].visible,
@@ -53,11 +58,26 @@ class EmissionJob(Job):
         }
         return replace(work, counts=counts, notes=report.notes, warnings=warnings_in(report.notes))
 
+    def _need(self, textures: Iterable[TextureRecord]) -> Need | None:
+        """How fine textures are needed, if that is asked for."""
+        if not self.options.need:
+            return None
+        from ptmtools.coverage.need import TextureSize, compute_need
+
+        run = self.run
+        sizes = {t.image: TextureSize(t.width, t.height, len(t.levels)) for t in textures}
+        return compute_need(
+            run[SCENE], run[CELLS], run[PVS], sizes, self.options.need, run.progress
+        )
+
 
 def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
     """What the emitted files say of the textures of a database."""
     from ptmtools.database import TextureRecord
-    from ptmtools.texture.detail import detail
+
+    def detail(name: str) -> Detail:
+        kept = detail_file(name)
+        return run.held(kept, lambda: read_detail(run.db.read_output(TEXTURES.name, kept)))
 
     record = run.record(TEXTURES)
     options, served = run.recorded(TEXTURES), run.db.path / SERVED
@@ -78,7 +98,8 @@ def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
                 sha256=run.db.output(TEXTURES.name, f"{SERVED}/{name}"),
                 fallback_level=fallback_level(header, options.fallback_size) if fallback else None,
                 fallback_bytes=(served / fallback).stat().st_size if fallback else 0,
-                detail=detail(served / name),
+                detail=detail(name),
+                stored=served / name,
             )
         )
     return tuple(records)

@@ -1,14 +1,17 @@
-"""One image as a task: the bytes of a `.ptm`, and of its fallback image."""
+"""One image as a task: the bytes of a `.ptm`, what its levels show, and of its fallback image."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import io
+import json
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 from ptmtools.errors import naming
 from ptmtools.pipeline.options import TextureOptions
 
 if TYPE_CHECKING:
+    from ptmtools.texture.detail import Detail
     from ptmtools.texture.model import PtmHeader
 
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
@@ -16,20 +19,23 @@ PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 
 def encoded_image(options: TextureOptions, image: tuple[str, bytes, int]) -> list[bytes]:
     """An image, (name, bytes of its file, how many of its finest levels to leave out), as the bytes
-    of a `.ptm` and, if there is to be one, of its fallback image.
+    of a `.ptm`, of its `Detail` as JSON and, if there is to be one, of its fallback image.
 
     Raises what `encode` and `read_image` raise.
     """
-    from ptmtools.texture import Limits, decode, encode, read_header, read_image
+    from ptmtools.texture import Limits, decode, encode_to, read_header, read_image
     from ptmtools.texture.images import png_bytes
 
     name, source, unresolved = image
     with naming(name):
         texels = read_image(source, Limits(options.limit << 20))
         height, width = texels.shape[:2]
-        data = encode(texels, without_finest(options, unresolved, width, height))
+        kept = without_finest(options, unresolved, width, height)
+        buffer = io.BytesIO()
+        detail = json.dumps(asdict(encode_to(buffer, texels, kept))).encode() + b"\n"
+        data = buffer.getvalue()
     if not options.fallback:
-        return [data]
+        return [data, detail]
     header = read_header(data)
     level = fallback_level(header, options.fallback_size)
     if level < len(header.levels) - 1 or options.max_error or header.trimmed:
@@ -39,7 +45,17 @@ def encoded_image(options: TextureOptions, image: tuple[str, bytes, int]) -> lis
         png = bare_png(source)
     else:
         png = png_bytes(texels)
-    return [data, png]
+    return [data, detail, png]
+
+
+def read_detail(data: bytes) -> Detail:
+    """The `Detail` of which `encoded_image` made JSON; raises what damage makes of it: ValueError,
+    LookupError or TypeError."""
+    from ptmtools.texture.detail import Detail
+
+    found = json.loads(data)
+    red, green, blue = map(int, found["color"])
+    return Detail(tuple(map(float, found["rms"])), (red, green, blue))
 
 
 def without_finest(options: TextureOptions, count: int, width: int, height: int) -> TextureOptions:

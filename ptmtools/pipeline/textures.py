@@ -32,7 +32,7 @@ from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages.textures import TEXTURES
 from ptmtools.pipeline.trimming import notes_on_trim, unresolved, unresolved_counts
 from ptmtools.quantities import count, size
-from ptmtools.store.layout import SERVED, sha256
+from ptmtools.store.layout import SERVED, STAGES_FOLDER, sha256
 from ptmtools.store.manifest import StageRecord
 from ptmtools.store.transaction import Transaction
 
@@ -69,6 +69,11 @@ def texture_names(images: Iterable[str]) -> list[str]:
 def texture_files(images: Iterable[str]) -> list[str]:
     """The `.ptm` of each image, by its name, relative to the served folder."""
     return [f"{FOLDER}/{name}.ptm" for name in texture_names(images)]
+
+
+def detail_file(texture: str) -> str:
+    """Where the `Detail` of a `.ptm` is kept, relative to the database."""
+    return f"{STAGES_FOLDER}/{texture.removesuffix('ptm')}json"
 
 
 def inputs_of(artifacts: Artifacts, options: TextureOptions) -> dict[str, str]:
@@ -212,9 +217,9 @@ class TexturesJob(Job):
         self._seconds += time.perf_counter() - start
 
     def _files(self, name: str) -> list[str]:
-        """The outputs of a texture, its `.ptm` first."""
-        suffixes = ("ptm", "png")[: 1 + self.options.fallback]
-        return [f"{SERVED}/{name.removesuffix('ptm')}{suffix}" for suffix in suffixes]
+        """The outputs of a texture, in the order of `encoded_image`."""
+        fallback = [f"{SERVED}/{name.removesuffix('ptm')}png"] if self.options.fallback else []
+        return [f"{SERVED}/{name}", detail_file(name), *fallback]
 
     def _task(self, i: int) -> str:
         """A digest of all that the files of a texture depend on, their names included."""

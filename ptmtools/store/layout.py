@@ -6,6 +6,7 @@
     stages/NAME.npz     the arrays of a stage
     stages/images.json  the list of the model's images
     stages/images/      a copy of each, under its SHA-256
+    stages/textures/    what the levels of each texture show
     www/                what is served, and nothing else
     .ptm-new/           outputs on their way in, see `transaction`
     .ptm-lock           who is writing, see `lock`

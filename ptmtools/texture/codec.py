@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from ptmtools.texture.detail import Detail
+
 _LIMITS = Limits()
 
 
@@ -56,12 +58,16 @@ def check(data: bytes, limits: Limits = _LIMITS) -> list[str]:
         return [str(error)]
 
 
-def examine(data: bytes, limits: Limits = _LIMITS) -> tuple[list[str], NDArray[Any] | None]:
-    """As `check`, and the finest level; None if something is wrong.
+def examine(
+    data: bytes, limits: Limits = _LIMITS
+) -> tuple[list[str], tuple[Detail, NDArray[Any]] | None]:
+    """As `check`, and what its levels show, and the finest of them; None if something is wrong.
 
     Raises LimitError, those of `ptmtools.texture.open` and `PtmReader.level`: nothing is wrong as
     far as the checksums tell.
     """
+    from ptmtools.texture.detail import detail_of_levels
+
     problems: list[str] = []
     try:
         with reader.open(data, limits=limits) as ptm:
@@ -75,7 +81,7 @@ def examine(data: bytes, limits: Limits = _LIMITS) -> tuple[list[str], NDArray[A
             problems += ptm.wrong_checksums()
             if not problems:
                 ptm.description()
-                return [], ptm.level()
+                return [], detail_of_levels(ptm.levels())
     except LimitError:
         raise
     except InputError as error:

@@ -13,6 +13,7 @@ import math
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import IO
 
 import numpy as np
@@ -27,6 +28,7 @@ from ptmtools.texture.container import (
     pack_head,
 )
 from ptmtools.texture.description import pack_description
+from ptmtools.texture.detail import Detail, detail_of, squares_between
 from ptmtools.texture.model import Description, EncodeOptions
 from ptmtools.texture.options import checked_coder, kept_levels
 from ptmtools.texture.parallel import ordered
@@ -75,8 +77,8 @@ def encode_to(
     *,
     description: Description = _PLAIN,
     threads: int = 1,
-) -> None:
-    """As `encode`, into a file that can seek, from where it stands.
+) -> Detail:
+    """As `encode`, into a file that can seek, from where it stands; returns what its levels show.
 
     The rows of ``image`` are read twice from top to bottom, a few at a time.
 
@@ -105,7 +107,11 @@ def encode_to(
     single, tiled = _levels(rows, kept, options.tile)
     tiles = coding.single([_whole(level) for level in single], more=bool(tiled))
     del single
-    below, memory = tiles[-1].texels, tiles[-1].memory
+    coarsest, below, memory = tiles[0].texels, tiles[-1].texels, tiles[-1].memory
+    above = [
+        (squares_between(tile.texels, under.texels), _texels_of(tile.texels))
+        for under, tile in pairwise(tiles)
+    ]
     groups: list[tuple[int, int]] = []
     for tile in tiles:
         file.write(tile.data)
@@ -113,13 +119,16 @@ def encode_to(
     del tiles
     while tiled:
         # The finest of them may be the image itself, of which nothing is kept.
-        group, below = coding.tiled(file, tiled.pop(0), below, memory, finest=not tiled)
+        level = tiled.pop(0)
+        group, below, squares = coding.tiled(file, level, below, memory, finest=not tiled)
         groups.append(group)
+        above.append((squares, _texels_of(level)))
     end = file.tell()
     trimmed = len(level_sizes(rows.width, rows.height)) - 1 - kept[-1]
     file.seek(start)
     file.write(pack_head(rows.shape, rows.dtype.name, options, trimmed, described, groups))
     file.seek(end)
+    return detail_of(coarsest, above)
 
 
 @dataclass(frozen=True)
@@ -157,9 +166,10 @@ class _Coding:
         below: Samples,
         memory: object,
         finest: bool,
-    ) -> tuple[tuple[int, int], Samples]:
+    ) -> tuple[tuple[int, int], Samples, float]:
         """Writes index and tiles of a level of several. Length of the group, CRC-32 of the index;
-        and the texels as a decoder has them, none of the finest level."""
+        the texels as a decoder has them, none of the finest level; and `squares_between` them and
+        those below."""
         side = self.options.tile
         height, width = level.shape[:2]
         across, down = tile_counts(width, height, side)
@@ -175,25 +185,27 @@ class _Coding:
                     strip = level[box.y0 : box.y1]
                 yield box, strip
 
-        def coded(job: tuple[Box, Samples]) -> tuple[Box, Tile]:
+        def coded(job: tuple[Box, Samples]) -> tuple[Box, Tile, float]:
             box, strip = job
             piece = np.ascontiguousarray(strip[:, box.x0 : box.x1])
             under = np.ascontiguousarray(below[box.below.slices])
-            return box, self._tile(piece, under, memory, 1.0 if finest else EXACT_FACTOR, 1)
+            tile = self._tile(piece, under, memory, 1.0 if finest else EXACT_FACTOR, 1)
+            return box, tile, squares_between(tile.texels, under)
 
         start = file.tell()
         file.write(bytes(across * down * TILE_ENTRY.size))
-        index = bytearray()
-        for box, tile in ordered(coded, boxes(), self.threads):
+        index, squares = bytearray(), 0.0
+        for box, tile, more in ordered(coded, boxes(), self.threads):
             file.write(tile.data)
             index += TILE_ENTRY.pack(len(tile.data), zlib.crc32(tile.data))
+            squares += more
             if self.options.max_error and not finest:
                 texels[box.slices] = tile.texels
         end = file.tell()
         file.seek(start)
         file.write(index)
         file.seek(end)
-        return (end - start, zlib.crc32(index)), texels
+        return (end - start, zlib.crc32(index)), texels, squares
 
     def _tile(
         self,
@@ -233,6 +245,12 @@ def _levels(
     tiled = [tile_counts(*sizes[n], tile) != (1, 1) for n in kept[1:]]
     single = len(kept) - sum(tiled)
     return levels[:single], levels[single:]
+
+
+def _texels_of(level: Samples | ImageRows) -> int:
+    """How many texels there are, without a look at them."""
+    height, width = level.shape[:2]
+    return int(height * width)
 
 
 def _whole(level: Samples | ImageRows) -> Samples:

@@ -121,6 +121,12 @@ class Level:
         return self.tiles != (1, 1)
 
 
+def gpu_texel_bytes(texel_bytes: int, components: int) -> int:
+    """Bytes of a texel as GPUs hold it: they have no texels of three components, so RGB takes the
+    room of RGBA."""
+    return texel_bytes * (4 if components == 3 else components) // components
+
+
 @dataclass(frozen=True)
 class PtmHeader:
     """The header and group table of a `.ptm`.

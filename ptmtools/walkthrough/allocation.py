@@ -41,9 +41,7 @@ def best_step(worth: Floats, cost: Ints, column: int, paid: int, last: int) -> t
 
 
 @kernel
-def allocate(
-    worth: Floats, cost: Ints, last: Ints, budget: int, column: Ints, exact: bool
-) -> int:
+def allocate(worth: Floats, cost: Ints, last: Ints, budget: int, column: Ints, exact: bool) -> int:
     """Writes to ``column`` (T,) what each texture should hold; returns the bytes, at most
     ``budget``.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import shutil
 from collections.abc import Callable
@@ -17,7 +18,7 @@ from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
 from ptmtools.database import EmitOptions, TextureRecord, emit
 from ptmtools.scene.model import Material, Scene, SourceImage
-from ptmtools.texture import encode, read_header
+from ptmtools.texture import encode_to, read_header
 from ptmtools.visibility.model import Pvs
 
 MATERIALS = (
@@ -94,7 +95,9 @@ def write_textures(www: Path) -> tuple[TextureRecord, ...]:
     records = []
     for image, (name, shape) in enumerate({"a": (16, 24, 3), "b": (9, 5, 4)}.items()):
         pixels = random.integers(0, 256, shape, np.uint8)
-        data = encode(pixels)
+        buffer = io.BytesIO()
+        detail = encode_to(buffer, pixels)
+        data = buffer.getvalue()
         header = read_header(data)
         (www / f"textures/{name}.ptm").write_bytes(data)
         Image.fromarray(pixels).save(www / f"textures/{name}.png")
@@ -110,6 +113,8 @@ def write_textures(www: Path) -> tuple[TextureRecord, ...]:
                 components,
                 header.levels,
                 digest,
+                detail=detail,
+                stored=www / f"textures/{name}.ptm",
             )
         )
     return tuple(records)
@@ -150,7 +155,15 @@ def finished(artifacts: Artifacts, tmp_path_factory: pytest.TempPathFactory) -> 
     """The database, with VRML alone; not to be changed."""
     db = tmp_path_factory.mktemp("finished") / "rooms"
     a, records = artifacts, write_textures(db / "www")
-    emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", EmitOptions(format="vrml"))
+    emit(
+        a.scene,
+        a.cells,
+        a.pvs,
+        a.ach,
+        records,
+        db / "www",
+        EmitOptions(format="vrml", first_look=8),
+    )
     write_manifest(db)
     return db
 

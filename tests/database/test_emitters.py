@@ -59,8 +59,9 @@ def test_a_toy_emitter(
     records, options = put_textures(db / "www"), EmitOptions(format=format)
     report = emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", options)
     ours = ("toys/0.txt", "toys/1.txt", "toys/2.txt", "toy.txt")
-    hints = tuple(f"hints/{name}.json" for name in ("c0000", "c0001", "c0002", "statistics"))
-    assert report.files[-9:] == (*ours, *hints, "hints.json"), "the hints are always written"
+    cells = [f"hints/c000{cell}.{kind}" for cell in range(3) for kind in ("json", "bin")]
+    hints = (*cells, "hints/statistics.json", "hints.json")
+    assert report.files[-12:] == (*ours, *hints), "the hints are always written"
     assert ("root.wrl" in report.files) is ("vrml" in format)
     assert ("gltf/c0000.glb" in report.files) is ("gltf" in format)
     with pytest.raises(OutputError, match="PTM-O001"):

@@ -14,6 +14,8 @@ from ptmtools.database.model import Viewpoint
 from ptmtools.database.viewpoints.pictures import DIRECTIONS, Pictures
 from ptmtools.database.viewpoints.placement import place_viewpoints
 from ptmtools.scene.model import Material, Scene, SourceImage
+from ptmtools.texture.detail import Detail
+from ptmtools.texture.model import Level
 from tests.conftest import scene_of
 
 CORRIDOR = 6
@@ -26,8 +28,13 @@ MATERIALS = (
 IMAGES = tuple(SourceImage(f"{name}.png", name * 64, bytes) for name in "ab")
 
 
-def record(image: int, side: int, detail: float) -> TextureRecord:
-    return TextureRecord(image, "", None, side, side, 3, (), "", detail=detail)
+def detail(contrast: float) -> Detail:
+    return Detail((0.0, 255 * contrast), (0, 0, 0))
+
+
+def record(image: int, side: int, contrast: float) -> TextureRecord:
+    levels = Level(1, 1, 0, 1, 0, (1, 1), 3), Level(2, 2, 1, 1, 0, (1, 1), 15)
+    return TextureRecord(image, "", None, side, side, 3, levels, "", detail=detail(contrast))
 
 
 PAINTING, PLASTER = record(0, 512, 0.1), record(1, 512, 0.005)
@@ -94,7 +101,7 @@ def test_where_most_is_to_be_seen_comes_first(
     wall = across(0, 0.5)[:, [2, 1, 0]] * [1, 1, 0]
     hangs = [(1, 17.0), (2, 19.0), (1, 10.0)]
     scene = hung(scene, *((m, wall + [x, 0, 1.99]) for m, x in hangs))
-    records = PAINTING, replace(PLASTER, detail=0.1)
+    records = PAINTING, replace(PLASTER, detail=detail(0.1))
     views, _ = place_viewpoints(scene, cells, EmitOptions(), records)
     assert views[0].cell == 4
     assert in_view(views[0], (17, 1.6, 2))
@@ -118,7 +125,7 @@ def test_plaster_is_no_picture(corridor: tuple[Scene, Cells]) -> None:
     worth = Pictures(scene, (PAINTING, PLASTER)).worth(middle)[0]
     left, right = worth[DIRECTIONS // 4], worth[3 * DIRECTIONS // 4]
     assert left > 2 * right > 0
-    alike = Pictures(scene, (PAINTING, replace(PLASTER, detail=0.1))).worth(middle)[0]
+    alike = Pictures(scene, (PAINTING, replace(PLASTER, detail=detail(0.1)))).worth(middle)[0]
     assert alike[3 * DIRECTIONS // 4] == pytest.approx(20 * right)
 
 

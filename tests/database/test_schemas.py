@@ -39,9 +39,10 @@ def validator(name: str) -> jsonschema.Draft202012Validator:
 
 @pytest.fixture(scope="module")
 def served(finished: Path) -> dict[str, dict[str, Any]]:
-    """By schema; the record with an optional field that no other database here has."""
+    """By schema; the record with optional fields that no other database here has."""
     found = {n: json.loads((finished / "www" / file).read_text()) for n, file in SERVED.items()}
     record = found[schemas.CELL]
+    record["need"] = [[0, 1, 0.25, 0.125]]
     record["textureShares"] = [[[0, record["ach"][0]]], [[None, record["ach"][1]]], []]
     return found
 

@@ -10,8 +10,12 @@ import numpy as np
 import pytest
 
 from ptmtools.coverage.ach import compute_ach
+from ptmtools.coverage.need import TextureSize, compute_need
 from ptmtools.coverage.options import AchOptions
-from ptmtools.database import TextureRecord, emit
+from ptmtools.database import TextureRecord, emit, validate_database
+from ptmtools.database.content import Content
+from ptmtools.database.hints.record import RecordWriter
+from ptmtools.visibility.model import Pvs
 
 
 def test_textures_of_visible_cells(artifacts, tmp_path: Path) -> None:
@@ -43,3 +47,29 @@ def test_textures_of_visible_cells(artifacts, tmp_path: Path) -> None:
                 for image, value in zip(ach.texture[part], ach.texture_value[part], strict=True)
             }
             assert {None if t is None else listed[t]: s for t, s in entry} == expected
+
+
+def test_how_fine_textures_are_needed(artifacts, tmp_path: Path, put_textures, seal) -> None:
+    """Told by their place in the document's list; what no cell in view has is left out."""
+    a, db = artifacts, tmp_path / "db"
+    records = put_textures(db / "www")[::-1]
+    sizes = {r.image: TextureSize(r.width, r.height, len(r.levels)) for r in records}
+    need = compute_need(a.scene, a.cells, a.pvs, sizes, 4)
+    emit(a.scene, a.cells, a.pvs, a.ach, records, db / "www", need=need)
+    seal(db)
+    assert validate_database(db).issues == ()
+    for cell in range(3):
+        record = json.loads((db / f"www/hints/c000{cell}.json").read_text())
+        rows = {records[place].image: (first, shares) for place, first, *shares in record["need"]}
+        entries = range(*need.start[cell : cell + 2].tolist())
+        assert sorted(rows) == need.image[entries.start : entries.stop].tolist() == [0, 1]
+        for entry in entries:
+            first, shares = rows[int(need.image[entry])]
+            wanted = need.share[slice(*need.share_start[entry : entry + 2].tolist())]
+            assert first == need.first[entry]
+            assert shares == pytest.approx(wanted, rel=5.1e-3)
+            assert all(share == float(f"{share:.3g}") for share in shares)
+    alone = Content(a.scene, a.cells, Pvs.from_matrix(np.eye(3, dtype=np.bool_)), a.ach, records)
+    for cell in range(3):
+        places = {place for place, *_ in RecordWriter(alone)._need(need, cell)}
+        assert places == set(alone.painted[cell].tolist())

@@ -55,7 +55,7 @@ def test_a_good_database_has_no_issue(finished: Path) -> None:
     report = validate_database(finished)
     assert report.issues == ()
     assert report.ok
-    assert report.files == 13
+    assert report.files == 16
     assert report.bytes == sum(
         p.stat().st_size for p in (finished / "www").rglob("*") if p.is_file()
     )
@@ -225,6 +225,11 @@ def painted(texture: object) -> Damage:
 def textured(shares: object) -> Damage:
     """Puts something in the place of the shares of textures of a cell that sees three."""
     return cell(2, lambda c: c.update(textureShares=shares))
+
+
+def needed(rows: object) -> Damage:
+    """Says how fine a cell needs textures."""
+    return cell(1, lambda c: c.update(need=rows))
 
 
 def repainted(db: Path) -> None:
@@ -421,6 +426,12 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D704", hinted(lambda d: d["textures"][0].update(sha256="0" * 64), STATISTICS)),
     ("D704", hinted(lambda d: d["textures"][0]["ends"].pop())),
     ("D704", hinted(lambda d: d["textures"][0].update(texelBytes=1))),
+    ("D704", hinted(lambda d: d["textures"][0].update(gpuTexelBytes=3))),
+    ("D704", hinted(lambda d: d["textures"][0]["rms"].pop())),
+    ("D704", hinted(lambda d: d["textures"][0]["rms"].sort(reverse=True))),
+    ("D704", hinted(lambda d: d["textures"][1]["color"].reverse())),
+    ("D700", hinted(lambda d: d["textures"][1]["color"].__setitem__(0, 256))),
+    ("D700", hinted(lambda d: d["textures"][1]["rms"].__setitem__(1, -1))),
     ("D704", hinted(lambda d: d["textures"][0]["ends"].__setitem__(1, 1))),
     ("D704", hinted(lambda d: d["textures"][0].update(width=23))),
     ("D704", hinted(lambda d: d["textures"][0].update(components=4))),
@@ -428,7 +439,7 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D704", hinted(lambda d: d["textures"][0].update(fallbackLevel=99))),
     ("D704", hinted(lambda d: d["textures"][0].update(fallbackLevel=None))),
     ("D704", coarser(1)),
-    ("D704 D711", recoded(lambda texels: texels[:, ::-1])),
+    ("D704 D711 D742", recoded(lambda texels: texels[:, ::-1])),
     ("D705", cell(1, lambda c: c["portals"].pop())),
     ("D705", portal(lambda row: row.update(area=99.0))),
     ("D705", portal(lambda row: moved(row, 0, 0, 0.1))),
@@ -448,7 +459,7 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D707", counted(2, lambda c: c["views"][3].__setitem__(0, 0.5))),
     ("D707", textured([[[0, 0.5]]] * 3)),
     ("D702", textured([[[0, 0.8]], [[0, 0.1]]])),
-    ("D708", unused),
+    ("D708 D742", unused),
     ("D709 D701 D741", cell(1, lambda c: c["leaves"][0]["points"][0].__setitem__(1, -1.0))),
     ("D709", cell(1, lambda c: c["leaves"][0]["faces"].pop())),
     ("D709", cell(1, lambda c: c["leaves"][0]["faces"][0].reverse())),
@@ -457,7 +468,7 @@ FAULTS: list[tuple[str, Damage]] = [
     ("D710 D704", flipped),
     ("D710 D704", appended(A, b"x")),
     ("D710 D704", rewritten(A, lambda data: data[:-1])),
-    ("D710", put(A, b"")),
+    ("D710 D742", put(A, b"")),
     ("D711", repainted),
     ("D711", lambda db: Image.new("RGB", (300, 200)).save(db / "www/textures/a.png")),
     ("D712", put("textures/b.png", b"\x89PNG")),
@@ -482,6 +493,25 @@ FAULTS: list[tuple[str, Damage]] = [
     *(("D700", painted(texture)) for texture in (2, -1, 0.0, True, "0", [])),
     *(("D740", hinted(lambda d: d.update(schema=1), name)) for name in (HINTS, R0, STATISTICS)),
     ("D740", hinted(lambda d: d.update(schema=3, cells="of another kind"))),
+    ("D742", hinted(lambda d: d.pop("firstLook"))),
+    ("D742", cell(0, lambda c: c.pop("firstLook"))),
+    ("D742", cell(0, lambda c: c["firstLook"].pop())),
+    ("D742", cell(0, lambda c: c["firstLook"].reverse())),
+    ("D742", cell(0, lambda c: c["firstLook"].append(c["firstLook"][-1]))),
+    ("D742", cell(0, lambda c: c["firstLook"][0].__setitem__(1, 99))),
+    ("D700", cell(0, lambda c: c["firstLook"][0].__setitem__(0, 2))),
+    ("D742", rewritten("hints/c0001.bin", lambda data: data[:-1])),
+    ("D742", appended("hints/c0001.bin", b"x")),
+    ("D742", rewritten("hints/c0001.bin", lambda data: data[:9] + b"x" + data[10:])),
+    ("D671", removed("hints/c0001.bin")),
+    ("D743", needed([[1, 0, 0.2], [0, 0, 0.3]])),
+    ("D743", needed([[0, 0, 0.2], [0, 0, 0.3]])),
+    ("D743", needed([[0, 3, 0.2, 0.1, 0.1]])),
+    ("D743", needed([[0, 0, 0.1, 0.2]])),
+    ("D743", needed([[0, 0, 0.5], [1, 0, 0.52]])),
+    ("D700", needed([[2, 0, 0.1]])),
+    ("D700", needed([[0, 0, 0]])),
+    ("D700", needed([[0, 0]])),
     ("D741", cell(0, lambda c: c.update(cell=1))),
     ("D741", hinted(lambda d: d.update(record="cells/{name}.wrl"))),
     ("D674 D741", hinted(lambda d: d.update(record="hints/{name}/../statistics.json"))),
@@ -613,7 +643,7 @@ def with_stage(db: Path, name: str, **record: object) -> None:
 
 GOOD_COUNTS = {
     "textures": {"textures": 2, "ptm_bytes": None, "raw_bytes": 16 * 24 * 3 + 9 * 5 * 4},
-    "emit": {"files": 9, "bytes": None, "shapes": None, "triangles": None, "viewpoints": 3},
+    "emit": {"files": 12, "bytes": None, "shapes": None, "triangles": None, "viewpoints": 3},
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from pathlib import Path
 from threading import Event
 
@@ -86,3 +87,31 @@ def test_a_note_says_what_max_side_leaves_and_what_more_would_cost(tmp_path: Pat
         if wanted:
             assert wanted in notes[0]
             assert "32 x 32; 64 x 64 would add" in notes[0]
+
+
+def tasks(db: Path) -> tuple[int, int, int] | None:
+    """How many textures a build has, keeps and takes over."""
+    (report,) = (s for s in build_scene(TWO_ROOMS, db).stages if s.stage == "textures")
+    return report.tasks
+
+
+def test_what_levels_show_outlasts_a_resumed_and_an_updated_build(tmp_path: Path) -> None:
+    """It is kept with the texture: one that is not encoded again still has it."""
+    build_scene(TWO_ROOMS, tmp_path / "whole")
+    wanted = json.loads((tmp_path / "whole/www/hints.json").read_text())["textures"]
+    assert all(len(row["rms"]) == len(row["ends"]) > 1 for row in wanted)
+    assert all(row["rms"][0] == 0 < max(row["rms"]) for row in wanted)
+    db = tmp_path / "db"
+    build_scene(TWO_ROOMS, db, until=CELLS)
+
+    def stopped(done: int, *_: object) -> None:
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_stage(db, TextureOptions(), workers=1, progress=stopped)
+    assert tasks(db) == (len(wanted), 0, 2)
+    assert json.loads((db / "www/hints.json").read_text())["textures"] == wanted
+    next((db / "stages/textures").iterdir()).unlink()
+    assert tasks(db) == (len(wanted), len(wanted) - 1, 0)
+    assert json.loads((db / "www/hints.json").read_text())["textures"] == wanted

@@ -1,43 +1,115 @@
-"""How much there is to see in an image."""
+"""What each level adds, from the encoder, against levels that were decoded and enlarged."""
 
 from __future__ import annotations
 
+import io
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
+from numpy.typing import NDArray
 
-from ptmtools.texture import encode
-from ptmtools.texture.detail import detail
+from ptmtools.texture import EncodeOptions, decode_levels, encode_to, read_header
+from ptmtools.texture.codec import examine
+from ptmtools.texture.detail import Detail, squares_between
 
-
-def stripes(side: int, period: int, low: int, high: int) -> np.ndarray:
-    rows = np.where(np.arange(side) // (period // 2) % 2, high, low).astype(np.uint8)
-    return np.repeat(np.repeat(rows[:, None], side, axis=1)[..., None], 3, axis=2)
-
-
-def test_stripes() -> None:
-    """Two texels of the level of 64 each: half their difference."""
-    assert detail(encode(stripes(256, 16, 0, 51))) == pytest.approx(0.1, rel=1e-6)
-    assert detail(encode(stripes(64, 4, 0, 51))) == pytest.approx(0.1, rel=1e-6)
-
-
-def test_grain_and_shading_are_no_detail() -> None:
-    random = np.random.default_rng(1)
-    noise = random.integers(100, 151, (1024, 1024, 3)).astype(np.uint8)
-    assert detail(encode(noise)) < 0.01
-    slope = np.repeat(np.arange(256, dtype=np.uint8)[:, None], 256, axis=1)[..., None]
-    assert detail(encode(slope)) < 0.02
-    assert detail(encode(np.full((32, 32, 1), 9, np.uint8))) == 0
+TYPES = (np.uint8, np.uint16, np.float16, np.float32)
+OPTIONS = (
+    {"tile": 16},
+    {"tile": 16, "max_error": 6},
+    {"min_side": 9},
+    {"max_side": 40},
+    {"max_level": 2},
+)
 
 
-def test_alpha_does_not_count() -> None:
-    rgba = np.full((64, 64, 4), 90, np.uint8)
-    rgba[::2, :, 3] = 255
-    assert detail(encode(rgba)) == 0
+def encoded(image: NDArray, **options: object) -> tuple[Detail, bytes]:
+    file = io.BytesIO()
+    detail = encode_to(file, image, EncodeOptions(**options))
+    return detail, file.getvalue()
 
 
-@pytest.mark.parametrize("shape", [(1, 1), (1, 300), (5, 3), (2, 64)])
-def test_small_and_narrow(shape: tuple[int, int]) -> None:
-    texels = np.zeros((*shape, 1), np.float32)
-    texels[..., : shape[1] // 2, :] = 4.0
-    assert 0 <= detail(encode(texels)) <= 0.5
-    assert np.isfinite(detail(encode(np.full((*shape, 1), np.nan, np.float32))))
+def enlarged(below: NDArray, height: int, width: int) -> NDArray[np.float64]:
+    """Nearest: each texel over its block, and an odd last row or column from the block beside."""
+    rows, columns = (
+        np.minimum(np.arange(side) // 2, under - 1)
+        for side, under in zip((height, width), below.shape[:2], strict=True)
+    )
+    return below[rows][:, columns].astype(np.float64)
+
+
+def by_definition(data: bytes) -> list[float]:
+    levels = list(decode_levels(data))
+    colours = {1: 1, 2: 1, 3: 3, 4: 3}[levels[0].shape[2]]
+    top = {"uint8": 255, "uint16": 65535}.get(levels[0].dtype.name, 1)
+    found = [0.0]
+    for below, level in pairwise(levels):
+        difference = (level - enlarged(below, *level.shape[:2]))[..., :colours]
+        found.append(float(np.sqrt(np.mean((difference * 255 / top) ** 2))))
+    return found
+
+
+def noise(height: int, width: int, components: int, dtype: type, seed: int = 0) -> NDArray:
+    random = np.random.default_rng(seed)
+    if np.dtype(dtype).kind == "f":
+        return random.uniform(0, 3, (height, width, components)).astype(dtype)
+    slope = np.linspace(0, 0.5, width)[None, :, None]
+    texels = (slope + random.uniform(0, 0.5, (height, width, components))) * np.iinfo(dtype).max
+    return texels.astype(dtype)
+
+
+@given(
+    st.integers(1, 40), st.integers(1, 40), st.integers(1, 4), st.sampled_from(TYPES), st.integers()
+)
+def test_the_differences_are_those_of_the_levels(
+    height: int, width: int, components: int, dtype: type, seed: int
+) -> None:
+    detail, data = encoded(noise(height, width, components, dtype, abs(seed)))
+    assert detail.rms == pytest.approx(by_definition(data), rel=5.1e-3)
+    assert all(value == float(f"{value:.3g}") for value in detail.rms)
+
+
+@pytest.mark.parametrize("options", OPTIONS, ids=str)
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_tiles_errors_and_levels_left_out(options: dict[str, int], dtype: type) -> None:
+    """Of what a decoder has, which an allowed error changes."""
+    detail, data = encoded(noise(83, 101, 3, dtype), **options)
+    assert len(detail.rms) == len(read_header(data).levels)
+    assert detail.rms == pytest.approx(by_definition(data), rel=5.1e-3)
+    faults, shown = examine(data)
+    assert not faults
+    assert shown
+    assert shown[0] == detail
+
+
+def test_alpha_is_no_colour() -> None:
+    image = noise(16, 16, 4, np.uint8)
+    opaque = image.copy()
+    opaque[..., 3] = 255
+    assert encoded(image)[0] == encoded(opaque)[0]
+    assert encoded(image[..., :3])[0] == encoded(image)[0]
+    assert encoded(image[..., :2])[0] == encoded(image[..., :1])[0]
+
+
+def test_the_colour_is_that_of_the_coarsest_level() -> None:
+    image = noise(64, 32, 3, np.uint8)
+    detail, data = encoded(image)
+    (first, *_) = decode_levels(data)
+    assert first.shape == (2, 1, 3)
+    assert detail.color == tuple(np.floor(first.mean(axis=(0, 1)) + 0.5).astype(int))
+    assert encoded(np.full((4, 4, 1), 0x8080, np.uint16))[0].color == (128, 128, 128)
+    assert encoded(np.full((4, 4, 3), (0, 0.5, 7), np.float32))[0].color == (0, 128, 255)
+
+
+def test_what_is_not_finite_differs_from_nothing() -> None:
+    level = np.ones((2, 2, 1), np.float32)
+    level[0, 0] = np.nan
+    level[0, 1] = 3
+    assert squares_between(level, np.ones((1, 1, 1), np.float32)) == 4
+
+
+def test_largest_differences_are_exact() -> None:
+    """The sum of 2^20 squares of 65,535."""
+    level = np.full((1024, 1024, 1), 65535, np.uint16)
+    assert squares_between(level, np.zeros((512, 512, 1), np.uint16)) == 65535**2 * 2**20

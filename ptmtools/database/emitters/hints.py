@@ -8,7 +8,7 @@ from ptmtools.lazy import Lazy
 
 HINTS_EMITTER = Emitter(
     name="hints",
-    about="hints.json, and a record of each cell",
+    about="hints.json, and a record and a first-look bundle of each cell",
     owns=(HINTS, f"{HINTS_FOLDER}/"),
     writer=Lazy("ptmtools.database.hints.files:hints_files"),
     reader=Lazy("ptmtools.database.validation.hints:read_file"),

@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.database.emitters import chosen_emitters
-from ptmtools.database.hints.numbers import coordinates, document_text
+from ptmtools.database.hints.numbers import coordinates, document_text, whole
 from ptmtools.database.model import TextureRecord, Viewpoint
-from ptmtools.database.names import RECORD_FILES, STATISTICS, cell_name
+from ptmtools.database.names import FIRST_LOOK_FILES, RECORD_FILES, STATISTICS, cell_name
+from ptmtools.texture.model import gpu_texel_bytes
 
 if TYPE_CHECKING:
     from ptmtools.database.content import Content
@@ -37,7 +38,7 @@ def index_text(content: Content) -> str:
     """
     space, cells = content.scene.space, content.cells
     emitters = chosen_emitters(content.options.format)
-    head = {
+    head: dict[str, Any] = {
         "format": FORMAT,
         "schema": SCHEMA,
         "origin": list(space.origin),
@@ -49,6 +50,8 @@ def index_text(content: Content) -> str:
         "geometry": {e.name: e.cell_files for e in emitters if e.cell_files},
         "statistics": STATISTICS,
     }
+    if content.options.first_look:
+        head["firstLook"] = FIRST_LOOK_FILES
     return document_text(
         head,
         {
@@ -83,16 +86,22 @@ def _viewpoint(viewpoint: Viewpoint) -> dict[str, Any]:
 def _texture(record: TextureRecord, fallback: bool) -> Mapping[str, Any]:
     png = record.fallback if fallback else None
     level = len(record.levels) - 1 if record.fallback_level is None else record.fallback_level
-    return {
+    texel = texel_bytes(record.levels[0]) if record.levels else record.components
+    row: dict[str, Any] = {
         "file": quote(record.file),
         "fallback": None if png is None else quote(png),
         "fallbackLevel": None if png is None else level,
         "width": record.width,
         "height": record.height,
         "components": record.components,
-        "texelBytes": texel_bytes(record.levels[0]) if record.levels else record.components,
+        "texelBytes": texel,
+        "gpuTexelBytes": gpu_texel_bytes(texel, record.components),
         "ends": [level.end for level in record.levels],
     }
+    if record.detail:
+        row["rms"] = [whole(value) for value in record.detail.rms]
+        row["color"] = list(record.detail.color)
+    return row
 
 
 def _boxes(content: Content) -> list[Any]:

@@ -54,9 +54,9 @@ def coordinates(values: ArrayLike, what: str) -> Any:
     return json.loads(text.replace(".0,", ",").replace(".0]", "]"))
 
 
-def significant(values: NDArray[np.floating]) -> list[float | None]:
-    """Numbers with `DIGITS` significant digits; None for NaN."""
-    return [None if v != v else _short(v) for v in values.tolist()]
+def significant(values: NDArray[np.floating], digits: int = DIGITS) -> list[float | None]:
+    """Numbers with so many significant digits; None for NaN."""
+    return [None if v != v else _short(v, digits) for v in values.tolist()]
 
 
 def shares_of(row: NDArray[np.float64]) -> list[float]:
@@ -75,14 +75,14 @@ def shares_of(row: NDArray[np.float64]) -> list[float]:
         carried = wanted - values[i]
     if order:
         rest = float(np.sum([values[i] for i in order[:-1]]))
-        values[order[-1]] = _whole(round(1 - rest, _SUM_DECIMALS))
+        values[order[-1]] = whole(round(1 - rest, _SUM_DECIMALS))
     return values
 
 
-def _short(value: float) -> float:
-    return _whole(float(f"{value:.{DIGITS}g}"))
+def _short(value: float, digits: int = DIGITS) -> float:
+    return whole(float(f"{value:.{digits}g}"))
 
 
-def _whole(value: float) -> float:
+def whole(value: float) -> float:
     """An int where that is the same, which JSON writes shorter."""
     return int(value) if value.is_integer() else value

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +12,13 @@ from ptmtools.database.hints.numbers import coordinates, document_text, signific
 from ptmtools.database.names import cell_name
 
 if TYPE_CHECKING:
+    from ptmtools.coverage.need import Need
     from ptmtools.database.content import Content
+    from ptmtools.database.hints.first_look import Piece
 
 FORMAT = "ptmtools cell"
+#: Significant digits of the need: sampling leaves two.
+NEED_DIGITS = 3
 
 
 class RecordWriter:
@@ -24,8 +29,11 @@ class RecordWriter:
         self._adjacent = content.cells.adjacent()
         self._portals = _portals(content.cells)
 
-    def record(self, cell: int) -> str:
-        """The text of a cell's record; raises DatabaseError PTM-D601."""
+    def record(self, cell: int, first_look: Sequence[Piece] | None) -> str:
+        """The text of a cell's record; ``first_look`` is its bundle, None if there are none.
+
+        Raises DatabaseError PTM-D601.
+        """
         content = self._content
         seen = content.pvs.row(cell).tolist()
         rows = content.ach.entries(cell)
@@ -42,8 +50,24 @@ class RecordWriter:
         }
         if content.ach.by_texture:
             head["textureShares"] = [self._texture_shares(e) for e in range(rows.start, rows.stop)]
+        if first_look is not None:
+            head["firstLook"] = [[piece.texture, piece.level] for piece in first_look]
+        if content.need:
+            head["need"] = self._need(content.need, cell)
         leaves = [_leaf(content.cells, leaf) for leaf in content.leaves[cell]]
         return document_text(head, {"leaves": leaves, "portals": self._portals[cell]})
+
+    def _need(self, need: Need, cell: int) -> list[list[Any]]:
+        """Of each texture in sight its place, the coarsest level wanted, and shares."""
+        records, seen = self._content.records, self._content.pvs.row(cell).tolist()
+        in_sight = {place for other in seen for place in self._content.painted[other].tolist()}
+        rows = []
+        for entry in range(*need.start[cell : cell + 2].tolist()):
+            place = records[int(need.image[entry])][0]
+            shares = need.share[slice(*need.share_start[entry : entry + 2].tolist())]
+            if place in in_sight:
+                rows.append([place, int(need.first[entry]), *significant(shares, NEED_DIGITS)])
+        return sorted(rows)
 
     def _texture_shares(self, entry: int) -> list[list[Any]]:
         """The pairs of a texture, None for what has none, and its share of an entry of the ACH."""

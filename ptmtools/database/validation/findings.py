@@ -90,6 +90,8 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D739": ("error", "a material of a GLB differs from that of its shape in the VRML file"),
     "PTM-D740": ("error", "the hints have another schema: the database is of another release"),
     "PTM-D741": ("error", "the index, the records and the statistics contradict each other"),
+    "PTM-D742": ("error", "a first-look bundle is not what its cell's record and the textures say"),
+    "PTM-D743": ("error", "what a record says of how fine textures are needed cannot be"),
 }
 
 #: Of files that are not as their stage wrote them: a build sees that by itself.

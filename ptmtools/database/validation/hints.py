@@ -15,9 +15,11 @@ from ptmtools.database.emitters import EMITTERS
 from ptmtools.database.fault import FileError, shaped
 from ptmtools.database.hints.index import SCHEMA
 from ptmtools.database.hints.record import FORMAT
-from ptmtools.database.names import HINTS, HINTS_FOLDER, STATISTICS, path_of
+from ptmtools.database.names import BUNDLE, HINTS, HINTS_FOLDER, STATISTICS, path_of
 from ptmtools.database.validation.findings import Place
+from ptmtools.database.validation.first_look import check_first_looks
 from ptmtools.database.validation.lists import check_graph, check_list, check_shares
+from ptmtools.database.validation.need import impossible_need
 from ptmtools.database.validation.served import ServedDatabase
 from ptmtools.database.validation.space import check_space
 from ptmtools.database.validation.textures import check_record
@@ -60,8 +62,11 @@ class ReadHints:
     def urls(self, form: str) -> list[str] | None:
         """The URLs of the cells' geometry in a form; None if the index does not name it."""
         template: str | None = self.index["geometry"].get(form)
-        cells = self.index["cells"]
-        return None if template is None else [_expanded(template, cell) for cell in cells]
+        return None if template is None else self.expanded(template)
+
+    def expanded(self, template: str) -> list[str]:
+        """The URLs of the cells by a template."""
+        return [_expanded(template, cell) for cell in self.index["cells"]]
 
     def known(self) -> Iterator[tuple[int, Row]]:
         """The records that can be used, with their cells' numbers."""
@@ -72,8 +77,8 @@ def _expanded(template: str, cell: Row) -> str:
     return template.replace("{name}", cell["name"])
 
 
-def read_file(path: str, data: bytes) -> Row | None:
-    """The index, a record or the statistics; nothing of other files.
+def read_file(path: str, data: bytes) -> Row | int | None:
+    """The index, a record or the statistics; of a bundle its length, of other files nothing.
 
     Raises FileError: PTM-D740 of another schema; PTM-D700 not as the schema says.
     """
@@ -82,6 +87,8 @@ def read_file(path: str, data: bytes) -> Row | None:
         for i, view in enumerate(index["viewpoints"]):
             _in_range([view["cell"]], len(index["cells"]), f"viewpoints[{i}].cell")
         return index
+    if path.endswith(BUNDLE):
+        return len(data)
     if not path.startswith(f"{HINTS_FOLDER}/") or not path.endswith(".json"):
         return None
     return _read(data, schemas.STATISTICS if path == STATISTICS else schemas.CELL)
@@ -152,6 +159,7 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
     _check_own_textures(known, own, places)
     _check_textures(hints, {t for textures in own.values() for t in textures}, database)
     _check_statistics(hints, database)
+    check_first_looks(hints, database)
     _check_forms(hints, database)
     check_space(hints.records, hints.index["viewpoints"], places, at)
     for i, view in enumerate(hints.index["viewpoints"]):
@@ -180,6 +188,8 @@ def _misplaced(record: Any, i: int, cells: int, textures: int) -> FileError | No
         for k, shares in enumerate(record.get("textureShares", ())):
             used = [texture for texture, _ in shares if texture is not None]
             _in_range(used, textures, f"textureShares[{k}]")
+        _in_range([t for t, _ in record.get("firstLook", ())], textures, "firstLook")
+        _in_range([row[0] for row in record.get("need", ())], textures, "need")
     except FileError as fault:
         return fault
     return None
@@ -222,6 +232,10 @@ def _check_own_textures(
 
 
 def _check_textures(hints: ReadHints, used: set[int], database: ServedDatabase) -> None:
+    levels = [len(row["ends"]) for row in hints.index["textures"]]
+    for i, record in hints.known():
+        if wrong := impossible_need(record, levels):
+            database.at(hints.paths[i]).add("PTM-D743", wrong, "need")
     complete = all(record is not None for record in hints.records)
     for i, (row, files) in enumerate(zip(hints.index["textures"], hints.images, strict=True)):
         at = database.at(HINTS, f"textures[{i}]")

@@ -8,12 +8,14 @@ import re
 from collections import Counter
 from collections.abc import Iterable
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote_to_bytes
 
 from ptmtools.database.names import CELL_FOLDER
 from ptmtools.database.validation.findings import Findings, Place
 from ptmtools.database.validation.textures import ReadTexture
+from ptmtools.files import open_regular
 from ptmtools.store.layout import SERVED
 
 if TYPE_CHECKING:
@@ -35,8 +37,9 @@ class ServedDatabase:
     named: the files that some URL names.
     """
 
-    def __init__(self, files: Iterable[str], found: Findings) -> None:
+    def __init__(self, folder: Path, files: Iterable[str], found: Findings) -> None:
         self.files = set(files)
+        self._folder = folder
         self.held: dict[str, Any] = {}
         self.textures: dict[str, ReadTexture] = {}
         self.named: set[str] = set()
@@ -55,6 +58,14 @@ class ServedDatabase:
     def at(self, path: str, place: str = "") -> Place:
         """Who adds what is found in a served file."""
         return self._found.at(f"{SERVED}/{path}", place)
+
+    def head(self, path: str, length: int) -> bytes:
+        """So many first bytes of a served file, or all that can be read."""
+        try:
+            with open_regular(self._folder / path) as file:
+                return file.read(length)
+        except OSError:
+            return b""
 
     def resolve(self, path: str, url: str) -> str | None:
         """The file that a URL in the file ``path`` names; None, and a finding, if there is none."""

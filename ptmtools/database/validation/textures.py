@@ -12,13 +12,18 @@ from numpy.typing import NDArray
 
 from ptmtools.database.validation.findings import Place
 from ptmtools.errors import LimitError, PtmError
+from ptmtools.texture.model import gpu_texel_bytes
 
 if TYPE_CHECKING:
     from ptmtools.texture import Limits, PtmHeader
+    from ptmtools.texture.detail import Detail
 
     Samples = NDArray[Any]
 
 _PNG = b"\x89PNG\r\n\x1a\n"
+#: How far, as a share of them, the `rms` of levels may be off: they are rounded, and those of
+#: floats are summed up in another order here.
+RMS_SLACK = 0.01
 #: Of the first chunk of a PNG: its length and kind, width and height.
 _IHDR = struct.Struct(">I4sII")
 
@@ -31,12 +36,14 @@ class ReadTexture:
     ----------
     header: of the file.
     sha256: hex digest of its bytes.
+    detail: what its levels show; None if they could not be decoded.
     fallback_level: the level that has the size of the fallback image; None if there is no image, or
         no such level.
     """
 
     header: PtmHeader
     sha256: str
+    detail: Detail | None = None
     fallback_level: int | None = None
 
 
@@ -47,41 +54,43 @@ def read_texture(
     PNG that has the size of no level is not decoded."""
     from ptmtools.texture import decode, read_header
 
-    texels = check_ptm(data, limits, at)
+    shown = check_ptm(data, limits, at)
+    detail, texels = shown or (None, None)
     try:
         header = read_header(data)
     except PtmError:
         return None
     if fallback is None:
-        return ReadTexture(header, digest)
+        return ReadTexture(header, digest, detail)
     png, size = f"{at.file.removesuffix('.ptm')}.png", _png_size(fallback)
     level = next((n for n, v in enumerate(header.levels) if (v.width, v.height) == size), None)
     if size is not None and level is None:
         message = f"{png} is {size[0]} x {size[1]}, which is not the size of any level"
         at.add("PTM-D711", message)
-        return ReadTexture(header, digest)
+        return ReadTexture(header, digest, detail)
     other = read_png(fallback, limits, at.found.at(png))
     if level is not None and texels is not None and other is not None:
         if level < len(header.levels) - 1:
             texels = decode(data, level, limits)
         if not _same_image(texels, other):
             at.add("PTM-D711", f"it differs from {png}", f"level {level}")
-    return ReadTexture(header, digest, level)
+    return ReadTexture(header, digest, detail, level)
 
 
-def check_ptm(data: bytes, limits: Limits, at: Place) -> Samples | None:
-    """A `.ptm` by itself, every group of it. Returns its finest level, if nothing is wrong."""
+def check_ptm(data: bytes, limits: Limits, at: Place) -> tuple[Detail, Samples] | None:
+    """A `.ptm` by itself, every group of it. Returns what its levels show, and the finest of them,
+    if nothing is wrong."""
     from ptmtools.texture.codec import examine
 
     try:
-        faults, texels = examine(data, limits)
+        faults, shown = examine(data, limits)
     except LimitError as limit:
         # More than is allowed here is no damage; more than the format allows is.
         at.add("PTM-D713" if limit.code == "PTM-L103" else "PTM-D710", limit.message)
         return None
     for fault in faults:
         at.add("PTM-D710", fault.partition(" [PTM-")[0])
-    return texels
+    return shown
 
 
 def read_png(data: bytes, limits: Limits, at: Place) -> Samples | None:
@@ -110,9 +119,15 @@ def check_record(record: Mapping[str, Any], texture: ReadTexture, at: Place) -> 
             "width": finest.width,
             "height": finest.height,
             "texelBytes": header.texel_bytes,
+            "gpuTexelBytes": gpu_texel_bytes(header.texel_bytes, header.components),
             "ends": [level.end for level in header.levels],
         },
     )
+    if texture.detail:
+        faults += _other(record, {"color": list(texture.detail.color)})
+        rms = record.get("rms", texture.detail.rms)
+        if len(rms) != len(header.levels) or not np.allclose(rms, texture.detail.rms, RMS_SLACK, 0):
+            faults.append("rms is not what the levels of the file differ by")
     fallback, held = record["fallback"], record["fallbackLevel"]
     if (fallback is None) != (held is None):
         faults.append("fallback and fallbackLevel do not go together")
@@ -124,7 +139,7 @@ def check_record(record: Mapping[str, Any], texture: ReadTexture, at: Place) -> 
 
 def _other(row: Mapping[str, Any], true: Mapping[str, Any]) -> list[str]:
     """In what a row differs from what the file says."""
-    return [f"{name} is {v} in the file" for name, v in true.items() if row[name] != v]
+    return [f"{name} is {v} in the file" for name, v in true.items() if row.get(name, v) != v]
 
 
 def _png_size(data: bytes) -> tuple[int, int] | None:

@@ -3,7 +3,7 @@
 Rays all around find what shows where. Each resolves as many texels as it has pixels on a screen of
 1080 lines, or fewer where a texel is larger than a pixel; of a texture that repeats, such as a
 tile of a floor, no more count than it has, as finely as it shows. A view is worth the cube root of
-what it shows of a texture, times its detail (`ptmtools.texture.detail`), summed up: four pictures
+what it shows of a texture, times its contrast, summed up: four pictures
 are worth more than one that fills the view, and a plastered wall next to nothing. It loses as much
 of that as it has of what is near: one wants to stand back. What is transparent and has no image is
 looked through.
@@ -15,6 +15,7 @@ five times as slow, and hardly another view.)
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -40,8 +41,22 @@ _ACROSS = int(_WITHIN * np.arctan(_ASPECT * _UP) / _STEP)
 _ROWS = int(_WITHIN * 2 * _UP / _STEP)
 #: Pixels of a screen of 1080 lines, for a radian up or across its middle.
 _PIXELS = 540 / _UP
+#: See `_contrast`; and what white is in a texture's detail.
+_SIDE, _WHITE = 64, 255
 #: What is nearer than this is near, metres; at most half of a view.
 _NEAR = 2.0
+
+
+def _contrast(texture: TextureRecord) -> float:
+    """By how much the colours of a texture differ from their surroundings, a sixteenth of the
+    picture wide, as a share of white: what the finest level of at most `_SIDE` texels and the one
+    below it add. What is finer is grain, which plaster and carpet have as much of as a painting;
+    from where one looks at a painting, it is not seen."""
+    if texture.detail is None:
+        return 0.0
+    small = [n for n, x in enumerate(texture.levels) if min(x.width, x.height) <= _SIDE]
+    last = max(small, default=0)
+    return math.hypot(*texture.detail.rms[max(last - 1, 0) : last + 1]) / _WHITE
 
 
 class Pictures:
@@ -52,7 +67,7 @@ class Pictures:
         self._detail = np.zeros(len(scene.images) + 1)
         for texture in textures:
             self._texels[texture.image] = texture.width * texture.height
-            self._detail[texture.image] = texture.detail
+            self._detail[texture.image] = _contrast(texture)
         image = np.array([m.image for m in scene.materials], dtype=np.int64)
         drawn = np.flatnonzero(scene.opaque | (image[scene.triangle_material] >= 0))
         corners = scene.corners[drawn]

@@ -20,8 +20,10 @@ def _summary(n: Mapping[str, Any]) -> str:
     of = ""
     if "owners" in n:  # not in databases of former versions
         of = f" from {n['visible']:,} of the model (uncut they would be {n['owners']:,})"
+    looks = n.get("first_look")
+    looked = f" ({size(looks)} of first-look bundles)" if looks else ""
     return (
-        f"{count(n['files'], 'file')}, {size(n['bytes'])}; "
+        f"{count(n['files'], 'file')}, {size(n['bytes'])}{looked}; "
         f"{count(n['triangles'], 'triangle')}{of}, {count(n['viewpoints'], 'viewpoint')}"
     )
 
@@ -30,8 +32,9 @@ EMIT: Stage[None] = Stage(
     name="emit",
     about="Write the served files: cells and hints.",
     recipe=7,
-    changed="hints.json is an index, with a record for each cell in hints/; it says which cells "
-    "are only seen; viewpoints look where pictures are",
+    changed="the hints say what each level of a texture adds, its mean colour, and what a texel "
+    "takes on a GPU; each cell has a bundle of coarse levels for a first look (--first-look); "
+    "viewpoints look where pictures are",
     options=EmitOptions,
     reads=(SCENE, CELLS, PVS, ACH, TEXTURES),
     job=Lazy("ptmtools.pipeline.emission:EmissionJob"),

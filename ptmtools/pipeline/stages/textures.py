@@ -26,7 +26,8 @@ def _summary(n: Mapping[str, Any]) -> str:
 TEXTURES: Stage[None] = Stage(
     name="textures",
     about="Encode the model's images as progressive textures.",
-    recipe=2,
+    recipe=3,
+    changed="what each level adds, and the mean colour of each texture, are kept for the hints",
     options=TextureOptions,
     reads=lambda options: (SCENE, CELLS, PVS) if options.trim else (SCENE,),
     inputs=Lazy("ptmtools.pipeline.textures:inputs_of"),

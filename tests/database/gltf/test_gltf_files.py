@@ -194,7 +194,7 @@ def test_without_fallback_only_the_ptm_is_named(
 def test_a_good_database_has_no_issue(gltf_database: Path) -> None:
     report = validate_database(gltf_database)
     assert report.issues == ()
-    assert report.files == 16
+    assert report.files == 19
 
 
 def test_same_bytes_again(emit_gltf: EmitGltf, gltf_finished: Path, tmp_path: Path) -> None:
@@ -237,7 +237,8 @@ def test_names_are_percent_encoded(
             old = tmp_path / f"db/www/textures/{'ab'[record.image]}.{suffix}"
             old.rename(old.with_name(f"{old.stem} ü#%41.{suffix}"))
         stem = f"textures/{'ab'[record.image]} ü#%41"
-        return replace(record, file=f"{stem}.ptm", fallback=f"{stem}.png")
+        place = tmp_path / f"db/www/{stem}.ptm"
+        return replace(record, file=f"{stem}.ptm", fallback=f"{stem}.png", stored=place)
 
     www = emit_gltf(tmp_path / "db/www", rename=rename)
     uris = {i["uri"] for tree in documents(www) for i in tree["images"]}

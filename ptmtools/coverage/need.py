@@ -1,0 +1,192 @@
+"""How fine each texture is needed in the views from a cell: its share of them by level of detail.
+
+From sample points of the cell, as those of the coverage hints (in the eye region, at eye height and
+up to the ceiling), rays are cast over the whole sphere, weighted by solid angle. Where one meets a
+textured surface, OpenGL's isotropic level of detail is log2 ρ, with ρ the larger of the lengths, in
+texels, that a pixel's width and height span in the texture; the pixel is that in the middle of an
+upright picture, so directions are alike. Of the two levels that are then blended the finer one is
+*wanted*. What is drawn at most once a texel (ρ ≤ 1) wants the finest.
+
+Tried: the band of ±30° that a level view of 60° shows, instead of the sphere. It leaves out the
+floor at one's feet, which wants the finest level, and with it a share that `ach` counts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Floats, Ints
+from ptmtools.cells.model import Cells
+from ptmtools.coverage.backends import BACKENDS
+from ptmtools.coverage.item_buffer import VIEWS, Surfaces
+from ptmtools.coverage.options import AchOptions
+from ptmtools.coverage.sample_points import SamplePoints
+from ptmtools.coverage.sampling import Sampler
+from ptmtools.progress import Progress, silent
+from ptmtools.scene.model import Scene
+from ptmtools.visibility.model import Pvs
+
+#: Side of a sample point's six views, rays.
+FACE = 16
+#: Width of a pixel a metre away: 1080 of them over 60°.
+PIXEL = 2 * math.tan(math.radians(30)) / 1080
+_UP = np.array([0.0, 1.0, 0.0])
+
+
+@dataclass(frozen=True)
+class TextureSize:
+    """Of the finest level stored, texels, and how many levels there are."""
+
+    width: int
+    height: int
+    levels: int
+
+
+@dataclass(frozen=True)
+class Need:
+    """
+    Attributes
+    ----------
+    start: (C + 1,) int64, CSR: the entries of each cell, one for every image that its rays met.
+    image: (n,) int32 image of the scene, ascending within a cell.
+    first: (n,) int32 the coarsest level that any ray wants.
+    share_start, share: (n + 1,) int64, CSR, and (m,) float64: the share of the view that wants
+        level ``first`` or a finer one, level ``first`` + 1 or a finer one, … until it is 0.
+    """
+
+    start: Ints
+    image: NDArray[np.int32]
+    first: NDArray[np.int32]
+    share_start: Ints
+    share: Floats
+
+
+def compute_need(
+    scene: Scene,
+    cells: Cells,
+    pvs: Pvs,
+    sizes: Mapping[int, TextureSize],
+    points: int,
+    progress: Progress = silent,
+) -> Need:
+    """The need of all cells, from ``points`` sample points each; ``sizes`` of the images that have
+    a texture. Equal input gives equal results.
+
+    Raises InputError PTM-I500 for a number of points that makes no sense.
+    """
+    options = AchOptions(
+        samples=points, face=FACE, backend="embree", weighting="solid-angle", placement="sobol"
+    )
+    sampler = Sampler(scene, cells, pvs, options, BACKENDS["embree"])
+    try:
+        wanting = _Wanting(scene, cells, sizes, sampler)
+        found = []
+        for cell in range(cells.cell_count):
+            progress(cell, cells.cell_count, "need")
+            found.append(wanting.shares(sampler.points_of(cell)))
+        progress(cells.cell_count, cells.cell_count, "need")
+    finally:
+        sampler.renderer.close()
+    return _gathered(found)
+
+
+class _Wanting:
+    """Ready to say what the pixels at any sample points want."""
+
+    def __init__(
+        self, scene: Scene, cells: Cells, sizes: Mapping[int, TextureSize], sampler: Sampler
+    ) -> None:
+        self._renderer = sampler.renderer
+        self._surfaces = surfaces = Surfaces.of(scene, cells)
+        self._weight = sampler.weight
+        images = max(sizes, default=-1) + 1
+        size = np.zeros((images + 1, 2))
+        #: The finest level of each image; -1 without a texture, as the image -1, which comes last.
+        self._finest = np.full(images + 1, -1, dtype=np.int64)
+        for image, each in sizes.items():
+            size[image], self._finest[image] = (each.width, each.height), each.levels - 1
+        self._image = np.where(surfaces.image < images, surfaces.image, -1)
+        source = cells.triangle_source
+        self._gradient = gradients(scene.corners, scene.uv)[source] * size[self._image][..., None]
+
+    def shares(self, points: SamplePoints) -> Floats:
+        """(I, L) share of the view from the points that wants each level of each image."""
+        wanted = np.zeros((len(self._finest) - 1, max(int(self._finest.max()), 0) + 1))
+        total, most = 0.0, self._renderer.most
+        for first in range(0, len(points), most):
+            part = points.part(slice(first, first + most))
+            rays = len(part) * len(VIEWS) * FACE**2
+            weight = np.repeat(self._weight(part), len(VIEWS), axis=0).ravel().astype(np.float64)
+            eye = np.repeat(part.position, rays // len(part), axis=0)
+            for shows, hits in zip(*self._renderer.trace(part, np.arange(rays)), strict=True):
+                total += float(weight[shows >= 0].sum())
+                met = np.flatnonzero((shows >= 0) & (self._finest[self._image[shows]] >= 0))
+                which = shows[met]
+                image = self._image[which]
+                finest = self._finest[image]
+                normal = self._surfaces.plane[which, :3]
+                detail = levels_of_detail(hits[met] - eye[met], normal, self._gradient[which])
+                level = finest - np.clip(np.floor(detail), 0, finest).astype(np.int64)
+                key = image * wanted.shape[1] + level
+                wanted += np.bincount(key, weight[met], wanted.size).reshape(wanted.shape)
+        return wanted / total if total else wanted
+
+
+def gradients(corners: Floats, uv: Floats) -> Floats:
+    """(T, 2, 3) how the texture coordinates, (T, 3, 2), change along the plane of triangles with
+    (T, 3, 3) corners, for a metre; 0 for triangles without area."""
+    edge, change = corners[:, 1:] - corners[:, :1], uv[:, 1:] - uv[:, :1]
+    gram = edge @ edge.transpose(0, 2, 1)
+    area = gram[:, 0, 0] * gram[:, 1, 1] - gram[:, 0, 1] * gram[:, 1, 0]
+    turned = np.stack([gram[:, 1, 1], -gram[:, 0, 1], -gram[:, 1, 0], gram[:, 0, 0]], axis=-1)
+    inverse = np.divide(
+        turned, area[:, None], out=np.zeros_like(turned), where=area[:, None] > 0
+    ).reshape(-1, 2, 2)
+    return np.asarray(change.transpose(0, 2, 1) @ inverse @ edge)
+
+
+def levels_of_detail(ray: Floats, normal: Floats, gradient: Floats) -> Floats:
+    """(n,) log2 ρ, see above, of pixels that look along the (n, 3) rays, from the eye to the
+    surface in metres; (n, 3) unit normals; (n, 2, 3) texels for a metre along the surface."""
+    distance = np.linalg.norm(ray, axis=1, keepdims=True)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = ray / distance
+        right = np.cross(along, _UP)
+        right /= np.linalg.norm(right, axis=1, keepdims=True)
+        right = np.where(np.isfinite(right), right, [1.0, 0.0, 0.0])  # straight up or down
+        facing = np.einsum("ij,ij->i", along, normal)[:, None]
+        spans = []
+        for axis in (right, np.cross(right, along)):
+            lean = np.einsum("ij,ij->i", axis, normal)[:, None] / facing
+            step = PIXEL * distance * (axis - along * lean)
+            spans.append(np.linalg.norm(np.einsum("ijk,ik->ij", gradient, step), axis=1))
+        detail = np.log2(np.maximum(*spans))
+    # On edge, or where the eye touches the surface, nothing is seen of it: the coarsest will do.
+    return np.asarray(np.where(np.isnan(detail), np.inf, detail))
+
+
+def _gathered(found: list[Floats]) -> Need:
+    """Of each cell (I, L) shares that want just that level."""
+    counts, images, firsts, lengths, shares = [0], [], [], [0], [np.zeros(0)]
+    for wanted in found:
+        finer = np.cumsum(wanted[:, ::-1], axis=1)[:, ::-1]
+        met = np.flatnonzero(wanted.any(axis=1))
+        for image in met.tolist():
+            levels = np.flatnonzero(wanted[image])
+            shares.append(finer[image, levels[0] : levels[-1] + 1])
+            images.append(image)
+            firsts.append(int(levels[0]))
+            lengths.append(len(shares[-1]))
+        counts.append(len(met))
+    return Need(
+        start=np.cumsum(counts),
+        image=np.array(images, dtype=np.int32),
+        first=np.array(firsts, dtype=np.int32),
+        share_start=np.cumsum(lengths),
+        share=np.concatenate(shares),
+    )
