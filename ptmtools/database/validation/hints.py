@@ -147,8 +147,11 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
     at = database.at(HINTS)
     places = [database.at(path) for path in hints.paths]
     known = dict(hints.known())
+    levels = [len(row["ends"]) for row in hints.index["textures"]]
     for i, record in known.items():
         _check_record(record, i, places[i])
+        if wrong := impossible_need(record, levels):
+            places[i].add("PTM-D743", wrong, "need")
         if not _holds(hints.index["cells"][i]["box"], record["leaves"]):
             at.add("PTM-D741", "does not hold the leaves of the cell", f"cells[{i}].box")
     adjacent, visible = (
@@ -232,10 +235,6 @@ def _check_own_textures(
 
 
 def _check_textures(hints: ReadHints, used: set[int], database: ServedDatabase) -> None:
-    levels = [len(row["ends"]) for row in hints.index["textures"]]
-    for i, record in hints.known():
-        if wrong := impossible_need(record, levels):
-            database.at(hints.paths[i]).add("PTM-D743", wrong, "need")
     complete = all(record is not None for record in hints.records)
     for i, (row, files) in enumerate(zip(hints.index["textures"], hints.images, strict=True)):
         at = database.at(HINTS, f"textures[{i}]")
