@@ -12,11 +12,11 @@ from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
 from ptmtools.database.names import HINTS
 from ptmtools.errors import InputError
-from ptmtools.files import write_bytes
+from ptmtools.files import write_bytes, writing
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stages import CELLS, SCENE
-from ptmtools.walkthrough import figure
+from ptmtools.walkthrough import figure, pictures
 from ptmtools.walkthrough.comparing import SimulateOptions, counted, play, require_hints
 from ptmtools.walkthrough.path.making import make_path
 from ptmtools.walkthrough.path.options import PathOptions
@@ -68,6 +68,29 @@ DURATION = 150.0
     show_default=True,
     help="What is plotted.",
 )
+@click.option(
+    "--frames",
+    "frames_folder",
+    type=click.Path(),
+    metavar="DIR",
+    help="Also draw frames as PNGs, of the first policy, bandwidth, memory and walk, with what it "
+    "shows.",
+)
+@click.option(
+    "--every",
+    type=click.FloatRange(0, min_open=True),
+    default=10.0,
+    show_default=True,
+    help="Seconds from one frame that is drawn to the next.",
+)
+@click.option(
+    "--strip",
+    "strip_file",
+    type=click.Path(),
+    metavar="FILE",
+    help="Also draw, of the first likewise, what is seen after 10, 35 and 80 s where the walk "
+    "begins, and the full picture, as a PNG.",
+)
 @forced
 @as_json
 @voiced
@@ -80,6 +103,9 @@ def simulate(
     csv_file: str | None,
     plot_file: str | None,
     measure: str,
+    frames_folder: str | None,
+    every: float,
+    strip_file: str | None,
     force: bool,
     as_json: bool,
     **values: Any,
@@ -90,7 +116,7 @@ def simulate(
     or made as `ptm path` makes them. DB is not changed.
     """
     options = take(SimulateOptions, values)
-    for file in (csv_file, plot_file):
+    for file in (csv_file, plot_file, strip_file):
         if file:
             writable(file, force)
     if plot_file:
@@ -110,6 +136,15 @@ def simulate(
         write_bytes(csv_file, as_csv(played).encode(), force=force)
     if plot_file:
         write_bytes(plot_file, figure.picture(played, measure), force=force)
+    first = worlds[played[0].walk]
+    if frames_folder:
+        folder = Path(frames_folder)
+        with writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+        for name, data in pictures.frames(first, played[0].run, every):
+            write_bytes(folder / name, data, force=force)
+    if strip_file:
+        write_bytes(strip_file, pictures.strip(first, played[0]), force=force)
     if as_json:
         voice.emit_json(document(db, played, worlds))
         return

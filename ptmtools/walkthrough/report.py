@@ -22,8 +22,8 @@ FORMAT, SCHEMA = "ptmtools simulation", 1
 INTRODUCTION = (
     "e says how far the picture is from the full one: the root mean square over red, green and",
     "blue (0 to 255), averaged over the pixels. 0 is the full picture, 1 a step of 8-bit colour.",
-    "Waste is what was received and never on the screen. For who stands where the walk begins, e has",
-    "halved after the seconds under 50%, and so on.",
+    "Waste is what was received and never on the screen. For who stands where the walk begins, e",
+    "has halved after the seconds under 50%, and so on.",
 )
 #: Of the CSV.
 COLUMNS = (
