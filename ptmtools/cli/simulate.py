@@ -18,6 +18,7 @@ from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.walkthrough import figure, pictures
 from ptmtools.walkthrough.comparing import SimulateOptions, counted, play, require_hints
+from ptmtools.walkthrough.flip import require as require_flip
 from ptmtools.walkthrough.path.making import make_path
 from ptmtools.walkthrough.path.options import PathOptions
 from ptmtools.walkthrough.report import as_csv, document, table
@@ -58,6 +59,12 @@ DURATION = 150.0
     type=click.Path(),
     metavar="FILE",
     help="How the link changes over time, JSON or CSV.",
+)
+@click.option(
+    "--flip",
+    is_flag=True,
+    help="Also measure FLIP, the difference as people see it, of 12 frames of each run; takes "
+    "seconds a run.",
 )
 @click.option("--csv", "csv_file", type=click.Path(), help="Also write every frame as CSV.")
 @click.option("--plot", "plot_file", type=click.Path(), help="Also plot over time, as a PNG.")
@@ -100,6 +107,7 @@ def simulate(
     walk_files: tuple[str, ...],
     seeds: tuple[int, ...],
     trace_file: str | None,
+    flip: bool,
     csv_file: str | None,
     plot_file: str | None,
     measure: str,
@@ -121,6 +129,8 @@ def simulate(
             writable(file, force)
     if plot_file:
         figure.require()
+    if flip:
+        require_flip()
     trace = read_trace(trace_file) if trace_file else None
     walks = {file: read_walk(file) for file in walk_files} or _made(db, seeds)
     served = read_served(db)
@@ -131,7 +141,7 @@ def simulate(
             name: counted(prepare(served, walk, pyramids, progress=progress), options)
             for name, walk in walks.items()
         }
-        played = play(worlds, options, trace, progress)
+        played = play(worlds, options, trace, progress, flip=flip)
     if csv_file:
         write_bytes(csv_file, as_csv(played).encode(), force=force)
     if plot_file:

@@ -9,6 +9,7 @@ from typing import Literal
 from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
 from ptmtools.quantities import MemorySize, parse_bandwidth, parse_duration, parse_memory
+from ptmtools.walkthrough.flip import Flip
 from ptmtools.walkthrough.measures import STANDS, Measures, measure
 from ptmtools.walkthrough.network import Conditions
 from ptmtools.walkthrough.policies import POLICIES, Declared
@@ -121,10 +122,15 @@ def play(
     options: SimulateOptions,
     trace: Trace | None = None,
     progress: Progress = silent,
+    *,
+    flip: bool = False,
 ) -> list[Played]:
     """All runs: by link, memory, policy, walk.
 
-    Raises InputError: PTM-I701 a policy's hints are not there; PTM-I711, PTM-I712.
+    Raises
+    ------
+    InputError: PTM-I701 a policy's hints are not there; PTM-I711, PTM-I712.
+    MissingComponentError: PTM-M702 with ``flip``, without flip-evaluator.
     """
     cases = [
         (link, memory, policy, name)
@@ -136,6 +142,7 @@ def play(
     for world in worlds.values():
         require_hints(world.served, options.policies)
     standing = {name: world.standing(STANDS) for name, world in worlds.items()}
+    looks = {name: Flip(world) for name, world in worlds.items()} if flip else {}
     found = []
     for done, (link, memory, policy, name) in enumerate(cases):
         progress(done, len(cases), "simulating")
@@ -143,7 +150,8 @@ def play(
         budget = budget_of(world, memory)
         run = simulate(world, policy, link, budget)
         stood = simulate(standing[name], policy, link, budget)
-        found.append(Played(name, memory.text, run, measure(run, world, stood)))
+        seen = float(looks[name].each(run).mean()) if flip else None
+        found.append(Played(name, memory.text, run, measure(run, world, stood), seen))
     return found
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from ptmtools.quantities import count, size
 from ptmtools.walkthrough.comparing import Played
+from ptmtools.walkthrough.flip import FRAMES, PER_DEGREE, PIXELS
 from ptmtools.walkthrough.measures import SHARES
 from ptmtools.walkthrough.network import Conditions
 from ptmtools.walkthrough.world import World
@@ -35,14 +36,20 @@ _DIGITS = 6
 
 def table(played: Sequence[Played], worlds: Mapping[str, World]) -> list[str]:
     """Lines of text: a block for each link and memory, a row for each policy, means over walks."""
-    lines = [*INTRODUCTION, ""]
-    lines += [f"{name}: {_walk_line(world)}" for name, world in worlds.items()]
+    lines = [*INTRODUCTION]
     several, flip = len(worlds) > 1, any(p.flip is not None for p in played)
+    if flip:
+        lines.append(
+            f"FLIP: mean over {FRAMES} frames of {PIXELS:,} pixels, {PER_DEGREE:g} to a degree; 0 "
+            "to 1."
+        )
+    lines.append("")
+    lines += [f"{name}: {_walk_line(world)}" for name, world in worlds.items()]
     wide = max(len(p.run.policy) for p in played)
     spread = f"{'of walks':>13} " if several else ""
     head = (
         f"  {'policy':<{wide}} {'e':>6} {spread}{'p95':>6} {'still':>6} {'moving':>6} "
-        f"{'rmse':>6} {'FLIP ' if flip else ''}{'missing':>7} {'quality':>7} {'received':>9} "
+        f"{'rmse':>6} {'  FLIP ' if flip else ''}{'missing':>7} {'quality':>7} {'received':>9} "
         f"{'waste':>5} {'requests':>8} {'stalled':>7}  {_final_head()}"
     )
     for (link, memory, budget), block in groupby(
@@ -87,7 +94,7 @@ def _row(name: str, some: list[Played]) -> str:
     e = [m.e.mean for m in measures]
     spread = f"{f'{min(e):.2f}–{max(e):.2f}':>13} " if len(some) > 1 else ""
     flips = [p.flip for p in some if p.flip is not None]
-    flip = f"{np.mean(flips):.3f} "[1:] + " " if flips else ""
+    flip = f"{np.mean(flips):6.4f} " if flips else ""
     final = []
     for k in range(len(SHARES)):
         times = [m.final[k] for m in measures]
