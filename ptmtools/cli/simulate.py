@@ -174,6 +174,6 @@ def _made(db: str, seeds: tuple[int, ...]) -> dict[str, Walk]:
     artifacts = Artifacts(open_database(db))
     scene, cells = artifacts[SCENE], artifacts[CELLS]
     return {
-        f"seed {seed}": make_path(scene, cells, PathOptions(seed, DURATION)).walk
+        f"seed {seed}": make_path(scene, cells, PathOptions(seed=seed, duration=DURATION)).walk
         for seed in dict.fromkeys(seeds)
     }
