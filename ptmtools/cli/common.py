@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 from collections.abc import Callable
@@ -12,6 +13,8 @@ from typing import Any
 import click
 
 from ptmtools.cli.output import Voice
+from ptmtools.errors import OutputError
+from ptmtools.files import refuse_existing, writing
 
 Command = Callable[..., Any]
 
@@ -124,3 +127,17 @@ def new_database(function: Command) -> Command:
         return function(*arguments, model=model, db=place, **values)
 
     return command
+
+
+def writable(file: str, force: bool) -> None:
+    """Raises the `OutputError` that writing the file would end in, before much is measured for it:
+    PTM-O001 it exists, PTM-O002 there is no such folder, or none that may be written to."""
+    if not force:
+        refuse_existing(file)
+    path = Path(file).absolute()
+    if path.exists() and not path.is_file():
+        raise OutputError("PTM-O002", "is not a file", file=file, remedy="name a file instead")
+    with writing(file):
+        os.stat(path.parent / ".")  # what is no folder fails too
+        if not os.access(path.parent, os.W_OK | os.X_OK):
+            raise OSError(errno.EACCES, os.strerror(errno.EACCES))

@@ -33,6 +33,7 @@ COMMANDS = {
     "plot": ("reports", "plot", "Draw the floor plan of a database."),
     "tradeoff": ("tradeoff", "tradeoff", "Measure what settings cost, and how accurate they are."),
     "path": ("path", "path", "Make a walk through every room of a database."),
+    "simulate": ("simulate", "simulate", "Walk through a database as clients would see it."),
     "encode": ("images", "encode", "Encode images as .ptm files."),
     "decode": ("images", "decode", "Decode .ptm files to images."),
     "warm-up": ("warm_up", "warm_up", "Compile for this machine, before the first run."),

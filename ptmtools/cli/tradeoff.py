@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import errno
-import os
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import click
 
-from ptmtools.cli.common import as_json, database, forced, voiced
+from ptmtools.cli.common import as_json, database, forced, voiced, writable
 from ptmtools.cli.output import Voice
 from ptmtools.coverage.options import MAX_SAMPLES
-from ptmtools.errors import OutputError
-from ptmtools.files import refuse_existing, write_bytes, writing
+from ptmtools.files import write_bytes
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
 from ptmtools.tradeoff.experiment import Trade, run
@@ -82,7 +78,7 @@ def tradeoff(
     """
     for file in (csv_file, plot_file):
         if file:
-            _writable(file, force)
+            writable(file, force)
     if plot_file:
         require()
     subject = Subject(Artifacts(open_database(db)), cells_tried, reference)
@@ -103,20 +99,6 @@ def tradeoff(
         for line in table(trade, wanted):
             voice.say(line)
         voice.say("")
-
-
-def _writable(file: str, force: bool) -> None:
-    """Raises the `OutputError` that writing the file would end in, before much is measured for it:
-    PTM-O001 it exists, PTM-O002 there is no such folder, or none that may be written to."""
-    if not force:
-        refuse_existing(file)
-    path = Path(file).absolute()
-    if path.exists() and not path.is_file():
-        raise OutputError("PTM-O002", "is not a file", file=file, remedy="name a file instead")
-    with writing(file):
-        os.stat(path.parent / ".")  # what is no folder fails too
-        if not os.access(path.parent, os.W_OK | os.X_OK):
-            raise OSError(errno.EACCES, os.strerror(errno.EACCES))
 
 
 def _document(trade: Trade, wanted: float | None) -> dict[str, Any]:

@@ -16,6 +16,10 @@ from ptmtools.walkthrough.memory import columns_of
 from ptmtools.walkthrough.served import Document, Served, Surfaces
 from ptmtools.walkthrough.view.tables import gradients
 
+#: A level that only repeats the texels of the one below still sharpens what is filtered between
+#: them, so it adds at least this, 0 to 255.
+LEAST_RMS = 0.5
+
 
 @dataclass(frozen=True)
 class Shapes:
@@ -44,8 +48,8 @@ class Catalogue:
     ----------
     levels: (T,) of each texture.
     ends: (T, K) bytes of the `.ptm` that hold each column. memory: (T, K) of texture memory.
-    rms: (T, K) what each column adds to the one before it, root mean square, 0 to 255; of the
-        first level 0, of what lies behind the last 0.
+    rms: (T, K) what each column adds to the one before it, root mean square, 0 to 255, at least
+        `LEAST_RMS`; of the first level 0, of what lies behind the last 0.
     colors: (T, 3) mean colour, 0 to 255.
     index_bytes, statistics_bytes, record_bytes, geometry_bytes: on the link; (C,) the latter two.
     records, statistics: of each cell.
@@ -151,6 +155,9 @@ def catalogue_of(served: Served, rms: Floats, colors: Floats) -> Catalogue:
     levels, ends, memory = columns_of(served.index["textures"])
     beside = np.zeros(ends.shape)
     beside[:, 1:] = rms[:, : ends.shape[1] - 1]
+    column = np.arange(ends.shape[1])
+    refines = (column > 1) & (column <= levels[:, None])
+    beside[refines] = np.maximum(beside[refines], LEAST_RMS)
     return Catalogue(
         levels=levels,
         ends=ends,

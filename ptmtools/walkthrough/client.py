@@ -34,6 +34,10 @@ class Kind(IntEnum):
     STATISTICS = 4
 
 
+#: What is neither textures nor geometry.
+DOCUMENTS = (Kind.INDEX, Kind.RECORD, Kind.STATISTICS)
+
+
 @dataclass(frozen=True, slots=True)
 class Range:
     """Bytes ``begin`` to ``end`` of the file number ``number`` of a kind."""

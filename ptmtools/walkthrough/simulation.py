@@ -12,7 +12,7 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.walkthrough.allocation import picture
-from ptmtools.walkthrough.client import Client
+from ptmtools.walkthrough.client import DOCUMENTS, Client
 from ptmtools.walkthrough.network import Conditions, Link
 from ptmtools.walkthrough.policies import Declared
 from ptmtools.walkthrough.world import World
@@ -34,6 +34,7 @@ class Run:
     memory: (F,) bytes of texture memory in use. fetched: (F,) bytes of bodies received so far.
     column: (F, T) what of each texture is in texture memory. there: (F, C) whose geometry is there.
     body, overhead, cancelled: bytes received: bodies, headers, what came after a cancellation.
+    documents: bytes of bodies that are neither textures nor geometry.
     useful: bytes of textures and geometry that were on the screen.
     uploads: bytes that went to texture memory. switches: changes of a texture's finest level.
     requests: how many. stalls: frames in which the cell the walker is in was not there.
@@ -56,6 +57,7 @@ class Run:
     body: float
     overhead: float
     cancelled: float
+    documents: int
     useful: float
     uploads: int
     switches: int
@@ -114,6 +116,7 @@ def simulate(world: World, policy: Declared, conditions: Conditions, budget: int
         body=link.bytes,
         overhead=link.overhead_bytes,
         cancelled=link.wasted,
+        documents=sum(int(client.files[kind].there.sum()) for kind in DOCUMENTS),
         useful=textures + float(stock.geometry_bytes[drawn].sum()),
         uploads=int(np.maximum(held[0] - held[1], 0).sum()),
         switches=int(np.count_nonzero(steps)),

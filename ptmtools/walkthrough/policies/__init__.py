@@ -39,12 +39,14 @@ class Declared:
     name, about: for `--policy`.
     knows: what it needs.
     client: makes a client of it, in a world, on a link, with a budget.
+    needs: a field that the records of cells must have, and how to get it; None: as they always are.
     """
 
     name: str
     about: str
     knows: Knows
     client: Callable[[World, Link, int], Client]
+    needs: tuple[str, str] | None = None
 
 
 def _engine(
@@ -80,6 +82,7 @@ _LIST = (
         "the same by texture, of hints with `--per-texture`",
         Knows.CAMERA,
         _same(coverage.Weighted(coverage.by_texture)),
+        needs=("textureShares", "measure it with `ptm ach DB --per-texture`, then `ptm emit DB`"),
     ),
     Declared(
         "distance",

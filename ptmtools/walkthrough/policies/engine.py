@@ -29,6 +29,8 @@ from ptmtools.walkthrough.world import World
 RANGE_SECONDS, RANGE_BYTES = 0.2, 8000
 #: Requests at a time.
 CONNECTIONS = 6
+#: What a request costs besides its bytes: headers, and waiting.
+OVERHEAD = 300
 #: What a pixel is wrong by where there is nothing: the mean of what was measured, 0 to 255.
 NOTHING = 64.0
 #: The record of a neighbouring cell is worth as much as so large a share of the screen.
@@ -172,7 +174,7 @@ class EngineClient(Client):
             return False
         left = sum(request.left for request in self.waiting)
         ahead = self.estimate.latency + RANGE_SECONDS / 2
-        return left == 0 or 8 * left / self.estimate.bandwidth < ahead
+        return left == 0 or 8 * left < ahead * self.estimate.bandwidth
 
     def _fetch_one(self) -> bool:
         """Asks for the range that is worth most; False if there is none."""
@@ -186,7 +188,7 @@ class EngineClient(Client):
             return False
         stock, worth = self.world.catalogue, self._worth
         best, texture, column = next_fetch(
-            worth.fetch, stock.ends, self.textures.asked, self._target
+            worth.fetch, stock.ends, self.textures.asked, self._target, OVERHEAD
         )
         left = self.geometry.size - self.geometry.asked
         density = np.where(left > 0, worth.geometry / np.maximum(left, 1), 0.0)
@@ -203,7 +205,7 @@ class EngineClient(Client):
             )
         if texture < 0 and worth.ahead is not None:
             best, texture, column = next_fetch(
-                worth.ahead, stock.ends, self.textures.asked, stock.levels
+                worth.ahead, stock.ends, self.textures.asked, stock.levels, OVERHEAD
             )
         if texture < 0:
             return False

@@ -1,0 +1,179 @@
+"""`ptm simulate`: what clients show on a walk, over a modelled link, with so much memory."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ptmtools.cli.common import as_json, database, forced, voiced, writable
+from ptmtools.cli.output import Voice
+from ptmtools.cli.parameters import options_of, take
+from ptmtools.database.names import HINTS
+from ptmtools.errors import InputError
+from ptmtools.files import write_bytes, writing
+from ptmtools.pipeline import Artifacts
+from ptmtools.pipeline.command import open_database
+from ptmtools.pipeline.stages import CELLS, SCENE
+from ptmtools.walkthrough import figure, pictures
+from ptmtools.walkthrough.comparing import SimulateOptions, counted, play, require_hints
+from ptmtools.walkthrough.flip import require as require_flip
+from ptmtools.walkthrough.path.making import make_path
+from ptmtools.walkthrough.path.options import PathOptions
+from ptmtools.walkthrough.report import as_csv, document, table
+from ptmtools.walkthrough.served import read_served
+from ptmtools.walkthrough.trace import read_trace
+from ptmtools.walkthrough.view.pyramids import read_pyramids
+from ptmtools.walkthrough.walk import Walk, read_walk
+from ptmtools.walkthrough.world import prepare
+
+#: How long the walk is that is made where none is given, s.
+DURATION = 150.0
+
+
+@click.command("simulate")
+@database
+@click.option(
+    "--walk",
+    "walk_files",
+    type=click.Path(),
+    multiple=True,
+    metavar="FILE",
+    help="A walk, as `ptm path` writes it. May be given several times. By default one of "
+    f"{DURATION:.0f} s is made.",
+)
+@click.option(
+    "--seed",
+    "seeds",
+    type=click.IntRange(0),
+    multiple=True,
+    default=(PathOptions.seed,),
+    show_default=True,
+    help="Of the walk that is made without --walk. May be given several times.",
+)
+@options_of(SimulateOptions)
+@click.option(
+    "--trace",
+    "trace_file",
+    type=click.Path(),
+    metavar="FILE",
+    help="How the link changes over time, JSON or CSV.",
+)
+@click.option(
+    "--flip",
+    is_flag=True,
+    help="Also measure FLIP, the difference as people see it, of 12 frames of each run; takes "
+    "seconds a run.",
+)
+@click.option("--csv", "csv_file", type=click.Path(), help="Also write every frame as CSV.")
+@click.option("--plot", "plot_file", type=click.Path(), help="Also plot over time, as a PNG.")
+@click.option(
+    "--measure",
+    type=click.Choice(list(figure.MEASURES)),
+    default="e",
+    show_default=True,
+    help="What is plotted.",
+)
+@click.option(
+    "--frames",
+    "frames_folder",
+    type=click.Path(),
+    metavar="DIR",
+    help="Also draw frames as PNGs, of the first policy, bandwidth, memory and walk, with what it "
+    "shows.",
+)
+@click.option(
+    "--every",
+    type=click.FloatRange(0, min_open=True),
+    default=10.0,
+    show_default=True,
+    help="Seconds from one frame that is drawn to the next.",
+)
+@click.option(
+    "--strip",
+    "strip_file",
+    type=click.Path(),
+    metavar="FILE",
+    help="Also draw, of the first likewise, what is seen after 10, 35 and 80 s where the walk "
+    "begins, and the full picture, as a PNG.",
+)
+@forced
+@as_json
+@voiced
+def simulate(
+    voice: Voice,
+    db: str,
+    walk_files: tuple[str, ...],
+    seeds: tuple[int, ...],
+    trace_file: str | None,
+    flip: bool,
+    csv_file: str | None,
+    plot_file: str | None,
+    measure: str,
+    frames_folder: str | None,
+    every: float,
+    strip_file: str | None,
+    force: bool,
+    as_json: bool,
+    **values: Any,
+) -> None:
+    """Walk through DB with clients that fetch it over a modelled link, and say what they showed.
+
+    Every policy walks over every link with every amount of memory. The walks are those of --walk,
+    or made as `ptm path` makes them. DB is not changed.
+    """
+    options = take(SimulateOptions, values)
+    for file in (csv_file, plot_file, strip_file):
+        if file:
+            writable(file, force)
+    if plot_file:
+        figure.require()
+    if flip:
+        require_flip()
+    trace = read_trace(trace_file) if trace_file else None
+    walks = {file: read_walk(file) for file in walk_files} or _made(db, seeds)
+    served = read_served(db)
+    require_hints(served, options.policies)
+    with voice.progress() as progress:
+        pyramids = read_pyramids(served, progress)
+        worlds = {
+            name: counted(prepare(served, walk, pyramids, progress=progress), options)
+            for name, walk in walks.items()
+        }
+        played = play(worlds, options, trace, progress, flip=flip)
+    if csv_file:
+        write_bytes(csv_file, as_csv(played).encode(), force=force)
+    if plot_file:
+        write_bytes(plot_file, figure.picture(played, measure), force=force)
+    first = worlds[played[0].walk]
+    if frames_folder:
+        folder = Path(frames_folder)
+        with writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+        for name, data in pictures.frames(first, played[0].run, every):
+            write_bytes(folder / name, data, force=force)
+    if strip_file:
+        write_bytes(strip_file, pictures.strip(first, played[0]), force=force)
+    if as_json:
+        voice.emit_json(document(db, played, worlds))
+        return
+    for line in table(played, worlds):
+        voice.say(line)
+
+
+def _made(db: str, seeds: tuple[int, ...]) -> dict[str, Walk]:
+    """Walks through a database, by what they are called."""
+    if (Path(db) / HINTS).exists():
+        raise InputError(
+            "PTM-I702",
+            "is a served folder, which does not say where one can walk",
+            file=db,
+            remedy="give a walk with --walk FILE, or the database that the folder belongs to",
+        )
+    artifacts = Artifacts(open_database(db))
+    scene, cells = artifacts[SCENE], artifacts[CELLS]
+    return {
+        f"seed {seed}": make_path(scene, cells, PathOptions(seed=seed, duration=DURATION)).walk
+        for seed in dict.fromkeys(seeds)
+    }

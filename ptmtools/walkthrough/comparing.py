@@ -1,0 +1,160 @@
+"""Policies, links and amounts of texture memory, all with all, on some walks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from ptmtools.errors import InputError
+from ptmtools.progress import Progress, silent
+from ptmtools.quantities import MemorySize, parse_bandwidth, parse_duration, parse_memory
+from ptmtools.walkthrough.flip import Flip
+from ptmtools.walkthrough.measures import STANDS, Measures, measure
+from ptmtools.walkthrough.network import Conditions
+from ptmtools.walkthrough.policies import POLICIES, Declared
+from ptmtools.walkthrough.served import Served
+from ptmtools.walkthrough.simulation import Run, simulate
+from ptmtools.walkthrough.trace import Trace
+from ptmtools.walkthrough.world import World
+
+
+@dataclass(frozen=True)
+class SimulateOptions:
+    """
+    Attributes
+    ----------
+    policy: clients that walk, with commas in between
+    bandwidth: of the link, bit/s, such as 56k, 4M (powers of ten) or inf, with commas in between.
+    latency: from a request to the first byte of its response, such as 100ms or 0.1.
+    overhead: bytes of headers a request.
+    protocol: h1, six connections that share the link, or h2, one with priorities.
+    memory: for textures, such as 4MiB, 10% of what all textures take, or inf, with commas in
+        between.
+    paper_bytes: count three bytes a texel of RGB, as the paper does; graphics processors take four.
+
+    Raises InputError: PTM-I711 a link that cannot be; PTM-I712 a word that is no such quantity.
+    """
+
+    policy: str = field(
+        default="paper,ach,screen+distance,oracle",
+        metadata={"choices": POLICIES, "several": True},
+    )
+    bandwidth: str = "512k,4M"
+    latency: str = "100ms"
+    overhead: int = 300
+    protocol: Literal["h1", "h2"] = "h1"
+    memory: str = "4MiB,10%"
+    paper_bytes: bool = False
+
+    def __post_init__(self) -> None:
+        self.links()
+        self.memories  # noqa: B018 - both raise for what cannot be read
+
+    @property
+    def policies(self) -> list[Declared]:
+        """In the order given."""
+        return [POLICIES[name] for name in _parts(self.policy)]
+
+    @property
+    def memories(self) -> list[MemorySize]:
+        """In the order given; raises InputError PTM-I712."""
+        return [parse_memory(part) for part in _parts(self.memory)]
+
+    def links(self, trace: Trace | None = None) -> list[Conditions]:
+        """A link for each bandwidth, all as the trace says; raises InputError PTM-I711, I712."""
+        return [
+            Conditions(
+                parse_bandwidth(part),
+                parse_duration(self.latency),
+                self.overhead,
+                self.protocol,
+                trace=trace,
+            )
+            for part in _parts(self.bandwidth)
+        ]
+
+
+@dataclass(frozen=True)
+class Played:
+    """A run and its place among the others.
+
+    Attributes
+    ----------
+    walk, memory: what they are called.
+    flip: mean FLIP of some frames, if it was asked for.
+    """
+
+    walk: str
+    memory: str
+    run: Run
+    measures: Measures
+    flip: float | None = None
+
+
+def require_hints(served: Served, policies: Sequence[Declared]) -> None:
+    """Raises InputError PTM-I701 if the records lack what a policy needs."""
+    for policy in policies:
+        if policy.needs and any(policy.needs[0] not in record for record in served.records):
+            raise InputError(
+                "PTM-I701",
+                f"policy {policy.name} needs {policy.needs[0]}, which the hints do not have",
+                file=served.folder,
+                remedy=policy.needs[1],
+            )
+
+
+def counted(world: World, options: SimulateOptions) -> World:
+    """The world with texture memory counted as asked."""
+    if not options.paper_bytes:
+        return world
+    return replace(world, catalogue=world.catalogue.counted_by_paper(world.served))
+
+
+def budget_of(world: World, memory: MemorySize) -> int:
+    """Bytes of texture memory; no limit is what all textures take."""
+    held = memory.of(world.catalogue.whole)
+    return world.catalogue.whole if held is None else held
+
+
+def play(
+    worlds: Mapping[str, World],
+    options: SimulateOptions,
+    trace: Trace | None = None,
+    progress: Progress = silent,
+    *,
+    flip: bool = False,
+) -> list[Played]:
+    """All runs: by link, memory, policy, walk.
+
+    Raises
+    ------
+    InputError: PTM-I701 a policy's hints are not there; PTM-I711, PTM-I712.
+    MissingComponentError: PTM-M702 with ``flip``, without flip-evaluator.
+    """
+    cases = [
+        (link, memory, policy, name)
+        for link in options.links(trace)
+        for memory in options.memories
+        for policy in options.policies
+        for name in worlds
+    ]
+    for world in worlds.values():
+        require_hints(world.served, options.policies)
+    standing = {name: world.standing(STANDS) for name, world in worlds.items()}
+    looks = {name: Flip(world) for name, world in worlds.items()} if flip else {}
+    found = []
+    for done, (link, memory, policy, name) in enumerate(cases):
+        progress(done, len(cases), "simulating")
+        world = worlds[name]
+        budget = budget_of(world, memory)
+        run = simulate(world, policy, link, budget)
+        stood = simulate(standing[name], policy, link, budget)
+        seen = float(looks[name].each(run).mean()) if flip else None
+        found.append(Played(name, memory.text, run, measure(run, world, stood), seen))
+    return found
+
+
+def _parts(text: str) -> list[str]:
+    """Each once."""
+    return list(dict.fromkeys(part.strip() for part in text.split(",")))

@@ -1,0 +1,199 @@
+"""Runs as a table of text, as a JSON document, and as CSV, a row for each frame."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from ptmtools.quantities import count, size
+from ptmtools.walkthrough.comparing import Played
+from ptmtools.walkthrough.flip import FRAMES, PER_DEGREE, PIXELS
+from ptmtools.walkthrough.measures import SHARES
+from ptmtools.walkthrough.network import Conditions
+from ptmtools.walkthrough.world import World
+
+FORMAT, SCHEMA = "ptmtools simulation", 1
+#: What a reader has to know of the table.
+INTRODUCTION = (
+    "e says how far the picture is from the full one: the root mean square over red, green and",
+    "blue (0 to 255), averaged over the pixels. 0 is the full picture, 1 a step of 8-bit colour.",
+    "Waste is what was received and never on the screen. For who stands where the walk begins, e",
+    "has halved after the seconds under 50%, and so on.",
+)
+#: Of the CSV.
+COLUMNS = (
+    *("policy", "bandwidth", "latency", "protocol", "memory", "walk", "time", "still"),
+    *("e", "rmse", "missing", "quality", "texture_bytes", "received_bytes"),
+)
+_DIGITS = 6
+
+
+def table(played: Sequence[Played], worlds: Mapping[str, World]) -> list[str]:
+    """Lines of text: a block for each link and memory, a row for each policy, means over walks."""
+    lines = [*INTRODUCTION]
+    several, flip = len(worlds) > 1, any(p.flip is not None for p in played)
+    if flip:
+        lines.append(
+            f"FLIP: mean over {FRAMES} frames of {PIXELS:,} pixels, {PER_DEGREE:g} to a degree; 0 "
+            "to 1."
+        )
+    lines.append("")
+    lines += [f"{name}: {_walk_line(world)}" for name, world in worlds.items()]
+    wide = max(len(p.run.policy) for p in played)
+    spread = f"{'of walks':>13} " if several else ""
+    head = (
+        f"  {'policy':<{wide}} {'e':>6} {spread}{'p95':>6} {'still':>6} {'moving':>6} "
+        f"{'rmse':>6} {'  FLIP ' if flip else ''}{'missing':>7} {'quality':>7} {'received':>9} "
+        f"{'waste':>5} {'requests':>8} {'stalled':>7}  {_final_head()}"
+    )
+    for (link, memory, budget), block in groupby(
+        played, lambda p: (p.run.conditions, p.memory, p.run.budget)
+    ):
+        lines += ["", f"{link_text(link)}; texture memory {memory} ({size(budget)})", head]
+        for policy, some in groupby(block, lambda p: p.run.policy):
+            lines.append(_row(f"{policy:<{wide}}", list(some)))
+    over = sum(p.measures.overruns for p in played)
+    if over:
+        lines += ["", f"{count(over, 'frame')} above the budget"]
+    return lines
+
+
+def _walk_line(world: World) -> str:
+    return (
+        f"{world.time[-1]:.0f} s, {world.frames:,} frames, "
+        f"the viewpoint still in {world.still.mean():.0%} of them"
+    )
+
+
+def link_text(link: Conditions) -> str:
+    """What a link is like."""
+    if link.bandwidth is None:
+        rate = "no limit of bandwidth"
+    else:
+        power, unit = next((p, u) for p, u in _UNITS if link.bandwidth >= p)
+        rate = f"{link.bandwidth / power:g} {unit}"
+    traced = ", by a trace" if link.trace else ""
+    return f"{rate}, {link.latency * 1000:g} ms, {link.protocol}{traced}"
+
+
+_UNITS = ((10**9, "Gbit/s"), (10**6, "Mbit/s"), (10**3, "kbit/s"), (0, "bit/s"))
+
+
+def _final_head() -> str:
+    return " ".join(f"{f'{share:.0%}':>6}" for share in SHARES)
+
+
+def _row(name: str, some: list[Played]) -> str:
+    measures = [p.measures for p in some]
+    e = [m.e.mean for m in measures]
+    spread = f"{f'{min(e):.2f}–{max(e):.2f}':>13} " if len(some) > 1 else ""
+    flips = [p.flip for p in some if p.flip is not None]
+    flip = f"{np.mean(flips):6.4f} " if flips else ""
+    final = []
+    for k in range(len(SHARES)):
+        times = [m.final[k] for m in measures]
+        known = [t for t in times if t is not None]
+        final.append(f"{np.mean(known):6.1f}" if len(known) == len(times) else f"{'–':>6}")
+    return (
+        f"  {name} {np.mean(e):6.2f} {spread}{_mean([m.e.p95 for m in measures]):>6} "
+        f"{_mean([m.e.still for m in measures]):>6} {_mean([m.e.moving for m in measures]):>6} "
+        f"{_mean([m.rmse.mean for m in measures]):>6} {flip}"
+        f"{np.mean([m.missing.mean for m in measures]):7.1%} "
+        f"{np.mean([m.quality.mean for m in measures]):7.1%} "
+        f"{size(round(np.mean([m.bytes for m in measures]))):>9} "
+        f"{np.mean([m.waste for m in measures]):5.0%} "
+        f"{np.mean([m.requests for m in measures]):8,.0f} "
+        f"{np.mean([m.stalls for m in measures]):5.1f} s  {' '.join(final)}"
+    )
+
+
+def _mean(values: list[float]) -> str:
+    """Of those that are numbers."""
+    known = [v for v in values if not np.isnan(v)]
+    return f"{np.mean(known):.2f}" if known else "–"
+
+
+def document(database: str, played: Sequence[Played], worlds: Mapping[str, World]) -> Any:
+    """All runs as JSON has them; the schema is published. Numbers have `_DIGITS` digits."""
+    some = next(iter(worlds.values()))
+    return {
+        "format": FORMAT,
+        "schema": SCHEMA,
+        "database": database,
+        "textureMemory": some.catalogue.whole,
+        "framesPerSecond": some.rate,
+        "pixels": [some.camera.width, some.camera.height],
+        "walks": [
+            {
+                "name": name,
+                "seconds": round(float(world.time[-1]), _DIGITS),
+                "frames": world.frames,
+                "still": round(float(world.still.mean()), _DIGITS),
+            }
+            for name, world in worlds.items()
+        ],
+        "runs": [_run_document(p) for p in played],
+    }
+
+
+def _run_document(played: Played) -> dict[str, Any]:
+    run, m = played.run, played.measures
+    found = {
+        "policy": run.policy,
+        "bandwidth": run.conditions.bandwidth,
+        "latency": run.conditions.latency,
+        "protocol": run.conditions.protocol,
+        "traced": run.conditions.trace is not None,
+        "memory": run.budget,
+        "walk": played.walk,
+        "e": asdict(m.e),
+        "rmse": m.rmse.mean,
+        "missing": m.missing.mean,
+        "quality": m.quality.mean,
+        "bytes": m.bytes,
+        "overheadBytes": m.overhead,
+        "cancelledBytes": m.cancelled,
+        "waste": m.waste,
+        "requests": m.requests,
+        "stalled": m.stalls,
+        "uploadedBytes": m.uploads,
+        "switchesPerMinute": m.switches,
+        "overruns": m.overruns,
+        "secondsTo": {f"{s:.0%}": t for s, t in zip(SHARES, m.final, strict=True)},
+        "details": {name: asdict(getattr(m, name)) for name in ("rmse", "missing", "quality")},
+    }
+    if played.flip is not None:
+        found["flip"] = played.flip
+    rounded: dict[str, Any] = _rounded(found)
+    return rounded
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _rounded(inner) for name, inner in value.items()}
+    return round(value, _DIGITS) if isinstance(value, float) else value
+
+
+def as_csv(played: Sequence[Played]) -> str:
+    """A row for each frame of each run; an empty bandwidth is none."""
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(COLUMNS)
+    for one in played:
+        run = one.run
+        link = run.conditions
+        rate = "" if link.bandwidth is None else f"{link.bandwidth:g}"
+        head = [run.policy, rate, f"{link.latency:g}", link.protocol, run.budget, one.walk]
+        numbers = np.stack([run.error, np.sqrt(run.square), run.missing, run.quality], axis=1)
+        whole = np.stack([run.still, run.memory, np.rint(run.fetched)], axis=1).astype(np.int64)
+        for time, (still, held, received), row in zip(
+            run.time.tolist(), whole.tolist(), numbers.tolist(), strict=True
+        ):
+            rows.writerow([*head, f"{time:g}", still, *(f"{v:.6g}" for v in row), held, received])
+    return text.getvalue()
