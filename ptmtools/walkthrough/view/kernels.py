@@ -6,10 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.compiled import kernel, plain_kernel
+from ptmtools.compiled import plain_kernel
 
 #: What is shown where nothing is known: 0 to 255.
 GREY = 128.0
+
+
+@plain_kernel
+def wrapped(at: float, side: int) -> int:
+    """Which texel is at a whole number along a side of a texture that repeats."""
+    if 0.0 <= at < side:  # most are, and divisions are dear
+        return int(at)
+    return int(at - np.floor(at / side) * side) % side
 
 
 @plain_kernel
@@ -32,14 +40,14 @@ def sample(
         x0 = int(min(max(left, 0.0), width - 1.0))
         x1 = int(min(max(left + 1.0, 0.0), width - 1.0))
     else:
-        x0 = int(left - np.floor(left / width) * width) % width
-        x1 = (x0 + 1) % width
+        x0 = wrapped(left, width)
+        x1 = x0 + 1 if x0 + 1 < width else 0
     if clamp_v:
         y0 = int(min(max(top, 0.0), height - 1.0))
         y1 = int(min(max(top + 1.0, 0.0), height - 1.0))
     else:
-        y0 = int(top - np.floor(top / height) * height) % height
-        y1 = (y0 + 1) % height
+        y0 = wrapped(top, height)
+        y1 = y0 + 1 if y0 + 1 < height else 0
     a, b = start + (y0 * width + x0) * 3, start + (y0 * width + x1) * 3
     c, d = start + (y1 * width + x0) * 3, start + (y1 * width + x1) * 3
     for k in range(3):
@@ -79,7 +87,7 @@ def level_of_detail(
     return float(np.log2(covered)) if covered > 1e-30 else -99.0
 
 
-@kernel
+@plain_kernel
 def add_frame(
     triangle: Ints,
     ray: Floats,
@@ -104,6 +112,10 @@ def add_frame(
     square: Floats,
     need: Floats,
     sight: Floats,
+    levels: Floats,
+    exact: Floats,
+    offset: Floats,
+    scaled: Floats,
 ) -> None:
     """Adds what the pixels of one frame show to the sums of each pair of cell and texture.
 
@@ -118,9 +130,8 @@ def add_frame(
         nothing, the mean colour, level 0, level 1, … as the finest that is there.
     need: (P, L) sums of how much each level is wanted, 0 to 1 a pixel; sight: the same of the
         client's item buffer.
+    levels, exact, offset, scaled: (L, 3), (3,), (3,), (2, 3) room to work in.
     """
-    levels = np.zeros((start.shape[1], 3))
-    exact, offset, scaled = np.zeros(3), np.zeros(3), np.zeros((2, 3))
     for i in range(len(triangle)):
         f = triangle[i]
         if f < 0:

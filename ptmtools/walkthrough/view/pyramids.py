@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints
 from ptmtools.progress import Progress, silent
 from ptmtools.texture import reader
+from ptmtools.texture.detail import squares_between
 from ptmtools.texture.model import Limits
 from ptmtools.walkthrough.served import Served
 
@@ -62,7 +63,7 @@ def read_pyramids(served: Served, progress: Progress = silent) -> Pyramids:
                 if below is None:
                     mean[t] = level.reshape(-1, 3).mean(axis=0)
                 else:
-                    rms[t, n] = _rms(level, below)
+                    rms[t, n] = np.sqrt(squares_between(level, below) / level.size)
                 start[t, n], size[t, n] = at, (level.shape[1], level.shape[0])
                 count[t] = n + 1
                 at += level.size
@@ -83,14 +84,3 @@ def _rgb(samples: NDArray[Any]) -> NDArray[np.uint8]:
         shown = np.rint(np.clip(held, 0, 1) * 255).astype(np.uint8)
     color = shown[:, :, :3] if shown.shape[2] >= 3 else np.repeat(shown[:, :, :1], 3, axis=2)
     return np.ascontiguousarray(color)
-
-
-def _rms(level: NDArray[np.uint8], below: NDArray[np.uint8]) -> float:
-    height, width = level.shape[:2]
-    row = np.minimum(np.arange(height) // 2, below.shape[0] - 1)
-    column = np.minimum(np.arange(width) // 2, below.shape[1] - 1)
-    total = 0
-    for y in range(0, height, 256):  # a few rows at a time: images may be large
-        under = below[row[y : y + 256]][:, column].astype(np.int32)
-        total += int(((level[y : y + 256] - under) ** 2).sum(dtype=np.int64))
-    return float(np.sqrt(total / level.size))

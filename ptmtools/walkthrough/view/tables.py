@@ -88,6 +88,7 @@ def look(
     pair = pair.reshape(-1).astype(np.int64)
     deepest = pyramids.start.shape[1]
     wide = (deepest + 2, deepest + 2, deepest, deepest)
+    room = [np.zeros(shape) for shape in ((deepest, 3), (3,), (3,), (2, 3))]
     sums = [np.zeros((len(pairs), columns)) for columns in wide]
     parts: list[list[Floats]] = [[] for _ in wide]
     found: list[Ints] = []
@@ -110,7 +111,7 @@ def look(
                 shown[k], rays[k], axes[k], eye[begin + k], pixel, corner, normal, gradient,
                 surfaces.uv, surfaces.texture, pair, surfaces.color, surfaces.clamped,
                 pyramids.texel, pyramids.start, pyramids.size, pyramids.count, pyramids.mean, seen,
-                *sums,
+                *sums, *room,
             )  # fmt: skip
             shows = shown[k, seen]
             hit = np.flatnonzero(shows >= 0)
