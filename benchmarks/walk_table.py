@@ -1,0 +1,159 @@
+"""What clients show to a walker: ``python benchmarks/walk_table.py``
+
+Every policy of the simulator, on four links and with three amounts of texture memory, on three
+walks of 150 seconds through each of four scenes (`walk_scenes`): `h1`, 100 ms to the first byte,
+300 bytes of headers a request; geometry, records and hints are on the link, too. What is missing is
+built and run, in two processes; an interrupted run goes on where it was (`walk_runs`).
+
+e             mean over pixels and frames of the root mean square error over R, G and B, 0 to 255
+p95           what e does not exceed in 95 % of the frames
+waste         share of the bytes received that was never on the screen
+/ oracle      e over that of `oracle` on the same walk under the same conditions, on average
+± walks       standard deviation of that ratio over the walks through a scene, root mean square
+s             seconds that a run takes
+
+The last table is beside the figures of the research prototype, which had geometry and hints for
+nothing, and other walks: e over the prototype's, over the scenes and conditions that it had.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from itertools import product
+from pathlib import Path
+from statistics import fmean, pstdev
+
+from walk_runs import Case, Row, made
+from walk_scenes import FOLDER, SCENES, WALKS, make_scenes
+
+from ptmtools.walkthrough.policies import POLICIES
+
+BANDWIDTHS = ("56k", "512k", "4M", "16M")
+MEMORIES = ("4MiB", "10%", "30%")
+#: e of the prototype in three scenes, at .5, 4 and 16 Mbit/s: where clients are alike.
+PROTOTYPE_SCENES, PROTOTYPE_LINKS = ("museum", "rooms", "hospital"), BANDWIDTHS[1:]
+PROTOTYPE = {
+    "paper": (1.83, 2.06, 3.18),
+    "lru": (6.6, 7.8, 19),
+    "ach": (0.76, 0.72, 1.69),
+    "ach-views": (0.73, 0.71, 1.68),
+    "ach-texture": (0.83, 0.79, 1.66),
+    "distance": (0.69, 0.62, 1.82),
+    "bbox": (0.76, 0.70, 1.64),
+    "screen+distance": (0.53, 0.54, 1.42),
+    "screen+ach": (0.55, 0.56, 1.41),
+    "best": (0.54, 0.54, 1.41),
+    "oracle": (0.40, 0.38, 1.38),
+}
+#: Rows of which a mean is taken, and what of them.
+Rows = Sequence[Row]
+Column = tuple[str, Callable[[Rows], float]]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--scenes", default=",".join(SCENES))
+    parser.add_argument("--walks", default=",".join(map(str, WALKS)))
+    parser.add_argument("--policy", default=",".join(POLICIES))
+    parser.add_argument("--bandwidth", default=",".join(BANDWIDTHS))
+    parser.add_argument("--memory", default=",".join(MEMORIES))
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--results", type=Path, default=FOLDER / "runs.jsonl")
+    given = parser.parse_args()
+    scenes = given.scenes.split(",")
+    make_scenes(scenes)
+    walks = map(int, given.walks.split(","))
+    asked = (given.policy.split(","), given.bandwidth.split(","), given.memory.split(","))
+    cases = [Case(*case) for case in product(scenes, walks, *asked)]
+    print("\n\n".join(tables(made(cases, given.results, given.jobs))))
+
+
+def tables(rows: Rows) -> list[str]:
+    """All tables, as Markdown."""
+    rows = [{**row, **row["e"]} for row in rows]
+    truth = {_place(row): row["mean"] for row in rows if row["policy"] == "oracle"}
+    rows = [{**row, "ratio": row["mean"] / truth.get(_place(row), float("nan"))} for row in rows]
+    conditions = list(dict.fromkeys((row["bandwidth"], row["memory"]) for row in rows))
+    scenes = list(dict.fromkeys(row["scene"] for row in rows))
+
+    def under(name: str, link: str, memory: str) -> Column:
+        alike = ("bandwidth", link), ("memory", memory)
+        return f"{link} {memory}", lambda some: _mean(name, some, *alike)
+
+    def within(name: str, scene: str) -> Column:
+        return scene, lambda some: _mean(name, some, ("scene", scene))
+
+    summary: list[Column] = [
+        ("e", lambda some: _mean("mean", some)),
+        ("p95", lambda some: _mean("p95", some)),
+        ("waste", lambda some: _mean("waste", some)),
+        ("/ oracle", lambda some: _mean("ratio", some)),
+        ("± walks", _spread),
+        ("s", lambda some: _mean("seconds", some)),
+    ]
+    found = [
+        _table("e", rows, [under("mean", *where) for where in conditions] + summary),
+        _table("e / oracle", rows, [under("ratio", *where) for where in conditions]),
+        _table("e, by scene", rows, [within("mean", scene) for scene in scenes]),
+        _table("p95, by scene", rows, [within("p95", scene) for scene in scenes]),
+        _table("e / oracle, by scene", rows, [within("ratio", scene) for scene in scenes]),
+        _preparation(rows),
+    ]
+    known = [row for row in rows if row["policy"] in PROTOTYPE]
+    known = [row for row in known if row["bandwidth"] in PROTOTYPE_LINKS]
+    beside = [s for s in PROTOTYPE_SCENES if s in scenes]
+    if known and beside:
+        found.append(_table("e / prototype", known, [_prototype(scene) for scene in beside]))
+    over = sum(row["overruns"] for row in rows)
+    return [*found, f"{len(rows):,} runs; frames above the budget: {over}"]
+
+
+def _table(title: str, rows: Rows, columns: Sequence[Column]) -> str:
+    """A row for each policy."""
+    lines = [f"| {title} | " + " | ".join(head for head, _ in columns) + " |"]
+    lines.append("|---" + "|--:" * len(columns) + "|")
+    for policy in dict.fromkeys(row["policy"] for row in rows):
+        some = [row for row in rows if row["policy"] == policy]
+        lines.append(f"| {policy} | " + " | ".join(f"{of(some):.2f}" for _, of in columns) + " |")
+    return "\n".join(lines)
+
+
+def _preparation(rows: Rows) -> str:
+    """Seconds that the walks of each scene took to be prepared."""
+    lines = ["| preparation, s | mean | most |", "|---|--:|--:|"]
+    for scene in dict.fromkeys(row["scene"] for row in rows):
+        took = {row["walk"]: row["preparation"] for row in rows if row["scene"] == scene}
+        lines.append(f"| {scene} | {fmean(took.values()):.1f} | {max(took.values()):.1f} |")
+    return "\n".join(lines)
+
+
+def _mean(name: str, rows: Rows, *alike: tuple[str, str]) -> float:
+    """Of the rows that have those values."""
+    return fmean(row[name] for row in rows if all(row[key] == value for key, value in alike))
+
+
+def _spread(rows: Rows) -> float:
+    """How much the ratio varies from walk to walk in the same scene, under the same conditions."""
+    walks: dict[tuple[str, str, str], list[float]] = {}
+    for row in rows:
+        walks.setdefault(_place(row)[:3], []).append(row["ratio"])
+    return fmean(pstdev(ratios) ** 2 for ratios in walks.values()) ** 0.5
+
+
+def _prototype(scene: str) -> Column:
+    at = PROTOTYPE_SCENES.index(scene)
+    return (
+        scene,
+        lambda some: _mean("mean", some, ("scene", scene)) / PROTOTYPE[some[0]["policy"]][at],
+    )
+
+
+def _place(row: Row) -> tuple[str, str, str, int]:
+    return row["scene"], row["bandwidth"], row["memory"], row["walk"]
+
+
+if __name__ == "__main__":
+    main()
