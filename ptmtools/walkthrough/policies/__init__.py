@@ -17,7 +17,6 @@ from ptmtools.walkthrough.policies.lru import LruClient
 from ptmtools.walkthrough.policies.oracle import Oracle
 from ptmtools.walkthrough.policies.paper import PaperClient
 from ptmtools.walkthrough.policies.screen import Screen
-from ptmtools.walkthrough.weighing import by_error
 from ptmtools.walkthrough.world import World
 
 
@@ -105,12 +104,6 @@ _LIST = (
         "screen, and what covers the view on average",
         Knows.SCREEN,
         _same(Screen(around.by_coverage)),
-    ),
-    Declared(
-        "xe",
-        "screen, and what covers the view on average",
-        Knows.SCREEN,
-        _same(Screen(around.by_distance, by_error)),
     ),
     Declared("oracle", "knows the walk", Knows.FUTURE, _engine(Oracle)),
 )

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from ptmtools.arrays import Floats
 from ptmtools.walkthrough.policies.around import geometry_worth
 from ptmtools.walkthrough.policies.engine import EngineClient, Worth
-from ptmtools.walkthrough.weighing import Weighing, by_rms
+from ptmtools.walkthrough.weighing import Weighing, by_difference
 
 #: What lies around counts so much beside what is on the screen, for what is fetched and for what is
 #: held.
@@ -33,7 +33,7 @@ class Screen:
     """
 
     around: Callable[[EngineClient], Floats] | None = None
-    weighing: Weighing = by_rms
+    weighing: Weighing = by_difference
     age: int = 1
 
     def __call__(self, client: EngineClient) -> Worth:
