@@ -5,11 +5,11 @@
 On the beginning of a walk, looked at once a second. What a client could have done at best is
 relaxed to fractions of levels: of each level of each texture a fraction is there, never less than
 before and never more than of the level below; a fraction of that is in texture memory, within the
-budget; of each cell a fraction of the geometry is there; and all bytes that are there could have come since
-two latencies after the beginning, without headers, index or records. The error of a pair of cell
-and texture falls linearly with the fraction of each level, as far as its geometry is there. Every
-client's walk is a solution of that with fractions of 0 and 1, so no client can show less than the
-optimum; how much of the rest is the relaxation's, nobody knows.
+budget; of each cell a fraction of the geometry is there; and all bytes that are there could have
+come since two latencies after the beginning, without headers, index or records. The error of a
+pair of cell and texture falls linearly with the fraction of each level, as far as its geometry is
+there. Every client's walk is a solution of that with fractions of 0 and 1, so no client can show
+less than the optimum; how much of the rest is the relaxation's, nobody knows.
 
 Needs scipy (HiGHS): pip install scipy.
 """

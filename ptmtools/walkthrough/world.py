@@ -131,7 +131,7 @@ def prepare(
     return World(
         served=served,
         pyramids=textures,
-        catalogue=catalogue_of(served, textures.rms, textures.mean),
+        catalogue=catalogue_of(served, textures.differences, textures.mean),
         views=views,
         view=view.reshape(-1).astype(np.int64),
         camera=camera,

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from ptmtools.arrays import Floats
 from ptmtools.walkthrough.policies.around import geometry_by_placeholders
 from ptmtools.walkthrough.policies.engine import EngineClient, Worth
-from ptmtools.walkthrough.weighing import Weighing, by_rms
+from ptmtools.walkthrough.weighing import Weighing, by_difference
 
 #: What lies around counts so much beside what is on the screen, and of that so much for what is to
 #: be in texture memory now.
@@ -35,7 +35,7 @@ class Screen:
 
     around: Callable[[EngineClient], Floats] | None = None
     share: float = AROUND
-    weighing: Weighing = by_rms
+    weighing: Weighing = by_difference
     age: int = 1
 
     def __call__(self, client: EngineClient) -> Worth:

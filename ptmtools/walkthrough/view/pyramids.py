@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints
 from ptmtools.progress import Progress, silent
 from ptmtools.texture import reader
+from ptmtools.texture.detail import difference_between
 from ptmtools.texture.model import Limits
 from ptmtools.walkthrough.served import Served
 
@@ -29,8 +30,8 @@ class Pyramids:
     size: (T, L, 2) int64 width and height; 0 beyond the finest.
     count: (T,) levels of each texture.
     mean: (T, 3) the mean of the coarsest level, 0 to 255.
-    rms: (T, L) root mean square of a level minus the level below it, each texel of which covers its
-        2 × 2 block; 0 for the coarsest.
+    differences: (T, L) of a level to the level below it, as `ptmtools.texture.detail` has them, of
+        what is shown; 0 for the coarsest.
     """
 
     texel: NDArray[np.uint8]
@@ -38,7 +39,7 @@ class Pyramids:
     size: Ints
     count: Ints
     mean: Floats
-    rms: Floats
+    differences: Floats
 
 
 def read_pyramids(served: Served, progress: Progress = silent) -> Pyramids:
@@ -50,7 +51,7 @@ def read_pyramids(served: Served, progress: Progress = silent) -> Pyramids:
     deepest = max((len(row["ends"]) for row in rows), default=1)
     start, count = np.zeros((len(rows), deepest), np.int64), np.zeros(len(rows), np.int64)
     size, mean = np.zeros((len(rows), deepest, 2), np.int64), np.zeros((len(rows), 3))
-    rms = np.zeros((len(rows), deepest))
+    differences = np.zeros((len(rows), deepest))
     parts: list[NDArray[np.uint8]] = []
     at = 0
     for t in range(len(rows)):
@@ -62,14 +63,15 @@ def read_pyramids(served: Served, progress: Progress = silent) -> Pyramids:
                 if below is None:
                     mean[t] = level.reshape(-1, 3).mean(axis=0)
                 else:
-                    rms[t, n] = _rms(level, below)
+                    texels = level.shape[0] * level.shape[1]
+                    differences[t, n] = difference_between(level, below) / texels
                 start[t, n], size[t, n] = at, (level.shape[1], level.shape[0])
                 count[t] = n + 1
                 at += level.size
                 parts.append(level.ravel())
                 below = level
     texel = np.concatenate(parts) if parts else np.zeros(0, np.uint8)
-    return Pyramids(texel, start, size, count, mean, rms)
+    return Pyramids(texel, start, size, count, mean, differences)
 
 
 def _rgb(samples: NDArray[Any]) -> NDArray[np.uint8]:
@@ -83,14 +85,3 @@ def _rgb(samples: NDArray[Any]) -> NDArray[np.uint8]:
         shown = np.rint(np.clip(held, 0, 1) * 255).astype(np.uint8)
     color = shown[:, :, :3] if shown.shape[2] >= 3 else np.repeat(shown[:, :, :1], 3, axis=2)
     return np.ascontiguousarray(color)
-
-
-def _rms(level: NDArray[np.uint8], below: NDArray[np.uint8]) -> float:
-    height, width = level.shape[:2]
-    row = np.minimum(np.arange(height) // 2, below.shape[0] - 1)
-    column = np.minimum(np.arange(width) // 2, below.shape[1] - 1)
-    total = 0
-    for y in range(0, height, 256):  # a few rows at a time: images may be large
-        under = below[row[y : y + 256]][:, column].astype(np.int32)
-        total += int(((level[y : y + 256] - under) ** 2).sum(dtype=np.int64))
-    return float(np.sqrt(total / level.size))
