@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 
 from ptmtools.walkthrough.client import Client
 from ptmtools.walkthrough.network import Link
@@ -117,7 +118,13 @@ _LIST = (
         needs=("need", "measure it with `ptm emit DB --need 64`"),
     ),
     Declared("best", "the viewer's: screen, need and distance", Knows.SCREEN, _same(BEST)),
-    Declared("oracle", "knows the walk", Knows.FUTURE, _engine(Oracle)),
+    Declared("oracle", "knows the walk, and is greedy", Knows.FUTURE, _engine(Oracle)),
+    Declared(
+        "oracle-exchange",
+        "the same, less greedy",
+        Knows.FUTURE,
+        _engine(partial(Oracle, exchanging=True)),
+    ),
 )
 #: By name.
 POLICIES = {policy.name: policy for policy in _LIST}
