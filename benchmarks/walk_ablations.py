@@ -4,9 +4,10 @@
 
 The policy `best` walks through each database, built with `--need 64`, and then without one thing at
 a time, over links of 56 kbit/s, 512 kbit/s and 4 Mbit/s with texture memory of a tenth of all
-textures. Printed are the mean errors of the picture, over all walks, each beside that of `best`;
-what the hint takes in the index and the records, gzipped; and what preprocessing takes for it. Below,
-the policy `ach` with coverage hints from fewer and from more sample points.
+textures. Printed are what each hint takes in the index and the records, gzipped, and the mean errors
+of the picture, over all walks, each beside that of `best`. Below, the policy `ach` with coverage
+hints from fewer and from more sample points, beside those of the database, and the processor
+seconds that these take (`benchmarks/need.py` has those of `need`).
 """
 
 from __future__ import annotations
