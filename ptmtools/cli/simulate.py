@@ -12,7 +12,7 @@ from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
 from ptmtools.database.names import HINTS
 from ptmtools.errors import InputError
-from ptmtools.files import write_bytes, writing
+from ptmtools.files import refuse_existing, write_bytes, writing
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stages import CELLS, SCENE
@@ -127,6 +127,9 @@ def simulate(
     for file in (csv_file, plot_file, strip_file):
         if file:
             writable(file, force)
+    frames_to = Path(frames_folder) if frames_folder else None
+    if frames_to and not force and frames_to.is_dir() and any(frames_to.iterdir()):
+        refuse_existing(frames_to, "use --force to replace frames in it, or name another folder")
     if plot_file:
         figure.require()
     if flip:
@@ -147,12 +150,11 @@ def simulate(
     if plot_file:
         write_bytes(plot_file, figure.picture(played, measure), force=force)
     first = worlds[played[0].walk]
-    if frames_folder:
-        folder = Path(frames_folder)
-        with writing(folder):
-            folder.mkdir(parents=True, exist_ok=True)
+    if frames_to:
+        with writing(frames_to):
+            frames_to.mkdir(parents=True, exist_ok=True)
         for name, data in pictures.frames(first, played[0].run, every):
-            write_bytes(folder / name, data, force=force)
+            write_bytes(frames_to / name, data, force=force)
     if strip_file:
         write_bytes(strip_file, pictures.strip(first, played[0]), force=force)
     if as_json:

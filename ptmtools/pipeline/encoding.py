@@ -55,7 +55,7 @@ def read_detail(data: bytes) -> Detail:
 
     found = json.loads(data)
     red, green, blue = map(int, found["color"])
-    return Detail(tuple(map(float, found["rms"])), (red, green, blue))
+    return Detail(tuple(map(float, found["differences"])), (red, green, blue))
 
 
 def without_finest(options: TextureOptions, count: int, width: int, height: int) -> TextureOptions:

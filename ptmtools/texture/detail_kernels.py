@@ -1,5 +1,6 @@
-"""The inner loops of `detail`: sums of the squared differences between (h, w, c) samples and those
-of (h >> 1, w >> 1, c) enlarged, over the first ``colours`` components."""
+"""The inner loops of `detail`: between (h, w, c) samples and those of (h >> 1, w >> 1, c) enlarged,
+of each texel the root of the sum of squared differences over the first ``colours`` components,
+summed up over the texels."""
 
 from __future__ import annotations
 
@@ -13,29 +14,36 @@ from ptmtools.compiled import kernel
 
 
 @kernel
-def integer_squares(level: NDArray[Any], below: NDArray[Any], colours: int) -> float:
-    """Of integers of up to 16 bits; exact up to 2^53, and a row always. Two texels at a time take a
-    third of the time of one."""
+def integer_lengths(level: NDArray[Any], below: NDArray[Any], colours: int) -> float:
+    """Of integers of up to 16 bits. The squares are exact; the roots of a row are summed up before
+    they are added to the rest, so of a million texels the sum is off by less than 1e-12 of it. Two
+    texels at a time take half the time of one."""
     height, width = below.shape[:2]
     total = 0.0
     for y in range(level.shape[0]):
         row = min(y >> 1, height - 1)
-        squares = np.int64(0)
-        for c in range(colours):
-            for x in range(width):
+        of_row = 0.0
+        for x in range(width):
+            left, right = np.int64(0), np.int64(0)
+            for c in range(colours):
                 under = np.int64(below[row, x, c])
-                left = np.int64(level[y, 2 * x, c]) - under
-                right = np.int64(level[y, 2 * x + 1, c]) - under
-                squares += left * left + right * right
-            for x in range(2 * width, level.shape[1]):
-                odd = np.int64(level[y, x, c]) - np.int64(below[row, width - 1, c])
-                squares += odd * odd
-        total += squares
+                one = np.int64(level[y, 2 * x, c]) - under
+                other = np.int64(level[y, 2 * x + 1, c]) - under
+                left += one * one
+                right += other * other
+            of_row += math.sqrt(float(left)) + math.sqrt(float(right))
+        for x in range(2 * width, level.shape[1]):
+            odd = np.int64(0)
+            for c in range(colours):
+                one = np.int64(level[y, x, c]) - np.int64(below[row, width - 1, c])
+                odd += one * one
+            of_row += math.sqrt(float(odd))
+        total += of_row
     return total
 
 
 @kernel
-def float_squares(level: NDArray[Any], below: NDArray[Any], colours: int) -> float:
+def float_lengths(level: NDArray[Any], below: NDArray[Any], colours: int) -> float:
     """Of floats; what is not finite differs from nothing."""
     height, width = below.shape[:2]
     total = 0.0
@@ -43,8 +51,10 @@ def float_squares(level: NDArray[Any], below: NDArray[Any], colours: int) -> flo
         row = min(y >> 1, height - 1)
         for x in range(level.shape[1]):
             column = min(x >> 1, width - 1)
+            squares = 0.0
             for c in range(colours):
                 difference = float(level[y, x, c]) - float(below[row, column, c])
                 if math.isfinite(difference):
-                    total += difference * difference
+                    squares += difference * difference
+            total += math.sqrt(squares)
     return total

@@ -28,7 +28,7 @@ from ptmtools.texture.container import (
     pack_head,
 )
 from ptmtools.texture.description import pack_description
-from ptmtools.texture.detail import Detail, detail_of, squares_between
+from ptmtools.texture.detail import Detail, detail_of, difference_between
 from ptmtools.texture.model import Description, EncodeOptions
 from ptmtools.texture.options import checked_coder, kept_levels
 from ptmtools.texture.parallel import ordered
@@ -109,7 +109,7 @@ def encode_to(
     del single
     coarsest, below, memory = tiles[0].texels, tiles[-1].texels, tiles[-1].memory
     above = [
-        (squares_between(tile.texels, under.texels), _texels_of(tile.texels))
+        (difference_between(tile.texels, under.texels), _texels_of(tile.texels))
         for under, tile in pairwise(tiles)
     ]
     groups: list[tuple[int, int]] = []
@@ -120,9 +120,9 @@ def encode_to(
     while tiled:
         # The finest of them may be the image itself, of which nothing is kept.
         level = tiled.pop(0)
-        group, below, squares = coding.tiled(file, level, below, memory, finest=not tiled)
+        group, below, difference = coding.tiled(file, level, below, memory, finest=not tiled)
         groups.append(group)
-        above.append((squares, _texels_of(level)))
+        above.append((difference, _texels_of(level)))
     end = file.tell()
     trimmed = len(level_sizes(rows.width, rows.height)) - 1 - kept[-1]
     file.seek(start)
@@ -168,8 +168,8 @@ class _Coding:
         finest: bool,
     ) -> tuple[tuple[int, int], Samples, float]:
         """Writes index and tiles of a level of several. Length of the group, CRC-32 of the index;
-        the texels as a decoder has them, none of the finest level; and `squares_between` them and
-        those below."""
+        the texels as a decoder has them, none of the finest level; and the `difference_between`
+        them and those below."""
         side = self.options.tile
         height, width = level.shape[:2]
         across, down = tile_counts(width, height, side)
@@ -190,22 +190,22 @@ class _Coding:
             piece = np.ascontiguousarray(strip[:, box.x0 : box.x1])
             under = np.ascontiguousarray(below[box.below.slices])
             tile = self._tile(piece, under, memory, 1.0 if finest else EXACT_FACTOR, 1)
-            return box, tile, squares_between(tile.texels, under)
+            return box, tile, difference_between(tile.texels, under)
 
         start = file.tell()
         file.write(bytes(across * down * TILE_ENTRY.size))
-        index, squares = bytearray(), 0.0
+        index, difference = bytearray(), 0.0
         for box, tile, more in ordered(coded, boxes(), self.threads):
             file.write(tile.data)
             index += TILE_ENTRY.pack(len(tile.data), zlib.crc32(tile.data))
-            squares += more
+            difference += more
             if self.options.max_error and not finest:
                 texels[box.slices] = tile.texels
         end = file.tell()
         file.seek(start)
         file.write(index)
         file.seek(end)
-        return (end - start, zlib.crc32(index)), texels, squares
+        return (end - start, zlib.crc32(index)), texels, difference
 
     def _tile(
         self,

@@ -18,7 +18,7 @@ from ptmtools.walkthrough.view.tables import gradients
 
 #: A level that only repeats the texels of the one below still sharpens what is filtered between
 #: them, so it adds at least this, 0 to 255.
-LEAST_RMS = 0.5
+LEAST = 0.5
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,8 @@ class Catalogue:
     ----------
     levels: (T,) of each texture.
     ends: (T, K) bytes of the `.ptm` that hold each column. memory: (T, K) of texture memory.
-    rms: (T, K) what each column adds to the one before it, root mean square, 0 to 255, at least
-        `LEAST_RMS`; of the first level 0, of what lies behind the last 0.
+    differences: (T, K) of each column to the one before it, on average over its texels, 0 to 255,
+        at least `LEAST`; of the first level 0, of what lies behind the last 0.
     colors: (T, 3) mean colour, 0 to 255.
     index_bytes, statistics_bytes, record_bytes, geometry_bytes: on the link; (C,) the latter two.
     records, statistics: of each cell.
@@ -59,7 +59,7 @@ class Catalogue:
     levels: Ints
     ends: Ints
     memory: Ints
-    rms: Floats
+    differences: Floats
     colors: Floats
     index_bytes: int
     statistics_bytes: int
@@ -88,17 +88,6 @@ class Catalogue:
     def first_shape(self) -> Ints:
         """(C + 1,) where the shapes of each cell begin."""
         return np.searchsorted(self.shapes.cell, np.arange(self.cell_count + 1))
-
-    @cached_property
-    def drops(self) -> Floats:
-        """(T, K, K) by how much the error of a pixel that wants column n falls with column k, by
-        `rms`: [t, k, n]; 0 for k = 0 and for n < k."""
-        squared = np.cumsum(self.rms**2, axis=1)
-        # Of who wants n and has k.
-        error = np.sqrt(np.maximum(squared[:, None, :] - squared[:, :, None], 0.0))
-        found = np.zeros(error.shape)
-        found[:, 1:] = error[:, :-1] - error[:, 1:]
-        return found
 
     @cached_property
     def visible(self) -> tuple[Ints, ...]:
@@ -149,20 +138,26 @@ class Catalogue:
         return replace(self, memory=memory)
 
 
-def catalogue_of(served: Served, rms: Floats, colors: Floats) -> Catalogue:
-    """The catalogue of a served folder; ``rms`` (T, L) and ``colors`` (T, 3) as `Pyramids` has
-    them, for hints that do not say them."""
-    levels, ends, memory = columns_of(served.index["textures"])
+def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalogue:
+    """The catalogue of a served folder; ``differences`` (T, L) and ``colors`` (T, 3) as `Pyramids`
+    has them, for hints that do not say them of every texture."""
+    textures = served.index["textures"]
+    levels, ends, memory = columns_of(textures)
     beside = np.zeros(ends.shape)
-    beside[:, 1:] = rms[:, : ends.shape[1] - 1]
+    beside[:, 1:] = differences[:, : ends.shape[1] - 1]
+    if all(len(row.get("differences", ())) == len(row["ends"]) for row in textures):
+        for into, row in zip(beside, textures, strict=True):
+            into[1 : len(row["ends"]) + 1] = row["differences"]
+    if textures and all("color" in row for row in textures):
+        colors = np.array([row["color"] for row in textures], dtype=np.float64)
     column = np.arange(ends.shape[1])
     refines = (column > 1) & (column <= levels[:, None])
-    beside[refines] = np.maximum(beside[refines], LEAST_RMS)
+    beside[refines] = np.maximum(beside[refines], LEAST)
     return Catalogue(
         levels=levels,
         ends=ends,
         memory=memory,
-        rms=beside,
+        differences=beside,
         colors=colors,
         index_bytes=served.index_bytes,
         statistics_bytes=served.statistics_bytes,

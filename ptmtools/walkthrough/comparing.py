@@ -37,7 +37,7 @@ class SimulateOptions:
     """
 
     policy: str = field(
-        default="paper,ach,screen+distance,oracle",
+        default="paper,ach,best,oracle",
         metadata={"choices": POLICIES, "several": True},
     )
     bandwidth: str = "512k,4M"

@@ -12,14 +12,15 @@ from typing import Any
 import numpy as np
 
 from ptmtools.arrays import Ints
+from ptmtools.texture.model import gpu_texel_bytes
 
 
 def texel_bytes(texture: Any, *, paper: bool = False) -> int:
     """Bytes of a texel of an entry of the index; with ``paper``, as the paper counts."""
     stored = int(texture["texelBytes"])
-    if paper or texture["components"] != 3:
+    if paper:
         return stored
-    return stored // 3 * 4
+    return int(texture.get("gpuTexelBytes", gpu_texel_bytes(stored, texture["components"])))
 
 
 def columns_of(textures: Sequence[Any], *, paper: bool = False) -> tuple[Ints, Ints, Ints]:

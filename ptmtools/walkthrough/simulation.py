@@ -90,7 +90,7 @@ def simulate(world: World, policy: Declared, conditions: Conditions, budget: int
         rows = views.rows(int(world.view[f]))
         error[f], square[f], missing[f] = picture(
             rows.start, rows.stop, views.cell, views.texture, views.error, views.square, views.need,
-            there[f], client.column, True, shown, drawn,
+            there[f], client.column, world.colored, shown, drawn,
         )  # fmt: skip
         quality[f] = _quality(client)
         fetched[f] = link.bytes

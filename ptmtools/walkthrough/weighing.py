@@ -1,19 +1,20 @@
 """From how many pixels want a level to what it is worth.
 
-Three measures, by what a client knows of the textures:
+Two measures, by what a client knows of the textures:
 
 * `by_pixels`: every level counts the same (the paper's view of it);
-* `by_rms`: a level counts by its root mean square against the one below;
-* `by_error`: a level counts by how much smaller the error gets. A pixel that wants level n and has
-  level k is wrong by about √(rms²ₖ₊₁ + … + rms²ₙ), since what levels add is nearly uncorrelated; so
-  a coarse level under a fine one that is missing anyway adds little.
+* `by_difference`: a level counts by its difference to the one below. A pixel that wants level n and
+  has level k is wrong by about the sum of the differences between them.
+
+(Tried: the root mean square over the texels of a level in place of the mean. At 0.5 Mbit/s with
+10 % and 30 % of the texture memory, the error of the picture is 1.90 and 1.67 then, and 1.83 and
+1.62 so. What the missing levels make together, so that a coarse one under a missing fine one counts
+little: no better.)
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-
-import numpy as np
 
 from ptmtools.arrays import Floats
 from ptmtools.walkthrough.catalogue import Catalogue
@@ -27,15 +28,6 @@ def by_pixels(stock: Catalogue, shares: Floats) -> Floats:
     return shares
 
 
-def by_rms(stock: Catalogue, shares: Floats) -> Floats:
+def by_difference(stock: Catalogue, shares: Floats) -> Floats:
     """See the module."""
-    return shares * stock.rms
-
-
-def by_error(stock: Catalogue, shares: Floats) -> Floats:
-    """See the module; ``shares`` do not increase from column to column, but for the first."""
-    finest = shares.copy()
-    finest[:, :-1] -= shares[:, 1:]
-    finest[:, 0] = 0.0
-    worth: Floats = np.einsum("tkn,tn->tk", stock.drops, np.maximum(finest, 0.0))
-    return worth
+    return shares * stock.differences

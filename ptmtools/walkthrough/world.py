@@ -48,6 +48,8 @@ class World:
     cell: (F,) that the eye is in; where it is in none, the one before.
     still: (F,) whether the viewpoint has not moved for a second.
     rate: frames a second.
+    colored: whether clients know the mean colour of each texture; else it is grey until its first
+        level comes.
     """
 
     served: Served
@@ -62,6 +64,7 @@ class World:
     cell: Ints
     still: Bools
     rate: float = RATE
+    colored: bool = True
 
     @property
     def frames(self) -> int:
@@ -128,7 +131,7 @@ def prepare(
     return World(
         served=served,
         pyramids=textures,
-        catalogue=catalogue_of(served, textures.rms, textures.mean),
+        catalogue=catalogue_of(served, textures.differences, textures.mean),
         views=views,
         view=view.reshape(-1).astype(np.int64),
         camera=camera,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,14 +22,14 @@ from ptmtools.texture.detail import Detail
 from ptmtools.texture.model import Level
 
 
-def made_up(lengths: list[int], rms: list[float]) -> TextureRecord:
+def made_up(lengths: list[int], differences: list[float]) -> TextureRecord:
     """A texture whose levels have these lengths and differences, sides 1, 2, 4…"""
     ends = np.cumsum(lengths).tolist()
     levels = tuple(
         Level(1 << n, 1 << n, end - length, length, 0, (1, 1), 0)
         for n, (end, length) in enumerate(zip(ends, lengths, strict=True))
     )
-    detail = Detail((0.0, *rms[1:]), (0, 0, 0))
+    detail = Detail((0.0, *differences[1:]), (0, 0, 0))
     side = levels[-1].width
     return TextureRecord(
         0, "a.ptm", None, side, side, 3, levels, "", detail=detail, stored=Path("a.ptm")
@@ -48,8 +47,8 @@ levels_of = st.lists(
 def test_steps_lead_to_the_finest_level_and_bring_less_and_less(
     levels: list[tuple[int, float]], side: int
 ) -> None:
-    lengths, rms = (list(column) for column in zip(*levels, strict=True))
-    record = made_up(lengths, rms)
+    lengths, differences = (list(column) for column in zip(*levels, strict=True))
+    record = made_up(lengths, differences)
     steps = steps_of(record, side)
     offered = [n for n, level in enumerate(record.levels) if level.width <= side]
     assert steps[-1].level == offered[-1]
@@ -59,13 +58,11 @@ def test_steps_lead_to_the_finest_level_and_bring_less_and_less(
     worth = [step.gain / (step.end - step.start) for step in steps]
     assert all(one > other for one, other in itertools.pairwise(worth))
     # None of the levels that are passed over lies above the hull.
-    squares = np.square([0.0, *rms[1:]])
-    off = [math.sqrt(squares[n + 1 :].sum()) for n in range(len(squares))]
     for n in offered:
         (step,) = (s for s in steps if s.start < record.levels[n].end <= s.end)
         before = sum(s.gain for s in steps if s.end <= step.start)
         share = (record.levels[n].end - step.start) / (step.end - step.start)
-        assert off[0] - off[n] <= before + share * step.gain + 1e-9
+        assert sum(differences[1 : n + 1]) <= before + share * step.gain + 1e-9
 
 
 def content_of(artifacts, records: tuple[TextureRecord, ...], side: int, ach=None) -> Content:
@@ -107,10 +104,9 @@ def value_at(content: Content, cell: int, share: dict[int, float], taken: int) -
     """How much less the view is off with so many pieces of a bundle."""
     total = 0.0
     for piece in FirstLooks(content).pieces(cell)[:taken]:
-        rms = np.square(content.textures[piece.texture].detail.rms)
+        differences = content.textures[piece.texture].detail.differences
         ends = [0, *(level.end for level in content.textures[piece.texture].levels)]
-        before = max(ends.index(piece.start) - 1, 0)
-        gain = math.sqrt(rms[before + 1 :].sum()) - math.sqrt(rms[piece.level + 1 :].sum())
+        gain = sum(differences[ends.index(piece.start) : piece.level + 1])
         total += share[piece.texture] * gain
     return total
 
@@ -120,10 +116,10 @@ def test_what_is_worth_more_comes_first(artifacts, tmp_path: Path, put_textures)
     before."""
     options = AchOptions(samples=32, face=8, backend="embree", per_texture=True)
     ach = compute_ach(artifacts.scene, artifacts.cells, artifacts.pvs, options)
-    rms = ((0, 40, 1, 0.5, 0.2), (0, 5, 9))
+    differences = ((0, 40, 1, 0.5, 0.2), (0, 5, 9))
     records = tuple(
         replace(record, detail=Detail(tuple(map(float, each)), (0, 0, 0)))
-        for record, each in zip(put_textures(tmp_path), rms, strict=True)
+        for record, each in zip(put_textures(tmp_path), differences, strict=True)
     )
     content = content_of(artifacts, records, 64, ach)
     for cell in range(3):

@@ -99,8 +99,8 @@ def test_what_levels_show_outlasts_a_resumed_and_an_updated_build(tmp_path: Path
     """It is kept with the texture: one that is not encoded again still has it."""
     build_scene(TWO_ROOMS, tmp_path / "whole")
     wanted = json.loads((tmp_path / "whole/www/hints.json").read_text())["textures"]
-    assert all(len(row["rms"]) == len(row["ends"]) > 1 for row in wanted)
-    assert all(row["rms"][0] == 0 < max(row["rms"]) for row in wanted)
+    assert all(len(row["differences"]) == len(row["ends"]) > 1 for row in wanted)
+    assert all(row["differences"][0] == 0 < max(row["differences"]) for row in wanted)
     db = tmp_path / "db"
     build_scene(TWO_ROOMS, db, until=CELLS)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ptmtools.texture import EncodeOptions, decode_levels, encode_to, read_header
 from ptmtools.texture.codec import examine
-from ptmtools.texture.detail import Detail, squares_between
+from ptmtools.texture.detail import Detail, difference_between
 
 TYPES = (np.uint8, np.uint16, np.float16, np.float32)
 OPTIONS = (
@@ -46,7 +46,7 @@ def by_definition(data: bytes) -> list[float]:
     found = [0.0]
     for below, level in pairwise(levels):
         difference = (level - enlarged(below, *level.shape[:2]))[..., :colours]
-        found.append(float(np.sqrt(np.mean((difference * 255 / top) ** 2))))
+        found.append(float(np.sqrt(np.mean((difference * 255 / top) ** 2, axis=2)).mean()))
     return found
 
 
@@ -66,8 +66,8 @@ def test_the_differences_are_those_of_the_levels(
     height: int, width: int, components: int, dtype: type, seed: int
 ) -> None:
     detail, data = encoded(noise(height, width, components, dtype, abs(seed)))
-    assert detail.rms == pytest.approx(by_definition(data), rel=5.1e-3)
-    assert all(value == float(f"{value:.3g}") for value in detail.rms)
+    assert detail.differences == pytest.approx(by_definition(data), rel=5.1e-3)
+    assert all(value == float(f"{value:.3g}") for value in detail.differences)
 
 
 @pytest.mark.parametrize("options", OPTIONS, ids=str)
@@ -75,8 +75,8 @@ def test_the_differences_are_those_of_the_levels(
 def test_tiles_errors_and_levels_left_out(options: dict[str, int], dtype: type) -> None:
     """Of what a decoder has, which an allowed error changes."""
     detail, data = encoded(noise(83, 101, 3, dtype), **options)
-    assert len(detail.rms) == len(read_header(data).levels)
-    assert detail.rms == pytest.approx(by_definition(data), rel=5.1e-3)
+    assert len(detail.differences) == len(read_header(data).levels)
+    assert detail.differences == pytest.approx(by_definition(data), rel=5.1e-3)
     faults, shown = examine(data)
     assert not faults
     assert shown
@@ -106,10 +106,27 @@ def test_what_is_not_finite_differs_from_nothing() -> None:
     level = np.ones((2, 2, 1), np.float32)
     level[0, 0] = np.nan
     level[0, 1] = 3
-    assert squares_between(level, np.ones((1, 1, 1), np.float32)) == 4
+    assert difference_between(level, np.ones((1, 1, 1), np.float32)) == 2
 
 
-def test_largest_differences_are_exact() -> None:
-    """The sum of 2^20 squares of 65,535."""
-    level = np.full((1024, 1024, 1), 65535, np.uint16)
-    assert squares_between(level, np.zeros((512, 512, 1), np.uint16)) == 65535**2 * 2**20
+@pytest.mark.parametrize("components", [1, 2, 3, 4])
+def test_the_largest_differences_add_up(components: int) -> None:
+    """2^20 times 65,535; of one colour to the last bit."""
+    level = np.full((1024, 1024, components), 65535, np.uint16)
+    found = difference_between(level, np.zeros((512, 512, components), np.uint16))
+    assert found == pytest.approx(65535 * 2**20, rel=1e-12 if components > 2 else 0, abs=0)
+
+
+@given(st.integers(0, 5), st.integers(0, 5), st.integers(1, 4), st.integers(0))
+def test_who_has_a_level_is_off_by_no_more_than_the_rest_adds(
+    high: int, wide: int, components: int, seed: int
+) -> None:
+    """Where each level has whole blocks of the next."""
+    detail, data = encoded(noise(1 << high, 1 << wide, components, np.uint8, seed))
+    colours = slice(components - (components in (2, 4)))
+    *rest, finest = (level[..., colours] for level in decode_levels(data))
+    for n, level in enumerate(rest):
+        times = 1 << (len(rest) - n)
+        shown = level.astype(np.float64).repeat(times, axis=0).repeat(times, axis=1)
+        off = np.sqrt(((finest - shown) ** 2).mean(axis=2)).mean()
+        assert off <= 1.006 * sum(detail.differences[n + 1 :])

@@ -149,6 +149,7 @@ def test_nothing_is_overwritten(ptm: Ptm, two_rooms: Path, walk_file: Path, tmp_
     file = tmp_path / "frames.csv"
     file.write_text("mine")
     assert "[PTM-O001]" in ptm(*words, "--csv", file).err
+    assert "[PTM-O001]" in ptm(*words, "--frames", tmp_path).err
     assert file.read_text() == "mine"
     assert ptm(*words, "--csv", file, "--force").status == 0
     assert file.read_text().startswith("policy,")

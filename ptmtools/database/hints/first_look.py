@@ -13,10 +13,9 @@ hull of its gain over its bytes. Of all textures the best step comes next.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from functools import cached_property
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -37,7 +36,7 @@ class Step(NamedTuple):
     ----------
     level: the one that is then there.
     start, end: bytes of the `.ptm`.
-    gain: how much less the texture is off, as `Detail.rms`.
+    gain: how much less the texture is off, as `Detail.differences`.
     """
 
     level: int
@@ -141,13 +140,13 @@ def steps_of(record: TextureRecord, side: int) -> list[Step]:
     if not (record.detail and record.stored):
         return []
     # The mean colour is there before any level: the first one brings nothing.
-    squares = np.square(record.detail.rms)
-    off = [math.sqrt(squares[n + 1 :].sum()) for n in range(len(squares))]
     corners = [(-1, 0, 0.0)]
-    for n, level in enumerate(record.levels):
+    for n, (level, gain) in enumerate(
+        zip(record.levels, accumulate(record.detail.differences), strict=True)
+    ):
         if max(level.width, level.height) > side:
             break
-        corner = (n, level.end, off[0] - off[n])
+        corner = (n, level.end, gain)
         while len(corners) > 1 and _slope(*corners[-2:]) <= _slope(corners[-1], corner):
             corners.pop()
         corners.append(corner)

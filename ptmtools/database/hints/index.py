@@ -99,7 +99,7 @@ def _texture(record: TextureRecord, fallback: bool) -> Mapping[str, Any]:
         "ends": [level.end for level in record.levels],
     }
     if record.detail:
-        row["rms"] = [whole(value) for value in record.detail.rms]
+        row["differences"] = [whole(value) for value in record.detail.differences]
         row["color"] = list(record.detail.color)
     return row
 

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     Samples = NDArray[Any]
 
 _PNG = b"\x89PNG\r\n\x1a\n"
-#: How far, as a share of them, the `rms` of levels may be off: they are rounded, and those of
-#: floats are summed up in another order here.
-RMS_SLACK = 0.01
+#: How far, as a share of them, `differences` of levels may be off: they are rounded, and
+#: summed up in another order here.
+DIFFERENCE_SLACK = 0.01
 #: Of the first chunk of a PNG: its length and kind, width and height.
 _IHDR = struct.Struct(">I4sII")
 
@@ -125,9 +125,10 @@ def check_record(record: Mapping[str, Any], texture: ReadTexture, at: Place) -> 
     )
     if texture.detail:
         faults += _other(record, {"color": list(texture.detail.color)})
-        rms = record.get("rms", texture.detail.rms)
-        if len(rms) != len(header.levels) or not np.allclose(rms, texture.detail.rms, RMS_SLACK, 0):
-            faults.append("rms is not what the levels of the file differ by")
+        true = texture.detail.differences
+        told = record.get("differences", true)
+        if len(told) != len(true) or not np.allclose(told, true, DIFFERENCE_SLACK, 0):
+            faults.append("differences is not what the levels of the file differ by")
     fallback, held = record["fallback"], record["fallbackLevel"]
     if (fallback is None) != (held is None):
         faults.append("fallback and fallbackLevel do not go together")

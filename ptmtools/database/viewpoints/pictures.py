@@ -15,7 +15,6 @@ five times as slow, and hardly another view.)
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -56,7 +55,7 @@ def _contrast(texture: TextureRecord) -> float:
         return 0.0
     small = [n for n, x in enumerate(texture.levels) if min(x.width, x.height) <= _SIDE]
     last = max(small, default=0)
-    return math.hypot(*texture.detail.rms[max(last - 1, 0) : last + 1]) / _WHITE
+    return sum(texture.detail.differences[max(last - 1, 0) : last + 1]) / _WHITE
 
 
 class Pictures:

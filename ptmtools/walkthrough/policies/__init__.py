@@ -8,16 +8,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 
 from ptmtools.walkthrough.client import Client
 from ptmtools.walkthrough.network import Link
 from ptmtools.walkthrough.policies import around, coverage
+from ptmtools.walkthrough.policies.best import BEST
 from ptmtools.walkthrough.policies.engine import EngineClient, Policy
 from ptmtools.walkthrough.policies.lru import LruClient
 from ptmtools.walkthrough.policies.oracle import Oracle
 from ptmtools.walkthrough.policies.paper import PaperClient
 from ptmtools.walkthrough.policies.screen import Screen
-from ptmtools.walkthrough.weighing import by_error
 from ptmtools.walkthrough.world import World
 
 
@@ -110,12 +111,20 @@ _LIST = (
         _same(Screen(around.by_coverage)),
     ),
     Declared(
-        "xe",
-        "screen, and what covers the view on average",
+        "screen+need",
+        "screen, and what is needed from the cell",
         Knows.SCREEN,
-        _same(Screen(around.by_distance, by_error)),
+        _same(Screen(around.by_need)),
+        needs=("need", "measure it with `ptm emit DB --need 64`"),
     ),
-    Declared("oracle", "knows the walk", Knows.FUTURE, _engine(Oracle)),
+    Declared("best", "the viewer's: screen, need and distance", Knows.SCREEN, _same(BEST)),
+    Declared("oracle", "knows the walk, and is greedy", Knows.FUTURE, _engine(Oracle)),
+    Declared(
+        "oracle-exchange",
+        "the same, less greedy",
+        Knows.FUTURE,
+        _engine(partial(Oracle, exchanging=True)),
+    ),
 )
 #: By name.
 POLICIES = {policy.name: policy for policy in _LIST}

@@ -16,20 +16,35 @@ NEAREST = 0.5
 BEHIND, BEYOND = 0.2, 0.05
 
 
-def geometry_worth(client: EngineClient) -> Floats:
-    """(C,) the worth of the geometry of cells: what a grey cell is wrong by."""
+def geometry_by_coverage(client: EngineClient) -> Floats:
+    """(C,) the worth of the geometry of cells: what a grey cell is wrong by, and how much of the
+    view it covers on average."""
+    stock = client.world.catalogue
+    known = client.known()
+    low, high = stock.boxes
+    ahead = client.frustum.meets_boxes(low[known], high[known])
+    share = np.zeros(stock.cell_count)
+    share[known] = np.where(ahead, 1.0, BEHIND) * client.coverage()
+    return NOTHING * np.maximum(share, _beyond(client))
+
+
+def geometry_by_placeholders(client: EngineClient, age: int) -> Floats:
+    """(C,) the same by how much of the item buffer, ``age`` frames old, shows a placeholder of each
+    cell; coverage says what is behind."""
+    share = np.zeros(client.world.catalogue.cell_count)
+    share[client.known()] = BEHIND * client.coverage()
+    return NOTHING * (np.maximum(share, _beyond(client)) + client.placeholders(age))
+
+
+def _beyond(client: EngineClient) -> Floats:
+    """(C,) what cells count for the neighbours from which they are seen."""
     stock = client.world.catalogue
     share = np.zeros(stock.cell_count)
     for neighbour in stock.adjacent[client.cell].tolist():
         if client.records.whole[neighbour]:
             cells = stock.visible[neighbour]
             share[cells] = np.maximum(share[cells], BEYOND * stock.coverage[neighbour])
-    known = client.known()
-    low, high = stock.boxes
-    ahead = client.frustum.meets_boxes(low[known], high[known])
-    coverage = client.coverage()
-    share[known] = np.maximum(share[known], np.where(ahead, 1.0, BEHIND) * coverage)
-    return NOTHING * share
+    return share
 
 
 def by_coverage(client: EngineClient) -> Floats:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.walkthrough.catalogue import Catalogue
-from ptmtools.walkthrough.policies.around import NEAREST, every_level, geometry_worth
+from ptmtools.walkthrough.policies.around import NEAREST, every_level, geometry_by_coverage
 from ptmtools.walkthrough.policies.engine import EngineClient, Worth
 
 #: (T,) weights of textures, by the shapes in the frustum.
@@ -31,7 +31,7 @@ class Weighted:
         there = client.shapes_there()
         ahead = there[client.frustum.meets_boxes(shapes.low[there], shapes.high[there])]
         worth = every_level(client, self.weights(client, ahead))
-        return Worth(worth, worth, geometry_worth(client))
+        return Worth(worth, worth, geometry_by_coverage(client))
 
 
 def by_distance(client: EngineClient, shapes: Ints) -> Floats:

@@ -34,7 +34,7 @@ OVERHEAD = 300
 #: What a pixel is wrong by where there is nothing: the mean of what was measured, 0 to 255.
 NOTHING = 64.0
 #: The record of a neighbouring cell is worth as much as so large a share of the screen.
-RECORD_SHARE = 0.02
+RECORD_SHARE = 0.005
 #: A level that is not wanted any more is held on to, at so small a share of its worth, which
 #: halves in so many seconds.
 HELD_ON, HELD_SECONDS = 1e-3, 7.0
@@ -145,7 +145,7 @@ class EngineClient(Client):
         fading = 0.5 ** (1 / (self.world.rate * HELD_SECONDS))
         self._kept = np.maximum(self._kept * fading, hold)
         stock = self.world.catalogue
-        worth = hold + HELD_ON * self._kept + HELD_ON**2 * stock.rms
+        worth = hold + HELD_ON * self._kept + HELD_ON**2 * stock.differences
         allocate(worth, stock.memory, self.have, self.budget, self.column, exact)
 
     def arrived(self, request: Request) -> None:

@@ -18,9 +18,11 @@ _LATER_SHARE, _SOON_HELD = 0.003, 1e-4
 
 
 class Oracle:
-    """A policy for one walk."""
+    """A policy for one walk; ``exchanging`` takes steps that did not fit in exchange for others,
+    see `ptmtools.walkthrough.allocation.exchange`."""
 
-    def __init__(self, world: World, soon: float = SOON) -> None:
+    def __init__(self, world: World, soon: float = SOON, *, exchanging: bool = False) -> None:
+        self._exchanging = exchanging
         self._now, self._cells = _drops(world)
         self._soon = [_discounted(table, soon * world.rate) for table in (self._now, self._cells)]
         self._later = [_discounted(t, LATER * world.rate) for t in (self._now, self._cells)]
@@ -35,6 +37,7 @@ class Oracle:
             fetch=soon + _LATER_SHARE * later,
             geometry=cells.astype(np.float64),
             ahead=later,
+            exact=self._exchanging,
         )
 
 

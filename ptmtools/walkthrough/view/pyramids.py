@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats, Ints
 from ptmtools.progress import Progress, silent
 from ptmtools.texture import reader
-from ptmtools.texture.detail import squares_between
+from ptmtools.texture.detail import difference_between
 from ptmtools.texture.model import Limits
 from ptmtools.walkthrough.served import Served
 
@@ -30,8 +30,8 @@ class Pyramids:
     size: (T, L, 2) int64 width and height; 0 beyond the finest.
     count: (T,) levels of each texture.
     mean: (T, 3) the mean of the coarsest level, 0 to 255.
-    rms: (T, L) root mean square of a level minus the level below it, each texel of which covers its
-        2 × 2 block; 0 for the coarsest.
+    differences: (T, L) of a level to the level below it, as `ptmtools.texture.detail` has them, of
+        what is shown; 0 for the coarsest.
     """
 
     texel: NDArray[np.uint8]
@@ -39,7 +39,7 @@ class Pyramids:
     size: Ints
     count: Ints
     mean: Floats
-    rms: Floats
+    differences: Floats
 
 
 def read_pyramids(served: Served, progress: Progress = silent) -> Pyramids:
@@ -51,7 +51,7 @@ def read_pyramids(served: Served, progress: Progress = silent) -> Pyramids:
     deepest = max((len(row["ends"]) for row in rows), default=1)
     start, count = np.zeros((len(rows), deepest), np.int64), np.zeros(len(rows), np.int64)
     size, mean = np.zeros((len(rows), deepest, 2), np.int64), np.zeros((len(rows), 3))
-    rms = np.zeros((len(rows), deepest))
+    differences = np.zeros((len(rows), deepest))
     parts: list[NDArray[np.uint8]] = []
     at = 0
     for t in range(len(rows)):
@@ -63,14 +63,15 @@ def read_pyramids(served: Served, progress: Progress = silent) -> Pyramids:
                 if below is None:
                     mean[t] = level.reshape(-1, 3).mean(axis=0)
                 else:
-                    rms[t, n] = np.sqrt(squares_between(level, below) / level.size)
+                    texels = level.shape[0] * level.shape[1]
+                    differences[t, n] = difference_between(level, below) / texels
                 start[t, n], size[t, n] = at, (level.shape[1], level.shape[0])
                 count[t] = n + 1
                 at += level.size
                 parts.append(level.ravel())
                 below = level
     texel = np.concatenate(parts) if parts else np.zeros(0, np.uint8)
-    return Pyramids(texel, start, size, count, mean, rms)
+    return Pyramids(texel, start, size, count, mean, differences)
 
 
 def _rgb(samples: NDArray[Any]) -> NDArray[np.uint8]:
