@@ -2,12 +2,12 @@
 
     python benchmarks/walk_ablations.py DB… [--walks 3] [--seconds 150]
 
-The policy `best` walks through each database, built with `--need 64`, and then without one thing at
-a time, over links of 56 kbit/s, 512 kbit/s and 4 Mbit/s with texture memory of a tenth of all
-textures. Printed are what each hint takes in the index and the records, gzipped, and the mean errors
-of the picture, over all walks, each beside that of `best`. Below, the policy `ach` with coverage
-hints from fewer and from more sample points, beside those of the database, and the processor
-seconds that these take (`benchmarks/need.py` has those of `need`).
+The policy `best` walks through each database, built with `--need 64`, and then without one thing
+at a time, over links of 56 kbit/s, 512 kbit/s and 4 Mbit/s with texture memory of a tenth of all
+textures. Printed are what each hint takes in the index and the records, gzipped, and the mean
+errors of the picture, over all walks, each beside that of `best`. Below, the policy `ach` with
+coverage hints from fewer and from more sample points, beside those of the database, and the
+processor seconds that these take (`benchmarks/need.py` has those of `need`).
 """
 
 from __future__ import annotations
@@ -39,7 +39,13 @@ from ptmtools.walkthrough.policies.around import (
     geometry_by_coverage,
 )
 from ptmtools.walkthrough.policies.best import BEST, SHARE, by_both
-from ptmtools.walkthrough.policies.engine import EngineClient, Policy, Worth
+from ptmtools.walkthrough.policies.engine import (
+    RANGE_BYTES,
+    RANGE_SECONDS,
+    EngineClient,
+    Policy,
+    Worth,
+)
 from ptmtools.walkthrough.policies.screen import Screen
 from ptmtools.walkthrough.request import Request
 from ptmtools.walkthrough.served import read_served
@@ -78,7 +84,10 @@ class Covered(Screen):
 
 
 class FirstLook(EngineClient):
-    """`best` that asks for the bundle of the first cell before any texture."""
+    """`best` that asks for the bundle of the first cell before any texture: for as much of it as a
+    range has, or for all of it."""
+
+    most: float | None = None
 
     def __init__(self, world: World, link: Link, budget: int) -> None:
         super().__init__(world, link, budget, BEST)
@@ -95,14 +104,32 @@ class FirstLook(EngineClient):
 
     def _fetch_one(self) -> bool:
         if self._bundle is None and self.cell >= 0 and self.geometry.asked[self.cell]:
-            stock = self.world.catalogue
-            finest = dict(stock.records[self.cell]["firstLook"])
-            ends = {t: int(stock.ends[t, level + 1]) for t, level in finest.items()}
+            ends = self._ends()
             self._pieces = [self.textures.ask(t, end) for t, end in ends.items()]
             self._bundle = self.link.request(sum(ends.values()), 1.0, None)
             self.waiting.append(self._bundle)
             return True
         return super()._fetch_one()
+
+    def _ends(self) -> dict[int, int]:
+        """Where the part of the bundle that is asked for ends in each texture."""
+        stock = self.world.catalogue
+        most = self.most or max(RANGE_BYTES, RANGE_SECONDS * self.estimate.bandwidth / 8)
+        ends: dict[int, int] = {}
+        size = 0
+        for t, level in stock.records[self.cell]["firstLook"]:
+            end = int(stock.ends[t, level + 1])
+            size += end - ends.get(t, 0)
+            if size > most:
+                break
+            ends[t] = end
+        return ends
+
+
+class WholeFirstLook(FirstLook):
+    """All of the bundle."""
+
+    most = np.inf
 
 
 def grey(world: World) -> World:
@@ -155,7 +182,8 @@ VARIANTS = (
     Variant("nothing of what lies around", engine(Screen())),
     Variant("no placeholders: geometry by `ach`", engine(Covered(by_both, SHARE))),
     Variant("an item buffer a second old", engine(Screen(by_both, SHARE, age=OLD))),
-    Variant("with `firstLook` in the first cell", FirstLook),
+    Variant("with a range of `firstLook` in the first cell", FirstLook),
+    Variant("with all of `firstLook` in the first cell", WholeFirstLook),
     Variant("geometry not compressed", engine(BEST), plain_geometry),
 )  # fmt: skip
 
@@ -217,6 +245,7 @@ def main() -> None:
     parser.add_argument("db", nargs="+")
     parser.add_argument("--walks", type=int, default=3)
     parser.add_argument("--seconds", type=float, default=150.0)
+    parser.add_argument("--only", default="", help="only variants that contain this")
     given = parser.parse_args()
     worlds: list[World] = []
     sources: list[Artifacts] = []
@@ -235,9 +264,11 @@ def main() -> None:
     head = " | ".join(f"{link / 1e3:g} kbit/s" for link in LINKS)
     print(f"\n| best, and without | {head} |\n|---|{'---|' * len(LINKS)}")
     base = walked(worlds, VARIANTS[0].client)
-    for variant in VARIANTS:
+    for variant in (v for v in VARIANTS if given.only in v.name):
         errors = walked([variant.change(world) for world in worlds], variant.client)
         printed(variant.name, errors, base)
+    if given.only:
+        return
     print(f"\n| ach of so many points | {head} | s |\n|---|{'---|' * (len(LINKS) + 1)}")
     client = POLICIES["ach"].client
     base = walked(worlds, client)
