@@ -172,7 +172,7 @@ class EngineClient(Client):
             return False
         left = sum(request.left for request in self.waiting)
         ahead = self.estimate.latency + RANGE_SECONDS / 2
-        return left == 0 or 8 * left / self.estimate.bandwidth < ahead
+        return left == 0 or 8 * left < ahead * self.estimate.bandwidth
 
     def _fetch_one(self) -> bool:
         """Asks for the range that is worth most; False if there is none."""
