@@ -123,13 +123,16 @@ def _least(worth: Floats, cost: Ints, column: Ints, kept: int) -> tuple[int, int
 
 
 @plain_kernel
-def next_fetch(worth: Floats, ends: Ints, requested: Ints, last: Ints) -> tuple[float, int, int]:
+def next_fetch(
+    worth: Floats, ends: Ints, requested: Ints, last: Ints, overhead: int
+) -> tuple[float, int, int]:
     """The texture whose next bytes are worth most: worth per byte, texture, and the column that
     they lead to; (0, -1, 0) if there is none.
 
     Parameters
     ----------
     worth, ends: (T, K). requested: (T,) bytes asked for already. last: (T,) wanted columns.
+    overhead: bytes that a request takes besides.
     """
     best, texture, column = 0.0, -1, 0
     for t in range(len(requested)):
@@ -139,7 +142,7 @@ def next_fetch(worth: Floats, ends: Ints, requested: Ints, last: Ints) -> tuple[
         here = 0
         while here < last[t] and ends[t, here + 1] <= asked:
             here += 1
-        density, to = best_step(worth[t], ends[t], here, asked, last[t])
+        density, to = best_step(worth[t], ends[t], here, asked - overhead, last[t])
         if density > best:
             best, texture, column = density, t, to
     return best, texture, column

@@ -29,10 +29,12 @@ from ptmtools.walkthrough.world import World
 RANGE_SECONDS, RANGE_BYTES = 0.2, 8000
 #: Requests at a time.
 CONNECTIONS = 6
+#: What a request costs besides its bytes: headers, and waiting.
+OVERHEAD = 300
 #: What a pixel is wrong by where there is nothing: the mean of what was measured, 0 to 255.
 NOTHING = 64.0
 #: The record of a neighbouring cell is worth as much as so large a share of the screen.
-RECORD_SHARE = 0.02
+RECORD_SHARE = 0.005
 #: A level that is not wanted any more is held on to, at so small a share of its worth, which
 #: halves in so many seconds.
 HELD_ON, HELD_SECONDS = 1e-3, 7.0
@@ -143,7 +145,7 @@ class EngineClient(Client):
         fading = 0.5 ** (1 / (self.world.rate * HELD_SECONDS))
         self._kept = np.maximum(self._kept * fading, hold)
         stock = self.world.catalogue
-        worth = hold + HELD_ON * self._kept + HELD_ON**2 * stock.rms
+        worth = hold + HELD_ON * self._kept + HELD_ON**2 * stock.differences
         allocate(worth, stock.memory, self.have, self.budget, self.column, exact)
 
     def arrived(self, request: Request) -> None:
@@ -186,7 +188,7 @@ class EngineClient(Client):
             return False
         stock, worth = self.world.catalogue, self._worth
         best, texture, column = next_fetch(
-            worth.fetch, stock.ends, self.textures.asked, self._target
+            worth.fetch, stock.ends, self.textures.asked, self._target, OVERHEAD
         )
         left = self.geometry.size - self.geometry.asked
         density = np.where(left > 0, worth.geometry / np.maximum(left, 1), 0.0)
@@ -203,7 +205,7 @@ class EngineClient(Client):
             )
         if texture < 0 and worth.ahead is not None:
             best, texture, column = next_fetch(
-                worth.ahead, stock.ends, self.textures.asked, stock.levels
+                worth.ahead, stock.ends, self.textures.asked, stock.levels, OVERHEAD
             )
         if texture < 0:
             return False

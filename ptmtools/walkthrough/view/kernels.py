@@ -170,10 +170,10 @@ def add_frame(
                 if n == -2:
                     shown = GREY
                 elif n == -1:
-                    shown = mean[t, k]
+                    shown = mean[t, k] * color[f, k]
                 else:
-                    shown = levels[n, k]
-                total += ((shown - exact[k]) * color[f, k]) ** 2
+                    shown = levels[n, k] * color[f, k]
+                total += (shown - exact[k] * color[f, k]) ** 2
             if n == sharp:
                 # With its finest level there, it is exact.
                 total = 0.0
