@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import Phase, given, settings, strategies as st
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.walkthrough.client import Client, Kind, Range
@@ -21,6 +21,8 @@ from ptmtools.walkthrough.world import World
 from tests.walkthrough.links import CONDITIONS
 from tests.walkthrough.worlds import SEEDS, any_world
 
+#: A world of a smaller seed is no smaller.
+PHASES = (Phase.explicit, Phase.reuse, Phase.generate)
 EACH = pytest.mark.parametrize("policy", POLICIES)
 BUDGETS = st.integers(0, 10_000) | st.just(1 << 40)
 #: From a modem on.
@@ -84,7 +86,7 @@ class Witness:
 
 
 @EACH
-@settings(max_examples=15)
+@settings(max_examples=15, phases=PHASES)
 @given(SEEDS, LINKS, BUDGETS)
 def test_what_no_client_may_do(policy: str, seed: int, conditions: Conditions, budget: int) -> None:
     world = any_world(seed)
@@ -139,7 +141,7 @@ def same(a: Run, b: Run) -> bool:
 
 
 @EACH
-@settings(max_examples=5)
+@settings(max_examples=5, phases=PHASES)
 @given(SEEDS, LINKS, BUDGETS)
 def test_the_same_run_twice(policy: str, seed: int, conditions: Conditions, budget: int) -> None:
     world = any_world(seed)
@@ -148,7 +150,7 @@ def test_the_same_run_twice(policy: str, seed: int, conditions: Conditions, budg
     assert same(first, simulate(world, declared, conditions, budget))
 
 
-@settings(max_examples=8)
+@settings(max_examples=8, phases=PHASES)
 @given(SEEDS, st.sampled_from(["h1", "h2"]))
 def test_all_come_to_the_same_without_limits(seed: int, protocol: str) -> None:
     """Who stands sees the full picture, whatever the policy, with the same levels on the screen."""
@@ -167,7 +169,7 @@ def test_all_come_to_the_same_without_limits(seed: int, protocol: str) -> None:
 
 
 @EACH
-@settings(max_examples=5)
+@settings(max_examples=5, phases=PHASES)
 @given(SEEDS)
 def test_nothing_comes_before_it_can(policy: str, seed: int) -> None:
     """The index takes a latency, the record and the geometry one more, textures a third."""
@@ -179,7 +181,7 @@ def test_nothing_comes_before_it_can(policy: str, seed: int) -> None:
     assert run.stalls >= early.sum()
 
 
-@settings(max_examples=20)
+@settings(max_examples=20, phases=PHASES)
 @given(SEEDS, st.lists(st.integers(0, 5000), min_size=2, max_size=4))
 def test_more_memory_is_no_worse_for_who_knows_all(seed: int, budgets: list[int]) -> None:
     """With all downloaded, for the oracle; but for what it holds on to, a few hundredths."""
@@ -191,7 +193,7 @@ def test_more_memory_is_no_worse_for_who_knows_all(seed: int, budgets: list[int]
     assert all(b <= a + 0.02 * (1 + a) for a, b in itertools.pairwise(errors))
 
 
-@settings(max_examples=10)
+@settings(max_examples=10, phases=PHASES)
 @given(SEEDS)
 def test_who_stands_sees_no_worse(seed: int) -> None:
     """Over a slow link, without a limit of memory, the oracle's picture only gets better."""

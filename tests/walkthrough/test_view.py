@@ -72,7 +72,8 @@ def room(random: np.random.Generator) -> Room:
         middle = random.uniform(low + 0.5, high - 0.5)
         corner.append(middle + random.normal(0, 1.0, (3, 3)))
     for points in corner:
-        uv.append(random.uniform(-1.5, 1.5, (3, 2)) * np.ptp(points, axis=0).max() / 2)
+        # Up to so fine that a pixel covers many texels.
+        uv.append(random.uniform(-1, 1, (3, 2)) * 10 ** random.uniform(0, 2.5))
     count = len(corner)
     texture = random.integers(-1, 3, count).astype(np.int32)
     return Room(
