@@ -59,7 +59,7 @@ def room(random: np.random.Generator) -> Room:
             height, width = (max(1, side // 2) for side in rows[0].shape[:2])
             rows.insert(0, random.integers(0, 256, (height, width, 3), dtype=np.uint8))
         levels.append(rows)
-    corner, uv = [], []
+    corner = []
     low, high = np.array([0.0, 0, 0]), np.array([6.0, 3, 4])
     for axis in range(3):
         for end in (low, high):
@@ -71,15 +71,14 @@ def room(random: np.random.Generator) -> Room:
     for _ in range(6):
         middle = random.uniform(low + 0.5, high - 0.5)
         corner.append(middle + random.normal(0, 1.0, (3, 3)))
-    for points in corner:
-        # Up to so fine that a pixel covers many texels.
-        uv.append(random.uniform(-1, 1, (3, 2)) * 10 ** random.uniform(0, 2.5))
     count = len(corner)
+    # Up to so fine that a pixel covers many texels.
+    uv = random.uniform(-1, 1, (count, 3, 2)) * 10 ** random.uniform(0, 2.5, (count, 1, 1))
     texture = random.integers(-1, 3, count).astype(np.int32)
     return Room(
         Surfaces(
             corner=np.array(corner),
-            uv=np.array(uv),
+            uv=uv,
             cell=np.sort(random.integers(0, 2, count)).astype(np.int32),
             shape=np.arange(count, dtype=np.int32),
             texture=texture,
