@@ -147,7 +147,7 @@ class EmitOptions:
         default=None, metadata={"default_before": (6, (0.25, 1.6, 0.75))}
     )
     field_of_view: float = 1.1
-    first_look: int = 64
+    first_look: int = 0
     need: int = 0
     gzip: bool = False
     format: str = field(

@@ -81,8 +81,7 @@ class Files:
         for entry in waiting:
             if entry[0] == part.end:
                 entry[1] = 1
-        while waiting and waiting[0][1]:
-            self.there[part.number] = waiting.popleft()[0]
+        self._pass(part.number)
 
     def given_up(self, part: Range, received: int) -> bool:
         """The last range of a file is given up, of which so much has arrived; False if it was not
@@ -90,10 +89,18 @@ class Files:
         waiting = self._waiting[part.number]
         if waiting[-1][0] != part.end:
             return False
-        waiting[-1][0] = part.begin + received
         self.asked[part.number] = part.begin + received
-        self.arrived(Range(part.kind, part.number, part.begin, part.begin + received))
+        waiting.pop()
+        if received:
+            waiting.append([part.begin + received, 1])
+            self._pass(part.number)
         return True
+
+    def _pass(self, number: int) -> None:
+        """Counts what is there without a gap."""
+        waiting = self._waiting[number]
+        while waiting and waiting[0][1]:
+            self.there[number] = waiting.popleft()[0]
 
 
 class Client(ABC):

@@ -33,7 +33,7 @@ EMIT: Stage[None] = Stage(
     about="Write the served files: cells and hints.",
     recipe=7,
     changed="the hints say what each level of a texture adds, its mean colour, and what a texel "
-    "takes on a GPU; each cell has a bundle of coarse levels for a first look (--first-look); "
+    "takes on a GPU; --first-look writes a bundle of coarse levels for each cell; "
     "viewpoints look where pictures are",
     options=EmitOptions,
     reads=(SCENE, CELLS, PVS, ACH, TEXTURES),

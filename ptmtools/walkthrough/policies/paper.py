@@ -18,8 +18,9 @@ portal that the way of the last half second leads through within two seconds, is
 Requests are made as soon as they are known, for the cell, then its visible set, then the next cell,
 then levels, which are asked for whole and never cancelled.
 
-Read in: a level is added only if it fits. By the letter levels are dropped one a frame while others
-are added at once, and a client that turns around would hold more than its budget.
+Read in: a level is added only if it fits, and where the budget shrinks, levels are dropped until it
+is kept. By the letter levels are dropped one a frame while others are added at once, and a client
+that turns around, or walks on, would hold more than its budget.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.walkthrough.client import Client, Kind
+from ptmtools.walkthrough.client import Client, Kind, Range
 from ptmtools.walkthrough.network import Link
 from ptmtools.walkthrough.policies.paper_kernels import refresh, share_out
 from ptmtools.walkthrough.world import World
@@ -140,9 +141,15 @@ class PaperClient(Client):
         return self.world.catalogue.visible[self.cell]
 
     def _whole(self, kind: Kind, number: int, priority: float) -> None:
+        """Asks for a file, or finds it more urgent than before."""
         files = self.files[kind]
         if not files.asked[number]:
             self.ask(kind, number, int(files.size[number]), priority)
+        elif not files.whole[number]:
+            part = Range(kind, number, 0, int(files.size[number]))
+            for request in self.waiting:
+                if request.tag == part and request.priority < priority:
+                    self.link.reprioritise(request, priority)
 
     def _enter(self) -> None:
         """Drops what the visible set of a new cell does not use."""

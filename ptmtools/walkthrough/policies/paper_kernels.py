@@ -66,16 +66,20 @@ def refresh(
     column: Ints,
 ) -> Ints:
     """Removes and adds a level of each texture, by what it keeps and has downloaded; returns the
-    textures that ask for their next level. ``column`` (T,) changes."""
+    textures that ask for their next level. ``column`` (T,) changes.
+
+    More levels are removed for as long as all of them exceed the budget, as when it has shrunk.
+    """
     asks = np.zeros(len(share), np.int64)
-    count, used = 0, 0
+    count, used, removed = 0, budget + 1, True
     before = column.copy()
-    for t in range(len(share)):
-        here = column[t]
-        # A level that can be added or asked for is no reason to remove one.
-        if here > 0 and memory[t, here] > share[t]:
-            column[t] = here - 1
-        used += memory[t, column[t]]
+    while removed and used > budget:
+        used, removed = 0, False
+        for t in range(len(share)):
+            if column[t] > 0 and memory[t, column[t]] > share[t]:
+                column[t] -= 1
+                removed = True
+            used += memory[t, column[t]]
     for t in range(len(share)):
         here = column[t]
         if here < before[t] or here >= levels[t] or memory[t, here + 1] > share[t]:
