@@ -75,7 +75,7 @@ def catalogue(
         ends_of = np.sort(random.uniform(0, 1, (2, len(shapes), 3)), axis=0)
         low, high = low + ends_of[0] * ROOM, low + ends_of[1] * ROOM
     own = Shapes(cell, texture_of, low, high, np.full(len(cell), 4.0), np.full(len(cell), 100.0))
-    records = tuple(_record(c, cells, len(textures), shapes, random) for c in range(cells))
+    records = tuple(_record(c, cells, textures, shapes, random) for c in range(cells))
     return Catalogue(
         levels=count,
         ends=ends,
@@ -95,7 +95,7 @@ def catalogue(
 def _record(
     cell: int,
     cells: int,
-    textures: int,
+    textures: Sequence[Texture],
     shapes: Sequence[tuple[int, int]],
     random: np.random.Generator | None,
 ) -> dict[str, Any]:
@@ -116,7 +116,7 @@ def _record(
         "leaves": [leaf(low, low + ROOM)],
         "textures": [[t for t, _ in row] for row in rows],
         "textureShares": rows,
-        "need": [[t, 1, 0.5 / textures, 0.25 / textures] for t in range(textures)],
+        "need": [[t, 0, *[0.5 / len(textures)] * len(x.groups)] for t, x in enumerate(textures)],
         "portals": [
             {"neighbour": c, "polygon": _door(low[0] + (ROOM[0] if c > cell else 0))} for c in doors
         ],
