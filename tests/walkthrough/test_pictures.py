@@ -51,7 +51,7 @@ def card() -> Any:
         size=np.array([[[1, 1], [2, 2]]]),
         count=np.array([2]),
         mean=mean[None],
-        rms=np.zeros((1, 2)),
+        differences=np.zeros((1, 2)),
     )
     return SimpleNamespace(
         served=SimpleNamespace(surfaces=surfaces),

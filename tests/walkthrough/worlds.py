@@ -63,11 +63,12 @@ def catalogue(
     count = np.array([len(t.groups) for t in textures], dtype=np.int64)
     wide = int(count.max(initial=0)) + 1
     ends, memory = (np.zeros((len(textures), wide), np.int64) for _ in range(2))
-    rms = np.zeros((len(textures), wide))
+    differences = np.zeros((len(textures), wide))
     for t, texture in enumerate(textures):
         for table, each in ((ends, texture.groups), (memory, texture.memory)):
             table[t, 1:] = np.cumsum([*each, *[0] * (wide - 1 - count[t])])
-        rms[t, 2 : count[t] + 1] = 8.0 if random is None else random.uniform(1, 20, count[t] - 1)
+        each = 8.0 if random is None else random.uniform(1, 20, count[t] - 1)
+        differences[t, 2 : count[t] + 1] = each
     cell, texture_of = np.array(shapes, dtype=np.int64).reshape(-1, 2).T
     low = cell[:, None] * [ROOM[0], 0, 0]
     high = low + ROOM
@@ -80,7 +81,7 @@ def catalogue(
         levels=count,
         ends=ends,
         memory=memory,
-        rms=rms,
+        differences=differences,
         colors=np.full((len(textures), 3), 100.0),
         index_bytes=500,
         statistics_bytes=700,
@@ -206,7 +207,7 @@ def _row(
     if texture >= 0:
         levels = int(stock.levels[texture])
         wanted = levels if random is None else int(random.integers(1, levels + 1))
-        squared = stock.rms[texture, : wanted + 1] ** 2
+        squared = stock.differences[texture, : wanted + 1] ** 2
         # With column k there, all that the columns behind it add is missing.
         wrong[1 : wanted + 2] = np.sqrt(np.append(np.cumsum(squared[:0:-1])[::-1], [0, 0]))[
             : wanted + 1

@@ -145,7 +145,7 @@ class EngineClient(Client):
         fading = 0.5 ** (1 / (self.world.rate * HELD_SECONDS))
         self._kept = np.maximum(self._kept * fading, hold)
         stock = self.world.catalogue
-        worth = hold + HELD_ON * self._kept + HELD_ON**2 * stock.rms
+        worth = hold + HELD_ON * self._kept + HELD_ON**2 * stock.differences
         allocate(worth, stock.memory, self.have, self.budget, self.column, exact)
 
     def arrived(self, request: Request) -> None:
