@@ -76,15 +76,15 @@ def prepared(scene: str, walk: Path) -> World:
 def _run_all(cases: list[Case], file: Path) -> None:
     """Runs cases of one world, and adds them to the file."""
     scene, walk = cases[0].scene, cases[0].walk
-    begin = time.perf_counter()
+    begin = time.process_time()
     world = prepared(scene, walk_file(scene, walk))
-    preparation, standing = time.perf_counter() - begin, world.standing(STANDS)
+    preparation, standing = time.process_time() - begin, world.standing(STANDS)
     for case in cases:
         link = Conditions(parse_bandwidth(case.bandwidth))
         budget, policy = budget_of(world, parse_memory(case.memory)), POLICIES[case.policy]
-        begin = time.perf_counter()
+        begin = time.process_time()
         run = simulate(world, policy, link, budget)
-        seconds = time.perf_counter() - begin
+        seconds = time.process_time() - begin
         found = measure(run, world, simulate(standing, policy, link, budget))
         row = {
             "key": case.key,
