@@ -95,11 +95,11 @@ def _run_all(cases: list[Case], file: Path) -> None:
             **asdict(found),
         }
         with file.open("a", encoding="utf-8") as lines:
-            lines.write(json.dumps(row) + "\n")
+            lines.write(f"\n{json.dumps(row)}")  # before it: the last line may have been cut off
 
 
 def _kept(file: Path) -> dict[str, Row]:
-    """The rows of a file, by key; the last may be cut off."""
+    """The rows of a file, by key; lines that were cut off are left out."""
     return {row["key"]: row for row in _rows(file)} if file.is_file() else {}
 
 
