@@ -46,7 +46,7 @@ def test_means_ratios_and_their_spread_over_walks() -> None:
     # Twice and six times the oracle's: 4 on average, 2 from it.
     assert (ach["/ oracle"], ach["± walks"], ach["p95 / ach"]) == ("4.00", "2.00", "1.00")
     assert ach["90 %, s"] == "60.00"
-    assert cells(whole, "oracle")["p95 / ach"] == "0.33"
+    assert cells(whole, "oracle")["p95 / ach"] == "0.21"
     assert cells(ratios, "ach")["4M 10%"] == "4.00"
     assert cells(by_scene, "ach")["museum / oracle"] == "4.00"
     assert cells(preparation, "museum")["mean"] == "15.0"
