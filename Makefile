@@ -5,6 +5,7 @@
 # make bench-codec   only those of the texture codec, beside other formats (about an hour)
 # make bench-pvs     cells and visibility, what is traded for what (a quarter of an hour)
 # make bench-ach     coverage hints: what accuracy costs (a quarter of an hour)
+# make bench-walk    what clients show to a walker: all policies, links and scenes (an hour)
 # make fuzz    100,000 damaged and hostile files for every reader (half an hour)
 # make sample  only the sample museum
 # make setup   only the virtual environment
@@ -27,7 +28,7 @@ JOBS ?= 2
 PYTEST_ARGS ?=
 export PTM_SHARED ?= $(abspath ../shared)
 
-.PHONY: help setup demo test lint bench bench-codec bench-pvs bench-ach fuzz sample docs-tables docs-timings docs-pictures clean
+.PHONY: help setup demo test lint bench bench-codec bench-pvs bench-ach bench-walk fuzz sample docs-tables docs-timings docs-pictures clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -99,6 +100,10 @@ bench-pvs: build/museum/.made $(VENV)/.installed-dev
 
 bench-ach: build/museum/.made $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/ach.py
+
+bench-walk: build/museum/.made $(VENV)/.installed-dev
+	$(BIN)/python benchmarks/walk_speed.py
+	$(BIN)/python benchmarks/walk_table.py
 
 bench: $(VENV)/.installed-dev
 	@mkdir -p build/bench

@@ -76,15 +76,15 @@ def prepared(scene: str, walk: Path) -> World:
 def _run_all(cases: list[Case], file: Path) -> None:
     """Runs cases of one world, and adds them to the file."""
     scene, walk = cases[0].scene, cases[0].walk
-    begin = time.perf_counter()
+    begin = time.process_time()
     world = prepared(scene, walk_file(scene, walk))
-    preparation, standing = time.perf_counter() - begin, world.standing(STANDS)
+    preparation, standing = time.process_time() - begin, world.standing(STANDS)
     for case in cases:
         link = Conditions(parse_bandwidth(case.bandwidth))
         budget, policy = budget_of(world, parse_memory(case.memory)), POLICIES[case.policy]
-        begin = time.perf_counter()
+        begin = time.process_time()
         run = simulate(world, policy, link, budget)
-        seconds = time.perf_counter() - begin
+        seconds = time.process_time() - begin
         found = measure(run, world, simulate(standing, policy, link, budget))
         row = {
             "key": case.key,
@@ -95,11 +95,11 @@ def _run_all(cases: list[Case], file: Path) -> None:
             **asdict(found),
         }
         with file.open("a", encoding="utf-8") as lines:
-            lines.write(json.dumps(row) + "\n")
+            lines.write(f"\n{json.dumps(row)}")  # before it: the last line may have been cut off
 
 
 def _kept(file: Path) -> dict[str, Row]:
-    """The rows of a file, by key; the last may be cut off."""
+    """The rows of a file, by key; lines that were cut off are left out."""
     return {row["key"]: row for row in _rows(file)} if file.is_file() else {}
 
 

@@ -10,7 +10,9 @@ p95           what e does not exceed in 95 % of the frames
 waste         share of the bytes received that was never on the screen
 / oracle      e over that of `oracle` on the same walk under the same conditions, on average
 ± walks       standard deviation of that ratio over the walks through a scene, root mean square
-s             seconds that a run takes
+p95 / ach     p95 on average over that of `ach`, which is 0 on some walks
+90 %, s       until who stands where the walk begins has 90 % of the picture, at most a minute
+s             processor seconds that a run takes; so many does the preparation of a walk
 
 The last table is beside the figures of the research prototype, which had geometry and hints for
 nothing, and other walks: e over the prototype's, over the scenes and conditions that it had.
@@ -21,12 +23,14 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 from itertools import product
+from math import nan
 from pathlib import Path
 from statistics import fmean, pstdev
 
 from walk_runs import Case, Row, made
 from walk_scenes import FOLDER, SCENES, WALKS, make_scenes
 
+from ptmtools.walkthrough.measures import STANDS
 from ptmtools.walkthrough.policies import POLICIES
 
 BANDWIDTHS = ("56k", "512k", "4M", "16M")
@@ -75,31 +79,34 @@ def tables(rows: Rows) -> list[str]:
     """All tables, as Markdown."""
     rows = [{**row, **row["e"]} for row in rows]
     truth = {_place(row): row["mean"] for row in rows if row["policy"] == "oracle"}
-    rows = [{**row, "ratio": row["mean"] / truth.get(_place(row), float("nan"))} for row in rows]
+    rival = {_place(row): row["p95"] for row in rows if row["policy"] == "ach"}
+    for row in rows:
+        row["ratio"] = row["mean"] / truth.get(_place(row), nan)
+        row["standing"] = STANDS if row["final"][1] is None else row["final"][1]
+        row["rival"] = rival.get(_place(row), nan)
     conditions = list(dict.fromkeys((row["bandwidth"], row["memory"]) for row in rows))
     scenes = list(dict.fromkeys(row["scene"] for row in rows))
 
-    def under(name: str, link: str, memory: str) -> Column:
-        alike = ("bandwidth", link), ("memory", memory)
-        return f"{link} {memory}", lambda some: _mean(name, some, *alike)
-
-    def within(name: str, scene: str) -> Column:
-        return scene, lambda some: _mean(name, some, ("scene", scene))
+    def under(name: str) -> list[Column]:
+        return [
+            (f"{link} {memory}", _mean(name, bandwidth=link, memory=memory))
+            for link, memory in conditions
+        ]
 
     summary: list[Column] = [
-        ("e", lambda some: _mean("mean", some)),
-        ("p95", lambda some: _mean("p95", some)),
-        ("waste", lambda some: _mean("waste", some)),
-        ("/ oracle", lambda some: _mean("ratio", some)),
-        ("± walks", _spread),
-        ("s", lambda some: _mean("seconds", some)),
+        *(("e", _mean("mean")), ("p95", _mean("p95")), ("waste", _mean("waste"))),
+        *(("/ oracle", _mean("ratio")), ("± walks", _spread), ("p95 / ach", _against)),
+        *(("90 %, s", _mean("standing")), ("s", _mean("seconds"))),
+    ]
+    by_scene: list[Column] = [
+        (f"{scene} {head}", _mean(name, scene=scene))
+        for scene in scenes
+        for head, name in (("e", "mean"), ("p95", "p95"), ("/ oracle", "ratio"))
     ]
     found = [
-        _table("e", rows, [under("mean", *where) for where in conditions] + summary),
-        _table("e / oracle", rows, [under("ratio", *where) for where in conditions]),
-        _table("e, by scene", rows, [within("mean", scene) for scene in scenes]),
-        _table("p95, by scene", rows, [within("p95", scene) for scene in scenes]),
-        _table("e / oracle, by scene", rows, [within("ratio", scene) for scene in scenes]),
+        _table("e", rows, under("mean") + summary),
+        _table("e / oracle", rows, under("ratio")),
+        _table("by scene", rows, by_scene),
         _preparation(rows),
     ]
     known = [row for row in rows if row["policy"] in PROTOTYPE]
@@ -122,7 +129,7 @@ def _table(title: str, rows: Rows, columns: Sequence[Column]) -> str:
 
 
 def _preparation(rows: Rows) -> str:
-    """Seconds that the walks of each scene took to be prepared."""
+    """Processor seconds that the walks of each scene took to be prepared."""
     lines = ["| preparation, s | mean | most |", "|---|--:|--:|"]
     for scene in dict.fromkeys(row["scene"] for row in rows):
         took = {row["walk"]: row["preparation"] for row in rows if row["scene"] == scene}
@@ -130,9 +137,11 @@ def _preparation(rows: Rows) -> str:
     return "\n".join(lines)
 
 
-def _mean(name: str, rows: Rows, *alike: tuple[str, str]) -> float:
-    """Of the rows that have those values."""
-    return fmean(row[name] for row in rows if all(row[key] == value for key, value in alike))
+def _mean(name: str, **alike: str) -> Callable[[Rows], float]:
+    """The mean of a figure of the rows that have those values."""
+    return lambda rows: fmean(
+        row[name] for row in rows if all(row[key] == value for key, value in alike.items())
+    )
 
 
 def _spread(rows: Rows) -> float:
@@ -143,12 +152,13 @@ def _spread(rows: Rows) -> float:
     return fmean(pstdev(ratios) ** 2 for ratios in walks.values()) ** 0.5
 
 
+def _against(rows: Rows) -> float:
+    return fmean(row["p95"] for row in rows) / fmean(row["rival"] for row in rows)
+
+
 def _prototype(scene: str) -> Column:
-    at = PROTOTYPE_SCENES.index(scene)
-    return (
-        scene,
-        lambda some: _mean("mean", some, ("scene", scene)) / PROTOTYPE[some[0]["policy"]][at],
-    )
+    here, at = _mean("mean", scene=scene), PROTOTYPE_SCENES.index(scene)
+    return scene, lambda rows: here(rows) / PROTOTYPE[rows[0]["policy"]][at]
 
 
 def _place(row: Row) -> tuple[str, str, str, int]:
