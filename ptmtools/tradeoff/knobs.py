@@ -36,6 +36,7 @@ class Knob:
     policy: who walks, if only some clients use what it makes; "" for whom the user asks for.
     own: the property of the options that says what is in force; by default the field.
     slow: values that take far longer, tried only if the knob is named.
+    of_longest: the values are shares of the longest side of a texture.
     """
 
     stage: Stage[Any]
@@ -45,6 +46,7 @@ class Knob:
     policy: str = ""
     own: str = ""
     slow: tuple[Any, ...] = ()
+    of_longest: bool = False
 
     @property
     def option(self) -> str:
@@ -60,13 +62,13 @@ class Knob:
 
 
 KNOBS = (
-    Knob(CELLS, "wall_area", (1.0, 4.0, 0.5)),
+    Knob(CELLS, "wall_area", (1.0, 4.0)),
     Knob(CELLS, "cells", ("leaf", "room")),
     Knob(PVS, "method", ("fast", "sampled", "full")),
     Knob(ACH, "samples", (8, 1, 64, 512), policy="ach", own="points"),
     Knob(TEXTURES, "profile", ("raw", "fast"), slow=("small",)),
-    Knob(TEXTURES, "max_error", (2, 1, 4), _more),
-    Knob(TEXTURES, "max_side", (512, 1024, 256), _less),
+    Knob(TEXTURES, "max_error", (2, 4), _more),
+    Knob(TEXTURES, "max_side", (1 / 2, 1 / 4), of_longest=True),
     Knob(TEXTURES, "trim", (True,), _more),
     Knob(EMIT, "need", (0,), _less),
 )
@@ -108,9 +110,10 @@ def settings(
             continue
         options = own[knob.stage]
         here = getattr(options, knob.own or knob.field)
-        limit = min(here or longest, longest) if knob.field == "max_side" else here
         values = (*knob.values, *(knob.slow if named else ()))
-        tried = [value for value in values if knob.worth(value, limit)]
+        if knob.of_longest:
+            values = tuple(int(share * longest) for share in values if share * longest >= 1)
+        tried = [value for value in values if knob.worth(value, here)]
         for value in tried[:1] if quick else tried:
             changed = replace(options, **{knob.field: value})
             yield Setting(knob, value, knob.said(here), changed)
