@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+from ptmtools.errors import InputError
 from ptmtools.pipeline.stage import Options, Stage
 from ptmtools.pipeline.stages import ACH, CELLS, EMIT, PVS, STAGES, TEXTURES
 from ptmtools.pipeline.words import option_name
@@ -115,8 +117,9 @@ def settings(
             values = tuple(int(share * longest) for share in values if share * longest >= 1)
         tried = [value for value in values if knob.worth(value, here)]
         for value in tried[:1] if quick else tried:
-            changed = replace(options, **{knob.field: value})
-            yield Setting(knob, value, knob.said(here), changed)
+            with suppress(InputError):  # what the other options do not allow
+                changed = replace(options, **{knob.field: value})
+                yield Setting(knob, value, knob.said(here), changed)
 
 
 def concerned(stage: Stage[Any], own: Mapping[Stage[Any], Options]) -> list[Stage[Any]]:

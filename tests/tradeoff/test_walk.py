@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
+from ptmtools.database.model import EmitOptions
 from ptmtools.pipeline import Artifacts, build_scene
 from ptmtools.pipeline.build import run_stage
 from ptmtools.pipeline.command import open_database
@@ -32,9 +35,15 @@ TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data/two_rooms/two_roo
 
 @pytest.fixture(scope="module")
 def db(tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("walk") / "rooms.db"
-    build_scene(TWO_ROOMS, path, AchOptions(preset="fast", backend="embree"), workers=1)
-    return path
+    """The two rooms, with noise on the walls, which no codec keeps for nothing."""
+    folder = tmp_path_factory.mktemp("walk")
+    shutil.copytree(TWO_ROOMS.parent, folder / "model")
+    random = np.random.default_rng(0)
+    for image in sorted((folder / "model").glob("*.png")):
+        Image.fromarray(random.integers(0, 256, (64, 64, 3), np.uint8)).save(image)
+    options = AchOptions(preset="fast", backend="embree"), EmitOptions(need=64)
+    build_scene(folder / "model" / TWO_ROOMS.name, folder / "rooms.db", *options, workers=1)
+    return folder / "rooms.db"
 
 
 @pytest.fixture(scope="module")
@@ -216,7 +225,8 @@ def test_the_command(db, walk_file, tmp_path, capsys) -> None:
     file = tmp_path / "t.csv"
     asked = ["tradeoff", str(db), "--stage", "walk", "--walk", str(walk_file), "--csv", str(file)]
     knobs = ["--knob", "max-side", "--knob", "pvs", "--knob", "samples"]
-    assert main([*asked, *knobs, "--quick", "--bandwidth", "64k,inf", "--json"]) == 0
+    links = ["--bandwidth", "64k,inf", "--memory", "inf"]
+    assert main([*asked, *knobs, *links, "--quick", "--json"]) == 0
     out, err = capsys.readouterr()
     assert "3 settings on a walk of 10 s; about" in err
     (found,) = json.loads(out)
