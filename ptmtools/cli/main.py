@@ -31,7 +31,7 @@ COMMANDS = {
     "validate": ("reports", "validate", "Check a database or a .ptm file."),
     "info": ("information", "info", "Show what is in a database or a .ptm file."),
     "plot": ("reports", "plot", "Draw the floor plan of a database."),
-    "tradeoff": ("tradeoff", "tradeoff", "Measure what settings cost, and how accurate they are."),
+    "tradeoff": ("tradeoff", "tradeoff", "Measure what settings cost, and what they are worth."),
     "path": ("path", "path", "Make a walk through every room of a database."),
     "simulate": ("simulate", "simulate", "Walk through a database as clients would see it."),
     "encode": ("images", "encode", "Encode images as .ptm files."),

@@ -3,23 +3,36 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import click
 
 from ptmtools.cli.common import as_json, database, forced, voiced, writable
 from ptmtools.cli.output import Voice
+from ptmtools.cli.parameters import options_of, take
 from ptmtools.coverage.options import MAX_SAMPLES
 from ptmtools.files import write_bytes
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
+from ptmtools.pipeline.stages import CELLS, SCENE
+from ptmtools.tradeoff import sentences
 from ptmtools.tradeoff.experiment import Trade, run
 from ptmtools.tradeoff.experiments import EXPERIMENTS, Subject
 from ptmtools.tradeoff.figure import picture, require
+from ptmtools.tradeoff.knobs import KNOBS
 from ptmtools.tradeoff.report import as_csv, table
+from ptmtools.tradeoff.walk import WalkOptions, WalkTrade, try_settings
+from ptmtools.walkthrough.path.making import make_path
+from ptmtools.walkthrough.path.options import PathOptions
+from ptmtools.walkthrough.walk import Walk, read_walk
 
 #: Sample points of the reference: at least so many that settings with fewer remain.
 LEAST_POINTS = 64
+#: What is tried on a walk, beside the experiments of the stages.
+WALK = "walk"
+#: How long the walk is that is made where none is given, s; in a hurry.
+DURATION, QUICK = 60.0, 30.0
 
 
 @click.command("tradeoff")
@@ -27,10 +40,29 @@ LEAST_POINTS = 64
 @click.option(
     "--stage",
     "stages",
-    type=click.Choice(list(EXPERIMENTS)),
+    type=click.Choice([WALK, *EXPERIMENTS]),
     multiple=True,
-    help="Try only this stage. May be given several times. By default all are tried.",
+    help="Try only this: all that changes what somebody sees who walks through the building "
+    f"({WALK}), or a stage by itself. May be given several times. By default all are tried.",
 )
+@click.option(
+    "--walk",
+    "walk_file",
+    type=click.Path(),
+    metavar="FILE",
+    help="The walk, as `ptm path` writes it. By default one of "
+    f"{DURATION:.0f} s is made, with --quick of {QUICK:.0f} s.",
+)
+@options_of(WalkOptions)
+@click.option(
+    "--knob",
+    "knobs",
+    type=click.Choice([knob.option.removeprefix("--") for knob in KNOBS]),
+    multiple=True,
+    help="Try only this option on the walk, with values that take long too. May be given several "
+    "times. By default all are tried.",
+)
+@click.option("--quick", is_flag=True, help="Try one value of each option, on a shorter walk.")
 @click.option(
     "--error",
     "wanted",
@@ -64,6 +96,9 @@ def tradeoff(
     voice: Voice,
     db: str,
     stages: tuple[str, ...],
+    walk_file: str | None,
+    knobs: tuple[str, ...],
+    quick: bool,
     wanted: float | None,
     cells_tried: int,
     reference: int,
@@ -71,34 +106,63 @@ def tradeoff(
     plot_file: str | None,
     force: bool,
     as_json: bool,
+    **values: Any,
 ) -> None:
-    """Measure what settings of each stage cost, and how accurate they are, on the scene of DB.
+    """Measure what settings of each stage cost, and what they are worth, on the scene of DB.
 
-    A star marks a setting if no cheaper one is more accurate. DB is not changed.
+    First what somebody sees who walks through the building: in sentences, and as a table. Then, of
+    each stage, how accurate its result is; a star marks a setting if no cheaper one is more
+    accurate. DB is not changed.
     """
+    options = take(WalkOptions, values)
     for file in (csv_file, plot_file):
         if file:
             writable(file, force)
     if plot_file:
         require()
-    subject = Subject(Artifacts(open_database(db)), cells_tried, reference)
+    artifacts = Artifacts(open_database(db))
+    subject = Subject(artifacts, cells_tried, reference)
+    walked: list[WalkTrade] = []
     trades = []
     with voice.progress() as progress:
-        for stage in stages or EXPERIMENTS:
+        for stage in stages or (WALK, *EXPERIMENTS):
             progress(0, 1, f"preparing {stage}")
-            experiment = EXPERIMENTS[stage].load()(subject)
-            trades.append(run(stage, experiment, progress))
+            if stage == WALK:
+                walk = read_walk(walk_file) if walk_file else _made(artifacts, quick)
+                walked.append(
+                    try_settings(
+                        Path(db), artifacts, walk, options, knobs,
+                        quick=quick, progress=progress, tell=voice.warn,
+                    )
+                )  # fmt: skip
+            else:
+                experiment = EXPERIMENTS[stage].load()(subject)
+                trades.append(run(stage, experiment, progress))
+    every = [trade for walk in walked for trade in sentences.trades(walk)] + trades
     if csv_file:
-        write_bytes(csv_file, as_csv(trades).encode(), force=force)
+        write_bytes(csv_file, as_csv(every).encode(), force=force)
     if plot_file:
-        write_bytes(plot_file, picture(trades), force=force)
+        write_bytes(plot_file, picture(every), force=force)
     if as_json:
-        voice.emit_json([_document(trade, wanted) for trade in trades])
+        found = [_walk_document(walk) for walk in walked]
+        voice.emit_json([*found, *(_document(trade, wanted) for trade in trades)])
         return
-    for trade in trades:
-        for line in table(trade, wanted):
+    blocks = [sentences.table(walk, wanted) for walk in walked]
+    for lines in [*blocks, *(table(trade, wanted) for trade in trades)]:
+        for line in lines:
             voice.say(line)
         voice.say("")
+
+
+def _made(artifacts: Artifacts, quick: bool) -> Walk:
+    """A walk through a database."""
+    options = PathOptions(duration=QUICK if quick else DURATION)
+    return make_path(artifacts[SCENE], artifacts[CELLS], options).walk
+
+
+def _walk_document(trade: WalkTrade) -> dict[str, Any]:
+    """As JSON has it: with what is said of it."""
+    return {"stage": WALK, "sentences": sentences.said(trade), **asdict(trade)}
 
 
 def _document(trade: Trade, wanted: float | None) -> dict[str, Any]:

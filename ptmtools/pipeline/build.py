@@ -88,18 +88,20 @@ def run_stage(
     *,
     workers: int = 0,
     scheduler: str | None = None,
+    rebuild: bool = False,
     progress: Progress = silent,
     tell: Tell = _nothing,
 ) -> BuildReport:
     """Runs one stage of a database, the one that these options are of: ``PvsOptions()`` runs the
-    visibility stage. ``workers``, ``scheduler`` and ``tell`` as for `build_scene`."""
+    visibility stage. The others as for `build_scene`."""
     start = time.perf_counter()
     chosen = chosen_options([options])
     stages = [stage for stage in STAGES.values() if isinstance(options, stage.options)]
     with naming_command(db):
         opened = DatabaseWriter.open_for_stage(db)
     with opened as writer, Workers(workers, scheduler) as used:
-        return _run(Run(writer, used, progress), stages, chosen, start, tell)
+        run = Run(writer, used, progress, rebuild=rebuild)
+        return _run(run, stages, chosen, start, tell)
 
 
 def chosen_options(given: Iterable[Options]) -> dict[Stage[Any], Options]:

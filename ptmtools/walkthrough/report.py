@@ -71,15 +71,18 @@ def _walk_line(world: World) -> str:
     )
 
 
+def rate_text(bandwidth: float | None) -> str:
+    """bit/s as people say them."""
+    if bandwidth is None:
+        return "no limit of bandwidth"
+    power, unit = next((p, u) for p, u in _UNITS if bandwidth >= p)
+    return f"{bandwidth / power:g} {unit}"
+
+
 def link_text(link: Conditions) -> str:
     """What a link is like."""
-    if link.bandwidth is None:
-        rate = "no limit of bandwidth"
-    else:
-        power, unit = next((p, u) for p, u in _UNITS if link.bandwidth >= p)
-        rate = f"{link.bandwidth / power:g} {unit}"
     traced = ", by a trace" if link.trace else ""
-    return f"{rate}, {link.latency * 1000:g} ms, {link.protocol}{traced}"
+    return f"{rate_text(link.bandwidth)}, {link.latency * 1000:g} ms, {link.protocol}{traced}"
 
 
 _UNITS = ((10**9, "Gbit/s"), (10**6, "Mbit/s"), (10**3, "kbit/s"), (0, "bit/s"))

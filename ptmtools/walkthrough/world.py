@@ -100,6 +100,8 @@ def prepare(
     rate: float = RATE,
     pixels: tuple[int, int] = PIXELS,
     progress: Progress = silent,
+    full: Pyramids | None = None,
+    views: Views | None = None,
 ) -> World:
     """The world of a walk.
 
@@ -107,6 +109,8 @@ def prepare(
     ----------
     pyramids: of this database, if they have been read already.
     rate: frames a second. pixels: of the item buffer, across and down.
+    full: that pictures are compared with instead; see `look`.
+    views: of this walk, if they have been made already.
 
     Raises
     ------
@@ -127,7 +131,9 @@ def prepare(
     textures = read_pyramids(served, progress) if pyramids is None else pyramids
     camera = Camera(*pixels, walk.field_of_view, walk.aspect)
     seen, view = np.unique(np.concatenate([eye, direction], axis=1), axis=0, return_inverse=True)
-    views = look(served.surfaces, textures, camera, seen[:, :3], seen[:, 3:], progress)
+    if views is None:
+        eyes, looks = seen[:, :3], seen[:, 3:]
+        views = look(served.surfaces, textures, camera, eyes, looks, progress, full=full)
     return World(
         served=served,
         pyramids=textures,

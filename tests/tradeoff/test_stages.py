@@ -28,6 +28,7 @@ from tests.conftest import files_below
 
 TWO_ROOMS = Path(__file__).resolve().parents[2] / "sample_data/two_rooms/two_rooms.obj"
 LITTLE = ("--cells-tried", "2", "--reference", "64")
+SHORT = ("--quick", "--bandwidth", "4M", "--knob", "pvs")
 
 
 @pytest.fixture(scope="module")
@@ -38,18 +39,19 @@ def db(tmp_path_factory) -> Path:
 
 
 def test_all_stages(db, tmp_path, capsys) -> None:
-    """One table for the whole pipeline; the database is as it was."""
+    """The walk, then one table for the whole pipeline; the database is as it was."""
     before = files_below(db)
     table, plot = tmp_path / "t.csv", tmp_path / "t.png"
-    asked = ["tradeoff", str(db), *LITTLE, "--csv", str(table), "--plot", str(plot)]
+    asked = ["tradeoff", str(db), *LITTLE, *SHORT, "--csv", str(table), "--plot", str(plot)]
     assert main([*asked, "--error", "0.05"]) == 0
     output = capsys.readouterr().out
     for stage in ("cells:", "pvs:", "ach:", "textures:"):
         assert output.count(stage) == 1
-    assert output.count("cheapest for an error of at most 0.05") == 4
+    assert output.startswith("--pvs fast instead of --pvs full ")
+    assert output.count("cheapest for an error of at most 0.05") == 5
     assert files_below(db) == before
     rows = table.read_text().splitlines()
-    assert {row.split(",")[0] for row in rows[1:]} == {"cells", "pvs", "ach", "textures"}
+    assert {row.split(",")[0] for row in rows[1:]} == {"walk", "cells", "pvs", "ach", "textures"}
     with Image.open(plot) as picture:
         assert picture.width > 400
     assert main(asked) == 4, "what is there is not written over"

@@ -107,15 +107,17 @@ def add_frame(
     size: Ints,
     count: Ints,
     mean: Floats,
+    full_texel: NDArray[np.uint8],
+    full_start: Ints,
+    full_size: Ints,
+    full_count: Ints,
+    same: bool,
     seen: Bools,
+    room: Floats,
     error: Floats,
     square: Floats,
     need: Floats,
     sight: Floats,
-    levels: Floats,
-    exact: Floats,
-    offset: Floats,
-    scaled: Floats,
 ) -> None:
     """Adds what the pixels of one frame show to the sums of each pair of cell and texture.
 
@@ -124,14 +126,17 @@ def add_frame(
     triangle: (n,) that each pixel shows, -1 for none. ray: (n, 3). axes: (2, 3). eye: (3,).
     corner, normal, uv: (m, 3, 3), (m, 3), (m, 3, 2) of the triangles. gradient: (m, 2, 3) of u and
         v, per metre. texture, pair, color, clamped: (m,), (m,), (m, 3), (m, 2).
-    texel, start, size, count, mean: see `Pyramids`.
+    texel, start, size, count, mean: see `Pyramids`. full_texel, full_start, full_size, full_count:
+        of those that the picture is compared with; ``same`` if they are these.
     seen: (n,) whether the pixel is also one of the client's own item buffer.
+    room: (L + 7, 3) to work in.
     error, square: (P, L + 2) sums of root mean squares over R, G and B, and of their squares, with
         nothing, the mean colour, level 0, level 1, … as the finest that is there.
     need: (P, L) sums of how much each level is wanted, 0 to 1 a pixel; sight: the same of the
         client's item buffer.
-    levels, exact, offset, scaled: (L, 3), (3,), (3,), (2, 3) room to work in.
     """
+    whole, exact, offset, fine, coarse = room[0], room[1], room[2], room[3], room[4]
+    scaled, levels = room[5:7], room[7:]
     for i in range(len(triangle)):
         f = triangle[i]
         if f < 0:
@@ -164,9 +169,8 @@ def add_frame(
             v += gradient[f, 1, k] * step
         detail = level_of_detail(ray[i], axes, normal[f], offset, scaled, pixel)
         detail = min(max(detail, 0.0), float(finest))
-        whole = int(detail)
-        part = detail - whole
-        sharp = finest - whole  # the finest level that is sampled
+        part = detail - int(detail)
+        sharp = finest - int(detail)  # the finest level that is sampled
         for n in range(sharp + 1):
             sample(
                 texel, start[t, n], size[t, n, 0], size[t, n, 1], u, v, clamped[f, 0],
@@ -174,8 +178,29 @@ def add_frame(
             )  # fmt: skip
         below = max(sharp - 1, 0)
         for k in range(3):
-            exact[k] = levels[sharp, k] + part * (levels[below, k] - levels[sharp, k])
-        for n in range(-2, sharp + 1):
+            whole[k] = levels[sharp, k] + part * (levels[below, k] - levels[sharp, k])
+            exact[k] = whole[k]
+        if not same:
+            best = full_count[t] - 1
+            for k in range(3):
+                scaled[0, k] = gradient[f, 0, k] * full_size[t, best, 0]
+                scaled[1, k] = gradient[f, 1, k] * full_size[t, best, 1]
+            away = level_of_detail(ray[i], axes, normal[f], offset, scaled, pixel)
+            away = min(max(away, 0.0), float(best))
+            upper = best - int(away)
+            lower = max(upper - 1, 0)
+            sample(
+                full_texel, full_start[t, upper], full_size[t, upper, 0], full_size[t, upper, 1],
+                u, v, clamped[f, 0], clamped[f, 1], fine,
+            )  # fmt: skip
+            sample(
+                full_texel, full_start[t, lower], full_size[t, lower, 0], full_size[t, lower, 1],
+                u, v, clamped[f, 0], clamped[f, 1], coarse,
+            )  # fmt: skip
+            for k in range(3):
+                exact[k] = fine[k] + (away - int(away)) * (coarse[k] - fine[k])
+        # Levels that are finer than what is sampled change nothing.
+        for n in range(-2, (sharp if same else finest) + 1):
             total = 0.0
             for k in range(3):
                 if n == -2:
@@ -183,11 +208,8 @@ def add_frame(
                 elif n == -1:
                     shown = mean[t, k] * color[f, k]
                 else:
-                    shown = levels[n, k] * color[f, k]
+                    shown = (levels[n, k] if n < sharp else whole[k]) * color[f, k]
                 total += (shown - exact[k] * color[f, k]) ** 2
-            if n == sharp:
-                # With its finest level there, it is exact.
-                total = 0.0
             error[p, n + 2] += np.sqrt(total / 3.0)
             square[p, n + 2] += total / 3.0
             if n >= 0:

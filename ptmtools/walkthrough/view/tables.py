@@ -12,7 +12,7 @@ buffer samples fewer pixels of the same picture.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,8 +74,11 @@ def look(
     eye: Floats,
     direction: Floats,
     progress: Progress = silent,
+    *,
+    full: Pyramids | None = None,
 ) -> Views:
-    """The tables of (F, 3) eyes and unit directions of view."""
+    """The tables of (F, 3) eyes and unit directions of view; errors are against what ``full`` would
+    show, which holds the same textures in other quality."""
     from ptmtools.walkthrough.view.kernels import add_frame
 
     corner = surfaces.corner
@@ -88,12 +91,13 @@ def look(
     pair = pair.reshape(-1).astype(np.int64)
     deepest = pyramids.start.shape[1]
     wide = (deepest + 2, deepest + 2, deepest, deepest)
-    room = [np.zeros(shape) for shape in ((deepest, 3), (3,), (3,), (2, 3))]
+    room = np.zeros((deepest + 7, 3))
     sums = [np.zeros((len(pairs), columns)) for columns in wide]
     parts: list[list[Floats]] = [[] for _ in wide]
     found: list[Ints] = []
     caster = Caster(surfaces)
     pixel = 2 * np.tan(camera.field_of_view / 2) / LINES
+    compared = pyramids if full is None else full
     seen = camera.sparse
     shares = np.array([1, 1, 1, max(int(seen.sum()), 1) / len(seen)]) * len(seen)
     owner = np.full((len(eye), int(seen.sum())), -1, np.int32)
@@ -110,8 +114,9 @@ def look(
             add_frame(
                 shown[k], rays[k], axes[k], eye[begin + k], pixel, corner, normal, gradient,
                 surfaces.uv, surfaces.texture, pair, surfaces.color, surfaces.clamped,
-                pyramids.texel, pyramids.start, pyramids.size, pyramids.count, pyramids.mean, seen,
-                *sums, *room,
+                pyramids.texel, pyramids.start, pyramids.size, pyramids.count, pyramids.mean,
+                compared.texel, compared.start, compared.size, compared.count, full is None, seen,
+                room, *sums,
             )  # fmt: skip
             shows = shown[k, seen]
             hit = np.flatnonzero(shows >= 0)
@@ -135,6 +140,19 @@ def look(
     cell, texture = pairs[rows].T.astype(np.int32)
     error, square, need, sight = tables
     return Views(start, cell, texture, error, square, need, sight, owner, depth)
+
+
+def limited(views: Views, count: Ints) -> Views:
+    """The same views of textures that lack their finest levels; ``count`` (T,) is how many levels
+    each has. What they cannot show stays an error."""
+    deepest = int(count.max(initial=1))
+    # One more, of surfaces without texture, which is the last.
+    has = np.arange(deepest) < np.append(count, deepest)[views.texture, None]
+    need, sight = (np.where(has, each[:, :deepest], 0) for each in (views.need, views.sight))
+    error, square = (
+        np.ascontiguousarray(each[:, : deepest + 2]) for each in (views.error, views.square)
+    )
+    return replace(views, error=error, square=square, need=need, sight=sight)
 
 
 def gradients(corner: Floats, uv: Floats, normal: Floats) -> Floats:

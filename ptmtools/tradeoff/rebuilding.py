@@ -1,0 +1,62 @@
+"""A database built again with another option, in a folder of its own.
+
+What a setting costs is what all stages after the scene then take: those that the option concerns
+run again, and the others took what they take with the database's own options.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from ptmtools.pipeline import Artifacts
+from ptmtools.pipeline.build import run_stage
+from ptmtools.pipeline.stage import Options, Stage
+from ptmtools.pipeline.stages import SCENE, STAGES
+from ptmtools.progress import Progress, silent
+from ptmtools.tradeoff.experiment import timed
+
+#: Seconds of one core that each stage took.
+Seconds = dict[str, float]
+Own = Mapping[Stage[Any], Options]
+
+
+def own_options(artifacts: Artifacts) -> Own:
+    """Those that the stages after the scene, which needs the model, last ran with.
+
+    Raises DatabaseError PTM-D004 if one has not run, PTM-D002 for options that no stage has.
+    """
+    return {stage: artifacts.recorded(stage) for stage in STAGES.values() if stage is not SCENE}
+
+
+@contextmanager
+def copied(db: Path) -> Iterator[Path]:
+    """A copy of a database, to be changed, for a while."""
+    with TemporaryDirectory(prefix="ptmtools-") as folder:
+        yield Path(shutil.copytree(db, Path(folder) / "db"))
+
+
+def build_again(
+    db: Path,
+    options: Own,
+    progress: Progress = silent,
+    *,
+    all_stages: bool = False,
+) -> Seconds:
+    """Brings a database up to date with these options, by one worker; what the stages that ran
+    took. ``all_stages`` run even if they are current."""
+    found: Seconds = {}
+    for stage, chosen in options.items():
+
+        def run(chosen: Options = chosen) -> bool:
+            done = run_stage(db, chosen, workers=1, rebuild=all_stages, progress=progress)
+            return done.stages[-1].ran
+
+        ran, seconds = timed(run)
+        if ran:
+            found[stage.name] = seconds
+    return found
