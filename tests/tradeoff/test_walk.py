@@ -18,7 +18,7 @@ from ptmtools.database.model import EmitOptions
 from ptmtools.pipeline import Artifacts, build_scene
 from ptmtools.pipeline.build import run_stage
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stages import TEXTURES
+from ptmtools.pipeline.stages import EMIT, TEXTURES
 from ptmtools.tradeoff.knobs import KNOBS, concerned, settings
 from ptmtools.tradeoff.rebuilding import build_again, copied, own_options
 from ptmtools.tradeoff.sentences import said, sentence, table, telling, trades
@@ -151,6 +151,9 @@ def test_settings_are_other_than_the_databases_own_and_coarser_where_pictures_ch
     names = {each.name for each in settings(own, 1024)}
     assert {"--max-side 512", "--cells leaf", "--trim", "--pvs fast", "--samples 8"} <= names
     assert not {"--max-side 1024", "--profile fast", "--profile small", "--pvs full"} & names
+    assert [s.name for s in settings(own, 1024, ["need"])] == ["--need 0"]
+    bare = {**own, EMIT: replace(own[EMIT], need=0)}
+    assert [s.name for s in settings(bare, 1024, ["need"])] == ["--need 64"]
     lossy = {**own, TEXTURES: replace(own[TEXTURES], max_error=2, trim=True)}
     names = {each.name for each in settings(lossy, 1)}
     assert "--max-error 4" in names
