@@ -71,7 +71,7 @@ TABLES = {
     "budgets-fine": Table("benchmarks/budget.py museum hospital gallery --wall-area 0.25"),
     **{
         f"hints-{part}": Table("benchmarks/ach.py", part=k)
-        for k, part in ((0, "presets"), (2, "tolerance"), (3, "agreement"))
+        for k, part in ((0, "presets"), (2, "tolerance"))
     },
     "starting": Table("benchmarks/codec/startup.py --only encode build", needs="textures"),
 }

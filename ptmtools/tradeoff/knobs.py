@@ -17,10 +17,6 @@ def _other(value: Any, own: Any) -> bool:
     return bool(value != own)
 
 
-def _less(value: Any, own: Any) -> bool:
-    return bool(value < own)
-
-
 def _more(value: Any, own: Any) -> bool:
     return bool(value > own)
 
@@ -72,7 +68,7 @@ KNOBS = (
     Knob(TEXTURES, "max_error", (2, 4), _more),
     Knob(TEXTURES, "max_side", (1 / 2, 1 / 4), of_longest=True),
     Knob(TEXTURES, "trim", (True,), _more),
-    Knob(EMIT, "need", (0,), _less),
+    Knob(EMIT, "need", (64, 0)),
 )
 
 

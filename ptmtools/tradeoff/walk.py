@@ -150,7 +150,7 @@ def try_settings(
     progress(0, len(chosen), "trying settings")
     WARM_UP.load()()
     with copied(db) as copy:
-        seconds = build_again(copy, own, all_stages=True)
+        seconds = build_again(copy, own)
     least = sum(
         looked + sum(seconds[s.name] for s in concerned(setting.knob.stage, own))
         for setting in chosen
@@ -207,7 +207,8 @@ class _Walker:
 def _tried(copy: Path, setting: Setting, own: Own, seconds: Seconds, walker: _Walker) -> Tried:
     stage = setting.knob.stage
     try:
-        took = build_again(copy, {**own, stage: setting.options})
+        options = {**own, stage: setting.options}
+        took = build_again(copy, {each: options[each] for each in concerned(stage, options)})
         world = walker.world(read_served(copy))
         seen = walker.walks(world, setting.knob.policy)
     except PtmError as fault:

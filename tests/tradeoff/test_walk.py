@@ -18,7 +18,7 @@ from ptmtools.database.model import EmitOptions
 from ptmtools.pipeline import Artifacts, build_scene
 from ptmtools.pipeline.build import run_stage
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stages import TEXTURES
+from ptmtools.pipeline.stages import EMIT, TEXTURES
 from ptmtools.tradeoff.knobs import KNOBS, concerned, settings
 from ptmtools.tradeoff.rebuilding import build_again, copied, own_options
 from ptmtools.tradeoff.sentences import said, sentence, table, telling, trades
@@ -66,8 +66,8 @@ def original(db, walk) -> World:
 def built(db: Path, **changed):
     """What is served of a copy with other options of its textures."""
     own = own_options(Artifacts(open_database(db)))
-    ran = build_again(db, {**own, TEXTURES: replace(own[TEXTURES], **changed)})
-    assert set(ran) == {"textures", "emit"}
+    options = {**own, TEXTURES: replace(own[TEXTURES], **changed)}
+    build_again(db, {stage: options[stage] for stage in concerned(TEXTURES, options)})
     return read_served(db)
 
 
@@ -151,6 +151,9 @@ def test_settings_are_other_than_the_databases_own_and_coarser_where_pictures_ch
     names = {each.name for each in settings(own, 1024)}
     assert {"--max-side 512", "--cells leaf", "--trim", "--pvs fast", "--samples 8"} <= names
     assert not {"--max-side 1024", "--profile fast", "--profile small", "--pvs full"} & names
+    assert [s.name for s in settings(own, 1024, ["need"])] == ["--need 0"]
+    bare = {**own, EMIT: replace(own[EMIT], need=0)}
+    assert [s.name for s in settings(bare, 1024, ["need"])] == ["--need 64"]
     lossy = {**own, TEXTURES: replace(own[TEXTURES], max_error=2, trim=True)}
     names = {each.name for each in settings(lossy, 1)}
     assert "--max-error 4" in names
@@ -213,9 +216,8 @@ def test_the_same_database_shows_the_same(db, walk, original) -> None:
 def test_a_stage_runs_again_where_it_is_current(db) -> None:
     own = own_options(Artifacts(open_database(db)))
     with copied(db) as copy:
-        assert build_again(copy, own) == {}
         before = files_below(copy / "www")
-        assert list(build_again(copy, own, all_stages=True)) == [stage.name for stage in own]
+        assert list(build_again(copy, own)) == [stage.name for stage in own]
         assert files_below(copy / "www") == before
         assert not run_stage(copy, own[TEXTURES], workers=1).stages[0].ran
 
