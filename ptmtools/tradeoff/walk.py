@@ -21,7 +21,7 @@ from ptmtools.progress import Progress, silent
 from ptmtools.tradeoff.knobs import Setting, concerned, settings
 from ptmtools.tradeoff.rebuilding import Own, Seconds, build_again, copied, own_options
 from ptmtools.walkthrough.catalogue import Catalogue, catalogue_of
-from ptmtools.walkthrough.comparing import SimulateOptions, budget_of, counted, play
+from ptmtools.walkthrough.comparing import SimulateOptions, budget_of, counted, play, require_hints
 from ptmtools.walkthrough.measures import SHARES
 from ptmtools.walkthrough.policies import POLICIES
 from ptmtools.walkthrough.served import Served, Surfaces, read_served
@@ -142,6 +142,7 @@ def try_settings(
     InputError: PTM-I700 the walk leads elsewhere; PTM-I701 a policy's hints are not there.
     """
     served = read_served(db)
+    require_hints(served, options.policies)
     own = own_options(artifacts)
     chosen = list(settings(own, _longest(served), knobs, quick=quick))
     begin = time.perf_counter()

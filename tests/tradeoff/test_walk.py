@@ -248,6 +248,18 @@ def test_the_command(db, walk_file, tmp_path, capsys) -> None:
     assert len(rows) == 4 + 2 * 3
 
 
+def test_a_policy_without_its_hints_is_refused_before_anything_is_built(
+    db, walk_file, tmp_path, capsys, monkeypatch
+) -> None:
+    with copied(db) as copy:
+        own = own_options(Artifacts(open_database(copy)))
+        build_again(copy, {EMIT: replace(own[EMIT], need=0)})
+        monkeypatch.setattr("ptmtools.tradeoff.walk.build_again", pytest.fail)
+        asked = ["tradeoff", str(copy), "--stage", "walk", "--walk", str(walk_file)]
+        assert main([*asked, "--policy", "screen+need"]) == 3
+    assert "PTM-I701" in capsys.readouterr().err
+
+
 def test_a_walk_elsewhere_is_refused(db, tmp_path, capsys) -> None:
     file = tmp_path / "away.json"
     rows = [[t, 1e3, 1.6, 1e3 + t, 0, 0, 1] for t in (0.0, 8.0)]
