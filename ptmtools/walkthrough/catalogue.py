@@ -49,7 +49,7 @@ class Catalogue:
     levels: (T,) of each texture.
     ends: (T, K) bytes of the `.ptm` that hold each column. memory: (T, K) of texture memory.
     differences: (T, K) of each column to the one before it, on average over its texels, 0 to 255,
-        at least `LEAST`; of the first level 0, of what lies behind the last 0.
+        at least `LEAST`; of what lies behind the last 0.
     colors: (T, 3) mean colour, 0 to 255.
     index_bytes, statistics_bytes, record_bytes, geometry_bytes: on the link; (C,) the latter two.
     records, statistics: of each cell.
@@ -151,8 +151,8 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
     if textures and all("color" in row for row in textures):
         colors = np.array([row["color"] for row in textures], dtype=np.float64)
     column = np.arange(ends.shape[1])
-    refines = (column > 1) & (column <= levels[:, None])
-    beside[refines] = np.maximum(beside[refines], LEAST)
+    stored = (column > 0) & (column <= levels[:, None])
+    beside[stored] = np.maximum(beside[stored], LEAST)
     return Catalogue(
         levels=levels,
         ends=ends,

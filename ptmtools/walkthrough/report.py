@@ -75,7 +75,7 @@ def rate_text(bandwidth: float | None) -> str:
     """bit/s as people say them."""
     if bandwidth is None:
         return "no limit of bandwidth"
-    power, unit = next((p, u) for p, u in _UNITS if bandwidth >= p)
+    power, unit = next((p, u) for p, u in _UNITS if bandwidth >= p or p == 1)
     return f"{bandwidth / power:g} {unit}"
 
 
@@ -85,7 +85,7 @@ def link_text(link: Conditions) -> str:
     return f"{rate_text(link.bandwidth)}, {link.latency * 1000:g} ms, {link.protocol}{traced}"
 
 
-_UNITS = ((10**9, "Gbit/s"), (10**6, "Mbit/s"), (10**3, "kbit/s"), (0, "bit/s"))
+_UNITS = ((10**9, "Gbit/s"), (10**6, "Mbit/s"), (10**3, "kbit/s"), (1, "bit/s"))
 
 
 def _final_head() -> str:

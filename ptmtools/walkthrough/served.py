@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,7 @@ from ptmtools.store.layout import SERVED
 FORM = "gltf"
 #: Bytes that a gzip file has more than a zlib stream.
 _GZIP_MORE = 12
-_BUILD = "build it again with `ptm build-scene`"
+BUILD = "build it again with `ptm build-scene`"
 
 Document = Mapping[str, Any]
 
@@ -119,8 +119,9 @@ def read_served(database: str | os.PathLike[str]) -> Served:
     names = [cell["name"] for cell in index["cells"]]
     found = [_document(_of(folder, index["record"], name), schemas.CELL) for name in names]
     records = tuple(document for document, _ in found)
-    for name, record in zip(names, records, strict=True):
-        _check_record(_of(folder, index["record"], name), record, len(names), index["textures"])
+    for cell, (name, record) in enumerate(zip(names, records, strict=True)):
+        file = _of(folder, index["record"], name)
+        _check_record(file, record, cell, len(names), index["textures"])
     statistics, statistics_bytes = _document(
         _inside(folder, index["statistics"]), schemas.STATISTICS
     )
@@ -151,7 +152,7 @@ def _inside(folder: Path, url: str) -> Path:
     path = Path(os.path.normpath(folder / unquote(url)))
     if not path.is_relative_to(folder):
         raise DatabaseError(
-            "PTM-D006", f"names {url!r}, outside the served folder", file=folder, remedy=_BUILD
+            "PTM-D006", f"names {url!r}, outside the served folder", file=folder, remedy=BUILD
         )
     return path
 
@@ -162,7 +163,7 @@ def _bytes(file: Path) -> bytes:
             return stream.read()
     except OSError as fault:
         raise DatabaseError(
-            "PTM-D005", f"cannot be read ({fault.strerror or fault})", file=file, remedy=_BUILD
+            "PTM-D005", f"cannot be read ({fault.strerror or fault})", file=file, remedy=BUILD
         ) from None
 
 
@@ -173,7 +174,7 @@ def _document(file: Path, schema: str) -> tuple[Document, int]:
         document: Document = schemas.read(data, schema)
     except schemas.ShapeError as fault:
         raise DatabaseError(
-            "PTM-D006", fault.message, file=file, place=fault.place or None, remedy=_BUILD
+            "PTM-D006", fault.message, file=file, place=fault.place or None, remedy=BUILD
         ) from None
     return document, _on_link(data)
 
@@ -183,12 +184,25 @@ def _on_link(data: bytes) -> int:
     return min(len(data), len(zlib.compress(data, 6)) + _GZIP_MORE)
 
 
-def _check_record(file: Path, record: Document, cells: int, textures: list[Document]) -> None:
+def _check_record(
+    file: Path, record: Document, cell: int, cells: int, textures: Sequence[Document]
+) -> None:
     others = [*record["visible"], *record["adjacent"], *(p["neighbour"] for p in record["portals"])]
+    shares = record.get("textureShares", record["textures"])
+    need = record.get("need", ())
     used = [t for row in record["textures"] for t in row]
-    rows = {len(record["visible"]), len(record["ach"]), len(record["textures"])}
+    used += [t for row in record.get("textureShares", ()) for t, _ in row if t is not None]
+    used += [row[0] for row in need]
+    rows = {len(record["visible"]), len(record["ach"]), len(record["textures"]), len(shares)}
+    wrong = ""
     if len(rows) > 1 or max(others, default=0) >= cells or max(used, default=-1) >= len(textures):
-        raise DatabaseError("PTM-D006", "an index is out of range", file=file, remedy=_BUILD)
+        wrong = "an index is out of range"
+    elif any(first + len(some) > len(textures[t]["ends"]) for t, first, *some in need):
+        wrong = "needs levels that there are not"
+    elif record["cell"] != cell or record["visible"][:1] != [cell]:
+        wrong = "is not that of its cell"
+    if wrong:
+        raise DatabaseError("PTM-D006", wrong, file=file, remedy=BUILD)
 
 
 def _glb(file: Path, data: bytes, cell: int, textures: int) -> ReadGlb:
@@ -196,11 +210,11 @@ def _glb(file: Path, data: bytes, cell: int, textures: int) -> ReadGlb:
         read = read_glb(data)
     except FileError as fault:
         raise DatabaseError(
-            "PTM-D006", fault.message, file=file, place=fault.place, remedy=_BUILD
+            "PTM-D006", fault.message, file=file, place=fault.place, remedy=BUILD
         ) from None
     used = [p.material.texture for p in read.primitives if p.material.texture is not None]
     if read.cell != cell or max(used, default=-1) >= textures:
-        raise DatabaseError("PTM-D006", "is not that of its cell", file=file, remedy=_BUILD)
+        raise DatabaseError("PTM-D006", "is not that of its cell", file=file, remedy=BUILD)
     return read
 
 

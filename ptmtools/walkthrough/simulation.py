@@ -93,7 +93,7 @@ def simulate(world: World, policy: Declared, conditions: Conditions, budget: int
             there[f], client.column, world.colored, shown, drawn,
         )  # fmt: skip
         quality[f] = _quality(client)
-        fetched[f] = link.bytes
+        fetched[f] = link.bytes + sum(request.received for request in client.waiting)
         client.fetch()
     steps = np.diff(column, axis=0, prepend=0)
     before = column - steps
@@ -113,7 +113,7 @@ def simulate(world: World, policy: Declared, conditions: Conditions, budget: int
         fetched=fetched,
         column=column,
         there=there,
-        body=link.bytes,
+        body=float(fetched[-1]),
         overhead=link.overhead_bytes,
         cancelled=link.wasted,
         documents=sum(int(client.files[kind].there.sum()) for kind in DOCUMENTS),

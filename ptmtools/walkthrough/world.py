@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.errors import InputError
+from ptmtools.errors import InputError, LimitError
 from ptmtools.progress import Progress, silent
 from ptmtools.walkthrough.catalogue import Catalogue, catalogue_of
 from ptmtools.walkthrough.locating import Locator
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 RATE = 5.0
 #: Pixels of the item buffer that errors are summed over.
 PIXELS = (160, 90)
+#: Frames of a walk at most: some five hours.
+MOST_FRAMES = 100_000
 #: Share of the walk that may lie in no cell.
 _ASTRAY = 0.05
 #: A viewpoint that in the last second moved less (metres) and turned less (cosine) is still.
@@ -114,8 +116,16 @@ def prepare(
 
     Raises
     ------
-    InputError: PTM-I700 the walk does not lead through this database; those of `read_pyramids`.
+    InputError: PTM-I700 the walk does not lead through this database.
+    LimitError: PTM-L700 it is too long.
+    DatabaseError, LimitError: those of `read_pyramids`.
     """
+    if walk.duration * rate > MOST_FRAMES:
+        raise LimitError(
+            "PTM-L700",
+            f"a walk of {walk.duration:g} s has more than {MOST_FRAMES:,} frames",
+            remedy="give a shorter one",
+        )
     time = np.arange(int(np.floor(walk.duration * rate + 1e-9)) + 1) / rate
     eye, direction = walk.at(time)
     cell = Locator(served.records).along(eye)

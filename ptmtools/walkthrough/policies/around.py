@@ -7,7 +7,6 @@ import numpy as np
 
 from ptmtools.arrays import Floats
 from ptmtools.walkthrough.policies.engine import NOTHING, EngineClient
-from ptmtools.walkthrough.view.tables import LINES
 
 #: What is nearer counts as being as far as this, metres.
 NEAREST = 0.5
@@ -83,15 +82,3 @@ def every_level(client: EngineClient, share: Floats) -> Floats:
     stock = client.world.catalogue
     column = np.arange(stock.ends.shape[1])
     return share[:, None] * ((column > 0) & (column <= stock.levels[:, None]))
-
-
-def wanted_levels(client: EngineClient, texture: Floats, density: Floats, far: Floats) -> Floats:
-    """(n, K) how much each column is wanted, 0 to 1, by surfaces of (n,) textures with (n,) texels
-    per metre, seen head-on from (n,) metres."""
-    stock = client.world.catalogue
-    pixel = 2 * np.tan(client.world.camera.field_of_view / 2) / LINES
-    detail = np.log2(np.maximum(density * far * pixel, 1e-9))
-    column = np.arange(stock.ends.shape[1])
-    coarser = stock.levels[texture][:, None] - column
-    wanted: Floats = np.clip(coarser + 1 - detail[:, None], 0, 1) * (column > 0) * (coarser >= 0)
-    return wanted

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
+from ptmtools.errors import DatabaseError, InputError, LimitError
 from ptmtools.progress import Progress, silent
 from ptmtools.texture import reader
 from ptmtools.texture.detail import difference_between
 from ptmtools.texture.model import Limits
-from ptmtools.walkthrough.served import Served
+from ptmtools.walkthrough.served import BUILD, Served
 
 #: A texture that needs more memory than this to decode is refused.
 _LIMITS = Limits(decoded_bytes=1 << 33)
@@ -45,8 +46,23 @@ class Pyramids:
 def read_pyramids(served: Served, progress: Progress = silent) -> Pyramids:
     """Decodes all textures.
 
-    Raises InputError, LimitError: those of `ptmtools.texture.open` and `PtmReader.levels`.
+    Raises
+    ------
+    DatabaseError: PTM-D005, D006 a texture is missing or damaged, or not what the index says.
+    LimitError: those of `ptmtools.texture.open` and `PtmReader.levels`.
     """
+    try:
+        return _pyramids(served, progress)
+    except LimitError:
+        raise
+    except InputError as fault:
+        code = "PTM-D005" if fault.code == "PTM-I120" else "PTM-D006"
+        raise DatabaseError(
+            code, fault.message, file=fault.file, place=fault.place, remedy=BUILD
+        ) from None
+
+
+def _pyramids(served: Served, progress: Progress) -> Pyramids:
     rows = served.index["textures"]
     deepest = max((len(row["ends"]) for row in rows), default=1)
     start, count = np.zeros((len(rows), deepest), np.int64), np.zeros(len(rows), np.int64)
@@ -57,7 +73,16 @@ def read_pyramids(served: Served, progress: Progress = silent) -> Pyramids:
     for t in range(len(rows)):
         progress(t, len(rows), "decoding textures")
         below = None
-        with reader.open(served.texture_file(t), limits=_LIMITS) as ptm:
+        file = served.texture_file(t)
+        with reader.open(file, limits=_LIMITS) as ptm:
+            held = [level.end for level in ptm.header.levels[: ptm.whole]]
+            finest = ptm.header.levels[-1]
+            if (held, finest.width, finest.height) != (
+                rows[t]["ends"], rows[t]["width"], rows[t]["height"],
+            ):  # fmt: skip
+                raise DatabaseError(
+                    "PTM-D006", "is not the texture that the index has", file=file, remedy=BUILD
+                )
             for n, samples in enumerate(ptm.levels()):
                 level = _rgb(samples)
                 if below is None:
