@@ -58,3 +58,9 @@ def test_what_hints_say_counts_only_if_they_say_it_of_every_texture(database: Pa
     assert (catalogue_of(served, *made_up).differences[:, 1:] == made_up[0]).all()
     without(served, "color")
     assert (catalogue_of(served, *made_up).colors == 0).all()
+
+
+def test_the_only_level_of_a_texture_is_worth_something(database: Path) -> None:
+    served, pyramids = (read_served(database), read_pyramids(read_served(database)))
+    stock = catalogue_of(served, pyramids.differences * 0, pyramids.mean)
+    assert (stock.differences[np.arange(stock.texture_count), 1] >= LEAST).all()
