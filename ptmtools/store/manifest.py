@@ -55,7 +55,7 @@ class StageRecord:
     outputs: Mapping[str, str]
     counts: Mapping[str, Any] = field(default_factory=dict)
     notes: Sequence[str] = ()
-    warnings: Sequence[str] = ()
+    warnings: Sequence[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)

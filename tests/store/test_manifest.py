@@ -35,7 +35,7 @@ def test_reads_one_of_an_earlier_release() -> None:
     earlier = document()
     del earlier["stages"]["cells"]["warnings"]
     again = Manifest.from_bytes(json.dumps(earlier).encode(), file="manifest.json")
-    assert again.stages["cells"].warnings == ()
+    assert again.stages["cells"].warnings == []
 
 
 def test_the_order_of_inputs_does_not_show() -> None:

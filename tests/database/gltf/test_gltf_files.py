@@ -194,7 +194,7 @@ def test_without_fallback_only_the_ptm_is_named(
 def test_a_good_database_has_no_issue(gltf_database: Path) -> None:
     report = validate_database(gltf_database)
     assert report.issues == ()
-    assert report.files == 19
+    assert report.files == 16
 
 
 def test_same_bytes_again(emit_gltf: EmitGltf, gltf_finished: Path, tmp_path: Path) -> None:
