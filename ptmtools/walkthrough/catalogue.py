@@ -13,8 +13,7 @@ import numpy as np
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.walkthrough.memory import columns_of
-from ptmtools.walkthrough.served import Document, Served, Surfaces
-from ptmtools.walkthrough.view.tables import gradients
+from ptmtools.walkthrough.served import Document, Served
 
 #: A level that only repeats the texels of the one below still sharpens what is filtered between
 #: them, so it adds at least this, 0 to 255.
@@ -29,15 +28,12 @@ class Shapes:
     ----------
     cell, texture: (n,) int64, ascending by cell; the texture is -1 without.
     low, high: (n, 3) corners of their boxes, metres.
-    area: (n,) m². density: (n,) texels per metre of the finest level, on average over the area.
     """
 
     cell: Ints
     texture: Ints
     low: Floats
     high: Floats
-    area: Floats
-    density: Floats
 
 
 @dataclass(frozen=True)
@@ -177,19 +173,5 @@ def _shapes(served: Served) -> Shapes:
     np.maximum.at(high, surfaces.shape, surfaces.corner.max(axis=1))
     cell, texture = (np.zeros(count, np.int64) for _ in range(2))
     cell[surfaces.shape], texture[surfaces.shape] = surfaces.cell, surfaces.texture
-    area, texels = _measures(surfaces, served.index["textures"])
-    whole = np.bincount(surfaces.shape, area, count)
-    density = np.bincount(surfaces.shape, area * texels, count)
     drawn = np.isfinite(low[:, 0])
-    fields = (cell, texture, low, high, whole, density / np.maximum(whole, 1e-30))
-    return Shapes(*(field[drawn] for field in fields))
-
-
-def _measures(surfaces: Surfaces, textures: Sequence[Document]) -> tuple[Floats, Floats]:
-    """(n,) m² of each triangle, and texels per metre along the axis that has more of them."""
-    ab, ac = (surfaces.corner[:, k] - surfaces.corner[:, 0] for k in (1, 2))
-    normal = np.cross(ab, ac)
-    gradient = gradients(surfaces.corner, surfaces.uv, normal)
-    sides = np.array([[t["width"], t["height"]] for t in textures] + [[0, 0]], dtype=np.float64)
-    gradient = gradient * sides[surfaces.texture][:, :, None]
-    return np.linalg.norm(normal, axis=1) / 2, np.linalg.norm(gradient, axis=2).max(axis=1)
+    return Shapes(*(field[drawn] for field in (cell, texture, low, high)))

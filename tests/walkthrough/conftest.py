@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,33 +12,11 @@ from ptmtools.cli.main import main
 from ptmtools.walkthrough.served import read_served
 from ptmtools.walkthrough.walk import Walk, read_walk
 from ptmtools.walkthrough.world import World, prepare
+from tests.e2e.conftest import Ptm, ptm
+
+__all__ = ["Ptm", "ptm"]
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_data"
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Exit status and what was printed."""
-
-    status: int
-    out: str
-    err: str
-
-
-Ptm = Callable[..., Outcome]
-
-
-@pytest.fixture
-def ptm(capfd: pytest.CaptureFixture[str]) -> Ptm:
-    """``ptm("info", path)``: the command, in this process."""
-
-    def run(*arguments: object) -> Outcome:
-        capfd.readouterr()
-        status = main([str(argument) for argument in arguments])
-        out, err = capfd.readouterr()
-        return Outcome(status, out, err)
-
-    return run
 
 
 @pytest.fixture(scope="session")

@@ -75,7 +75,7 @@ def catalogue(
     if random is not None:
         ends_of = np.sort(random.uniform(0, 1, (2, len(shapes), 3)), axis=0)
         low, high = low + ends_of[0] * ROOM, low + ends_of[1] * ROOM
-    own = Shapes(cell, texture_of, low, high, np.full(len(cell), 4.0), np.full(len(cell), 100.0))
+    own = Shapes(cell, texture_of, low, high)
     records = tuple(_record(c, cells, textures, shapes, random) for c in range(cells))
     return Catalogue(
         levels=count,

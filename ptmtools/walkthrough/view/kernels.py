@@ -88,6 +88,44 @@ def level_of_detail(
 
 
 @plain_kernel
+def texel_under(
+    ray: Floats,
+    axes: Floats,
+    eye: Floats,
+    pixel: float,
+    corner: Floats,
+    normal: Floats,
+    gradient: Floats,
+    uv: Floats,
+    size: Ints,
+    offset: Floats,
+    scaled: Floats,
+) -> tuple[float, float, float]:
+    """Texture coordinates of what a pixel shows, and its level of detail (see `level_of_detail`).
+
+    Parameters
+    ----------
+    corner, normal, uv: (3,), (3,), (2,) of the triangle, and of one of its corners. gradient:
+        (2, 3) of u and v, per metre. size: (2,) texels of the finest level.
+    offset, scaled: (3,), (2, 3) to work in.
+    """
+    facing, depth = 0.0, 0.0
+    for k in range(3):
+        offset[k] = corner[k] - eye[k]
+        facing += normal[k] * ray[k]
+        depth += normal[k] * offset[k]
+        scaled[0, k] = gradient[0, k] * size[0]
+        scaled[1, k] = gradient[1, k] * size[1]
+    depth = depth / facing if facing != 0.0 else 0.0
+    u, v = uv[0], uv[1]
+    for k in range(3):
+        step = depth * ray[k] - offset[k]
+        u += gradient[0, k] * step
+        v += gradient[1, k] * step
+    return u, v, level_of_detail(ray, axes, normal, offset, scaled, pixel)
+
+
+@plain_kernel
 def add_frame(
     triangle: Ints,
     ray: Floats,
@@ -153,21 +191,10 @@ def add_frame(
                 sight[p, 0] += 1.0
             continue
         finest = count[t] - 1
-        facing = 0.0
-        depth = 0.0
-        for k in range(3):
-            offset[k] = corner[f, 0, k] - eye[k]
-            facing += normal[f, k] * ray[i, k]
-            depth += normal[f, k] * offset[k]
-            scaled[0, k] = gradient[f, 0, k] * size[t, finest, 0]
-            scaled[1, k] = gradient[f, 1, k] * size[t, finest, 1]
-        depth = depth / facing if facing != 0.0 else 0.0
-        u, v = uv[f, 0, 0], uv[f, 0, 1]
-        for k in range(3):
-            step = depth * ray[i, k] - offset[k]
-            u += gradient[f, 0, k] * step
-            v += gradient[f, 1, k] * step
-        detail = level_of_detail(ray[i], axes, normal[f], offset, scaled, pixel)
+        u, v, detail = texel_under(
+            ray[i], axes, eye, pixel, corner[f, 0], normal[f], gradient[f], uv[f, 0],
+            size[t, finest], offset, scaled,
+        )  # fmt: skip
         detail = min(max(detail, 0.0), float(finest))
         part = detail - int(detail)
         sharp = finest - int(detail)  # the finest level that is sampled
@@ -182,10 +209,10 @@ def add_frame(
             exact[k] = whole[k]
         if not same:
             best = full_count[t] - 1
-            for k in range(3):
-                scaled[0, k] = gradient[f, 0, k] * full_size[t, best, 0]
-                scaled[1, k] = gradient[f, 1, k] * full_size[t, best, 1]
-            away = level_of_detail(ray[i], axes, normal[f], offset, scaled, pixel)
+            _, _, away = texel_under(
+                ray[i], axes, eye, pixel, corner[f, 0], normal[f], gradient[f], uv[f, 0],
+                full_size[t, best], offset, scaled,
+            )  # fmt: skip
             away = min(max(away, 0.0), float(best))
             upper = best - int(away)
             lower = max(upper - 1, 0)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.compiled import kernel
-from ptmtools.walkthrough.view.kernels import GREY, level_of_detail, sample
+from ptmtools.walkthrough.view.kernels import GREY, sample, texel_under
 
 
 @kernel
@@ -61,20 +61,10 @@ def shade(
                 shown[i, k] = color[f, k] * (mean[t, k] if t >= 0 else 255.0)
             continue
         finest = count[t] - 1
-        facing, depth = 0.0, 0.0
-        for k in range(3):
-            offset[k] = corner[f, 0, k] - eye[k]
-            facing += normal[f, k] * ray[i, k]
-            depth += normal[f, k] * offset[k]
-            scaled[0, k] = gradient[f, 0, k] * size[t, finest, 0]
-            scaled[1, k] = gradient[f, 1, k] * size[t, finest, 1]
-        depth = depth / facing if facing != 0.0 else 0.0
-        u, v = uv[f, 0, 0], uv[f, 0, 1]
-        for k in range(3):
-            step = depth * ray[i, k] - offset[k]
-            u += gradient[f, 0, k] * step
-            v += gradient[f, 1, k] * step
-        detail = level_of_detail(ray[i], axes, normal[f], offset, scaled, pixel)
+        u, v, detail = texel_under(
+            ray[i], axes, eye, pixel, corner[f, 0], normal[f], gradient[f], uv[f, 0],
+            size[t, finest], offset, scaled,
+        )  # fmt: skip
         # The finest level that is there bounds the level of detail from below.
         detail = min(max(detail, float(finest - held + 1)), float(finest))
         whole = int(detail)
