@@ -21,11 +21,10 @@ import numpy as np
 from ptmtools.arrays import Floats, Ints
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.walkthrough.catalogue import Catalogue
 from ptmtools.walkthrough.network import Conditions
-from ptmtools.walkthrough.path.making import make_path
 from ptmtools.walkthrough.path.options import PathOptions
+from ptmtools.walkthrough.path.through import path_through
 from ptmtools.walkthrough.policies import POLICIES
 from ptmtools.walkthrough.policies.paper import PaperClient, Patience
 from ptmtools.walkthrough.served import read_served
@@ -108,7 +107,7 @@ def main() -> None:
     parser.add_argument("--plot", type=Path)
     given = parser.parse_args()
     artifacts = Artifacts(open_database(given.database))
-    made = make_path(artifacts[SCENE], artifacts[CELLS], PathOptions())
+    made = path_through(artifacts, PathOptions())
     world = prepare(read_served(given.database), made.walk, pixels=PIXELS)
     world = replace(world, catalogue=world.catalogue.counted_by_paper(world.served))
     stock = world.catalogue

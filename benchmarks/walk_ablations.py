@@ -30,8 +30,8 @@ from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.stages import CELLS, PVS, SCENE
 from ptmtools.walkthrough.client import Client
 from ptmtools.walkthrough.network import Conditions, Link
-from ptmtools.walkthrough.path.making import make_path
 from ptmtools.walkthrough.path.options import PathOptions
+from ptmtools.walkthrough.path.through import path_through
 from ptmtools.walkthrough.policies import POLICIES, Declared, Knows
 from ptmtools.walkthrough.policies.around import (
     by_distance,
@@ -254,7 +254,7 @@ def main() -> None:
         pyramids = read_pyramids(served)
         for seed in range(1, given.walks + 1):
             options = PathOptions(seed=seed, duration=given.seconds)
-            walk = make_path(made[SCENE], made[CELLS], options).walk
+            walk = path_through(made, options).walk
             worlds.append(prepare(served, walk, pyramids))
             sources.append(made)
         index, records = [served.index], list(served.records)

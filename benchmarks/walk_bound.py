@@ -24,11 +24,10 @@ from numpy.typing import NDArray
 
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.quantities import parse_bandwidth, parse_memory
 from ptmtools.walkthrough.network import Conditions
-from ptmtools.walkthrough.path.making import make_path
 from ptmtools.walkthrough.path.options import PathOptions
+from ptmtools.walkthrough.path.through import path_through
 from ptmtools.walkthrough.policies import POLICIES
 from ptmtools.walkthrough.served import read_served
 from ptmtools.walkthrough.simulation import simulate
@@ -155,7 +154,7 @@ def main() -> None:
     given = parser.parse_args()
     made = Artifacts(open_database(given.db))
     options = PathOptions(seed=given.seed, duration=given.seconds)
-    walk = make_path(made[SCENE], made[CELLS], options).walk
+    walk = path_through(made, options).walk
     world = begun(prepare(read_served(given.db), walk), given.seconds)
     link = Conditions(parse_bandwidth(given.bandwidth))
     budget = parse_memory(given.memory).of(world.catalogue.whole)

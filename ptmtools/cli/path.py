@@ -6,17 +6,17 @@ from typing import Any
 
 import click
 
-from ptmtools.cli.common import as_json, database, forced, voiced
+from ptmtools.cli.common import as_json, database, forced, voiced, writable
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
 from ptmtools.errors import naming
-from ptmtools.files import refuse_existing, write_bytes
+from ptmtools.files import write_bytes
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.quantities import count
-from ptmtools.walkthrough.path.making import Path, make_path
+from ptmtools.walkthrough.path.making import Path
 from ptmtools.walkthrough.path.options import PathOptions
+from ptmtools.walkthrough.path.through import path_through
 from ptmtools.walkthrough.walk import walk_text
 
 #: Rooms that are named without ``-v``.
@@ -33,14 +33,13 @@ SHOWN = 12
 def path(voice: Voice, db: str, output: str, force: bool, as_json: bool, **values: Any) -> None:
     """Make a walk through every room of DB: on floors and through doors, with stops at pictures.
 
-    The same seed makes the same walk.
+    It begins where a viewpoint is. The same seed makes the same walk.
     """
     options = take(PathOptions, values)
-    if not force:
-        refuse_existing(output)
+    writable(output, force)
     artifacts = Artifacts(open_database(db))
     with naming(db):
-        made = make_path(artifacts[SCENE], artifacts[CELLS], options)
+        made = path_through(artifacts, options)
     write_bytes(output, walk_text(made.walk).encode(), force=force)
     if as_json:
         voice.emit_json(_document(made))

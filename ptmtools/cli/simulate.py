@@ -15,12 +15,11 @@ from ptmtools.errors import InputError
 from ptmtools.files import refuse_existing, write_bytes, writing
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.walkthrough import figure, pictures
 from ptmtools.walkthrough.comparing import SimulateOptions, counted, play, require_hints
 from ptmtools.walkthrough.flip import require as require_flip
-from ptmtools.walkthrough.path.making import make_path
 from ptmtools.walkthrough.path.options import PathOptions
+from ptmtools.walkthrough.path.through import path_through
 from ptmtools.walkthrough.report import as_csv, document, table
 from ptmtools.walkthrough.served import read_served
 from ptmtools.walkthrough.trace import read_trace
@@ -174,8 +173,7 @@ def _made(db: str, seeds: tuple[int, ...]) -> dict[str, Walk]:
             remedy="give a walk with --walk FILE, or the database that the folder belongs to",
         )
     artifacts = Artifacts(open_database(db))
-    scene, cells = artifacts[SCENE], artifacts[CELLS]
     return {
-        f"seed {seed}": make_path(scene, cells, PathOptions(seed=seed, duration=DURATION)).walk
+        f"seed {seed}": path_through(artifacts, PathOptions(seed=seed, duration=DURATION)).walk
         for seed in dict.fromkeys(seeds)
     }

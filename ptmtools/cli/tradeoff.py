@@ -15,7 +15,6 @@ from ptmtools.coverage.options import MAX_SAMPLES
 from ptmtools.files import write_bytes
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stages import CELLS, SCENE
 from ptmtools.tradeoff import sentences
 from ptmtools.tradeoff.experiment import Trade, run
 from ptmtools.tradeoff.experiments import EXPERIMENTS, Subject
@@ -23,8 +22,8 @@ from ptmtools.tradeoff.figure import picture, require
 from ptmtools.tradeoff.knobs import KNOBS
 from ptmtools.tradeoff.report import as_csv, table
 from ptmtools.tradeoff.walk import WalkOptions, WalkTrade, try_settings
-from ptmtools.walkthrough.path.making import make_path
 from ptmtools.walkthrough.path.options import PathOptions
+from ptmtools.walkthrough.path.through import path_through
 from ptmtools.walkthrough.walk import Walk, read_walk
 
 #: Sample points of the reference: at least so many that settings with fewer remain.
@@ -115,6 +114,11 @@ def tradeoff(
     accurate. DB is not changed.
     """
     options = take(WalkOptions, values)
+    stages = stages or (WALK, *EXPERIMENTS)
+    if WALK not in stages and (walk_file or knobs):
+        given = "--walk" if walk_file else "--knob"
+        raise click.UsageError(f"{given} is for --stage {WALK}, which is not asked for")
+    walk = read_walk(walk_file) if walk_file else None
     for file in (csv_file, plot_file):
         if file:
             writable(file, force)
@@ -125,13 +129,12 @@ def tradeoff(
     walked: list[WalkTrade] = []
     trades = []
     with voice.progress() as progress:
-        for stage in stages or (WALK, *EXPERIMENTS):
+        for stage in stages:
             progress(0, 1, f"preparing {stage}")
             if stage == WALK:
-                walk = read_walk(walk_file) if walk_file else _made(artifacts, quick)
                 walked.append(
                     try_settings(
-                        Path(db), artifacts, walk, options, knobs,
+                        Path(db), artifacts, walk or _made(artifacts, quick), options, knobs,
                         quick=quick, progress=progress, tell=voice.warn,
                     )
                 )  # fmt: skip
@@ -157,7 +160,7 @@ def tradeoff(
 def _made(artifacts: Artifacts, quick: bool) -> Walk:
     """A walk through a database."""
     options = PathOptions(duration=QUICK if quick else DURATION)
-    return make_path(artifacts[SCENE], artifacts[CELLS], options).walk
+    return path_through(artifacts, options).walk
 
 
 def _walk_document(trade: WalkTrade) -> dict[str, Any]:

@@ -93,6 +93,14 @@ class Served:
         return _inside(self.folder, self.index["textures"][texture]["file"])
 
 
+def read_index(folder: Path) -> Document:
+    """The `hints.json` of a served folder.
+
+    Raises DatabaseError: PTM-D005 it cannot be read; PTM-D006 it is damaged.
+    """
+    return _document(folder / HINTS, schemas.HINTS)[0]
+
+
 def read_served(database: str | os.PathLike[str]) -> Served:
     """What a database serves; the folder of the database, or the served one itself.
 

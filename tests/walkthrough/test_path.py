@@ -296,6 +296,30 @@ def test_where_eyes_may_be_anywhere(room_row: RoomRow) -> None:
     np.testing.assert_allclose(made.walk.eye[:, 1], 0.94 * 1.7, atol=0.01)
 
 
+def test_seeds_begin_at_the_viewpoints_that_can_be_walked_to(subject: Subjects) -> None:
+    """In turn, and look as they do; one in the air and one in the wrong cell are none of them."""
+    scene, cells = subject("two rooms")
+    places = np.array([[-2.0, 1.6, 0.5], [2.5, 1.6, -0.5]])
+    looks = np.array([[-0.6, 0.0, 0.8], [0.0, 0.6, -0.8]])
+    one, other = cells.locate(places).tolist()
+    high, wrong = (places[0] + [0, 9, 0]).tolist(), places[1].tolist()
+    viewpoints = [
+        (one, high, [1.0, 0.0, 0.0]),
+        (one, places[0].tolist(), looks[0].tolist()),
+        (one, wrong, [1.0, 0.0, 0.0]),
+        (other, places[1].tolist(), looks[1].tolist()),
+    ]
+    for seed, number in ((1, 0), (2, 1), (3, 0)):
+        walk = make_path(scene, cells, PathOptions(seed=seed), viewpoints).walk
+        still = walk.time < 3  # at least, before he goes on
+        away = np.linalg.norm(walk.eye[still] - places[number], axis=1)
+        assert away.max() < 0.5
+        np.testing.assert_allclose(walk.direction[still], looks[[number]].repeat(still.sum(), 0))
+    assert walk_text(make_path(scene, cells).walk) == walk_text(
+        make_path(scene, cells, viewpoints=[viewpoints[0], viewpoints[2]]).walk
+    )
+
+
 @pytest.mark.parametrize(("duration", "samples"), [(None, 2), (5.0, 51)])
 def test_a_single_bare_room(room_row: RoomRow, duration: float | None, samples: int) -> None:
     """There is nowhere to go."""

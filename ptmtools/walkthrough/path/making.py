@@ -11,6 +11,7 @@ from ptmtools.arrays import Bools, Floats
 from ptmtools.cells.model import Cells
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Scene
+from ptmtools.walkthrough.path.beginning import Viewpoints, beginning
 from ptmtools.walkthrough.path.footing import over_floors
 from ptmtools.walkthrough.path.gaze import directions
 from ptmtools.walkthrough.path.motion import Motion
@@ -38,7 +39,7 @@ class Path:
     rooms: cells in which one can stand.
     visited: those of them that an eye of the walk is in, ascending.
     unreachable: those of them that no way leads to at the height of eyes, ascending.
-    stops: pictures that are looked at, standing.
+    stops: how often he stands and looks.
     """
 
     walk: Walk
@@ -52,9 +53,10 @@ def make_path(
     scene: Scene,
     cells: Cells,
     options: PathOptions = PathOptions(),  # noqa: B008 - a frozen value
+    viewpoints: Viewpoints = (),
 ) -> Path:
-    """A walk through all rooms of a building, nearest next, with stops before pictures; the same
-    for the same seed.
+    """A walk through all rooms of a building, from one of its ``viewpoints`` on, nearest next, with
+    stops before pictures; the same for the same seed.
 
     Raises InputError: PTM-I810 eyes cannot be as high as asked for; PTM-I811 nobody can walk there.
     """
@@ -74,7 +76,9 @@ def make_path(
             remedy="build the cells with a smaller --walker, or with --standing anywhere",
         )
     views = Views(scene, ground, obstacles, random)
-    first = int(random.choice([*middles.values()]))
+    first = beginning(ground, viewpoints, options.seed)
+    if first is None:
+        first = Leg.at(int(random.choice([*middles.values()])))
     smoother = Smoother(eyes, obstacles, eye_height, cells.walker.radius)
     legs: list[Floats] = []
     looks: list[Floats] = []

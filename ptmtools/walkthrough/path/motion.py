@@ -95,6 +95,8 @@ class Motion:
         begin, arrive, leave = (np.zeros(len(legs)) for _ in range(3))
         until, clock, stand = [], 0.0, 0
         facing = out[moves][0] if moves.any() else np.array([1.0, 0.0, 0.0])
+        if not moves[0] and len(looks[0]):
+            facing = looks[0][0]
         for leg in range(len(legs)):
             begin[leg], arrive[leg] = clock, clock + walked[leg]
             clock = arrive[leg]

@@ -18,8 +18,8 @@ class PathOptions:
     """
     Attributes
     ----------
-    seed: another seed is another walk: it begins in another room, looks at other pictures first,
-        and glances elsewhere.
+    seed: another seed is another walk: 1 begins at the first viewpoint, 2 at the next, and so on;
+        each looks at other pictures first, and glances elsewhere.
     duration: seconds. A shorter walk ends before it has been everywhere, a longer one goes round
         again and looks at other pictures. By default as long as every room takes.
     speed: of walking, in m/s.

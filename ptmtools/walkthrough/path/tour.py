@@ -34,17 +34,22 @@ class Leg:
     passed: tuple[int, ...]
     looks: Floats
 
+    @staticmethod
+    def at(place: int, *looks: tuple[float, float, float]) -> Leg:
+        """No way, and what is looked at from there."""
+        return Leg(np.array([place]), (), np.array(looks, dtype=np.float64).reshape(-1, 3))
 
-def tour(ground: Ground, middles: dict[int, int], views: Views, first: int) -> Iterator[list[Leg]]:
-    """Round after round, without an end, from a ``first`` place on.
+
+def tour(ground: Ground, middles: dict[int, int], views: Views, first: Leg) -> Iterator[list[Leg]]:
+    """Round after round, without an end, the ``first`` leg before them.
 
     Each round visits all cells that have ``middles``, see `middles_of`.
     """
-    at = first
+    legs, before = [first], [first]
     while True:
-        legs = list(_round(ground, middles, views.round(), at))
-        yield legs
-        at = int(legs[-1].places[-1])
+        legs = list(_round(ground, middles, views.round(), int(legs[-1].places[-1])))
+        yield before + legs
+        before = []
 
 
 def middles_of(ground: Ground, standing: Bools) -> dict[int, int]:
