@@ -28,7 +28,7 @@ SCENES = ("museum", *SIDES, "hospital")
 #: Seeds of the walks, and how long each is, s.
 WALKS, SECONDS = (1, 2, 3), 150
 #: What clients other than the default ones need; browsers without a decoder are not measured.
-BUILD = ("--need", "64", "--per-texture", "--fallback-size", "256")
+BUILD = ("--per-texture", "--fallback-size", "256")
 
 
 def database_of(scene: str) -> Path:

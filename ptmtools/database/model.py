@@ -129,8 +129,8 @@ class EmitOptions:
     field_of_view: field of view of viewpoints that are not cameras of the model, in radians.
     first_look: for each cell also write the levels of up to this many texels a side of all textures
         that can be seen from it, in one file; 0 does not.
-    need: for each cell also write how fine each texture is needed, measured from so many sample
-        points, such as 64; 0 does not.
+    need: for each cell write how fine each texture is needed, measured from so many sample points;
+        0 does not.
     gzip: also write a gzip copy of each VRML and JSON file, such as root.wrl.gz, for servers that
         send precompressed files.
     format: what to write, one or more names separated by commas
@@ -148,7 +148,7 @@ class EmitOptions:
     )
     field_of_view: float = 1.1
     first_look: int = 0
-    need: int = 0
+    need: int = field(default=16, metadata={"default_before": (8, 0)})
     gzip: bool = False
     format: str = field(
         default="vrml,gltf",

@@ -68,7 +68,7 @@ KNOBS = (
     Knob(TEXTURES, "max_error", (2, 4), _more),
     Knob(TEXTURES, "max_side", (1 / 2, 1 / 4), of_longest=True),
     Knob(TEXTURES, "trim", (True,), _more),
-    Knob(EMIT, "need", (64, 0)),
+    Knob(EMIT, "need", (16, 0)),
 )
 
 

@@ -153,7 +153,7 @@ def test_settings_are_other_than_the_databases_own_and_coarser_where_pictures_ch
     assert not {"--max-side 1024", "--profile fast", "--profile small", "--pvs full"} & names
     assert [s.name for s in settings(own, 1024, ["need"])] == ["--need 0"]
     bare = {**own, EMIT: replace(own[EMIT], need=0)}
-    assert [s.name for s in settings(bare, 1024, ["need"])] == ["--need 64"]
+    assert [s.name for s in settings(bare, 1024, ["need"])] == ["--need 16"]
     lossy = {**own, TEXTURES: replace(own[TEXTURES], max_error=2, trim=True)}
     names = {each.name for each in settings(lossy, 1)}
     assert "--max-error 4" in names

@@ -31,7 +31,7 @@ def _summary(n: Mapping[str, Any]) -> str:
 EMIT: Stage[None] = Stage(
     name="emit",
     about="Write the served files: cells and hints.",
-    recipe=7,
+    recipe=8,
     changed="the hints say what each level of a texture adds, its mean colour, and what a texel "
     "takes on a GPU; --first-look writes a bundle of coarse levels for each cell; "
     "viewpoints look where pictures are",

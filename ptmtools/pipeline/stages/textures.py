@@ -26,7 +26,7 @@ def _summary(n: Mapping[str, Any]) -> str:
 TEXTURES: Stage[None] = Stage(
     name="textures",
     about="Encode the model's images as progressive textures.",
-    recipe=3,
+    recipe=4,
     changed="what each level adds, and the mean colour of each texture, are kept for the hints",
     options=TextureOptions,
     reads=lambda options: (SCENE, CELLS, PVS) if options.trim else (SCENE,),

@@ -115,7 +115,7 @@ _LIST = (
         "screen, and what is needed from the cell",
         Knows.SCREEN,
         _same(Screen(around.by_need)),
-        needs=("need", "measure it with `ptm emit DB --need 64`"),
+        needs=("need", "measure it with `ptm emit DB --need 16`"),
     ),
     Declared("best", "the viewer's: screen, need and distance", Knows.SCREEN, _same(BEST)),
     Declared("oracle", "knows the walk, and is greedy", Knows.FUTURE, _engine(Oracle)),
