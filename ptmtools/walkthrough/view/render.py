@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.scene.mapping import gradients
 from ptmtools.walkthrough.view.rays import Camera, Caster
-from ptmtools.walkthrough.view.tables import LINES, gradients
+from ptmtools.walkthrough.view.tables import LINES
 
 if TYPE_CHECKING:
     from ptmtools.walkthrough.world import World
@@ -52,7 +53,7 @@ class Renderer:
         )
         corner = world.served.surfaces.corner
         self._normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        self._gradient = gradients(corner, world.served.surfaces.uv, self._normal)
+        self._gradient = gradients(corner, world.served.surfaces.uv)
         self._caster = Caster(world.served.surfaces)
 
     def look(self, eye: Floats, direction: Floats) -> Sight:

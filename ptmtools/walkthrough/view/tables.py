@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints, Singles
 from ptmtools.progress import Progress, silent
+from ptmtools.scene.mapping import gradients
 from ptmtools.walkthrough.served import Surfaces
 from ptmtools.walkthrough.view.pyramids import Pyramids
 from ptmtools.walkthrough.view.rays import Camera, Caster
@@ -83,7 +84,7 @@ def look(
 
     corner = surfaces.corner
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    gradient = gradients(corner, surfaces.uv, normal)
+    gradient = gradients(corner, surfaces.uv)
     pairs, pair = np.unique(
         np.stack([surfaces.cell, surfaces.texture], axis=1).reshape(-1, 2),
         axis=0, return_inverse=True,
@@ -153,14 +154,3 @@ def limited(views: Views, count: Ints) -> Views:
         np.ascontiguousarray(each[:, : deepest + 2]) for each in (views.error, views.square)
     )
     return replace(views, error=error, square=square, need=need, sight=sight)
-
-
-def gradients(corner: Floats, uv: Floats, normal: Floats) -> Floats:
-    """(n, 2, 3) of u and v along each triangle's plane, per metre; 0 for triangles without area."""
-    area = np.maximum((normal**2).sum(axis=1), np.finfo(np.float64).tiny)[:, None]
-    ab, ac = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    along_b = np.cross(ac, normal) / area
-    along_c = np.cross(normal, ab) / area
-    b, c = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    found: Floats = b[:, :, None] * along_b[:, None] + c[:, :, None] * along_c[:, None]
-    return found
