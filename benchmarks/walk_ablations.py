@@ -152,7 +152,7 @@ def squared(world: World) -> World:
     found = np.zeros(stock.differences.shape)
     for t in range(stock.texture_count):
         below = None
-        for n in range(int(pyramids.count[t])):
+        for n in range(int(pyramids.levels[t])):
             level = texels(pyramids, t, n)
             if below is not None:
                 row = np.minimum(np.arange(level.shape[0]) // 2, below.shape[0] - 1)

@@ -49,7 +49,7 @@ def card() -> Any:
         texel=texels,
         start=np.array([[0, 3]]),
         size=np.array([[[1, 1], [2, 2]]]),
-        count=np.array([2]),
+        levels=np.array([2]),
         mean=mean[None],
         differences=np.zeros((1, 2)),
     )

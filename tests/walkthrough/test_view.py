@@ -17,8 +17,8 @@ from ptmtools.walkthrough.served import Surfaces
 from ptmtools.walkthrough.view.frustum import Frustum
 from ptmtools.walkthrough.view.kernels import GREY, level_of_detail
 from ptmtools.walkthrough.view.pyramids import Pyramids
-from ptmtools.walkthrough.view.rays import Camera
-from ptmtools.walkthrough.view.tables import LINES, look
+from ptmtools.walkthrough.view.rays import LINES, Camera
+from ptmtools.walkthrough.view.tables import look
 from tests.walkthrough.worlds import SEEDS, leaf
 
 CAMERA = Camera(16, 10, 1.0, 1.6)
