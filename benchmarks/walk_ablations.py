@@ -50,7 +50,8 @@ from ptmtools.walkthrough.policies.screen import Screen
 from ptmtools.walkthrough.request import Request
 from ptmtools.walkthrough.served import read_served
 from ptmtools.walkthrough.simulation import simulate
-from ptmtools.walkthrough.view.pyramids import Pyramids, read_pyramids
+from ptmtools.walkthrough.view.pyramids import read_pyramids
+from ptmtools.walkthrough.view.records import Pyramids
 from ptmtools.walkthrough.weighing import by_pixels
 from ptmtools.walkthrough.world import World, prepare
 

@@ -25,7 +25,8 @@ from ptmtools.walkthrough.comparing import SimulateOptions, budget_of, counted, 
 from ptmtools.walkthrough.measures import SHARES
 from ptmtools.walkthrough.policies import POLICIES
 from ptmtools.walkthrough.served import Served, Surfaces, read_served
-from ptmtools.walkthrough.view.pyramids import Pyramids, read_pyramids
+from ptmtools.walkthrough.view.pyramids import read_pyramids
+from ptmtools.walkthrough.view.records import Pyramids
 from ptmtools.walkthrough.view.tables import limited
 from ptmtools.walkthrough.walk import Walk
 from ptmtools.walkthrough.world import World, prepare

@@ -10,7 +10,7 @@ import numpy as np
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.lazy import component
 from ptmtools.walkthrough.simulation import Run
-from ptmtools.walkthrough.view.rays import Sight
+from ptmtools.walkthrough.view.records import Sight
 from ptmtools.walkthrough.view.render import Renderer
 from ptmtools.walkthrough.world import World
 

@@ -16,8 +16,8 @@ from ptmtools.walkthrough import flip as flips
 from ptmtools.walkthrough.comparing import SimulateOptions, play
 from ptmtools.walkthrough.pictures import frames, strip
 from ptmtools.walkthrough.served import Surfaces
-from ptmtools.walkthrough.view.pyramids import Pyramids
 from ptmtools.walkthrough.view.rays import Camera
+from ptmtools.walkthrough.view.records import Pyramids
 from ptmtools.walkthrough.view.render import Renderer
 from ptmtools.walkthrough.world import World
 

@@ -16,8 +16,8 @@ from ptmtools.walkthrough.locating import Locator
 from ptmtools.walkthrough.served import Surfaces
 from ptmtools.walkthrough.view.frustum import Frustum
 from ptmtools.walkthrough.view.kernels import GREY, level_of_detail
-from ptmtools.walkthrough.view.pyramids import Pyramids
 from ptmtools.walkthrough.view.rays import LINES, Camera
+from ptmtools.walkthrough.view.records import Pyramids
 from ptmtools.walkthrough.view.tables import look
 from tests.walkthrough.worlds import SEEDS, leaf
 

@@ -2,43 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import DatabaseError, InputError, LimitError
 from ptmtools.progress import Progress, silent
 from ptmtools.texture import reader
 from ptmtools.texture.detail import difference_between
 from ptmtools.texture.model import Limits
 from ptmtools.walkthrough.served import BUILD, Served
+from ptmtools.walkthrough.view.records import Pyramids
 
 #: A texture that needs more memory than this to decode is refused.
 _LIMITS = Limits(decoded_bytes=1 << 33)
-
-
-class Pyramids(NamedTuple):
-    """Levels count from the coarsest, 0.
-
-    Attributes
-    ----------
-    texel: (N,) uint8 RGB, level by level, rows from the top.
-    start: (T, L) where each level begins in it.
-    size: (T, L, 2) int64 width and height; 0 beyond the finest.
-    levels: (T,) how many each texture has.
-    mean: (T, 3) the mean of the coarsest level, 0 to 255.
-    differences: (T, L) of a level to the level below it, as `ptmtools.texture.detail` has them, of
-        what is shown; 0 for the coarsest.
-    """
-
-    texel: NDArray[np.uint8]
-    start: Ints
-    size: Ints
-    levels: Ints
-    mean: Floats
-    differences: Floats
 
 
 def read_pyramids(served: Served, progress: Progress = silent) -> Pyramids:

@@ -6,13 +6,14 @@ One-sided surfaces are passed through from behind, and glass always: it shows wh
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.vectors import normals
 from ptmtools.walkthrough.served import Surfaces
+from ptmtools.walkthrough.view.records import Sight
 
 #: Lines of the screen that pictures are made for.
 LINES = 1080
@@ -72,23 +73,6 @@ def axes(direction: Floats) -> tuple[Floats, Floats]:
     length = np.linalg.norm(right, axis=1, keepdims=True)
     right = np.where(length > 1e-9, right / np.maximum(length, 1e-9), [1.0, 0.0, 0.0])
     return right, np.cross(right, direction)
-
-
-class Sight(NamedTuple):
-    """What the pixels of a frame show.
-
-    Attributes
-    ----------
-    triangle: (n,) -1 for none.
-    ray: (n, 3) with component 1 along the view. axes: (2, 3) right and up. eye: (3,).
-    pixel: see `Camera`.
-    """
-
-    triangle: Ints
-    ray: Floats
-    axes: Floats
-    eye: Floats
-    pixel: float
 
 
 class Caster:

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.walkthrough.view.rays import Camera, Caster, Sight
-from ptmtools.walkthrough.view.triangles import Triangles
+from ptmtools.walkthrough.view.rays import Camera, Caster
+from ptmtools.walkthrough.view.records import Sight
+from ptmtools.walkthrough.view.triangles import triangles_of
 
 if TYPE_CHECKING:
     from ptmtools.walkthrough.world import World
@@ -31,7 +32,7 @@ class Renderer:
         self._camera = Camera(
             self.width * samples, height * samples, camera.field_of_view, camera.aspect
         )
-        self._triangles = Triangles.of(world.served.surfaces)
+        self._triangles = triangles_of(world.served.surfaces)
         self._caster = Caster(world.served.surfaces)
 
     def look(self, eye: Floats, direction: Floats) -> Sight:

@@ -8,9 +8,7 @@ import numpy as np
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.compiled import kernel
 from ptmtools.walkthrough.view.kernels import GREY, blend, texel_under
-from ptmtools.walkthrough.view.pyramids import Pyramids
-from ptmtools.walkthrough.view.rays import Sight
-from ptmtools.walkthrough.view.triangles import Triangles
+from ptmtools.walkthrough.view.records import Pyramids, Sight, Triangles
 
 
 @kernel

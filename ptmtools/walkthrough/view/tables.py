@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.progress import Progress, silent
 from ptmtools.walkthrough.served import Surfaces
-from ptmtools.walkthrough.view.pyramids import Pyramids
-from ptmtools.walkthrough.view.rays import Camera, Caster, Sight
-from ptmtools.walkthrough.view.triangles import Triangles
+from ptmtools.walkthrough.view.rays import Camera, Caster
+from ptmtools.walkthrough.view.records import Pyramids, Sight, Triangles
+from ptmtools.walkthrough.view.triangles import triangles_of
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def look(
 ) -> Views:
     """The tables of (F, 3) eyes and unit directions of view; errors are against what ``full`` would
     show, which holds the same textures in other quality."""
-    triangles, caster, seen = Triangles.of(surfaces), Caster(surfaces), camera.sparse
+    triangles, caster, seen = triangles_of(surfaces), Caster(surfaces), camera.sparse
     tally = _Tally(triangles, pyramids, full, seen)
     owner = np.empty((len(eye), int(seen.sum())), np.int32)
     depth = np.empty(owner.shape, np.float32)
