@@ -50,7 +50,8 @@ from ptmtools.walkthrough.policies.screen import Screen
 from ptmtools.walkthrough.request import Request
 from ptmtools.walkthrough.served import read_served
 from ptmtools.walkthrough.simulation import simulate
-from ptmtools.walkthrough.view.pyramids import Pyramids, read_pyramids
+from ptmtools.walkthrough.view.pyramids import read_pyramids
+from ptmtools.walkthrough.view.records import Pyramids
 from ptmtools.walkthrough.weighing import by_pixels
 from ptmtools.walkthrough.world import World, prepare
 
@@ -152,7 +153,7 @@ def squared(world: World) -> World:
     found = np.zeros(stock.differences.shape)
     for t in range(stock.texture_count):
         below = None
-        for n in range(int(pyramids.count[t])):
+        for n in range(int(pyramids.levels[t])):
             level = texels(pyramids, t, n)
             if below is not None:
                 row = np.minimum(np.arange(level.shape[0]) // 2, below.shape[0] - 1)

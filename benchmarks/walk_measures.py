@@ -24,8 +24,8 @@ from ptmtools.walkthrough.flip import PER_DEGREE, SEED, Flip
 from ptmtools.walkthrough.policies import POLICIES
 from ptmtools.walkthrough.served import read_served
 from ptmtools.walkthrough.simulation import Run, simulate
+from ptmtools.walkthrough.view.rays import LINES
 from ptmtools.walkthrough.view.render import Renderer
-from ptmtools.walkthrough.view.tables import LINES
 from ptmtools.walkthrough.walk import read_walk
 from ptmtools.walkthrough.world import World, prepare
 

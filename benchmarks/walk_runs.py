@@ -27,7 +27,8 @@ from ptmtools.walkthrough.network import Conditions
 from ptmtools.walkthrough.policies import POLICIES
 from ptmtools.walkthrough.served import Served, read_served
 from ptmtools.walkthrough.simulation import simulate
-from ptmtools.walkthrough.view.pyramids import Pyramids, read_pyramids
+from ptmtools.walkthrough.view.pyramids import read_pyramids
+from ptmtools.walkthrough.view.records import Pyramids
 from ptmtools.walkthrough.walk import read_walk
 from ptmtools.walkthrough.world import World, prepare
 

@@ -28,6 +28,7 @@ from ptmtools.coverage.options import AchOptions
 from ptmtools.coverage.sample_points import SamplePoints
 from ptmtools.coverage.sampling import Sampler
 from ptmtools.progress import Progress, silent
+from ptmtools.scene.mapping import gradients
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
 
@@ -135,19 +136,6 @@ class _Wanting:
                 key = image * wanted.shape[1] + level
                 wanted += np.bincount(key, weight[met], wanted.size).reshape(wanted.shape)
         return wanted / total if total else wanted
-
-
-def gradients(corners: Floats, uv: Floats) -> Floats:
-    """(T, 2, 3) how the texture coordinates, (T, 3, 2), change along the plane of triangles with
-    (T, 3, 3) corners, for a metre; 0 for triangles without area."""
-    edge, change = corners[:, 1:] - corners[:, :1], uv[:, 1:] - uv[:, :1]
-    gram = edge @ edge.transpose(0, 2, 1)
-    area = gram[:, 0, 0] * gram[:, 1, 1] - gram[:, 0, 1] * gram[:, 1, 0]
-    turned = np.stack([gram[:, 1, 1], -gram[:, 0, 1], -gram[:, 1, 0], gram[:, 0, 0]], axis=-1)
-    inverse = np.divide(
-        turned, area[:, None], out=np.zeros_like(turned), where=area[:, None] > 0
-    ).reshape(-1, 2, 2)
-    return np.asarray(change.transpose(0, 2, 1) @ inverse @ edge)
 
 
 def levels_of_detail(ray: Floats, normal: Floats, gradient: Floats) -> Floats:

@@ -30,7 +30,8 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.cells.model import Cells
-from ptmtools.cells.vectors import normals, ranges
+from ptmtools.cells.vectors import cross, normals, ranges
+from ptmtools.scene.mapping import gradients
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
 
@@ -97,22 +98,14 @@ def _texels(scene: Scene, sizes: Floats) -> Floats:
     image = np.array([m.image for m in scene.materials], dtype=np.int64)[scene.triangle_material]
     size = np.ones((len(image), 2))
     size[image >= 0] = sizes[image[image >= 0]]
-    a, b = (scene.corners[:, i] - scene.corners[:, 0] for i in (1, 2))
-    s, t = (size * (scene.uv[:, i] - scene.uv[:, 0]) for i in (1, 2))
-    area = np.linalg.norm(normals(scene.corners), axis=1)
-    stretched = abs(s[:, 0] * t[:, 1] - s[:, 1] * t[:, 0])
+    gradient = gradients(scene.corners, scene.uv) * size[..., None]
     # Sum and root of the product of the squares of the singular values.
-    square = (
-        (s * s).sum(axis=1) * (b * b).sum(axis=1)
-        - 2 * (s * t).sum(axis=1) * (a * b).sum(axis=1)
-        + (t * t).sum(axis=1) * (a * a).sum(axis=1)
-    )
-    flat = area == 0
-    area = np.where(flat, 1.0, area)
-    total, product = np.maximum(square, 0.0) / area**2, stretched / area
+    total = (gradient**2).sum(axis=(1, 2))
+    product = np.linalg.norm(cross(gradient[:, 0], gradient[:, 1]), axis=1)
     most = np.sqrt((total + np.sqrt(np.maximum(total**2 - 4 * product**2, 0.0))) / 2)
     least = np.divide(product, most, out=np.zeros_like(most), where=most > 0)
     counted = np.maximum(least / 2, most / (ANISOTROPY * np.sqrt(2)))
+    flat = ~normals(scene.corners).any(axis=1)
     return np.asarray(np.where(flat, np.inf, counted))
 
 

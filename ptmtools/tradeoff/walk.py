@@ -25,7 +25,8 @@ from ptmtools.walkthrough.comparing import SimulateOptions, budget_of, counted, 
 from ptmtools.walkthrough.measures import SHARES
 from ptmtools.walkthrough.policies import POLICIES
 from ptmtools.walkthrough.served import Served, Surfaces, read_served
-from ptmtools.walkthrough.view.pyramids import Pyramids, read_pyramids
+from ptmtools.walkthrough.view.pyramids import read_pyramids
+from ptmtools.walkthrough.view.records import Pyramids
 from ptmtools.walkthrough.view.tables import limited
 from ptmtools.walkthrough.walk import Walk
 from ptmtools.walkthrough.world import World, prepare
@@ -235,15 +236,15 @@ def compared(served: Served, walk: Walk, original: World) -> World:
         world,
         pyramids=own,
         catalogue=catalogue_of(served, own.differences, own.mean),
-        views=limited(world.views, own.count),
+        views=limited(world.views, own.levels),
     )
 
 
 def begins_with(full: Pyramids, few: Pyramids) -> bool:
     """Whether each texture of the one has the coarsest levels of that of the other, and no more."""
-    if len(few.count) != len(full.count) or (few.count > full.count).any():
+    if len(few.levels) != len(full.levels) or (few.levels > full.levels).any():
         return False
-    for t, count in enumerate(few.count.tolist()):
+    for t, count in enumerate(few.levels.tolist()):
         if (few.size[t, :count] != full.size[t, :count]).any():
             return False
         length = 3 * int(few.size[t, :count].prod(axis=1).sum())

@@ -10,7 +10,8 @@ import numpy as np
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.lazy import component
 from ptmtools.walkthrough.simulation import Run
-from ptmtools.walkthrough.view.render import Renderer, Sight
+from ptmtools.walkthrough.view.records import Sight
+from ptmtools.walkthrough.view.render import Renderer
 from ptmtools.walkthrough.world import World
 
 #: Frames that are looked at, and the seed by which they are drawn.

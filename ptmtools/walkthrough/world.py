@@ -17,8 +17,9 @@ from ptmtools.walkthrough.catalogue import Catalogue, catalogue_of
 from ptmtools.walkthrough.locating import Locator
 from ptmtools.walkthrough.served import Served
 from ptmtools.walkthrough.view.frustum import Frustum
-from ptmtools.walkthrough.view.pyramids import Pyramids, read_pyramids
+from ptmtools.walkthrough.view.pyramids import read_pyramids
 from ptmtools.walkthrough.view.rays import Camera
+from ptmtools.walkthrough.view.records import Pyramids
 from ptmtools.walkthrough.view.tables import Views, look
 
 if TYPE_CHECKING:

@@ -16,7 +16,6 @@ from ptmtools.coverage.need import (
     Need,
     TextureSize,
     compute_need,
-    gradients,
     levels_of_detail,
 )
 from ptmtools.coverage.options import AchOptions
@@ -216,16 +215,3 @@ def test_straight_down_on_edge_and_at_no_distance() -> None:
     assert levels_of_detail(np.array([[1.0, 0, 0]]), floor, gradient) == np.inf
     assert levels_of_detail(np.zeros((1, 3)), floor, gradient) == np.inf
     assert levels_of_detail(down, floor, 0 * gradient) == -np.inf
-
-
-def test_gradients_of_triangles() -> None:
-    random = np.random.default_rng(2)
-    corners, uv = random.normal(size=(50, 3, 3)), random.normal(size=(50, 3, 2))
-    found = gradients(corners, uv)
-    for change, points, at in zip(found, corners, uv, strict=True):
-        assert change @ (points[1] - points[0]) == pytest.approx(at[1] - at[0])
-        assert change @ (points[2] - points[0]) == pytest.approx(at[2] - at[0])
-        assert change @ np.cross(points[1] - points[0], points[2] - points[0]) == pytest.approx(
-            0, abs=1e-9
-        )
-    assert (gradients(np.zeros((1, 3, 3)), uv[:1]) == 0).all()

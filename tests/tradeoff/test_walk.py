@@ -173,7 +173,7 @@ def test_what_lacks_levels_is_predicted_by_the_tables_of_the_original(db, walk, 
         own = read_pyramids(coarse)
     assert begins_with(original.pyramids, own)
     assert not begins_with(own, original.pyramids)
-    assert own.count.max() < original.pyramids.count.max()
+    assert own.levels.max() < original.pyramids.levels.max()
     unique, first = np.unique(original.view, return_index=True)
     again = look(
         coarse.surfaces, own, original.camera, original.eye[first], original.direction[first],
@@ -186,7 +186,7 @@ def test_what_lacks_levels_is_predicted_by_the_tables_of_the_original(db, walk, 
         np.testing.assert_allclose(
             getattr(again, name), getattr(world.views, name), rtol=1e-4, atol=1e-6, err_msg=name
         )
-    finest = own.count[world.views.texture] + 1
+    finest = own.levels[world.views.texture] + 1
     textured = world.views.texture >= 0
     left = world.views.error[np.arange(len(finest)), finest][textured]
     assert left.sum() > 0, "what is gone is an error"
@@ -198,7 +198,7 @@ def test_texels_that_differ_are_an_error_even_when_all_is_there(db, walk, origin
         world = compared(built(copy, max_error=8), walk, original)
     assert not begins_with(original.pyramids, world.pyramids)
     rows = np.flatnonzero(world.views.texture >= 0)
-    last = world.pyramids.count[world.views.texture[rows]] + 1
+    last = world.pyramids.levels[world.views.texture[rows]] + 1
     left, exact = (views.error[rows, last] for views in (world.views, original.views))
     assert left.sum() > 0
     # A frame's errors are means over its pixels; no texel is off by more than was allowed.

@@ -16,8 +16,8 @@ from ptmtools.walkthrough import flip as flips
 from ptmtools.walkthrough.comparing import SimulateOptions, play
 from ptmtools.walkthrough.pictures import frames, strip
 from ptmtools.walkthrough.served import Surfaces
-from ptmtools.walkthrough.view.pyramids import Pyramids
 from ptmtools.walkthrough.view.rays import Camera
+from ptmtools.walkthrough.view.records import Pyramids
 from ptmtools.walkthrough.view.render import Renderer
 from ptmtools.walkthrough.world import World
 
@@ -49,7 +49,7 @@ def card() -> Any:
         texel=texels,
         start=np.array([[0, 3]]),
         size=np.array([[[1, 1], [2, 2]]]),
-        count=np.array([2]),
+        levels=np.array([2]),
         mean=mean[None],
         differences=np.zeros((1, 2)),
     )

@@ -11,13 +11,14 @@ from hypothesis import assume, given, settings
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.scene.mapping import gradients
 from ptmtools.walkthrough.locating import Locator
 from ptmtools.walkthrough.served import Surfaces
 from ptmtools.walkthrough.view.frustum import Frustum
 from ptmtools.walkthrough.view.kernels import GREY, level_of_detail
-from ptmtools.walkthrough.view.pyramids import Pyramids
-from ptmtools.walkthrough.view.rays import Camera
-from ptmtools.walkthrough.view.tables import LINES, gradients, look
+from ptmtools.walkthrough.view.rays import LINES, Camera
+from ptmtools.walkthrough.view.records import Pyramids
+from ptmtools.walkthrough.view.tables import look
 from tests.walkthrough.worlds import SEEDS, leaf
 
 CAMERA = Camera(16, 10, 1.0, 1.6)
@@ -238,7 +239,7 @@ def test_levels_of_detail_against_differences(seed: int) -> None:
     ray = rays.reshape(-1, 3)[random.integers(CAMERA.width * CAMERA.height)]
     corner, size = surfaces.corner, np.array([64, 32])
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    slopes = gradients(corner, surfaces.uv, normal) * size[:, None]
+    slopes = gradients(corner, surfaces.uv) * size[:, None]
     pixel = 2 * np.tan(CAMERA.field_of_view / 2) / LINES
     for f in range(len(corner)):
         if abs(normal[f] @ ray) < 0.05 * np.linalg.norm(normal[f]):

@@ -1,15 +1,40 @@
-"""Compiled sampling of textures, and the sums of errors by level (see `tables`)."""
+"""Compiled sampling of textures, and the sums of errors by level (see `tables`).
+
+What is called for every pixel becomes part of its caller: to hand over all arrays of the records
+takes half as long again.
+"""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.compiled import plain_kernel
+from ptmtools.compiled import inlined_kernel, plain_kernel
+from ptmtools.walkthrough.view.records import Pyramids, Sight, Triangles
 
 #: What is shown where nothing is known: 0 to 255.
 GREY = 128.0
+
+
+class Sums(NamedTuple):
+    """What frames show, by pair of cell and texture.
+
+    Attributes
+    ----------
+    pair: (m,) of each triangle.
+    error, square: (P, L + 2) root mean squares over R, G and B, and their squares, with nothing,
+        the mean colour, level 0, level 1, … as the finest that is there.
+    need, sight: (P, L) how much each level is wanted, 0 to 1 a pixel, of all pixels and of those of
+        a client's item buffer; the first stands for surfaces without texture.
+    """
+
+    pair: Ints
+    error: Floats
+    square: Floats
+    need: Floats
+    sight: Floats
 
 
 @plain_kernel
@@ -21,39 +46,55 @@ def wrapped(at: float, side: int) -> int:
 
 
 @plain_kernel
+def around(at: float, side: int, clamped: bool) -> tuple[int, int, float]:
+    """The two texels around a texture coordinate along a side, and the share of the second."""
+    place = at * side - 0.5
+    low = np.floor(place)
+    if clamped:
+        last = side - 1.0
+        first, second = int(min(max(low, 0.0), last)), int(min(max(low + 1.0, 0.0), last))
+    else:
+        first = wrapped(low, side)
+        second = first + 1 if first + 1 < side else 0
+    return first, second, place - low
+
+
+@inlined_kernel
 def sample(
-    texel: NDArray[np.uint8],
-    start: int,
-    width: int,
-    height: int,
-    u: float,
-    v: float,
-    clamp_u: bool,
-    clamp_v: bool,
-    color: Floats,
+    textures: Pyramids, t: int, level: int, u: float, v: float, clamped: Bools, color: Floats
 ) -> None:
-    """Writes the bilinear sample of a level at (u, v) to ``color`` (3,), 0 to 255."""
-    x, y = u * width - 0.5, v * height - 0.5
-    left, top = np.floor(x), np.floor(y)
-    across, down = x - left, y - top
-    if clamp_u:
-        x0 = int(min(max(left, 0.0), width - 1.0))
-        x1 = int(min(max(left + 1.0, 0.0), width - 1.0))
-    else:
-        x0 = wrapped(left, width)
-        x1 = x0 + 1 if x0 + 1 < width else 0
-    if clamp_v:
-        y0 = int(min(max(top, 0.0), height - 1.0))
-        y1 = int(min(max(top + 1.0, 0.0), height - 1.0))
-    else:
-        y0 = wrapped(top, height)
-        y1 = y0 + 1 if y0 + 1 < height else 0
+    """Writes the bilinear sample of a level of a texture at (u, v) to ``color`` (3,), 0 to 255;
+    ``clamped`` (2,) as of `Surfaces`."""
+    texel, start = textures.texel, textures.start[t, level]
+    width, height = textures.size[t, level, 0], textures.size[t, level, 1]
+    x0, x1, across = around(u, width, clamped[0])
+    y0, y1, down = around(v, height, clamped[1])
     a, b = start + (y0 * width + x0) * 3, start + (y0 * width + x1) * 3
     c, d = start + (y1 * width + x0) * 3, start + (y1 * width + x1) * 3
     for k in range(3):
         upper = texel[a + k] + across * (float(texel[b + k]) - texel[a + k])
         lower = texel[c + k] + across * (float(texel[d + k]) - texel[c + k])
         color[k] = upper + down * (lower - upper)
+
+
+@plain_kernel
+def blend(
+    textures: Pyramids,
+    t: int,
+    detail: float,
+    u: float,
+    v: float,
+    clamped: Bools,
+    color: Floats,
+    coarse: Floats,
+) -> None:
+    """As `sample`, between the two levels around a level of detail, of 0 and up to the coarsest;
+    ``coarse`` (3,) to work in."""
+    sharp = textures.levels[t] - 1 - int(detail)
+    sample(textures, t, sharp, u, v, clamped, color)
+    sample(textures, t, max(sharp - 1, 0), u, v, clamped, coarse)
+    for k in range(3):
+        color[k] += (detail - int(detail)) * (coarse[k] - color[k])
 
 
 @plain_kernel
@@ -87,160 +128,108 @@ def level_of_detail(
     return float(np.log2(covered)) if covered > 1e-30 else -99.0
 
 
-@plain_kernel
+@inlined_kernel
 def texel_under(
-    ray: Floats,
-    axes: Floats,
-    eye: Floats,
-    pixel: float,
-    corner: Floats,
-    normal: Floats,
-    gradient: Floats,
-    uv: Floats,
-    size: Ints,
-    offset: Floats,
-    scaled: Floats,
+    sight: Sight, i: int, triangles: Triangles, textures: Pyramids, room: Floats
 ) -> tuple[float, float, float]:
-    """Texture coordinates of what a pixel shows, and its level of detail (see `level_of_detail`).
+    """Texture coordinates of what a pixel shows, and its level of detail (see `level_of_detail`),
+    which is 0 at least and at most that of the coarsest level.
 
-    Parameters
-    ----------
-    corner, normal, uv: (3,), (3,), (2,) of the triangle, and of one of its corners. gradient:
-        (2, 3) of u and v, per metre. size: (2,) texels of the finest level.
-    offset, scaled: (3,), (2, 3) to work in.
+    ``i`` is the pixel, of a triangle with a texture; ``room`` (3, 3) to work in.
     """
+    f = sight.triangle[i]
+    t = triangles.texture[f]
+    finest = textures.levels[t] - 1
+    ray, normal, gradient = sight.ray[i], triangles.normal[f], triangles.gradient[f]
+    offset, scaled = room[0], room[1:]
     facing, depth = 0.0, 0.0
     for k in range(3):
-        offset[k] = corner[k] - eye[k]
+        offset[k] = triangles.corner[f, 0, k] - sight.eye[k]
         facing += normal[k] * ray[k]
         depth += normal[k] * offset[k]
-        scaled[0, k] = gradient[0, k] * size[0]
-        scaled[1, k] = gradient[1, k] * size[1]
+        scaled[0, k] = gradient[0, k] * textures.size[t, finest, 0]
+        scaled[1, k] = gradient[1, k] * textures.size[t, finest, 1]
     depth = depth / facing if facing != 0.0 else 0.0
-    u, v = uv[0], uv[1]
+    u, v = triangles.uv[f, 0, 0], triangles.uv[f, 0, 1]
     for k in range(3):
         step = depth * ray[k] - offset[k]
         u += gradient[0, k] * step
         v += gradient[1, k] * step
-    return u, v, level_of_detail(ray, axes, normal, offset, scaled, pixel)
+    detail = level_of_detail(ray, sight.axes, normal, offset, scaled, sight.pixel)
+    return u, v, min(max(detail, 0.0), float(finest))
+
+
+@plain_kernel
+def distance(color: Floats, exact: Floats) -> float:
+    """The mean square over R, G and B by which two colours (3,) differ."""
+    total = 0.0
+    for k in range(3):
+        total += (color[k] - exact[k]) ** 2
+    return total / 3.0
 
 
 @plain_kernel
 def add_frame(
-    triangle: Ints,
-    ray: Floats,
-    axes: Floats,
-    eye: Floats,
-    pixel: float,
-    corner: Floats,
-    normal: Floats,
-    gradient: Floats,
-    uv: Floats,
-    texture: NDArray[np.int32],
-    pair: Ints,
-    color: Floats,
-    clamped: Bools,
-    texel: NDArray[np.uint8],
-    start: Ints,
-    size: Ints,
-    count: Ints,
-    mean: Floats,
-    full_texel: NDArray[np.uint8],
-    full_start: Ints,
-    full_size: Ints,
-    full_count: Ints,
-    same: bool,
+    sight: Sight,
     seen: Bools,
+    triangles: Triangles,
+    textures: Pyramids,
+    full: Pyramids,
+    same: bool,
+    sums: Sums,
     room: Floats,
-    error: Floats,
-    square: Floats,
-    need: Floats,
-    sight: Floats,
 ) -> None:
-    """Adds what the pixels of one frame show to the sums of each pair of cell and texture.
+    """Adds what the pixels of one frame show.
 
     Parameters
     ----------
-    triangle: (n,) that each pixel shows, -1 for none. ray: (n, 3). axes: (2, 3). eye: (3,).
-    corner, normal, uv: (m, 3, 3), (m, 3), (m, 3, 2) of the triangles. gradient: (m, 2, 3) of u and
-        v, per metre. texture, pair, color, clamped: (m,), (m,), (m, 3), (m, 2).
-    texel, start, size, count, mean: see `Pyramids`. full_texel, full_start, full_size, full_count:
-        of those that the picture is compared with; ``same`` if they are these.
     seen: (n,) whether the pixel is also one of the client's own item buffer.
+    full: what the picture is compared with; ``same`` if these are the textures.
     room: (L + 7, 3) to work in.
-    error, square: (P, L + 2) sums of root mean squares over R, G and B, and of their squares, with
-        nothing, the mean colour, level 0, level 1, … as the finest that is there.
-    need: (P, L) sums of how much each level is wanted, 0 to 1 a pixel; sight: the same of the
-        client's item buffer.
     """
-    whole, exact, offset, fine, coarse = room[0], room[1], room[2], room[3], room[4]
-    scaled, levels = room[5:7], room[7:]
-    for i in range(len(triangle)):
-        f = triangle[i]
+    exact, coarse, work, shown = room[0], room[1], room[2:5], room[5:]
+    shown[0] = GREY
+    for i in range(len(sight.triangle)):
+        f = sight.triangle[i]
         if f < 0:
             continue
-        p, t = pair[f], texture[f]
+        p, t, color = sums.pair[f], triangles.texture[f], triangles.color[f]
         if t < 0:
-            total = 0.0
             for k in range(3):
-                total += (GREY - 255.0 * color[f, k]) ** 2
-            error[p, 0] += np.sqrt(total / 3.0)
-            square[p, 0] += total / 3.0
-            need[p, 0] += 1.0
+                exact[k] = 255.0 * color[k]
+            square = distance(shown[0], exact)
+            sums.error[p, 0] += np.sqrt(square)
+            sums.square[p, 0] += square
+            sums.need[p, 0] += 1.0
             if seen[i]:
-                sight[p, 0] += 1.0
+                sums.sight[p, 0] += 1.0
             continue
-        finest = count[t] - 1
-        u, v, detail = texel_under(
-            ray[i], axes, eye, pixel, corner[f, 0], normal[f], gradient[f], uv[f, 0],
-            size[t, finest], offset, scaled,
-        )  # fmt: skip
-        detail = min(max(detail, 0.0), float(finest))
-        part = detail - int(detail)
+        clamped, finest = triangles.clamped[f], textures.levels[t] - 1
+        if not same:
+            u, v, detail = texel_under(sight, i, triangles, full, work)
+            blend(full, t, detail, u, v, clamped, exact, coarse)
+        u, v, detail = texel_under(sight, i, triangles, textures, work)
         sharp = finest - int(detail)  # the finest level that is sampled
         for n in range(sharp + 1):
-            sample(
-                texel, start[t, n], size[t, n, 0], size[t, n, 1], u, v, clamped[f, 0],
-                clamped[f, 1], levels[n],
-            )  # fmt: skip
+            sample(textures, t, n, u, v, clamped, shown[n + 2])
         below = max(sharp - 1, 0)
         for k in range(3):
-            whole[k] = levels[sharp, k] + part * (levels[below, k] - levels[sharp, k])
-            exact[k] = whole[k]
-        if not same:
-            best = full_count[t] - 1
-            _, _, away = texel_under(
-                ray[i], axes, eye, pixel, corner[f, 0], normal[f], gradient[f], uv[f, 0],
-                full_size[t, best], offset, scaled,
-            )  # fmt: skip
-            away = min(max(away, 0.0), float(best))
-            upper = best - int(away)
-            lower = max(upper - 1, 0)
-            sample(
-                full_texel, full_start[t, upper], full_size[t, upper, 0], full_size[t, upper, 1],
-                u, v, clamped[f, 0], clamped[f, 1], fine,
-            )  # fmt: skip
-            sample(
-                full_texel, full_start[t, lower], full_size[t, lower, 0], full_size[t, lower, 1],
-                u, v, clamped[f, 0], clamped[f, 1], coarse,
-            )  # fmt: skip
-            for k in range(3):
-                exact[k] = fine[k] + (away - int(away)) * (coarse[k] - fine[k])
+            step = shown[below + 2, k] - shown[sharp + 2, k]
+            shown[sharp + 2, k] += (detail - int(detail)) * step
+            shown[1, k] = textures.mean[t, k]
+            if same:
+                exact[k] = shown[sharp + 2, k]
+            exact[k] *= color[k]
+            for n in range(1, sharp + 3):
+                shown[n, k] *= color[k]
         # Levels that are finer than what is sampled change nothing.
-        for n in range(-2, (sharp if same else finest) + 1):
-            total = 0.0
-            for k in range(3):
-                if n == -2:
-                    shown = GREY
-                elif n == -1:
-                    shown = mean[t, k] * color[f, k]
-                else:
-                    shown = (levels[n, k] if n < sharp else whole[k]) * color[f, k]
-                total += (shown - exact[k] * color[f, k]) ** 2
-            error[p, n + 2] += np.sqrt(total / 3.0)
-            square[p, n + 2] += total / 3.0
-            if n >= 0:
-                wanted = min(max(float(finest - n) + 1.0 - detail, 0.0), 1.0)
-                need[p, n] += wanted
-                if seen[i]:
-                    sight[p, n] += wanted
+        last = sharp if same else finest
+        for n in range(last + 3):
+            square = distance(shown[min(n, sharp + 2)], exact)
+            sums.error[p, n] += np.sqrt(square)
+            sums.square[p, n] += square
+        for n in range(last + 1):
+            wanted = min(max(finest - n + 1.0 - detail, 0.0), 1.0)
+            sums.need[p, n] += wanted
+            if seen[i]:
+                sums.sight[p, n] += wanted

@@ -2,45 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import DatabaseError, InputError, LimitError
 from ptmtools.progress import Progress, silent
 from ptmtools.texture import reader
 from ptmtools.texture.detail import difference_between
 from ptmtools.texture.model import Limits
 from ptmtools.walkthrough.served import BUILD, Served
+from ptmtools.walkthrough.view.records import Pyramids
 
 #: A texture that needs more memory than this to decode is refused.
 _LIMITS = Limits(decoded_bytes=1 << 33)
-
-
-@dataclass(frozen=True)
-class Pyramids:
-    """Levels count from the coarsest, 0.
-
-    Attributes
-    ----------
-    texel: (N,) uint8 RGB, level by level, rows from the top.
-    start: (T, L) where each level begins in it.
-    size: (T, L, 2) int64 width and height; 0 beyond the finest.
-    count: (T,) levels of each texture.
-    mean: (T, 3) the mean of the coarsest level, 0 to 255.
-    differences: (T, L) of a level to the level below it, as `ptmtools.texture.detail` has them, of
-        what is shown; 0 for the coarsest.
-    """
-
-    texel: NDArray[np.uint8]
-    start: Ints
-    size: Ints
-    count: Ints
-    mean: Floats
-    differences: Floats
 
 
 def read_pyramids(served: Served, progress: Progress = silent) -> Pyramids:
@@ -65,7 +41,7 @@ def read_pyramids(served: Served, progress: Progress = silent) -> Pyramids:
 def _pyramids(served: Served, progress: Progress) -> Pyramids:
     rows = served.index["textures"]
     deepest = max((len(row["ends"]) for row in rows), default=1)
-    start, count = np.zeros((len(rows), deepest), np.int64), np.zeros(len(rows), np.int64)
+    start, levels = np.zeros((len(rows), deepest), np.int64), np.zeros(len(rows), np.int64)
     size, mean = np.zeros((len(rows), deepest, 2), np.int64), np.zeros((len(rows), 3))
     differences = np.zeros((len(rows), deepest))
     parts: list[NDArray[np.uint8]] = []
@@ -91,12 +67,12 @@ def _pyramids(served: Served, progress: Progress) -> Pyramids:
                     texels = level.shape[0] * level.shape[1]
                     differences[t, n] = difference_between(level, below) / texels
                 start[t, n], size[t, n] = at, (level.shape[1], level.shape[0])
-                count[t] = n + 1
+                levels[t] = n + 1
                 at += level.size
                 parts.append(level.ravel())
                 below = level
     texel = np.concatenate(parts) if parts else np.zeros(0, np.uint8)
-    return Pyramids(texel, start, size, count, mean, differences)
+    return Pyramids(texel, start, size, levels, mean, differences)
 
 
 def _rgb(samples: NDArray[Any]) -> NDArray[np.uint8]:

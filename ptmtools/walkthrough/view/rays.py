@@ -11,8 +11,14 @@ from typing import Any
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.vectors import normals
 from ptmtools.walkthrough.served import Surfaces
+from ptmtools.walkthrough.view.records import Sight
 
+#: Lines of the screen that pictures are made for.
+LINES = 1080
+#: Rays that are cast at a time.
+_RAYS = 1 << 18
 #: Surfaces that a ray passes through before it is given up.
 _LAYERS = 16
 
@@ -39,6 +45,11 @@ class Camera:
         odd = [np.arange(side) % 2 == 1 for side in (self.height, self.width)]
         found: Bools = np.outer(*odd).ravel()
         return found
+
+    @property
+    def pixel(self) -> float:
+        """Side of a pixel of the screen at depth 1, whatever the pixels of the camera are."""
+        return float(2 * np.tan(self.field_of_view / 2) / LINES)
 
     def rays(self, direction: Floats) -> tuple[Floats, Floats]:
         """(F, height, width, 3) rays of which the component along the view is 1, from the top left,
@@ -74,7 +85,7 @@ class Caster:
         corner = surfaces.corner
         self._which = np.flatnonzero(~surfaces.glass)
         self._corner = corner
-        self._normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        self._normal = normals(corner)
         self._one_sided = ~surfaces.two_sided
         low, high = corner.min(axis=(0, 1), initial=0), corner.max(axis=(0, 1), initial=0)
         self._middle = (low + high) / 2
@@ -86,12 +97,21 @@ class Caster:
             local = (corner[self._which] - self._middle).astype(np.float32)
             TriangleMesh(self._tree, np.ascontiguousarray(local))
 
+    def look(self, camera: Camera, eye: Floats, direction: Floats) -> Sight:
+        """What is seen from an eye (3,) in a direction (3,)."""
+        rays, axes = camera.rays(direction[None])
+        ray = rays.reshape(-1, 3)
+        parts = np.array_split(ray, -(-len(ray) // _RAYS))
+        triangle = np.concatenate([self.first(eye, part) for part in parts])
+        return Sight(triangle, ray, axes[0], eye, camera.pixel)
+
     def first(self, eye: Floats, along: Floats) -> Ints:
-        """(n,) the triangle that each of (n, 3) rays from (n, 3) points shows, or -1."""
-        found = np.full(len(eye), -1, np.int64)
+        """(n,) the triangle that each of (n, 3) rays from a point (3,) shows, or -1."""
+        found = np.full(len(along), -1, np.int64)
         if self._tree is None:
             return found
-        start, waiting = eye - self._middle, np.arange(len(eye))
+        waiting = np.arange(len(along))
+        start = np.repeat((eye - self._middle)[None], len(along), axis=0)
         for _ in range(_LAYERS):
             origin = start[waiting].astype(np.float32)
             hit = self._tree.run(origin, along[waiting].astype(np.float32), query="INTERSECT")

@@ -17,16 +17,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Floats, Ints, Singles
+from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.progress import Progress, silent
 from ptmtools.walkthrough.served import Surfaces
-from ptmtools.walkthrough.view.pyramids import Pyramids
 from ptmtools.walkthrough.view.rays import Camera, Caster
-
-#: Lines of the screen that pictures are made for.
-LINES = 1080
-#: Rays that are cast at a time.
-_RAYS = 1 << 17
+from ptmtools.walkthrough.view.records import Pyramids, Sight, Triangles
+from ptmtools.walkthrough.view.triangles import triangles_of
 
 
 @dataclass(frozen=True)
@@ -79,67 +75,72 @@ def look(
 ) -> Views:
     """The tables of (F, 3) eyes and unit directions of view; errors are against what ``full`` would
     show, which holds the same textures in other quality."""
-    from ptmtools.walkthrough.view.kernels import add_frame
-
-    corner = surfaces.corner
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    gradient = gradients(corner, surfaces.uv, normal)
-    pairs, pair = np.unique(
-        np.stack([surfaces.cell, surfaces.texture], axis=1).reshape(-1, 2),
-        axis=0, return_inverse=True,
-    )  # fmt: skip
-    pair = pair.reshape(-1).astype(np.int64)
-    deepest = pyramids.start.shape[1]
-    wide = (deepest + 2, deepest + 2, deepest, deepest)
-    room = np.zeros((deepest + 7, 3))
-    sums = [np.zeros((len(pairs), columns)) for columns in wide]
-    parts: list[list[Floats]] = [[] for _ in wide]
-    found: list[Ints] = []
-    caster = Caster(surfaces)
-    pixel = 2 * np.tan(camera.field_of_view / 2) / LINES
-    compared = pyramids if full is None else full
-    seen = camera.sparse
-    shares = np.array([1, 1, 1, max(int(seen.sum()), 1) / len(seen)]) * len(seen)
-    owner = np.full((len(eye), int(seen.sum())), -1, np.int32)
-    depth = np.full(owner.shape, np.inf, np.float32)
-    at_once = max(1, _RAYS // len(seen))
-    for begin in range(0, len(eye), at_once):
-        progress(begin, len(eye), "looking along the walk")
-        batch = slice(begin, begin + at_once)
-        rays, axes = camera.rays(direction[batch])
-        rays = rays.reshape(len(rays), -1, 3)
-        origin = np.repeat(eye[batch], len(seen), axis=0)
-        shown = caster.first(origin, rays.reshape(-1, 3)).reshape(len(rays), -1)
-        for k in range(len(rays)):
-            add_frame(
-                shown[k], rays[k], axes[k], eye[begin + k], pixel, corner, normal, gradient,
-                surfaces.uv, surfaces.texture, pair, surfaces.color, surfaces.clamped,
-                pyramids.texel, pyramids.start, pyramids.size, pyramids.count, pyramids.mean,
-                compared.texel, compared.start, compared.size, compared.count, full is None, seen,
-                room, *sums,
-            )  # fmt: skip
-            shows = shown[k, seen]
-            hit = np.flatnonzero(shows >= 0)
-            shows = shows[hit]
-            owner[begin + k, hit] = surfaces.cell[shows]
-            offset = corner[shows, 0] - eye[begin + k]
-            facing = np.einsum("ij,ij->i", normal[shows], rays[k][seen][hit])
-            depth[begin + k, hit] = np.einsum("ij,ij->i", normal[shows], offset) / facing
-            there = np.flatnonzero(sums[2][:, 0])
-            found.append(there)
-            for table, part, share in zip(sums, parts, shares.tolist(), strict=True):
-                part.append(table[there] / share)
-                table[there] = 0.0
+    triangles, caster, seen = triangles_of(surfaces), Caster(surfaces), camera.sparse
+    tally = _Tally(triangles, pyramids, full, seen)
+    owner = np.empty((len(eye), int(seen.sum())), np.int32)
+    depth = np.empty(owner.shape, np.float32)
+    for k in range(len(eye)):
+        progress(k, len(eye), "looking along the walk")
+        sight = caster.look(camera, eye[k], direction[k])
+        tally.add(sight)
+        owner[k], depth[k] = _item_buffer(sight, triangles, seen)
     progress(len(eye), len(eye), "looking along the walk")
-    rows = np.concatenate([np.zeros(0, np.int64), *found])
-    tables = [
-        np.concatenate([np.zeros((0, columns)), *part]).astype(np.float32)
-        for columns, part in zip(wide, parts, strict=True)
-    ]
-    start = np.concatenate([[0], np.cumsum([len(r) for r in found])]).astype(np.int64)
-    cell, texture = pairs[rows].T.astype(np.int32)
-    error, square, need, sight = tables
-    return Views(start, cell, texture, error, square, need, sight, owner, depth)
+    return tally.views(owner, depth)
+
+
+class _Tally:
+    """Adds up frames."""
+
+    def __init__(
+        self, triangles: Triangles, pyramids: Pyramids, full: Pyramids | None, seen: Bools
+    ) -> None:
+        from ptmtools.walkthrough.view.kernels import Sums
+
+        keys = np.stack([triangles.cell, triangles.texture], axis=1)
+        self._pairs, pair = np.unique(keys, axis=0, return_inverse=True)
+        deepest = pyramids.start.shape[1]
+        columns = (deepest + 2, deepest + 2, deepest, deepest)
+        self._sums = Sums(pair.reshape(-1), *(np.zeros((len(self._pairs), n)) for n in columns))
+        self._what = seen, triangles, pyramids, pyramids if full is None else full, full is None
+        self._room = np.zeros((deepest + 7, 3))
+        pixels = len(seen)
+        self._pixels = (pixels, pixels, pixels, max(int(seen.sum()), 1))
+        #: Of no frame, and of each: its pairs, and its rows of each table.
+        self._found = [np.zeros(0, np.int64)]
+        self._rows = [[np.zeros((0, n), np.float32)] for n in columns]
+
+    def add(self, sight: Sight) -> None:
+        """Makes the rows of the next frame."""
+        from ptmtools.walkthrough.view.kernels import add_frame
+
+        add_frame(sight, *self._what, self._sums, self._room)
+        found = np.flatnonzero(self._sums.need[:, 0])
+        self._found.append(found)
+        for rows, table, pixels in zip(self._rows, self._sums[1:], self._pixels, strict=True):
+            rows.append((table[found] / pixels).astype(np.float32))
+            table[found] = 0.0
+
+    def views(self, owner: NDArray[np.int32], depth: Singles) -> Views:
+        """Those of all frames, with their item buffers."""
+        start = np.cumsum([len(found) for found in self._found])
+        cell, texture = self._pairs[np.concatenate(self._found)].T
+        error, square, need, sight = map(np.concatenate, self._rows)
+        return Views(start, cell, texture, error, square, need, sight, owner, depth)
+
+
+def _item_buffer(
+    sight: Sight, triangles: Triangles, seen: Bools
+) -> tuple[NDArray[np.int32], Singles]:
+    """(n,) ``owner`` and ``depth`` of `Views`, of the pixels that are seen."""
+    shows, rays = sight.triangle[seen], sight.ray[seen]
+    owner, depth = np.full(len(shows), -1, np.int32), np.full(len(shows), np.inf, np.float32)
+    hit = np.flatnonzero(shows >= 0)
+    shows = shows[hit]
+    normal, offset = triangles.normal[shows], triangles.corner[shows, 0] - sight.eye
+    owner[hit] = triangles.cell[shows]
+    facing = np.einsum("ij,ij->i", normal, rays[hit])
+    depth[hit] = np.einsum("ij,ij->i", normal, offset) / facing
+    return owner, depth
 
 
 def limited(views: Views, count: Ints) -> Views:
@@ -153,14 +154,3 @@ def limited(views: Views, count: Ints) -> Views:
         np.ascontiguousarray(each[:, : deepest + 2]) for each in (views.error, views.square)
     )
     return replace(views, error=error, square=square, need=need, sight=sight)
-
-
-def gradients(corner: Floats, uv: Floats, normal: Floats) -> Floats:
-    """(n, 2, 3) of u and v along each triangle's plane, per metre; 0 for triangles without area."""
-    area = np.maximum((normal**2).sum(axis=1), np.finfo(np.float64).tiny)[:, None]
-    ab, ac = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    along_b = np.cross(ac, normal) / area
-    along_c = np.cross(normal, ab) / area
-    b, c = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    found: Floats = b[:, :, None] * along_b[:, None] + c[:, :, None] * along_c[:, None]
-    return found
