@@ -105,12 +105,12 @@ class EngineClient(Client):
         known = self.known()
         missing = known[~there[known]]
         if len(missing):
-            low, high = stock.boxes
             view = int(world.view[frame])
             rays, _ = world.camera.rays(world.direction[frame : frame + 1])
             holes(
                 rays.reshape(-1, 3)[world.camera.sparse], world.views.owner[view],
-                world.views.depth[view], world.eye[frame], low, high, there, missing, share,
+                world.views.depth[view], world.eye[frame], stock.low, stock.high, there,
+                missing, share,
             )  # fmt: skip
         return share
 
