@@ -109,20 +109,10 @@ class Catalogue:
 
     @cached_property
     def in_sight(self) -> tuple[Ints, ...]:
-        """Of each cell the textures of all that it may see."""
-        empty = np.zeros(0, np.int64)
+        """Of each cell the textures of all that it may see, as its record names them."""
         return tuple(
-            np.unique(np.concatenate([empty, *(self.painted[c] for c in cells.tolist())]))
-            for cells in self.visible
-        )
-
-    @cached_property
-    def painted(self) -> tuple[Ints, ...]:
-        """Of each cell the textures that it uses."""
-        textures = self.shapes.texture
-        return tuple(
-            np.setdiff1d(textures[a:b], [-1])
-            for a, b in zip(self.first_shape[:-1], self.first_shape[1:], strict=True)
+            np.unique(np.array([t for row in record["textures"] for t in row], dtype=np.int64))
+            for record in self.records
         )
 
     def counted_by_paper(self, served: Served) -> Catalogue:

@@ -90,12 +90,14 @@ def _scrambled(stock: Catalogue, record: Bools, geometry: Bools) -> Catalogue:
     """Where they are not there, records that say little, and shapes that are elsewhere."""
     shapes, away = stock.shapes, 7.0 * ~geometry[stock.shapes.cell][:, None]
     painted = np.where(geometry[shapes.cell], shapes.texture, -1)
-    nowhere = leaf(np.full(3, -99.0), np.full(3, -98.0))
-    little = {"ach": [1.0], "adjacent": [], "need": [], "leaves": [nowhere]}
-    records: list[Any] = [
-        row if there else {**row, **little, "visible": [c]}
-        for c, (row, there) in enumerate(zip(stock.records, record.tolist(), strict=True))
-    ]
+    nowhere = {"leaves": [leaf(np.full(3, -99.0), np.full(3, -98.0))]}
+    little = {"ach": [1.0], "adjacent": [], "need": [], "textures": [[]]}
+    records: list[Any] = []
+    for c, row in enumerate(stock.records):
+        unsaid = {} if record[c] else {**little, "visible": [c]}
+        # The paper's cells bring their hulls with their geometry.
+        unplaced = {} if record[c] or geometry[c] else nowhere
+        records.append({**row, **unsaid, **unplaced})
     low, high = shapes.low + away, shapes.high + 2 * away
     scrambled = replace(shapes, low=low, high=high, texture=painted)
     return replace(stock, records=tuple(records), shapes=scrambled)
