@@ -44,13 +44,11 @@ def did(run: Run, frames: int | None = None) -> tuple[bytes, ...]:
 
 
 @EACH
-@settings(max_examples=12, phases=PHASES)
-@given(SEEDS, LINKS, BUDGETS, st.integers(1, 20))
-def test_the_way_to_come(
-    policy: str, seed: int, link: Conditions, budget: int, frames: int
-) -> None:
-    """Who goes elsewhere later has done the same until then."""
-    world = any_world(seed)
+@settings(max_examples=25, phases=PHASES)
+@given(SEEDS, st.integers(1, 1000), st.integers(3, 20))
+def test_the_way_to_come(policy: str, seed: int, budget: int, frames: int) -> None:
+    """Who goes elsewhere later has done the same until then, however little fits into memory."""
+    world, link = any_world(seed), Conditions(1e6, 0.05)
     elsewhere = np.where(np.arange(world.frames) < frames, np.arange(world.frames), 0)
     other = replace(
         world,
