@@ -104,4 +104,5 @@ def _scrambled(stock: Catalogue, record: Bools, geometry: Bools) -> Catalogue:
 def _unseen(views: Views, geometry: Bools) -> Views:
     """Where they are not there, cells that show nothing."""
     sight = np.where(geometry[views.cell][:, None], views.sight, 0)
-    return replace(views, sight=sight.astype(np.float32))
+    depth = np.where((views.owner >= 0) & geometry[views.owner], views.depth, 0.01)
+    return replace(views, sight=sight.astype(np.float32), depth=depth.astype(np.float32))
