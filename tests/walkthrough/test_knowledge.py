@@ -14,6 +14,7 @@ from ptmtools.walkthrough.catalogue import Catalogue
 from ptmtools.walkthrough.client import Client, Kind
 from ptmtools.walkthrough.network import Conditions, Link
 from ptmtools.walkthrough.policies import POLICIES, Knows
+from ptmtools.walkthrough.request import Request
 from ptmtools.walkthrough.simulation import Run, simulate
 from ptmtools.walkthrough.view.tables import Views
 from ptmtools.walkthrough.world import World
@@ -27,20 +28,32 @@ LINKS = st.builds(Conditions, st.floats(2e3, 5e4), st.floats(0, 0.5))
 BUDGETS = st.integers(1, 10_000)
 
 
-def played(policy: str, world: World, link: Conditions, budget: int) -> tuple[Run, Client]:
-    """A run, and the client as it is in the end."""
-    clients = []
+def played(
+    policy: str, world: World, conditions: Conditions, budget: int
+) -> tuple[Run, Client, list[Request]]:
+    """A run, the client as it is in the end, and what it asked for."""
+    clients, asked = [], []
 
     def make(world: World, link: Link, budget: int) -> Client:
+        ask = link.request
+
+        def request(size: int, priority: float, tag: object = None) -> Request:
+            asked.append(ask(size, priority, tag))
+            return asked[-1]
+
+        link.request = request  # type: ignore[method-assign]
         clients.append(POLICIES[policy].client(world, link, budget))
         return clients[0]
 
-    return simulate(world, replace(POLICIES[policy], client=make), link, budget), clients[0]
+    run = simulate(world, replace(POLICIES[policy], client=make), conditions, budget)
+    return run, clients[0], asked
 
 
-def did(run: Run, frames: int | None = None) -> tuple[bytes, ...]:
-    """All that a client has done, of its first frames."""
-    return tuple(table[:frames].tobytes() for table in (run.column, run.there, run.fetched))
+def did(run: Run, _: Client, asked: list[Request], frames: int | None = None) -> tuple[Any, ...]:
+    """All that a client has done, until the last of its first frames."""
+    until = run.time[:frames][-1]
+    tables = [table[:frames].tobytes() for table in (run.column, run.there, run.fetched)]
+    return tables, [(r.issued, r.tag, r.priority) for r in asked if r.issued <= until]
 
 
 @EACH
@@ -54,8 +67,8 @@ def test_the_way_to_come(policy: str, seed: int, budget: int, frames: int) -> No
         world,
         **{name: getattr(world, name)[elsewhere] for name in ("view", "eye", "direction", "cell")},
     )
-    runs = [simulate(each, POLICIES[policy], link, budget) for each in (world, other)]
-    assert did(runs[0], frames) == did(runs[1], frames)
+    runs = [played(policy, each, link, budget) for each in (world, other)]
+    assert did(*runs[0], frames) == did(*runs[1], frames)
 
 
 def test_the_oracle_knows_the_way_to_come() -> None:
@@ -64,10 +77,8 @@ def test_the_oracle_knows_the_way_to_come() -> None:
     for seed in range(10):
         world = any_world(seed)
         stays = replace(world, view=np.minimum(world.view, 4))
-        runs = [
-            simulate(each, POLICIES["oracle"], Conditions(5e4, 0.0), 500) for each in (world, stays)
-        ]
-        differ.append(did(runs[0], 5) != did(runs[1], 5))
+        runs = [played("oracle", each, Conditions(5e4, 0.0), 500) for each in (world, stays)]
+        differ.append(did(*runs[0], 5) != did(*runs[1], 5))
     assert any(differ)
 
 
@@ -77,11 +88,11 @@ def test_the_oracle_knows_the_way_to_come() -> None:
 def test_what_has_not_come(policy: str, seed: int, link: Conditions, budget: int) -> None:
     """Records and geometry may say anything as long as they have not come."""
     world = any_world(seed)
-    run, client = played(policy, world, link, budget)
-    record, geometry = (client.files[kind].whole for kind in (Kind.RECORD, Kind.GEOMETRY))
+    known = played(policy, world, link, budget)
+    record, geometry = (known[1].files[kind].whole for kind in (Kind.RECORD, Kind.GEOMETRY))
     stock = _scrambled(world.catalogue, record, geometry)
     other = replace(world, catalogue=stock, views=_unseen(world.views, geometry))
-    assert did(simulate(other, POLICIES[policy], link, budget)) == did(run)
+    assert did(*played(policy, other, link, budget)) == did(*known)
 
 
 def _scrambled(stock: Catalogue, record: Bools, geometry: Bools) -> Catalogue:
@@ -104,5 +115,5 @@ def _scrambled(stock: Catalogue, record: Bools, geometry: Bools) -> Catalogue:
 def _unseen(views: Views, geometry: Bools) -> Views:
     """Where they are not there, cells that show nothing."""
     sight = np.where(geometry[views.cell][:, None], views.sight, 0)
-    depth = np.where((views.owner >= 0) & geometry[views.owner], views.depth, 0.01)
+    depth = np.where((views.owner >= 0) & geometry[views.owner], views.depth, np.inf)
     return replace(views, sight=sight.astype(np.float32), depth=depth.astype(np.float32))
