@@ -222,6 +222,14 @@ def test_a_client_that_takes_more_memory_than_there_is() -> None:
     assert run.overruns > 0
 
 
+def test_the_papers_quality_is_of_what_was_downloaded() -> None:
+    """Whether or not any of it fits into memory."""
+    stock = catalogue([raw(8)], [(0, 0)])
+    run = simulate(standing(stock, 5), POLICIES["lru"], Conditions(None), 0)
+    assert not run.column.any()
+    assert (run.quality[0], run.quality[-1]) == (0, 1)
+
+
 @settings(max_examples=20, phases=PHASES)
 @given(SEEDS, st.lists(st.integers(0, 5000), min_size=2, max_size=4))
 def test_more_memory_is_no_worse_for_who_knows_all(seed: int, budgets: list[int]) -> None:
