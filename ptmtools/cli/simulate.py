@@ -11,7 +11,7 @@ from ptmtools.cli.common import as_json, database, forced, voiced, writable
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
 from ptmtools.database.names import HINTS
-from ptmtools.errors import InputError
+from ptmtools.errors import InputError, OutputError
 from ptmtools.files import refuse_existing, write_bytes, writing
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
@@ -127,8 +127,8 @@ def simulate(
         if file:
             writable(file, force)
     frames_to = Path(frames_folder) if frames_folder else None
-    if frames_to and not force and frames_to.is_dir() and any(frames_to.iterdir()):
-        refuse_existing(frames_to, "use --force to replace frames in it, or name another folder")
+    if frames_to:
+        _fillable(frames_to, force)
     if plot_file:
         figure.require()
     if flip:
@@ -161,6 +161,21 @@ def simulate(
         return
     for line in table(played, worlds):
         voice.say(line)
+
+
+def _fillable(folder: Path, force: bool) -> None:
+    """Raises the `OutputError` that filling the folder would end in: PTM-O001 there is something in
+    it, PTM-O002 it cannot be made, since it or what it is to be in is a file."""
+    nearest = next(p for p in (folder, *folder.absolute().parents) if p.exists())
+    if not nearest.is_dir():
+        raise OutputError(
+            "PTM-O002",
+            f"cannot be made: {nearest.name} is no folder",
+            file=folder,
+            remedy="name another folder",
+        )
+    if not force and nearest == folder and any(folder.iterdir()):
+        refuse_existing(folder, "use --force to replace frames in it, or name another folder")
 
 
 def _made(db: str, seeds: tuple[int, ...]) -> dict[str, Walk]:

@@ -48,6 +48,8 @@ class Catalogue:
         at least `LEAST`; of what lies behind the last 0.
     colors: (T, 3) mean colour, 0 to 255.
     index_bytes, statistics_bytes, record_bytes, geometry_bytes: on the link; (C,) the latter two.
+    low, high: (C, 3) corners of the cells' boxes, metres, as the index rounds them: a client has
+        leaves only of cells whose record is there.
     records, statistics: of each cell.
     shapes: see `Shapes`.
     """
@@ -61,6 +63,8 @@ class Catalogue:
     statistics_bytes: int
     record_bytes: Ints
     geometry_bytes: Ints
+    low: Floats
+    high: Floats
     records: tuple[Document, ...]
     statistics: Sequence[Document]
     shapes: Shapes
@@ -105,27 +109,10 @@ class Catalogue:
 
     @cached_property
     def in_sight(self) -> tuple[Ints, ...]:
-        """Of each cell the textures of all that it may see."""
-        empty = np.zeros(0, np.int64)
+        """Of each cell the textures of all that it may see, as its record names them."""
         return tuple(
-            np.unique(np.concatenate([empty, *(self.painted[c] for c in cells.tolist())]))
-            for cells in self.visible
-        )
-
-    @cached_property
-    def boxes(self) -> tuple[Floats, Floats]:
-        """(C, 3) least and greatest coordinates of what each cell consists of, metres."""
-        points = [np.concatenate([leaf["points"] for leaf in r["leaves"]]) for r in self.records]
-        low, high = ([end(p, axis=0) for p in points] for end in (np.min, np.max))
-        return np.array(low), np.array(high)
-
-    @cached_property
-    def painted(self) -> tuple[Ints, ...]:
-        """Of each cell the textures that it uses."""
-        textures = self.shapes.texture
-        return tuple(
-            np.setdiff1d(textures[a:b], [-1])
-            for a, b in zip(self.first_shape[:-1], self.first_shape[1:], strict=True)
+            np.unique(np.array([t for row in record["textures"] for t in row], dtype=np.int64))
+            for record in self.records
         )
 
     def counted_by_paper(self, served: Served) -> Catalogue:
@@ -146,6 +133,8 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
             into[1 : len(row["ends"]) + 1] = row["differences"]
     if textures and all("color" in row for row in textures):
         colors = np.array([row["color"] for row in textures], dtype=np.float64)
+    boxes = np.array([cell["box"] for cell in served.index["cells"]], dtype=np.float64)
+    low, high = boxes.reshape(-1, 2, 3).transpose(1, 0, 2).copy()
     column = np.arange(ends.shape[1])
     stored = (column > 0) & (column <= levels[:, None])
     beside[stored] = np.maximum(beside[stored], LEAST)
@@ -159,6 +148,8 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
         statistics_bytes=served.statistics_bytes,
         record_bytes=served.record_bytes,
         geometry_bytes=served.geometry_bytes,
+        low=low,
+        high=high,
         records=served.records,
         statistics=served.statistics["cells"],
         shapes=_shapes(served),

@@ -62,16 +62,13 @@ class SimulateOptions:
         return [parse_memory(part) for part in _parts(self.memory)]
 
     def links(self, trace: Trace | None = None) -> list[Conditions]:
-        """A link for each bandwidth, all as the trace says; raises InputError PTM-I711, I712."""
+        """A link for each bandwidth, however it is written, all as the trace says; raises
+        InputError PTM-I711, I712."""
+        latency = parse_duration(self.latency)
+        bandwidths = dict.fromkeys(parse_bandwidth(part) for part in _parts(self.bandwidth))
         return [
-            Conditions(
-                parse_bandwidth(part),
-                parse_duration(self.latency),
-                self.overhead,
-                self.protocol,
-                trace=trace,
-            )
-            for part in _parts(self.bandwidth)
+            Conditions(bandwidth, latency, self.overhead, self.protocol, trace=trace)
+            for bandwidth in bandwidths
         ]
 
 

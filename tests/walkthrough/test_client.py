@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from hypothesis import given, strategies as st
 
 from ptmtools.walkthrough.client import Files, Kind, Range
+from ptmtools.walkthrough.network import Conditions, Link
+from ptmtools.walkthrough.policies.lru import LruClient
+from tests.walkthrough.worlds import catalogue, raw, standing
 
 ACTS = st.lists(
     st.tuples(st.just("ask"), st.integers(1, 40))
@@ -45,6 +50,26 @@ def test_files_against_single_bytes(acts: list[tuple[str, int]]) -> None:
         assert files.whole.tolist() == [False, held.all()]
         assert files.there[1] <= files.asked[1]
         assert files.asked[0] == files.there[0] == 0
+
+
+def test_the_last_byte_counts() -> None:
+    """A file, or a level, that lacks one is not there."""
+    textures = [raw(8), raw(4)]
+    stock = catalogue(textures, [(0, 0), (0, 1)])
+    client = LruClient(standing(stock, 1), Link(Conditions()), 1 << 40)
+    for kind, files in client.files.items():
+        for number, size in enumerate(files.size.tolist()):
+            files.arrived(files.ask(number, size - 1))
+            assert not files.whole[number]
+            files.arrived(files.ask(number, size))
+            assert files.whole[number], kind
+    for t, texture in enumerate(textures):
+        client.textures.there[t] = 0
+        for level, end in enumerate(itertools.accumulate(texture.groups)):
+            client.textures.there[t] = end - 1
+            assert client.have[t] == level
+            client.textures.there[t] = end
+            assert client.have[t] == level + 1
 
 
 def test_who_gives_up_before_anything_came_has_nothing_of_what_is_before_it() -> None:

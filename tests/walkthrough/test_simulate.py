@@ -100,6 +100,13 @@ def test_means_over_walks_come_with_their_spread(world: World) -> None:
         assert row[1:3] == [f"{np.mean(e):.2f}", f"{min(e):.2f}–{max(e):.2f}"]
 
 
+def test_the_same_twice_is_run_once(world: World) -> None:
+    """However it is written: two rows of a table would else be taken for two walks."""
+    options = SimulateOptions(policy="ach,ach", bandwidth="4M,4000k,4.0M,inf", memory="10%,10%")
+    assert [c.bandwidth for c in options.links()] == [4_000_000, None]
+    assert len(play({"": world}, options)) == 2
+
+
 @pytest.mark.parametrize(
     ("words", "code"),
     [
@@ -150,6 +157,9 @@ def test_nothing_is_overwritten(ptm: Ptm, two_rooms: Path, walk_file: Path, tmp_
     file.write_text("mine")
     assert "[PTM-O001]" in ptm(*words, "--csv", file).err
     assert "[PTM-O001]" in ptm(*words, "--frames", tmp_path).err
+    for folder in (file, file / "frames"):
+        refused = ptm("simulate", "nowhere", "--frames", folder).err
+        assert "frames.csv is no folder" in refused
     assert file.read_text() == "mine"
     assert ptm(*words, "--csv", file, "--force").status == 0
     assert file.read_text().startswith("policy,")

@@ -15,11 +15,12 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.walkthrough.client import Client, Kind, Range
 from ptmtools.walkthrough.network import Conditions, Link
 from ptmtools.walkthrough.policies import POLICIES
+from ptmtools.walkthrough.policies.lru import LruClient
 from ptmtools.walkthrough.request import Request
 from ptmtools.walkthrough.simulation import Run, simulate
 from ptmtools.walkthrough.world import World
 from tests.walkthrough.links import CONDITIONS
-from tests.walkthrough.worlds import SEEDS, any_world
+from tests.walkthrough.worlds import SEEDS, any_world, catalogue, raw, standing
 
 #: A world of a smaller seed is no smaller.
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)
@@ -110,12 +111,24 @@ def test_what_no_client_may_do(policy: str, seed: int, conditions: Conditions, b
     assert run.fetched[-1] == run.body
     assert run.useful <= run.body + 1e-6
     _check_once(seen)
+    _check_changes(run, world)
     # What is seen.
     assert (run.error >= 0).all()
     assert (run.error <= of_nothing(world) + 1e-4).all()
     for share in (run.quality, run.missing):
         assert (share >= 0).all()
         assert (share <= 1 + 1e-6).all()
+
+
+def _check_changes(run: Run, world: World) -> None:
+    """Levels that come are uploaded, those that go cost nothing."""
+    uploads = switches = 0
+    for memory, columns in zip(world.catalogue.memory, run.column.T.tolist(), strict=True):
+        for before, after in itertools.pairwise([0, *columns]):
+            uploads += int(memory[max(before, after)] - memory[before])
+            switches += before != after
+    assert (run.uploads, run.switches) == (uploads, switches)
+    assert run.stalls == sum(not run.there[f, c] for f, c in enumerate(world.cell.tolist()))
 
 
 def _check_once(seen: Witness) -> None:
@@ -179,6 +192,42 @@ def test_nothing_comes_before_it_can(policy: str, seed: int) -> None:
     assert run.error[early] == pytest.approx(of_nothing(world)[early])
     assert not run.column[run.time < 1.5].any()
     assert run.stalls >= early.sum()
+
+
+@pytest.mark.parametrize("policy", [name for name in POLICIES if name != "paper"])
+def test_a_run_counted_by_hand(policy: str) -> None:
+    """Who stands before two textures gets all there is, once, and all of it is on the screen."""
+    textures = [raw(8), raw(16)]
+    stock = catalogue(textures, [(0, 0), (0, 1)])
+    run = simulate(standing(stock, 5), POLICIES[policy], Conditions(None, 0.1), 1 << 40)
+    files = sum(sum(t.groups) for t in textures) + 4000
+    # The index and the record; ach-views goes by the statistics, too.
+    documents = 500 + 300 + 700 * (policy == "ach-views")
+    assert (run.documents, run.body, run.useful) == (documents, documents + files, files)
+    assert (run.overhead, run.cancelled) == (300 * run.requests, 0)
+    assert run.memory[-1] == run.uploads == sum(sum(t.memory) for t in textures)
+    assert run.quality[-1] == 1
+    # Geometry comes after the index, and for who waits for it also after the record.
+    assert run.stalls == run.there[:, 0].argmax() == (2 if policy == "lru" else 1)
+
+
+def test_a_client_that_takes_more_memory_than_there_is() -> None:
+    """Is found out: none of ours is, or should be."""
+    careless = replace(POLICIES["lru"], client=lambda *given: LruClient(*given[:2], 1 << 40))
+    stock = catalogue([raw(8)], [(0, 0)])
+    whole = stock.whole
+    for budget, over in ((whole, False), (whole - 1, True)):
+        run = simulate(standing(stock, 5), careless, Conditions(None), budget)
+        assert run.overruns == over * np.count_nonzero(run.column[:, 0] == stock.levels[0])
+    assert run.overruns > 0
+
+
+def test_the_papers_quality_is_of_what_was_downloaded() -> None:
+    """Whether or not any of it fits into memory."""
+    stock = catalogue([raw(8)], [(0, 0)])
+    run = simulate(standing(stock, 5), POLICIES["lru"], Conditions(None), 0)
+    assert not run.column.any()
+    assert (run.quality[0], run.quality[-1]) == (0, 1)
 
 
 @settings(max_examples=20, phases=PHASES)

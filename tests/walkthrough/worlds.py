@@ -76,6 +76,7 @@ def catalogue(
         ends_of = np.sort(random.uniform(0, 1, (2, len(shapes), 3)), axis=0)
         low, high = low + ends_of[0] * ROOM, low + ends_of[1] * ROOM
     own = Shapes(cell, texture_of, low, high)
+    rooms = np.arange(cells)[:, None] * [ROOM[0], 0, 0]
     records = tuple(_record(c, cells, textures, shapes, random) for c in range(cells))
     return Catalogue(
         levels=count,
@@ -87,6 +88,8 @@ def catalogue(
         statistics_bytes=700,
         record_bytes=np.full(cells, 300),
         geometry_bytes=np.full(cells, geometry),
+        low=rooms,
+        high=rooms + ROOM,
         records=records,
         statistics=[{"views": np.tile(r["ach"], (6, 1)).tolist()} for r in records],
         shapes=own,
@@ -108,15 +111,15 @@ def _record(
         weight *= random.uniform(0.1, 1, len(visible))
     low = np.array([cell * ROOM[0], 0, 0])
     doors = [c for c in (cell - 1, cell + 1) if 0 <= c < cells]
-    rows = [[[t, 1.0] for c, t in shapes if c == other] for other in visible]
+    rows = [sorted({t for c, t in shapes if c == other and t >= 0}) for other in visible]
     return {
         "visible": visible,
         "ach": (weight / weight.sum()).tolist(),
         "floor": 1e-4,
         "adjacent": doors,
         "leaves": [leaf(low, low + ROOM)],
-        "textures": [[t for t, _ in row] for row in rows],
-        "textureShares": rows,
+        "textures": rows,
+        "textureShares": [[[None, 1.0], *([t, 1.0] for t in row)] for row in rows],
         "need": [[t, 0, *[0.5 / len(textures)] * len(x.groups)] for t, x in enumerate(textures)],
         "portals": [
             {"neighbour": c, "polygon": _door(low[0] + (ROOM[0] if c > cell else 0))} for c in doors

@@ -20,8 +20,7 @@ def geometry_by_coverage(client: EngineClient) -> Floats:
     view it covers on average."""
     stock = client.world.catalogue
     known = client.known()
-    low, high = stock.boxes
-    ahead = client.frustum.meets_boxes(low[known], high[known])
+    ahead = client.frustum.meets_boxes(stock.low[known], stock.high[known])
     share = np.zeros(stock.cell_count)
     share[known] = np.where(ahead, 1.0, BEHIND) * client.coverage()
     return NOTHING * np.maximum(share, _beyond(client))
@@ -47,12 +46,13 @@ def _beyond(client: EngineClient) -> Floats:
 
 
 def by_coverage(client: EngineClient) -> Floats:
-    """(T, K) shares by average coverage: that of a cell is split equally among its shapes."""
+    """(T, K) shares by average coverage: that of a cell is split equally among its textures, as the
+    record of the cell that the client is in names them."""
     stock = client.world.catalogue
     share = np.zeros(stock.texture_count)
-    for cell, covers in zip(client.known().tolist(), client.coverage().tolist(), strict=True):
-        own = stock.shapes.texture[stock.first_shape[cell] : stock.first_shape[cell + 1]]
-        np.add.at(share, own[own >= 0], covers / max(len(own), 1))
+    own = stock.records[client.cell]["textures"]
+    for covers, textures in zip(client.coverage().tolist(), own, strict=True):
+        share[textures] += covers / max(len(textures), 1)
     return every_level(client, share)
 
 
