@@ -41,7 +41,7 @@ def db(tmp_path_factory) -> Path:
     random = np.random.default_rng(0)
     for image in sorted((folder / "model").glob("*.png")):
         Image.fromarray(random.integers(0, 256, (64, 64, 3), np.uint8)).save(image)
-    options = AchOptions(preset="fast", backend="embree"), EmitOptions(need=64)
+    options = AchOptions(preset="fast", backend="embree"), EmitOptions()
     build_scene(folder / "model" / TWO_ROOMS.name, folder / "rooms.db", *options, workers=1)
     return folder / "rooms.db"
 

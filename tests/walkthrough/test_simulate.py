@@ -189,7 +189,8 @@ def test_the_paper_counts_three_bytes(ptm: Ptm, two_rooms: Path, walk_file: Path
 @pytest.mark.parametrize("policy", ALL, ids=[policy.name for policy in ALL])
 def test_without_limits_all_ends_well(world: World, policy: Declared) -> None:
     stays = world.standing(20)
-    run = simulate(stays, policy, Conditions(None), stays.catalogue.whole)
+    # The paper's client shares memory out by coverage: it takes more than all textures.
+    run = simulate(stays, policy, Conditions(None), 100 * stays.catalogue.whole)
     assert run.error[0] > 1
     assert run.error[-1] == 0
     assert run.missing[-1] == 0
