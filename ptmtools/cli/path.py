@@ -48,6 +48,11 @@ def path(voice: Voice, db: str, output: str, force: bool, as_json: bool, **value
         f"{output}: {len(made.visited):,} of {count(made.rooms, 'room')}, "
         f"{made.walk.length:.0f} m in {made.walk.duration:.0f} s, {count(made.stops, 'stop')}"
     )
+    left = made.rooms - len(made.visited) - len(made.unreachable)
+    if left and options.duration is not None:
+        voice.say(f"{count(left, 'room')} more with a longer --duration")
+    if not made.walk.length:
+        voice.say("there is one place to stand and nowhere to go")
     if made.unreachable:
         named = made.unreachable if voice.verbose else made.unreachable[:SHOWN]
         more = ", …; -v names all" if len(named) < len(made.unreachable) else ""

@@ -47,9 +47,7 @@ DURATION = 150.0
     "seeds",
     type=click.IntRange(0),
     multiple=True,
-    default=(PathOptions.seed,),
-    show_default=True,
-    help="Of the walk that is made without --walk. May be given several times.",
+    help="Of the walk that is made without --walk; 1 by default. May be given several times.",
 )
 @options_of(SimulateOptions)
 @click.option(
@@ -123,9 +121,13 @@ def simulate(
     or made as `ptm path` makes them. DB is not changed.
     """
     options = take(SimulateOptions, values)
-    for file in (csv_file, plot_file, strip_file):
-        if file:
-            writable(file, force)
+    if walk_files and seeds:
+        raise click.UsageError("--seed is of the walk that is made without --walk")
+    files = [file for file in (csv_file, plot_file, strip_file) if file]
+    for file in files:
+        writable(file, force)
+    if len({Path(file).resolve() for file in files}) < len(files):
+        raise click.UsageError("one file is named for two pictures or tables")
     frames_to = Path(frames_folder) if frames_folder else None
     if frames_to:
         _fillable(frames_to, force)
@@ -134,7 +136,7 @@ def simulate(
     if flip:
         require_flip()
     trace = read_trace(trace_file) if trace_file else None
-    walks = {file: read_walk(file) for file in walk_files} or _made(db, seeds)
+    walks = {file: read_walk(file) for file in walk_files} or _made(db, seeds or (PathOptions.seed,))
     served = read_served(db)
     require_hints(served, options.policies)
     with voice.progress() as progress:

@@ -145,9 +145,10 @@ def _far_face(eye: Floats, ray: Floats, low: Floats, high: Floats) -> float:
 
 
 @settings(max_examples=30)
-@given(SEEDS)
-def test_the_picture_of_a_frame(seed: int) -> None:
-    """Row by row: what is resident is wrong by its column's error, what is missing by all of it."""
+@given(SEEDS, st.booleans())
+def test_the_picture_of_a_frame(seed: int, colored: bool) -> None:
+    """Row by row: what is resident is wrong by its column's error, what is missing by all of it, or
+    by all but its mean colour, if that is known."""
     world = any_world(seed, frames=4)
     random = np.random.default_rng(seed)
     stock, views = world.catalogue, world.views
@@ -158,7 +159,7 @@ def test_the_picture_of_a_frame(seed: int) -> None:
         shown, drawn = np.zeros(stock.ends.shape, np.bool_), np.zeros(stock.cell_count, np.bool_)
         found = picture(
             rows.start, rows.stop, views.cell, views.texture, views.error, views.square,
-            views.need, there, column, True, shown, drawn,
+            views.need, there, column, colored, shown, drawn,
         )  # fmt: skip
         sums, levels, seen = np.zeros(2), np.zeros(2), np.zeros_like(shown)
         for r in range(rows.start, rows.stop):
@@ -166,7 +167,7 @@ def test_the_picture_of_a_frame(seed: int) -> None:
             if known and t < 0:
                 continue
             held = int(column[t]) if known else 0
-            at = held + 1 if known else 0
+            at = held + 1 if known and (held or colored) else 0
             sums += [float(views.error[r, at]), float(views.square[r, at])]
             if t >= 0:
                 levels += [float(views.need[r, held:].sum()), float(views.need[r].sum())]

@@ -34,6 +34,15 @@ def test_a_walk(db: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert files_below(db) == before
 
 
+def test_a_walk_that_is_too_short_for_all_rooms(
+    db: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["path", str(db), "-o", str(tmp_path / "walk.json"), "--duration", "1"]) == 0
+    said = capsys.readouterr().out
+    assert "1 of 2 rooms" in said
+    assert "1 room more with a longer --duration\n" in said
+
+
 def test_options_and_json(db: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "walk.json"
     asked = ["--seed", "3", "--duration", "12", "--rate", "20", "--speed", "1", "--json"]

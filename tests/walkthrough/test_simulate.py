@@ -119,6 +119,8 @@ def test_the_same_twice_is_run_once(world: World) -> None:
         (["--walk", "nowhere.json"], "PTM-I800"),
         (["--trace", "nowhere.json"], "PTM-I099"),
         (["--csv", "nowhere/frames.csv"], "PTM-O002"),
+        (["--walk", "walk.json", "--seed", "2"], "PTM-U001"),
+        (["--csv", "both", "--plot", "./both"], "PTM-U001"),
     ],
 )
 def test_what_is_wrong_is_said(ptm: Ptm, two_rooms: Path, words: list[str], code: str) -> None:
