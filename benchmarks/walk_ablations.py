@@ -2,9 +2,9 @@
 
     python benchmarks/walk_ablations.py DB… [--walks 3] [--seconds 150]
 
-The policy `best` walks through each database, built with `--need 64`, and then without one thing
-at a time, over links of 56 kbit/s, 512 kbit/s and 4 Mbit/s with texture memory of a tenth of all
-textures. Printed are what each hint takes in the index and the records, gzipped, and the mean
+The policy `best` walks through each database, built with `--first-look 64`, and then without one
+thing at a time, over links of 56 kbit/s, 512 kbit/s and 4 Mbit/s with texture memory of a tenth of
+all textures. Printed are what each hint takes in the index and the records, gzipped, and the mean
 errors of the picture, over all walks, each beside that of `best`. Below, the policy `ach` with
 coverage hints from fewer and from more sample points, beside those of the database, and the
 processor seconds that these take (`benchmarks/need.py` has those of `need`).
@@ -147,6 +147,13 @@ def plain_geometry(world: World) -> World:
     return replace(world, catalogue=replace(world.catalogue, geometry_bytes=sizes))
 
 
+def nearly_free(world: World) -> World:
+    """Records and geometry of a byte each, which come after the latency."""
+    stock = world.catalogue
+    geometry, records = np.ones_like(stock.geometry_bytes), np.ones_like(stock.record_bytes)
+    return replace(world, catalogue=replace(stock, geometry_bytes=geometry, record_bytes=records))
+
+
 def squared(world: World) -> World:
     """Root mean squares of the levels' differences in place of their means."""
     pyramids, stock = world.pyramids, world.catalogue
@@ -186,6 +193,7 @@ VARIANTS = (
     Variant("with a range of `firstLook` in the first cell", FirstLook),
     Variant("with all of `firstLook` in the first cell", WholeFirstLook),
     Variant("geometry not compressed", engine(BEST), plain_geometry),
+    Variant("records and geometry of a byte each", engine(BEST), nearly_free),
 )  # fmt: skip
 
 

@@ -136,7 +136,9 @@ def simulate(
     if flip:
         require_flip()
     trace = read_trace(trace_file) if trace_file else None
-    walks = {file: read_walk(file) for file in walk_files} or _made(db, seeds or (PathOptions.seed,))
+    walks = {file: read_walk(file) for file in walk_files} or _made(
+        db, seeds or (PathOptions.seed,)
+    )
     served = read_served(db)
     require_hints(served, options.policies)
     with voice.progress() as progress:
