@@ -136,9 +136,7 @@ def simulate(
     if flip:
         require_flip()
     trace = read_trace(trace_file) if trace_file else None
-    walks = {file: read_walk(file) for file in walk_files} or _made(
-        db, seeds or (PathOptions.seed,)
-    )
+    walks = {file: read_walk(file) for file in walk_files} or _made(db, seeds)
     served = read_served(db)
     require_hints(served, options.policies)
     with voice.progress() as progress:
@@ -194,5 +192,5 @@ def _made(db: str, seeds: tuple[int, ...]) -> dict[str, Walk]:
     artifacts = Artifacts(open_database(db))
     return {
         f"seed {seed}": path_through(artifacts, PathOptions(seed=seed, duration=DURATION)).walk
-        for seed in dict.fromkeys(seeds)
+        for seed in dict.fromkeys(seeds or (PathOptions.seed,))
     }
