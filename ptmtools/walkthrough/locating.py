@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from ptmtools.arrays import Floats, Ints
-from ptmtools.walkthrough.served import Document
 
 #: Metres that an eye may be in front of a plane: leaves that touch then overlap (docs/hints.md).
 SLACK = 1e-3
@@ -16,7 +16,7 @@ SLACK = 1e-3
 class Locator:
     """The leaves of all cells."""
 
-    def __init__(self, records: Sequence[Document]) -> None:
+    def __init__(self, records: Sequence[Mapping[str, Any]]) -> None:
         self._planes = [[_planes(leaf) for leaf in record["leaves"]] for record in records]
         points = [np.concatenate([leaf["points"] for leaf in r["leaves"]]) for r in records]
         self._low = np.array([p.min(axis=0) for p in points]) - SLACK
@@ -34,14 +34,17 @@ class Locator:
             found[f] = cell
         return found
 
+    def outside(self, cell: int, point: Floats) -> Floats:
+        """(n,) metres that (n, 3) points are in front of the plane that each is farthest in front
+        of, in the leaf of a cell in which that is least: 0 or less inside."""
+        leaves = [(point @ leaf[:, :3].T + leaf[:, 3]).max(axis=1) for leaf in self._planes[cell]]
+        return np.asarray(np.min(leaves, axis=0))
+
     def _holds(self, cell: int, point: Floats) -> bool:
-        return any(
-            bool((planes[:, :3] @ point + planes[:, 3] <= SLACK).all())
-            for planes in self._planes[cell]
-        )
+        return bool(self.outside(cell, point[None])[0] <= SLACK)
 
 
-def _planes(leaf: Document) -> Floats:
+def _planes(leaf: Mapping[str, Any]) -> Floats:
     """(n, 4) outward unit normals and offsets of a leaf's faces."""
     point = np.array(leaf["points"], dtype=np.float64)
     rows = []

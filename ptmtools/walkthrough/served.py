@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools import schemas
-from ptmtools.arrays import Bools, Floats
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.database.fault import FileError
 from ptmtools.database.gltf.material import WRAPS
 from ptmtools.database.gltf.reader import ReadGlb, ReadPrimitive, read_glb
@@ -26,6 +26,8 @@ from ptmtools.database.names import HINTS
 from ptmtools.errors import DatabaseError
 from ptmtools.files import open_regular
 from ptmtools.store.layout import SERVED
+from ptmtools.walkthrough.locating import Locator
+from ptmtools.walkthrough.sides import sides
 
 #: The form of the geometry that clients of the hints fetch.
 FORM = "gltf"
@@ -47,6 +49,8 @@ class Surfaces:
     color: (n, 3) what multiplies the texel, encoded as sRGB, 0 to 1.
     two_sided, glass: (n,) seen from both sides; without texture and not opaque.
     clamped: (n, 2) whether u and v stop at the edge of the texture instead of repeating it.
+    seen: (n, 2) of each the one that is seen in its place from where its normal points to, and from
+        behind it, see `sides`.
     """
 
     corner: Floats
@@ -58,6 +62,7 @@ class Surfaces:
     two_sided: Bools
     glass: Bools
     clamped: Bools
+    seen: Ints
 
 
 @dataclass(frozen=True)
@@ -148,7 +153,7 @@ def read_served(database: str | os.PathLike[str]) -> Served:
         statistics_bytes,
         np.array([size for _, size in found], dtype=np.int64),
         np.array(sizes, dtype=np.int64),
-        _surfaces(geometry),
+        _surfaces(geometry, Locator(records)),
     )
 
 
@@ -226,7 +231,7 @@ def _glb(file: Path, data: bytes, cell: int, textures: int) -> ReadGlb:
     return read
 
 
-def _surfaces(geometry: list[ReadGlb]) -> Surfaces:
+def _surfaces(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
     shapes = [(glb.cell, p) for glb in geometry for p in glb.primitives]
     count = [len(p.triangle) for _, p in shapes]
 
@@ -242,16 +247,20 @@ def _surfaces(geometry: list[ReadGlb]) -> Surfaces:
         -1 if p.uv is None or p.material.texture is None else p.material.texture for _, p in shapes
     ]
     clamp = WRAPS["clamp"]
+    corner = joined([p.point.astype(np.float64)[p.triangle] for _, p in shapes], 3)
+    cell = spread([cell for cell, _ in shapes], np.int32)
+    two_sided = spread([m.two_sided for m in looks], np.bool_)
     return Surfaces(
-        corner=joined([p.point.astype(np.float64)[p.triangle] for _, p in shapes], 3),
+        corner=corner,
         uv=joined([_texture_points(p) for _, p in shapes], 2),
-        cell=spread([cell for cell, _ in shapes], np.int32),
+        cell=cell,
         shape=np.repeat(np.arange(len(shapes), dtype=np.int32), count),
         texture=spread(texture, np.int32),
         color=spread([[_encoded(c) for c in m.factor[:3]] for m in looks], np.float64, 3),
-        two_sided=spread([m.two_sided for m in looks], np.bool_),
+        two_sided=two_sided,
         glass=spread([m.blends and t < 0 for m, t in zip(looks, texture, strict=True)], np.bool_),
         clamped=spread([[w == clamp for w in m.wrap] for m in looks], np.bool_, 2),
+        seen=sides(corner, cell, two_sided, locator),
     )
 
 

@@ -87,6 +87,7 @@ def room(random: np.random.Generator) -> Room:
             two_sided=random.random(count) < 0.7,
             glass=(random.random(count) < 0.3) & (texture < 0),
             clamped=random.random((count, 2)) < 0.5,
+            seen=np.repeat(np.arange(count)[:, None], 2, axis=1),
         ),
         levels,
     )

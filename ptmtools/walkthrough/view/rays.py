@@ -86,7 +86,7 @@ class Caster:
         self._which = np.flatnonzero(~surfaces.glass)
         self._corner = corner
         self._normal = normals(corner)
-        self._one_sided = ~surfaces.two_sided
+        self._one_sided, self._seen = ~surfaces.two_sided, surfaces.seen
         low, high = corner.min(axis=(0, 1), initial=0), corner.max(axis=(0, 1), initial=0)
         self._middle = (low + high) / 2
         #: Metres by which a ray goes on behind what it passed through.
@@ -119,7 +119,8 @@ class Caster:
             waiting, triangle = waiting[met], self._which[hit[met]]
             turn = np.einsum("ij,ij->i", self._normal[triangle], along[waiting])
             passed = self._one_sided[triangle] & (turn > 0)
-            found[waiting[~passed]] = triangle[~passed]
+            behind = turn[~passed] > 0
+            found[waiting[~passed]] = self._seen[triangle[~passed], behind.astype(np.int64)]
             waiting, triangle, turn = waiting[passed], triangle[passed], turn[passed]
             if not len(waiting):
                 break
