@@ -7,19 +7,12 @@
 import { createHash } from "node:crypto";
 import { readFileSync } from "node:fs";
 
+import { makeEngine } from "./engines.mjs";
 import { readHeader } from "../../web/ptm/src/container.js";
 import { LevelDecoder } from "../../web/ptm/src/level-decoder.js";
 
 const [, , path, engineName = "js", format = "native", memory] = process.argv;
-const folder = new URL("../../web/ptm/", import.meta.url);
-
-async function makeEngine() {
-  if (engineName === "js") return (await import("../../web/ptm/src/js/engine.js")).plainEngine;
-  const { wasmEngine } = await import("../../web/ptm/src/wasm-engine.js");
-  return wasmEngine(await WebAssembly.compile(readFileSync(new URL("decoder.wasm", folder))));
-}
-
-const engine = await makeEngine();
+const engine = await makeEngine(engineName);
 const cases = readFileSync(path);
 for (let at = 0; at < cases.length; ) {
   const length = cases.readUInt32LE(at);
