@@ -30,7 +30,9 @@ static const i16 activity_weights[3][3][7] = {
     {{8, 74, 31, 128, 0, 0, 0}, {3, 88, 23, 131, 38, 0, 0}, {1, 24, 20, 61, 25, 39, 55}},
 };
 static const i16 class_bounds[CLASSES - 1] = {1, 3, 7, 12, 20, 32, 50, 76, 115, 170, 250, 370, 560};
-static u8 class_of[ACTIVITY_TOP + 1];
+// Of an activity, its class times three: so many KB a table is behind the first.
+static u8 kilobytes[ACTIVITY_TOP + 1];
+_Static_assert(sizeof(Table) == 3 << 10, "three KB");
 
 typedef struct {
   i32 component, references;
@@ -45,8 +47,8 @@ typedef struct {
 } Plane;
 
 static Plane planes[MOST_PLANES];
-static i16 *zeros, *prediction;
-static u16 *activity, *symbols;
+static i16 *prediction;
+static u16 *activity, *symbols, *rest;  // rest: of what is above the components
 static v128_t stray;
 
 static inline v128_t load(const i16 *from) { return wasm_v128_load(from); }
@@ -145,6 +147,10 @@ static void predict_any(Plane *plane, i32 y, i32 k) {
   }
 }
 
+static inline const Table *table_of(const Table *first, u32 a) {
+  return (const Table *)((const u8 *)first + ((u32)kilobytes[a] << 10));
+}
+
 // The symbols of a row, whose tables are known: the four states work side by side.
 static void decode_row(const Table *first) {
   const i32 n = tile.bw;
@@ -154,10 +160,10 @@ static void decode_row(const Table *first) {
   const u8 *word = stream.word;
   i32 x = 0;
   for (; x + 4 <= n; x += 4) {
-    symbols[x] = (u16)step(&a, first + class_of[activity[x]], &word);
-    symbols[x + 1] = (u16)step(&b, first + class_of[activity[x + 1]], &word);
-    symbols[x + 2] = (u16)step(&c, first + class_of[activity[x + 2]], &word);
-    symbols[x + 3] = (u16)step(&d, first + class_of[activity[x + 3]], &word);
+    symbols[x] = (u16)step(&a, table_of(first, activity[x]), &word);
+    symbols[x + 1] = (u16)step(&b, table_of(first, activity[x + 1]), &word);
+    symbols[x + 2] = (u16)step(&c, table_of(first, activity[x + 2]), &word);
+    symbols[x + 3] = (u16)step(&d, table_of(first, activity[x + 3]), &word);
   }
   stream.state[lane & 3] = a;
   stream.state[(lane + 1) & 3] = b;
@@ -165,7 +171,10 @@ static void decode_row(const Table *first) {
   stream.state[(lane + 3) & 3] = d;
   stream.word = word;
   stream.count += (u32)x;
-  for (; x < n; x++) symbols[x] = (u16)plain_symbol((u32)(first - tables) + class_of[activity[x]]);
+  for (; x < n; x++) {
+    u32 *state = &stream.state[stream.count++ & 3];
+    symbols[x] = (u16)step(state, table_of(first, activity[x]), &stream.word);
+  }
   // Behind the row there are no residuals.
   wasm_v128_store(symbols + n, wasm_i16x8_splat(0));
 }
@@ -307,7 +316,7 @@ static i16 *take_row(void) {
 }
 
 static bool take_rows(void) {
-  bool all = (zeros = take_row()) && (prediction = take_row());
+  bool all = (rest = (u16 *)take_row()) && (prediction = take_row());
   all = all && (activity = (u16 *)take_row()) && (symbols = (u16 *)take_row());
   for (i32 c = 0; c < tile.components; c++) {
     Plane *plane = &planes[c];
@@ -365,7 +374,7 @@ static void decode_edge(void) {
   for (i32 i = 0; i < count; i++) {
     i32 place = edge_place(i);
     Around a = around_edge(place);
-    u32 texel = 0;
+    u32 texel = opaque();
     for (u32 at = 0; at < 8 * (u32)tile.components; at += 8) {
       i32 guess = median(a.w >> at & 255, a.n >> at & 255, a.nw >> at & 255);
       texel |= ((u32)(guess + signed_of(plain_symbol(EDGE_TABLE))) & 255) << at;
@@ -403,8 +412,8 @@ static bool decode_plane(Plane *plane, i32 y) {
 }
 
 int decode_haar(void) {
-  for (i32 a = 0; a <= ACTIVITY_TOP && !class_of[ACTIVITY_TOP]; a++) {
-    for (u32 i = 0; i < CLASSES - 1; i++) class_of[a] += class_bounds[i] <= a;
+  for (i32 a = 0; a <= ACTIVITY_TOP && !kilobytes[ACTIVITY_TOP]; a++) {
+    for (u32 i = 0; i < CLASSES - 1; i++) kilobytes[a] += class_bounds[i] <= a ? 3 : 0;
   }
   const u8 *data = tile.data;
   if (!take_rows()) return NO_MEMORY;
@@ -412,7 +421,8 @@ int decode_haar(void) {
   if (!begin_stream(data)) return DAMAGED;
   stray = wasm_i16x8_splat(0);
   const u16 *upper[MOST_PLANES], *lower[MOST_PLANES];
-  for (i32 c = 0; c < MOST_PLANES; c++) upper[c] = lower[c] = (const u16 *)zeros;
+  __builtin_memset(rest, opaque() ? 255 : 0, sizeof(i16) * (u32)tile.bw);
+  for (i32 c = 0; c < MOST_PLANES; c++) upper[c] = lower[c] = rest;
   for (i32 c = 0; c < tile.components; c++) {
     upper[planes[c].component] = planes[c].upper;
     lower[planes[c].component] = planes[c].lower;

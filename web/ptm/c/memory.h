@@ -26,10 +26,10 @@ enum { OK, DAMAGED, NO_MEMORY };
 // Texels that may be read and written behind the last one of a row, eight blocks at a time.
 enum { BLOCKS = 8 };
 
-// One tile: component c of a texel in bits 8 c … 8 c + 7.
+// One tile: component c of a texel in bits 8 c … 8 c + 7. Above three components is alpha, 255.
 typedef struct {
   const u8 *data, *end;  // its bytes, behind those that name its coder
-  const u32 *below;      // (height >> 1, width >> 1)
+  u32 *below;            // (height >> 1, width >> 1)
   u32 *texels;           // (height, width), to be filled
   i32 width, height, components;
   i32 bw, bh;  // blocks in a row and a column
@@ -41,7 +41,14 @@ extern Tile tile;
 // there is no more memory.
 void *take(u32 size);
 
-static inline u32 word16(const u8 *at) { return (u32)at[0] | (u32)at[1] << 8; }
+static inline u32 word16(const u8 *at) {
+  u16 word;
+  __builtin_memcpy(&word, at, sizeof word);
+  return word;
+}
+
+// What stands above the components of a texel.
+static inline u32 opaque(void) { return tile.components == 3 ? 0xff000000 : 0; }
 
 static inline i32 at_least(i32 a, i32 low) { return a < low ? low : a; }
 static inline i32 at_most(i32 a, i32 high) { return a > high ? high : a; }

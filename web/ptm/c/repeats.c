@@ -314,6 +314,8 @@ int decode_repeats(void) {
   u32 bits = blocks ? 32 - (u32)__builtin_clz(blocks) : 0;
   bits = (u32)at_most(at_least((i32)bits, 6), MOST_BITS);
   shift_of_slots = 32 - bits;
+  const u32 mask = ~opaque();
+  for (u32 i = 0; i < blocks; i++) tile.below[i] &= mask;
   for (u32 i = 0; i < SORTS; i++) __builtin_memset(slots[i], 0, sizeof(u32) << bits);
   for (i32 y = 0; y < tile.bh; y++) {
     u32 before = 0;
@@ -343,5 +345,6 @@ int decode_repeats(void) {
     }
   }
   decode_edge();
+  for (i32 i = 0; i < tile.width * tile.height; i++) tile.texels[i] |= ~mask;
   return end_stream() ? OK : DAMAGED;
 }

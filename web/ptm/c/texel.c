@@ -164,7 +164,8 @@ int decode_texels(i32 error) {
           plane->own[k] = value - guess;
           row[2] = (u8)magnitude(value - guess);
           u32 *texel = tile.texels + py * tile.width + px;
-          *texel = (*texel & ~((u32)255 << at)) | (u32)value << at;
+          if (c == 0) *texel = opaque();
+          *texel |= (u32)value << at;
         }
       }
     }

@@ -1,8 +1,13 @@
-// Texels as numbers of 32 bits, component c in bits 8 c to 8 c + 7 and zeros above: how they come
-// from stored bytes, and what they become for those who asked for them.
+// Texels as numbers of 32 bits, component c in bits 8 c to 8 c + 7. Above three components is the
+// alpha of what is opaque, so that most of what is decoded is ready for upload as it is; above fewer
+// are zeros. How they come from stored bytes, and what they become for those who asked for them.
 
 import { damaged } from "./errors.js";
 import { Reader } from "./reader.js";
+
+/** What stands above three components. */
+export const OPAQUE = 0xff << 24;
+const GREY = 0x010101;
 
 /**
  * @typedef {object} Shape
@@ -21,7 +26,7 @@ import { Reader } from "./reader.js";
  */
 function pack(bytes, components, out, at, step) {
   for (let i = 0; i < bytes.length; at += step) {
-    let texel = bytes[i++];
+    let texel = (components === 3 ? OPAQUE : 0) | bytes[i++];
     for (let shift = 8; shift < 8 * components; shift += 8) texel |= bytes[i++] << shift;
     out[at] = texel;
   }
@@ -65,7 +70,7 @@ export function rawTexels(data, below, { width, height, components }) {
   for (let block = 0, pair = 0; block < below.length; block++) {
     const at = 2 * Math.floor(block / bw) * width + 2 * (block % bw);
     const [p, q, r] = [out[at], out[at + 1], out[at + width]];
-    let s = 0;
+    let s = components === 3 ? OPAQUE : 0;
     for (let shift = 0; shift < 8 * components; shift += 8, pair++) {
       const remainder = (pairs[pair >> 2] >> (2 * (pair & 3))) & 3;
       const others = (p >>> shift) + (q >>> shift) + (r >>> shift);
@@ -82,14 +87,13 @@ export function rawTexels(data, below, { width, height, components }) {
  * @param {number} components
  */
 export function toRgba(texels, components) {
-  const out = texels.slice();
-  if (components === 3) for (let i = 0; i < out.length; i++) out[i] |= 0xff000000;
-  if (components < 3) {
-    const opaque = components === 1 ? 255 : 0;
-    for (let i = 0; i < out.length; i++) {
-      const texel = out[i];
-      out[i] = ((texel & 255) * 0x10101) | (((texel >> 8) | opaque) << 24);
-    }
+  if (components > 2) return new Uint8Array(texels.slice().buffer);
+  // Signed numbers: unsigned ones of 32 bits are no small integers to an engine.
+  const from = new Int32Array(texels.buffer, texels.byteOffset, texels.length);
+  const out = new Int32Array(texels.length);
+  for (let i = 0; i < out.length; i++) {
+    const alpha = components === 2 ? (from[i] & 0xff00) << 16 : OPAQUE;
+    out[i] = Math.imul(from[i] & 255, GREY) | alpha;
   }
   return new Uint8Array(out.buffer);
 }

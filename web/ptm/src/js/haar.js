@@ -4,6 +4,7 @@
 import { damaged } from "../errors.js";
 import { geometricTables } from "../families.js";
 import { Reader } from "../reader.js";
+import { OPAQUE } from "../texels.js";
 import { edgePlaces, median, planeOrder, references } from "./planes.js";
 import { ESCAPE, Symbols, readTables } from "./rans.js";
 
@@ -82,7 +83,7 @@ export function decodeHaar(data, below, shape) {
   const tables = readTables(reader, 2 * CLASSES + 1, geometricTables());
   const edge = edgePlaces(width, height);
   const symbols = new Symbols(reader, tables, Math.max(bw, edge.length * components));
-  const out = new Uint32Array(width * height);
+  const out = new Uint32Array(width * height).fill(components === 3 ? OPAQUE : 0);
   const none = new Int32Array(bw + 2);
   const prediction = new Int32Array(bw);
   const table = new Uint8Array(bw);
@@ -434,7 +435,7 @@ function decodeEdge(symbols, edge, width, components, out) {
     const w = left ? out[at - 1] : up ? out[at - width] : 0;
     const n = up ? out[at - width] : w;
     const nw = left && up ? out[at - width - 1] : n;
-    let texel = 0;
+    let texel = components === 3 ? OPAQUE : 0;
     for (let shift = 0; shift < 8 * components; shift += 8) {
       const guess = median((w >>> shift) & 255, (n >>> shift) & 255, (nw >>> shift) & 255);
       const z = symbols.plain(EDGE_TABLE);

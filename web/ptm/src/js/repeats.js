@@ -4,6 +4,7 @@
 import { damaged } from "../errors.js";
 import { geometricTables } from "../families.js";
 import { Reader } from "../reader.js";
+import { OPAQUE } from "../texels.js";
 import { edgePlaces, median, planeOrder, references } from "./planes.js";
 import { Symbols, readTables } from "./rans.js";
 
@@ -91,7 +92,9 @@ class Group {
     this.components = components;
     this.bw = width >> 1;
     this.bh = height >> 1;
-    this.below = new Int32Array(below.buffer, below.byteOffset, below.length);
+    /** Above the components there are zeros here. */
+    this.below = new Int32Array(below);
+    if (components === 3) for (let i = 0; i < below.length; i++) this.below[i] &= ~OPAQUE;
     this.texels = new Int32Array(width * height);
     this.order = planeOrder(components);
     this.shift = Math.min(Math.max(Math.clz32(below.length), 19), 26);
@@ -145,6 +148,7 @@ class Group {
       symbols.check();
     }
     symbols.end();
+    if (this.components === 3) for (let i = 0; i < texels.length; i++) texels[i] |= OPAQUE;
     return new Uint32Array(texels.buffer);
   }
 

@@ -4,6 +4,7 @@
 import { damaged } from "../errors.js";
 import { tokenTables } from "../families.js";
 import { Reader } from "../reader.js";
+import { OPAQUE } from "../texels.js";
 import { planeOrder, references } from "./planes.js";
 import { Symbols, readTables } from "./rans.js";
 import { NEIGHBOURS, TEXEL_WEIGHTS } from "./texel-layout.js";
@@ -56,7 +57,7 @@ export function decodeTexels(data, below, shape, error) {
   const errors = order.map(() => new Int32Array(4 * stride));
   /** Errors of the block; those of one plane more are no reference. */
   const own = Array.from({ length: components + 1 }, () => new Int32Array(4));
-  const out = new Uint32Array(width * height);
+  const out = new Uint32Array(width * height).fill(components === 3 ? OPAQUE : 0);
   for (let y = 0; y < height; y += 2) {
     for (let x = 0; x < width; x += 2) {
       for (let c = 0; c < components; c++) {
