@@ -20,7 +20,7 @@ ZIG = "0.15.2"
 SOURCES = ("decoder.c", "rans.c", "haar.c", "repeats.c", "texel.c")
 FLAGS = (
     *("-target", "wasm32-freestanding", "-mcpu=mvp+simd128+bulk_memory+sign_ext"),
-    *("-std=c17", "-O3", "-flto", "-ffreestanding", "-nostdlib", "-fno-exceptions", "-g0"),
+    *("-std=c17", "-Os", "-ffreestanding", "-nostdlib", "-fno-exceptions", "-g0"),
     *("-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Werror"),
     *("-Wl,--no-entry", "-Wl,--strip-all", "-Wl,-z,stack-size=65536"),
 )

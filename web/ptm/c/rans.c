@@ -82,6 +82,15 @@ bool read_tables(const u8 **data, u32 count, const u16 (*family)[256], u32 kinds
   return !from.broken;
 }
 
+__attribute__((noinline)) u32 plain_symbol(const Table *table) {
+  return step(&stream.state[stream.count++ & 3], table, &stream.word);
+}
+
+__attribute__((noinline)) u32 symbol(u32 table) {
+  u32 z = step(&stream.state[stream.count++ & 3], &tables[table], &stream.word);
+  return __builtin_expect(z == ESCAPE, 0) ? next_escape() : z;
+}
+
 bool begin_stream(const u8 *data) {
   if (tile.end - data < 4) return false;
   u32 escapes = word16(data) | word16(data + 2) << 16;

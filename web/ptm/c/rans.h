@@ -63,15 +63,10 @@ static inline u32 step(u32 *state, const Table *table, const u8 **word) {
 }
 
 // The next symbol, 255 as it is.
-static inline u32 plain_symbol(u32 table) {
-  return step(&stream.state[stream.count++ & 3], &tables[table], &stream.word);
-}
+u32 plain_symbol(const Table *table);
 
-// The next symbol.
-static inline u32 symbol(u32 table) {
-  u32 z = plain_symbol(table);
-  return __builtin_expect(z == ESCAPE, 0) ? next_escape() : z;
-}
+// The next symbol. One copy of it in the module costs no time that can be measured.
+u32 symbol(u32 table);
 
 static inline i32 signed_of(u32 z) { return (i32)(z >> 1) ^ -(i32)(z & 1); }
 
