@@ -7,6 +7,7 @@ come out on any machine.
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -41,7 +42,7 @@ def build(target: Path) -> None:
             [sys.executable, "-m", "ziglang", "cc", *FLAGS, *SOURCES, "-o", str(target.resolve())],
             cwd=HERE / "c",
             check=True,
-            env={"ZIG_GLOBAL_CACHE_DIR": cache, "ZIG_LOCAL_CACHE_DIR": cache, "PATH": "/usr/bin"},
+            env={**os.environ, "ZIG_GLOBAL_CACHE_DIR": cache, "ZIG_LOCAL_CACHE_DIR": cache},
         )
 
 

@@ -35,8 +35,10 @@ import { tileSpan } from "./tiling.js";
  * @property {number} [memory] bytes that decoding may take, `DEFAULT_MEMORY` unless given
  */
 
-/** 256 MiB: enough for 4096² texels and more. */
+/** 256 MiB: enough for 5000² texels in tiles of 512, for 3000² without. */
 export const DEFAULT_MEMORY = 2 ** 28;
+/** More is not taken: texels are counted in 30 bits. */
+const MOST_MEMORY = 2 ** 31;
 
 /** Coders of a group of `fast`. */
 const STORED = 0;
@@ -65,7 +67,10 @@ export function memoryNeeded(header, number) {
 
 /** Decodes the levels of a file one after the other; see `refine`. */
 export class LevelDecoder {
-  /** The texels of the level decoded last. */
+  /**
+   * The texels of the level decoded last.
+   * @type {Uint32Array}
+   */
   #texels = new Uint32Array(0);
 
   /**
@@ -77,7 +82,7 @@ export class LevelDecoder {
     this.header = header;
     this.engine = engine;
     this.format = format;
-    this.memory = memory;
+    this.memory = Math.min(memory, MOST_MEMORY);
     /** The level decoded last, -1 at first. */
     this.level = -1;
   }

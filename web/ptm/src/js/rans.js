@@ -69,9 +69,8 @@ export function readTables(reader, count, family) {
   const sent = new Uint16Array(256);
   for (t = 0; t < count; t++) {
     if (!kinds[t]) continue;
-    let f = sent;
     if (kinds[t] === ESCAPE) readSent(numbers, sent);
-    else f = family.subarray(256 * (kinds[t] - 1), 256 * kinds[t]);
+    const f = kinds[t] === ESCAPE ? sent : family.subarray(256 * (kinds[t] - 1), 256 * kinds[t]);
     for (let z = 0, at = 0; z < 256; z++) {
       if (!f[z]) continue;
       slots.fill(z, SUM * t + at, SUM * t + at + f[z]);

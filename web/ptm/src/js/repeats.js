@@ -119,6 +119,7 @@ class Group {
       let before = 0;
       let ended = false;
       for (let x = 0; x < bw; ) {
+        /** @type {number} */
         const run = ended ? 0 : this.run(y, x);
         let flat = 0;
         if (run) {
