@@ -10,6 +10,7 @@ import struct
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from ptmtools.errors import PtmError
@@ -66,6 +67,7 @@ def decode_all(
     return [Decoded(tuple(one["levels"]), one["error"]) for one in told]
 
 
+@cache
 def by_python(file: bytes, limits: Limits | None = None) -> Decoded:
     """What Python's decoder makes of a file: as far as levels are whole."""
     levels = []

@@ -15,8 +15,9 @@ import pytest
 from numpy.typing import NDArray
 
 from ptmtools.texture import EncodeOptions, Limits, decode_levels, encode, read_header
+from ptmtools.texture.container import whole_levels
 from tests.texture.test_repeats import ZOO
-from tests.web.node import by_python, decode_all, missing, run
+from tests.web.node import Decoded, by_python, decode_all, missing, run
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
@@ -127,11 +128,14 @@ def test_ready_for_upload(tmp_path: Path, engine: str) -> None:
 def test_cut_at_every_byte(tmp_path: Path, engine: str, name: str) -> None:
     """Whatever is whole comes out, and nothing else."""
     file = (VECTORS / f"{name}.ptm").read_bytes()
+    header, exact = read_header(file), by_python(file)
     cuts = [file[:size] for size in range(len(file))]
     for cut, found in zip(cuts, decode_all(tmp_path, cuts, engine), strict=True):
-        wanted = by_python(cut)
-        # An empty file is neither cut nor damaged.
-        assert found == wanted, len(cut)
+        if len(cut) < header.description[0]:
+            assert found == by_python(cut)
+        else:
+            whole = whole_levels(header, len(cut))
+            assert found == Decoded(exact.levels[:whole], None), len(cut)
 
 
 @pytest.mark.parametrize(
@@ -172,8 +176,8 @@ def test_flips_behind_right_checksums(tmp_path: Path, engine: str) -> None:
 def test_the_fuzzers_files(tmp_path: Path, engine: str) -> None:
     """What Python accepts comes out the same; what it refuses is refused, after the same levels."""
     target = Ptm(tmp_path, tmp_path)
-    rng = random.Random(f"browser {engine}")
-    files = [target.make(rng).data for _ in range(3000)]
+    rng = random.Random("browser")
+    files = [target.make(rng).data for _ in range(2000)]
     decoded = decode_all(tmp_path, files, engine, "native", str(LIMITS.decoded_bytes))
     accepted = refused = 0
     for file, found in zip(files, decoded, strict=True):
