@@ -1,10 +1,10 @@
-"""How fast the browser's decoder is, beside Python's: ``python benchmarks/web_decoder.py [NAME…]``
+"""How fast the browser's decoder is, beside Python's: `python benchmarks/web_decoder.py [NAME…]`
 
-Names are those of the sets of `benchmarks/codec/images.py`. All levels of every image are decoded on
-one thread: by Python and numba, and in node by plain JavaScript and by WebAssembly, in turn, several
-times over; of each the least time counts. MB are those of the finest level. ``--browser`` does the
-same in a worker of headless Chromium, beside `createImageBitmap` of the same images as PNG (which
-may decode on a thread of its own). Last come the sizes of what a page downloads.
+Names are those of the sets of `benchmarks/codec/images.py`. All levels of every image are decoded
+on one thread: by Python and numba, and in node by plain JavaScript and by WebAssembly, in turn,
+several times over; of each the least time counts. MB are those of the finest level. ``--browser``
+does the same in a worker of headless Chromium, beside `createImageBitmap` of the same images as PNG
+(which may decode on a thread of its own). Last come the sizes of what a page downloads.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ PACKAGE = ROOT / "web" / "ptm"
 #: What a page downloads where there is WebAssembly with SIMD; a worker has modules of its own.
 GLUE = sorted((PACKAGE / "src").glob("*.js"))
 ENGINES = ("js", "wasm")
+#: In one process, so that what compiles while it runs has done so.
+ROUNDS = 10
 
 
 @dataclass
@@ -92,9 +94,8 @@ def in_browser(timed: list[Timed], folder: Path, rounds: int) -> None:
 
     files = [file.name for one in timed for file in one.files]
     code = (ROOT / "benchmarks" / "web_decoder_page.js").read_text()
-    page = web.REPORTING + (
-        f'<script type="module">const files = {json.dumps(files)}, rounds = {rounds};\n{code}</script>'
-    )
+    given = f"const files = {json.dumps(files)}, rounds = {rounds};"
+    page = f'{web.REPORTING}<script type="module">{given}\n{code}</script>'
     visit = web.visit(page, {"ptm": PACKAGE, "files": folder}, seconds=900)
     if visit.messages:
         sys.exit("; ".join(visit.messages))
@@ -138,9 +139,9 @@ def main() -> None:
             for one in timed:
                 one.note("Python", [by_python(file.read_bytes()) for file in one.files])
                 for engine in ENGINES:
-                    one.note(engine, by_node(engine, one.files, 4))
+                    one.note(engine, by_node(engine, one.files, ROUNDS))
         if given.browser:
-            in_browser(timed, folder, 4 * given.rounds)
+            in_browser(timed, folder, ROUNDS * given.rounds)
     decoders = list(timed[0].least)
     print(f"| MB/s (share of Python's) | {' | '.join(decoders)} |")
     print("|---" * (1 + len(decoders)) + "|")

@@ -237,6 +237,14 @@ def test_memory_stays_within_the_limit(tmp_path: Path, engine: str) -> None:
     assert int(told[2]) < 1 << 24
 
 
+def test_a_large_tile_leaves_nothing_behind(tmp_path: Path, engine: str) -> None:
+    """Of 34 MB: the engine in WebAssembly gives its memory up and begins anew."""
+    large = encode(np.full((2600, 2600, 1), 200, np.uint8), EncodeOptions(tile=0))
+    small = encode(image("photo", 60, 61, 3))
+    found = decode_all(tmp_path, [small, large, small], engine)
+    assert found == [by_python(file) for file in (small, large, small)]
+
+
 def test_a_limit_is_a_limit(tmp_path: Path, engine: str) -> None:
     file = encode(image("photo", 300, 400, 3))
     whole = decode_all(tmp_path, [file], engine)[0]
