@@ -7,7 +7,9 @@ import random
 import struct
 import sys
 import zlib
+from collections import Counter
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +24,8 @@ from tests.web.node import Decoded, by_python, decode_all, missing, run
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.fuzz.textures import LIMITS, Ptm, sealed  # noqa: E402
+from benchmarks.fuzz.mutation import damaged  # noqa: E402
+from benchmarks.fuzz.textures import FIELDS, LIMITS, Ptm, sealed  # noqa: E402
 
 VECTORS = ROOT / "tests" / "texture" / "vectors" / "v2"
 #: Of a profile, kind of sample or version that is not read.
@@ -56,6 +59,7 @@ def image(name: str, height: int, width: int, components: int) -> Bytes:
     return np.ascontiguousarray(np.tile(one, (tall, wide, deep))[:height, :width, :components])
 
 
+@cache
 def synthetic() -> dict[str, bytes]:
     """Files of all shapes, components, tiles and errors, and of every coder."""
     files = {}
@@ -162,7 +166,7 @@ def test_flips_behind_right_checksums(tmp_path: Path, engine: str) -> None:
     for name in ("fast-rgb-ranks", "fast-rgb-palette", "fast-rgb-error-2", "fast-rgb-tiles"):
         file = (VECTORS / f"{name}.ptm").read_bytes()
         begin = read_header(file).levels[0].offset
-        for at in range(begin, len(file), 3):
+        for at in range(begin, len(file), 7):
             flipped = bytearray(file)
             flipped[at] ^= 1 << (at % 8)
             flips.append(sealed(bytes(flipped), file))
@@ -174,25 +178,24 @@ def test_flips_behind_right_checksums(tmp_path: Path, engine: str) -> None:
 
 
 def test_the_fuzzers_files(tmp_path: Path, engine: str) -> None:
-    """What Python accepts comes out the same; what it refuses is refused, after the same levels."""
-    target = Ptm(tmp_path, tmp_path)
-    rng = random.Random("browser")
-    files = [target.make(rng).data for _ in range(2000)]
+    """The same levels as Python's, and the same code of what is refused."""
+    target, rng = Ptm(tmp_path, tmp_path), random.Random("browser")
+    files = [target.make(rng).data for _ in range(1000)]
+    own = [file for file in synthetic().values() if len(file) < 5000]
+    for _ in range(1500):
+        file = rng.choice(own)
+        changed = damaged(rng, file, rng.choice(own), rng.choice(((), (), FIELDS)))
+        files.append(sealed(changed, file) if rng.random() < 0.9 else changed)
     decoded = decode_all(tmp_path, files, engine, "native", str(LIMITS.decoded_bytes))
-    accepted = refused = 0
+    outcomes: Counter[str | None] = Counter()
     for file, found in zip(files, decoded, strict=True):
         wanted = by_python(file, LIMITS)
-        assert found.levels == wanted.levels[: len(found.levels)]
-        if found.error == UNKNOWN:
-            continue
-        if wanted.error is None:
+        # Python looks whether the finest level is within its limit before the coarsest.
+        if found.error != UNKNOWN and "PTM-L103" not in (found.error, wanted.error):
             assert found == wanted
-            accepted += 1
-        else:
-            assert found.error is not None
-            refused += 1
-    assert accepted > 100
-    assert refused > 100
+            outcomes[found.error] += 1
+    assert outcomes[None] > 300
+    assert outcomes["PTM-I112"] > 200
 
 
 def hostile_head(**fields: int) -> bytes:
