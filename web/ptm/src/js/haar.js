@@ -84,7 +84,8 @@ export function decodeHaar(data, below, shape) {
   const edge = edgePlaces(width, height);
   const symbols = new Symbols(reader, tables, Math.max(bw, edge.length * components));
   const out = new Uint32Array(width * height).fill(components === 3 ? OPAQUE : 0);
-  const none = new Int32Array(bw + 2);
+  const nothing = { foretold: new Int32Array(bw), lively: new Int32Array(bw) };
+  const buffers = { foretold: new Int32Array(bw), lively: new Int32Array(bw) };
   const prediction = new Int32Array(bw);
   const table = new Uint8Array(bw);
   const decoded = new Int32Array(bw);
@@ -105,11 +106,10 @@ export function decodeHaar(data, below, shape) {
           const blockRow = k === 2 ? y - 1 : y;
           if (blockRow < 0 || blockRow === bh) continue;
           const side = blockRow & 1;
-          const r1 = plane.others > 0 ? planes[0].residuals[k][side] : none;
-          const r2 = plane.others > 1 ? planes[1].residuals[k][side] : none;
-          if (k === 0) predictV(plane, y, r1, r2, prediction, table);
-          else if (k === 1) predictH(plane, y, r1, r2, prediction, table);
-          else predictG(plane, blockRow, r1, r2, prediction, table);
+          const referred = plane.others ? refer(plane, k, planes, side, buffers) : nothing;
+          if (k === 0) predictV(plane, y, referred, prediction, table);
+          else if (k === 1) predictH(plane, y, referred, prediction, table);
+          else predictG(plane, blockRow, referred, prediction, table);
           symbols.row(table, bw, decoded);
           symbols.check();
           absorb(symbols, decoded, prediction, plane.residuals[k][side], plane.values[k][side]);
@@ -208,15 +208,39 @@ function near(above, x) {
 }
 
 /**
+ * What a row takes from the planes that it refers to: parts of its predictions and activities.
+ * @typedef {{foretold: Int32Array, lively: Int32Array}} Referred
+ */
+
+/**
+ * @param {Plane} plane
+ * @param {number} k
+ * @param {Plane[]} planes
+ * @param {number} side
+ * @param {Referred} out overwritten
+ */
+function refer(plane, k, planes, side, out) {
+  const { foretold, lively } = out;
+  const r1 = planes[0].residuals[k][side];
+  const r2 = planes[1].residuals[k][side];
+  const [w1, w2] = plane.weights[k].slice(5);
+  const [a1, a2] = plane.activities[k].slice(2);
+  for (let x = 0; x < foretold.length; x++) {
+    foretold[x] = w1 * r1[x + 1] + w2 * r2[x + 1];
+    lively[x] = a1 * Math.abs(r1[x + 1]) + a2 * Math.abs(r2[x + 1]);
+  }
+  return out;
+}
+
+/**
  * Predictions and tables of a row of V.
  * @param {Plane} plane
  * @param {number} y
- * @param {Int32Array} r1
- * @param {Int32Array} r2
+ * @param {Referred} referred
  * @param {Int32Array} prediction
  * @param {Uint8Array} table
  */
-function predictV(plane, y, r1, r2, prediction, table) {
+function predictV(plane, y, { foretold, lively }, prediction, table) {
   const { rows } = plane;
   const nn = rows[(y - 2) & 7];
   const n = rows[(y - 1) & 7];
@@ -225,22 +249,20 @@ function predictV(plane, y, r1, r2, prediction, table) {
   const ss = rows[(y + 2) & 7];
   const above = plane.residuals[0][1 - (y & 1)];
   const slope = plane.gradient[y & 1];
-  const [w0, w1, w2, w3, , w5, w6] = plane.weights[0];
-  const [a0, a1, a2, a3] = plane.activities[0];
+  const [w0, w1, w2, w3] = plane.weights[0];
+  const [a0, a1] = plane.activities[0];
   for (let x = 0; x < prediction.length; x++) {
     prediction[x] = clamped(
       w0 * (s[x + 2] - n[x + 2]) +
         w1 * (s[x + 1] - n[x + 1] + s[x + 3] - n[x + 3]) +
         w2 * (ss[x + 2] - i[x + 2]) +
         w3 * (i[x + 2] - nn[x + 2]) +
-        w5 * r1[x + 1] +
-        w6 * r2[x + 1],
+        foretold[x],
     );
     const a =
       (a0 * slope[x] +
         a1 * near(above, x) +
-        a2 * Math.abs(r1[x + 1]) +
-        a3 * Math.abs(r2[x + 1])) >>
+        lively[x]) >>
       6;
     table[x] = CLASS[a < 1023 ? a : 1023];
   }
@@ -250,12 +272,11 @@ function predictV(plane, y, r1, r2, prediction, table) {
  * Of a row of h.
  * @param {Plane} plane
  * @param {number} y
- * @param {Int32Array} r1
- * @param {Int32Array} r2
+ * @param {Referred} referred
  * @param {Int32Array} prediction
  * @param {Uint8Array} table
  */
-function predictH(plane, y, r1, r2, prediction, table) {
+function predictH(plane, y, { foretold, lively }, prediction, table) {
   const { rows } = plane;
   const n = rows[(y - 1) & 7];
   const i = rows[y & 7];
@@ -264,22 +285,20 @@ function predictH(plane, y, r1, r2, prediction, table) {
   const ev = plane.residuals[0][y & 1];
   const above = plane.residuals[1][1 - (y & 1)];
   const slope = plane.gradient[y & 1];
-  const [w0, w1, w2, w3, , w5, w6] = plane.weights[1];
-  const [a0, a1, a2, a3, a4] = plane.activities[1];
+  const [w0, w1, w2, w3] = plane.weights[1];
+  const [a0, a1, , , a4] = plane.activities[1];
   for (let x = 0; x < prediction.length; x++) {
     prediction[x] = clamped(
       w0 * (i[x + 3] - i[x + 1]) +
         w1 * (n[x + 3] - n[x + 1]) +
         w2 * (s[x + 3] - s[x + 1]) +
         w3 * (v[x + 2] - v[x]) +
-        w5 * r1[x + 1] +
-        w6 * r2[x + 1],
+        foretold[x],
     );
     const a =
       (a0 * slope[x] +
         a1 * near(above, x) +
-        a2 * Math.abs(r1[x + 1]) +
-        a3 * Math.abs(r2[x + 1]) +
+        lively[x] +
         a4 * Math.abs(ev[x + 1])) >>
       6;
     table[x] = CLASS[a < 1023 ? a : 1023];
@@ -290,12 +309,11 @@ function predictH(plane, y, r1, r2, prediction, table) {
  * Of a row of g.
  * @param {Plane} plane
  * @param {number} y
- * @param {Int32Array} r1
- * @param {Int32Array} r2
+ * @param {Referred} referred
  * @param {Int32Array} prediction
  * @param {Uint8Array} table
  */
-function predictG(plane, y, r1, r2, prediction, table) {
+function predictG(plane, y, { foretold, lively }, prediction, table) {
   const side = y & 1;
   const i = plane.rows[y & 7];
   const s = plane.rows[(y + 1) & 7];
@@ -307,8 +325,8 @@ function predictG(plane, y, r1, r2, prediction, table) {
   const ehUnder = plane.residuals[1][1 - side];
   const above = plane.residuals[2][1 - side];
   const slope = plane.gradient[side];
-  const [w0, w1, w2, w3, w4, w5, w6] = plane.weights[2];
-  const [a0, a1, a2, a3, a4, a5, a6] = plane.activities[2];
+  const [w0, w1, w2, w3, w4] = plane.weights[2];
+  const [a0, a1, , , a4, a5, a6] = plane.activities[2];
   for (let x = 0; x < prediction.length; x++) {
     prediction[x] = clamped(
       w0 * (i[x + 3] - i[x + 1]) +
@@ -316,14 +334,12 @@ function predictG(plane, y, r1, r2, prediction, table) {
         w2 * h[x + 1] +
         w3 * under[x + 1] +
         w4 * (v[x + 2] - v[x]) +
-        w5 * r1[x + 1] +
-        w6 * r2[x + 1],
+        foretold[x],
     );
     const a =
       (a0 * slope[x] +
         a1 * near(above, x) +
-        a2 * Math.abs(r1[x + 1]) +
-        a3 * Math.abs(r2[x + 1]) +
+        lively[x] +
         a4 * Math.abs(ev[x + 1]) +
         a5 * Math.abs(eh[x + 1]) +
         a6 * Math.abs(ehUnder[x + 1])) >>
