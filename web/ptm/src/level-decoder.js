@@ -47,8 +47,8 @@ const REPEATS = 5;
 const PYRAMID = 6;
 /** Forms of a tile within an error. */
 const PLAIN = 1;
-/** Rows and tables of an engine, at most, for tiles that are not wide. */
-const FIXED_MEMORY = 2 ** 20;
+/** Tables of an engine, at most. */
+const FIXED_MEMORY = 2 ** 21;
 
 /**
  * Bytes that decoding a level takes at most: its texels and those below it, what comes out, and of
