@@ -5,69 +5,15 @@ import { damaged } from "../errors.js";
 import { geometricTables } from "../families.js";
 import { Reader } from "../reader.js";
 import { OPAQUE } from "../texels.js";
-import { edgePlaces, median, planeOrder, references } from "./planes.js";
+import { readPlanes } from "./haar-planes.js";
+import { CLASSES, gradient, predictG, predictH, predictV, refer } from "./haar-predictions.js";
+import { edgePlaces, median } from "./planes.js";
 import { ESCAPE, Symbols, readTables } from "./rans.js";
 
-const CLASSES = 14;
+/** @typedef {import("./haar-planes.js").Plane} Plane */
+/** @typedef {import("./haar-planes.js").Ranks} Ranks */
+
 const EDGE_TABLE = 28;
-const WEIGHT_TOP = 2047;
-const PREDICTION_TOP = 1020;
-
-// In 1/256, for planes with 0, 1, 2 references: V, h, g.
-const WEIGHTS = [
-  [[-158, -5, 31, 29, 0, 0, 0], [-79, 5, 6, -18, 0, 0, 0], [-22, 10, 44, 44, 10, 0, 0]],
-  [[-167, -2, 32, 32, 0, 241, 0], [-78, 1, 4, -18, 0, 241, 0], [-19, 10, 47, 49, 9, 235, 0]],
-  [[-152, -7, 25, 22, 0, 236, 35], [-78, 0, 3, -18, 0, 236, 28], [-19, 9, 46, 46, 10, 228, 70]],
-];
-const ACTIVITIES = [
-  [[154, 139, 0, 0, 0, 0, 0], [61, 153, 0, 0, 25, 0, 0], [11, 67, 0, 0, 22, 66, 88]],
-  [[9, 98, 36, 0, 0, 0, 0], [3, 99, 51, 0, 60, 0, 0], [1, 27, 57, 0, 17, 50, 49]],
-  [[8, 74, 31, 128, 0, 0, 0], [3, 88, 23, 131, 38, 0, 0], [1, 24, 20, 61, 25, 39, 55]],
-];
-const BOUNDS = [1, 3, 7, 12, 20, 32, 50, 76, 115, 170, 250, 370, 560];
-const CLASS = Uint8Array.from({ length: 1024 }, (_, a) => BOUNDS.filter((b) => b <= a).length);
-
-/** Values of a component coded by rank: ranks of all 256 values, and values of the ranks. */
-class Ranks {
-  /** @param {Uint8Array | null} bitmap */
-  constructor(bitmap) {
-    /** @type {number[]} */
-    this.values = [];
-    this.rank = Int32Array.from({ length: 256 }, (_, value) => value);
-    if (!bitmap) return;
-    for (let v = 0; v < 256; v++) if ((bitmap[v >> 3] >> (v & 7)) & 1) this.values.push(v);
-    if (this.values.length < 2) throw damaged("a rank bitmap has fewer than two values");
-    for (let v = 0, i = 0; v < 256; v++) {
-      while (i + 1 < this.values.length && (this.values[i] + this.values[i + 1]) >> 1 < v) i++;
-      this.rank[v] = i;
-    }
-  }
-}
-
-/** What is kept of a plane: of blocks two rows, of the level below eight. */
-class Plane {
-  /**
-   * @param {number} component
-   * @param {number} others how many planes it refers to
-   * @param {number[][]} weights
-   * @param {Ranks} ranks
-   * @param {number} bw blocks in a row
-   */
-  constructor(component, others, weights, ranks, bw) {
-    const row = () => new Int32Array(bw + 2);
-    this.component = component;
-    this.others = others;
-    this.weights = weights;
-    this.activities = ACTIVITIES[others];
-    this.ranks = ranks;
-    /** Ranks of the level below, from two before the row on. */
-    this.rows = Array.from({ length: 8 }, () => new Int32Array(bw + 4));
-    this.gradient = [row(), row()];
-    /** V, h, g and their residuals of block rows y and y - 1, from one before the row on. */
-    this.values = [0, 1, 2].map(() => [row(), row()]);
-    this.residuals = [0, 1, 2].map(() => [row(), row()]);
-  }
-}
 
 /**
  * @param {Uint8Array} data behind the byte that names the coder
@@ -124,40 +70,6 @@ export function decodeHaar(data, below, shape) {
 }
 
 /**
- * @param {Reader} reader
- * @param {number} components
- * @param {number} bw
- */
-function readPlanes(reader, components, bw) {
-  const flags = reader.number(1);
-  if (flags & ~(1 | (((1 << components) - 1) << 4))) throw damaged(`flags ${flags} are unknown`);
-  /** @type {Ranks[]} */
-  const ranks = [];
-  for (let c = 0; c < components; c++) {
-    ranks.push(new Ranks((flags >> (4 + c)) & 1 ? reader.take(32) : null));
-  }
-  return planeOrder(components).map((component, i) => {
-    const others = references(components, i);
-    const weights = WEIGHTS[others].map((own, k) => (flags & 1 ? readWeights(reader, k, others) : own));
-    return new Plane(component, others, weights, ranks[component], bw);
-  });
-}
-
-/**
- * @param {Reader} reader
- * @param {number} k
- * @param {number} others
- */
-function readWeights(reader, k, others) {
-  const weights = [0, 0, 0, 0, 0, 0, 0];
-  for (let i = 0; i < 5 + others; i++) {
-    if (i !== 4 || k === 2) weights[i] = reader.signed();
-    if (Math.abs(weights[i]) > WEIGHT_TOP) throw damaged("a weight is out of range");
-  }
-  return weights;
-}
-
-/**
  * A row of the level below, it and both its ends repeated outwards.
  * @param {Plane} plane
  * @param {Uint32Array} below
@@ -173,179 +85,6 @@ function loadRow(plane, below, bw, bh, y) {
   for (let x = 0; x < bw; x++) row[x + 2] = rank[(below[from + x] >>> shift) & 255];
   row[0] = row[1] = row[2];
   row[bw + 3] = row[bw + 2] = row[bw + 1];
-}
-
-/**
- * @param {Plane} plane
- * @param {number} y
- * @param {number} bw
- */
-function gradient(plane, y, bw) {
-  const north = plane.rows[(y - 1) & 7];
-  const row = plane.rows[y & 7];
-  const south = plane.rows[(y + 1) & 7];
-  const out = plane.gradient[y & 1];
-  for (let x = 0; x < bw; x++) {
-    out[x] = Math.abs(row[x + 3] - row[x + 1]) + Math.abs(south[x + 2] - north[x + 2]);
-  }
-}
-
-/**
- * @param {number} sum
- */
-function clamped(sum) {
-  const p = (sum + 128) >> 8;
-  return p < -PREDICTION_TOP ? -PREDICTION_TOP : p > PREDICTION_TOP ? PREDICTION_TOP : p;
-}
-
-/**
- * Magnitudes of the residuals around in the row of blocks above.
- * @param {Int32Array} above
- * @param {number} x
- */
-function near(above, x) {
-  return 2 * Math.abs(above[x + 1]) + Math.abs(above[x]) + Math.abs(above[x + 2]);
-}
-
-/**
- * What a row takes from the planes that it refers to: parts of its predictions and activities.
- * @typedef {{foretold: Int32Array, lively: Int32Array}} Referred
- */
-
-/**
- * @param {Plane} plane
- * @param {number} k
- * @param {Plane[]} planes
- * @param {number} side
- * @param {Referred} out overwritten
- */
-function refer(plane, k, planes, side, out) {
-  const { foretold, lively } = out;
-  const r1 = planes[0].residuals[k][side];
-  const r2 = planes[1].residuals[k][side];
-  const [w1, w2] = plane.weights[k].slice(5);
-  const [a1, a2] = plane.activities[k].slice(2);
-  for (let x = 0; x < foretold.length; x++) {
-    foretold[x] = w1 * r1[x + 1] + w2 * r2[x + 1];
-    lively[x] = a1 * Math.abs(r1[x + 1]) + a2 * Math.abs(r2[x + 1]);
-  }
-  return out;
-}
-
-/**
- * Predictions and tables of a row of V.
- * @param {Plane} plane
- * @param {number} y
- * @param {Referred} referred
- * @param {Int32Array} prediction
- * @param {Uint8Array} table
- */
-function predictV(plane, y, { foretold, lively }, prediction, table) {
-  const { rows } = plane;
-  const nn = rows[(y - 2) & 7];
-  const n = rows[(y - 1) & 7];
-  const i = rows[y & 7];
-  const s = rows[(y + 1) & 7];
-  const ss = rows[(y + 2) & 7];
-  const above = plane.residuals[0][1 - (y & 1)];
-  const slope = plane.gradient[y & 1];
-  const [w0, w1, w2, w3] = plane.weights[0];
-  const [a0, a1] = plane.activities[0];
-  for (let x = 0; x < prediction.length; x++) {
-    prediction[x] = clamped(
-      w0 * (s[x + 2] - n[x + 2]) +
-        w1 * (s[x + 1] - n[x + 1] + s[x + 3] - n[x + 3]) +
-        w2 * (ss[x + 2] - i[x + 2]) +
-        w3 * (i[x + 2] - nn[x + 2]) +
-        foretold[x],
-    );
-    const a =
-      (a0 * slope[x] +
-        a1 * near(above, x) +
-        lively[x]) >>
-      6;
-    table[x] = CLASS[a < 1023 ? a : 1023];
-  }
-}
-
-/**
- * Of a row of h.
- * @param {Plane} plane
- * @param {number} y
- * @param {Referred} referred
- * @param {Int32Array} prediction
- * @param {Uint8Array} table
- */
-function predictH(plane, y, { foretold, lively }, prediction, table) {
-  const { rows } = plane;
-  const n = rows[(y - 1) & 7];
-  const i = rows[y & 7];
-  const s = rows[(y + 1) & 7];
-  const v = plane.values[0][y & 1];
-  const ev = plane.residuals[0][y & 1];
-  const above = plane.residuals[1][1 - (y & 1)];
-  const slope = plane.gradient[y & 1];
-  const [w0, w1, w2, w3] = plane.weights[1];
-  const [a0, a1, , , a4] = plane.activities[1];
-  for (let x = 0; x < prediction.length; x++) {
-    prediction[x] = clamped(
-      w0 * (i[x + 3] - i[x + 1]) +
-        w1 * (n[x + 3] - n[x + 1]) +
-        w2 * (s[x + 3] - s[x + 1]) +
-        w3 * (v[x + 2] - v[x]) +
-        foretold[x],
-    );
-    const a =
-      (a0 * slope[x] +
-        a1 * near(above, x) +
-        lively[x] +
-        a4 * Math.abs(ev[x + 1])) >>
-      6;
-    table[x] = CLASS[a < 1023 ? a : 1023];
-  }
-}
-
-/**
- * Of a row of g.
- * @param {Plane} plane
- * @param {number} y
- * @param {Referred} referred
- * @param {Int32Array} prediction
- * @param {Uint8Array} table
- */
-function predictG(plane, y, { foretold, lively }, prediction, table) {
-  const side = y & 1;
-  const i = plane.rows[y & 7];
-  const s = plane.rows[(y + 1) & 7];
-  const v = plane.values[0][side];
-  const h = plane.values[1][side];
-  const under = plane.values[1][1 - side];
-  const ev = plane.residuals[0][side];
-  const eh = plane.residuals[1][side];
-  const ehUnder = plane.residuals[1][1 - side];
-  const above = plane.residuals[2][1 - side];
-  const slope = plane.gradient[side];
-  const [w0, w1, w2, w3, w4] = plane.weights[2];
-  const [a0, a1, , , a4, a5, a6] = plane.activities[2];
-  for (let x = 0; x < prediction.length; x++) {
-    prediction[x] = clamped(
-      w0 * (i[x + 3] - i[x + 1]) +
-        w1 * (s[x + 3] - s[x + 1]) +
-        w2 * h[x + 1] +
-        w3 * under[x + 1] +
-        w4 * (v[x + 2] - v[x]) +
-        foretold[x],
-    );
-    const a =
-      (a0 * slope[x] +
-        a1 * near(above, x) +
-        lively[x] +
-        a4 * Math.abs(ev[x + 1]) +
-        a5 * Math.abs(eh[x + 1]) +
-        a6 * Math.abs(ehUnder[x + 1])) >>
-      6;
-    table[x] = CLASSES + CLASS[a < 1023 ? a : 1023];
-  }
 }
 
 /**

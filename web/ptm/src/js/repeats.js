@@ -7,6 +7,7 @@ import { Reader } from "../reader.js";
 import { OPAQUE } from "../texels.js";
 import { edgePlaces, median, planeOrder, references } from "./planes.js";
 import { Symbols, readTables } from "./rans.js";
+import { K0, K1, K2, K3, K4, K5, WEIGHTS, classOf, fits, minus, plus } from "./repeats-texels.js";
 
 const TABLES = 196;
 /** First table of each sort of symbol. */
@@ -24,61 +25,6 @@ const LONGEST_RUN = 254;
 /** A block found as it is. */
 const TEXELS = 3;
 const MOST_SYMBOLS = 32;
-
-const K0 = 0x9e3779b1 | 0;
-const K1 = 0x85ebca6b | 0;
-const K2 = 0xc2b2ae35 | 0;
-const K3 = 0x27d4eb2f;
-const K4 = 0x165667b1;
-const K5 = 0xa24baed5 | 0;
-const HIGH = 0x80808080 | 0;
-const LOW7 = 0x7f7f7f7f;
-const EVEN = 0x00ff00ff;
-const BOUNDS = [2, 4, 8, 16, 32, 64, 128, 256, 512];
-const CLASS = Uint8Array.from({ length: 1024 }, (_, a) => BOUNDS.filter((b) => b <= a).length);
-// In 1/64: of W, N, NW, NE for p, q, r.
-const WEIGHTS = [
-  [20, 24, -10, -7],
-  [2, 27, -12, -2],
-  [13, -7, -6, -39],
-];
-
-/**
- * a - b, byte by byte.
- * @param {number} a
- * @param {number} b
- */
-function minus(a, b) {
-  return ((a | HIGH) - (b & LOW7)) ^ ((a ^ b ^ HIGH) & HIGH);
-}
-
-/**
- * @param {number} a
- * @param {number} b
- */
-function plus(a, b) {
-  return ((a & LOW7) + (b & LOW7)) ^ ((a ^ b) & HIGH);
-}
-
-/** @param {number} activity */
-function classOf(activity) {
-  return CLASS[activity < 1023 ? activity : 1023];
-}
-
-/**
- * Whether p q r s have that mean in every component.
- * @param {number} mean
- * @param {number} p
- * @param {number} q
- * @param {number} r
- * @param {number} s
- */
-function fits(mean, p, q, r, s) {
-  const low = (p & EVEN) + (q & EVEN) + (r & EVEN) + (s & EVEN);
-  const high =
-    ((p >>> 8) & EVEN) + ((q >>> 8) & EVEN) + ((r >>> 8) & EVEN) + ((s >>> 8) & EVEN);
-  return (((low >>> 2) & EVEN) | (((high >>> 2) & EVEN) << 8)) === mean;
-}
 
 class Group {
   /**
