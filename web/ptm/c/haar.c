@@ -9,21 +9,13 @@
 
 #include <wasm_simd128.h>
 
+#include "haar.h"
 #include "rans.h"
 
-enum { CLASSES = 14, EDGE_TABLE = 28, TABLES = 29, WEIGHT_TOP = 2047, PREDICTION_TOP = 1020,
-       ACTIVITY_TOP = 1023, DIFFERENCE_TOP = 1024, MOST_PLANES = 4, SENT_WEIGHTS = 1, RANKED = 16 };
-// The differences of a block.
-enum { V, H, G };
-// Of a row of numbers: room before the first, and behind the last of a whole eight.
-enum { MARGIN = 8 };
+enum { CLASSES = 14, EDGE_TABLE = 28, TABLES = 29, PREDICTION_TOP = 1020, ACTIVITY_TOP = 1023,
+       DIFFERENCE_TOP = 1024 };
 
-// In 1/256, for planes with 0, 1, 2 references: V, h, g.
-static const i16 built_in[3][3][7] = {
-    {{-158, -5, 31, 29, 0, 0, 0}, {-79, 5, 6, -18, 0, 0, 0}, {-22, 10, 44, 44, 10, 0, 0}},
-    {{-167, -2, 32, 32, 0, 241, 0}, {-78, 1, 4, -18, 0, 241, 0}, {-19, 10, 47, 49, 9, 235, 0}},
-    {{-152, -7, 25, 22, 0, 236, 35}, {-78, 0, 3, -18, 0, 236, 28}, {-19, 9, 46, 46, 10, 228, 70}},
-};
+// In 1/64, by the number of references: of what surrounds a block, its activity in sixteenths.
 static const i16 activity_weights[3][3][7] = {
     {{154, 139, 0, 0, 0, 0, 0}, {61, 153, 0, 0, 25, 0, 0}, {11, 67, 0, 0, 22, 66, 88}},
     {{9, 98, 36, 0, 0, 0, 0}, {3, 99, 51, 0, 60, 0, 0}, {1, 27, 57, 0, 17, 50, 49}},
@@ -34,21 +26,6 @@ static const i16 class_bounds[CLASSES - 1] = {1, 3, 7, 12, 20, 32, 50, 76, 115, 
 static u8 kilobytes[ACTIVITY_TOP + 1];
 _Static_assert(sizeof(Table) == 3 << 10, "three KB");
 
-typedef struct {
-  i32 component, references;
-  i16 weights[3][7];
-  i16 *rows[8];         // ranks of the level below: row y is number y & 7
-  i16 *gradient[2];     // of block row y: number y & 1, here and below
-  i16 *value[3][2];     // V, h, g
-  i16 *residual[3][2];  // and what was not predicted of them
-  u16 *upper, *lower;   // texels of a row of blocks, two to a number, the left one in the low byte
-  i32 top;              // the highest rank, 0 where values stand for themselves
-  u8 rank[256], values[256];
-} Plane;
-
-static Plane planes[MOST_PLANES];
-static i16 *zeros, *prediction;
-static u16 *activity, *symbols, *rest;  // rest: of what is above the components
 static v128_t stray;
 
 static inline v128_t load(const i16 *from) { return wasm_v128_load(from); }
@@ -83,7 +60,10 @@ static inline __attribute__((always_inline)) void predict(Plane *plane, i32 y, c
   const i16 *r1 = plane->references > 0 ? planes[0].residual[k][side] : zeros;
   const i16 *r2 = plane->references > 1 ? planes[1].residual[k][side] : zeros;
   const i16 *w = plane->weights[k], *c = activity_weights[plane->references][k];
-  for (i32 x = 0; x < tile.bw; x += BLOCKS) {
+  i16 *const predicted = prediction;
+  u16 *const lively = activity;
+  const i32 bw = tile.bw;
+  for (i32 x = 0; x < bw; x += BLOCKS) {
     v128_t e1 = load(r1 + x), e2 = load(r2 + x);
     v128_t low = wasm_i32x4_splat(128), high = low;
     if (k == V) {
@@ -107,7 +87,7 @@ static inline __attribute__((always_inline)) void predict(Plane *plane, i32 y, c
     summed(e1, e2, both(w[5], w[6]), &low, &high);
     v128_t p = wasm_i16x8_narrow_i32x4(wasm_i32x4_shr(low, 8), wasm_i32x4_shr(high, 8));
     p = wasm_i16x8_max(p, wasm_i16x8_splat(-PREDICTION_TOP));
-    wasm_v128_store(prediction + x, wasm_i16x8_min(p, wasm_i16x8_splat(PREDICTION_TOP)));
+    wasm_v128_store(predicted + x, wasm_i16x8_min(p, wasm_i16x8_splat(PREDICTION_TOP)));
 
     v128_t around = more(absolute(load(above + x - 1)), absolute(load(above + x + 1)));
     v128_t own = absolute(load(above + x));
@@ -124,7 +104,7 @@ static inline __attribute__((always_inline)) void predict(Plane *plane, i32 y, c
       summed(d, d, both(c[6], 0), &low, &high);
     }
     v128_t a = wasm_i16x8_narrow_i32x4(wasm_i32x4_shr(low, 6), wasm_i32x4_shr(high, 6));
-    wasm_v128_store(activity + x, wasm_u16x8_min(a, wasm_i16x8_splat(ACTIVITY_TOP)));
+    wasm_v128_store(lively + x, wasm_u16x8_min(a, wasm_i16x8_splat(ACTIVITY_TOP)));
   }
 }
 
@@ -135,16 +115,18 @@ static inline const Table *table_of(const Table *first, u32 a) {
 // The symbols of a row, whose tables are known: the four states work side by side.
 static void decode_row(const Table *first) {
   const i32 n = tile.bw;
+  const u16 *const lively = activity;
+  u16 *const out = symbols;
   const u32 lane = stream.count;
   u32 a = stream.state[lane & 3], b = stream.state[(lane + 1) & 3];
   u32 c = stream.state[(lane + 2) & 3], d = stream.state[(lane + 3) & 3];
   const u8 *word = stream.word;
   i32 x = 0;
   for (; x + 4 <= n; x += 4) {
-    symbols[x] = (u16)step(&a, table_of(first, activity[x]), &word);
-    symbols[x + 1] = (u16)step(&b, table_of(first, activity[x + 1]), &word);
-    symbols[x + 2] = (u16)step(&c, table_of(first, activity[x + 2]), &word);
-    symbols[x + 3] = (u16)step(&d, table_of(first, activity[x + 3]), &word);
+    out[x] = (u16)step(&a, table_of(first, lively[x]), &word);
+    out[x + 1] = (u16)step(&b, table_of(first, lively[x + 1]), &word);
+    out[x + 2] = (u16)step(&c, table_of(first, lively[x + 2]), &word);
+    out[x + 3] = (u16)step(&d, table_of(first, lively[x + 3]), &word);
   }
   stream.state[lane & 3] = a;
   stream.state[(lane + 1) & 3] = b;
@@ -152,30 +134,33 @@ static void decode_row(const Table *first) {
   stream.state[(lane + 3) & 3] = d;
   stream.word = word;
   stream.count += (u32)x;
-  for (; x < n; x++) symbols[x] = (u16)plain_symbol(table_of(first, activity[x]));
+  for (; x < n; x++) out[x] = (u16)plain_symbol(table_of(first, lively[x]));
   // Behind the row there are no residuals.
-  wasm_v128_store(symbols + n, wasm_i16x8_splat(0));
+  wasm_v128_store(out + n, wasm_i16x8_splat(0));
 }
 
 // From symbols to residuals and differences.
 static void absorb(i16 *residual, i16 *value) {
   const v128_t one = wasm_i16x8_splat(1), escape = wasm_i16x8_splat(ESCAPE);
-  for (i32 x = 0; x < tile.bw; x += BLOCKS) {
-    v128_t z = wasm_v128_load(symbols + x);
+  u16 *const from = symbols;
+  const i16 *const predicted = prediction;
+  const i32 bw = tile.bw;
+  for (i32 x = 0; x < bw; x += BLOCKS) {
+    v128_t z = wasm_v128_load(from + x);
     if (__builtin_expect(wasm_v128_any_true(wasm_i16x8_eq(z, escape)), 0)) {
       for (i32 j = x; j < x + BLOCKS; j++) {
-        if (symbols[j] == ESCAPE) symbols[j] = (u16)next_escape();
+        if (from[j] == ESCAPE) from[j] = (u16)next_escape();
       }
-      z = wasm_v128_load(symbols + x);
+      z = wasm_v128_load(from + x);
     }
     v128_t e = wasm_v128_xor(wasm_u16x8_shr(z, 1), wasm_i16x8_neg(wasm_v128_and(z, one)));
-    v128_t found = more(e, load(prediction + x));
+    v128_t found = more(e, load(predicted + x));
     wasm_v128_store(residual + x, e);
     wasm_v128_store(value + x, found);
     v128_t raised = more(found, wasm_i16x8_splat(DIFFERENCE_TOP));
     stray = wasm_v128_or(stray, wasm_v128_and(raised, wasm_i16x8_splat(~(2 * DIFFERENCE_TOP - 1))));
   }
-  value[tile.bw] = 0;
+  value[bw] = 0;
 }
 
 // Texels of a row of blocks from differences of values.
@@ -274,77 +259,6 @@ static void fill_gradient(Plane *plane, i32 y) {
     v128_t down = absolute(less(load(s + x), load(n + x)));
     wasm_v128_store(plane->gradient[y & 1] + x, more(across, down));
   }
-}
-
-static void read_ranks(Plane *plane, const u8 *bitmap) {
-  i32 many = 0;
-  for (i32 v = 0; v < 256; v++) {
-    if (bitmap[v >> 3] >> (v & 7) & 1) plane->values[many++] = (u8)v;
-  }
-  plane->top = many - 1;
-  for (i32 v = 0, i = 0; v < 256; v++) {
-    while (i < plane->top && (plane->values[i] + plane->values[i + 1]) >> 1 < v) i++;
-    plane->rank[v] = (u8)i;
-  }
-}
-
-static i16 *take_row(void) {
-  i16 *row = take(sizeof(i16) * (u32)(tile.bw + 2 * MARGIN + 2 * BLOCKS));
-  return row ? row + MARGIN : NULL;
-}
-
-static bool take_rows(void) {
-  bool all = (zeros = take_row()) && (rest = (u16 *)take_row()) && (prediction = take_row());
-  all = all && (activity = (u16 *)take_row()) && (symbols = (u16 *)take_row());
-  for (i32 c = 0; c < tile.components; c++) {
-    Plane *plane = &planes[c];
-    for (i32 i = 0; i < 8; i++) all = all && (plane->rows[i] = take_row());
-    for (i32 i = 0; i < 2; i++) {
-      all = all && (plane->gradient[i] = take_row());
-      for (i32 k = 0; k < 3; k++) {
-        all = all && (plane->value[k][i] = take_row()) && (plane->residual[k][i] = take_row());
-      }
-    }
-    all = all && (plane->upper = (u16 *)take_row()) && (plane->lower = (u16 *)take_row());
-  }
-  return all;
-}
-
-// Flags, ranks and weights; false if they are damaged.
-static bool read_planes(const u8 **data) {
-  if (*data == tile.end) return false;
-  u32 flags = *(*data)++;
-  if (flags & ~(u32)(SENT_WEIGHTS | RANKED * ((1 << tile.components) - 1))) return false;
-  const u8 *bitmaps[MOST_PLANES] = {0};
-  for (i32 c = 0; c < tile.components; c++) {
-    if (!(flags & (u32)RANKED << c)) continue;
-    if (tile.end - *data < 32) return false;
-    bitmaps[c] = *data;
-    *data += 32;
-  }
-  for (i32 c = 0; c < tile.components; c++) {
-    Plane *plane = &planes[c];
-    plane->component = component_of(c);
-    plane->references = references_of(c);
-    plane->top = 0;
-    if (bitmaps[plane->component]) {
-      read_ranks(plane, bitmaps[plane->component]);
-      if (plane->top < 1) return false;
-    }
-    __builtin_memcpy(plane->weights, built_in[plane->references], sizeof plane->weights);
-    if (!(flags & SENT_WEIGHTS)) continue;
-    for (i32 k = V; k <= G; k++) {
-      for (i32 i = 0; i < 7; i++) {
-        bool sent = i < 4 || (i == 4 && k == G) || (i > 4 && i < 5 + plane->references);
-        if (sent && tile.end - *data < 2) return false;
-        i16 weight = sent ? (i16)word16(*data) : 0;
-        *data += sent ? 2 : 0;
-        if (magnitude(weight) > WEIGHT_TOP) return false;
-        plane->weights[k][i] = weight;
-      }
-    }
-  }
-  return true;
 }
 
 static void decode_edge(void) {

@@ -1,5 +1,7 @@
 // Sums of texels and of their bytes: keys, differences, means (docs/format-ptm.md, "Repeats coder").
 
+import { damaged } from "../errors.js";
+
 export const K0 = 0x9e3779b1 | 0;
 export const K1 = 0x85ebca6b | 0;
 export const K2 = 0xc2b2ae35 | 0;
@@ -53,4 +55,10 @@ export function fits(mean, p, q, r, s) {
   const high =
     ((p >>> 8) & EVEN) + ((q >>> 8) & EVEN) + ((r >>> 8) & EVEN) + ((s >>> 8) & EVEN);
   return (((low >>> 2) & EVEN) | (((high >>> 2) & EVEN) << 8)) === mean;
+}
+
+/** @param {number} value */
+export function inByte(value) {
+  if (value & ~255) throw damaged("its stream leads to impossible texels");
+  return value;
 }

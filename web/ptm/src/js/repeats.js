@@ -7,7 +7,7 @@ import { Reader } from "../reader.js";
 import { OPAQUE } from "../texels.js";
 import { edgePlaces, median, planeOrder, references } from "./planes.js";
 import { Symbols, readTables } from "./rans.js";
-import { K0, K1, K2, K3, K4, K5, WEIGHTS, classOf, fits, minus, plus } from "./repeats-texels.js";
+import { K0, K1, K2, K3, K4, K5, WEIGHTS, classOf, fits, inByte, minus, plus } from "./repeats-texels.js";
 
 const TABLES = 196;
 /** First table of each sort of symbol. */
@@ -121,10 +121,7 @@ class Group {
 
   /**
    * @param {number} at
-   * @param {number} p
-   * @param {number} q
-   * @param {number} r
-   * @param {number} s
+   * @param {number} p @param {number} q @param {number} r @param {number} s
    */
   put(at, p, q, r, s) {
     const { texels, width } = this;
@@ -248,8 +245,7 @@ class Group {
 
   /**
    * @param {number} at
-   * @param {number} i the mean
-   * @param {number} w0 @param {number} w1 @param {number} n0 @param {number} n1
+   * @param {number} i the mean @param {number} w0 @param {number} w1 @param {number} n0 @param {number} n1
    * @param {number} nw @param {number} ne
    * @param {number} near
    */
@@ -334,8 +330,7 @@ class Group {
   /**
    * A block by its Haar differences.
    * @param {number} at
-   * @param {number} i the mean
-   * @param {number} w0 @param {number} w1 @param {number} n0 @param {number} n1
+   * @param {number} i the mean @param {number} w0 @param {number} w1 @param {number} n0 @param {number} n1
    * @param {number} e means around @param {number} s @param {number} sw @param {number} se
    */
   differences(at, i, w0, w1, n0, n1, e, s, sw, se) {
@@ -407,12 +402,6 @@ class Group {
     }
     return (this.seen[slot] = texel);
   }
-}
-
-/** @param {number} value */
-function inByte(value) {
-  if (value & ~255) throw damaged("its stream leads to impossible texels");
-  return value;
 }
 
 /**
