@@ -9,17 +9,9 @@ import { edgePlaces, median, planeOrder, references } from "./planes.js";
 import { Symbols, readTables } from "./rans.js";
 import { K0, K1, K2, K3, K4, K5, WEIGHTS, classOf, fits, inByte, minus, plus } from "./repeats-texels.js";
 
-const TABLES = 196;
-/** First table of each sort of symbol. */
-const GUESS = 12;
-const TEXEL = 24;
-const LAST = 60;
-const EDGE = 72;
-const EDGE_SAMPLE = 84;
-const HAAR = 85;
-const SAMPLE = 145;
-const REMAINDER = 185;
-const RUN = 188;
+/** First table of each sort of symbol, and how many there are. */
+const [GUESS, TEXEL, LAST, EDGE, EDGE_SAMPLE] = [12, 24, 60, 72, 84];
+const [HAAR, SAMPLE, REMAINDER, RUN, TABLES] = [85, 145, 185, 188, 196];
 
 const LONGEST_RUN = 254;
 /** A block found as it is. */
