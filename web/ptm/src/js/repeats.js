@@ -9,14 +9,13 @@ import { edgePlaces, median, planeOrder, references } from "./planes.js";
 import { Symbols, readTables } from "./rans.js";
 import { K0, K1, K2, K3, K4, K5, WEIGHTS, classOf, fits, inByte, minus, plus } from "./repeats-texels.js";
 
-/** First table of each sort of symbol, and how many there are. */
+/** First table of each sort of symbol; tables. */
 const [GUESS, TEXEL, LAST, EDGE, EDGE_SAMPLE] = [12, 24, 60, 72, 84];
 const [HAAR, SAMPLE, REMAINDER, RUN, TABLES] = [85, 145, 185, 188, 196];
-
-const LONGEST_RUN = 254;
-/** A block found as it is. */
+/** What follows the three guesses: texel by texel. */
 const TEXELS = 3;
-const MOST_SYMBOLS = 32;
+/** Blocks of a run; symbols of a block, with room to spare. */
+const [LONGEST_RUN, MOST_SYMBOLS] = [254, 32];
 
 class Group {
   /**
@@ -230,9 +229,8 @@ class Group {
    * @param {number} e @param {number} ke
    */
   slotOf(a, ka, b, kb, c, kc, d, kd, e, ke) {
-    const key =
-      Math.imul(a, ka) + Math.imul(b, kb) + Math.imul(c, kc) + Math.imul(d, kd) + Math.imul(e, ke);
-    return this.slot(key | 0);
+    const { imul } = Math;
+    return this.slot(imul(a, ka) + imul(b, kb) + imul(c, kc) + imul(d, kd) + imul(e, ke) | 0);
   }
 
   /**
@@ -396,11 +394,7 @@ class Group {
   }
 }
 
-/**
- * @param {Uint8Array} data behind the byte that names the coder
- * @param {Uint32Array} below
- * @param {import("../texels.js").Shape} shape
- */
+/** @type {import("../level-decoder.js").Engine["repeats"]} */
 export function decodeRepeats(data, below, shape) {
   return new Group(data, below, shape).decode();
 }
