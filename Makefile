@@ -1,6 +1,6 @@
 # make demo    a sample museum, its database and a floor plan, from nothing but python3 and make
 # make test    everything the tests need, then the tests
-# make lint    ruff and mypy
+# make lint    ruff, mypy, and tsc for what is JavaScript
 # make bench   the benchmarks, on the data at hand
 # make bench-codec   only those of the texture codec, beside other formats (about an hour)
 # make bench-pvs     cells and visibility, what is traded for what (a quarter of an hour)
@@ -78,6 +78,8 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	@.ci/test-components
+	$(BIN)/python tests/web/checked_types.py
 	$(BIN)/mypy --config-file benchmarks/mypy.ini
 	$(BIN)/mypy --config-file benchmarks/mypy.ini -p benchmarks.fuzz
 	@large=$$(git ls-files -z | xargs -0 stat -c '%s %n' | awk '$$1 > 1048576 { print $$2 }'); \

@@ -10,6 +10,7 @@ import pytest
 
 from ptmtools.texture import check, decode, decode_levels, read_header, read_ptm
 from ptmtools.texture.samples import KINDS
+from tests.texture.vectors.page import PAGE, page
 
 VECTORS = Path(__file__).resolve().parent / "vectors"
 DIGESTS: dict[str, list[str]] = {
@@ -56,3 +57,8 @@ def test_every_profile_with_every_kind_of_sample() -> None:
         (profile, kind, True) for profile in ("fast", "small") for kind in ("uint8", "uint16")
     }
     assert found >= wanted
+
+
+def test_the_page_of_vectors_is_what_the_decoders_do() -> None:
+    """`PYTHONPATH=. python tests/texture/vectors/page.py` writes it."""
+    assert PAGE.read_text("utf-8") == page()

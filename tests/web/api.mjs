@@ -1,0 +1,87 @@
+// What a page does with the package, in node: prints one JSON object for `test_api.py`.
+
+import { createHash } from "node:crypto";
+import { readFileSync } from "node:fs";
+
+import { DecoderWorkers, loadEngine, openPtm, serve } from "../../web/ptm/src/index.js";
+
+const file = new Uint8Array(readFileSync(process.argv[2]));
+const wasm = readFileSync(new URL("../../web/ptm/decoder.wasm", import.meta.url));
+const told = {};
+
+const digest = (image) => createHash("sha256").update(image.data).digest("hex");
+const settled = (promise) => promise.then(() => null, (error) => (error.name === "PtmError" ? error.code : error.name));
+
+/** Ranges of `bytes`, and which were asked for. */
+function ranges(bytes) {
+  const asked = [];
+  const read = async (offset, length) => {
+    asked.push([offset, length]);
+    return bytes.slice(offset, offset + length);
+  };
+  return { asked, read };
+}
+
+async function digests(ptm, options) {
+  const found = [];
+  for await (const image of ptm.decode({ format: "native", ...options })) found.push(digest(image));
+  return found;
+}
+
+const engine = await loadEngine(wasm);
+told.engines = [engine.name, (await loadEngine(new Uint8Array(8))).name];
+
+const whole = ranges(file);
+const ptm = await openPtm(whole.read);
+told.rangesOf = ptm.levels.map((_, n) => Object.values(ptm.rangeOf(n)));
+told.levels = await digests(ptm, { engine });
+told.asked = [...whole.asked];
+told.plain = await digests(ptm, { engine: (await import("../../web/ptm/src/js/engine.js")).plainEngine });
+told.one = digest(await ptm.image(3, { engine, format: "native" }));
+told.noLevel = await settled(ptm.image(99, { engine }));
+
+// A file that is cut after level 4, and within level 5.
+const { offset, length } = ptm.rangeOf(4);
+const cut = file.slice(0, offset + length + 7);
+const cutPtm = await openPtm(ranges(cut).read);
+told.cut = await digests(cutPtm, { engine });
+told.cutLevel = await settled(cutPtm.image(5, { engine }));
+
+// Workers: two of them, each a thread's end of a channel.
+const ports = [];
+const create = () => {
+  const { port1, port2 } = new MessageChannel();
+  serve(port2);
+  ports.push(port2);
+  return port1;
+};
+const workers = new DecoderWorkers({ count: 2, create, wasm: await WebAssembly.compile(wasm) });
+const both = await Promise.all([digests(ptm, { workers }), digests(cutPtm, { workers })]);
+told.workers = both;
+told.names = workers.lanes.map((lane) => lane.engine);
+
+// Bytes stay whose they were; what is refused can be given again; what is aborted is not lost.
+const group = (n) => file.slice(ptm.levels[n].offset, ptm.levels[n].offset + ptm.levels[n].length);
+const remote = workers.decoder(ptm.header, { format: "native" });
+const bad = group(0);
+bad[bad.length - 1] ^= 1;
+told.damaged = await settled(remote.refine(bad));
+const first = group(0);
+told.first = digest(await remote.refine(first));
+told.kept = first.length;
+const stop = new AbortController();
+const going = settled(remote.refine(group(1), { signal: stop.signal }));
+stop.abort();
+told.aborted = await going;
+told.again = digest(await remote.refine(group(1)));
+const busy = workers.decoder(ptm.header, {});
+const lane = busy.lane;
+const before = workers.decoder(ptm.header, {});
+before.lane = lane;
+told.before = await settled(before.refine(group(0), { signal: AbortSignal.abort() }));
+told.closing = settled(remote.refine(group(2)));
+workers.close();
+told.closing = await told.closing;
+for (const port of ports) port.close();
+told.openAborted = await settled(openPtm(whole.read, { signal: AbortSignal.abort() }));
+console.log(JSON.stringify(told));

@@ -1,0 +1,206 @@
+// Decoders that work in Workers: bytes go there as copies, texels come back in transferred buffers.
+
+import { PtmError } from "./errors.js";
+
+/** @typedef {import("./container.js").Header} Header */
+/** @typedef {import("./level-decoder.js").Image} Image */
+/** @typedef {import("./level-decoder.js").DecoderOptions} DecoderOptions */
+
+/**
+ * @typedef {object} WorkersOptions
+ * @property {number} [count] of workers; one less than there are processors, 1 to 4
+ * @property {import("./load-engine.js").ModuleSource} [wasm] where `decoder.wasm` is, if elsewhere
+ * @property {() => import("./serve.js").Port} [create] how a worker is made, if otherwise
+ */
+
+/** A group of bytes on its way through a worker. */
+class Task {
+  /**
+   * @param {number} decoder
+   * @param {Uint8Array} data
+   */
+  constructor(decoder, data) {
+    this.decoder = decoder;
+    this.data = data;
+    /** @type {(image: Image) => void} */
+    this.resolve = () => {};
+    /** @type {(error: unknown) => void} */
+    this.reject = () => {};
+    /** @type {Promise<Image>} */
+    this.image = new Promise((resolve, reject) => {
+      this.resolve = resolve;
+      this.reject = reject;
+    });
+    // Whoever asked may have gone.
+    this.image.catch(() => {});
+  }
+}
+
+/** One worker: it is given a task at a time, so that those that wait can still be called off. */
+class Lane {
+  /** @type {Task[]} */
+  #waiting = [];
+  /** @type {Task | undefined} */
+  #task;
+
+  /** @param {import("./serve.js").Port} port */
+  constructor(port) {
+    this.port = port;
+    this.decoders = 0;
+    /** Name of the engine, once it has worked. */
+    this.engine = "";
+    port.onmessage = ({ data }) => this.#answered(data);
+    port.onerror = (event) => this.fail(new Error(`a worker failed: ${event.message ?? event}`));
+  }
+
+  /** @param {Task} task */
+  add(task) {
+    this.#waiting.push(task);
+    this.#next();
+  }
+
+  /**
+   * Whether the task had not begun; then it never will.
+   * @param {Task} task
+   */
+  callOff(task) {
+    const place = this.#waiting.indexOf(task);
+    if (place >= 0) this.#waiting.splice(place, 1);
+    return place >= 0;
+  }
+
+  /** @param {Error} error */
+  fail(error) {
+    for (const task of [this.#task, ...this.#waiting]) task?.reject(error);
+    this.#task = undefined;
+    this.#waiting = [];
+  }
+
+  #next() {
+    if (this.#task) return;
+    this.#task = this.#waiting.shift();
+    if (!this.#task) return;
+    const { decoder } = this.#task;
+    const data = this.#task.data.slice();
+    this.port.postMessage({ decoder, data }, [data.buffer]);
+  }
+
+  /** @param {import("./serve.js").Answer} answer */
+  #answered(answer) {
+    const task = this.#task;
+    this.#task = undefined;
+    if ("image" in answer) {
+      this.engine = answer.engine;
+      task?.resolve(answer.image);
+    } else {
+      const { code, message } = answer;
+      task?.reject(code ? new PtmError(code, message.slice(code.length + 2)) : new Error(message));
+    }
+    this.#next();
+  }
+}
+
+/** As `LevelDecoder`, in a worker. */
+class RemoteDecoder {
+  /** @type {Task | undefined} */
+  #task;
+  #asked = false;
+
+  /**
+   * @param {Lane} lane
+   * @param {number} number
+   */
+  constructor(lane, number) {
+    this.lane = lane;
+    this.number = number;
+    /** The level decoded last, -1 at first. */
+    this.level = -1;
+  }
+
+  /**
+   * The next level from its group, as `LevelDecoder.refine`; one at a time. What is aborted while a
+   * worker is at it is not lost: the next call returns it, whatever bytes it is given.
+   * @param {Uint8Array} data all bytes of the group
+   * @param {{signal?: AbortSignal}} [options] rejects with the signal's reason
+   * @returns {Promise<Image>}
+   */
+  async refine(data, { signal } = {}) {
+    signal?.throwIfAborted();
+    if (this.#asked) throw new Error("a level is being decoded already");
+    this.#asked = true;
+    let task = this.#task;
+    if (!task) {
+      task = this.#task = new Task(this.number, data);
+      this.lane.add(task);
+    }
+    try {
+      const image = await unlessAborted(task.image, signal);
+      this.level = image.level;
+      this.#task = undefined;
+      return image;
+    } catch (error) {
+      if (!signal?.aborted || this.lane.callOff(task)) this.#task = undefined;
+      throw error;
+    } finally {
+      this.#asked = false;
+    }
+  }
+
+  /** Gives back what the worker keeps of it; it cannot be used any more. */
+  close() {
+    if (this.#task) this.lane.callOff(this.#task);
+    this.lane.decoders--;
+    this.lane.port.postMessage({ decoder: this.number }, []);
+  }
+}
+
+/** Workers that share the decoding of many files. */
+export class DecoderWorkers {
+  #decoders = 0;
+
+  /** @param {WorkersOptions} [options] */
+  constructor({ count, wasm, create } = {}) {
+    const processors = globalThis.navigator?.hardwareConcurrency ?? 2;
+    const url = new URL("./worker.js", import.meta.url);
+    const make = create ?? (() => new Worker(url, { type: "module" }));
+    this.lanes = Array.from({ length: count ?? Math.min(Math.max(processors - 1, 1), 4) }, () => {
+      const lane = new Lane(make());
+      lane.port.postMessage({ wasm }, []);
+      return lane;
+    });
+  }
+
+  /**
+   * A decoder of a file, in the worker that has the fewest.
+   * @param {Header} header
+   * @param {DecoderOptions} [options]
+   */
+  decoder(header, options = {}) {
+    const lane = this.lanes.reduce((one, other) => (other.decoders < one.decoders ? other : one));
+    lane.decoders++;
+    const number = this.#decoders++;
+    lane.port.postMessage({ decoder: number, header, options }, []);
+    return new RemoteDecoder(lane, number);
+  }
+
+  /** Ends all workers at once; what is under way is rejected. */
+  close() {
+    for (const { port } of this.lanes) (port.terminate ?? port.close)?.call(port);
+    for (const lane of this.lanes) lane.fail(new Error("the workers were closed"));
+  }
+}
+
+/**
+ * @template T
+ * @param {Promise<T>} promise
+ * @param {AbortSignal} [signal]
+ * @returns {Promise<T>}
+ */
+function unlessAborted(promise, signal) {
+  if (!signal) return promise;
+  return new Promise((resolve, reject) => {
+    const stop = () => reject(signal.reason);
+    signal.addEventListener("abort", stop, { once: true });
+    promise.then(resolve, reject).finally(() => signal.removeEventListener("abort", stop));
+  });
+}
