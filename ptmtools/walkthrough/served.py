@@ -76,6 +76,7 @@ class Served:
     index_bytes, statistics_bytes: on the link, and record_bytes, geometry_bytes: (C,). All of it
         counts as gzip makes it: servers send it so (docs/walkthrough.md).
     surfaces: the geometry of all cells.
+    locator: of the cells.
     """
 
     folder: Path
@@ -87,6 +88,7 @@ class Served:
     record_bytes: NDArray[np.int64]
     geometry_bytes: NDArray[np.int64]
     surfaces: Surfaces
+    locator: Locator
 
     @property
     def cell_count(self) -> int:
@@ -144,6 +146,7 @@ def read_served(database: str | os.PathLike[str]) -> Served:
         data = _bytes(file)
         geometry.append(_glb(file, data, cell, len(index["textures"])))
         sizes.append(_on_link(data))
+    locator = Locator(records)
     return Served(
         folder,
         index,
@@ -153,7 +156,8 @@ def read_served(database: str | os.PathLike[str]) -> Served:
         statistics_bytes,
         np.array([size for _, size in found], dtype=np.int64),
         np.array(sizes, dtype=np.int64),
-        _surfaces(geometry, Locator(records)),
+        _surfaces(geometry, locator),
+        locator,
     )
 
 

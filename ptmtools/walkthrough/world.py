@@ -14,7 +14,6 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.progress import Progress, silent
 from ptmtools.walkthrough.catalogue import Catalogue, catalogue_of
-from ptmtools.walkthrough.locating import Locator
 from ptmtools.walkthrough.served import Served
 from ptmtools.walkthrough.view.frustum import Frustum
 from ptmtools.walkthrough.view.pyramids import read_pyramids
@@ -129,7 +128,7 @@ def prepare(
         )
     time = np.arange(int(np.floor(walk.duration * rate + 1e-9)) + 1) / rate
     eye, direction = walk.at(time)
-    cell = Locator(served.records).along(eye)
+    cell = served.locator.along(eye)
     astray = cell < 0
     if astray.mean() > _ASTRAY:
         raise InputError(

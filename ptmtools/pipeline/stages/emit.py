@@ -33,7 +33,8 @@ EMIT: Stage[None] = Stage(
     about="Write the served files: cells and hints.",
     recipe=8,
     changed="the hints say what each level of a texture adds, its mean colour, and what a texel "
-    "takes on a GPU; --first-look writes a bundle of coarse levels for each cell; "
+    "takes on a GPU, and how fine each is needed in each cell; --first-look writes a bundle of "
+    "coarse levels for each cell; "
     "viewpoints look where pictures are",
     options=EmitOptions,
     reads=(SCENE, CELLS, PVS, ACH, TEXTURES),
