@@ -74,6 +74,17 @@ const going = settled(remote.refine(group(1), { signal: stop.signal }));
 stop.abort();
 told.aborted = await going;
 told.again = digest(await remote.refine(group(1)));
+// Several levels in one go, until one is refused; then from there on.
+const swift = workers.decoder(ptm.header, { format: "native" });
+const refused = await swift.refineAll([group(0), group(1), bad]).catch((error) => error);
+told.refused = [refused.code, refused.decoded, swift.level];
+const rest = ptm.levels.slice(2).map((_, n) => group(n + 2));
+told.rest = (await swift.refineAll(rest)).map(digest);
+// A module that cannot be had is looked for by the worker.
+const failing = new DecoderWorkers({ count: 1, create, wasm: Promise.reject(new Error("none")) });
+const alone = failing.decoder(ptm.header, { format: "native" });
+told.alone = [digest(await alone.refine(group(0))), failing.lanes[0].engine !== ""];
+failing.close();
 const busy = workers.decoder(ptm.header, {});
 const lane = busy.lane;
 const before = workers.decoder(ptm.header, {});

@@ -83,6 +83,9 @@ def test_bytes_can_be_given_again(told: dict[str, Any], levels: list[str]) -> No
     assert told["damaged"] == "PTM-I108"
     assert told["first"] == levels[0]
     assert told["kept"] > 0
+    assert told["refused"] == ["PTM-I107", 2, 1]
+    assert told["rest"] == levels[2:]
+    assert told["alone"] == [levels[0], True]
 
 
 def test_what_is_aborted_is_not_lost(told: dict[str, Any], levels: list[str]) -> None:

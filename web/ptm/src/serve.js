@@ -10,14 +10,16 @@ import { loadEngine } from "./load-engine.js";
  * @typedef {{wasm?: import("./load-engine.js").ModuleSource}
  *   | {decoder: number, header: import("./container.js").Header,
  *      options: import("./level-decoder.js").DecoderOptions}
- *   | {decoder: number, data: Uint8Array}
+ *   | {decoder: number, groups: Uint8Array[]}
  *   | {decoder: number}} Order
  */
 
 /**
- * What it answers to each group of bytes, in order.
- * @typedef {{image: import("./level-decoder.js").Image, engine: string}
- *   | {code: string | null, message: string}} Answer
+ * What it answers when it has refined: the levels that were decoded, and what is wrong with the next.
+ * @typedef {object} Answer
+ * @property {import("./level-decoder.js").Image[]} images
+ * @property {string} engine its name, "" if there was none
+ * @property {{code: string | null, message: string} | null} fault
  */
 
 /**
@@ -48,10 +50,17 @@ export function serve(port) {
     const engine = await (loading ??= loadEngine());
     if ("header" in order) {
       decoders.set(order.decoder, new LevelDecoder(order.header, engine, order.options));
-    } else if ("data" in order) {
+    } else if ("groups" in order) {
       const decoder = /** @type {LevelDecoder} */ (decoders.get(order.decoder));
-      const image = decoder.refine(order.data);
-      port.postMessage({ image, engine: engine.name }, [image.data.buffer]);
+      const images = [];
+      let fault = null;
+      try {
+        for (const group of order.groups) images.push(decoder.refine(group));
+      } catch (error) {
+        fault = faultOf(error);
+      }
+      const answer = { images, engine: engine.name, fault };
+      port.postMessage(answer, images.map(({ data }) => data.buffer));
     } else {
       decoders.delete(order.decoder);
     }
@@ -60,9 +69,14 @@ export function serve(port) {
   port.onmessage = ({ data: order }) => {
     before = before.then(() =>
       obey(order).catch((error) => {
-        const code = error instanceof PtmError ? error.code : null;
-        port.postMessage({ code, message: String(error?.message ?? error) }, []);
+        port.postMessage({ images: [], engine: "", fault: faultOf(error) }, []);
       }),
     );
   };
+}
+
+/** @param {any} error */
+function faultOf(error) {
+  const code = error instanceof PtmError ? error.code : null;
+  return { code, message: String(error?.message ?? error) };
 }

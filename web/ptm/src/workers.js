@@ -5,34 +5,36 @@ import { PtmError } from "./errors.js";
 /** @typedef {import("./container.js").Header} Header */
 /** @typedef {import("./level-decoder.js").Image} Image */
 /** @typedef {import("./level-decoder.js").DecoderOptions} DecoderOptions */
+/** @typedef {import("./load-engine.js").ModuleSource} ModuleSource */
 
 /**
  * @typedef {object} WorkersOptions
  * @property {number} [count] of workers; one less than there are processors, 1 to 4
- * @property {import("./load-engine.js").ModuleSource} [wasm] where `decoder.wasm` is, if elsewhere
+ * @property {ModuleSource | Promise<ModuleSource>} [wasm] where `decoder.wasm` is, if elsewhere, or
+ *   what will be made of it while the workers start
  * @property {() => import("./serve.js").Port} [create] how a worker is made, if otherwise
  */
 
-/** A group of bytes on its way through a worker. */
+/** Groups of bytes on their way through a worker. */
 class Task {
   /**
    * @param {number} decoder
-   * @param {Uint8Array} data
+   * @param {Uint8Array[]} groups
    */
-  constructor(decoder, data) {
+  constructor(decoder, groups) {
     this.decoder = decoder;
-    this.data = data;
-    /** @type {(image: Image) => void} */
+    this.groups = groups;
+    /** @type {(images: Image[]) => void} */
     this.resolve = () => {};
     /** @type {(error: unknown) => void} */
     this.reject = () => {};
-    /** @type {Promise<Image>} */
-    this.image = new Promise((resolve, reject) => {
+    /** @type {Promise<Image[]>} */
+    this.images = new Promise((resolve, reject) => {
       this.resolve = resolve;
       this.reject = reject;
     });
     // Whoever asked may have gone.
-    this.image.catch(() => {});
+    this.images.catch(() => {});
   }
 }
 
@@ -43,18 +45,38 @@ class Lane {
   /** @type {Task | undefined} */
   #task;
 
-  /** @param {import("./serve.js").Port} port */
-  constructor(port) {
+  /**
+   * @param {import("./serve.js").Port} port
+   * @param {WorkersOptions["wasm"]} wasm
+   */
+  constructor(port, wasm) {
     this.port = port;
+    // A worker that is not told of a module looks for it by itself.
+    this.ready = Promise.resolve(wasm).then(
+      (wasm) => port.postMessage({ wasm }, []),
+      () => {},
+    );
     this.decoders = 0;
+    /** @type {Error | undefined} */
+    this.failure = undefined;
     /** Name of the engine, once it has worked. */
     this.engine = "";
     port.onmessage = ({ data }) => this.#answered(data);
     port.onerror = (event) => this.fail(new Error(`a worker failed: ${event.message ?? event}`));
   }
 
+  /**
+   * What comes behind the module, in order.
+   * @param {import("./serve.js").Order} order
+   * @param {Transferable[]} [transfer]
+   */
+  tell(order, transfer = []) {
+    this.ready.then(() => this.port.postMessage(order, transfer));
+  }
+
   /** @param {Task} task */
   add(task) {
+    if (this.failure) return task.reject(this.failure);
     this.#waiting.push(task);
     this.#next();
   }
@@ -69,8 +91,9 @@ class Lane {
     return place >= 0;
   }
 
-  /** @param {Error} error */
+  /** Nothing comes of a worker that has failed. @param {Error} error */
   fail(error) {
+    this.failure = error;
     for (const task of [this.#task, ...this.#waiting]) task?.reject(error);
     this.#task = undefined;
     this.#waiting = [];
@@ -81,20 +104,21 @@ class Lane {
     this.#task = this.#waiting.shift();
     if (!this.#task) return;
     const { decoder } = this.#task;
-    const data = this.#task.data.slice();
-    this.port.postMessage({ decoder, data }, [data.buffer]);
+    const groups = this.#task.groups.map((group) => group.slice());
+    this.tell({ decoder, groups }, groups.map(({ buffer }) => buffer));
   }
 
   /** @param {import("./serve.js").Answer} answer */
-  #answered(answer) {
+  #answered({ images, engine, fault }) {
     const task = this.#task;
     this.#task = undefined;
-    if ("image" in answer) {
-      this.engine = answer.engine;
-      task?.resolve(answer.image);
+    this.engine = engine || this.engine;
+    if (fault) {
+      const { code, message } = fault;
+      const error = code ? new PtmError(code, message.slice(code.length + 2)) : new Error(message);
+      task?.reject(Object.assign(error, { decoded: images.length }));
     } else {
-      const { code, message } = answer;
-      task?.reject(code ? new PtmError(code, message.slice(code.length + 2)) : new Error(message));
+      task?.resolve(images);
     }
     this.#next();
   }
@@ -130,11 +154,11 @@ class RemoteDecoder {
     this.#asked = true;
     let task = this.#task;
     if (!task) {
-      task = this.#task = new Task(this.number, data);
+      task = this.#task = new Task(this.number, [data]);
       this.lane.add(task);
     }
     try {
-      const image = await unlessAborted(task.image, signal);
+      const [image] = await unlessAborted(task.images, signal);
       this.level = image.level;
       this.#task = undefined;
       return image;
@@ -146,11 +170,33 @@ class RemoteDecoder {
     }
   }
 
+  /**
+   * The next levels from their groups, in one go: threads that are busy are waited for only once.
+   * What is thrown tells how many were `decoded` before.
+   * @param {Uint8Array[]} groups
+   */
+  async refineAll(groups) {
+    if (this.#asked || this.#task) throw new Error("a level is being decoded already");
+    this.#asked = true;
+    try {
+      const task = new Task(this.number, groups);
+      this.lane.add(task);
+      const images = await task.images;
+      this.level += images.length;
+      return images;
+    } catch (error) {
+      this.level += /** @type {{decoded?: number}} */ (error).decoded ?? 0;
+      throw error;
+    } finally {
+      this.#asked = false;
+    }
+  }
+
   /** Gives back what the worker keeps of it; it cannot be used any more. */
   close() {
     if (this.#task) this.lane.callOff(this.#task);
     this.lane.decoders--;
-    this.lane.port.postMessage({ decoder: this.number }, []);
+    this.lane.tell({ decoder: this.number });
   }
 }
 
@@ -163,11 +209,8 @@ export class DecoderWorkers {
     const processors = globalThis.navigator?.hardwareConcurrency ?? 2;
     const url = new URL("./worker.js", import.meta.url);
     const make = create ?? (() => new Worker(url, { type: "module" }));
-    this.lanes = Array.from({ length: count ?? Math.min(Math.max(processors - 1, 1), 4) }, () => {
-      const lane = new Lane(make());
-      lane.port.postMessage({ wasm }, []);
-      return lane;
-    });
+    count ??= Math.min(Math.max(processors - 1, 1), 4);
+    this.lanes = Array.from({ length: count }, () => new Lane(make(), wasm));
   }
 
   /**
@@ -179,7 +222,7 @@ export class DecoderWorkers {
     const lane = this.lanes.reduce((one, other) => (other.decoders < one.decoders ? other : one));
     lane.decoders++;
     const number = this.#decoders++;
-    lane.port.postMessage({ decoder: number, header, options }, []);
+    lane.tell({ decoder: number, header, options });
     return new RemoteDecoder(lane, number);
   }
 
