@@ -13,6 +13,7 @@ import numpy as np
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.walkthrough.memory import columns_of
+from ptmtools.walkthrough.recording import Browser
 from ptmtools.walkthrough.served import Document, Served
 
 #: A level that only repeats the texels of the one below still sharpens what is filtered between
@@ -113,6 +114,12 @@ class Catalogue:
         return tuple(
             np.unique(np.array([t for row in record["textures"] for t in row], dtype=np.int64))
             for record in self.records
+        )
+
+    def as_found(self, browser: Browser) -> Catalogue:
+        """The same with records and geometry as large as a browser found them."""
+        return replace(
+            self, record_bytes=browser.record_bytes, geometry_bytes=browser.geometry_bytes
         )
 
     def counted_by_paper(self, served: Served) -> Catalogue:

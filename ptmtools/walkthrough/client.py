@@ -7,6 +7,7 @@ has been downloaded stays in main memory; texture memory is what is short.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections import deque
 from dataclasses import dataclass
@@ -124,8 +125,8 @@ class Client(ABC):
         self.frame = 0
         self.files = {
             Kind.INDEX: Files(Kind.INDEX, np.array([stock.index_bytes])),
-            Kind.RECORD: Files(Kind.RECORD, stock.record_bytes),
-            Kind.GEOMETRY: Files(Kind.GEOMETRY, stock.geometry_bytes),
+            Kind.RECORD: Files(Kind.RECORD, stock.record_bytes.copy()),
+            Kind.GEOMETRY: Files(Kind.GEOMETRY, stock.geometry_bytes.copy()),
             Kind.TEXTURE: Files(Kind.TEXTURE, stock.ends[:, -1]),
             Kind.STATISTICS: Files(Kind.STATISTICS, np.array([stock.statistics_bytes])),
         }
@@ -158,10 +159,21 @@ class Client(ABC):
             self.cell = here
         self.settle()
 
+    def glance(self, frame: int) -> None:  # noqa: B027 - only browsers have item buffers of other frames
+        """There is a frame; who has an item buffer may see another one than before."""
+
+    def give(self, kind: Kind, number: int, size: int) -> None:
+        """A file is on the way before the client asks for it."""
+        if not self.files[kind].asked[number]:
+            self.files[kind].size[number] = size
+            self.ask(kind, number, size, math.inf)
+
     def ask(self, kind: Kind, number: int, end: int, priority: float) -> None:
         """Asks for a file up to a byte."""
-        part = self.files[kind].ask(number, end)
-        self.waiting.append(self.link.request(part.end - part.begin, priority, part))
+        part, now = self.files[kind].ask(number, end), self.link.now
+        browser = self.world.browser
+        late = {"late": browser.sent.until(now) - now} if browser else {}
+        self.waiting.append(self.link.request(part.end - part.begin, priority, part, **late))
 
     def arrived(self, request: Request) -> None:
         """A request is finished."""

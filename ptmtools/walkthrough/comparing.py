@@ -32,6 +32,7 @@ class SimulateOptions:
     memory: for textures, such as 4MiB, 10% of what all textures take, or inf, with commas in
         between.
     paper_bytes: count three bytes a texel of RGB, as the paper does; graphics processors take four.
+    one_range: ask for one range of a file at a time, as browsers must.
 
     Raises InputError: PTM-I711 a link that cannot be; PTM-I712 a word that is no such quantity.
     """
@@ -46,6 +47,7 @@ class SimulateOptions:
     protocol: Literal["h1", "h2"] = "h1"
     memory: str = "4MiB,10%"
     paper_bytes: bool = False
+    one_range: bool = False
 
     def __post_init__(self) -> None:
         self.links()
@@ -102,7 +104,8 @@ def require_hints(served: Served, policies: Sequence[Declared]) -> None:
 
 
 def counted(world: World, options: SimulateOptions) -> World:
-    """The world with texture memory counted as asked."""
+    """The world with texture memory counted, and ranges asked for, as the options say."""
+    world = replace(world, one_range=world.one_range or options.one_range)
     if not options.paper_bytes:
         return world
     return replace(world, catalogue=world.catalogue.counted_by_paper(world.served))

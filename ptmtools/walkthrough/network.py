@@ -127,11 +127,14 @@ class Link:
         """Bytes so far of what is still arriving: headers, bodies, and what is unwanted."""
         return sum(r.unwanted if r.cancelled else r.arrived for r in self._arriving)
 
-    def request(self, size: int, priority: float, tag: object = None) -> Request:
-        """Ask for ``size`` bytes now; ValueError if they are fewer than none."""
+    def request(self, size: int, priority: float, tag: object = None, late: float = 0.0) -> Request:
+        """Ask for ``size`` bytes now; ValueError if they are fewer than none. It goes out so many
+        seconds late, ``late``, on a connection that it has taken."""
         if size < 0:
             raise ValueError(f"a request of {size} bytes")
-        request = Request(size, self.conditions.overhead, priority, tag, self.requests, self.now)
+        request = Request(
+            size, self.conditions.overhead, priority, tag, self.requests, self.now, late
+        )
         self.requests += 1
         if self._shared:
             insort(self._queue, request, key=_rank)
@@ -251,7 +254,8 @@ class Link:
     def _send(self, request: Request, latency: float) -> None:
         if self._loss and self._random.random() < self._loss:
             latency += self._latency
-        request.sent, request.starts = self.now, self.now + latency
+        request.sent = self.now + request.late
+        request.starts = request.sent + latency
         insort(self._away, request, key=_starts)
 
     def _next_step(self) -> None:

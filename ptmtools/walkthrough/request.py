@@ -17,7 +17,7 @@ class Request:
     priority: the greater, the sooner.
     tag: whatever the client wants to know it by.
     number: how many requests were made before.
-    issued: when it was asked for, s.
+    issued: when it was asked for, s. late: so many seconds later it goes out on its connection.
     sent: when it went out, s, later than that if it had to wait for a connection; None before.
     first_byte: when its response began to arrive, s; None before.
     ended: when it was finished or cancelled, s; None before.
@@ -34,6 +34,7 @@ class Request:
     tag: object
     number: int
     issued: float
+    late: float = 0.0
     sent: float | None = None
     first_byte: float | None = None
     ended: float | None = None

@@ -6,16 +6,22 @@ it ask for more; what is in texture memory changes only with a frame.
 
 from __future__ import annotations
 
+import math
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.walkthrough.allocation import picture
-from ptmtools.walkthrough.client import DOCUMENTS, Client
+from ptmtools.walkthrough.client import DOCUMENTS, Client, Kind
 from ptmtools.walkthrough.network import Conditions, Link
 from ptmtools.walkthrough.policies import Declared
+from ptmtools.walkthrough.request import Request
 from ptmtools.walkthrough.world import World
+
+#: Seconds from one look of a client in a browser to the next, unless something has arrived.
+LOOK_SECONDS = 0.2
 
 
 @dataclass(frozen=True)
@@ -78,13 +84,13 @@ def simulate(world: World, policy: Declared, conditions: Conditions, budget: int
     shown = np.zeros(stock.ends.shape, dtype=bool)
     drawn = np.zeros(stock.cell_count, dtype=bool)
     each = np.arange(stock.texture_count)
+    passing = _Passing(client, link)
     for f in range(frames):
         for tick in range(1, client.ticks if f else 0):
             part = tick / client.ticks
-            _pass(client, link, float((1 - part) * world.time[f - 1] + part * world.time[f]))
+            passing.until(float((1 - part) * world.time[f - 1] + part * world.time[f]))
             client.tick()
-        _pass(client, link, float(world.time[f]))
-        client.look(f)
+        passing.frame(f)
         column[f], there[f] = client.column, client.geometry.whole
         memory[f] = stock.memory[each, client.column].sum()
         rows = views.rows(int(world.view[f]))
@@ -93,7 +99,8 @@ def simulate(world: World, policy: Declared, conditions: Conditions, budget: int
             there[f], client.column, world.colored, shown, drawn,
         )  # fmt: skip
         quality[f] = _quality(client)
-        fetched[f] = link.bytes + sum(request.received for request in client.waiting)
+        arriving = sum(request.received for request in client.waiting)
+        fetched[f] = link.bytes - passing.page_bytes + arriving
         client.fetch()
     steps = np.diff(column, axis=0, prepend=0)
     before = column - steps
@@ -120,21 +127,86 @@ def simulate(world: World, policy: Declared, conditions: Conditions, budget: int
         useful=textures + float(stock.geometry_bytes[drawn].sum()),
         uploads=int(np.maximum(held[0] - held[1], 0).sum()),
         switches=int(np.count_nonzero(steps)),
-        requests=link.requests,
+        requests=link.requests - passing.page,
         stalls=int((~there[np.arange(frames), world.cell]).sum()),
         overruns=int((memory > budget).sum()),
     )
 
 
-def _pass(client: Client, link: Link, until: float) -> None:
-    """Time passes."""
-    while True:
-        finished = link.advance(until)
-        client.estimate.observe(finished)
-        if finished is None:
-            return
-        client.arrived(finished)
-        client.fetch()
+class _Passing:
+    """Time passes for a client, which in a browser does not look in every frame, and finds files on
+    the way that it has not asked for.
+
+    Attributes
+    ----------
+    page, page_bytes: how many files of the page itself were asked for, and the bytes of those that
+        have come.
+    """
+
+    def __init__(self, client: Client, link: Link) -> None:
+        self._client, self._link = client, link
+        self._browser = client.world.browser
+        self._given = deque(self._browser.files if self._browser else ())
+        self._begun, self._news, self._looked = False, False, -math.inf
+        self._late: deque[tuple[float, Request]] = deque()
+        self.page = self.page_bytes = 0
+
+    def until(self, moment: float) -> None:
+        """Time passes, and the client handles what arrives."""
+        while True:
+            due = self._late[0][0] if self._late else math.inf
+            finished = self._arrival(min(due, moment))
+            if finished:
+                free = self._link.now
+                if self._browser:
+                    free = self._browser.taken.until(free)
+                if free <= self._link.now and not self._late:
+                    self._handle(finished)
+                else:
+                    self._late.append((free, finished))
+            elif due < moment:
+                self._handle(self._late.popleft()[1])
+            else:
+                return
+
+    def frame(self, frame: int) -> None:
+        """Time passes up to a frame, and the client looks: in a browser several times a second, and
+        if there is something new."""
+        now = float(self._client.world.time[frame])
+        self.until(now)
+        self._begun = True
+        self._client.glance(frame)
+        if self._browser is None or self._news or now - self._looked >= LOOK_SECONDS:
+            self._looked, self._news = now, False
+            self._client.look(frame)
+
+    def _handle(self, finished: Request) -> None:
+        self._client.arrived(finished)
+        self._news = True
+        if self._begun:
+            self._client.fetch()
+
+    def _arrival(self, moment: float) -> Request | None:
+        """The next of the client's files to arrive by then."""
+        while self._given and self._given[0].asked <= moment:
+            finished = self._flow(max(self._given[0].asked, self._link.now))
+            if finished:
+                return finished
+            given = self._given.popleft()
+            if given.kind == "page":
+                self.page += 1
+                self._link.request(given.size, math.inf)
+            else:
+                self._client.give(Kind[given.kind.upper()], given.number, given.size)
+        return self._flow(moment)
+
+    def _flow(self, moment: float) -> Request | None:
+        while True:
+            finished = self._link.advance(moment)
+            self._client.estimate.observe(finished)
+            if finished is None or finished.tag is not None:
+                return finished
+            self.page_bytes += finished.size
 
 
 def _quality(client: Client) -> float:

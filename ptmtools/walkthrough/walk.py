@@ -19,6 +19,7 @@ from ptmtools import schemas
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError, LimitError, naming
 from ptmtools.files import open_regular
+from ptmtools.walkthrough.recording import Browser, browser_of
 
 FORMAT, SCHEMA = "ptmtools walk", 1
 #: A larger file is no walk, bytes: this is a day at 60 samples a second.
@@ -40,6 +41,7 @@ class Walk:
     direction: (n, 3) unit vectors, where the eye looks.
     field_of_view: vertical, radians.
     aspect: width of the picture by its height.
+    browser: how it was walked, if it was recorded in one; else None.
 
     Raises
     ------
@@ -53,6 +55,7 @@ class Walk:
     direction: Floats
     field_of_view: float
     aspect: float
+    browser: Browser | None = None
 
     def __post_init__(self) -> None:
         count = len(self.time)
@@ -103,7 +106,8 @@ class Walk:
 
 
 def walk_text(walk: Walk) -> str:
-    """The document of a walk, a line for each sample, with `DIGITS` digits after the point."""
+    """The document of a walk, a line for each sample, with `DIGITS` digits after the point; of one
+    that was recorded in a browser only where it led."""
     rows = np.column_stack([walk.time, walk.eye, walk.direction]).round(DIGITS) + 0.0  # no -0
     head = json.dumps(
         {
@@ -121,8 +125,8 @@ def read_walk(path: str | os.PathLike[str]) -> Walk:
     """The walk in a file.
 
     Raises InputError: PTM-I800 the file cannot be read; PTM-I801 it is no walk; PTM-I802 it has
-    another schema number, or is not as the schema says; PTM-I803 to PTM-I806 as `Walk`. LimitError
-    PTM-L800: it is larger than any walk.
+    another schema number, or is not as the schema says; PTM-I803 to PTM-I806 as `Walk`, PTM-I807 as
+    `Browser`. LimitError PTM-L800: it is larger than any walk.
     """
     try:
         with open_regular(Path(path)) as stream:
@@ -156,7 +160,9 @@ def parse_walk(data: bytes) -> Walk:
         raise InputError("PTM-I802", fault.message, place=fault.place) from None
     rows = np.array(document["samples"], dtype=np.float64).reshape(-1, 7)
     view = float(document["fieldOfView"]), float(document["aspect"])
-    return Walk(rows[:, 0], rows[:, 1:4], rows[:, 4:], *view)
+    told = document.get("browser")
+    browser = browser_of(told, rows[:, 0]) if told is not None else None
+    return Walk(rows[:, 0], rows[:, 1:4], rows[:, 4:], *view, browser)
 
 
 def _no_walk(what: str) -> InputError:

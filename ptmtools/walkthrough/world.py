@@ -14,6 +14,7 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.progress import Progress, silent
 from ptmtools.walkthrough.catalogue import Catalogue, catalogue_of
+from ptmtools.walkthrough.recording import Browser
 from ptmtools.walkthrough.served import Served
 from ptmtools.walkthrough.view.frustum import Frustum
 from ptmtools.walkthrough.view.pyramids import read_pyramids
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 RATE = 5.0
 #: Pixels of the item buffer that errors are summed over.
 PIXELS = (160, 90)
+#: Pixels of the item buffer of a browser, whatever the form of its screen.
+_ITEM_PIXELS = 3600
 #: Frames of a walk at most: some five hours.
 MOST_FRAMES = 100_000
 #: Share of the walk that may lie in no cell.
@@ -50,6 +53,10 @@ class World:
     cell: (F,) that the eye is in; where it is in none, the one before.
     still: (F,) whether the viewpoint has not moved for a second.
     rate: frames a second.
+    one_range: whether a client has one range of a file on the way at a time, as browsers must.
+    browser: how the walk was walked in one, or None. Times then are since navigation, and a frame
+        has the view of the item buffer that is at hand.
+    drawn: (F,) the frame in which that was drawn, -1 if there is none; None unless in a browser.
     colored: whether clients know the mean colour of each texture; else it is grey until its first
         level comes.
     """
@@ -67,6 +74,9 @@ class World:
     still: Bools
     rate: float = RATE
     colored: bool = True
+    one_range: bool = False
+    browser: Browser | None = None
+    drawn: Ints | None = None
 
     @property
     def frames(self) -> int:
@@ -80,9 +90,10 @@ class World:
 
     def standing(self, seconds: float) -> World:
         """Who stays at the first frame of this, so long."""
-        count = int(np.ceil(seconds * self.rate)) + 1
+        rate = RATE if self.browser else self.rate
+        count = int(np.ceil(seconds * rate)) + 1
         first = np.zeros(count, np.int64)
-        time = np.arange(count) / self.rate
+        time = np.arange(count) / rate
         return replace(
             self,
             view=self.view[first],
@@ -91,6 +102,9 @@ class World:
             direction=self.direction[first],
             cell=self.cell[first],
             still=time >= STILL_SECONDS,
+            rate=rate,
+            browser=None,
+            drawn=None,
         )
 
 
@@ -126,9 +140,17 @@ def prepare(
             f"a walk of {walk.duration:g} s has more than {MOST_FRAMES:,} frames",
             remedy="give a shorter one",
         )
-    time = np.arange(int(np.floor(walk.duration * rate + 1e-9)) + 1) / rate
-    eye, direction = walk.at(time)
-    cell = served.locator.along(eye)
+    browser = walk.browser
+    if browser:
+        _require_fitting(browser, served)
+        rate, time = (len(walk.time) - 1) / walk.duration, walk.time
+        eye, direction, cell = walk.eye, walk.direction, browser.cell
+        if (cell < 0).any():
+            cell = np.where(cell < 0, served.locator.along(eye), cell)
+    else:
+        time = np.arange(int(np.floor(walk.duration * rate + 1e-9)) + 1) / rate
+        eye, direction = walk.at(time)
+        cell = served.locator.along(eye)
     astray = cell < 0
     if astray.mean() > _ASTRAY:
         raise InputError(
@@ -140,24 +162,55 @@ def prepare(
     cell = cell[np.where(known < 0, int(np.argmax(~astray)), known)]
     textures = read_pyramids(served, progress) if pyramids is None else pyramids
     camera = Camera(*pixels, walk.field_of_view, walk.aspect)
-    seen, view = np.unique(np.concatenate([eye, direction], axis=1), axis=0, return_inverse=True)
+    pose, drawn = np.concatenate([eye, direction], axis=1), None
+    if browser:
+        camera, drawn = _camera(walk, browser), _drawn(time, browser.age)
+        pose = pose[np.where(drawn < 0, np.arange(len(time)), drawn)]
+    seen, view = np.unique(pose, axis=0, return_inverse=True)
     if views is None:
         eyes, looks = seen[:, :3], seen[:, 3:]
         views = look(served.surfaces, textures, camera, eyes, looks, progress, full=full)
+    catalogue = catalogue_of(served, textures.differences, textures.mean)
     return World(
         served=served,
         pyramids=textures,
-        catalogue=catalogue_of(served, textures.differences, textures.mean),
+        catalogue=catalogue.as_found(browser) if browser else catalogue,
         views=views,
         view=view.reshape(-1).astype(np.int64),
         camera=camera,
-        time=time,
+        time=time + browser.begun if browser else time,
         eye=eye,
         direction=direction,
         cell=cell,
         still=_still(time, eye, direction),
         rate=rate,
+        one_range=browser is not None,
+        browser=browser,
+        drawn=drawn,
     )
+
+
+def _require_fitting(browser: Browser, served: Served) -> None:
+    if len(browser.record_bytes) != served.cell_count:
+        raise InputError(
+            "PTM-I700",
+            f"was recorded among {len(browser.record_bytes)} cells, not {served.cell_count}",
+            remedy="give the database whose site it was recorded on",
+        )
+
+
+def _camera(walk: Walk, browser: Browser) -> Camera:
+    """With twice as many pixels each way as the viewer's item buffer has."""
+    tall = max(1, round(np.sqrt(_ITEM_PIXELS / walk.aspect)))
+    wide = max(1, round(_ITEM_PIXELS / tall))
+    return Camera(2 * wide, 2 * tall, walk.field_of_view, walk.aspect, browser.lines)
+
+
+def _drawn(time: Floats, age: Floats) -> Ints:
+    """(F,) the frame in which the item buffer was drawn that is at hand in each, -1 without one."""
+    # It is dated by the beginning of its frame, frames by their end.
+    frames: Ints = np.where(age < 0, -1, np.searchsorted(time, time - age, "right"))
+    return frames
 
 
 def _still(time: Floats, eye: Floats, direction: Floats) -> Bools:

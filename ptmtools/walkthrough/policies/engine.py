@@ -20,10 +20,11 @@ from typing import Protocol
 
 import numpy as np
 
-from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.arrays import Floats, Ints
 from ptmtools.walkthrough.allocation import allocate, gather, holes, next_fetch
 from ptmtools.walkthrough.client import Client, Kind
 from ptmtools.walkthrough.network import Link
+from ptmtools.walkthrough.policies.items import Items
 from ptmtools.walkthrough.request import Request
 from ptmtools.walkthrough.world import World
 
@@ -31,8 +32,8 @@ from ptmtools.walkthrough.world import World
 RANGE_SECONDS, RANGE_BYTES = 0.2, 8000
 #: Requests at a time.
 CONNECTIONS = 6
-#: What a request costs besides its bytes: headers, and waiting.
-OVERHEAD = 300
+#: Bytes of the headers of a request, and the most that waiting counts, of links without a limit.
+OVERHEAD, LONGEST_WAIT = 300, 1 << 20
 #: What a pixel is wrong by where there is nothing: the mean of what was measured, 0 to 255.
 NOTHING = 64.0
 #: The record of a neighbouring cell is worth as much as so large a share of the screen.
@@ -81,7 +82,9 @@ class EngineClient(Client):
         self._target: Ints = np.zeros(stock.texture_count, np.int64)
         self._kept = np.zeros(stock.ends.shape)
         self._worth: Worth | None = None
-        self._there: list[Bools] = []
+        self._items, self._looked = Items(self), -math.inf
+        #: With what is there twice while it grows.
+        self._all = budget
         self.frustum = world.frustum(0)
 
     # What policies look at.
@@ -89,30 +92,26 @@ class EngineClient(Client):
     def sight(self, age: int) -> Floats:
         """(T, K) the share of the item buffer that wants each level, in columns, as it was drawn
         so many frames ago: with the geometry that was there."""
-        frame = max(0, self.frame - age)
         found = np.zeros(self.world.catalogue.ends.shape)
-        views = self.world.views
-        rows = views.rows(int(self.world.view[frame]))
-        gather(
-            rows.start, rows.stop, views.cell, views.texture, views.sight, self._there[frame], found
-        )
+        item, views = self._items.at_hand(age), self.world.views
+        if item:
+            rows = views.rows(item.view)
+            gather(rows.start, rows.stop, views.cell, views.texture, views.sight, item.there, found)
         return found
 
     def placeholders(self, age: int) -> Floats:
         """(C,) the share of the item buffer, so many frames old, that shows placeholders: of cells
         that may be seen and whose geometry is not there, the far faces of their boxes."""
         stock, world = self.world.catalogue, self.world
-        frame, there = max(0, self.frame - age), self.geometry.whole
         share = np.zeros(stock.cell_count)
-        known = self.known()
-        missing = known[~there[known]]
-        if len(missing):
-            view = int(world.view[frame])
-            rays, _ = world.camera.rays(world.direction[frame : frame + 1])
+        item = self._items.at_hand(age)
+        if item and len(item.missing):
+            there = item.there if world.browser else self.geometry.whole
+            rays, _ = world.camera.rays(world.direction[item.frame : item.frame + 1])
             holes(
-                rays.reshape(-1, 3)[world.camera.sparse], world.views.owner[view],
-                world.views.depth[view], world.eye[frame], stock.low, stock.high, there,
-                missing, share,
+                rays.reshape(-1, 3)[world.camera.sparse], world.views.owner[item.view],
+                world.views.depth[item.view], world.eye[item.frame], stock.low, stock.high, there,
+                item.missing, share,
             )  # fmt: skip
         return share
 
@@ -135,16 +134,25 @@ class EngineClient(Client):
     def look(self, frame: int) -> None:
         """See `Client.look`."""
         self.frustum = self.world.frustum(frame)
-        self._there.append(self.geometry.whole)
+        self._items.look()
         super().look(frame)
+
+    def glance(self, frame: int) -> None:
+        """See `Client.glance`."""
+        if self._items.glance(frame):
+            self._weigh()
 
     def settle(self) -> None:
         """See `Client.settle`."""
+        if self.world.browser:
+            self.budget = self._all - self._reserve()
         self._weigh()
         if self._worth is None:
             return
         hold, exact = self._worth.hold, self._worth.exact
-        fading = 0.5 ** (1 / (self.world.rate * HELD_SECONDS))
+        now = float(self.world.time[self.frame])
+        fading = 0.5 ** ((now - self._looked) / HELD_SECONDS)
+        self._looked = now
         self._kept = np.maximum(self._kept * fading, hold)
         stock = self.world.catalogue
         worth = hold + HELD_ON * self._kept + HELD_ON**2 * stock.differences
@@ -156,7 +164,14 @@ class EngineClient(Client):
         if request.tag.kind != Kind.TEXTURE:  # type: ignore[attr-defined]
             if self.cell < 0 and self.records.whole[self.world.cell[self.frame]]:
                 self.cell = int(self.world.cell[self.frame])
+            self._items.note()
             self._weigh()
+
+    def _reserve(self) -> int:
+        """Bytes of what is there twice while it grows: at most the greatest texture, less its
+        finest level."""
+        column, memory = self.column, self.world.catalogue.memory
+        return int(memory[np.arange(len(column)), np.maximum(column - 1, 0)].max(initial=0))
 
     def _weigh(self) -> None:
         if self.cell >= 0 and (self.files[Kind.STATISTICS].whole[0] or not self._statistics):
@@ -192,9 +207,8 @@ class EngineClient(Client):
         if self._worth is None:
             return False
         stock, worth = self.world.catalogue, self._worth
-        best, texture, column = next_fetch(
-            worth.fetch, stock.ends, self.textures.asked, self._target, OVERHEAD
-        )
+        asked, overhead = self._asked(), self._overhead()
+        best, texture, column = next_fetch(worth.fetch, stock.ends, asked, self._target, overhead)
         size = np.maximum(self.geometry.size, 1)
         density = np.where(self.geometry.asked == 0, worth.geometry / size, 0.0)
         cell = int(density.argmax())
@@ -208,11 +222,27 @@ class EngineClient(Client):
             return self._whole(Kind.GEOMETRY, cell, float(density[cell]))
         if texture < 0 and worth.ahead is not None:
             best, texture, column = next_fetch(
-                worth.ahead, stock.ends, self.textures.asked, stock.levels, OVERHEAD
+                worth.ahead, stock.ends, asked, stock.levels, overhead
             )
         if texture < 0:
             return False
         return self._range(texture, int(stock.ends[texture, column]), best)
+
+    def _asked(self) -> Ints:
+        """(T,) bytes of each texture from its beginning that are not to be asked for: with one
+        range a file at a time, all of what is on the way."""
+        asked = self.textures.asked
+        if not self.world.one_range:
+            return asked
+        under_way = asked > self.textures.there
+        return np.where(under_way, self.textures.size, asked)
+
+    def _overhead(self) -> int:
+        """Bytes that a request costs besides its own: headers, and what its connection could have
+        brought while it waits. So of a fast link more levels are asked for at once."""
+        latency, bandwidth = self.estimate.latency, self.estimate.bandwidth
+        waiting = latency * bandwidth / 8 / CONNECTIONS if latency else 0.0
+        return OVERHEAD + int(min(waiting, LONGEST_WAIT))
 
     def _whole(self, kind: Kind, number: int, priority: float) -> bool:
         files = self.files[kind]

@@ -12,6 +12,7 @@ from ptmtools.progress import Progress, silent
 from ptmtools.texture import reader
 from ptmtools.texture.detail import difference_between
 from ptmtools.texture.model import Limits
+from ptmtools.texture.samples import in_eight_bits
 from ptmtools.walkthrough.served import BUILD, Served
 from ptmtools.walkthrough.view.records import Pyramids
 
@@ -76,13 +77,7 @@ def _pyramids(served: Served, progress: Progress) -> Pyramids:
 
 
 def _rgb(samples: NDArray[Any]) -> NDArray[np.uint8]:
-    """(h, w, 3) of (h, w, c) samples of any kind; floats count from 0 to 1."""
-    if samples.dtype == np.uint16:
-        shown = (samples >> 8).astype(np.uint8)
-    elif samples.dtype == np.uint8:
-        shown = samples
-    else:
-        held = np.nan_to_num(samples.astype(np.float32))
-        shown = np.rint(np.clip(held, 0, 1) * 255).astype(np.uint8)
+    """(h, w, 3) of (h, w, c) samples of any kind."""
+    shown = in_eight_bits(samples)
     color = shown[:, :, :3] if shown.shape[2] >= 3 else np.repeat(shown[:, :, :1], 3, axis=2)
     return np.ascontiguousarray(color)

@@ -30,13 +30,14 @@ class Camera:
     Attributes
     ----------
     width, height: pixels. field_of_view: vertical, radians. aspect: width over height of the view,
-        whatever its pixels are.
+        whatever its pixels are. lines: of the screen that the picture is made for.
     """
 
     width: int
     height: int
     field_of_view: float
     aspect: float
+    lines: int = LINES
 
     @property
     def sparse(self) -> Bools:
@@ -49,7 +50,7 @@ class Camera:
     @property
     def pixel(self) -> float:
         """Side of a pixel of the screen at depth 1, whatever the pixels of the camera are."""
-        return float(2 * np.tan(self.field_of_view / 2) / LINES)
+        return float(2 * np.tan(self.field_of_view / 2) / self.lines)
 
     def rays(self, direction: Floats) -> tuple[Floats, Floats]:
         """(F, height, width, 3) rays of which the component along the view is 1, from the top left,

@@ -1,7 +1,8 @@
 """Pictures of frames, with exactly the levels that a client has, or with all.
 
-As for the tables, levels are chosen as for a screen of 1080 lines: a smaller picture is that one
-made smaller. At 960 × 540 with two samples each way its samples are the pixels of the screen.
+As for the tables, levels are chosen as for the screen of the walk, of 1080 lines unless it was
+recorded: a smaller picture is that one made smaller. At 960 × 540 with two samples each way its
+samples are the pixels of the screen.
 """
 
 from __future__ import annotations
@@ -30,7 +31,11 @@ class Renderer:
         self._world = world
         camera = world.camera
         self._camera = Camera(
-            self.width * samples, height * samples, camera.field_of_view, camera.aspect
+            self.width * samples,
+            height * samples,
+            camera.field_of_view,
+            camera.aspect,
+            camera.lines,
         )
         self._triangles = triangles_of(world.served.surfaces)
         self._caster = Caster(world.served.surfaces)
