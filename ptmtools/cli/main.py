@@ -34,6 +34,8 @@ COMMANDS = {
     "tradeoff": ("tradeoff", "tradeoff", "Measure what settings cost, and what they are worth."),
     "path": ("path", "path", "Make a walk through every room of a database."),
     "simulate": ("simulate", "simulate", "Walk through a database as clients would see it."),
+    "serve": ("serve", "serve", "Serve a database to browsers on this machine."),
+    "publish": ("publish", "publish", "Write a walk for browsers, a folder for any web server."),
     "encode": ("images", "encode", "Encode images as .ptm files."),
     "decode": ("images", "decode", "Decode .ptm files to images."),
     "warm-up": ("warm_up", "warm_up", "Compile for this machine, before the first run."),

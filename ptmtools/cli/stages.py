@@ -26,7 +26,6 @@ from ptmtools.cli.common import (
 )
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
-from ptmtools.database.emitters import EMITTERS
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.build import build_scene as build, run_stage
 from ptmtools.pipeline.changes import NEVER_RUN
@@ -37,7 +36,6 @@ from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import EMIT, PVS, STAGES
 from ptmtools.pipeline.visitor import Visitor
 from ptmtools.quantities import count, size
-from ptmtools.store.layout import SERVED
 
 #: What ``ptm STAGE DB --report`` prints besides: what that is, and a function of the artifacts that
 #: returns it as a document and as lines.
@@ -199,13 +197,10 @@ def print_report(voice: Voice, report: BuildReport, as_json: bool) -> None:
         voice.say("")
         voice.say(f"The database is {db}. Next:")
         commands = {
+            f"{ptm} serve {db} --open": "walk through it in a browser",
             f"{ptm} plot {db} -o plan.png": "draw its floor plan",
             f"{ptm} validate {db}": "check every file",
         }
-        www = Path(report.database) / SERVED
-        for entry in [e.entry for e in EMITTERS.values() if e.entry and (www / e.entry).exists()]:
-            look = f"look at it on this machine: open {entry}"
-            commands[f"python3 -m http.server -d {db}/{SERVED}"] = look
         width = max(map(len, commands))
         for command, purpose in commands.items():
             voice.say(f"  {command:<{width}}  {purpose}")

@@ -28,7 +28,7 @@ from typing import Any
 #: Names of the schemas.
 HINTS, CELL, STATISTICS = "hints", "cell", "statistics"
 MANIFEST, VALIDATION, GLB, SCENE = "manifest", "validation", "glb", "scene"
-WALK, TRACE, SIMULATION = "walk", "trace", "simulation"
+WALK, TRACE, SIMULATION, SITE = "walk", "trace", "simulation", "site"
 #: So many lists and objects lie in each other at most, where anything may stand.
 DEEPEST = 16
 #: How the message of a number ends that is beyond float64.

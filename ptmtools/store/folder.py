@@ -82,8 +82,7 @@ class DatabaseFolder:
             with open_regular(file) as stream:
                 data = stream.read()
         except OSError as fault:
-            reason = fault.strerror or fault
-            raise _unusable("PTM-D005", f"cannot be read ({reason})", file) from fault
+            raise unreadable(file, fault) from fault
         if sha256(data) != digest:
             raise damaged(file, "its SHA-256 is not the recorded one")
         return data
@@ -116,6 +115,11 @@ class DatabaseFolder:
             except OSError:
                 return name
         return None
+
+
+def unreadable(file: Path, fault: OSError) -> DatabaseError:
+    """The error for a file of a database that the system does not let read, PTM-D005."""
+    return _unusable("PTM-D005", f"cannot be read ({fault.strerror or fault})", file)
 
 
 def damaged(file: Path, what: str) -> DatabaseError:

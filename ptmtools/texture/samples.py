@@ -107,3 +107,16 @@ def round_to(values: NDArray[np.float64], dtype: np.dtype[Any]) -> NDArray[Any]:
         rounded = values.astype(dtype)
     rounded.view(f"u{kind.size}")[np.isnan(values)] = kind.quiet_nan
     return rounded
+
+
+def in_eight_bits(samples: NDArray[Any]) -> NDArray[np.uint8]:
+    """Samples of any kind as screens show them: integers by their eight highest bits, floats from 0
+    to 1."""
+    import numpy as np
+
+    if samples.dtype == np.uint8:
+        return samples
+    if samples.dtype == np.uint16:
+        return (samples >> 8).astype(np.uint8)
+    held = np.nan_to_num(samples.astype(np.float32))
+    return np.rint(np.clip(held, 0, 1) * 255).astype(np.uint8)

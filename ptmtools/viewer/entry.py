@@ -1,0 +1,30 @@
+"""What a site consists of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A file of a site.
+
+    Attributes
+    ----------
+    name: its URL relative to the site, percent-encoded as it stands in links.
+    source: where its bytes are, or the bytes.
+    media: its media type.
+    forever: whether the name changes with the content, so that caches may keep it for ever.
+    compressed: whether it is sent compressed to who takes that; else in byte ranges to who asks.
+    """
+
+    name: str
+    source: Path | bytes
+    media: str
+    forever: bool = False
+    compressed: bool = False
+
+    def read(self) -> bytes:
+        """All its bytes."""
+        return self.source if isinstance(self.source, bytes) else self.source.read_bytes()

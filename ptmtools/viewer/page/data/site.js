@@ -1,0 +1,114 @@
+// What the page is told of its site, and where the files are that the index names.
+
+/**
+ * @typedef {object} SiteConfig
+ * @property {string} index URLs, relative to the page
+ * @property {string} worker
+ * @property {string} wasm
+ * @property {string} [poster]
+ * @property {string} title
+ *
+ * @typedef {object} TextureRow
+ * @property {string} file
+ * @property {number} width
+ * @property {number} height
+ * @property {number} components
+ * @property {number} texelBytes
+ * @property {number} gpuTexelBytes
+ * @property {number[]} ends
+ * @property {number[]} differences
+ * @property {number[]} color
+ *
+ * @typedef {object} CellRow
+ * @property {string} name
+ * @property {number[]} box
+ * @property {boolean} [standing]
+ * @property {string} record
+ * @property {string} geometry
+ * @property {number} recordBytes
+ * @property {number} geometryBytes
+ *
+ * @typedef {object} Viewpoint
+ * @property {string} name
+ * @property {string} description
+ * @property {number[]} position
+ * @property {number[]} direction
+ * @property {number} fieldOfView
+ * @property {number} cell
+ * @property {string} [thumbnail]
+ *
+ * @typedef {object} Index
+ * @property {number} schema
+ * @property {number[]} avatarSize
+ * @property {Viewpoint[]} viewpoints
+ * @property {TextureRow[]} textures
+ * @property {CellRow[]} cells
+ *
+ * @typedef {object} Leaf
+ * @property {number[][]} points
+ * @property {number[][]} faces
+ *
+ * @typedef {object} CellRecord
+ * @property {number} cell
+ * @property {number[]} visible
+ * @property {number[]} adjacent
+ * @property {number[]} ach
+ * @property {number} floor
+ * @property {number[][]} textures
+ * @property {number[][]} [need]
+ * @property {Leaf[]} leaves
+ * @property {{neighbour: number, area: number, polygon: number[][]}[]} portals
+ */
+
+/** The schema of the index that this page reads. */
+const SCHEMA = 2;
+
+/** @returns {SiteConfig} */
+export function readConfig() {
+  return JSON.parse(document.getElementById("site")?.textContent ?? "{}");
+}
+
+/** A site: its index, and the addresses of what the index names. */
+export class Site {
+  /**
+   * @param {Index} index
+   * @param {string} address of the index
+   */
+  constructor(index, address) {
+    if (index.schema !== SCHEMA) {
+      throw new Error(`the index has schema ${index.schema}, and this page reads ${SCHEMA}`);
+    }
+    this.index = index;
+    this.address = address;
+  }
+
+  /**
+   * @param {"record" | "geometry"} kind
+   * @param {number} cell
+   */
+  cell(kind, cell) {
+    return this.of(this.index.cells[cell][kind]);
+  }
+
+  /** @param {number} texture */
+  texture(texture) {
+    return this.of(this.index.textures[texture].file);
+  }
+
+  /** @param {string} url relative to the index */
+  of(url) {
+    return new URL(url, this.address).href;
+  }
+}
+
+/**
+ * The sizes of a texture's levels, coarsest first, and the bytes of a texel on the GPU.
+ * @param {TextureRow} row
+ */
+export function levelsOf({ width, height, ends, gpuTexelBytes }) {
+  const sizes = ends.map((_, n) => {
+    const halved = ends.length - 1 - n;
+    return { width: width >> halved, height: height >> halved };
+  });
+  return { sizes, channels: gpuTexelBytes };
+}

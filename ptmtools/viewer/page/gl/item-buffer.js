@@ -1,0 +1,183 @@
+// Which textures the screen shows, and how finely: a small picture of them, read back without
+// waiting, and a second one of placeholders for what is not there yet.
+
+import { aim, programOf } from "./program.js";
+
+/** Pixels of it, whatever the form of the screen: 80 × 45 on most. */
+const PIXELS = 3600;
+
+/** @typedef {import("./camera.js").Camera} Camera */
+
+/**
+ * @typedef {object} Reading
+ * @property {number} pixels
+ * @property {Uint16Array} items two numbers a pixel: texture + 1, level of detail · 256
+ * @property {Uint16Array | null} placeholders the first is the cell + 1; null if none were drawn
+ * @property {number} drawn when, s
+ */
+
+export class ItemBuffer {
+  /** @type {{sync: WebGLSync, second: boolean, drawn: number} | null} */
+  #waiting = null;
+
+  /** @param {WebGL2RenderingContext} gl */
+  constructor(gl) {
+    this.gl = gl;
+    this.item = programOf(gl, "item");
+    this.placeholder = programOf(gl, "placeholder");
+    this.frame = gl.createFramebuffer();
+    this.depth = gl.createRenderbuffer();
+    this.colors = [gl.createRenderbuffer(), gl.createRenderbuffer()];
+    this.packs = [gl.createBuffer(), gl.createBuffer()];
+    this.boxes = gl.createBuffer();
+    this.boxArray = gl.createVertexArray();
+    this.width = this.height = 0;
+    gl.bindVertexArray(this.boxArray);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.boxes);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 12, 0);
+    gl.bindVertexArray(null);
+  }
+
+  /** Whether one was drawn and not read yet. */
+  get busy() {
+    return this.#waiting !== null;
+  }
+
+  /** @param {number} aspect */
+  #resize(aspect) {
+    const { gl } = this;
+    const height = Math.max(1, Math.round(Math.sqrt(PIXELS / aspect)));
+    const width = Math.max(1, Math.round(PIXELS / height));
+    if (width === this.width && height === this.height) return;
+    Object.assign(this, { width, height });
+    gl.bindRenderbuffer(gl.RENDERBUFFER, this.depth);
+    gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH_COMPONENT24, width, height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
+    gl.framebufferRenderbuffer(
+      gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, this.depth,
+    );
+    this.colors.forEach((color, k) => {
+      const at = gl.COLOR_ATTACHMENT0 + k;
+      gl.bindRenderbuffer(gl.RENDERBUFFER, color);
+      gl.renderbufferStorage(gl.RENDERBUFFER, gl.RGBA8, width, height);
+      gl.framebufferRenderbuffer(gl.FRAMEBUFFER, at, gl.RENDERBUFFER, color);
+      gl.bindBuffer(gl.PIXEL_PACK_BUFFER, this.packs[k]);
+      // Chromium warns of buffers to be read that are written once more, read or not.
+      gl.bufferData(gl.PIXEL_PACK_BUFFER, 4 * width * height, gl.DYNAMIC_COPY);
+    });
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
+  }
+
+  /**
+   * @param {object} view
+   * @param {Camera} view.camera
+   * @param {number} view.aspect
+   * @param {number} view.lines of the screen
+   * @param {number} view.now s
+   * @param {import("./renderer.js").Drawn[]} view.drawn
+   * @param {{cell: number, box: number[]}[]} view.missing
+   * @param {(texture: number) => number[]} view.sizeOf texels of the finest level, across and down
+   */
+  draw({ camera, aspect, lines, now, drawn, missing, sizeOf }) {
+    const { gl, item } = this;
+    this.#resize(aspect);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
+    gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.NONE]);
+    gl.viewport(0, 0, this.width, this.height);
+    gl.disable(gl.BLEND);
+    gl.disable(gl.DITHER);
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthMask(true);
+    gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 0]);
+    gl.clearBufferfv(gl.DEPTH, 0, [1]);
+    aim(gl, item, camera);
+    gl.uniform1f(item.at.pixels, lines / this.height);
+    for (const { buffers, batches } of drawn) {
+      gl.bindVertexArray(buffers.vertexArray);
+      for (const batch of batches) {
+        const { texture, blends, twoSided } = batch.look;
+        if (blends && texture < 0) continue;
+        (twoSided ? gl.disable : gl.enable).call(gl, gl.CULL_FACE);
+        gl.uniform1f(item.at.item, texture + 1);
+        gl.uniform2fv(item.at.size, texture < 0 ? [1, 1] : sizeOf(texture));
+        buffers.draw(batch);
+      }
+    }
+    if (missing.length) this.#drawPlaceholders(camera, missing);
+    this.#read(0);
+    if (missing.length) this.#read(1);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.bindVertexArray(null);
+    const sync = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    if (sync) this.#waiting = { sync, second: missing.length > 0, drawn: now };
+    gl.flush();
+  }
+
+  /**
+   * The far faces of the boxes of cells, which are rooms, behind what is drawn already.
+   * @param {Camera} camera
+   * @param {{cell: number, box: number[]}[]} missing
+   */
+  #drawPlaceholders(camera, missing) {
+    const { gl, placeholder } = this;
+    gl.drawBuffers([gl.NONE, gl.COLOR_ATTACHMENT1]);
+    gl.clearBufferfv(gl.COLOR, 1, [0, 0, 0, 0]);
+    aim(gl, placeholder, camera);
+    gl.bindVertexArray(this.boxArray);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.boxes);
+    const corners = new Float32Array(missing.flatMap(({ box }) => faces(box)));
+    gl.bufferData(gl.ARRAY_BUFFER, corners, gl.STREAM_DRAW);
+    gl.enable(gl.CULL_FACE);
+    gl.cullFace(gl.FRONT);
+    missing.forEach(({ cell }, k) => {
+      gl.uniform1f(placeholder.at.item, cell + 1);
+      gl.drawArrays(gl.TRIANGLES, 36 * k, 36);
+    });
+    gl.cullFace(gl.BACK);
+  }
+
+  /** @param {number} k */
+  #read(k) {
+    const { gl } = this;
+    gl.readBuffer(gl.COLOR_ATTACHMENT0 + k);
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, this.packs[k]);
+    gl.readPixels(0, 0, this.width, this.height, gl.RGBA, gl.UNSIGNED_BYTE, 0);
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
+  }
+
+  /**
+   * What was drawn last, once it can be had without waiting.
+   * @returns {Reading | null}
+   */
+  poll() {
+    const { gl } = this, waiting = this.#waiting;
+    if (!waiting || gl.getSyncParameter(waiting.sync, gl.SYNC_STATUS) !== gl.SIGNALED) return null;
+    gl.deleteSync(waiting.sync);
+    this.#waiting = null;
+    const pixels = this.width * this.height;
+    const found = [0, 1].slice(0, waiting.second ? 2 : 1).map((k) => {
+      const numbers = new Uint16Array(2 * pixels);
+      gl.bindBuffer(gl.PIXEL_PACK_BUFFER, this.packs[k]);
+      gl.getBufferSubData(gl.PIXEL_PACK_BUFFER, 0, numbers);
+      return numbers;
+    });
+    gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
+    return { pixels, items: found[0], placeholders: found[1] ?? null, drawn: waiting.drawn };
+  }
+}
+
+/** Corners of a box, of which bit k says whether the greater end of axis k; its faces from outside. */
+const FACES = [
+  [0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6],
+];
+
+/**
+ * The triangles of a box, counter-clockwise seen from outside.
+ * @param {number[]} box least and greatest x, y, z
+ */
+function faces(box) {
+  return FACES.flatMap(([a, b, c, d]) =>
+    [a, b, c, a, c, d].flatMap((corner) => [0, 1, 2].map((k) => box[k + 3 * ((corner >> k) & 1)])),
+  );
+}

@@ -1,0 +1,128 @@
+// Draws the cells: what is opaque cell by cell, then what one sees through, the farthest first.
+
+import { CellBuffers } from "./cell-buffers.js";
+import { aim, programOf } from "./program.js";
+
+/** @typedef {import("./cell-buffers.js").Batch} Batch */
+
+/**
+ * What is drawn of a cell.
+ * @typedef {object} Drawn
+ * @property {number} cell
+ * @property {CellBuffers} buffers
+ * @property {Batch[]} batches
+ */
+
+/** What is behind everything. */
+const SKY = [0.16, 0.17, 0.19, 1];
+
+export class Renderer {
+  /** @type {Map<number, CellBuffers>} */
+  cells = new Map();
+
+  /**
+   * @param {WebGL2RenderingContext} gl
+   * @param {import("./texture-memory.js").TextureMemory} memory
+   * @param {number[][]} means the mean colour of each texture, 0 to 255
+   */
+  constructor(gl, memory, means) {
+    this.gl = gl;
+    this.memory = memory;
+    this.means = means.map((color) => color.map((part) => part / 255));
+    this.surface = programOf(gl, "surface");
+  }
+
+  /**
+   * @param {number} cell
+   * @param {import("../data/glb.js").Shape[]} shapes
+   */
+  add(cell, shapes) {
+    if (!this.cells.has(cell)) this.cells.set(cell, new CellBuffers(this.gl, shapes));
+  }
+
+  /** @param {number} cell */
+  remove(cell) {
+    this.cells.get(cell)?.delete();
+    this.cells.delete(cell);
+  }
+
+  delete() {
+    for (const cell of [...this.cells.keys()]) this.remove(cell);
+    this.gl.deleteProgram(this.surface.program);
+  }
+
+  /** Bytes of vertices and indices. */
+  get bytes() {
+    let sum = 0;
+    for (const { bytes } of this.cells.values()) sum += bytes;
+    return sum;
+  }
+
+  /**
+   * Draws into what is bound; true as long as something fades in.
+   * @param {import("./camera.js").Camera} camera
+   * @param {Drawn[]} drawn nearest cells first
+   * @param {number} now s
+   */
+  draw(camera, drawn, now) {
+    const { gl, surface } = this;
+    gl.clearColor(SKY[0], SKY[1], SKY[2], 1);
+    gl.depthMask(true);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.enable(gl.DEPTH_TEST);
+    gl.disable(gl.BLEND);
+    aim(gl, surface, camera);
+    let fading = false;
+    /** @type {{buffers: CellBuffers, batch: Batch, far: number}[]} */
+    const behind = [];
+    for (const { buffers, batches } of drawn) {
+      gl.bindVertexArray(buffers.vertexArray);
+      for (const batch of batches) {
+        if (batch.look.blends) {
+          behind.push({ buffers, batch, far: distance(camera.eye, batch) });
+        } else {
+          fading = this.#draw(buffers, batch, now) || fading;
+        }
+      }
+    }
+    if (behind.length) {
+      gl.enable(gl.BLEND);
+      gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+      gl.depthMask(false);
+      for (const { buffers, batch } of behind.sort((a, b) => b.far - a.far)) {
+        gl.bindVertexArray(buffers.vertexArray);
+        fading = this.#draw(buffers, batch, now) || fading;
+      }
+      gl.depthMask(true);
+    }
+    gl.bindVertexArray(null);
+    return fading;
+  }
+
+  /**
+   * @param {CellBuffers} buffers
+   * @param {Batch} batch
+   * @param {number} now
+   */
+  #draw(buffers, batch, now) {
+    const { gl } = this, { at } = this.surface, { texture, clampU, clampV, twoSided } = batch.look;
+    (twoSided ? gl.disable : gl.enable).call(gl, gl.CULL_FACE);
+    gl.uniform4fv(at.color, batch.color);
+    gl.uniform1i(at.textured, +(texture >= 0));
+    const storage = texture < 0 ? null : this.memory.of(texture);
+    gl.uniform1i(at.channels, storage?.channels ?? 0);
+    if (texture >= 0) gl.uniform3fv(at.mean, this.means[texture]);
+    const fading = storage?.bind(clampU, clampV, now) ?? false;
+    buffers.draw(batch);
+    return fading;
+  }
+}
+
+/**
+ * How far the middle of a batch's box is.
+ * @param {number[]} eye
+ * @param {Batch} batch
+ */
+function distance(eye, { low, high }) {
+  return Math.hypot(...eye.map((x, k) => (low[k] + high[k]) / 2 - x));
+}

@@ -1,0 +1,99 @@
+// The programs. Positions are taken relative to the eye before anything is multiplied, and the view
+// only turns them: so what is far from the origin loses no digits.
+
+const CORNERS = `#version 300 es
+precision highp float;
+uniform vec3 eye;
+uniform mat3 turn;
+uniform vec4 lens; // 1/tan across, 1/tan up, and of depth: scale, offset
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec2 place;
+out vec3 seen;
+out vec2 uv;
+void main() {
+  seen = turn * (position - eye);
+  uv = place;
+  gl_Position = vec4(seen.xy * lens.xy, seen.z * lens.z + lens.w, -seen.z);
+}`;
+
+/** What a textured surface shows; of one or two channels grey, and alpha in the second. */
+const TEXEL = `
+uniform sampler2D map;
+uniform int channels; // 0: nothing of the texture is there
+uniform vec4 color;
+uniform vec3 mean;
+uniform bool textured;
+vec4 texel() {
+  vec4 found = texture(map, uv);
+  if (channels == 1) found = vec4(found.rrr, 1.0);
+  if (channels == 2) found = found.rrrg;
+  return channels == 0 ? vec4(mean, 1.0) : found;
+}`;
+
+/**
+ * Textured surfaces are unlit, as in VRML browsers; the others glow a little and are lit from the eye.
+ * Colours multiply as they are encoded.
+ */
+const SURFACE = `#version 300 es
+precision highp float;
+in vec3 seen;
+in vec2 uv;
+out vec4 shown;
+${TEXEL}
+void main() {
+  vec4 found = texel();
+  float light = 1.0;
+  if (!textured) {
+    vec3 normal = cross(dFdx(seen), dFdy(seen));
+    float size = length(normal);
+    light = 0.25 + 0.75 * (size > 0.0 ? abs(dot(normal, normalize(seen))) / size : 1.0);
+    found = vec4(1.0);
+  }
+  shown = vec4(found.rgb * color.rgb * light, found.a * color.a);
+  if (shown.a < 0.004) discard;
+}`;
+
+/** Numbers of 16 bits in two channels of 8. */
+const BYTES = `
+vec2 bytes(float number) {
+  float high = floor(number / 256.0);
+  return vec2(number - 256.0 * high, high) / 255.0;
+}`;
+
+/**
+ * The item buffer: texture + 1, and the level of detail in 1/256, where the finest level has 0.
+ * u / w and 1 / w are linear across the screen, so their differences give exact derivatives however
+ * large a pixel is.
+ */
+const ITEM = `#version 300 es
+precision highp float;
+in vec3 seen;
+in vec2 uv;
+uniform float item;
+uniform vec2 size; // texels of the finest level
+uniform float pixels; // of the screen, for one of the item buffer
+out vec4 shown;
+${BYTES}
+void main() {
+  float w = gl_FragCoord.w;
+  vec2 texels = uv * size;
+  vec2 across = (dFdx(texels * w) - texels * dFdx(w)) / w;
+  vec2 up = (dFdy(texels * w) - texels * dFdy(w)) / w;
+  float most = max(dot(across, across), dot(up, up));
+  float detail = 0.5 * log2(max(most, 1e-30)) - log2(pixels);
+  shown = vec4(bytes(item), bytes(floor(256.0 * clamp(detail, 0.0, 31.0))));
+}`;
+
+/** A placeholder: the cell + 1. */
+const PLACEHOLDER = `#version 300 es
+precision highp float;
+uniform float item;
+layout(location = 1) out vec4 shown;
+${BYTES}
+void main() { shown = vec4(bytes(item), 0.0, 1.0); }`;
+
+export const SOURCES = {
+  surface: [CORNERS, SURFACE],
+  item: [CORNERS, ITEM],
+  placeholder: [CORNERS, PLACEHOLDER],
+};

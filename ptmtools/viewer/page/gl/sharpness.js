@@ -1,0 +1,50 @@
+// How finely the canvas is drawn: as finely as the screen is, but for who moves on a machine that
+// cannot keep up.
+
+/** Screens finer than this are drawn at so many pixels for one of CSS. */
+const MOST = 2;
+/** Shares of the full number of lines, and seconds a frame beyond which the next is taken. */
+const SHARES = [1, 0.7, 0.5], SLOW = 0.045;
+/** Frames whose mean is judged. */
+const FRAMES = 6;
+
+export class Sharpness {
+  #step = 0;
+  /** @type {number[]} */
+  #times = [];
+
+  /** @param {HTMLCanvasElement} canvas */
+  constructor(canvas) {
+    this.canvas = canvas;
+  }
+
+  /** Lines of the screen that pictures are made for. */
+  get lines() {
+    return this.#size(1)[1];
+  }
+
+  /**
+   * Sizes the canvas; true if that changed it.
+   * @param {number} seconds since the frame before
+   * @param {boolean} moving
+   */
+  settle(seconds, moving) {
+    const { canvas } = this;
+    this.#times = moving ? [...this.#times, seconds].slice(-FRAMES) : [];
+    const mean = this.#times.reduce((sum, time) => sum + time, 0) / FRAMES;
+    if (this.#times.length === FRAMES && mean > SLOW && this.#step < SHARES.length - 1) {
+      this.#step++;
+      this.#times = [];
+    }
+    const [width, height] = this.#size(moving ? SHARES[this.#step] : 1);
+    if (canvas.width === width && canvas.height === height) return false;
+    Object.assign(canvas, { width, height });
+    return true;
+  }
+
+  /** @param {number} share */
+  #size(share) {
+    const { clientWidth, clientHeight } = this.canvas, ratio = Math.min(devicePixelRatio, MOST);
+    return [clientWidth, clientHeight].map((side) => Math.max(1, Math.round(side * ratio * share)));
+  }
+}

@@ -1,0 +1,12 @@
+// What goes wrong, in words for visitors; the codes are those of docs/viewer.md.
+
+export class PageError extends Error {
+  /**
+   * @param {string} code
+   * @param {string} message
+   */
+  constructor(code, message) {
+    super(message);
+    this.code = code;
+  }
+}

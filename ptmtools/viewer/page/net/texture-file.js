@@ -1,0 +1,74 @@
+// The beginning of a `.ptm` that is here, and its levels, decoded in a worker.
+
+import { PtmError, readHeader } from "../../decoder/src/index.js";
+
+/** @typedef {import("../../decoder/src/level-decoder.js").Image} Image */
+/** @typedef {import("../../decoder/src/workers.js").DecoderWorkers} DecoderWorkers */
+/** @typedef {ReturnType<DecoderWorkers["decoder"]>} Decoder */
+
+export class TextureFile {
+  #bytes = new Uint8Array(0);
+  /** Bytes that are here. */
+  length = 0;
+
+  /**
+   * @param {import("../data/site.js").TextureRow} row
+   * @param {DecoderWorkers} workers
+   */
+  constructor(row, workers) {
+    this.row = row;
+    this.workers = workers;
+  }
+
+  /**
+   * @param {number} begin at most `length`
+   * @param {Uint8Array} part
+   */
+  append(begin, part) {
+    const end = begin + part.length;
+    if (end <= this.length) return;
+    if (end > this.#bytes.length) {
+      const size = this.row.ends[this.row.ends.length - 1];
+      const grown = new Uint8Array(Math.min(Math.max(end, 2 * this.#bytes.length), size));
+      grown.set(this.#bytes.subarray(0, this.length));
+      this.#bytes = grown;
+    }
+    this.#bytes.set(part, begin);
+    this.length = end;
+  }
+
+  /**
+   * Forgets what is behind so many bytes.
+   * @param {number} length
+   */
+  cut(length) {
+    this.length = Math.min(this.length, length);
+  }
+
+  /**
+   * The first levels, so many. Throws PtmError with `level`: the one that is damaged.
+   * @param {number} levels
+   * @returns {Promise<Image[]>}
+   */
+  async decode(levels) {
+    const { ends, components } = this.row;
+    /** @type {Decoder | null} */
+    let decoder = null;
+    try {
+      const header = readHeader(this.#bytes.subarray(0, this.length));
+      if (header.levels.some(({ offset, length }, n) => offset + length !== ends[n])) {
+        throw new PtmError("PTM-I105", "another file than the index says");
+      }
+      decoder = this.workers.decoder(header, { format: components < 3 ? "native" : "rgba" });
+      const groups = header.levels.slice(0, levels);
+      return await decoder.refineAll(
+        groups.map(({ offset, length }) => this.#bytes.subarray(offset, offset + length)),
+      );
+    } catch (error) {
+      const { decoded = 0 } = /** @type {{decoded?: number}} */ (error);
+      throw Object.assign(/** @type {Error} */ (error), { level: decoded });
+    } finally {
+      decoder?.close();
+    }
+  }
+}

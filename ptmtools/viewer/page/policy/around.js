@@ -1,0 +1,75 @@
+// What lies around a client, as shares of pixels by texture and column, and what the geometry of
+// cells is worth.
+
+import { distance } from "../space/frustum.js";
+
+/** @typedef {import("./client.js").Client} Client */
+
+/** What a pixel is wrong by where there is nothing, 0 to 255. */
+export const NOTHING = 64;
+// What is nearer counts as being as far as this, metres.
+const NEAREST = 0.5;
+// What a cell counts that is out of sight, or is seen from a neighbouring cell only.
+const BEHIND = 0.2, BEYOND = 0.05;
+
+/**
+ * (T) shares that fall with the square of the distance of the nearest shape; they sum to 1.
+ * @param {Client} client
+ */
+function byDistance({ catalogue, shapes, frustum }) {
+  const share = new Float64Array(catalogue.T), eye = frustum?.eye ?? [0, 0, 0];
+  for (const some of shapes) {
+    if (!some) continue;
+    const { textures, boxes } = some;
+    for (let s = 0; s < textures.length; s++) {
+      const far = Math.max(distance(eye, boxes, boxes, 6 * s, 6 * s + 3), NEAREST);
+      const near = 1 / (far * far);
+      if (near > share[textures[s]]) share[textures[s]] = near;
+    }
+  }
+  const total = Math.max(share.reduce((sum, each) => sum + each, 0), 1e-12);
+  return share.map((each) => each / total);
+}
+
+/**
+ * Writes to `around` (T × K) the mean of what is near and of what the record of the cell needs;
+ * what is near alone, if the record does not tell.
+ * @param {Client} client
+ * @param {Float64Array} around
+ */
+export function lookAround(client, around) {
+  const { T, K, levels } = client.catalogue;
+  const near = byDistance(client), need = client.known[client.cell]?.need;
+  around.fill(0);
+  for (const [texture, first, ...shares] of need ?? []) {
+    const at = texture * K + 1;
+    around.fill(shares[0], at, at + first);
+    around.set(shares, at + first);
+  }
+  for (let t = 0; t < T; t++) {
+    for (let k = 1, at = t * K + 1; k <= levels[t]; k++, at++) {
+      around[at] = need ? (near[t] + around[at]) / 2 : near[t];
+    }
+  }
+}
+
+/**
+ * Writes to `worth` (C) what the geometry of each cell adds: by how much of the item buffer shows
+ * its placeholder, and by what it covers on average.
+ * @param {Client} client
+ * @param {Float64Array} worth
+ */
+export function weighGeometry({ known, cell, hidden, left }, worth) {
+  const here = known[cell];
+  worth.fill(0);
+  if (!here) return;
+  here.visible.forEach((c, i) => (worth[c] = BEHIND * here.coverage[i]));
+  for (const neighbour of here.adjacent) {
+    const there = known[neighbour];
+    there?.visible.forEach((c, i) => {
+      // What was forgotten is not fetched again for being seen from elsewhere.
+      if (!left[c]) worth[c] = Math.max(worth[c], BEYOND * there.coverage[i]);
+    });
+  }
+  for (let c = 0; c < worth.length; c++) worth[c] = NOTHING * (worth[c] + hidden[c]);
+}

@@ -1,0 +1,180 @@
+// The policy of docs/client.md: what is worth most for its bytes, by the pixels of the view, by
+// what is near and by what is needed. What should be in texture memory is chosen to the last level
+// that fits; what is missing of that is asked for in ranges of a fraction of a second, so that
+// little is under way that may not be wanted any more. When nothing is missing it goes on with what
+// is worth most beyond the budget.
+
+import { allocate, nextFetch } from "./allocation.js";
+import { lookAround, NOTHING, weighGeometry } from "./around.js";
+import { OVERHEAD } from "./downloads.js";
+import { meetsBox } from "../space/frustum.js";
+
+/** @typedef {import("./client.js").Client} Client */
+/** @typedef {import("./client.js").Policy} Policy */
+/** @typedef {import("./estimate.js").Belief} Belief */
+
+// A range takes so many seconds of the link, and at least so many bytes.
+const RANGE_SECONDS = 0.2, RANGE_BYTES = 8000;
+const CONNECTIONS = 6;
+// The most bytes that waiting counts, of links without a limit.
+const LONGEST_WAIT = 2 ** 20;
+// The record of a neighbouring cell is worth as much as so large a share of the screen.
+const RECORD_SHARE = 0.005;
+// What lies around counts so much beside what is on the screen, and of that so much for what is to
+// be in texture memory now.
+const AROUND = 0.1, HELD = 0.1;
+// A level that is not wanted any more is held on to, at so small a share of its worth, which halves
+// in so many seconds.
+const HELD_ON = 1e-3, HELD_SECONDS = 7;
+
+/**
+ * Whether the link would run dry before a request made later could be answered.
+ * @param {Belief} estimate
+ * @param {Iterable<{left: number}>} waiting requests on the way
+ */
+export function room(estimate, waiting) {
+  let left = 0, count = 0;
+  for (const request of waiting) {
+    left += Math.max(request.left, 0);
+    count++;
+  }
+  const ahead = estimate.latency + RANGE_SECONDS / 2;
+  return count < CONNECTIONS && (left === 0 || 8 * left < ahead * estimate.bandwidth);
+}
+
+/**
+ * Bytes that a request costs besides its own: headers, and what its connection could have brought
+ * while it waits. So of a fast link more levels are asked for at once.
+ * @param {Belief} estimate
+ */
+function overheadOf({ latency, bandwidth }) {
+  const waiting = latency > 0 ? latency * bandwidth / 8 / CONNECTIONS : 0;
+  return OVERHEAD + Math.floor(Math.min(waiting, LONGEST_WAIT));
+}
+
+/** @implements {Policy} */
+export class Best {
+  #client; #geometry; #wanted;
+  /** @type {Float64Array} (T × K) what each column adds on the screen now, and soon; what it adds
+   *   beyond the budget; what it added lately */
+  #hold; #fetch; #ahead; #kept;
+  #weighed = false;
+  #looked = -Infinity;
+
+  /** @param {Client} client */
+  constructor(client) {
+    const { T, C, K } = client.catalogue;
+    this.#client = client;
+    this.target = new Int32Array(T);
+    this.#hold = new Float64Array(T * K);
+    this.#fetch = new Float64Array(T * K);
+    this.#ahead = new Float64Array(T * K);
+    this.#kept = new Float64Array(T * K);
+    /** (C) what the geometry of each cell adds. */
+    this.#geometry = new Float64Array(C);
+    /** (T) what would be in texture memory if all of it were downloaded. */
+    this.#wanted = new Int32Array(T);
+  }
+
+  learned() {
+    const client = this.#client;
+    if (client.cell < 0 && client.known[client.here]) client.cell = client.here;
+    this.#weighed = false;
+  }
+
+  look() {
+    const { catalogue, cell, have, budget, column, downloads } = this.#client;
+    if (cell < 0) return;
+    this.#weigh();
+    const fading = 0.5 ** ((downloads.now - this.#looked) / HELD_SECONDS);
+    this.#looked = downloads.now;
+    const kept = this.#kept, hold = this.#hold;
+    for (let i = 0; i < kept.length; i++) kept[i] = Math.max(kept[i] * fading, hold[i]);
+    allocate(this.#holding(), catalogue.memory, have, budget, column);
+  }
+
+  /** (T × K) what each column is worth in texture memory. */
+  #holding() {
+    const { differences } = this.#client.catalogue, kept = this.#kept;
+    return this.#hold.map((hold, i) => hold + HELD_ON * kept[i] + HELD_ON ** 2 * differences[i]);
+  }
+
+  #weigh() {
+    if (this.#weighed || this.#client.cell < 0) return;
+    this.#weighed = true;
+    const { catalogue, sight, budget } = this.#client, { memory, levels, differences } = catalogue;
+    const around = this.#ahead;
+    lookAround(this.#client, around);
+    for (let i = 0; i < around.length; i++) {
+      this.#hold[i] = (sight[i] + HELD * AROUND * around[i]) * differences[i];
+      this.#fetch[i] = (sight[i] + AROUND * around[i]) * differences[i];
+      around[i] *= differences[i];
+    }
+    weighGeometry(this.#client, this.#geometry);
+    allocate(this.#fetch, memory, levels, budget, this.target);
+  }
+
+  missing() {
+    const { catalogue, sight, cell, here, frustum, have, known, hidden, downloads, budget } =
+      this.#client;
+    const { T, K, memory, levels, low, high } = catalogue;
+    let count = 0;
+    if (!downloads.there("record", here)) count++;
+    if (cell < 0 || !frustum) return count;
+    this.#weigh();
+    for (const c of known[cell]?.visible ?? []) {
+      const seen = c === here || hidden[c] > 0 || meetsBox(frustum, low, high, 3 * c);
+      if (seen && !downloads.there("geometry", c)) count++;
+    }
+    allocate(this.#holding(), memory, levels, budget, this.#wanted);
+    for (let t = 0; t < T; t++) {
+      let k = have[t] + 1;
+      while (k <= this.#wanted[t] && !(sight[t * K + k] > 0)) k++;
+      if (k <= this.#wanted[t]) count++;
+    }
+    return count;
+  }
+
+  /** @param {Belief} estimate */
+  next(estimate) {
+    const { catalogue, known, cell, here, downloads } = this.#client;
+    const { C, recordBytes, geometryBytes, ends, levels } = catalogue;
+    if (!room(estimate, downloads.waiting)) return null;
+    if (downloads.free("record", here)) return downloads.ask("record", here, Infinity);
+    if (cell < 0) {
+      return downloads.free("geometry", here) ? downloads.ask("geometry", here, Infinity) : null;
+    }
+    this.#weigh();
+    /** @param {number} t */
+    const free = (t) => downloads.free("texture", t);
+    const overhead = overheadOf(estimate);
+    let step = nextFetch(this.#fetch, ends, downloads.bytes, this.target, overhead, free);
+
+    let nearest = -1, geometry = 0;
+    for (let c = 0; c < C; c++) {
+      const density = this.#geometry[c] / Math.max(geometryBytes[c], 1);
+      if (density > geometry && downloads.free("geometry", c)) [nearest, geometry] = [c, density];
+    }
+    let least = -1;
+    for (const c of known[cell]?.adjacent ?? []) {
+      const fewer = least < 0 || recordBytes[c] < recordBytes[least];
+      if (fewer && downloads.free("record", c)) least = c;
+    }
+    const record = least < 0 ? 0 : NOTHING * RECORD_SHARE / recordBytes[least];
+    if (record > Math.max(step.density, geometry)) return downloads.ask("record", least, record);
+    if (geometry > step.density) return downloads.ask("geometry", nearest, geometry);
+    if (step.texture < 0) {
+      step = nextFetch(this.#ahead, ends, downloads.bytes, levels, overhead, free);
+    }
+    return step.texture < 0 ? null : this.#range(step, estimate);
+  }
+
+  /** @param {import("./allocation.js").Step} step @param {Belief} estimate */
+  #range({ texture, column, density }, estimate) {
+    const { catalogue, downloads } = this.#client;
+    const most = Math.max(RANGE_BYTES, RANGE_SECONDS * estimate.bandwidth / 8);
+    const begin = downloads.bytes[texture], whole = catalogue.ends[texture * catalogue.K + column];
+    const end = whole - begin > most ? begin + Math.floor(most) : whole;
+    return downloads.ask("texture", texture, density, end);
+  }
+}

@@ -1,0 +1,181 @@
+// A client on a walk: it knows what has arrived, and a policy says from that what should be in
+// texture memory and what to ask for next (docs/client.md).
+
+import { Downloads } from "./downloads.js";
+import { knownOf, shapesOf } from "./knowledge.js";
+
+/** @typedef {import("./catalogue.js").Catalogue} Catalogue */
+/** @typedef {import("./downloads.js").Request} Request */
+/** @typedef {import("./estimate.js").Belief} Belief */
+/** @typedef {import("./knowledge.js").Known} Known */
+/** @typedef {import("./knowledge.js").CellRecord} CellRecord */
+/** @typedef {import("./knowledge.js").Shapes} Shapes */
+/** @typedef {import("../space/frustum.js").Frustum} Frustum */
+/** @typedef {Float32Array | Float64Array} Shares */
+
+/**
+ * What a policy does for a client.
+ * @typedef {object} Policy
+ * @property {Int32Array} target (T) columns that it wants to download
+ * @property {() => void} look the walker is somewhere: sets `client.column`
+ * @property {() => void} learned there is a record, geometry or item buffer that was not there
+ * @property {(estimate: Belief) => Request | null} next
+ * @property {() => number} missing
+ */
+
+/**
+ * Where the walker is, and what it sees.
+ * @typedef {object} Look
+ * @property {number} now s, on any clock
+ * @property {number} cell that the eye is in; one whose record is not there yet is asked for, and
+ *   the one before goes on to be gone by. −1: it is not known
+ * @property {Frustum} frustum
+ * @property {boolean} [still] whether the eye has not moved for a second
+ * @property {Shares} [sight] see `sees`
+ * @property {Shares} [hidden]
+ */
+
+export class Client {
+  /** @type {Policy} */
+  #policy;
+
+  /**
+   * @param {Catalogue} catalogue
+   * @param {{budget: number, policy: (client: Client) => Policy}} options bytes of texture memory;
+   *   one of `POLICIES`
+   */
+  constructor(catalogue, { budget, policy }) {
+    const { T, C, K } = catalogue;
+    this.catalogue = catalogue;
+    /** Bytes of texture memory; a change counts from the next look on. */
+    this.budget = budget;
+    /** (T) what of each texture should be in texture memory. */
+    this.column = new Int32Array(T);
+    this.downloads = new Downloads(catalogue);
+    /** The cell that the eye is in, and the one whose record is gone by; −1 for none. */
+    this.here = -1;
+    this.cell = -1;
+    this.still = false;
+    /** How long a level may take under the paper's policy, s: while the eye moves, and is still. */
+    this.patience = { moving: 0.5, still: 20 };
+    /** @type {Frustum | null} */
+    this.frustum = null;
+    /** @type {Shares} (T × K) of the screen that wants each column */
+    this.sight = new Float64Array(T * K);
+    /** @type {Shares} (C) of the screen that shows the placeholder of each cell */
+    this.hidden = new Float64Array(C);
+    /** @type {(Known | undefined)[]} by cell */
+    this.known = new Array(C).fill(undefined);
+    /** @type {(Shapes | undefined)[]} by cell; they stay when geometry is forgotten */
+    this.shapes = new Array(C).fill(undefined);
+    /** (C) whose geometry was forgotten: it is asked for only when it may be seen again. */
+    this.left = new Uint8Array(C);
+    this.#policy = policy(this);
+  }
+
+  /** Another policy goes on with what is there. @param {(client: Client) => Policy} policy */
+  set policy(policy) {
+    this.#policy = policy(this);
+  }
+
+  /** (T) columns that are downloaded whole. */
+  get have() {
+    return this.downloads.have;
+  }
+
+  /** (T) columns that it wants to download. */
+  get target() {
+    return this.#policy.target;
+  }
+
+  /** @param {number} cell @param {CellRecord} record */
+  learnRecord(cell, record) {
+    this.known[cell] = knownOf(record);
+    this.downloads.came("record", cell);
+    this.#policy.learned();
+  }
+
+  /**
+   * @param {number} cell
+   * @param {{texture: number, low: number[], high: number[]}[]} shapes
+   */
+  learnGeometry(cell, shapes) {
+    this.shapes[cell] = shapesOf(shapes);
+    this.left[cell] = 0;
+    this.downloads.came("geometry", cell);
+    this.#policy.learned();
+  }
+
+  /**
+   * The geometry of a cell is not there any more: neither its bytes nor what was made of them. Its
+   * boxes still tell what is near. (Geometry that only leaves the GPU need not be forgotten.)
+   * @param {number} cell
+   */
+  forgetGeometry(cell) {
+    this.left[cell] = 1;
+    this.downloads.lost("geometry", cell);
+    this.#policy.learned();
+  }
+
+  /**
+   * There is an item buffer.
+   * @param {Shares} sight (T × K) the share of its pixels that wants each column
+   * @param {Shares} hidden (C) the share that shows the placeholder of each cell
+   */
+  sees(sight, hidden) {
+    this.sight = sight;
+    this.hidden = hidden;
+    this.#policy.learned();
+  }
+
+  /** Chooses `column`. @param {Look} look */
+  look({ now, cell, frustum, still = false, sight = this.sight, hidden = this.hidden }) {
+    if (cell >= 0) this.here = cell;
+    if (this.known[this.here]) this.cell = this.here;
+    Object.assign(this, { frustum, still });
+    this.downloads.now = now;
+    this.sees(sight, hidden);
+    this.#policy.look();
+  }
+
+  /** How much that this view could use, and that fits into the budget, is not there yet. */
+  missing() {
+    return this.#policy.missing();
+  }
+
+  /**
+   * What to ask for now, which then counts as asked for; to be called until there is nothing.
+   * @param {Belief} estimate
+   */
+  next(estimate) {
+    return this.here < 0 || !this.frustum ? null : this.#policy.next(estimate);
+  }
+
+  /**
+   * A request is finished. What a record or geometry says is told by `learnRecord` and
+   * `learnGeometry`; of a texture the bytes up to `end` are there, be it that it broke off or that
+   * a server sent more.
+   * @param {Request} request
+   */
+  arrived(request, end = request.end) {
+    this.downloads.over(request, end);
+  }
+
+  /**
+   * A request came to nothing and may be made again, though not before `until`, s.
+   * @param {Request} request
+   */
+  failed(request, until = 0) {
+    this.downloads.failed(request, until);
+  }
+
+  /**
+   * Of a texture only so many first bytes are good; more may be asked for from `until` on, s.
+   * @param {number} texture
+   * @param {number} bytes
+   * @param {number} until
+   */
+  lose(texture, bytes, until = 0) {
+    this.downloads.cut(texture, bytes, until);
+  }
+}

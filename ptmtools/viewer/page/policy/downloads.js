@@ -1,0 +1,129 @@
+// What was asked for, and what is there. Records and geometry are asked for whole; of a texture one
+// range at a time, each where the last one ended: caches of browsers ask once more for ranges of a
+// file that they are still receiving.
+
+/** @typedef {import("./catalogue.js").Catalogue} Catalogue */
+/** @typedef {"record" | "geometry" | "texture"} Kind */
+
+/**
+ * Bytes `begin` to `end` of a file.
+ * @typedef {object} Request
+ * @property {Kind} kind
+ * @property {number} number of the cell or texture
+ * @property {number} begin
+ * @property {number} end a guess for what is asked for whole, if the index does not say it
+ * @property {number} priority the greater, the sooner; it may grow
+ * @property {number} left bytes that are yet to come, headers included: for whoever receives them
+ *   to keep up to date
+ */
+
+/** Bytes of the headers of a request. */
+export const OVERHEAD = 300;
+const ABSENT = 0, ASKED = 1, THERE = 2;
+
+export class Downloads {
+  #stock;
+  /** @type {Record<Kind, Uint8Array>} */
+  #state;
+  /** @type {Record<Kind, Float64Array>} until when nothing of it is asked for, s */
+  #rests;
+
+  /** @param {Catalogue} stock */
+  constructor(stock) {
+    const { T, C } = stock;
+    this.#stock = stock;
+    this.#state = {
+      record: new Uint8Array(C), geometry: new Uint8Array(C), texture: new Uint8Array(T),
+    };
+    this.#rests = {
+      record: new Float64Array(C), geometry: new Float64Array(C), texture: new Float64Array(T),
+    };
+    /** (T) bytes of each texture, from its beginning. */
+    this.bytes = new Float64Array(T);
+    /** (T) columns that are there whole. */
+    this.have = new Int32Array(T);
+    /** @type {Set<Request>} on the way */
+    this.waiting = new Set();
+    /** Seconds, on the clock of whoever looks. */
+    this.now = 0;
+  }
+
+  /** Whether it may be asked for. @param {Kind} kind @param {number} number */
+  free(kind, number) {
+    return this.#state[kind][number] === ABSENT && this.#rests[kind][number] <= this.now;
+  }
+
+  /** Whether all of a record or of geometry is there. @param {Kind} kind @param {number} number */
+  there(kind, number) {
+    return this.#state[kind][number] === THERE;
+  }
+
+  /** @param {Kind} kind @param {number} number */
+  came(kind, number) {
+    this.#state[kind][number] = THERE;
+  }
+
+  /** @param {Kind} kind @param {number} number */
+  lost(kind, number) {
+    this.#state[kind][number] = ABSENT;
+  }
+
+  /**
+   * @param {Kind} kind
+   * @param {number} number
+   * @param {number} priority
+   * @param {number} [end] of a texture
+   * @returns {Request}
+   */
+  ask(kind, number, priority, end) {
+    const { recordBytes, geometryBytes } = this.#stock;
+    end ??= (kind === "record" ? recordBytes : geometryBytes)[number];
+    const begin = kind === "texture" ? this.bytes[number] : 0;
+    const request = { kind, number, begin, end, priority, left: OVERHEAD + end - begin };
+    this.#state[kind][number] = ASKED;
+    this.waiting.add(request);
+    return request;
+  }
+
+  /**
+   * A request is over; of a texture the bytes up to `end` are there.
+   * @param {Request} request
+   * @param {number} end
+   */
+  over(request, end) {
+    const { kind, number } = request, { K, ends, levels } = this.#stock;
+    this.waiting.delete(request);
+    if (kind !== "texture") return;
+    this.lost(kind, number);
+    this.bytes[number] = Math.max(this.bytes[number], end);
+    while (this.have[number] < levels[number]
+        && ends[number * K + this.have[number] + 1] <= this.bytes[number]) this.have[number]++;
+  }
+
+  /**
+   * Of a texture only so many first bytes are good; no more is asked for before `until`.
+   * @param {number} texture
+   * @param {number} bytes
+   * @param {number} until
+   */
+  cut(texture, bytes, until) {
+    const { K, ends } = this.#stock;
+    this.bytes[texture] = Math.min(this.bytes[texture], bytes);
+    while (this.have[texture] > 0 && ends[texture * K + this.have[texture]] > bytes) {
+      this.have[texture]--;
+    }
+    this.#rests.texture[texture] = until;
+  }
+
+  /**
+   * A request came to nothing; it is not to be made again before `until`.
+   * @param {Request} request
+   * @param {number} until
+   */
+  failed(request, until) {
+    const { kind, number } = request;
+    this.waiting.delete(request);
+    if (this.#state[kind][number] === ASKED) this.lost(kind, number);
+    this.#rests[kind][number] = until;
+  }
+}

@@ -1,0 +1,92 @@
+// What a client believes of its link, from what it has downloaded lately. Bandwidth is bytes over
+// the time during which any were arriving, both forgotten with a half-life of such time: a pause
+// neither lowers the estimate nor ages it, and parallel requests do not count against each other.
+// Latency is the mean of the last few, of requests whose response did not wait for those of others.
+
+/**
+ * @typedef {object} Belief
+ * @property {number} bandwidth bit/s
+ * @property {number} latency s from a request to its first byte
+ */
+
+// After so many s of arriving bytes they count half.
+const HALF_LIFE = 1;
+// With fewer bytes and less time than these the prior is believed.
+const ENOUGH_BYTES = 16384, ENOUGH_SECONDS = 0.25;
+const LATENCIES = 8;
+// A response that begins so soon after another has ended had to wait for it, s.
+const AT_ONCE = 1e-3;
+
+/** @implements {Belief} */
+export class Estimate {
+  /** @type {Map<unknown, {sent: number, waited: number}>} `waited` is −1 before the first byte */
+  #requests = new Map();
+  /** @type {number[]} */
+  #latencies = [];
+  #prior;
+  #bytes = 0;
+  #seconds = 0;
+  #arriving = 0;
+  #seen = 0;
+  #ended = -Infinity;
+
+  /** @param {Belief} prior */
+  constructor(prior = { bandwidth: 1e6, latency: 0.1 }) {
+    this.#prior = prior;
+  }
+
+  /** A request goes out. @param {unknown} id @param {number} now s */
+  sent(id, now) {
+    this.#requests.set(id, { sent: now, waited: -1 });
+  }
+
+  /** Its response begins. @param {unknown} id @param {number} now */
+  firstByte(id, now) {
+    this.bytes(now, 0);
+    const request = this.#requests.get(id);
+    if (!request || request.waited >= 0) return;
+    const behind = this.#ended > request.sent && Math.abs(now - this.#ended) < AT_ONCE;
+    request.waited = behind ? NaN : now - request.sent;
+    this.#arriving++;
+  }
+
+  /** So many bytes have come since it was last called. @param {number} now @param {number} count */
+  bytes(now, count) {
+    const seconds = this.#arriving > 0 ? Math.max(now - this.#seen, 0) : 0;
+    const fading = 0.5 ** (seconds / HALF_LIFE);
+    this.#seen = Math.max(this.#seen, now);
+    this.#bytes = this.#bytes * fading + count;
+    this.#seconds = this.#seconds * fading + seconds;
+  }
+
+  /** It came to its end, whole or not. @param {unknown} id @param {number} now */
+  finished(id, now) {
+    this.bytes(now, 0);
+    const request = this.#requests.get(id);
+    this.#requests.delete(id);
+    if (!request || request.waited === -1) return;
+    this.#arriving--;
+    this.#ended = now;
+    if (request.waited >= 0) this.#latencies.push(request.waited);
+    this.#latencies = this.#latencies.slice(-LATENCIES);
+  }
+
+  get bandwidth() {
+    if (this.#bytes < ENOUGH_BYTES && this.#seconds < ENOUGH_SECONDS) return this.#prior.bandwidth;
+    return this.#seconds > 0 ? 8 * this.#bytes / this.#seconds : Infinity;
+  }
+
+  get latency() {
+    const some = this.#latencies;
+    return some.length ? some.reduce((a, b) => a + b, 0) / some.length : this.#prior.latency;
+  }
+}
+
+/**
+ * Seconds until a request of so many bytes would be finished, if it had the link for itself.
+ * @param {Belief} estimate
+ * @param {number} size
+ */
+export function duration({ bandwidth, latency }, size) {
+  return bandwidth > 0 ? latency + 8 * size / bandwidth : Infinity;
+}

@@ -1,0 +1,144 @@
+// The client of Marvie & Bouatouch, §6.1 and §6.2, as `ptm simulate --policy paper` reads them:
+// memory is shared out among the cells in the frustum by their average coverage, and equally among
+// the shapes of each; a texture adds, removes or asks for one level at each look, if it may be had
+// within the patience of the visitor. Requests are made as soon as they are known.
+
+import { duration } from "./estimate.js";
+import { refresh, shareOut } from "./sharing.js";
+import { meetsBox, meetsHull } from "../space/frustum.js";
+import { nextCell } from "../space/portals.js";
+
+/** @typedef {import("./client.js").Client} Client */
+/** @typedef {import("./client.js").Policy} Policy */
+/** @typedef {import("./downloads.js").Kind} Kind */
+/** @typedef {import("./estimate.js").Belief} Belief */
+
+// Way that is taken for the way on, and how far ahead, s.
+const BEFORE = 0.5, AHEAD = 2;
+// Priorities of requests.
+const LEVEL = 1, NEXT = 2, VISIBLE = 3, CURRENT = 4;
+
+/** @implements {Policy} */
+export class Paper {
+  #client;
+  #entered = -1;
+  /** @type {Set<number>} textures that the visible set uses */
+  #used = new Set();
+  /** @type {number[]} textures that want their next level; those of them not considered yet */
+  #asks = [];
+  /** @type {number[]} */
+  #due = [];
+  /** @type {{now: number, eye: number[]}[]} places of late */
+  #way = [];
+
+  /** @param {Client} client */
+  constructor(client) {
+    this.#client = client;
+    this.target = client.column;
+  }
+
+  learned() {}
+
+  look() {
+    const { catalogue, cell, column, have, budget, downloads, frustum, known } = this.#client;
+    const here = known[cell];
+    if (!frustum) return;
+    this.#way.push({ now: downloads.now, eye: frustum.eye });
+    while (this.#way[0].now < downloads.now - BEFORE - 1e-9) this.#way.shift();
+    if (!here) return;
+    if (cell !== this.#entered) {
+      // What the visible set of the new cell does not use is dropped.
+      this.#entered = cell;
+      this.#used = new Set(here.textures);
+      column.forEach((_, t) => this.#used.has(t) || (column[t] = 0));
+    }
+    const share = new Float64Array(catalogue.T);
+    shareOut(catalogue, this.#shown(), column, budget, share);
+    this.#asks = refresh(catalogue, share, have, budget, column).filter((t) => this.#used.has(t));
+    this.#due = [...this.#asks];
+  }
+
+  /** The cells in the frustum, by descending hint. */
+  #shown() {
+    const { cell, frustum, known, shapes, downloads } = this.#client;
+    const here = known[cell], cells = [];
+    if (!here || !frustum) return [];
+    for (const [i, c] of here.visible.entries()) {
+      const some = shapes[c], hull = known[c]?.hull;
+      if (!some || !downloads.there("geometry", c)) continue;
+      if (c !== cell && !(hull ? meetsHull(frustum, hull) : this.#boxed(c))) continue;
+      const { textures, boxes } = some;
+      const ahead = textures.filter((_, s) => meetsBox(frustum, boxes, boxes, 6 * s, 6 * s + 3));
+      cells.push({ weight: here.coverage[i], textures: ahead });
+    }
+    return cells.sort((a, b) => b.weight - a.weight);
+  }
+
+  /** Whether the box of a cell, whose hull is not known, meets the frustum. @param {number} c */
+  #boxed(c) {
+    const { catalogue, frustum } = this.#client;
+    return !!frustum && meetsBox(frustum, catalogue.low, catalogue.high, 3 * c);
+  }
+
+  missing() {
+    const { cell, here, known, downloads } = this.#client;
+    let count = downloads.there("record", here) ? 0 : 1;
+    for (const c of known[cell]?.visible ?? []) {
+      const seen = c === cell || this.#boxed(c);
+      if (seen && !downloads.there("geometry", c)) count++;
+    }
+    return count + this.#asks.length;
+  }
+
+  /** @param {Belief} estimate */
+  next(estimate) {
+    const { cell, here, known } = this.#client;
+    const own = known[cell];
+    /** @type {[Kind, number, number][]} */
+    const files = [["record", here, CURRENT], ["geometry", here, CURRENT]];
+    if (own) {
+      for (const c of own.visible) files.push(["geometry", c, VISIBLE]);
+      const following = this.#following();
+      if (following >= 0) files.push(["record", following, NEXT], ["geometry", following, NEXT]);
+    }
+    return this.#first(files) ?? this.#level(estimate);
+  }
+
+  /**
+   * Asks for the first of files that is not there; those on the way may become more urgent.
+   * @param {[Kind, number, number][]} files
+   */
+  #first(files) {
+    const { downloads } = this.#client;
+    for (const [kind, number, priority] of files) {
+      if (downloads.free(kind, number)) return downloads.ask(kind, number, priority);
+      for (const request of downloads.waiting) {
+        if (request.kind === kind && request.number === number) {
+          request.priority = Math.max(request.priority, priority);
+        }
+      }
+    }
+    return null;
+  }
+
+  /** @param {Belief} estimate */
+  #level(estimate) {
+    const { catalogue, downloads, have, patience, still } = this.#client;
+    const most = still ? patience.still : patience.moving;
+    while (this.#due.length > 0) {
+      const t = this.#due.splice(0, 1)[0], end = catalogue.ends[t * catalogue.K + have[t] + 1];
+      const soon = duration(estimate, end - downloads.bytes[t]) <= most;
+      if (soon && downloads.free("texture", t)) return downloads.ask("texture", t, LEVEL, end);
+    }
+    return null;
+  }
+
+  /** The cell behind the first portal that the way of late leads through soon, or −1. */
+  #following() {
+    const { cell, known } = this.#client;
+    const first = this.#way[0], last = this.#way[this.#way.length - 1], here = known[cell];
+    if (!here || first === last) return -1;
+    const ahead = AHEAD / (last.now - first.now);
+    return nextCell(here.portals, last.eye, last.eye.map((x, i) => (x - first.eye[i]) * ahead));
+  }
+}

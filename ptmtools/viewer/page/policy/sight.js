@@ -1,0 +1,30 @@
+// From the pixels of an item buffer to what the view wants (docs/client.md, step 2).
+
+/**
+ * @typedef {object} Sight
+ * @property {Float64Array} present T × K: of each column of each texture the share of the pixels
+ * @property {Float64Array} hidden of each cell the share of the pixels that show its placeholder
+ */
+
+/**
+ * @param {import("../gl/item-buffer.js").Reading} reading
+ * @param {{T: number, C: number, K: number, levels: Int32Array}} catalogue
+ * @returns {Sight}
+ */
+export function sightOf({ pixels, items, placeholders }, { T, C, K, levels }) {
+  const present = new Float64Array(T * K), hidden = new Float64Array(C);
+  const each = 1 / pixels;
+  for (let at = 0; at < 2 * pixels; at += 2) {
+    const texture = items[at] - 1;
+    if (texture < 0) continue;
+    const count = levels[texture], first = texture * K + 1;
+    const wanted = count - Math.min(items[at + 1] / 256, count - 1);
+    const whole = Math.floor(wanted);
+    for (let n = 0; n < whole; n++) present[first + n] += each;
+    if (whole < count) present[first + whole] += (wanted - whole) * each;
+  }
+  for (let at = 0; placeholders && at < 2 * pixels; at += 2) {
+    if (placeholders[at]) hidden[placeholders[at] - 1] += each;
+  }
+  return { present, hidden };
+}

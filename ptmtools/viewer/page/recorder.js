@@ -1,0 +1,89 @@
+// A walk as it was, for the simulator to walk it again (docs/walkthrough.md): a sample of each frame,
+// the age of the item buffer in it, and what the page had asked for before the first.
+
+import { clock } from "./net/fetcher.js";
+
+/** Digits behind the point: 0.01 mm and 0.01 ms. @param {number} x */
+const short = (x) => Math.round(x * 1e5) / 1e5;
+
+export class Recorder {
+  /** @type {number[][]} t, eye, direction: as samples of walks */
+  #samples = [];
+  /** @type {number[][]} cell, age of the item buffer, −1 for none, and s for which nothing else ran */
+  #frames = [];
+  #begun = -1;
+  /** @type {Map<string, number[]>} when what came from each address was taken note of, s */
+  #taken = new Map();
+
+  /** @param {import("./walkthrough.js").Walkthrough} walk */
+  constructor(walk) {
+    this.walk = walk;
+    performance.setResourceTimingBufferSize(1e5);
+    const { client, site } = walk, arrived = client.arrived.bind(client);
+    client.arrived = (request, end) => {
+      const { kind, number } = request;
+      const url = kind === "texture" ? site.texture(number) : site.cell(kind, number);
+      this.#taken.set(url, [...(this.#taken.get(url) ?? []), clock()]);
+      arrived(request, end);
+    };
+  }
+
+  /**
+   * A frame that is about to ask for files.
+   * @param {number} before when it began, s
+   * @param {import("./space/frustum.js").Frustum} frustum
+   * @param {number} drawn when the item buffer was that is at hand, s, or −1
+   */
+  frame(before, { eye, direction }, drawn) {
+    const now = clock();
+    if (this.#begun < 0) this.#begun = now;
+    this.#samples.push([now - this.#begun, ...eye, ...direction].map(short));
+    const age = drawn < 0 ? -1 : now - drawn;
+    this.#frames.push([this.walk.cell, age, now - before].map(short));
+  }
+
+  /** A document of a walk, with how it was walked. */
+  get document() {
+    const { tall, aspect, budget, policy, sharpness, catalogue } = this.walk;
+    return {
+      format: "ptmtools walk", schema: 1, fieldOfView: tall, aspect, samples: this.#samples,
+      browser: {
+        begun: short(this.#begun), lines: sharpness.lines, budget: Math.round(budget), policy,
+        recordBytes: Array.from(catalogue.recordBytes),
+        geometryBytes: Array.from(catalogue.geometryBytes),
+        files: this.#files(), frames: this.#frames, ...this.#waits(),
+      },
+    };
+  }
+
+  /** What came without the client's asking for it: when, kind, number, bytes. */
+  #files() {
+    const { site } = this.walk, asked = new Map([[site.address, ["index", 0]]]);
+    site.index.cells.forEach((_, cell) => {
+      asked.set(site.cell("record", cell), ["record", cell]);
+      asked.set(site.cell("geometry", cell), ["geometry", cell]);
+    });
+    const entries = [...performance.getEntriesByType("navigation"),
+      ...performance.getEntriesByType("resource")];
+    return /** @type {PerformanceResourceTiming[]} */ (entries)
+      .filter(({ name, requestStart, transferSize }) => transferSize > 0
+        && (asked.has(name) ? requestStart < 1000 * this.#begun : !name.endsWith(".ptm")))
+      .map(({ name, requestStart, encodedBodySize }) =>
+        [short(requestStart / 1000), ...(asked.get(name) ?? ["page", 0]), encodedBodySize]);
+  }
+
+  /** From when to when requests waited for the browser, and what had come for the page. */
+  #waits() {
+    /** @type {number[][]} */
+    const sent = [], taken = [];
+    const entries = /** @type {PerformanceResourceTiming[]} */ (
+      performance.getEntriesByType("resource"));
+    for (const { name, startTime, requestStart, responseEnd } of entries) {
+      const at = this.#taken.get(name)?.find((at) => at >= responseEnd / 1000);
+      if (!at) continue;
+      if (startTime >= 1000 * this.#begun) sent.push([startTime / 1000, requestStart / 1000].map(short));
+      taken.push([responseEnd / 1000, at].map(short));
+    }
+    return { sent, taken };
+  }
+}

@@ -1,0 +1,186 @@
+// Carries out what the client asks for: requests go out, and what comes is given to whom it concerns.
+
+import { PtmError } from "../decoder/src/index.js";
+import { readGlb } from "./data/glb.js";
+import { PageError } from "./net/errors.js";
+import { clock } from "./net/fetcher.js";
+import { TextureFile } from "./net/texture-file.js";
+
+/** @typedef {import("./policy/downloads.js").Request} Request */
+/** @typedef {import("./data/site.js").CellRecord} CellRecord */
+/** @typedef {import("./data/glb.js").Shape} Shape */
+
+/** Seconds until a file that could not be had is asked for again. */
+const REST = 10;
+const CONNECTIONS = 6;
+
+export class Stream {
+  /** @type {Map<number, CellRecord>} */
+  records = new Map();
+  /** @type {Map<number, Shape[]>} */
+  shapes = new Map();
+  /** Whether anything has arrived that was not looked at yet. */
+  news = false;
+  /** Whether nothing more is asked for. */
+  resting = false;
+  /** @type {Request[]} */
+  #queue = [];
+  #sent = 0;
+  /** The level at which a texture was found to be damaged. @type {Map<number, number>} */
+  #suspect = new Map();
+  #cannotDecode = false;
+
+  /**
+   * @param {object} parts
+   * @param {import("./data/site.js").Site} parts.site
+   * @param {import("./policy/client.js").Client} parts.client
+   * @param {import("./space/locating.js").Locator} parts.locator
+   * @param {import("./policy/estimate.js").Estimate} parts.estimate
+   * @param {import("./net/fetcher.js").Fetcher} parts.fetcher
+   * @param {import("../decoder/src/workers.js").DecoderWorkers} parts.workers
+   * @param {(error: PageError, kind: string, number: number) => void} parts.report what it is about
+   */
+  constructor({ site, client, locator, estimate, fetcher, workers, report }) {
+    this.site = site;
+    this.client = client;
+    this.locator = locator;
+    this.estimate = estimate;
+    this.fetcher = fetcher;
+    this.report = report;
+    this.files = site.index.textures.map((row) => new TextureFile(row, workers));
+  }
+
+  /** Asks for what is worth most, as long as the link would run dry. */
+  pump() {
+    while (!this.resting) {
+      const request = this.client.next(this.estimate);
+      if (!request) return;
+      this.ask(request);
+    }
+  }
+
+  /**
+   * As many requests are on the way as browsers have connections to a host, the most urgent ones.
+   * @param {Request} request
+   */
+  ask(request) {
+    this.#queue.push(request);
+    this.#send();
+  }
+
+  #send() {
+    while (this.#sent < CONNECTIONS && this.#queue.length) {
+      const { priority } = this.#queue.reduce((a, b) => (b.priority > a.priority ? b : a));
+      const first = this.#queue.findIndex((request) => request.priority === priority);
+      const [request] = this.#queue.splice(first, 1);
+      this.#sent++;
+      this.#fetch(request).finally(() => {
+        this.#sent--;
+        this.#send();
+        this.pump();
+      });
+    }
+  }
+
+  /** @param {Request} request */
+  async #fetch(request) {
+    const { kind, number } = request, { client } = this;
+    try {
+      if (kind === "texture") await this.#texture(request);
+      else await this.#cell(kind, request);
+      this.news = true;
+    } catch (fault) {
+      const known = fault instanceof PageError;
+      const error = known ? fault : new PageError("PTM-V106", String(fault));
+      const forGood = error.code === "PTM-V103" || error.code === "PTM-V105";
+      client.failed(request, forGood ? Infinity : clock() + REST);
+      this.report(error, kind, number);
+    }
+  }
+
+  /**
+   * @param {"record" | "geometry"} kind
+   * @param {Request} request
+   */
+  async #cell(kind, request) {
+    const { client } = this, cell = request.number, url = this.site.cell(kind, cell);
+    if (kind === "record") {
+      const record = await this.fetcher.whole(url, (body) => readRecord(body, cell), request);
+      this.records.set(cell, record);
+      this.locator.learn(cell, record);
+      client.arrived(request);
+      client.learnRecord(cell, record);
+    } else {
+      const shapes = await this.fetcher.whole(url, (body) => readShapes(body, cell), request);
+      this.shapes.set(cell, shapes);
+      client.arrived(request);
+      client.learnGeometry(cell, shapes);
+    }
+  }
+
+  /** @param {Request} request */
+  async #texture(request) {
+    const { number, begin, end } = request, file = this.files[number];
+    const size = file.row.ends[file.row.ends.length - 1];
+    const url = this.site.texture(number), cache = this.#suspect.has(number) ? "no-store" : "default";
+    const part = await this.fetcher.range(url, begin, end, size, request, cache);
+    // What was here before it may have been found to be damaged.
+    if (part.begin <= file.length) file.append(part.begin, part.body);
+    this.client.arrived(request, file.length);
+  }
+
+  /**
+   * The first levels, so many, of a texture whose bytes are here. A level that is damaged is asked for
+   * once more; if that is damaged as well, what is below it remains.
+   * @param {number} texture
+   * @param {number} levels
+   */
+  async decode(texture, levels) {
+    const file = this.files[texture];
+    // What was damaged is on its way once more.
+    if (levels > this.client.have[texture]) throw new Error("not here");
+    try {
+      const images = await file.decode(levels);
+      if (levels > (this.#suspect.get(texture) ?? levels)) this.#suspect.delete(texture);
+      return images;
+    } catch (fault) {
+      // Who cannot decode at all knows nothing of the file.
+      if (!(fault instanceof PtmError)) {
+        if (!this.#cannotDecode) {
+          this.report(new PageError("PTM-V106", `Textures cannot be decoded: ${fault}`), "decoder", 0);
+        }
+        this.#cannotDecode = true;
+        throw fault;
+      }
+      const { level = 0 } = /** @type {{level?: number}} */ (fault);
+      const kept = level > 0 ? file.row.ends[level - 1] : 0;
+      file.cut(kept);
+      this.client.lose(texture, kept, this.#suspect.get(texture) === level ? Infinity : 0);
+      this.#suspect.set(texture, level);
+      const message = `${file.row.file} is damaged: ${fault.message}`;
+      this.report(new PageError("PTM-V105", message), "texture", texture);
+      throw fault;
+    }
+  }
+}
+
+/**
+ * @param {Uint8Array} body
+ * @param {number} cell
+ * @returns {CellRecord}
+ */
+function readRecord(body, cell) {
+  const record = JSON.parse(new TextDecoder().decode(body));
+  if (record.cell !== cell) throw new Error("is of another cell");
+  return record;
+}
+
+/**
+ * @param {Uint8Array<ArrayBuffer>} body
+ * @param {number} cell
+ */
+function readShapes(body, cell) {
+  const read = readGlb(body.buffer);
+  if (read.cell !== cell) throw new Error("is of another cell");
+  return read.shapes;
+}

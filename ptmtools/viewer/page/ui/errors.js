@@ -1,0 +1,53 @@
+// What went wrong, in words, and what to do about it.
+
+import { find, make } from "./elements.js";
+
+/** What to do, by the code of the error. @type {Record<string, string>} */
+const REMEDIES = {
+  "PTM-V101": "Use Chrome, Edge, Firefox or Safari 15, with hardware acceleration switched on.",
+  "PTM-V103": "Whoever put this site up can publish it again.",
+  "PTM-V104": "See whether there is a connection, and load the page again.",
+  "PTM-V106": "Update the browser, or let this page run workers.",
+  "PTM-V105": "Whoever put this site up can publish it again.",
+};
+const OTHERWISE = "Load the page again. If that does not help, tell whoever put it up.";
+/** How long a notice stays, ms. */
+const STAYS = 8000;
+
+/** Shows an error, in the way of everything. @param {Document} root
+ * @param {{code: string, message: string}} error */
+export function showError(root, { code, message }) {
+  const panel = find(root, "#error"), again = find(root, "#again");
+  find(root, "#error-text").textContent = message;
+  find(root, "#error-remedy").textContent = REMEDIES[code] ?? OTHERWISE;
+  find(root, "#error-code").textContent = code;
+  find(root, "#loading").hidden = true;
+  panel.hidden = false;
+  for (const name of ["nav", "#panels", "#view"]) find(root, name).inert = true;
+  again.onclick = () => location.reload();
+  again.focus();
+}
+
+/** Says something in passing. @param {Document} root @param {...(string | Node)} message */
+export function showNotice(root, ...message) {
+  const line = make("p", {}, ...message);
+  find(root, "#notices").append(line);
+  // Not from under whoever is in it.
+  const leave = () => {
+    if (line.contains(root.activeElement)) setTimeout(leave, STAYS);
+    else line.remove();
+  };
+  setTimeout(leave, STAYS);
+}
+
+/** Each notice is given once. @param {Document} root @param {import("./all.js").App} app */
+export function attachErrors(root, app) {
+  /** @type {Set<string>} */
+  const said = new Set();
+  app.on("error", (error) => showError(root, error));
+  app.on("notice", ({ message }) => {
+    if (said.has(message)) return;
+    said.add(message);
+    showNotice(root, message);
+  });
+}

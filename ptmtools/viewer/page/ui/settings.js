@@ -1,0 +1,59 @@
+// What a visitor may choose: fewer bytes, memory, patience, the policy; and a picture to compare.
+
+import { find, inMemory, make } from "./elements.js";
+
+/** @typedef {import("./all.js").App} App */
+
+const MIB = 2 ** 20, POLICIES = ["best", "paper"];
+
+/**
+ * A slider that is moved by factors of the square root of two.
+ * @param {string} name @param {number[]} range least and greatest @param {number} now
+ * @param {(value: number) => string} told @param {(value: number) => void} choose
+ */
+function slider(name, [least, greatest], now, told, choose) {
+  const shown = make("span", { ariaHidden: "true" }, told(now));
+  const at = (/** @type {number} */ value) => Math.round(2 * Math.log2(value / least));
+  const input = make("input", { type: "range", min: 0, max: at(greatest), value: at(now) });
+  const value = () => least * 2 ** (input.value / 2);
+  const say = () => (shown.textContent = input.ariaValueText = told(value()));
+  input.oninput = say;
+  input.onchange = () => choose(value());
+  input.ariaValueText = told(now);
+  return make("label", {}, name, shown, input);
+}
+
+/** @param {HTMLElement} root the panel @param {App} app */
+export function attachSettings(root, app) {
+  const { budgetBytes, patience = 0.5, policy, dataSaver = false } = app.state();
+  const saver = make("input", { type: "checkbox", role: "switch", checked: dataSaver });
+  saver.onchange = () => app.setDataSaver(saver.checked);
+  const policies = POLICIES.map((one) => make("option", { selected: one === policy }, one));
+  const choice = make("select", {}, ...policies);
+  choice.onchange = () => app.setPolicy(choice.value);
+
+  /** @param {string} name @param {(on: boolean) => void} press */
+  const toggle = (name, press) => {
+    const button = make("button", { "aria-pressed": "false" }, name);
+    button.onclick = () => {
+      const on = button.getAttribute("aria-pressed") !== "true";
+      button.setAttribute("aria-pressed", String(on));
+      press(on);
+    };
+    return button;
+  };
+  const freeze = toggle("Freeze", (on) => app.freeze(on));
+  const compare = toggle("Compare", (on) => {
+    app.compare(on);
+    find(document, "#halves").hidden = !on;
+  });
+  const seconds = (/** @type {number} */ value) => `${value.toPrecision(2)} s`;
+  root.append(
+    make("h3", {}, "Settings"),
+    make("label", { className: "switch" }, "Data saver: only what is in view", saver),
+    slider("Texture memory", [4 * MIB, 1024 * MIB], budgetBytes, inMemory, app.setBudget),
+    slider("Patience, δt", [0.0625, 4], patience, seconds, app.setPatience),
+    make("label", {}, "Policy", choice),
+    make("p", { className: "row" }, freeze, compare),
+  );
+}

@@ -1,0 +1,199 @@
+// What a walker meets: the triangles of the cells whose geometry is there, each cell's in a tree.
+//
+// A triangle carries who stands on it, if it is within 45° of level, and is in the way of who
+// walks, unless it lies in the opening of a portal: there hangs a door.
+
+/** @typedef {import("../data/glb.js").Shape} Shape */
+/** @typedef {{portals: {polygon: number[][]}[]}} Openings */
+/** Its corners are x, y, z thrice from `at` on.
+ * @typedef {(corners: Float32Array, at: number, kind: number) => void} Visit */
+
+/** Kinds of triangles: a sum of these. */
+export const BLOCKS = 1;
+export const CARRIES = 2;
+/** How far from the plane of a portal a door may hang, and how much wider than it may be, m. */
+const DEEP = 0.25, WIDER = 0.1;
+/** How far inside the opening its middle must be, lest the sides of the opening be doors, m. */
+const INSIDE = 0.03;
+const FEW = 4;
+/** Triangles that are looked at without a pause. */
+const AT_ONCE = 64;
+
+/**
+ * How far a point is inside a polygon (negative: outside), if it is near enough to its plane for a
+ * door; null if it lies flat.
+ * @param {number[][]} polygon convex
+ * @returns {((x: number, y: number, z: number) => number) | null}
+ */
+function openingOf(polygon) {
+  const [[x0, y0, z0]] = polygon;
+  let nx = 0, ny = 0, nz = 0;
+  polygon.forEach(([x, y, z], k) => {
+    const [u, v, w] = polygon[(k + 1) % polygon.length];
+    nx += (y - v) * (z + w);
+    ny += (z - w) * (x + u);
+    nz += (x - u) * (y + v);
+  });
+  const size = Math.hypot(nx, ny, nz);
+  if (!(Math.abs(ny) < 0.7 * size)) return null;
+  nx /= size;
+  ny /= size;
+  nz /= size;
+  const edges = polygon.map(([x, y, z], k) => {
+    const [u, v, w] = polygon[(k + 1) % polygon.length];
+    const a = u - x, b = v - y, c = w - z, length = Math.hypot(a, b, c) || 1;
+    const inward = [ny * c - nz * b, nz * a - nx * c, nx * b - ny * a].map((v) => v / length);
+    return [...inward, inward[0] * x + inward[1] * y + inward[2] * z];
+  });
+  return (x, y, z) => {
+    if (Math.abs(nx * (x - x0) + ny * (y - y0) + nz * (z - z0)) > DEEP) return -Infinity;
+    return edges.reduce((far, [a, b, c, d]) => Math.min(far, a * x + b * y + c * z - d), Infinity);
+  };
+}
+
+/** Triangles in a tree: nodes in the order of a walk through it, each with where the next begins
+ * that is not below it. It is made step by step: thousands of triangles take longer than a frame. */
+class Tree {
+  corners = new Float32Array(0);
+  kinds = new Uint8Array(0);
+  order = new Uint32Array(0);
+  boxes = new Float32Array(0);
+  next = new Uint32Array(0);
+  /** First and last triangle of a node without others below it. */
+  ranges = new Uint32Array(0);
+  count = 0;
+
+  /** @param {Shape[]} shapes @param {Openings} record */
+  constructor(shapes, record) {
+    this.steps = this.#make(shapes, record);
+  }
+
+  /** @param {Shape[]} shapes @param {Openings} record */
+  *#make(shapes, { portals }) {
+    const openings = portals.map(({ polygon }) => openingOf(polygon)).filter((one) => one !== null);
+    const most = shapes.reduce((sum, { indices }) => sum + indices.length / 3, 0);
+    this.corners = new Float32Array(9 * most);
+    this.kinds = new Uint8Array(most);
+    let count = 0;
+    for (const { positions, indices } of shapes) {
+      for (let k = 0; k + 2 < indices.length; k += 3) {
+        if (k % (3 * AT_ONCE) === 0) yield;
+        const p = this.corners.subarray(9 * count, 9 * count + 9);
+        for (let n = 0; n < 9; n++) p[n] = positions[3 * indices[k + Math.floor(n / 3)] + (n % 3)];
+        const ax = p[3] - p[0], ay = p[4] - p[1], az = p[5] - p[2];
+        const bx = p[6] - p[0], by = p[7] - p[1], bz = p[8] - p[2];
+        const level = Math.hypot(ay * bz - az * by, ax * by - ay * bx);
+        const upright = Math.abs(az * bx - ax * bz);
+        if (level + upright === 0) continue;
+        const [x, y, z] = [0, 1, 2].map((n) => (p[n] + p[n + 3] + p[n + 6]) / 3);
+        const door = openings.some((inside) => inside(x, y, z) > INSIDE
+          && [0, 3, 6].every((n) => inside(p[n], p[n + 1], p[n + 2]) > -WIDER));
+        this.kinds[count] = (door ? 0 : BLOCKS) + (level <= upright ? CARRIES : 0);
+        if (this.kinds[count] > 0) count++;
+      }
+    }
+    this.order = Uint32Array.from({ length: count }, (_, k) => k);
+    this.boxes = new Float32Array(12 * count + 6);
+    this.next = new Uint32Array(2 * count + 1);
+    this.ranges = new Uint32Array(4 * count + 2);
+    // What is still to be made, the next at the end; between them nodes that are over then.
+    const left = count ? [{ begin: 0, end: count, over: -1 }] : [];
+    for (let next = left.pop(); next; next = left.pop()) {
+      const { begin, end, over } = next;
+      if (over >= 0) {
+        this.next[over] = this.count;
+        continue;
+      }
+      yield;
+      const node = this.count, split = this.#node(begin, end);
+      left.push({ begin, end, over: node });
+      if (split < end) left.push({ begin: split, end, over: -1 }, { begin, end: split, over: -1 });
+    }
+  }
+
+  /**
+   * Makes a node of triangles, and where they fall into two; `end`, if they do not.
+   * @param {number} begin @param {number} end
+   */
+  #node(begin, end) {
+    const { corners, order } = this, node = this.count++;
+    const box = this.boxes.subarray(6 * node, 6 * node + 6).fill(Infinity, 0, 3).fill(-Infinity, 3);
+    for (let k = begin; k < end; k++) {
+      for (let n = 0; n < 9; n++) {
+        const value = corners[9 * order[k] + n], axis = n % 3;
+        if (value < box[axis]) box[axis] = value;
+        if (value > box[3 + axis]) box[3 + axis] = value;
+      }
+    }
+    if (end - begin <= FEW) {
+      this.ranges[2 * node] = begin;
+      this.ranges[2 * node + 1] = end;
+      return end;
+    }
+    const sizes = [box[3] - box[0], box[4] - box[1], box[5] - box[2]];
+    const axis = sizes.indexOf(Math.max(...sizes)), middle = 1.5 * (box[axis] + box[3 + axis]);
+    let split = begin;
+    for (let k = begin; k < end; k++) {
+      const one = order[k], at = 9 * one + axis;
+      if (corners[at] + corners[at + 3] + corners[at + 6] >= middle) continue;
+      order[k] = order[split];
+      order[split++] = one;
+    }
+    return split === begin || split === end ? (begin + end) >> 1 : split;
+  }
+
+  /** @param {number[]} low @param {number[]} high @param {Visit} visit */
+  visit(low, high, visit) {
+    const { boxes, order } = this;
+    for (let node = 0; node < this.count; ) {
+      const at = 6 * node;
+      const meets = [0, 1, 2].every((k) => boxes[at + k] <= high[k] && boxes[at + 3 + k] >= low[k]);
+      for (let k = this.ranges[2 * node]; meets && k < this.ranges[2 * node + 1]; k++) {
+        visit(this.corners, 9 * order[k], this.kinds[order[k]]);
+      }
+      node = meets ? node + 1 : this.next[node];
+    }
+  }
+}
+
+/** The triangles of the cells that are there. */
+export class Solids {
+  /** @type {Map<number, Tree>} */
+  #trees = new Map();
+  /** @type {Map<number, Tree>} of cells that are not there yet */
+  #growing = new Map();
+
+  /**
+   * Adds a cell, or as much of it as there is time for: it is there when all of it is, by further
+   * calls; true if it is.
+   * @param {number} cell @param {Shape[]} shapes @param {Openings} record
+   * @param {() => boolean} [late] whether the time has come
+   */
+  add(cell, shapes, record, late = () => false) {
+    const tree = this.#growing.get(cell) ?? new Tree(shapes, record);
+    this.#growing.set(cell, tree);
+    while (!tree.steps.next().done) if (late()) return false;
+    this.#growing.delete(cell);
+    this.#trees.set(cell, tree);
+    return true;
+  }
+
+  /** @param {number} cell */
+  remove(cell) {
+    this.#trees.delete(cell);
+    this.#growing.delete(cell);
+  }
+
+  /** @param {number} cell */
+  has(cell) {
+    return this.#trees.has(cell);
+  }
+
+  /**
+   * Visits all triangles that may meet a box, and some that do not.
+   * @param {number[]} low @param {number[]} high @param {Visit} visit
+   */
+  near(low, high, visit) {
+    for (const tree of this.#trees.values()) tree.visit(low, high, visit);
+  }
+}

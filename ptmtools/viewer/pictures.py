@@ -1,0 +1,188 @@
+"""Pictures of viewpoints, as the page draws them: a poster, and a small one for each in the menu.
+
+Rays find what the pixels show (`ptmtools.walkthrough.view.rays`), and textures are sampled at the
+level nearest to what a pixel covers, of those up to `FINEST` texels a side: of a texture that no
+picture shows nothing is read, and of the others their first bytes. (Tried: the compiled sampling of
+`ptmtools.walkthrough.view`, trilinear: nobody tells the two apart at this size, and where it is not
+compiled yet that takes four seconds.)
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from functools import partial
+from itertools import islice
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Floats, Ints
+from ptmtools.texture.model import Limits
+from ptmtools.texture.parallel import ordered
+from ptmtools.texture.samples import in_eight_bits
+from ptmtools.walkthrough.served import Served
+from ptmtools.walkthrough.view.rays import Camera, Caster
+from ptmtools.walkthrough.view.records import Sight, Triangles
+from ptmtools.walkthrough.view.triangles import triangles_of
+
+#: Pixels of the poster, and of the small pictures; bytes that they may have.
+POSTER, POSTER_BYTES = (640, 360), 12_000
+SMALL, SMALL_BYTES = (160, 90), 3_000
+#: Rays for a pixel, each way.
+_FINER = 1.5
+#: Viewpoints that have a picture at most.
+MOST = 32
+#: Texels of the longer side of the finest level that is sampled.
+FINEST = 256
+#: What is behind everything, 0 to 1, and the light on surfaces without texture: as the page has it.
+_SKY = (0.16, 0.17, 0.19)
+_AMBIENT = 0.4
+_LIMITS = Limits(decoded_bytes=1 << 33)
+_THREADS = 4
+_QUALITIES = (80, 72, 64, 56, 48, 40, 32, 24, 16, 8)
+
+#: The levels of a texture: (h, w, 3) each, coarsest first.
+Levels = Sequence[NDArray[np.uint8]]
+
+
+def pictures(served: Served) -> tuple[bytes, list[bytes]]:
+    """JPEGs of a database's viewpoints: of the first one for a poster, and small ones of the first
+    `MOST`.
+
+    Raises
+    ------
+    ImportError: there is no Embree.
+    InputError, LimitError: those of `ptmtools.texture.open` and `PtmReader.levels`.
+    """
+    viewpoints = served.index["viewpoints"][:MOST]
+    caster, triangles = Caster(served.surfaces), triangles_of(served.surfaces)
+    wanted = [(POSTER, viewpoints[0]), *((SMALL, each) for each in viewpoints)]
+    sights = [_look(caster, size, viewpoint) for size, viewpoint in wanted]
+    shown = np.unique(np.concatenate([np.unique(sight.triangle) for sight in sights]))
+    used = set(triangles.texture[shown[shown >= 0]].tolist()) - {-1}
+    textures = sorted(used)
+    # The lock of the interpreter is free while levels are decoded and numpy is at work.
+    levels = ordered(partial(_levels, served), textures, _THREADS)
+    draw = partial(_jpeg_of, triangles, dict(zip(textures, levels, strict=True)))
+    sizes = [size for size, _ in wanted]
+    poster, *small = ordered(draw, zip(sights, sizes, strict=True), _THREADS)
+    return poster, small
+
+
+def _jpeg_of(
+    triangles: Triangles, textures: Mapping[int, Levels], shown: tuple[Sight, tuple[int, int]]
+) -> bytes:
+    sight, size = shown
+    most = POSTER_BYTES if size == POSTER else SMALL_BYTES
+    return jpeg(_colors(sight, triangles, textures), size, most)
+
+
+def jpeg(colors: Floats, size: tuple[int, int], most: int) -> bytes:
+    """A JPEG of so many bytes at most, if quality can make it so, of the (n, 3) colours of rays."""
+    from PIL import Image
+
+    width, height = _rays(size)
+    pixels = np.rint(np.clip(colors, 0, 255)).astype(np.uint8).reshape(height, width, 3)
+    image = Image.fromarray(pixels).resize(size, Image.Resampling.BOX)
+    data = b""
+    for quality in _QUALITIES:
+        out = io.BytesIO()
+        image.save(out, "JPEG", quality=quality, optimize=True, progressive=True)
+        data = out.getvalue()
+        if len(data) <= most:
+            break
+    return data
+
+
+def _rays(size: tuple[int, int]) -> tuple[int, int]:
+    return round(size[0] * _FINER), round(size[1] * _FINER)
+
+
+def _look(caster: Caster, size: tuple[int, int], viewpoint: Mapping[str, Any]) -> Sight:
+    width, height = _rays(size)
+    camera = Camera(width, height, viewpoint["fieldOfView"], width / height)
+    sight = caster.look(camera, np.array(viewpoint["position"]), np.array(viewpoint["direction"]))
+    # Levels are chosen for the pixels that there are.
+    return sight._replace(pixel=2 * np.tan(camera.field_of_view / 2) / size[1])
+
+
+def _levels(served: Served, texture: int) -> Levels:
+    """Those of a texture up to `FINEST`, the coarsest in any case."""
+    from ptmtools.texture import open as open_ptm
+
+    found: list[NDArray[np.uint8]] = []
+    with open_ptm(served.texture_file(texture), limits=_LIMITS) as ptm:
+        sides = [max(level.width, level.height) for level in ptm.header.levels]
+        count = max(1, sum(side <= FINEST for side in sides))
+        for samples in islice(ptm.levels(), count):
+            shown = in_eight_bits(samples)
+            found.append(shown[:, :, :3] if shown.shape[2] >= 3 else shown[:, :, [0, 0, 0]])
+    return found
+
+
+def _colors(sight: Sight, triangles: Triangles, textures: Mapping[int, Levels]) -> Floats:
+    """(n, 3) what the rays show, 0 to 255."""
+    shown = np.empty((len(sight.ray), 3))
+    shown[:] = np.multiply(_SKY, 255)
+    hit = np.flatnonzero(sight.triangle >= 0)
+    triangle, ray = sight.triangle[hit], sight.ray[hit]
+    normal = triangles.normal[triangle]
+    facing = np.einsum("ij,ij->i", normal, ray)
+    length = np.linalg.norm(normal, axis=1) * np.linalg.norm(ray, axis=1)
+    light = _AMBIENT + (1 - _AMBIENT) * np.abs(facing) / np.maximum(length, 1e-300)
+    found = np.repeat(255.0 * light[:, None], 3, axis=1)
+    texture = triangles.texture[triangle]
+    facing = np.where(facing == 0, 1e-300, facing)
+    for number, levels in textures.items():
+        rows = np.flatnonzero(texture == number)
+        if len(rows):
+            of = hit[rows]
+            found[rows] = _sampled(sight, of, facing[rows], triangles, levels)
+    shown[hit] = found * triangles.color[triangle]
+    return shown
+
+
+def _sampled(
+    sight: Sight, pixel: Ints, facing: Floats, triangles: Triangles, levels: Levels
+) -> Floats:
+    """(n, 3) what some pixels show of a texture; ``facing`` is the normal along the ray."""
+    triangle, ray = sight.triangle[pixel], sight.ray[pixel]
+    normal, gradient = triangles.normal[triangle], triangles.gradient[triangle]
+    offset = triangles.corner[triangle, 0] - sight.eye
+    depth = np.einsum("ij,ij->i", normal, offset) / facing
+    at = ray * depth[:, None] - offset
+    uv = triangles.uv[triangle, 0] + np.einsum("ikj,ij->ik", gradient, at)
+    # By how many texels of the finest level the texture moves from a pixel to the next, across the
+    # screen and up it; the larger of the two counts, as in OpenGL.
+    height, width = levels[-1].shape[:2]
+    slope = np.einsum("ij,kj->ik", normal, sight.axes) / facing[:, None]
+    move = sight.axes[None] - slope[:, :, None] * ray[:, None]
+    texels = np.einsum("icj,ikj->ikc", gradient, move) * [width, height]
+    covered = np.linalg.norm(texels, axis=2).max(axis=1) * np.abs(depth) * sight.pixel
+    finest = len(levels) - 1
+    coarser = np.clip(np.rint(np.log2(np.maximum(covered, 1.0))), 0, finest).astype(np.int64)
+    clamped = triangles.clamped[triangle]
+    found = np.empty((len(pixel), 3))
+    for step in np.unique(coarser):
+        rows = np.flatnonzero(coarser == step)
+        found[rows] = _bilinear(levels[finest - step], uv[rows], clamped[rows])
+    return found
+
+
+def _bilinear(level: NDArray[np.uint8], uv: Floats, clamped: NDArray[np.bool_]) -> Floats:
+    """(n, 3) of a level at (n, 2) texture coordinates."""
+    size = np.array([level.shape[1], level.shape[0]])
+    place = uv * size - 0.5
+    low = np.floor(place)
+    share = place - low
+    x, y = (
+        np.where(clamped, np.clip(low + k, 0, size - 1), np.mod(low + k, size)).astype(np.int64)
+        for k in (0, 1)
+    )
+    across, down = share[:, :1], share[:, 1:]
+    upper = level[x[:, 1], x[:, 0]] * (1 - across) + level[x[:, 1], y[:, 0]] * across
+    lower = level[y[:, 1], x[:, 0]] * (1 - across) + level[y[:, 1], y[:, 0]] * across
+    found: Floats = upper * (1 - down) + lower * down
+    return found

@@ -1,0 +1,291 @@
+"""A site: what a browser needs to walk through a database, file by file.
+
+Every file but the page has a hash of its contents in its name, so that caches may keep it for ever
+and a site that changes is never half old. The index is that of the hints, with names and sizes of
+each file instead of templates: a client plans with what a record and the geometry of a cell cost.
+
+The geometry stays GLB. (Tried, `benchmarks/site_geometry.py`: differences of vertices in planes of
+bytes save 22 to 44 % of it, but 0.02 to 0.04 s until the first room at 512 kbit/s; a GLB without
+the names and URIs that the page does not read, 5 %.)
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+from urllib.parse import quote, unquote
+
+from ptmtools.database.served import compressed
+from ptmtools.errors import DatabaseError, InputError, LimitError
+from ptmtools.files import open_regular
+from ptmtools.pipeline.command import naming_command, open_database
+from ptmtools.pipeline.stages.emit import EMIT
+from ptmtools.progress import Progress, silent
+from ptmtools.store.folder import DatabaseFolder, damaged
+from ptmtools.store.layout import SERVED, sha256
+from ptmtools.store.manifest import BUILD
+from ptmtools.viewer.entry import Entry
+from ptmtools.viewer.program import DIGITS, page, program_files
+from ptmtools.viewer.textures import web_texture
+from ptmtools.walkthrough.served import FORM, Served, read_served
+
+FORMAT = "ptmtools site"
+DATA = "data"
+JSON, JPEG = "application/json", "image/jpeg"
+GLB, PTM = "model/gltf-binary", "application/octet-stream"
+#: What the index of a database has and that of a site has not.
+_LEFT_OUT = ("record", "geometry", "statistics", "firstLook")
+_VRML_MEDIA = {".wrl": "model/vrml", ".png": "image/png"}
+#: How pictures begin.
+_MAGIC = (
+    (rb"\xff\xd8\xff", JPEG, ".jpg"),
+    (rb"\x89PNG\r\n\x1a\n", "image/png", ".png"),
+    (rb"RIFF....WEBP", "image/webp", ".webp"),
+)
+#: What is said of a texture since the hints have it.
+_NEEDED = {"gpuTexelBytes", "differences", "color"}
+_STRANGE = re.compile(r"[^A-Za-z0-9_-]+")
+
+
+@dataclass(frozen=True)
+class SiteOptions:
+    """What may be chosen of a site.
+
+    Attributes
+    ----------
+    title: of the page; by default the name of the database.
+    poster: a picture to show until the building is there, JPEG, PNG or WebP, in place of one that
+        is drawn.
+    pictures: draw a poster and pictures of the viewpoints.
+    clients: who it is for: this page only, or VRML browsers too, with their files and the images
+        that these show.
+    """
+
+    title: str = ""
+    poster: str = ""
+    pictures: bool = True
+    clients: Literal["page", "vrml"] = field(default="page", metadata={"option": "for"})
+
+
+@dataclass(frozen=True)
+class Site:
+    """A site.
+
+    Attributes
+    ----------
+    entries: its files, by name.
+    index: the document that the page reads first.
+    notes: what there is to say of it, one line each.
+    """
+
+    entries: Mapping[str, Entry]
+    index: Mapping[str, Any]
+    notes: tuple[str, ...] = ()
+
+
+def site_of(
+    database: str | os.PathLike[str],
+    options: SiteOptions | None = None,
+    progress: Progress = silent,
+) -> Site:
+    """The site of a finished database.
+
+    Raises
+    ------
+    DatabaseError: PTM-D001 to D003 there is no database, or one of another version; PTM-D901 its
+        hints are of an earlier release; PTM-D004 it is not finished; PTM-D005, D006 a file is
+        missing or damaged; PTM-D606 there is no geometry in glTF.
+    InputError, LimitError: those of `program_files` and `web_texture`.
+    """
+    options = options or SiteOptions()
+    with naming_command(database):
+        folder = open_database(database)
+        folder.record(EMIT.name)
+        return _Making(folder, read_served(folder.path), options, progress).site()
+
+
+class _Making:
+    """A site in the making."""
+
+    def __init__(
+        self, folder: DatabaseFolder, served: Served, options: SiteOptions, progress: Progress
+    ) -> None:
+        self._folder, self._served, self._options = folder, served, options
+        self._progress = progress
+        self._digests = folder.manifest.outputs()
+        self._entries: dict[str, Entry] = {}
+        self._notes: list[str] = []
+
+    def site(self) -> Site:
+        """All of it."""
+        index = dict(self._served.index)
+        for name in _LEFT_OUT:
+            index.pop(name, None)
+        index["format"] = FORMAT
+        index["cells"] = list(self._cells())
+        index["textures"] = list(self._textures())
+        index["viewpoints"], poster = self._pictures()
+        if self._options.clients == "vrml":
+            self._vrml()
+        text = json.dumps(index, ensure_ascii=False, separators=(",", ":")).encode()
+        name = self._add("index", ".json", JSON, text, compressed=True)
+        self._page(index, f"{DATA}/{name}", poster)
+        return Site(self._entries, index, tuple(self._notes))
+
+    def _page(self, index: Mapping[str, Any], url: str, poster: str | None) -> None:
+        program = program_files()
+        title = self._options.title or title_of(self._folder.path)
+        first = index["cells"][index["viewpoints"][0]["cell"]]
+        for entry in program.values():
+            self._entries[entry.name] = entry
+        told: dict[str, Any] = {
+            "index": url,
+            "worker": program["worker.js"].name,
+            "wasm": program["decoder.wasm"].name,
+            "poster": poster,
+            "title": title,
+        }
+        preload = [url, *(f"{DATA}/{first[kind]}" for kind in ("record", "geometry"))]
+        preload.append(program["decoder.wasm"].name)
+        filled = page(title, told, program["viewer.js"].name, preload)
+        self._entries[filled.name] = filled
+
+    def _cells(self) -> Iterator[dict[str, Any]]:
+        index = self._served.index
+        templates = {"record": index["record"], "geometry": index["geometry"][FORM]}
+        media = {"record": (".json", JSON), "geometry": (".glb", GLB)}
+        for number, cell in enumerate(index["cells"]):
+            self._progress(number, len(index["cells"]), "cells")
+            row = dict(cell)
+            for kind, template in templates.items():
+                data = self._read(template.replace("{name}", cell["name"]))
+                row[kind] = self._add(cell["name"], *media[kind], data, compressed=True)
+                row[f"{kind}Bytes"] = min(len(data), len(compressed(data)))
+            yield row
+
+    def _textures(self) -> Iterator[Mapping[str, Any]]:
+        rows = self._served.index["textures"]
+        for number, row in enumerate(rows):
+            self._progress(number, len(rows), "textures")
+            if _NEEDED - row.keys():
+                raise DatabaseError(
+                    "PTM-D901",
+                    "is of an earlier release: its hints do not say all that the page goes by",
+                    file=self._folder.path,
+                    remedy=f"run {BUILD}",
+                )
+            file, digest = self._place(row["file"])
+            found = web_texture(file, row)
+            if found.note:
+                self._notes.append(found.note)
+            source = file if found.data is None else found.data
+            name = self._add(file.stem, ".ptm", PTM, source, digest=digest)
+            yield {**found.row, "file": name, "fallback": None, "fallbackLevel": None}
+
+    def _pictures(self) -> tuple[list[dict[str, Any]], str | None]:
+        """The viewpoints, and the URL of the poster."""
+        rows = [dict(row) for row in self._served.index["viewpoints"]]
+        poster = None
+        if self._options.poster:
+            media, suffix, data = _picture_file(self._options.poster)
+            poster = self._add("poster", suffix, media, data)
+        if self._options.pictures:
+            for drawn, small in self._drawn():
+                poster = poster or self._add("poster", ".jpg", JPEG, drawn)
+                for number, (row, data) in enumerate(zip(rows, small, strict=False)):
+                    row["thumbnail"] = self._add(f"vp-{number:03}", ".jpg", JPEG, data)
+        return rows, poster and f"{DATA}/{poster}"
+
+    def _drawn(self) -> Iterator[tuple[bytes, list[bytes]]]:
+        """The poster and the small pictures; nothing where they cannot be drawn."""
+        from ptmtools.viewer.pictures import pictures
+
+        self._progress(0, 1, "pictures")
+        try:
+            yield pictures(self._served)
+        except ImportError:
+            self._notes.append("no pictures: embreex is not installed, whose rays draw them")
+        except LimitError:
+            raise
+        except InputError as fault:
+            raise damaged(Path(fault.file or self._folder.path), fault.message) from None
+
+    def _vrml(self) -> None:
+        """The files of VRML, under the names that they have in the database."""
+        if "vrml" not in self._served.index["geometry"]:
+            raise DatabaseError(
+                "PTM-D900",
+                "has no VRML files",
+                file=self._folder.path,
+                remedy="write them with `ptm emit DB --format both`",
+            )
+        for name in sorted(self._digests):
+            media = _VRML_MEDIA.get(Path(name).suffix)
+            if media and name.startswith(f"{SERVED}/"):
+                own = quote(name.removeprefix(f"{SERVED}/"))
+                self._entries[own] = Entry(
+                    own, self._folder.path / name, media, compressed=own.endswith(".wrl")
+                )
+
+    def _place(self, url: str) -> tuple[Path, str]:
+        """The file that a URL of the index names, and its recorded hash."""
+        name = f"{SERVED}/{os.path.normpath(unquote(url))}"
+        file = self._folder.path / name
+        if name not in self._digests:
+            raise damaged(file, "the manifest does not list it")
+        return file, self._digests[name]
+
+    def _read(self, url: str) -> bytes:
+        file, digest = self._place(url)
+        return self._folder.read(file.relative_to(self._folder.path).as_posix(), digest)
+
+    def _add(
+        self,
+        stem: str,
+        suffix: str,
+        media: str,
+        source: Path | bytes,
+        *,
+        compressed: bool = False,
+        digest: str = "",
+    ) -> str:
+        """Adds a file of the data; its URL relative to the index."""
+        digest = sha256(source) if isinstance(source, bytes) else digest
+        name = f"{_STRANGE.sub('_', stem)[:64]}-{digest[:DIGITS]}{suffix}"
+        entry = Entry(f"{DATA}/{name}", source, media, forever=True, compressed=compressed)
+        self._entries[entry.name] = entry
+        return name
+
+
+def _picture_file(file: str) -> tuple[str, str, bytes]:
+    """Media type, suffix and bytes of a picture; raises InputError PTM-I901 if it is none."""
+    try:
+        with open_regular(file) as stream:
+            data = stream.read()
+    except OSError as fault:
+        what = f"cannot be read ({fault.strerror or fault})"
+        raise InputError("PTM-I901", what, file=file) from None
+    for begin, media, suffix in _MAGIC:
+        if re.match(begin, data, re.DOTALL):
+            return media, suffix, data
+    remedy = "give a JPEG, PNG or WebP"
+    raise InputError("PTM-I901", "is no picture that browsers show", file=file, remedy=remedy)
+
+
+def title_of(database: Path) -> str:
+    """The name of a database as a title: `old_town-hall.db` is "Old town hall"."""
+    words = re.sub(r"[\s_-]+", " ", database.resolve().stem).strip()
+    return words[:1].upper() + words[1:]
+
+
+def link_bytes(entry: Entry) -> int:
+    """Bytes of a file on the link, without headers: as a gzip copy if it is sent so."""
+    if isinstance(entry.source, Path) and not entry.compressed:
+        return entry.source.stat().st_size
+    data = entry.read()
+    return min(len(data), len(compressed(data))) if entry.compressed else len(data)
