@@ -1,0 +1,72 @@
+// Cells from their GLBs, as docs/gltf.md describes them: in unlit materials, with textures of
+// one's own.
+
+import { ClampToEdgeWrapping, Mesh, MeshBasicMaterial, RepeatWrapping, Texture } from "three";
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+
+/** @typedef {import("three").Group} Group */
+/**
+ * Gives the texture of the index with that number, wrapped so.
+ * @typedef {(texture: number, wrapS: number, wrapT: number) => Texture} TextureOf
+ */
+
+const CLAMP = 33071;
+
+/** Loads cells whose surfaces show the textures that it is given. */
+export class CellLoader {
+  #textureOf;
+  // The loader is kept from fetching images.
+  #loader = new GLTFLoader().register(() => {
+    return { name: "none", loadTexture: async () => new Texture() };
+  });
+
+  /** @param {TextureOf} textureOf */
+  constructor(textureOf) {
+    this.#textureOf = textureOf;
+  }
+
+  /**
+   * The geometry of a cell, in world coordinates. Rejects with the signal's reason, or with an
+   * Error that names the file.
+   * @param {string | URL} url
+   * @param {AbortSignal} [signal]
+   * @returns {Promise<Group>}
+   */
+  async load(url, signal) {
+    const response = await fetch(url, { signal });
+    if (!response.ok) throw new Error(`${url}: ${response.status} ${response.statusText}`);
+    const { scene } = await this.#loader.parseAsync(await response.arrayBuffer(), "");
+    signal?.throwIfAborted();
+    /** @type {Map<unknown, MeshBasicMaterial>} */
+    const looks = new Map();
+    scene.traverse((node) => {
+      if (!(node instanceof Mesh)) return;
+      const look = looks.get(node.material) ?? this.#look(node.material);
+      looks.set(node.material, look);
+      node.material = look;
+    });
+    return scene;
+  }
+
+  /** @param {import("three").Material} material the loader's, with the extras as `userData` */
+  #look({ color, opacity, transparent, side, userData }) {
+    const { texture, wrapS, wrapT } = userData;
+    const wrap = (/** @type {number} */ n) => (n === CLAMP ? ClampToEdgeWrapping : RepeatWrapping);
+    const map = texture === undefined ? null : this.#textureOf(texture, wrap(wrapS), wrap(wrapT));
+    const depthWrite = !transparent;
+    return new MeshBasicMaterial({ color, opacity, transparent, side, depthWrite, map });
+  }
+}
+
+/**
+ * Gives back what the GPU has of a cell. Its textures may be others' too, and stay.
+ * @param {Group} cell
+ */
+export function disposeCell(cell) {
+  cell.removeFromParent();
+  cell.traverse((node) => {
+    if (!(node instanceof Mesh)) return;
+    node.geometry.dispose();
+    node.material.dispose();
+  });
+}

@@ -1,0 +1,7 @@
+// What the package offers: see README.md.
+
+export { shareOut } from "./budget.js";
+export { CellLoader, disposeCell } from "./cell-loader.js";
+export { PtmTexture } from "./ptm-texture.js";
+export { RangeFile } from "./range-file.js";
+export { Walk } from "./walk.js";

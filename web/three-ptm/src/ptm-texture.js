@@ -1,0 +1,322 @@
+// A texture that holds exactly the levels asked for.
+//
+// GL allocates a pyramid at once and cannot let go of one of its levels. So the storage is as large
+// as the finest level that is there, and another takes its place when that changes: what both have
+// is copied on the GPU (exactly, as sRGB of 8 bits survives that), what is new is uploaded in
+// stripes, and only then is the old one given back. Until then both are counted. Textures of a
+// renderer do so one after the other, so that not more than one is there twice.
+//
+// The object that materials refer to stays the same: three.js finds the new storage behind it, as
+// textures with equal settings share that of their source.
+//
+// Tried: `needsUpdate`, which uploads all levels again; RGB, which in sRGB comes out black.
+
+import {
+  Box2,
+  DataTexture,
+  LinearFilter,
+  LinearMipmapLinearFilter,
+  RepeatWrapping,
+  SRGBColorSpace,
+  Vector2,
+} from "three";
+import { DecoderWorkers, HEAD_MAX, openPtm } from "ptm-decoder";
+import { TEXEL_BYTES, pyramidBytes } from "./budget.js";
+import { RangeFile } from "./range-file.js";
+
+/** @typedef {import("three").WebGLRenderer} WebGLRenderer */
+/** @typedef {Awaited<ReturnType<import("ptm-decoder").Ptm["image"]>>} Image */
+
+/**
+ * @typedef {object} TextureOptions
+ * @property {DecoderWorkers} [workers] that decode; all textures without share some
+ * @property {number[]} [ends] the index's: saves the request that finds out where levels end
+ * @property {number[]} [color] red, green, blue, 0 to 255: what it shows before any level is there
+ * @property {number} [wrapS] `RepeatWrapping`, unless told otherwise
+ * @property {number} [wrapT]
+ */
+
+/** Bytes of the first request where nobody knows how long the levels are. */
+const FIRST = 4096;
+/** Levels of fewer texels wait for the next: they are not worth a storage. */
+const LEAST = 32 * 32;
+/** Bytes of one upload, and ms of uploads before others have their turn. */
+const STRIPE = 2 ** 18;
+const PATIENCE = 4;
+
+/** @type {DecoderWorkers | undefined} */
+let shared;
+/**
+ * The change of storage that each renderer is at.
+ * @type {WeakMap<WebGLRenderer, Promise<unknown>>}
+ */
+const turns = new WeakMap();
+
+/** See `refine`. Its rows begin at the top, as glTF has it. */
+export class PtmTexture extends DataTexture {
+  #renderer;
+  #options;
+  /** @type {import("ptm-decoder").Ptm | undefined} */
+  #ptm;
+  #wanted = -1;
+  /** The call of `refine` that is being answered. @type {symbol | undefined} */
+  #call;
+  /** @type {Promise<boolean>} */
+  #answer = Promise.resolve(true);
+  #control = new AbortController();
+  /** Storages that the GPU has, and their bytes. @type {Map<DataTexture, number>} */
+  #storages = new Map();
+
+  /**
+   * Settings that samplers depend on (wraps, filters, anisotropy) are made before `refine`.
+   * @param {WebGLRenderer} renderer the one that shows it
+   * @param {RangeFile | string | URL} file textures that share a file download it once
+   * @param {TextureOptions} [options]
+   */
+  constructor(renderer, file, options = {}) {
+    super(null, 1, 1);
+    this.#renderer = renderer;
+    this.#options = options;
+    this.file = file instanceof RangeFile ? file : new RangeFile(file);
+    /** The finest level that is there, -1 if none is. */
+    this.level = -1;
+    this.colorSpace = SRGBColorSpace;
+    this.magFilter = LinearFilter;
+    this.minFilter = LinearMipmapLinearFilter;
+    this.wrapS = options.wrapS ?? RepeatWrapping;
+    this.wrapT = options.wrapT ?? RepeatWrapping;
+    this.#blank();
+    renderer.domElement.addEventListener("webglcontextlost", this.#lost);
+    renderer.domElement.addEventListener("webglcontextrestored", this.#restored);
+  }
+
+  /** What the GPU has of it, bytes: while storage is exchanged, the old and the new. */
+  get gpuBytes() {
+    return [...this.#storages.values()].reduce((sum, bytes) => sum + bytes, 0);
+  }
+
+  /**
+   * Fetches, decodes and shows the levels up to this one, coarsest first, and gives finer ones
+   * back; -1 leaves nothing but the colour. Levels larger than the GPU's limit are left out. Calls
+   * off what was asked for before. After a loss of the context all comes back from the bytes at
+   * hand.
+   *
+   * Rejects with what `openPtm` and decoding throw, and with an Error that names the file if it
+   * does not come; levels that were shown before stay.
+   *
+   * @param {number} level
+   * @returns {Promise<boolean>} whether it is so; false if it was called off
+   */
+  refine(level) {
+    if (this.#call && level === this.#wanted) return this.#answer;
+    this.#control.abort();
+    this.#wanted = level;
+    this.#call = Symbol();
+    return (this.#answer = this.#reach(level, this.#call));
+  }
+
+  /** The same image with storage of its own, which begins with nothing. */
+  clone() {
+    const { wrapS, wrapT } = this;
+    const options = { ...this.#options, wrapS, wrapT };
+    return /** @type {this} */ (new PtmTexture(this.#renderer, this.file, options));
+  }
+
+  /** Gives everything back; it cannot be used any more. */
+  dispose() {
+    this.#call = undefined;
+    this.#control.abort();
+    this.#renderer.domElement.removeEventListener("webglcontextlost", this.#lost);
+    this.#renderer.domElement.removeEventListener("webglcontextrestored", this.#restored);
+    this.#free();
+  }
+
+  // Now, since what is left of a lost context cannot be given back to the next one.
+  #lost = () => {
+    this.#control.abort();
+    for (const storage of this.#storages.keys()) if (storage !== this) storage.dispose();
+    this.#free();
+    this.#blank();
+  };
+
+  #restored = () => {
+    if (!this.#call && this.#wanted >= 0) this.refine(this.#wanted);
+  };
+
+  #free() {
+    super.dispose();
+    this.#storages.delete(this);
+    this.level = -1;
+  }
+
+  /** Nothing but the colour. */
+  #blank() {
+    const [r, g, b] = this.#options.color ?? [128, 128, 128];
+    this.source = new DataTexture(new Uint8Array([r, g, b, 255]), 1, 1).source;
+    this.mipmaps = [];
+    this.needsUpdate = true;
+    this.#storages.set(this, TEXEL_BYTES);
+  }
+
+  /**
+   * @param {number} level
+   * @param {symbol} call
+   */
+  async #reach(level, call) {
+    try {
+      while (this.#call === call) {
+        const { signal } = (this.#control = new AbortController());
+        try {
+          await contextOf(this.#renderer);
+          signal.throwIfAborted();
+          await (level > this.level ? this.#rise(level, signal) : this.#hold(level, [], signal));
+          return true;
+        } catch (error) {
+          if (!signal.aborted) throw error;
+        }
+      }
+      return false;
+    } finally {
+      if (this.#call === call) this.#call = undefined;
+    }
+  }
+
+  /**
+   * From the bytes at hand, and a range behind them. Of bytes with a wrong checksum, once more.
+   * @param {number} level
+   * @param {AbortSignal} signal
+   */
+  async #rise(level, signal) {
+    try {
+      await this.#decode(level, signal);
+    } catch (error) {
+      const { code } = /** @type {{code?: string}} */ (error);
+      if (signal.aborted || (code !== "PTM-I105" && code !== "PTM-I108")) throw error;
+      console.warn(`three-ptm: ${this.file.url}: ${error}; asked for once more`);
+      this.file.forget(this.#ptm?.levels[this.level + 1]?.offset ?? 0);
+      this.#ptm = undefined;
+      await this.#decode(level, signal);
+    } finally {
+      await this.file.settle(signal);
+    }
+  }
+
+  /**
+   * @param {number} level
+   * @param {AbortSignal} signal
+   */
+  async #decode(level, signal) {
+    const workers = this.#options.workers ?? (shared ??= new DecoderWorkers());
+    this.file.until = this.#options.ends?.[level] ?? FIRST;
+    const read = this.file.read.bind(this.file);
+    this.#ptm ??= await openPtm(read, { signal, first: HEAD_MAX });
+    const { levels } = this.#ptm;
+    const most = this.#renderer.capabilities.maxTextureSize;
+    const fit = levels.findLastIndex(({ width, height }) => Math.max(width, height) <= most);
+    const to = Math.min(level, fit);
+    if (to <= this.level) return;
+    this.file.until = levels[to].offset + levels[to].length;
+    /** @type {Image[]} */
+    let images = [];
+    for await (const image of this.#ptm.decode({ to, workers, signal })) {
+      if (image.level <= this.level) continue;
+      images.push(image);
+      if (image.level < to && image.width * image.height < LEAST) continue;
+      await this.#hold(image.level, images, signal);
+      images = [];
+    }
+  }
+
+  /**
+   * Storage of the levels up to this one, filled with what is there and with images.
+   * @param {number} level
+   * @param {Image[]} images
+   * @param {AbortSignal} signal
+   */
+  #hold(level, images, signal) {
+    return inTurn(this.#renderer, async () => {
+      signal.throwIfAborted();
+      if (level === this.level) return;
+      if (level < 0) {
+        this.#free();
+        this.#blank();
+        return;
+      }
+      const next = this.#storage(level);
+      try {
+        for (const image of images) await this.#upload(image, next, level - image.level, signal);
+        for (let kept = Math.min(this.level, level); kept >= 0; kept--) {
+          const [from, to] = [this.level - kept, level - kept];
+          this.#renderer.copyTextureToTexture(this, next, null, null, from, to);
+        }
+        const bytes = /** @type {number} */ (this.#storages.get(next));
+        this.#free();
+        this.source = next.source;
+        this.mipmaps = next.mipmaps;
+        this.#renderer.initTexture(this);
+        this.#storages.set(this, bytes);
+        this.level = level;
+      } finally {
+        next.dispose();
+        this.#storages.delete(next);
+      }
+    });
+  }
+
+  /** @param {number} level */
+  #storage(level) {
+    const { levels } = /** @type {import("ptm-decoder").Ptm} */ (this.#ptm);
+    const sizes = levels.slice(0, level + 1).reverse();
+    const [{ width, height }] = sizes;
+    const next = new DataTexture(null, width, height);
+    const { wrapS, wrapT, magFilter, minFilter, anisotropy, colorSpace } = this;
+    Object.assign(next, { wrapS, wrapT, magFilter, minFilter, anisotropy, colorSpace });
+    next.mipmaps = sizes.map((size) => ({ data: null, width: size.width, height: size.height }));
+    next.source.dataReady = false;
+    next.needsUpdate = true;
+    this.#renderer.initTexture(next);
+    this.#storages.set(next, pyramidBytes(levels, level));
+    return next;
+  }
+
+  /**
+   * @param {Image} image
+   * @param {DataTexture} next
+   * @param {number} mip
+   * @param {AbortSignal} signal
+   */
+  async #upload({ width, height, data }, next, mip, signal) {
+    const source = new DataTexture(data, width, height);
+    const rows = Math.max(Math.floor(STRIPE / (TEXEL_BYTES * width)), 1);
+    let began = performance.now();
+    for (let y = 0; y < height; y += rows) {
+      const stripe = new Box2(new Vector2(0, y), new Vector2(width, Math.min(y + rows, height)));
+      this.#renderer.copyTextureToTexture(source, next, stripe, new Vector2(0, y), 0, mip);
+      if (performance.now() - began < PATIENCE) continue;
+      await new Promise((resolve) => setTimeout(resolve));
+      signal.throwIfAborted();
+      began = performance.now();
+    }
+  }
+}
+
+/**
+ * @param {WebGLRenderer} renderer
+ * @param {() => Promise<void>} work
+ */
+function inTurn(renderer, work) {
+  const done = (turns.get(renderer) ?? Promise.resolve()).then(work);
+  turns.set(renderer, done.catch(() => {}));
+  return done;
+}
+
+/**
+ * Waits for a context that was lost.
+ * @param {WebGLRenderer} renderer
+ */
+async function contextOf(renderer) {
+  if (!renderer.getContext().isContextLost()) return;
+  await new Promise((resolve) => {
+    renderer.domElement.addEventListener("webglcontextrestored", resolve, { once: true });
+  });
+}

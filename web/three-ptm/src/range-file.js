@@ -1,0 +1,208 @@
+// The first bytes of a file on a server, as many as were wanted so far: read by range requests, one
+// at a time, each of which goes on where the last one ended. What has come is kept, also of a
+// request that broke or was called off.
+
+/** How often in a row a request may fail, and the pause after the first time, ms. */
+const ATTEMPTS = 3;
+const PAUSE = 500;
+
+/** Hosts that were seen to ignore ranges. */
+const rangeless = new Set();
+
+/** What no further request mends. */
+class Unusable extends Error {}
+
+/**
+ * An answer under way.
+ * @typedef {object} Body
+ * @property {ReadableStreamDefaultReader<Uint8Array>} reader
+ * @property {number} at where in the file its next byte belongs
+ * @property {number} end where it ends
+ * @property {boolean} all whether it is the whole file, whatever was asked for
+ */
+
+/** See `read`. */
+export class RangeFile {
+  #bytes = new Uint8Array(0);
+  #held = 0;
+  #size = Infinity;
+  /** Whether caches are to be passed by. */
+  #anew = false;
+  /** @type {Body | undefined} */
+  #body;
+  /** @type {AbortController | undefined} */
+  #control;
+  /** @type {Promise<unknown>} */
+  #turn = Promise.resolve();
+
+  /** @param {string | URL} url */
+  constructor(url) {
+    this.url = new URL(url, globalThis.document?.baseURI);
+    /** How far a request should lead at least: set it before reading what lies below. */
+    this.until = 0;
+  }
+
+  /** Bytes that are there. */
+  get held() {
+    return this.#held;
+  }
+
+  /**
+   * Bytes of the file, as soon as these are there; fewer only where it ends. Calls take turns.
+   * Rejects with the signal's reason, or with an Error that names the file.
+   * @param {number} offset
+   * @param {number} length
+   * @param {AbortSignal} [signal]
+   */
+  async read(offset, length, signal) {
+    await this.#inTurn(() => this.#fill(offset + length, signal));
+    return this.#bytes.subarray(offset, Math.min(offset + length, this.#held));
+  }
+
+  /**
+   * Lets go of the connection. Of a host that ignores ranges the rest is awaited, so that the file
+   * is not fetched again.
+   * @param {AbortSignal} [signal]
+   */
+  settle(signal) {
+    return this.#inTurn(async () => {
+      if (this.#body?.all && !signal?.aborted) await this.#fill(Infinity, signal);
+      else this.#stop();
+    });
+  }
+
+  /**
+   * Forgets the bytes from there on, which turned out to be wrong: they are asked for again.
+   * @param {number} offset
+   */
+  forget(offset) {
+    this.#stop();
+    this.#held = Math.min(this.#held, offset);
+    this.#anew = true;
+  }
+
+  /**
+   * @template T
+   * @param {() => Promise<T>} work
+   * @returns {Promise<T>}
+   */
+  #inTurn(work) {
+    const done = this.#turn.then(work);
+    this.#turn = done.catch(() => {});
+    return done;
+  }
+
+  /**
+   * @param {number} end
+   * @param {AbortSignal} [signal]
+   */
+  async #fill(end, signal) {
+    const stop = () => this.#stop(signal?.reason);
+    signal?.addEventListener("abort", stop);
+    try {
+      for (let failed = 0; this.#held < Math.min(end, this.#size); ) {
+        signal?.throwIfAborted();
+        try {
+          await this.#more(Math.max(end, this.until));
+          failed = 0;
+        } catch (error) {
+          this.#stop();
+          signal?.throwIfAborted();
+          if (error instanceof Unusable || ++failed === ATTEMPTS) throw error;
+          this.#anew = true;
+          await new Promise((resolve) => setTimeout(resolve, PAUSE * 2 ** (failed - 1)));
+        }
+      }
+    } finally {
+      signal?.removeEventListener("abort", stop);
+    }
+  }
+
+  /**
+   * The next piece of the answer under way, or of a new one.
+   * @param {number} end
+   */
+  async #more(end) {
+    const body = (this.#body ??= await this.#request(end));
+    if (!body) return;
+    const { done, value } = await body.reader.read();
+    if (value) this.#append(value, body);
+    if (!done && body.at < body.end) return;
+    if (body.at > body.end || (!done && !(await body.reader.read()).done)) {
+      throw new Unusable(`${this.url}: more bytes than the server said`);
+    }
+    this.#body = undefined;
+    if (body.all) this.#size = body.at;
+    else if (body.at < body.end) throw new Error(`${this.url}: the answer was cut short`);
+    this.#anew = false;
+  }
+
+  /**
+   * Of the whole file only what is new.
+   * @param {Uint8Array} piece
+   * @param {Body} body
+   */
+  #append(piece, body) {
+    const fresh = piece.subarray(Math.max(this.#held - body.at, 0), body.end - body.at);
+    body.at += piece.length;
+    const held = this.#held + fresh.length;
+    if (held > this.#bytes.length) {
+      const grown = new Uint8Array(Math.max(held, Number.isFinite(body.end) ? body.end : 2 * held));
+      grown.set(this.#bytes.subarray(0, this.#held));
+      this.#bytes = grown;
+    }
+    this.#bytes.set(fresh, this.#held);
+    this.#held = held;
+  }
+
+  /**
+   * @param {number} end
+   * @returns {Promise<Body | undefined>} nothing if the file ends before
+   */
+  async #request(end) {
+    this.#control = new AbortController();
+    const response = await fetch(this.url, {
+      headers: { range: `bytes=${this.#held}-${Number.isFinite(end) ? end - 1 : ""}` },
+      cache: this.#anew ? "no-store" : "default",
+      signal: this.#control.signal,
+    });
+    const { status, headers, body } = response;
+    const length = headers.get("content-length");
+    const range = /^bytes (?:(\d+)-(\d+)|\*)\/(\d+|\*)$/.exec(headers.get("content-range") ?? "");
+    if (status === 416 && range && Number(range[3]) <= this.#held) {
+      this.#size = this.#held;
+      return undefined;
+    }
+    if (!response.ok || !body) {
+      const Kind = status === 429 || status >= 500 ? Error : Unusable;
+      throw new Kind(`${this.url}: ${status} ${response.statusText}`);
+    }
+    const reader = body.getReader();
+    if (status === 200) {
+      if (!rangeless.has(this.url.host)) {
+        rangeless.add(this.url.host);
+        console.warn(`three-ptm: ${this.url.host} ignores byte ranges: its textures come whole`);
+      }
+      return { reader, at: 0, end: Infinity, all: true };
+    }
+    const [at, last] = [Number(range?.[1]), Number(range?.[2])];
+    const right = status === 206 && at === this.#held && last >= at && last < end;
+    if (!right || (length && Number(length) !== last + 1 - at)) {
+      throw new Unusable(
+        `${this.url}: asked for bytes from ${this.#held} on, the server answers ${status}, ` +
+          `Content-Range ${headers.get("content-range")}, Content-Length ${length} ` +
+          "(another host has to expose Content-Range)",
+      );
+    }
+    const size = range?.[3] === "*" ? this.#size : Number(range?.[3]);
+    if (this.#held && size !== this.#size) throw new Unusable(`${this.url}: it has changed`);
+    this.#size = size;
+    return { reader, at, end: last + 1, all: false };
+  }
+
+  /** @param {unknown} [reason] */
+  #stop(reason) {
+    this.#control?.abort(reason);
+    this.#body = undefined;
+  }
+}

@@ -1,0 +1,324 @@
+// A walk through a database: what can be seen from the viewer's cell, as its hints say
+// (docs/hints.md).
+
+import { Group } from "three";
+import { DecoderWorkers } from "ptm-decoder";
+import { levelSizes, shareOut } from "./budget.js";
+import { CellLoader, disposeCell } from "./cell-loader.js";
+import { holds, near, planesOf } from "./locating.js";
+import { PtmTexture } from "./ptm-texture.js";
+import { RangeFile } from "./range-file.js";
+
+/** @typedef {import("three").Vector3} Vector3 */
+
+/**
+ * @typedef {object} Index `hints.json`, as far as it is used here
+ * @property {number} schema
+ * @property {string} [record]
+ * @property {{gltf?: string}} [geometry]
+ * @property {{position: number[], direction: number[], fieldOfView: number, cell: number,
+ *   description: string}[]} viewpoints
+ * @property {{file: string, width: number, height: number, ends: number[], color?: number[]}[]}
+ *   textures
+ * @property {{name: string, box: number[], record?: string, geometry?: string}[]} cells
+ */
+
+/**
+ * @typedef {object} CellRecord
+ * @property {number[]} visible
+ * @property {number[]} ach
+ * @property {number} floor
+ * @property {number[][]} textures
+ * @property {import("./locating.js").Leaf[]} leaves
+ */
+
+/**
+ * @typedef {object} WalkOptions
+ * @property {number} [budget] texture memory, bytes; 256 MiB
+ * @property {number} [connections] requests at a time; 4, as browsers open six over HTTP/1.1
+ * @property {DecoderWorkers} [workers] that decode; its own, unless given
+ * @property {(error: unknown) => void} [onError] told of a file that does not come
+ */
+
+/** Texels of a side: so far all textures are refined before any is refined further. */
+const FIRST_LOOK = 64;
+
+/** Shows what can be seen from a cell, and frees what cannot: see `update` and `enter`. */
+export class Walk {
+  /** Everything that can be seen from the cell; to be added to a scene. */
+  shown = new Group();
+  /** The cell that the viewer is in, -1 at first. */
+  cell = -1;
+  #renderer;
+  #url;
+  #options;
+  #ownWorkers;
+  #loader = new CellLoader((...which) => this.#texture(...which));
+  /** @type {Map<number, Promise<CellRecord & {planes: import("three").Plane[][]}>>} */
+  #records = new Map();
+  /** @type {Map<number, {control: AbortController, done: Promise<void>}>} */
+  #cells = new Map();
+  /** Of each texture its file and what shows it, by how it is wrapped.
+   * @type {Map<number, {file: RangeFile, copies: Map<string, PtmTexture>}>} */
+  #textures = new Map();
+  #entered = new AbortController();
+  #locating = false;
+
+  /**
+   * Fetches an index: `hints.json` of a database that is served, or the index of a site.
+   * @param {import("three").WebGLRenderer} renderer
+   * @param {string | URL} url
+   * @param {WalkOptions} [options]
+   */
+  static async open(renderer, url, options) {
+    const index = await json(new URL(url, globalThis.document?.baseURI));
+    return new Walk(renderer, index, url, options);
+  }
+
+  /**
+   * Throws an Error if the hints are of another schema.
+   * @param {import("three").WebGLRenderer} renderer
+   * @param {Index} index
+   * @param {string | URL} url of the index
+   * @param {WalkOptions} [options]
+   */
+  constructor(renderer, index, url, options = {}) {
+    if (index.schema !== 2) throw new Error(`hints of schema ${index.schema}, not 2`);
+    this.index = index;
+    this.budget = options.budget ?? 2 ** 28;
+    this.#renderer = renderer;
+    this.#url = new URL(url, globalThis.document?.baseURI);
+    this.#options = options;
+    this.#ownWorkers = options.workers ? undefined : new DecoderWorkers();
+  }
+
+  /** Bytes of all textures on the GPU. */
+  get gpuBytes() {
+    return this.textures.reduce((sum, { texture }) => sum + texture.gpuBytes, 0);
+  }
+
+  /** What shows the textures now, with their numbers in the index. */
+  get textures() {
+    return [...this.#textures].flatMap(([number, { copies }]) =>
+      [...copies.values()].map((texture) => ({ number, texture })),
+    );
+  }
+
+  /**
+   * For each frame: enters the cell that holds the viewer when it is another one.
+   * @param {Vector3} position
+   */
+  async update(position) {
+    if (this.#locating) return;
+    this.#locating = true;
+    const cell = await this.locate(position)
+      .catch((error) => (this.#tell(error), -1))
+      .finally(() => (this.#locating = false));
+    if (cell >= 0 && cell !== this.cell) await this.enter(cell);
+  }
+
+  /**
+   * The cell that holds a point, or -1: it is behind all planes of one of the cell's leaves. Boxes
+   * tell which records are worth a look, that of the cell the viewer was in first.
+   * @param {Vector3} point
+   * @param {number} [slack] metres
+   */
+  async locate(point, slack = 1e-3) {
+    const { cells } = this.index;
+    for (const cell of [Math.max(this.cell, 0), ...cells.keys()]) {
+      if (!near(cells[cell].box, point, slack)) continue;
+      const { planes } = await this.#record(cell);
+      if (planes.some((leaf) => holds(leaf, point, slack))) return cell;
+    }
+    return -1;
+  }
+
+  /**
+   * Frees what cannot be seen from a cell, fetches what can, and shares out texture memory by what
+   * covers the view. Calls off what a cell entered before still needs alone.
+   * @param {number} cell
+   * @param {number} [budget] texture memory, bytes, from now on
+   * @returns {Promise<boolean>} whether all is there; false if another cell was entered since
+   */
+  async enter(cell, budget = this.budget) {
+    this.#entered.abort();
+    const { signal } = (this.#entered = new AbortController());
+    this.cell = cell;
+    this.budget = budget;
+    try {
+      const record = await this.#record(cell);
+      if (signal.aborted) return false;
+      const shares = sharesOf(record);
+      this.#free(new Set(record.visible), shares);
+      const order = [...record.visible.keys()].sort((a, b) => record.ach[b] - record.ach[a]);
+      await this.#all(order.map((n) => () => this.#load(record.visible[n])), signal);
+      if (!signal.aborted) await this.#refine(shares, signal);
+    } catch (error) {
+      this.#tell(error);
+    }
+    return !signal.aborted;
+  }
+
+  /** Gives everything back; it cannot be used any more. */
+  dispose() {
+    this.#entered.abort();
+    this.#free(new Set(), new Map());
+    this.#ownWorkers?.close();
+  }
+
+  /** @param {unknown} error */
+  #tell(error) {
+    (this.#options.onError ?? console.error)(error);
+  }
+
+  /** @param {number} cell */
+  #record(cell) {
+    const read = async () => {
+      /** @type {CellRecord} */
+      const record = await json(this.#address(cell, "record"));
+      return { ...record, planes: record.leaves.map(planesOf) };
+    };
+    const found = this.#records.get(cell) ?? read();
+    this.#records.set(cell, found);
+    found.catch(() => this.#records.delete(cell));
+    return found;
+  }
+
+  /**
+   * @param {number} cell
+   * @param {"record" | "geometry"} what
+   */
+  #address(cell, what) {
+    const row = this.index.cells[cell];
+    const template = what === "record" ? this.index.record : this.index.geometry?.gltf;
+    const url = row[what] ?? template?.replace("{name}", row.name);
+    if (url === undefined) throw new Error(`${this.#url}: cells without ${what} as glTF`);
+    return new URL(url, this.#url);
+  }
+
+  /** @param {number} cell */
+  #load(cell) {
+    const found = this.#cells.get(cell);
+    if (found) return found.done;
+    const control = new AbortController();
+    const load = async () => {
+      try {
+        const url = this.#address(cell, "geometry");
+        const group = await this.#loader.load(url, control.signal);
+        control.signal.addEventListener("abort", () => disposeCell(group));
+        this.shown.add(group);
+      } catch (error) {
+        if (control.signal.aborted) return;
+        this.#cells.delete(cell);
+        throw error;
+      }
+    };
+    const done = load();
+    this.#cells.set(cell, { control, done });
+    return done;
+  }
+
+  /**
+   * @param {number} number
+   * @param {number} wrapS
+   * @param {number} wrapT
+   */
+  #texture(number, wrapS, wrapT) {
+    const { file, ends, color } = this.index.textures[number];
+    const slot = this.#textures.get(number) ?? {
+      file: new RangeFile(new URL(file, this.#url)),
+      copies: new Map(),
+    };
+    this.#textures.set(number, slot);
+    const workers = this.#options.workers ?? this.#ownWorkers;
+    const texture =
+      slot.copies.get(`${wrapS} ${wrapT}`) ??
+      new PtmTexture(this.#renderer, slot.file, { workers, ends, color, wrapS, wrapT });
+    slot.copies.set(`${wrapS} ${wrapT}`, texture);
+    return texture;
+  }
+
+  /**
+   * @param {Set<number>} cells those that stay
+   * @param {Map<number, number>} textures those that stay
+   */
+  #free(cells, textures) {
+    for (const [cell, { control }] of this.#cells) {
+      if (cells.has(cell)) continue;
+      control.abort();
+      this.#cells.delete(cell);
+    }
+    for (const [number, { copies }] of this.#textures) {
+      if (textures.has(number)) continue;
+      for (const texture of copies.values()) texture.dispose();
+      this.#textures.delete(number);
+    }
+  }
+
+  /**
+   * What has too much gives it back before anything grows; then all get a little; then the rest,
+   * beginning with what covers most.
+   * @param {Map<number, number>} shares
+   * @param {AbortSignal} signal
+   */
+  async #refine(shares, signal) {
+    const wants = [...this.#textures].map(([number, { copies }]) => {
+      const sizes = levelSizes(this.index.textures[number]);
+      const share = shares.get(number) ?? 0;
+      return { sizes, share, copies: copies.size, all: [...copies.values()] };
+    });
+    const levels = shareOut(wants, this.budget);
+    const order = [...wants.keys()].sort((a, b) => wants[b].share - wants[a].share);
+    /** @param {(n: number, now: number) => number} target */
+    const pass = (target) =>
+      this.#all(
+        order.map((n) => async () => {
+          // One after the other: the second finds the bytes there.
+          for (const texture of wants[n].all) await texture.refine(target(n, texture.level));
+        }),
+        signal,
+      );
+    await pass((n, now) => Math.min(levels[n], now));
+    await pass((n, now) => {
+      const sides = wants[n].sizes.map(({ width, height }) => Math.max(width, height));
+      const first = sides.findLastIndex((side) => side <= FIRST_LOOK);
+      return Math.min(levels[n], Math.max(first, now, 0));
+    });
+    await pass((n) => levels[n]);
+  }
+
+  /**
+   * Does them in order, a few at a time; one that fails is told of.
+   * @param {(() => Promise<void>)[]} jobs
+   * @param {AbortSignal} signal
+   */
+  async #all(jobs, signal) {
+    const left = [...jobs];
+    const lane = async () => {
+      for (let job; !signal.aborted && (job = left.shift()); ) {
+        await job().catch((error) => this.#tell(error));
+      }
+    };
+    await Promise.all(Array.from({ length: this.#options.connections ?? 4 }, lane));
+  }
+}
+
+/**
+ * How much of the view the cells cover that use each texture.
+ * @param {CellRecord} record
+ */
+function sharesOf({ ach, floor, textures }) {
+  /** @type {Map<number, number>} */
+  const shares = new Map();
+  textures.forEach((used, k) => {
+    for (const t of used) shares.set(t, (shares.get(t) ?? 0) + Math.max(ach[k], floor));
+  });
+  return shares;
+}
+
+/** @param {URL} url */
+async function json(url) {
+  const response = await fetch(url);
+  if (!response.ok) throw new Error(`${url}: ${response.status} ${response.statusText}`);
+  return response.json();
+}

@@ -1,0 +1,6 @@
+import { Group, Texture } from "three";
+
+export class GLTFLoader {
+  register(plugin: () => { name: string; loadTexture: () => Promise<Texture> }): this;
+  parseAsync(data: ArrayBuffer, path: string): Promise<{ scene: Group }>;
+}
