@@ -1,4 +1,5 @@
 # make demo    a sample museum, its database and a floor plan, from nothing but python3 and make
+# make walk    a walk through that museum, in a browser
 # make test    everything the tests need, then the tests
 # make lint    ruff, mypy, and tsc for what is JavaScript
 # make bench   the benchmarks, on the data at hand
@@ -6,6 +7,7 @@
 # make bench-pvs     cells and visibility, what is traded for what (a quarter of an hour)
 # make bench-ach     coverage hints: what accuracy costs (a quarter of an hour)
 # make bench-walk    what clients show to a walker: all policies, links and scenes (an hour)
+# make bench-web     how soon a view is there, by the walk page and by what people do otherwise
 # make fuzz    100,000 damaged and hostile files for every reader (half an hour)
 # make sample  only the sample museum
 # make setup   only the virtual environment
@@ -28,7 +30,7 @@ JOBS ?= 2
 PYTEST_ARGS ?=
 export PTM_SHARED ?= $(abspath ../shared)
 
-.PHONY: help setup demo test lint bench bench-codec bench-pvs bench-ach bench-walk fuzz sample docs-tables docs-timings docs-pictures clean
+.PHONY: help setup demo walk test lint bench bench-codec bench-pvs bench-ach bench-walk bench-web fuzz sample docs-tables docs-timings docs-pictures clean
 
 help:
 	@sed -n 's/^# \(make .*\)/\1/p' Makefile
@@ -51,6 +53,11 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 	$(PIP) install --editable '.[dev]'
 	@touch $@
 
+$(VENV)/.installed-viewer: $(VENV)/.installed
+	@echo "Installing what serves the page into $(VENV) …"
+	$(PIP) install --editable '.[viewer]'
+	@touch $@
+
 setup: $(VENV)/.installed
 
 # The stamp, not the OBJ, is the target: the script decides what to write again.
@@ -68,7 +75,12 @@ demo: build/museum/.made
 	$(BIN)/ptm plot build/museum.db --cell "$$($(FIRST_CELL))" -o build/museum.png --force
 	@echo
 	@echo "The floor plan of the museum, with what is seen from the first viewpoint, is in build/museum.png."
+	@echo "Walk through it: make walk"
 	@echo "Your own model: $(BIN)/ptm build-scene MODEL.obj -o MODEL.db"
+
+walk: build/museum/.made $(VENV)/.installed-viewer
+	$(BIN)/ptm build-scene build/museum/museum.obj -o build/museum.db
+	$(BIN)/ptm serve build/museum.db --open
 
 test: $(VENV)/.installed-dev
 	@.ci/test-components
@@ -81,7 +93,7 @@ lint: $(VENV)/.installed-dev
 	@.ci/test-components
 	$(BIN)/python tests/web/checked_types.py
 	$(BIN)/mypy --config-file benchmarks/mypy.ini
-	$(BIN)/mypy --config-file benchmarks/mypy.ini -p benchmarks.fuzz
+	$(BIN)/mypy --config-file benchmarks/mypy.ini -p benchmarks.fuzz -p benchmarks.web_rivals
 	@large=$$(git ls-files -z | xargs -0 stat -c '%s %n' | awk '$$1 > 1048576 { print $$2 }'); \
 	  [ -z "$$large" ] || { echo "Tracked files over 1 MiB: $$large" >&2; exit 1; }
 	$(BIN)/python benchmarks/docs_tables.py --check
@@ -106,6 +118,13 @@ bench-ach: build/museum/.made $(VENV)/.installed-dev
 bench-walk: build/museum/.made $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/walk_speed.py
 	$(BIN)/python benchmarks/walk_table.py
+
+bench-web: build/museum/.made $(VENV)/.installed-dev
+	$(BIN)/python benchmarks/walk_scenes.py museum rooms
+	@for scene in museum rooms; do set -x; \
+	  $(BIN)/python -m benchmarks.web_rivals "build/bench/walks/$$scene.db"; \
+	  $(BIN)/python -m benchmarks.web_rivals "build/bench/walks/$$scene.db" --memory; \
+	  { set +x; } 2>/dev/null; done
 
 bench: $(VENV)/.installed-dev
 	@mkdir -p build/bench

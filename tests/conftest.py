@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,6 +36,23 @@ def absent(what: str, remedy: str) -> None:
 def require() -> Callable[[str, str], None]:
     """``require(what, remedy)``: report a missing component (skip, or fail with CI=true)."""
     return absent
+
+
+@pytest.fixture(scope="session")
+def chromium(require: Callable[[str, str], None]) -> Iterator[Any]:
+    """Headless Chromium by playwright, of which a process can have one; visits have contexts."""
+    from tests.e2e.browsers import web
+
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        require("playwright", "pip install -e '.[dev]'")
+    if (program := web.chromium()) is None:
+        require("Chromium", "apt install chromium")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield browser
+        browser.close()
 
 
 @pytest.fixture(scope="session")

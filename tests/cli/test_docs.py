@@ -48,7 +48,7 @@ def all_codes() -> set[str]:
     """Codes that the program can give."""
     return {
         f"PTM-{letter}{number}"
-        for file in (ROOT / "ptmtools").rglob("*.py")
+        for file in (*ROOT.glob("ptmtools/**/*.py"), *ROOT.glob("ptmtools/viewer/page/**/*.js"))
         for letter, number in FIRST.findall(file.read_text("utf-8"))
     }
 

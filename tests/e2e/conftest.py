@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -80,6 +81,16 @@ def gltf_museum(tmp_path_factory: pytest.TempPathFactory) -> Path:
     built = ["-q", "build-scene", str(make_museum(folder / "model")), "-o", str(folder / "db")]
     assert main([*built, "-j", "1"]) == 0
     return folder / "db"
+
+
+@pytest.fixture(scope="session")
+def three(require: Callable[[str, str], None]) -> Any:
+    """What runs scripts with three.js in Chromium."""
+    from tests.e2e.browsers import three_js
+
+    if remedy := three_js.missing():
+        require("three.js in Chromium", remedy)
+    return three_js
 
 
 def listing(folder: Path) -> dict[str, bytes | None]:

@@ -1,4 +1,4 @@
-"""Cells as glTF in three.js: the client of docs/gltf.md shows what rays see."""
+"""Cells as glTF in three.js: the walk of `web/three-ptm` shows what rays see, within its memory."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import io
 import json
 import shutil
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +15,12 @@ from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests" / "e2e"), str(ROOT / "benchmarks")]
-from browsers import three_js  # noqa: E402
+from browsers import web  # noqa: E402
 from likeness import likeness, outline  # noqa: E402
 from render import Look, View, load, render  # noqa: E402
+
+from ptmtools.cli.main import main  # noqa: E402
+from tests.e2e.conftest import make_museum  # noqa: E402
 
 #: What MeshBasicMaterial shows before a background of nothing.
 LOOK = Look("none", sky=(0, 0, 0), mipmaps=True)
@@ -27,10 +29,12 @@ LIKE = 30.0
 
 
 @pytest.fixture(scope="module")
-def three(require: Callable[[str, str], None]) -> Any:
-    if remedy := three_js.missing():
-        require("three.js in Chromium", remedy)
-    return three_js
+def rooms(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What is served of a museum in which not every cell sees all the others."""
+    folder = tmp_path_factory.mktemp("rooms")
+    model = make_museum(folder / "model", rooms=3)
+    assert main(["-q", "build-scene", str(model), "-o", str(folder / "db"), "-j", "1"]) == 0
+    return folder / "db" / "www"
 
 
 def read(www: Path, name: str) -> dict[str, Any]:
@@ -58,21 +62,25 @@ def test_three_js_shows_what_rays_see(three: Any, gltf_museum: Path) -> None:
     """With what can be seen from the viewpoint's cell, and nothing else."""
     www = gltf_museum / "www"
     index, scene = read(www, "hints.json"), load(gltf_museum)
+    textures = {row["file"]: row for row in index["textures"]}
     width, height = 320, 240
     mirrored = []
     for place, viewpoint in enumerate(index["viewpoints"][:2]):
         walked = three.walk(www, viewpoint=place, width=width, height=height)
         assert walked.messages == ()
-        assert walked.cell == viewpoint["cell"]
-        cells, share = seen_from(www, walked.cell)
+        (stay,) = walked.stays
+        assert stay["cell"] == viewpoint["cell"]
+        cells, share = seen_from(www, stay["cell"])
         records = {file for file in walked.files if file.startswith("hints/")}
-        assert f"hints/c{walked.cell:04d}.json" in records
+        assert f"hints/c{stay['cell']:04d}.json" in records
         assert len(records) <= 3, "those whose boxes hold the eye"
         assert walked.files - records == {
             "hints.json",
             *(f"gltf/c{cell:04d}.glb" for cell in cells),
-            *(url.replace(".ptm", ".png") for url in share),
+            *share,
         }
+        whole = {url: len(textures[url]["ends"]) - 1 for url in share}
+        assert dict(stay["levels"]) == whole
         with Image.open(io.BytesIO(walked.png)) as image:
             shown = np.asarray(image.convert("RGB"))
         view = View.of_hint(viewpoint, width, height)
@@ -85,33 +93,89 @@ def test_three_js_shows_what_rays_see(three: Any, gltf_museum: Path) -> None:
 
 
 def gpu_bytes(texture: dict[str, Any], level: int) -> int:
-    """Texture memory of the pyramid up to a level."""
+    """Texture memory of the pyramid up to a level; RGB is held as RGBA."""
     last = len(texture["ends"]) - 1
     halved = range(last - level, last + 1)
-    texels = sum((texture["width"] >> k) * (texture["height"] >> k) for k in halved)
-    return int(texels * texture["texelBytes"])
+    return 4 * sum((texture["width"] >> k) * (texture["height"] >> k) for k in halved)
 
 
 def test_three_js_shares_out_memory(three: Any, gltf_museum: Path) -> None:
-    """What covers most of the view comes first; without memory, the coarsest level."""
+    """By what covers the view, never more than there is, as counted at GL; without memory, the
+    coarsest level. What a texture leaves of its part is the others'."""
     www = gltf_museum / "www"
     index = read(www, "hints.json")
     textures = {row["file"]: row for row in index["textures"]}
     _, share = seen_from(www, index["viewpoints"][0]["cell"])
-    half = sum(gpu_bytes(textures[url], len(textures[url]["ends"]) - 1) for url in share) // 2
-    walked = three.walk(www, width=64, height=64, gpu_bytes=half)
-    assert sorted(url for url, _ in walked.levels) == sorted(share)
-    parts = [share[url] for url, _ in walked.levels]
-    assert parts == sorted(parts, reverse=True)
-    assert parts[0] > parts[-1]
-    used = sum(gpu_bytes(textures[url], level) for url, level in walked.levels)
-    assert sum(gpu_bytes(textures[url], 0) for url in share) < used <= half
-    for url, level in walked.levels:
-        part = half * share[url] / sum(share.values())
-        finer = min(level + 1, len(textures[url]["ends"]) - 1)
-        assert level == finer or gpu_bytes(textures[url], finer) > part * (1 - 1e-9)
-    none = three.walk(www, width=64, height=64, gpu_bytes=0)
-    assert {level for _, level in none.levels} == {0}
+    whole = sum(gpu_bytes(textures[url], len(textures[url]["ends"]) - 1) for url in share)
+    half = whole // 2
+    walked = three.walk(www, stays=[(None, half), (None, half // 4), (None, half), (None, 0)])
+    assert walked.messages == ()
+    most, less, again, none = walked.stays
+    coarsest = sum(gpu_bytes(textures[url], 0) for url in share)
+    for stay, budget in ((most, half), (less, half // 4), (again, half)):
+        assert sorted(url for url, _ in stay["levels"]) == sorted(share)
+        used = sum(gpu_bytes(textures[url], level) for url, level in stay["levels"])
+        assert coarsest < used == stay["told"] == stay["counted"] <= budget
+        levels = dict(stay["levels"])
+        spare = max(gpu_bytes(textures[url], max(level - 1, 0)) for url, level in levels.items())
+        for url, level in levels.items():
+            part = (budget - 4 * spare) * share[url] / sum(share.values())
+            finer = min(level + 1, len(textures[url]["ends"]) - 1)
+            assert level == finer or gpu_bytes(textures[url], finer) > part * (1 - 1e-9)
+    assert most["most"] <= half, "storage that is exchanged is there twice"
+    assert again["most"] <= half
+    assert less["counted"] < most["counted"] == again["counted"]
+    assert {level for _, level in none["levels"]} == {0}
+
+
+def test_three_js_frees_what_is_out_of_sight(three: Any, rooms: Path) -> None:
+    """From cell to cell there is what the cell sees and no more; at last nothing."""
+    cells = range(len(read(rooms, "hints.json")["cells"]))
+    route = [cell for cell in cells if len(seen_from(rooms, cell)[0]) < len(cells)]
+    assert len({tuple(sorted(seen_from(rooms, cell)[0])) for cell in route}) > 1
+    route += route[:1]
+    walked = three.walk(rooms, stays=[(cell, 1 << 40) for cell in route])
+    assert walked.messages == ()
+    for cell, stay in zip(route, walked.stays, strict=True):
+        visible, share = seen_from(rooms, cell)
+        assert stay["cell"] == cell
+        assert stay["groups"] == len(visible)
+        assert {url for url, _ in stay["levels"]} == set(share)
+        assert stay["told"] == stay["counted"]
+    alone = three.walk(rooms, stays=[(route[0], 1 << 40)]).stays[0]
+    for stay in (walked.stays[0], walked.stays[-1]):
+        assert sorted(stay["levels"]) == sorted(alone["levels"])
+        for what in ("counted", "groups", "geometries"):
+            assert stay[what] == alone[what]
+    assert walked.left["bytes"] == walked.left["geometries"] == 0
+
+
+HURRY = """
+const walk = await Walk.open(renderer, "/www/hints.json");
+const [here, there] = settings.cells;
+const first = walk.enter(here);
+await new Promise((resolve) => setTimeout(resolve, settings.after));
+const second = walk.enter(there);
+return { done: [await first, await second], groups: walk.shown.children.length,
+         files: walk.textures.map(({ number }) => walk.index.textures[number].file) };
+"""
+
+
+@pytest.mark.parametrize("after", [0, 60])
+def test_three_js_moves_on(three: Any, rooms: Path, after: int) -> None:
+    """What a cell alone needed is called off when the viewer enters another."""
+    seen = [set(seen_from(rooms, cell)[0]) for cell in range(len(list(rooms.glob("gltf/*.glb"))))]
+    here, there = next((a, b) for a, at in enumerate(seen) for b, to in enumerate(seen) if at - to)
+    found, visit = three.run(HURRY, {"www": rooms}, cells=[here, there], after=after)
+    assert visit.messages == []
+    visible, share = seen_from(rooms, there)
+    assert found["done"][1] is True
+    assert found["groups"] == len(visible)
+    assert set(found["files"]) == set(share)
+    if not after:
+        assert found["done"][0] is False
+        alone = seen[here] - seen[there]
+        assert not [path for path in visit.paths for cell in alone if f"c{cell:04d}.glb" in path]
 
 
 def test_three_js_refuses_another_schema(three: Any, gltf_museum: Path, tmp_path: Path) -> None:
@@ -121,8 +185,56 @@ def test_three_js_refuses_another_schema(three: Any, gltf_museum: Path, tmp_path
 
 
 def test_three_js_complains(three: Any, gltf_museum: Path, tmp_path: Path) -> None:
-    """Of a cell that is not there."""
+    """Of a cell and of a texture that are not there; the others are shown."""
     www = Path(shutil.copytree(gltf_museum / "www", tmp_path / "www"))
     cell = read(www, "hints.json")["viewpoints"][0]["cell"]
-    (www / f"gltf/c{cell:04d}.glb").unlink()
-    assert "404" in " ".join(three.walk(www, width=64, height=64).messages)
+    visible, share = seen_from(www, cell)
+    others = {t for other in visible[1:] for t in record_of(www, other)["textures"][0]}
+    glb = f"gltf/c{cell:04d}.glb"
+    ptm = read(www, "hints.json")["textures"][min(others)]["file"]
+    assert ptm in share
+    (www / glb).unlink()
+    (www / ptm).unlink()
+    walked = three.walk(www, width=64, height=64)
+    said = " ".join(walked.messages)
+    assert f"{glb}: 404" in said
+    assert f"{ptm}: 404" in said
+    assert walked.stays[0]["groups"] == len(visible) - 1
+
+
+EXAMPLE = """
+<iframe style="border: 0" width="320" height="240"
+  src="/node_modules/three-ptm/example/index.html?index=/www/hints.json&budget=1"></iframe>
+<script type="module">
+const frame = document.querySelector("iframe");
+const pause = (ms) => new Promise((go) => setTimeout(go, ms));
+const line = () => frame.contentDocument?.getElementById("status")?.textContent ?? "";
+const seen = [];
+for (let n = 0; n < 600 && !(seen.length > 9 && new Set(seen.slice(-9)).size === 1); n++) {
+  await pause(100);
+  if (/ [1-9][0-9]* cells in sight/.test(line())) seen.push(line());
+}
+await new Promise((drawn) => frame.contentWindow.requestAnimationFrame(drawn));
+const paper = new OffscreenCanvas(32, 24).getContext("2d");
+paper.drawImage(frame.contentDocument.querySelector("canvas"), 0, 0, 32, 24);
+const colors = new Set(new Uint32Array(paper.getImageData(0, 0, 32, 24).data.buffer)).size;
+await post("/done", JSON.stringify({ line: line(), colors }));
+</script>
+"""
+
+
+def test_the_example_walks(three: Any, gltf_museum: Path, tmp_path: Path) -> None:
+    """As it is shipped, beside the packages as npm installs them."""
+    folders = three.folders()
+    names = {"three": "three", "ptm-decoder": "decoder", "three-ptm": "adapter"}
+    for name, folder in names.items():
+        (tmp_path / name).symlink_to(folders[folder])
+    served = {"node_modules": tmp_path, "www": gltf_museum / "www"}
+    visit = web.visit(web.REPORTING + EXAMPLE, served)
+    found = json.loads(visit.body)
+    index = read(gltf_museum / "www", "hints.json")
+    first = index["viewpoints"][0]["cell"]
+    visible, _ = seen_from(gltf_museum / "www", first)
+    assert visit.messages == []
+    assert found["line"].startswith(f"cell {first}, {len(visible)} cells in sight, textures: ")
+    assert found["colors"] > 50

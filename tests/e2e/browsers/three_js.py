@@ -1,7 +1,7 @@
-"""three.js in headless Chromium, with the client of docs/gltf.md as it stands there.
+"""three.js in headless Chromium, with the package `web/three-ptm`.
 
-The page knows nothing but the address of the served folder: it finds the cell of a viewpoint, loads
-what can be seen from it with the PNG files as textures, and takes a picture.
+A script is run in a page that has three.js, the package and the decoder by name, and GL calls that
+are counted; `walk` is the script that walks from cell to cell of a served folder.
 """
 
 from __future__ import annotations
@@ -9,8 +9,7 @@ from __future__ import annotations
 import base64
 import json
 import os
-import re
-import tempfile
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,66 +23,133 @@ INSTALL = (
     "npm install --no-save --no-package-lock --ignore-scripts --no-audit --no-fund "
     f"--prefix {PREFIX} three@{VERSION}"
 )
-PAGE = (
+ADAPTER = ROOT / "web" / "three-ptm"
+#: `gpu.bytes` and `gpu.most` are of all storage in sRGB that there is and that there was at once.
+#: `levelsOf` reads a texture back: SHA-256 of its levels, coarsest first.
+HEAD = (
     web.REPORTING
     + """\
 <script type="importmap">
 { "imports": { "three": "/three/build/three.module.js",
-               "three/addons/": "/three/examples/jsm/" } }
+               "three/addons/": "/three/examples/jsm/",
+               "ptm-decoder": "/decoder/src/index.js",
+               "three-ptm": "/adapter/src/index.js" } }
 </script>
-<script type="module">
-import * as THREE from "three";
-import { Walk } from "/client/walk.js";
-
-const { width, height, gpuBytes, place } = SETTINGS;
-try {
-  const base = new URL("/www/", location).href;
-  const index = await (await fetch(base + "hints.json")).json();
-  const renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
-  renderer.setSize(width, height);
-  document.body.append(renderer.domElement);
-  const levels = [];
-  const images = new THREE.TextureLoader();
-  const walk = new Walk(base, index, (row, level) => {
-    levels.push([row.file, level]);
-    return images.loadAsync(base + row.fallback);
-  });
-  const view = index.viewpoints[place];
-  const camera = new THREE.PerspectiveCamera(
-    THREE.MathUtils.radToDeg(view.fieldOfView), width / height, 0.05, 1000);
-  camera.position.set(...view.position);
-  camera.lookAt(camera.position.clone().add(new THREE.Vector3(...view.direction)));
-  const cell = await walk.locate(camera.position);
-  await walk.enter(cell, gpuBytes);
-  renderer.render(new THREE.Scene().add(walk.shown), camera);
-  const picture = renderer.domElement.toDataURL("image/png");
-  await post("/done", JSON.stringify({ cell, levels, picture }));
-} catch (fault) {
-  await post("/say", `error: ${fault.stack}`);
-  await post("/done", JSON.stringify({ cell: -1, levels: [], picture: "," }));
+<script>
+const gpu = { bytes: 0, most: 0, uploads: 0, largest: 0, storages: new Map() };
+const calls = WebGL2RenderingContext.prototype;
+const { texStorage2D, texSubImage2D, deleteTexture } = calls;
+calls.texStorage2D = function (target, levels, format, width, height) {
+  texStorage2D.apply(this, arguments);
+  if (format !== this.SRGB8_ALPHA8) return;
+  let bytes = 0;
+  for (let k = 0; k < levels; k++) bytes += 4 * Math.max(1, width >> k) * Math.max(1, height >> k);
+  gpu.storages.set(this.getParameter(this.TEXTURE_BINDING_2D), bytes);
+  gpu.bytes += bytes;
+  gpu.most = Math.max(gpu.most, gpu.bytes);
+};
+calls.texSubImage2D = function (target, level, x, y, width, height) {
+  texSubImage2D.apply(this, arguments);
+  gpu.uploads += 4 * width * height;
+  gpu.largest = Math.max(gpu.largest, 4 * width * height);
+};
+calls.deleteTexture = function (texture) {
+  deleteTexture.apply(this, arguments);
+  gpu.bytes -= gpu.storages.get(texture) ?? 0;
+  gpu.storages.delete(texture);
+};
+const two = (byte) => byte.toString(16).padStart(2, "0");
+const hex = (bytes) => [...new Uint8Array(bytes)].map(two).join("");
+async function levelsOf(renderer, texture) {
+  const gl = renderer.getContext(), found = [];
+  const framebuffer = gl.createFramebuffer();
+  gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+  const { __webglTexture: handle } = renderer.properties.get(texture);
+  for (let mip = texture.level; mip >= 0; mip--) {
+    const { width, height } = texture.mipmaps[mip];
+    const texels = new Uint8Array(4 * width * height);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, handle, mip);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, texels);
+    found.push(hex(await crypto.subtle.digest("SHA-256", texels)));
+  }
+  gl.deleteFramebuffer(framebuffer);
+  renderer.resetState();
+  return found;
 }
 </script>
 """
 )
+FRAME = """\
+<script type="module">
+import * as THREE from "three";
+import { PtmTexture, RangeFile, Walk } from "three-ptm";
+
+const settings = SETTINGS;
+try {
+  const renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
+  renderer.setSize(settings.width, settings.height);
+  document.body.append(renderer.domElement);
+  const answer = await (async () => {
+    SCRIPT
+  })();
+  await post("/done", JSON.stringify(answer));
+} catch (fault) {
+  await post("/say", `error: ${fault.stack}`);
+  await post("/done", "null");
+}
+</script>
+"""
+WALK = """
+const walk = await Walk.open(renderer, "/www/hints.json");
+const view = walk.index.viewpoints[settings.viewpoint];
+const camera = new THREE.PerspectiveCamera(
+  THREE.MathUtils.radToDeg(view.fieldOfView), settings.width / settings.height, 0.05, 1000);
+camera.position.set(...view.position);
+camera.lookAt(camera.position.clone().add(new THREE.Vector3(...view.direction)));
+const scene = new THREE.Scene().add(walk.shown);
+const stays = [];
+for (const [cell, budget] of settings.stays) {
+  await walk.enter(cell ?? (await walk.locate(camera.position)), budget);
+  renderer.render(scene, camera);
+  stays.push({
+    cell: walk.cell,
+    levels: walk.textures.map(({ number, texture }) =>
+      [walk.index.textures[number].file, texture.level]),
+    told: walk.gpuBytes,
+    counted: gpu.bytes,
+    most: gpu.most,
+    geometries: renderer.info.memory.geometries,
+    textures: renderer.info.memory.textures,
+    groups: walk.shown.children.length,
+  });
+  gpu.most = gpu.bytes;
+}
+const picture = renderer.domElement.toDataURL("image/png");
+walk.dispose();
+return { stays, picture, left: { ...renderer.info.memory, bytes: gpu.bytes } };
+"""
 
 
 @dataclass(frozen=True)
 class Walked:
-    """What the client saw.
+    """What the walk came to.
 
     Attributes
     ----------
-    png: the picture.
-    cell: in which it found the viewpoint.
-    levels: (texture's URL, level) in the order in which they were asked for.
+    png: the last picture.
+    stays: for each cell that was entered: the cell, levels of the textures by URL, bytes of texture
+        memory as told and as counted, and the most since the cell before.
+    left: what was there when all had been given back.
     files: paths below the served folder that were fetched.
+    ranges: of the textures, see `web.Visit`.
     messages: lines of the console.
     """
 
     png: bytes
-    cell: int
-    levels: tuple[tuple[str, int], ...]
+    stays: tuple[dict[str, Any], ...]
+    left: dict[str, int]
     files: frozenset[str]
+    ranges: tuple[tuple[str, int, int], ...]
     messages: tuple[str, ...]
 
 
@@ -100,41 +166,49 @@ def missing() -> str | None:
     return "; ".join(lacking) or None
 
 
-def client() -> str:
-    """The module in docs/gltf.md."""
-    (module,) = re.findall(r"```js\n(.*?)```", (ROOT / "docs/gltf.md").read_text(), re.DOTALL)
-    return str(module)
+def folders() -> dict[str, Path]:
+    """What the names in the page's import map stand for."""
+    three = package()
+    if three is None:
+        raise FileNotFoundError(missing())
+    return {"three": three, "decoder": ROOT / "web" / "ptm", "adapter": ADAPTER}
+
+
+def run(
+    script: str,
+    served: Mapping[str, Path],
+    *,
+    width: int = 64,
+    height: int = 64,
+    seconds: float = 120,
+    **settings: Any,
+) -> tuple[Any, web.Visit]:
+    """What the body of an asynchronous function returns; it has ``renderer``, ``settings``."""
+    told = json.dumps({"width": width, "height": height, **settings})
+    page = HEAD + FRAME.replace("SETTINGS", told).replace("SCRIPT", script)
+    everything = {**folders(), **served}
+    seen = web.visit(page, everything, width=width, height=height, seconds=seconds)
+    return json.loads(seen.body), seen
 
 
 def walk(
     www: Path,
     *,
     viewpoint: int = 0,
-    gpu_bytes: int = 1 << 40,
+    stays: Sequence[tuple[int | None, int]] = ((None, 1 << 40),),
     width: int = 640,
     height: int = 480,
-    seconds: float = 120,
 ) -> Walked:
-    """Enters the cell of a viewpoint with so much texture memory, and looks."""
-    three = package()
-    if three is None:
-        raise FileNotFoundError(missing())
-    settings: dict[str, Any] = {
-        "width": width,
-        "height": height,
-        "gpuBytes": gpu_bytes,
-        "place": viewpoint,
-    }
-    page = PAGE.replace("SETTINGS", json.dumps(settings))
-    with tempfile.TemporaryDirectory(prefix="three-") as folder:
-        (Path(folder) / "walk.js").write_text(client())
-        folders = {"three": three, "client": Path(folder), "www": www}
-        seen = web.visit(page, folders, width=width, height=height, seconds=seconds)
-    answer = json.loads(seen.body)
+    """Enters cells, each with so much texture memory (None: that of the viewpoint), and looks."""
+    answer, seen = run(
+        WALK, {"www": www}, viewpoint=viewpoint, stays=stays, width=width, height=height
+    )
+    answer = answer or {"stays": [], "picture": ",", "left": {}}
     return Walked(
         png=base64.b64decode(answer["picture"].partition(",")[2]),
-        cell=answer["cell"],
-        levels=tuple((file, level) for file, level in answer["levels"]),
+        stays=tuple(answer["stays"]),
+        left=answer["left"],
         files=frozenset(p.removeprefix("/www/") for p in seen.paths if p.startswith("/www/")),
+        ranges=tuple(seen.ranges),
         messages=tuple(seen.messages),
     )

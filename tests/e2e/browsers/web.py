@@ -7,7 +7,9 @@ says, and at last what it was made to find out. Only the loopback address can be
 from __future__ import annotations
 
 import functools
+import io
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -17,6 +19,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 #: At the head of a page: `post`, and the console's complaints posted to /say. What is posted to
@@ -53,11 +56,13 @@ FLAGS = (
 
 @dataclass
 class Visit:
-    """What a page posted to /done, the lines of its console, and what was asked of the server."""
+    """What a page posted to /done, the lines of its console, and what was asked of the server;
+    ``ranges`` are (path, first byte, first byte behind), in order."""
 
     body: bytes = b""
     messages: list[str] = field(default_factory=list)
     paths: list[str] = field(default_factory=list)
+    ranges: list[tuple[str, int, int]] = field(default_factory=list)
     done: threading.Event = field(default_factory=threading.Event)
 
 
@@ -145,6 +150,24 @@ class _Handler(SimpleHTTPRequestHandler):
             self.wfile.write(body)
         else:
             super().do_GET()
+
+    def send_head(self) -> Any:
+        """A range of a file, if one is asked for."""
+        wanted = re.fullmatch(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
+        path = Path(self.translate_path(self.path))
+        if wanted is None or not path.is_file():
+            return super().send_head()
+        size = path.stat().st_size
+        begin, end = int(wanted[1]), min(int(wanted[2]) + 1, size)
+        self.seen.ranges.append((urlsplit(self.path).path, begin, end))
+        self.send_response(206 if begin < size else 416)
+        self.send_header("Content-Type", "application/octet-stream")
+        told = f"{begin}-{end - 1}" if begin < size else "*"
+        self.send_header("Content-Range", f"bytes {told}/{size}")
+        part = path.read_bytes()[begin:end]
+        self.send_header("Content-Length", str(len(part)))
+        self.end_headers()
+        return io.BytesIO(part)
 
     def translate_path(self, path: str) -> str:
         _, name, rest = (path + "//").split("/", 2)

@@ -1,0 +1,207 @@
+"""What a simulated client saw, received, chose and asked for, in that order, for another client to
+do the same."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ptmtools.walkthrough.allocation import allocate
+from ptmtools.walkthrough.catalogue import Catalogue
+from ptmtools.walkthrough.client import Client, Kind
+from ptmtools.walkthrough.network import Conditions, Link
+from ptmtools.walkthrough.policies import POLICIES
+from ptmtools.walkthrough.policies.engine import HELD_ON, EngineClient
+from ptmtools.walkthrough.request import Request
+from ptmtools.walkthrough.simulation import simulate
+from ptmtools.walkthrough.world import World
+from tests.web.node import run
+
+HERE = Path(__file__).resolve().parent
+Event = dict[str, Any]
+
+
+@dataclass
+class Witness:
+    """Watches a client in a world.
+
+    Attributes
+    ----------
+    events: what happened to it. answers: what it did then: what it holds in texture memory, what
+        it has downloaded, what it asked for.
+    """
+
+    world: World
+    policy: str
+    budget: int
+    events: list[Event] = field(default_factory=list)
+    answers: list[Any] = field(default_factory=list)
+
+    def client(self, world: World, link: Link, budget: int) -> Client:
+        """The one that is watched."""
+        client = POLICIES[self.policy].client(world, link, budget)
+        client.ticks = 1
+        look, fetch, arrived = client.look, client.fetch, client.arrived
+        #: Of all requests but that for the index, the next number.
+        number: dict[Request, int] = {}
+
+        def looked(frame: int) -> None:
+            look(frame)
+            eye, (x, y, z) = world.eye[frame].tolist(), world.direction[frame].tolist()
+            chosen = [client.column.tolist(), _missing(client)]
+            self._note(
+                "look", chosen, now=float(world.time[frame]), eye=eye,
+                cell=int(world.cell[frame]), still=bool(world.still[frame]),
+                yaw=math.atan2(-x, -z), pitch=math.asin(max(-1.0, min(1.0, y))), **_seen(client),
+            )  # fmt: skip
+
+        def fetched() -> None:
+            left = [[number[r], r.left] for r in client.waiting if r in number]
+            levels = [request for request in client.waiting if request not in number]
+            fetch()
+            estimate = client.estimate
+            found = [request for request in client.waiting if request not in number]
+            # Some policies ask for levels when they look; documents are asked for before these.
+            found.sort(key=levels.__contains__)
+            rows = [r for r in found if r.tag.kind != Kind.INDEX]  # type: ignore[attr-defined]
+            for request in rows:
+                number[request] = len(number)
+            if client.index:
+                self._note(
+                    "fetch", [_row(request) for request in rows], left=left,
+                    bandwidth=estimate.bandwidth, latency=estimate.latency,
+                )  # fmt: skip
+
+        def came(request: Request) -> None:
+            arrived(request)
+            if request in number:
+                part: Any = request.tag
+                seen = {} if part.kind == Kind.TEXTURE else _seen(client)
+                self._note("arrived", client.have.tolist(), number=number[request], **seen)
+
+        vars(client).update(look=looked, fetch=fetched, arrived=came)
+        return client
+
+    def _note(self, act: str, answer: Any, **told: Any) -> None:
+        self.events.append({"act": act, **told})
+        self.answers.append(answer)
+
+    def walk(self, conditions: Conditions) -> None:
+        """Walks through the world, as a browser has to ask for ranges."""
+        simulate(
+            replace(self.world, one_range=True),
+            replace(POLICIES[self.policy], client=self.client),
+            conditions,
+            self.budget,
+        )
+
+    def in_javascript(self, folder: Path) -> list[Any]:
+        """What the viewer's client answers to the same events."""
+        document = {
+            **documents(self.world),
+            "policy": self.policy,
+            "budget": self.budget,
+            "events": self.events,
+        }
+        file = folder / "walk.json"
+        write(file, document)
+        answers: list[Any] = json.loads(run(HERE / "policy_walk.mjs", file))
+        return answers
+
+
+def _seen(client: Client) -> Event:
+    """What its policy sees."""
+    if not isinstance(client, EngineClient) or client.cell < 0:
+        return {}
+    sight, hidden = client.sight(1), client.placeholders(1)
+    return {"sight": sight.ravel().tolist(), "hidden": hidden.tolist()}
+
+
+def _missing(client: Client) -> int | None:
+    """Records, geometry and textures that the view could use: of those the item buffer shows, and
+    with all downloaded would be in texture memory."""
+    if not isinstance(client, EngineClient):
+        return None
+    stock = client.world.catalogue
+    here = int(client.world.cell[client.frame])
+    count = int(not client.records.whole[here])
+    if client.cell < 0 or client._worth is None:
+        return count
+    known = client.known()
+    seen = client.frustum.meets_boxes(stock.low[known], stock.high[known])
+    seen |= (known == here) | (client.placeholders(1)[known] > 0)
+    count += int((seen & ~client.geometry.whole[known]).sum())
+    hold, kept, best = client._worth.hold, client._kept, np.zeros(len(stock.levels), np.int64)
+    worth = hold + HELD_ON * kept + HELD_ON**2 * stock.differences
+    allocate(worth, stock.memory, stock.levels, client.budget, best, False)
+    column = np.arange(stock.ends.shape[1])
+    absent = (column > client.have[:, None]) & (column <= best[:, None])
+    return count + int((absent & (client.sight(1) > 0)).any(axis=1).sum())
+
+
+def _row(request: Request) -> list[Any]:
+    part: Any = request.tag
+    priority = request.priority if math.isfinite(request.priority) else None
+    return [part.kind.name.lower(), part.number, part.begin, part.end, priority]
+
+
+def tables(stock: Catalogue) -> dict[str, Any]:
+    """A catalogue as the viewer has it."""
+    count, wide = stock.ends.shape
+    arrays = {
+        "levels": stock.levels,
+        "ends": stock.ends,
+        "memory": stock.memory,
+        "differences": stock.differences,
+        "colors": stock.colors,
+        "low": stock.low,
+        "high": stock.high,
+        "recordBytes": stock.record_bytes,
+        "geometryBytes": stock.geometry_bytes,
+    }
+    sizes = {"T": count, "C": stock.cell_count, "K": wide, "whole": stock.whole}
+    return {**sizes, **{name: np.asarray(array).tolist() for name, array in arrays.items()}}
+
+
+def documents(world: World) -> dict[str, Any]:
+    """What there is to fetch in a world, and the angles of its camera."""
+    stock, camera = world.catalogue, world.camera
+    shapes: list[list[Any]] = [[] for _ in range(stock.cell_count)]
+    rows = stock.shapes
+    fields = (x.tolist() for x in (rows.cell, rows.texture, rows.low, rows.high))
+    for cell, texture, low, high in zip(*fields, strict=True):
+        shapes[cell].append({"texture": texture, "low": low, "high": high})
+    return {
+        "catalogue": tables(stock),
+        "records": stock.records,
+        "shapes": shapes,
+        "view": [camera.field_of_view, camera.aspect],
+    }
+
+
+def write(file: Path, document: Any) -> None:
+    """JSON, in which what is infinite is a number, too."""
+    file.write_text(json.dumps(document).replace("Infinity", "1e999"))
+
+
+def called(folder: Path, calls: Sequence[tuple[str, Event]]) -> list[Any]:
+    """What functions of ``calls.mjs`` return; all in one process."""
+    write(folder / "calls.json", calls)
+    answers: list[Any] = json.loads(run(HERE / "calls.mjs", folder / "calls.json"))
+    return answers
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether answers are the same, priorities but for rounding: sums are added up in another
+    order."""
+    if isinstance(one, list):
+        return len(one) == len(other) and all(map(same, one, other))
+    if isinstance(one, float):
+        return math.isclose(one, other, rel_tol=1e-9)
+    return bool(one == other)
