@@ -6,12 +6,14 @@ plan.png     both floors, with what the middle room sees shaded by its coverage 
 levels.jpg   a painting, as its levels show it while the `.ptm` arrives
 view.jpg     the view from a viewpoint with the first levels of all textures, and with all of them:
              rays cast at the model, no browser
+walk.jpg     the page of `ptm serve` in Chromium, with the map and the details open
 door-*.png   two rooms with a door leaf in the doorway: with the door closed one is lost
 """
 
 from __future__ import annotations
 
 import argparse
+import io
 import json
 import shutil
 import sys
@@ -83,6 +85,29 @@ def views(database: Path) -> Image.Image:
     return sheet
 
 
+def walk(database: Path) -> Image.Image:
+    """The page at a viewpoint, once everything is there."""
+    from playwright.sync_api import sync_playwright
+
+    from ptmtools.server.running import serving
+    from ptmtools.viewer.site import site_of
+
+    program = shutil.which("chromium")
+    with serving(site_of(database).entries) as url, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 1280, "height": 720})
+        page.goto(url)
+        page.wait_for_function("window.ptm")
+        page.evaluate("(place) => window.ptm.goTo(place)", VIEWPOINT)
+        for name in ("Map", "Details"):
+            page.get_by_role("button", name=name).click()
+        page.wait_for_function("window.ptm.state().complete", timeout=300_000)
+        page.wait_for_timeout(1000)
+        picture = Image.open(io.BytesIO(page.screenshot()))
+        browser.close()
+    return picture.convert("RGB")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("database", type=Path, help="of the sample museum")
@@ -92,6 +117,7 @@ def main() -> None:
     ptm("plot", str(database), "--cell", str(CELL), "--dpi", "90", "-o", plan, "--force")
     levels(database / f"www/textures/{PAINTING}.ptm").save(PICTURES / "levels.jpg", quality=85)
     views(database).save(PICTURES / "view.jpg", quality=85)
+    walk(database).save(PICTURES / "walk.jpg", quality=85)
     with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(TWO_ROOMS, f"{folder}/model")
         model = Path(folder, "model", "two_rooms.obj")

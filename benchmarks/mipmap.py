@@ -28,8 +28,11 @@ class Pyramid:
     levels: tuple[NDArray[np.uint8], ...]
 
     @staticmethod
-    def of(image: NDArray[np.uint8]) -> Pyramid:
-        """The pyramid of an (h, w, 4) image; an odd last row or column is left out of the mean."""
+    def of(image: NDArray[np.uint8], floored: bool = False) -> Pyramid:
+        """The pyramid of an (h, w, 4) image; an odd last row or column is left out of the mean.
+
+        ``floored``: means are rounded down, as those of a `.ptm` are.
+        """
         levels = [image]
         while max(levels[-1].shape[:2]) > 1:
             h, w = levels[-1].shape[:2]
@@ -38,7 +41,8 @@ class Pyramid:
             blocks = even.reshape(rows, min(h, 2), columns, min(w, 2), 4)
             total = blocks.sum(axis=(1, 3))
             count = blocks.shape[1] * blocks.shape[3]
-            levels.append(((total + count // 2) // count).astype(np.uint8))
+            half = 0 if floored else count // 2
+            levels.append(((total + half) // count).astype(np.uint8))
         return Pyramid(tuple(levels))
 
     def reduced(self, side: int) -> Pyramid:

@@ -56,18 +56,22 @@ class Look:
     ----------
     lit: which surfaces: all, none, or those emitted with a Material.
     parallel: the headlight's rays are parallel to the direction of view.
-    glow: what an untextured surface shines by itself, a share of its colour.
+    headlight: what a surface shines that faces it, a share of its colour.
+    glow: what an untextured surface shines by itself, likewise.
     ambient: what a lit surface shines besides the headlight's part.
     sky: (r, g, b) in 0…1 where nothing is.
     mipmaps: textures are looked up as graphics cards do.
+    floored: in levels whose means are rounded down, as those of a `.ptm` are.
     """
 
     lit: Literal["all", "material", "none"] = "all"
     parallel: bool = False
+    headlight: float = 1.0
     glow: float = 0.0
     ambient: float = 0.0
     sky: tuple[float, float, float] = (0.62, 0.74, 0.88)
     mipmaps: bool = False
+    floored: bool = False
 
 
 X_ITE = Look("material", parallel=True, glow=0.25, sky=(0, 0, 0), mipmaps=True)
@@ -193,12 +197,12 @@ def to_world(space: Space, point: Vector) -> NDArray[np.float64]:
 
 
 @functools.lru_cache(maxsize=2)
-def _pyramids(images: tuple[Any, ...]) -> tuple[Pyramid, ...]:
+def _pyramids(images: tuple[Any, ...], floored: bool) -> tuple[Pyramid, ...]:
     """Of every image of a scene; kept, since one scene is looked at from many places."""
     pyramids = []
     for source in images:
         with Image.open(io.BytesIO(source.load())) as image:
-            pyramids.append(Pyramid.of(np.asarray(image.convert("RGBA"))))
+            pyramids.append(Pyramid.of(np.asarray(image.convert("RGBA")), floored))
     return tuple(pyramids)
 
 
@@ -207,7 +211,7 @@ def render(
 ) -> NDArray[np.uint8]:
     """(height, width, 3) picture, of textures with at most ``side`` texels a side if that is
     given."""
-    pyramids = tuple(pyramid.reduced(side) for pyramid in _pyramids(scene.images))
+    pyramids = tuple(pyramid.reduced(side) for pyramid in _pyramids(scene.images, look.floored))
     tracer = Tracer(scene, view.eye)
     material = np.array([m.image < 0 or m.opacity < 1 for m in scene.materials])
     lit = {"all": material | True, "material": material, "none": material & False}[look.lit]
@@ -234,7 +238,9 @@ def render(
         # A wall that the eye sees from the side may have turned its back on parallel light.
         light = view.frame()[2] if look.parallel else ray
         facing = np.maximum((normal * light).sum(axis=1), 0).astype(np.float32)
-        shade = np.where(lit[which], facing + look.ambient + glow[which], np.float32(1))
+        shade = np.where(
+            lit[which], look.headlight * facing + look.ambient + glow[which], np.float32(1)
+        )
         # A browser clips the light that leaves a surface, then blends.
         rgba[:, :3] = np.minimum(rgba[:, :3] * shade[:, None], 1)
         color[active] += (left[active] * rgba[:, 3])[:, None] * rgba[:, :3]

@@ -1,0 +1,1 @@
+"""The walk page beside what people do otherwise: what each shows when, and in how much memory."""

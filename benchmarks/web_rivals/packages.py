@@ -1,0 +1,52 @@
+"""What the rivals need from npm; each has a folder of its own, since npm removes what else lies in
+one."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@dataclass(frozen=True)
+class Package:
+    """``name`` of a version, in a folder below ``build/browsers``."""
+
+    name: str
+    version: str
+    prefix: str
+
+    @property
+    def folder(self) -> Path:
+        """Where it is once it is installed."""
+        return ROOT / "build/browsers" / self.prefix / "node_modules" / self.name
+
+    @property
+    def command(self) -> str:
+        """What installs it, in the checkout."""
+        options = "--no-save --no-package-lock --ignore-scripts --no-audit --no-fund"
+        prefix = f"--prefix build/browsers/{self.prefix}"
+        return f"npm install {options} {prefix} {self.name}@{self.version}"
+
+    def remedy(self) -> str | None:
+        """What to install first, or None."""
+        if shutil.which("node") is None:
+            return "apt install nodejs npm"
+        if (self.folder / "package.json").is_file():
+            return None
+        return f"in the checkout: {self.command}"
+
+    def require(self) -> None:
+        """Raises SystemExit with the remedy."""
+        if remedy := self.remedy():
+            raise SystemExit(f"{self.name} is missing; {remedy}")
+
+
+THREE = Package("three", "0.187.0", "three")
+KTX2 = Package("ktx2-encoder", "0.6.0", "ktx2")
+#: Joins and shortens the modules of a page, as those who use three.js do.
+ESBUILD = Package("esbuild", "0.28.2", "esbuild")
+#: The one that tests need and others do not install.
+INSTALL = ESBUILD.command
