@@ -4,6 +4,7 @@ import { clock } from "./net/fetcher.js";
 import { POLICIES } from "./policy/policies.js";
 import { Recorder } from "./recorder.js";
 import { footprintOf } from "./space/footprint.js";
+import { stateOf } from "./state.js";
 import { poseOf } from "./ui/address.js";
 import { Solids } from "./walk/solids.js";
 import { Walker } from "./walk/walker.js";
@@ -96,7 +97,7 @@ export class App {
 
   /** The numbers of the overlay. */
   state() {
-    return { ...this.walk.state(), pose: this.walker.pose };
+    return { ...stateOf(this.walk), pose: this.walker.pose };
   }
 
   /** @param {number | Pose} place a viewpoint, or a pose */

@@ -21,8 +21,6 @@ export class Stream {
   shapes = new Map();
   /** Whether anything has arrived that was not looked at yet. */
   news = false;
-  /** Whether nothing more is asked for. */
-  resting = false;
   /** @type {Request[]} */
   #queue = [];
   #sent = 0;
@@ -38,21 +36,23 @@ export class Stream {
    * @param {import("./policy/estimate.js").Estimate} parts.estimate
    * @param {import("./net/fetcher.js").Fetcher} parts.fetcher
    * @param {import("../decoder/src/workers.js").DecoderWorkers} parts.workers
+   * @param {() => boolean} parts.rests whether nothing more is asked for
    * @param {(error: PageError, kind: string, number: number) => void} parts.report what it is about
    */
-  constructor({ site, client, locator, estimate, fetcher, workers, report }) {
+  constructor({ site, client, locator, estimate, fetcher, workers, rests, report }) {
     this.site = site;
     this.client = client;
     this.locator = locator;
     this.estimate = estimate;
     this.fetcher = fetcher;
+    this.rests = rests;
     this.report = report;
     this.files = site.index.textures.map((row) => new TextureFile(row, workers));
   }
 
   /** Asks for what is worth most, as long as the link would run dry. */
   pump() {
-    while (!this.resting) {
+    while (!this.rests()) {
       const request = this.client.next(this.estimate);
       if (!request) return;
       this.ask(request);
@@ -91,7 +91,7 @@ export class Stream {
       this.news = true;
     } catch (fault) {
       const known = fault instanceof PageError;
-      const error = known ? fault : new PageError("PTM-V106", String(fault));
+      const error = known ? fault : new PageError("PTM-V107", String(fault));
       const forGood = error.code === "PTM-V103" || error.code === "PTM-V105";
       client.failed(request, forGood ? Infinity : clock() + REST);
       this.report(error, kind, number);

@@ -6,6 +6,7 @@ import { levelsOf } from "./data/site.js";
 import { cameraOf } from "./gl/camera.js";
 import { ItemBuffer } from "./gl/item-buffer.js";
 import { Renderer } from "./gl/renderer.js";
+import { Reserve } from "./gl/reserve.js";
 import { Sharpness } from "./gl/sharpness.js";
 import { TextureMemory } from "./gl/texture-memory.js";
 import { clock, Fetcher } from "./net/fetcher.js";
@@ -84,6 +85,7 @@ export class Walkthrough {
     this.budget = options.budget;
     this.policy = options.policy;
     this.catalogue = catalogueOf(index);
+    this.reserve = new Reserve(this.catalogue);
     this.sharpness = new Sharpness(canvas);
     this.estimate = new Estimate();
     watchLink(this.estimate);
@@ -100,6 +102,7 @@ export class Walkthrough {
       estimate: this.estimate,
       fetcher: this.fetcher,
       workers: options.workers,
+      rests: () => this.#rests,
       report: (error, kind, number) => this.#report(error, kind, number),
     });
     this.rows = index.textures.map(levelsOf);
@@ -185,7 +188,7 @@ export class Walkthrough {
    * @param {Pose} pose
    */
   frame(pose) {
-    const now = clock(), { gl, client } = this;
+    const now = clock(), { gl } = this;
     if (gl.isContextLost()) return;
     this.locate(pose);
     const still = this.#still(pose, now);
@@ -206,14 +209,12 @@ export class Walkthrough {
     }
     if (!this.begun) this.#begin();
     this.recorder?.frame(now, frustum, this.#sightDrawn);
-    if (client.frustum) this.#fetch();
+    this.stream.pump();
   }
 
-  /** Asks for more, unless what is on the screen is enough. */
-  #fetch() {
-    const enough = this.saving || document.hidden;
-    this.stream.resting = this.frozen || (enough && this.client.missing() === 0);
-    this.stream.pump();
+  /** Whether nothing more is asked for: what is on the screen may be enough. */
+  get #rests() {
+    return this.frozen || ((this.saving || document.hidden) && this.client.missing() === 0);
   }
 
   /** Tells how far the first picture is: the room, then the coarse levels of what is seen of it. */
@@ -359,23 +360,16 @@ export class Walkthrough {
   #look(now, frustum, still) {
     this.#looked = now;
     this.stream.news = false;
-    const { client, memory, comparison } = this;
+    const { client, memory, reserve, comparison } = this;
     if (comparison) comparison.settle();
     if (this.frozen) return;
-    client.budget = this.budget - this.#reserve();
-    client.look({ now, cell: this.cell, frustum, still });
+    reserve.enter(this.cell, this.budget);
+    do {
+      client.budget = this.budget - reserve.bytes;
+      client.look({ now, cell: this.cell, frustum, still });
+    } while (reserve.grow(client.column));
     memory.budget = this.budget;
     memory.settle(client.column, this.#priority());
-  }
-
-  /** Bytes for a texture that is twice there while it grows: at most the greatest less its finest level. */
-  #reserve() {
-    const { K, memory } = this.catalogue;
-    let most = 0;
-    this.client.column.forEach((column, t) => {
-      if (column > 0) most = Math.max(most, memory[t * K + column - 1]);
-    });
-    return most;
   }
 
   /** How much of the view each texture is, for the order of uploads. */
@@ -385,45 +379,21 @@ export class Walkthrough {
     return share;
   }
 
-  /** The numbers of the overlay, for tests and for the curious. */
-  state() {
-    const { catalogue, client, estimate, fetcher, memory } = this, now = clock();
-    const levels = new Array(catalogue.K).fill(0);
-    for (const held of memory.held) levels[held]++;
-    const paper = this.site.index.textures.reduce((sum, { components }, t) => {
-      const texels = this.rows[t].sizes.slice(0, memory.held[t]);
-      return sum + components * texels.reduce((all, { width, height }) => all + width * height, 0);
-    }, 0);
-    return {
-      cell: this.cell,
-      visible: [...this.visible],
-      drawnCells: this.drawn.map(({ cell }) => cell).sort((a, b) => a - b),
-      residentBytes: memory.bytes,
-      peakBytes: memory.peak,
-      budgetBytes: this.budget,
-      paperBytes: paper,
-      geometryBytes: this.renderer?.bytes ?? 0,
-      requests: fetcher.requests,
-      bytes: fetcher.bytes,
-      pending: fetcher.pending,
-      complete: this.complete,
-      fps: this.#frames.length,
-      bandwidth: estimate.bandwidth,
-      latency: estimate.latency,
-      bufferAge: this.#sightDrawn < 0 ? null : now - this.#sightDrawn,
-      policy: this.policy,
-      patience: client.patience.moving,
-      dataSaver: this.saving,
-      levels,
-      held: Array.from(memory.held),
-    };
+  /** Pictures in the second before the last one. */
+  get fps() {
+    return this.#frames.length;
+  }
+
+  /** Seconds since the item buffer that is gone by was drawn; null before there is one. */
+  get bufferAge() {
+    return this.#sightDrawn < 0 ? null : clock() - this.#sightDrawn;
   }
 
   /** Whether nothing that this view could use is missing within the budget. */
   get complete() {
     const { client, memory, present, catalogue: { T, K } } = this;
     if (!present || this.#sightDrawn < this.#changed || this.#looked < this.#changed) return false;
-    if (client.cell !== this.cell || client.missing() > 0) return false;
+    if (client.cell !== this.cell || client.missing() > 0 || !this.sharpness.full) return false;
     for (let t = 0; t < T; t++) {
       const held = memory.held[t];
       for (let column = client.column[t]; column > held; column--) {

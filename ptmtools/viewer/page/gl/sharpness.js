@@ -23,6 +23,12 @@ export class Sharpness {
     return this.#size(1)[1];
   }
 
+  /** Whether the canvas is as fine as the screen. */
+  get full() {
+    const [width, height] = this.#size(1);
+    return this.canvas.width === width && this.canvas.height === height;
+  }
+
   /**
    * Sizes the canvas; true if that changed it.
    * @param {number} seconds since the frame before

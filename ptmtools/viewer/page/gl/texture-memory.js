@@ -192,17 +192,32 @@ export class TextureMemory {
   }
 
   /**
-   * Storage for so many levels, or null if there is no room.
+   * Storage for so many levels, or null if there is no room. What grows leaves room for what is to
+   * shrink, without which there would be none in the end.
    * @param {number} texture
    * @param {number} levels
    */
   #make(texture, levels) {
-    const { sizes, channels } = this.rows[texture], kept = sizes.slice(0, levels);
-    const bytes = kept.reduce((sum, { width, height }) => sum + width * height * channels, 0);
-    if (this.bytes + bytes > this.budget) return null;
+    const { sizes, channels } = this.rows[texture], bytes = this.#size(texture, levels);
+    const left = levels < this.held[texture] ? 0 : this.#shrinking();
+    if (this.bytes + bytes + left > this.budget) return null;
     this.bytes += bytes;
     this.peak = Math.max(this.peak, this.bytes);
-    return new Storage(this.gl, kept, channels);
+    return new Storage(this.gl, sizes.slice(0, levels), channels);
+  }
+
+  /** Bytes of so many levels. @param {number} texture @param {number} levels */
+  #size(texture, levels) {
+    const { sizes, channels } = this.rows[texture];
+    return sizes.slice(0, levels).reduce((sum, size) => sum + size.width * size.height * channels, 0);
+  }
+
+  /** The most that a texture which is to shrink will take, until it has. */
+  #shrinking() {
+    return this.#want.reduce(
+      (most, levels, t) => (levels < this.held[t] ? Math.max(most, this.#size(t, levels)) : most),
+      0,
+    );
   }
 
   /** @param {Storage} storage */

@@ -14,6 +14,9 @@ const OTHERWISE = "Load the page again. If that does not help, tell whoever put 
 /** How long a notice stays, ms. */
 const STAYS = 8000;
 
+/** What an error is in the way of. */
+const BEHIND = ["nav", "#panels", "#view"];
+
 /** Shows an error, in the way of everything. @param {Document} root
  * @param {{code: string, message: string}} error */
 export function showError(root, { code, message }) {
@@ -23,9 +26,15 @@ export function showError(root, { code, message }) {
   find(root, "#error-code").textContent = code;
   find(root, "#loading").hidden = true;
   panel.hidden = false;
-  for (const name of ["nav", "#panels", "#view"]) find(root, name).inert = true;
+  for (const name of BEHIND) find(root, name).inert = true;
   again.onclick = () => location.reload();
   again.focus();
+}
+
+/** The walk has begun after all. @param {Document} root */
+function hideError(root) {
+  find(root, "#error").hidden = true;
+  for (const name of BEHIND) find(root, name).inert = false;
 }
 
 /** Says something in passing. @param {Document} root @param {...(string | Node)} message */
@@ -45,6 +54,7 @@ export function attachErrors(root, app) {
   /** @type {Set<string>} */
   const said = new Set();
   app.on("error", (error) => showError(root, error));
+  app.on("first-picture", () => hideError(root));
   app.on("notice", ({ message }) => {
     if (said.has(message)) return;
     said.add(message);
