@@ -26,6 +26,7 @@ from ptmtools.cli.common import (
 )
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
+from ptmtools.database.emitters.gltf import GLTF
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.build import build_scene as build, run_stage
 from ptmtools.pipeline.changes import NEVER_RUN
@@ -36,6 +37,7 @@ from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import EMIT, PVS, STAGES
 from ptmtools.pipeline.visitor import Visitor
 from ptmtools.quantities import count, size
+from ptmtools.store.layout import SERVED
 
 #: What ``ptm STAGE DB --report`` prints besides: what that is, and a function of the artifacts that
 #: returns it as a document and as lines.
@@ -196,8 +198,15 @@ def print_report(voice: Voice, report: BuildReport, as_json: bool) -> None:
         ptm, db = _invoked(), shlex.quote(report.database)
         voice.say("")
         voice.say(f"The database is {db}. Next:")
+        walkable = all((Path(report.database) / SERVED / own).exists() for own in GLTF.owns)
         commands = {
-            f"{ptm} serve {db} --open": "walk through it in a browser",
+            **(
+                {f"{ptm} serve {db} --open": "walk through it in a browser"}
+                if walkable
+                else {
+                    f"{ptm} emit {db} --format vrml,gltf": "write what `ptm serve` shows, as well"
+                }
+            ),
             f"{ptm} plot {db} -o plan.png": "draw its floor plan",
             f"{ptm} validate {db}": "check every file",
         }

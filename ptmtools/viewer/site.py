@@ -222,7 +222,7 @@ class _Making:
                 "PTM-D900",
                 "has no VRML files",
                 file=self._folder.path,
-                remedy="write them with `ptm emit DB --format both`",
+                remedy="write them with `ptm emit DB --format vrml,gltf`",
             )
         for name in sorted(self._digests):
             media = _VRML_MEDIA.get(Path(name).suffix)

@@ -129,7 +129,7 @@ def read_served(database: str | os.PathLike[str]) -> Served:
             "PTM-D606",
             "has no geometry in glTF, which is what clients of the hints fetch",
             file=database,
-            remedy="write it with `ptm emit DB --format both`",
+            remedy="write it with `ptm emit DB --format vrml,gltf`",
         )
     names = [cell["name"] for cell in index["cells"]]
     found = [_document(_of(folder, index["record"], name), schemas.CELL) for name in names]

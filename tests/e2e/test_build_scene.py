@@ -71,13 +71,17 @@ def test_two_rooms(tmp_path: Path) -> None:
     assert str(TWO_ROOMS) not in manifest
 
 
-def test_what_is_not_there_is_not_to_be_opened(ptm: Ptm, database: Path) -> None:
+def test_what_cannot_be_walked_in_is_not_to_be_served(ptm: Ptm, database: Path) -> None:
     for format in ("vrml", "gltf", "vrml,gltf"):
         done = ptm("emit", database, "--format", format)
         assert done.status == 0
         assert "ptm validate" in done.out
-        root = database / "www" / "root.wrl"
-        assert ("open root.wrl" in done.out) == root.exists() == ("vrml" in format)
+        assert (f"ptm serve {database}" in done.out) == ("gltf" in format)
+        remedy = ("emit", database, "--format", "vrml,gltf")
+        assert (" ".join(map(str, remedy)) in done.out) == (format == "vrml")
+        if format == "vrml":
+            assert ptm(*remedy).status == 0
+            assert (database / "www" / "gltf").is_dir()
 
 
 def test_the_same_bytes_anywhere_and_with_any_number_of_workers(
