@@ -19,7 +19,7 @@ import math
 import time
 from dataclasses import dataclass
 
-from ptmtools.errors import InputError
+from ptmtools.walkthrough.network import Conditions
 
 #: Seconds of the link that a round of pieces takes, one piece of each flow.
 PIECE = 0.01
@@ -43,15 +43,8 @@ class Throttle:
     latency: float = 0.0
 
     def __post_init__(self) -> None:
-        wrong = ""
-        if self.bandwidth is not None and not 0 < self.bandwidth < math.inf:
-            wrong = f"a bandwidth of {self.bandwidth:g} bit/s"
-        elif not 0 <= self.latency < math.inf:
-            wrong = f"a latency of {self.latency:g} s"
-        if wrong:
-            raise InputError(
-                "PTM-I711", f"no link has {wrong}", remedy="leave it out for its default"
-            )
+        # It refuses what makes no sense.
+        Conditions(bandwidth=self.bandwidth, latency=self.latency)
 
 
 class Flow:
