@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 
+from anyio.to_thread import run_sync
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
@@ -53,7 +54,7 @@ def app_of(
 
     Parameters
     ----------
-    files: what there is.
+    files: what there is; called from several threads.
     throttle: the link that is imitated, if one is.
     visits: records every request.
     origin: whose pages may read the files besides those of this server: an origin, or ``*``.
@@ -77,7 +78,7 @@ def _answer(files: Lookup, origin: str | None) -> Callable[[Request], Awaitable[
         if request.method == "OPTIONS":
             return Response(status_code=204, headers=common | _SHARED)
         name = name_of(request.scope["raw_path"])
-        entry = files(name) if name is not None else None
+        entry = await run_sync(files, name) if name is not None else None
         try:
             whole = stored(entry) if entry else None
         except OSError:

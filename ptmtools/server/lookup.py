@@ -76,12 +76,3 @@ def below(folder: Path, *, hashed: bool = False) -> Lookup:
         return Entry(name, file, media, hashed and bool(_HASH.search(name)), compressed)
 
     return find
-
-
-def first_of(*lookups: Lookup) -> Lookup:
-    """What the first of them finds that finds something."""
-
-    def find(name: str) -> Entry | None:
-        return next((entry for lookup in lookups if (entry := lookup(name))), None)
-
-    return find

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
+from threading import Lock
 
-from ptmtools.errors import DatabaseError
+from ptmtools.errors import DatabaseError, PtmError
 from ptmtools.pipeline.command import naming_command, open_database
 from ptmtools.pipeline.stages.emit import EMIT
-from ptmtools.server.lookup import INDEX, Lookup, among, below, first_of
+from ptmtools.server.lookup import INDEX, Lookup, among, below
 from ptmtools.store.layout import MANIFEST, SERVED
+from ptmtools.viewer.entry import Entry
 
 
 def files_of(folder: str | PathLike[str]) -> Lookup:
@@ -22,18 +24,53 @@ def files_of(folder: str | PathLike[str]) -> Lookup:
     DatabaseError: PTM-D001 it is neither; PTM-D002, D003 a damaged database, or one of another
         schema; PTM-D004 one that is not built to the end; and what making the site raises.
     """
-    from ptmtools.viewer.site import SiteOptions, site_of
-
     path = Path(folder)
     if (path / INDEX).is_file() and not (path / MANIFEST).exists():
         return below(path, hashed=True)
-    with naming_command(path):
+    return _Database(path)
+
+
+class _Database:
+    """The files of a database, which may be built again meanwhile: the site is made anew for the
+    next who asks for its page. Until then what its old names stood for is gone."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._lock = Lock()
+        self._built = self._stamp()
+        self._site = self._made()
+        self._others = below(path / SERVED)
+
+    def __call__(self, name: str) -> Entry | None:
+        with self._lock:
+            built = self._stamp()
+            if name == INDEX and built != self._built:
+                try:
+                    self._site, self._built = self._made(), built
+                except PtmError:
+                    return None  # it is being built
+            entry = self._site(name)
+            if entry and built != self._built and isinstance(entry.source, Path):
+                return None
+        return entry or self._others(name)
+
+    def _stamp(self) -> tuple[int, int]:
+        """Changes whenever a stage is finished."""
         try:
-            database = open_database(path)
-        except DatabaseError as fault:
-            if fault.code == "PTM-D001" and path.exists():
-                fault.message = "neither a database nor a folder that `ptm publish` wrote"
-            raise
-        database.record(EMIT.name)
-        site = site_of(path, SiteOptions(pictures=False))
-    return first_of(among(site.entries), below(path / SERVED))
+            state = (self._path / MANIFEST).stat()
+        except OSError:
+            return 0, 0
+        return state.st_mtime_ns, state.st_ino
+
+    def _made(self) -> Lookup:
+        from ptmtools.viewer.site import SiteOptions, site_of
+
+        with naming_command(self._path):
+            try:
+                database = open_database(self._path)
+            except DatabaseError as fault:
+                if fault.code == "PTM-D001" and self._path.exists():
+                    fault.message = "neither a database nor a folder that `ptm publish` wrote"
+                raise
+            database.record(EMIT.name)
+            return among(site_of(self._path, SiteOptions(pictures=False)).entries)

@@ -163,8 +163,11 @@ class _Making:
             self._progress(number, len(index["cells"]), "cells")
             row = dict(cell)
             for kind, template in templates.items():
-                data = self._read(template.replace("{name}", cell["name"]))
-                row[kind] = self._add(cell["name"], *media[kind], data, compressed=True)
+                file, digest = self._place(template.replace("{name}", cell["name"]))
+                data = self._folder.read(file.relative_to(self._folder.path).as_posix(), digest)
+                row[kind] = self._add(
+                    cell["name"], *media[kind], file, digest=digest, compressed=True
+                )
                 row[f"{kind}Bytes"] = min(len(data), len(compressed(data)))
             yield row
 
@@ -239,10 +242,6 @@ class _Making:
         if name not in self._digests:
             raise damaged(file, "the manifest does not list it")
         return file, self._digests[name]
-
-    def _read(self, url: str) -> bytes:
-        file, digest = self._place(url)
-        return self._folder.read(file.relative_to(self._folder.path).as_posix(), digest)
 
     def _add(
         self,

@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from ptmtools.server.lookup import Lookup, among, below, first_of
+from ptmtools.server.lookup import Lookup, among, below
 from ptmtools.server.running import serving
 from ptmtools.server.visits import Visits
 from ptmtools.viewer.entry import Entry
@@ -81,7 +81,8 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Lookup:
         Entry("data/small.json", b"{}", "application/json", compressed=True),
         Entry("data/empty.ptm", b"", "application/octet-stream"),
     ]
-    return first_of(among({entry.name: entry for entry in entries}), below(www))
+    own, others = among({entry.name: entry for entry in entries}), below(www)
+    return lambda name: own(name) or others(name)
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -18,11 +21,14 @@ import pytest
 
 from ptmtools.cli.main import main
 from ptmtools.server import opening
+from ptmtools.server.lookup import Lookup
 from ptmtools.server.running import url_of
 from ptmtools.store.manifest import SCHEMA, Manifest, StageRecord
 from ptmtools.viewer.entry import Entry
 from ptmtools.viewer.site import SiteOptions
 from tests.server.conftest import NOISE, PAGE, client_of
+
+TWO_ROOMS = Path(__file__).parents[2] / "sample_data/two_rooms/two_rooms.obj"
 
 
 @pytest.fixture
@@ -241,3 +247,46 @@ def test_a_site_goes_before_the_files_of_its_database(
         assert entry
         assert entry.read() == content
     assert find("manifest.json") is None
+
+
+def test_a_database_that_is_built_again(tmp_path: Path) -> None:
+    """Its page is the new one; no old name stands for new bytes."""
+    made = tmp_path / "two_rooms.db"
+    build = ["-q", "build-scene", str(TWO_ROOMS), "-o", str(made), "-j", "1"]
+    assert main(build) == 0
+    find = opening.files_of(made)
+    before = data_of(find)
+    assert main([*build, "--max-level", "-2"]) == 0
+    kept = {name: entry.read() for name in before if (entry := find(name))}
+    assert kept.items() <= before.items()
+    assert len(kept) < len(before)
+    after = data_of(find)
+    assert textures_in(after).isdisjoint(textures_in(before))
+    shutil.rmtree(made)
+    assert find("index.html") is None
+    assert main(["-q", "cells", str(TWO_ROOMS), "-o", str(made)]) == 0
+    assert find("index.html") is None
+    assert main(build) == 0
+    assert data_of(find) == before
+
+
+def textures_in(data: Mapping[str, bytes]) -> set[str]:
+    return {name for name in data if name.endswith(".ptm")}
+
+
+def data_of(find: Lookup) -> dict[str, bytes]:
+    """Records, geometry and textures, as who opens the page finds them."""
+
+    def read(name: str) -> bytes:
+        entry = find(name)
+        assert entry, name
+        return entry.read()
+
+    told = re.search(
+        rb'<script type="application/json" id="site">(.*?)</script>', read("index.html")
+    )
+    assert told
+    index = json.loads(read(json.loads(told[1])["index"]))
+    names = [cell[key] for cell in index["cells"] for key in ("record", "geometry")]
+    names += [row["file"] for row in index["textures"]]
+    return {f"data/{name}": read(f"data/{name}") for name in names}
