@@ -60,13 +60,13 @@ export class RangeFile {
   }
 
   /**
-   * Lets go of the connection. Of a host that ignores ranges the rest is awaited, so that the file
-   * is not fetched again.
+   * Lets go of the connection. The rest of what was asked for is awaited, so that no byte is fetched
+   * again; that is all of the file where a host ignores ranges.
    * @param {AbortSignal} [signal]
    */
   settle(signal) {
     return this.#inTurn(async () => {
-      if (this.#body?.all && !signal?.aborted) await this.#fill(Infinity, signal);
+      if (this.#body && !signal?.aborted) await this.#fill(this.#body.end, signal);
       else this.#stop();
     });
   }
