@@ -5,9 +5,10 @@
 /** @param {import("../policy/estimate.js").Estimate} estimate */
 export function watchLink(estimate) {
   let id = 0;
-  const observer = new PerformanceObserver((list) => {
-    const found = /** @type {PerformanceResourceTiming[]} */ (list.getEntries());
-    for (const entry of found.sort((a, b) => a.responseEnd - b.responseEnd)) {
+  /** @param {PerformanceEntryList} found */
+  const note = (found) => {
+    const entries = /** @type {PerformanceResourceTiming[]} */ (found);
+    for (const entry of entries.sort((a, b) => a.responseEnd - b.responseEnd)) {
       // Nothing that came out of a cache; and other origins may hide how much there was.
       if (!entry.transferSize || !entry.responseStart) continue;
       const number = id++;
@@ -16,6 +17,8 @@ export function watchLink(estimate) {
       estimate.bytes(entry.responseEnd / 1000, entry.encodedBodySize);
       estimate.finished(number, entry.responseEnd / 1000);
     }
-  });
-  observer.observe({ type: "resource", buffered: true });
+  };
+  // Those before are known at once, for the first request to go by.
+  note(performance.getEntriesByType("resource"));
+  new PerformanceObserver((list) => note(list.getEntries())).observe({ type: "resource" });
 }
