@@ -8,9 +8,8 @@ our own work, wrapped from outside: n, mean, 99th percentile and longest; of cal
 part only the inner one counts. *drawing* is what WebGL's calls that draw or wait for drawing take,
 which here is done by software. *frame, rest* is what a frame takes beside all of these. Then long
 tasks, and kB of the JavaScript heap, after a collection, and of textures and geometry at the end of
-each minute (``--minutes``) or of the walk.
-The heap has the times themselves in it, some 8 bytes each, so it
-grows by those; and on a machine that does other things the longest is what those took.
+each minute (``--minutes``) or of the walk. Of times only histograms are kept, lest the heap grow by
+them. On a machine that does other things the longest is what those took.
 """
 
 from __future__ import annotations
@@ -25,17 +24,26 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks"), str(ROOT / "tests" / "viewer")]
 
-from browser import chromium_program, visiting  # noqa: E402
+import numpy as np  # noqa: E402
+from browser import visiting  # noqa: E402
 from walk_scenes import database_of  # noqa: E402
 
 from ptmtools.viewer.site import SiteOptions, site_of  # noqa: E402
+from tests.e2e.browsers import web  # noqa: E402
 
 WIDTH, HEIGHT = 320, 240
 
 #: Before the page: the clock of nested parts, and the calls of WebGL.
 CLOCK = """
 (() => {
-  const parts = (window.parts = {}), open = [], tasks = (window.longTasks = []);
+  const parts = (window.parts = {}), open = [], tasks = (window.longTasks = { n: 0, longest: 0 });
+  window.took = (name, ms) => {
+    const part = (parts[name] ??= { n: 0, sum: 0, longest: 0, bins: new Array(1001).fill(0) });
+    part.n++;
+    part.sum += ms;
+    part.longest = Math.max(part.longest, ms);
+    part.bins[Math.min(Math.floor(10 * ms), 1000)]++;
+  };
   window.timed = (name, f) => function (...given) {
     open.push(0);
     const begun = performance.now();
@@ -44,7 +52,7 @@ CLOCK = """
     } finally {
       const whole = performance.now() - begun, own = whole - open.pop();
       if (open.length) open[open.length - 1] += whole;
-      (parts[name] ??= []).push(own);
+      took(name, own);
     }
   };
   window.wrap = (object, name, part) => { object[name] = timed(part, object[name]); };
@@ -64,7 +72,10 @@ CLOCK = """
     set(f) { set.call(this, timed("messages of workers", f)); },
   });
   new PerformanceObserver((list) => {
-    for (const { startTime, duration } of list.getEntries()) tasks.push([startTime, duration]);
+    for (const { duration } of list.getEntries()) {
+      tasks.n++;
+      tasks.longest = Math.max(tasks.longest, duration);
+    }
   }).observe({ entryTypes: ["longtask"] });
 })();
 """
@@ -99,9 +110,10 @@ PARTS = """
   fetcher.whole = (...given) =>
     whole.apply(fetcher, given).then((body) => ((since = performance.now()), body));
   client.arrived = (request, ...more) => {
-    const took = performance.now() - since;
     // Not of what was on its way before this.
-    if (since && request.kind !== "texture") (parts[`reading ${request.kind}`] ??= []).push(took);
+    if (since && request.kind !== "texture") {
+      took(`reading ${request.kind}`, performance.now() - since);
+    }
     since = 0;
     return arrived.call(client, request, ...more);
   };
@@ -130,16 +142,19 @@ WALK = """
 """
 
 
-def report(parts: dict[str, list[float]], tasks: list[list[float]]) -> None:
+#: Bins of a millisecond.
+BINS = 10
+
+
+def report(parts: dict[str, dict[str, Any]], tasks: dict[str, float]) -> None:
     """Prints the table of parts."""
     print("| ms | n | mean | 99 % | longest |\n|---|--:|--:|--:|--:|")
-    for name, times in sorted(parts.items(), key=lambda row: -max(row[1])):
-        ranked = sorted(times)
-        late = ranked[min(len(ranked) - 1, int(0.99 * len(ranked)))]
-        mean = sum(times) / len(times)
-        print(f"| {name} | {len(times)} | {mean:.2f} | {late:.1f} | {ranked[-1]:.1f} |")
-    longest = max((duration for _, duration in tasks), default=0)
-    print(f"\nlong tasks: {len(tasks)}, the longest {longest:.0f} ms")
+    for name, part in sorted(parts.items(), key=lambda row: -row[1]["longest"]):
+        upto = np.cumsum(part["bins"])
+        late = min((np.searchsorted(upto, 0.99 * part["n"]) + 1) / BINS, part["longest"])
+        mean = part["sum"] / part["n"]
+        print(f"| {name} | {part['n']} | {mean:.2f} | {late:.1f} | {part['longest']:.1f} |")
+    print(f"\nlong tasks: {tasks['n']}, the longest {tasks['longest']:.0f} ms")
 
 
 def memory(page: Any, session: Any) -> str:
@@ -162,9 +177,7 @@ def main() -> None:
     parser.add_argument("--minutes", type=int, default=0)
     given = parser.parse_args()
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=chromium_program(), args=["--no-sandbox"]
-        )
+        browser = playwright.chromium.launch(executable_path=web.chromium(), args=["--no-sandbox"])
         for database in given.databases:
             entries = site_of(database, SiteOptions(pictures=False)).entries
             with visiting(

@@ -27,7 +27,7 @@ import numpy as np
 from at_hand import ROOT
 
 sys.path[:0] = [str(ROOT), str(ROOT / "tests/viewer")]
-from browser import chromium_program, visiting  # noqa: E402
+from browser import visiting  # noqa: E402
 
 from ptmtools.quantities import parse_bandwidth, parse_duration  # noqa: E402
 from ptmtools.server.throttle import Throttle  # noqa: E402
@@ -43,6 +43,7 @@ from ptmtools.walkthrough.view.records import Pyramids  # noqa: E402
 from ptmtools.walkthrough.view.render import Renderer  # noqa: E402
 from ptmtools.walkthrough.walk import Walk, parse_walk, read_walk  # noqa: E402
 from ptmtools.walkthrough.world import World, prepare  # noqa: E402
+from tests.e2e.browsers import web  # noqa: E402
 
 #: FLIP of a picture that counts as the full one. Lines of it. Poses a second of the walk.
 ENOUGH, LINES, RATE = 0.01, 240, 20
@@ -299,9 +300,7 @@ def main() -> None:
         "in texture memory and as chosen",
     )
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=chromium_program(), args=["--no-sandbox"]
-        )
+        browser = playwright.chromium.launch(executable_path=web.chromium(), args=["--no-sandbox"])
         for database, walk in zip(options.scene[::2], options.scene[1::2], strict=True):
             served = read_served(database)
             scene = served, read_pyramids(served)
