@@ -50,12 +50,12 @@ def publish(voice: Voice, db: str, folder: str, force: bool, as_json: bool, **va
         f"{folder}: {count(len(done.written), 'file')} written, "
         f"{len(done.unchanged):,} unchanged{removed}"
     )
-    voice.say(f"a visitor downloads {size(weight.page)} before anything of the building,")
+    voice.say(f"a visitor downloads {size(weight.page)} for the page itself,")
     voice.say(
-        f"{size(weight.first_room)} until the first room is there, with textures of up to "
-        f"{COARSE} texels,"
+        f"{size(weight.first_room)} in total until the first room is shown (textures of up to "
+        f"{COARSE} texels a side),"
     )
     voice.say(
-        f"{size(weight.mean_room)} for another room on average, {size(weight.worst_room)} at most "
-        f"(cell {weight.worst_cell}), and {size(weight.whole)} at most in all"
+        f"then {size(weight.mean_room)} for another room on average, at most "
+        f"{size(weight.worst_room)} (cell {weight.worst_cell}), and {size(weight.whole)} in all"
     )

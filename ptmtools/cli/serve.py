@@ -24,7 +24,7 @@ _ORIGIN = re.compile(r"\*|https?://[^\s/?#@]+")
 def _origin(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
     if value is not None and not _ORIGIN.fullmatch(value):
         raise click.BadParameter(
-            f"{value!r} is no origin such as https://example.org; DB goes first"
+            f"{value!r} is not an origin such as https://example.org; put DB before --cors"
         )
     return value
 
@@ -47,8 +47,8 @@ def _origin(context: click.Context, parameter: click.Parameter, value: str | Non
 def serve(voice: Voice, db: str, opened: bool, origin: str | None, **values: Any) -> None:
     """Serve DB to browsers on this machine, until Ctrl-C, and print the URL of its page.
 
-    DB is a database, or a folder that `ptm publish` wrote. --bandwidth and --latency make it as
-    slow as a thin link.
+    DB is a database, or a folder that `ptm publish` wrote. --bandwidth and --latency simulate
+    a slow connection.
     """
     options = take(ServeOptions, values)
     require()
@@ -63,14 +63,14 @@ def serve(voice: Voice, db: str, opened: bool, origin: str | None, **values: Any
         ) as url:
             voice.say(url)
             if not voice.quiet and sys.stderr.isatty():
-                click.echo("Ctrl-C ends it", err=True)
+                click.echo("Press Ctrl-C to stop", err=True)
             if not _own(options.host):
                 voice.warn(
-                    f"warning: it listens on {options.host}: whoever reaches this machine there "
+                    f"warning: listening on {options.host}: anyone who can reach this machine there "
                     "can read what is served"
                 )
             if opened and not _shown(url):
-                voice.warn("note: there is no browser to open; open the page yourself")
+                voice.warn("note: no browser could be started; open the page yourself")
             threading.Event().wait()
     except KeyboardInterrupt:
         pass  # which is how one ends it

@@ -47,7 +47,7 @@ DURATION = 150.0
     "seeds",
     type=click.IntRange(0),
     multiple=True,
-    help="Of the walk that is made without --walk; 1 by default. May be given several times.",
+    help="Seed of the walk that is made without --walk; 1 by default. May be given several times.",
 )
 @options_of(SimulateOptions)
 @click.option(

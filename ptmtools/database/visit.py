@@ -2,7 +2,7 @@
 
 All are bytes as they lie on the disk, textures losslessly and whole unless said otherwise.
 
-A *plain browser* opens the VRML root and loads everything that this leads to: all cells, and the
+A *VRML browser* opens the root and loads everything that this leads to: all cells, and the
 fallback image of every texture. A client of the *hints* fetches the index, the record of the cell
 that it is in, and of what that cell sees the geometry and the textures; the geometry in a form
 that has no entry of its own, and so is there for such clients, if one was written. For it **the
@@ -36,7 +36,7 @@ class Visit:
 
     Attributes
     ----------
-    browser: bytes that a plain browser fetches; None without VRML.
+    browser: bytes that a VRML browser fetches; None without VRML.
     first_room: bytes until the first room is complete.
     mean_at_hand, most_at_hand: bytes.
     mean_volume, most_volume: share of the volume of all cells that is at hand.

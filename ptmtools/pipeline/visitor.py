@@ -59,7 +59,7 @@ class Visitor:
             return size(count) + (", heavier than the model" if heavier else "")
 
         if visit["browser"] is not None:
-            lines.append(f"a plain browser fetches {told(visit['browser'])}")
+            lines.append(f"a VRML browser fetches {told(visit['browser'])}")
         lines.append(f"the first room is complete after {told(visit['first_room'])}")
         for what, when in (("mean", "on average"), ("most", "at most")):
             shares = f"{visit[f'{what}_volume']:.1%} of the volume"

@@ -13,12 +13,11 @@ class ServeOptions:
     """
     Attributes
     ----------
-    port: to listen on; 0 is any that is free.
+    port: the port to listen on; 0 picks a free one.
     host: the address to listen on; 0.0.0.0 is all that this machine has, for other machines too.
-    bandwidth: of a link that is imitated, bit/s of all connections together, such as 56k, 4M
-        (powers of ten) or inf.
-    latency: that is imitated, from a request to the first byte of its response, such as 100ms or
-        0.1.
+    bandwidth: limit the bandwidth, bit/s over all connections together, such as 56k, 4M (powers of
+        ten) or inf.
+    latency: delay before the first byte of each response, such as 100ms or 0.1.
 
     Raises InputError: PTM-I711 a link that cannot be; PTM-I712 a word that is no such quantity.
     """

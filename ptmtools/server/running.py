@@ -95,7 +95,7 @@ def running(app: ASGIApp, *, host: str = "127.0.0.1", port: int = 0) -> Iterator
 def require() -> None:
     """Raises `MissingComponentError` PTM-M920 without Starlette or uvicorn."""
     for module in ("starlette", "uvicorn"):
-        component(module, "PTM-M920", f"{module} is missing, which serves the page", "viewer")
+        component(module, "PTM-M920", f"{module} is not installed; `ptm serve` needs it", "viewer")
 
 
 def url_of(listener: socket.socket) -> str:

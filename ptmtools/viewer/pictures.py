@@ -38,7 +38,7 @@ MOST = 32
 FINEST = 256
 #: What is behind everything, 0 to 1, and the light on surfaces without texture: as the page has it.
 _SKY = (0.16, 0.17, 0.19)
-_AMBIENT = 0.4
+_AMBIENT = 0.25
 _LIMITS = Limits(decoded_bytes=1 << 33)
 _THREADS = 4
 _QUALITIES = (80, 72, 64, 56, 48, 40, 32, 24, 16, 8)

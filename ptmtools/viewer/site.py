@@ -58,7 +58,7 @@ class SiteOptions:
 
     Attributes
     ----------
-    title: of the page; by default the name of the database.
+    title: the title of the page; by default the name of the database.
     poster: a picture to show until the building is there, JPEG, PNG or WebP, in place of one that
         is drawn.
     pictures: draw a poster and pictures of the viewpoints.
@@ -178,7 +178,7 @@ class _Making:
             if _NEEDED - row.keys():
                 raise DatabaseError(
                     "PTM-D901",
-                    "is of an earlier release: its hints do not say all that the page goes by",
+                    "was built by an earlier release: its hints lack what the page needs",
                     file=self._folder.path,
                     remedy=f"run {BUILD}",
                 )
@@ -212,7 +212,7 @@ class _Making:
         try:
             yield pictures(self._served)
         except ImportError:
-            self._notes.append("no pictures: embreex is not installed, whose rays draw them")
+            self._notes.append("no poster or thumbnails: embreex, which renders them, is not installed")
         except LimitError:
             raise
         except InputError as fault:

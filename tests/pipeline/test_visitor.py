@@ -35,7 +35,7 @@ VISIT = {
 def test_what_is_heavier_than_the_model_is_said_to_be() -> None:
     assert Visitor(500_000, 1_500_000, VISIT).lines() == [
         "the model as it was: 2.0 MB (500.0 kB, and 1.5 MB of image files)",
-        "a plain browser fetches 4.0 MB, heavier than the model",
+        "a VRML browser fetches 4.0 MB, heavier than the model",
         "the first room is complete after 1.0 MB",
         "at hand on average 25.0% of the volume and 30.0% of the texels: 1.5 MB",
         "at hand at most 50.0% of the volume and 100.0% of the texels: 2.5 MB, heavier than the "
@@ -50,7 +50,7 @@ def test_images_inside_the_model_are_not_counted_apart() -> None:
 @pytest.mark.parametrize(("model", "heavier"), [(3_960_000, False), (3_700_000, True)])
 def test_a_few_percent_are_not_heavier(model: int, heavier: bool) -> None:
     browser = Visitor(model, 0, VISIT).lines()[1]
-    assert browser.startswith("a plain browser fetches 4.0 MB")
+    assert browser.startswith("a VRML browser fetches 4.0 MB")
     assert browser.endswith("heavier than the model") is heavier
 
 

@@ -112,7 +112,7 @@ def test_serves_all_the_same_where_no_browser_opens(folder: Path) -> None:
     with serve(folder, "--open", BROWSER="false %s") as process:
         assert process.stderr
         url = line(process)
-        assert process.stderr.readline().startswith("ptm: note: there is no browser to open")
+        assert process.stderr.readline().startswith("ptm: note: no browser could be started")
         with client_of(url) as ask:
             assert ask("/").status == 200
         assert interrupted(process)[0] == 0
@@ -122,7 +122,7 @@ def test_warns_where_others_can_reach_it(folder: Path) -> None:
     with serve(folder, "--host", "0.0.0.0", "--cors") as process:
         assert process.stderr
         url = line(process)
-        assert "warning: it listens on 0.0.0.0" in process.stderr.readline()
+        assert "warning: listening on 0.0.0.0" in process.stderr.readline()
         with client_of(url) as ask:
             assert ask("/").headers["access-control-allow-origin"] == "*"
         assert interrupted(process)[0] == 0

@@ -227,7 +227,7 @@ export class Walkthrough {
       loaded += Math.min(memory.held[t], wanted);
     }
     const room = loaded < 2 || total === 2;
-    this.emit("progress", { stage: room ? "The room" : "The pictures", loaded, total: room ? 12 : total });
+    this.emit("progress", { stage: room ? "Loading the room" : "Loading textures", loaded, total: room ? 12 : total });
     if ((room || loaded < total) && !this.complete) return;
     this.begun = true;
     this.emit("first-picture", undefined);

@@ -87,9 +87,8 @@ export class Fetcher {
   #tell() {
     if (this.ignoresRanges) return;
     this.ignoresRanges = true;
-    const message = "This host ignores byte ranges: each texture is downloaded whole before it is seen.";
-    console.warn(message);
-    this.notice(message);
+    console.warn("This host ignores byte ranges: each texture is downloaded whole before it is seen.");
+    this.notice("Textures load slowly here: the server does not support range requests.");
   }
 
   /**

@@ -2,15 +2,16 @@
 
 import { find, make } from "./elements.js";
 
+const TELL = "Tell the owner of this site: publishing it again should repair it.";
 /** What to do, by the code of the error. @type {Record<string, string>} */
 const REMEDIES = {
-  "PTM-V101": "Use Chrome, Edge, Firefox or Safari 15, with hardware acceleration switched on.",
-  "PTM-V103": "Whoever put this site up can publish it again.",
-  "PTM-V104": "See whether there is a connection, and load the page again.",
-  "PTM-V106": "Update the browser, or let this page run workers.",
-  "PTM-V105": "Whoever put this site up can publish it again.",
+  "PTM-V101": "Use a current Chrome, Edge or Firefox, or Safari 15 or newer, with hardware acceleration on.",
+  "PTM-V103": TELL,
+  "PTM-V104": "Check your connection and reload the page.",
+  "PTM-V106": "Update the browser, or allow this page to use web workers.",
+  "PTM-V105": TELL,
 };
-const OTHERWISE = "Load the page again. If that does not help, tell whoever put it up.";
+const OTHERWISE = "Reload the page. If that does not help, tell the owner of this site.";
 /** How long a notice stays, ms. */
 const STAYS = 8000;
 

@@ -12,7 +12,7 @@ const HERE = "#ffc766", SEEN = "#7fa8d8", REST = "#ffffff24", WALLS = "#f4f1ea8c
 export function attachMinimap(root, app) {
   const plan = make("canvas", { role: "img" });
   const storey = make("span"), key = make("p", { className: "key" });
-  for (const [name, color] of [["you are here", HERE], ["may be seen", SEEN]]) {
+  for (const [name, color] of [["you are here", HERE], ["visible from here", SEEN]]) {
     key.append(make("span", { style: `--color:${color}` }, name), " ");
   }
   root.append(make("h2", {}, "Map", storey), plan, key);

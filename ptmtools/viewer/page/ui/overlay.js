@@ -10,13 +10,13 @@ const OFTEN = 250;
 
 /** @type {[string, (state: State) => string][]} */
 const ROWS = [
-  ["Frames", ({ fps }) => `${fps.toFixed(0)} a second`],
-  ["As the paper counts", ({ paperBytes }) => inMemory(paperBytes)],
+  ["Frame rate", ({ fps }) => `${fps.toFixed(0)} fps`],
+  ["With 3 bytes for RGB", ({ paperBytes }) => inMemory(paperBytes)],
   ["Received", ({ bytes, requests }) => `${inBytes(bytes)}, ${requests} requests`],
-  ["Link", ({ bandwidth, latency }) =>
+  ["Connection", ({ bandwidth, latency }) =>
     `${(bandwidth / 1e6).toFixed(2)} Mbit/s, ${(1000 * latency).toFixed(0)} ms`],
-  ["Cell", ({ cell, drawnCells }) => `${cell < 0 ? "none" : cell}, ${drawnCells.length} drawn`],
-  ["Still to come", ({ pending, complete }) => (complete ? "nothing for this view" : `${pending}`)],
+  ["Cell", ({ cell, drawnCells }) => `${cell < 0 ? "none" : cell} (${drawnCells.length} drawn)`],
+  ["Pending", ({ pending, complete }) => (complete ? "nothing for this view" : `${pending} requests`)],
 ];
 
 /** @param {HTMLElement} root the panel @param {import("./all.js").App} app */
@@ -28,7 +28,7 @@ export function attachOverlay(root, app) {
   root.append(
     make("h2", {}, "Details"), memory, fill,
     make("dl", {}, ...ROWS.flatMap(([name], k) => [make("dt", {}, name), values[k]])),
-    make("h3", {}, "Textures by their finest level"), bars,
+    make("h3", {}, "Textures by finest level loaded"), bars,
   );
   attachSettings(root, app);
 

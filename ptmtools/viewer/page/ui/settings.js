@@ -30,7 +30,14 @@ export function attachSettings(root, app) {
   saver.onchange = () => app.setDataSaver(saver.checked);
   const policies = POLICIES.map((one) => make("option", { selected: one === policy }, one));
   const choice = make("select", {}, ...policies);
-  choice.onchange = () => app.setPolicy(choice.value);
+  const seconds = (/** @type {number} */ value) => `${value.toPrecision(2)} s`;
+  const waiting = slider("Patience, δt", [0.0625, 4], patience, seconds, app.setPatience);
+  // Only the paper's policy goes by it.
+  waiting.hidden = policy !== "paper";
+  choice.onchange = () => {
+    app.setPolicy(choice.value);
+    waiting.hidden = choice.value !== "paper";
+  };
 
   /** @param {string} name @param {(on: boolean) => void} press */
   const toggle = (name, press) => {
@@ -42,18 +49,17 @@ export function attachSettings(root, app) {
     };
     return button;
   };
-  const freeze = toggle("Freeze", (on) => app.freeze(on));
+  const freeze = toggle("Freeze loading", (on) => app.freeze(on));
   const compare = toggle("Compare", (on) => {
     app.compare(on);
     find(document, "#halves").hidden = !on;
   });
-  const seconds = (/** @type {number} */ value) => `${value.toPrecision(2)} s`;
   root.append(
     make("h3", {}, "Settings"),
     make("label", { className: "switch" }, "Data saver: only what is in view", saver),
-    slider("Texture memory", [4 * MIB, 1024 * MIB], budgetBytes, inMemory, app.setBudget),
-    slider("Patience, δt", [0.0625, 4], patience, seconds, app.setPatience),
+    slider("Texture memory", [4 * MIB, 4096 * MIB], budgetBytes, inMemory, app.setBudget),
     make("label", {}, "Policy", choice),
+    waiting,
     make("p", { className: "row" }, freeze, compare),
   );
 }
