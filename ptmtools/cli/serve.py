@@ -66,8 +66,8 @@ def serve(voice: Voice, db: str, opened: bool, origin: str | None, **values: Any
                 click.echo("Press Ctrl-C to stop", err=True)
             if not _own(options.host):
                 voice.warn(
-                    f"warning: listening on {options.host}: anyone who can reach this machine there "
-                    "can read what is served"
+                    f"warning: listening on {options.host}: anyone who can reach this machine "
+                    "there can read what is served"
                 )
             if opened and not _shown(url):
                 voice.warn("note: no browser could be started; open the page yourself")

@@ -69,7 +69,11 @@ def _answer(files: Lookup, origin: str | None) -> Callable[[Request], Awaitable[
     copies = Copies()
     # The same to all, whoever asks: so no cache can hold the wrong one.
     common = _BOTH | (
-        {"Access-Control-Allow-Origin": origin, "Access-Control-Expose-Headers": _SHOWN}
+        {
+            "Access-Control-Allow-Origin": origin,
+            "Access-Control-Expose-Headers": _SHOWN,
+            "Timing-Allow-Origin": origin,
+        }
         if origin
         else {}
     )
@@ -78,15 +82,19 @@ def _answer(files: Lookup, origin: str | None) -> Callable[[Request], Awaitable[
         if request.method == "OPTIONS":
             return Response(status_code=204, headers=common | _SHARED)
         name = name_of(request.scope["raw_path"])
-        entry = await run_sync(files, name) if name is not None else None
         try:
+            entry = await run_sync(files, name) if name is not None else None
             whole = stored(entry) if entry else None
+        except BlockingIOError as later:
+            headers = common | {"Cache-Control": FRESH, "Retry-After": "2"}
+            return Response(f"{later}\n", 503, headers, "text/plain")
         except OSError:
             whole = None
-        if entry is None or whole is None:
+        if whole is None:
             headers = common | {"Cache-Control": FRESH}
             return Response("not found\n", 404, headers, "text/plain")
         try:
+            assert entry
             return await _response(request, entry, whole, copies, common)
         except BaseException:
             whole.close()

@@ -14,7 +14,7 @@ from urllib.parse import unquote, unquote_to_bytes
 from ptmtools.files import leads_inside
 from ptmtools.viewer.entry import Entry
 
-#: The file of a decoded name, or None.
+#: The file of a decoded name, or None; raises BlockingIOError for what will be there later.
 Lookup = Callable[[str], Entry | None]
 
 INDEX = "index.html"

@@ -32,27 +32,35 @@ def files_of(folder: str | PathLike[str]) -> Lookup:
 
 class _Database:
     """The files of a database, which may be built again meanwhile: the site is made anew for the
-    next who asks for its page. Until then what its old names stood for is gone."""
+    next who asks for its page. Until then what its old names stood for may be other bytes, and is
+    not served."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._lock = Lock()
-        self._built = self._stamp()
-        self._site = self._made()
+        self._making = Lock()
+        # The site, and the state of the database that it is of.
+        built = self._stamp()
+        self._made = self._site(), built
         self._others = below(path / SERVED)
 
     def __call__(self, name: str) -> Entry | None:
-        with self._lock:
-            built = self._stamp()
-            if name == INDEX and built != self._built:
-                try:
-                    self._site, self._built = self._made(), built
-                except PtmError:
-                    return None  # it is being built
-            entry = self._site(name)
-            if entry and built != self._built and isinstance(entry.source, Path):
-                return None
+        if name == INDEX and self._made[1] != self._stamp():
+            self._renew()
+        site, built = self._made
+        entry = site(name)
+        if entry and isinstance(entry.source, Path) and built != self._stamp():
+            raise BlockingIOError(f"{name}: the database has been built again")
         return entry or self._others(name)
+
+    def _renew(self) -> None:
+        with self._making:
+            built = self._stamp()
+            if self._made[1] == built:
+                return
+            try:
+                self._made = self._site(), built
+            except PtmError as fault:
+                raise BlockingIOError(f"the database is being built: {fault}") from None
 
     def _stamp(self) -> tuple[int, int]:
         """Changes whenever a stage is finished."""
@@ -62,7 +70,7 @@ class _Database:
             return 0, 0
         return state.st_mtime_ns, state.st_ino
 
-    def _made(self) -> Lookup:
+    def _site(self) -> Lookup:
         from ptmtools.viewer.site import SiteOptions, site_of
 
         with naming_command(self._path):

@@ -212,7 +212,9 @@ class _Making:
         try:
             yield pictures(self._served)
         except ImportError:
-            self._notes.append("no poster or thumbnails: embreex, which renders them, is not installed")
+            self._notes.append(
+                "no poster or thumbnails: embreex, which renders them, is not installed"
+            )
         except LimitError:
             raise
         except InputError as fault:

@@ -29,7 +29,11 @@ const walker = new Walker({ solids, locate, avatar: [0.25, 1.6, 0.5] });
 walker.place(poseOf(location.hash) ?? poses[0]);
 
 const listeners = {}, calls = [];
-const called = (name) => (...what) => calls.push([name, ...what]);
+// As methods are, which are lost without their object.
+const called = (name) => function (...what) {
+  if (this !== app) throw new TypeError(`${name} of nothing`);
+  calls.push([name, ...what]);
+};
 const canvas = document.querySelector("#view");
 let budget = 64 * 2 ** 20, policy = "best", frames = 0;
 const app = {
@@ -45,8 +49,8 @@ const app = {
     walker.place(typeof place === "number" ? poses[place] : place);
   },
   on: (name, tell) => (listeners[name] ??= []).push(tell),
-  setBudget(bytes) { calls.push(["setBudget", (budget = bytes)]); },
-  setPolicy(name) { calls.push(["setPolicy", (policy = name)]); },
+  setBudget(bytes) { called("setBudget").call(this, (budget = bytes)); },
+  setPolicy(name) { called("setPolicy").call(this, (policy = name)); },
   setPatience: called("setPatience"),
   setDataSaver: called("setDataSaver"),
   freeze: called("freeze"),

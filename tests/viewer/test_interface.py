@@ -332,9 +332,12 @@ def test_errors_and_notices(desk: Any) -> None:
     assert notices.inner_text().count("whole files") == 1
     desk.evaluate("fake.emit('error', {code: 'PTM-V103', message: 'data/c1.glb is not there.'})")
     panel = desk.get_by_role("alertdialog")
-    for text in ("data/c1.glb is not there.", "publish it again", "PTM-V103"):
+    for text in ("data/c1.glb is not there.", "publishing it again", "PTM-V103"):
         assert text in panel.inner_text()
     assert desk.evaluate("document.activeElement.textContent") == "Reload"
+    desk.evaluate("fake.emit('first-picture')")
+    assert not panel.is_visible()
+    assert desk.evaluate("document.activeElement.id") == "view"
 
 
 @pytest.mark.parametrize("motion", ["reduce", "no-preference"])

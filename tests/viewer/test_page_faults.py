@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from ptmtools.server.throttle import Throttle
 from ptmtools.viewer.site import Site
@@ -114,6 +117,57 @@ def test_a_missing_file(visit: Callable[..., Any], museum: Site) -> None:
         assert visitor.page.locator("#error").is_hidden()
     assert code == "PTM-V103"
     assert row["file"] in message
+
+
+def test_no_textures_at_all(visit: Callable[..., Any], museum: Site) -> None:
+    """There is a walk all the same, and a tab that is hidden, or a data saver, can rest."""
+    entries = {name: e for name, e in museum.entries.items() if not name.endswith(".ptm")}
+    with visit(Site(entries, museum.index)) as visitor:
+        visitor.page.evaluate("window.ptm.setDataSaver(true)")
+        visitor.until("window.ptm.walk.begun && s.complete")
+        assert visitor.page.locator("body.begun").count() == 1
+        assert set(visitor.state()["held"]) == {0}
+
+
+@pytest.mark.parametrize("kind", ["record", "geometry"])
+def test_cells_that_are_not_as_they_should_be(
+    visit: Callable[..., Any], museum: Site, kind: str
+) -> None:
+    """Of all cells but the first: they are reported, and the walk is where it was."""
+    first = museum.index["viewpoints"][0]["cell"]
+    entries = dict(museum.entries)
+    for cell, row in enumerate(museum.index["cells"]):
+        name = f"data/{row[kind]}"
+        if cell == first:
+            continue
+        if kind == "record":
+            data = json.dumps({"cell": cell}).encode()
+        else:
+            data = re.sub(rb'"(min|max)":', b'"xxx":', entries[name].read())
+        entries[name] = replace(entries[name], source=data)
+    with visit(Site(entries, museum.index)) as visitor:
+        visitor.until("window.ptm.errors.length > 0 && s.held.some((held) => held > 5)")
+        assert {error["code"] for error in visitor.page.evaluate("window.ptm.errors")} == {
+            "PTM-V105"
+        }
+        assert visitor.page.locator("#error").is_hidden()
+
+
+def test_a_frozen_walk(visit: Callable[..., Any], museum: Site) -> None:
+    """Texture memory stays as it is, whatever becomes of the budget or of the context."""
+    with visit(museum, reduced_motion="reduce") as visitor:
+        held = visitor.complete()["held"]
+        visitor.page.evaluate("window.ptm.freeze(true)")
+        requests = visitor.state()["requests"]
+        visitor.page.evaluate("window.ptm.goTo(1)")
+        visitor.lose_context()
+        visitor.restore_context()
+        visitor.until(f"JSON.stringify(s.held) === '{json.dumps(held, separators=(',', ':'))}'")
+        visitor.page.wait_for_timeout(500)
+        assert visitor.state()["held"] == held
+        assert visitor.state()["requests"] - requests <= 6
+        visitor.page.evaluate("window.ptm.freeze(false)")
+        visitor.complete()
 
 
 def test_a_lost_context(visit: Callable[..., Any], museum: Site) -> None:

@@ -130,7 +130,7 @@ export class App {
 
   /** @param {boolean} on whether texture memory stays as it is */
   freeze(on) {
-    this.walk.frozen = on;
+    this.walk.freeze(on);
   }
 
   /** @param {boolean} on whether the right half shows what every level would */
@@ -180,6 +180,7 @@ export class App {
     const until = clock() + SOLID_TIME, late = () => clock() > until;
     const { walk, solids } = this, { records, shapes } = walk.stream;
     const record = records.get(walk.cell);
+    solids.keep(new Set([...walk.visible, ...(record?.adjacent ?? [])]));
     for (const cell of record ? [walk.cell, ...record.adjacent] : []) {
       const its = records.get(cell), geometry = shapes.get(cell);
       if (!its || !geometry || solids.has(cell)) continue;

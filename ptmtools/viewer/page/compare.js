@@ -3,6 +3,10 @@
 
 import { Renderer } from "./gl/renderer.js";
 import { TextureMemory } from "./gl/texture-memory.js";
+import { room } from "./policy/best.js";
+
+/** A request takes so many seconds of the link, and at least so many bytes, lest the walk wait for it. */
+const RANGE_SECONDS = 0.2, RANGE = 65536;
 
 export class Comparison {
   /** @param {import("./walkthrough.js").Walkthrough} walk */
@@ -16,7 +20,7 @@ export class Comparison {
 
   /** Asks for what the view shows, to the finest level that it can resolve; true once it is there. */
   settle() {
-    const { walk, memory } = this, { client, catalogue, present } = walk;
+    const { walk, memory } = this, { client, catalogue, present, estimate } = walk;
     const { T, K, levels, ends } = catalogue;
     if (!present) return false;
     const want = new Int32Array(T), share = new Float64Array(T);
@@ -27,8 +31,11 @@ export class Comparison {
       while (column > 0 && !(present[t * K + column] > 0)) column--;
       want[t] = Math.min(column, client.have[t]);
       whole &&= want[t] === column && memory.held[t] >= column;
-      if (column > client.have[t] && client.downloads.free("texture", t)) {
-        walk.stream.ask(client.downloads.ask("texture", t, share[t], ends[t * K + column]));
+      const { downloads } = client;
+      if (column > client.have[t] && downloads.free("texture", t) && room(estimate, downloads.waiting)) {
+        const most = downloads.bytes[t] + Math.max(RANGE, RANGE_SECONDS * estimate.bandwidth / 8);
+        const end = Math.min(ends[t * K + column], Math.floor(most));
+        walk.stream.ask(downloads.ask("texture", t, share[t], end));
       }
     }
     memory.settle(want, share);

@@ -20,8 +20,9 @@ async function siteOf(config) {
 /** Decoders, which start while the index is on its way. @param {import("./data/site.js").SiteConfig} config */
 function workersOf(config) {
   const worker = new URL(config.worker, location.href);
+  const wasm = new URL(config.wasm, location.href).href;
   const compiled = async () =>
-    WebAssembly.compile(await (await fetch(config.wasm)).arrayBuffer());
+    WebAssembly.compile(await new Fetcher(() => {}).whole(wasm, (body) => body));
   const create = () => new Worker(worker, { type: "module" });
   return new DecoderWorkers({ wasm: compiled(), create });
 }
@@ -50,6 +51,7 @@ async function main() {
       try {
         app.frame(now - before, controls.wishes());
       } catch (fault) {
+        app.freeze(true);
         end(fault);
         throw fault;
       }

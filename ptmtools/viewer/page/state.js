@@ -31,8 +31,8 @@ export function stateOf(walk) {
 }
 
 /** What is held, as the paper counts. @param {import("./walkthrough.js").Walkthrough} walk */
-function paperBytes({ site, rows, memory }) {
-  return site.index.textures.reduce((sum, { components }, t) => {
+function paperBytes({ index, rows, memory }) {
+  return index.textures.reduce((sum, { components }, t) => {
     const texels = rows[t].sizes.slice(0, memory.held[t]);
     return sum + components * texels.reduce((all, { width, height }) => all + width * height, 0);
   }, 0);

@@ -105,13 +105,18 @@ export class Stream {
   async #cell(kind, request) {
     const { client } = this, cell = request.number, url = this.site.cell(kind, cell);
     if (kind === "record") {
-      const record = await this.fetcher.whole(url, (body) => readRecord(body, cell), request);
-      this.records.set(cell, record);
+      const { cells, textures } = this.site.index;
+      const read = (/** @type {Uint8Array} */ body) =>
+        readRecord(body, cell, cells.length, textures.length);
+      const record = await this.fetcher.whole(url, read, request);
       this.locator.learn(cell, record);
+      this.records.set(cell, record);
       client.arrived(request);
       client.learnRecord(cell, record);
     } else {
-      const shapes = await this.fetcher.whole(url, (body) => readShapes(body, cell), request);
+      const textures = this.site.index.textures.length;
+      const read = (/** @type {Uint8Array<ArrayBuffer>} */ body) => readShapes(body, cell, textures);
+      const shapes = await this.fetcher.whole(url, read, request);
       this.shapes.set(cell, shapes);
       client.arrived(request);
       client.learnGeometry(cell, shapes);
@@ -152,8 +157,16 @@ export class Stream {
         this.#cannotDecode = true;
         throw fault;
       }
+      // Somebody else has found it out.
+      if (levels > this.client.have[texture]) throw fault;
       const { level = 0 } = /** @type {{level?: number}} */ (fault);
       const kept = level > 0 ? file.row.ends[level - 1] : 0;
+      if (fault.code.startsWith("PTM-L")) {
+        this.client.lose(texture, kept, Infinity);
+        const message = `${file.row.file} is not shown with all of its levels: ${fault.message}`;
+        this.report(new PageError("PTM-V106", message), "texture", texture);
+        throw fault;
+      }
       file.cut(kept);
       this.client.lose(texture, kept, this.#suspect.get(texture) === level ? Infinity : 0);
       this.#suspect.set(texture, level);
@@ -167,20 +180,32 @@ export class Stream {
 /**
  * @param {Uint8Array} body
  * @param {number} cell
+ * @param {number} cells that there are
+ * @param {number} textures
  * @returns {CellRecord}
  */
-function readRecord(body, cell) {
+function readRecord(body, cell, cells, textures) {
   const record = JSON.parse(new TextDecoder().decode(body));
   if (record.cell !== cell) throw new Error("is of another cell");
+  /** @param {unknown} list @param {number} count */
+  const names = (list, count) =>
+    Array.isArray(list) && list.every((n) => Number.isInteger(n) && n >= 0 && n < count);
+  const { visible, adjacent, ach, leaves, portals } = record;
+  const whole = names(visible, cells) && names(adjacent, cells) && ach?.length === visible.length
+    && Array.isArray(leaves) && Array.isArray(portals)
+    && portals.every(({ neighbour }) => names([neighbour], cells))
+    && Array.isArray(record.textures) && record.textures.every((/** @type {unknown} */ list) => names(list, textures));
+  if (!whole) throw new Error("is not as it should be");
   return record;
 }
 
 /**
  * @param {Uint8Array<ArrayBuffer>} body
  * @param {number} cell
+ * @param {number} textures that there are
  */
-function readShapes(body, cell) {
-  const read = readGlb(body.buffer);
+function readShapes(body, cell, textures) {
+  const read = readGlb(body.buffer, textures);
   if (read.cell !== cell) throw new Error("is of another cell");
   return read.shapes;
 }

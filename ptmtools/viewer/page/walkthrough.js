@@ -2,7 +2,7 @@
 // asked for next (docs/client.md).
 
 import { Comparison } from "./compare.js";
-import { levelsOf } from "./data/site.js";
+import { fitting, levelsOf } from "./data/site.js";
 import { cameraOf } from "./gl/camera.js";
 import { ItemBuffer } from "./gl/item-buffer.js";
 import { Renderer } from "./gl/renderer.js";
@@ -77,7 +77,8 @@ export class Walkthrough {
    * @param {import("./app.js").App["emit"]} emit
    */
   constructor(canvas, gl, site, options, emit) {
-    const { index } = site;
+    const index = fitting(site.index, gl.getParameter(gl.MAX_TEXTURE_SIZE));
+    this.index = index;
     this.canvas = canvas;
     this.gl = gl;
     this.site = site;
@@ -88,8 +89,8 @@ export class Walkthrough {
     this.reserve = new Reserve(this.catalogue);
     this.sharpness = new Sharpness(canvas);
     this.estimate = new Estimate();
-    watchLink(this.estimate);
     this.fetcher = new Fetcher((message) => emit("notice", { message }));
+    watchLink(this.estimate, this.fetcher);
     this.locator = new Locator(this.catalogue);
     this.client = new Client(this.catalogue, {
       budget: options.budget,
@@ -121,6 +122,7 @@ export class Walkthrough {
     });
     canvas.addEventListener("webglcontextrestored", () => {
       this.#make();
+      this.memory.resume();
       if (this.comparison) this.comparison = new Comparison(this);
     });
   }
@@ -214,15 +216,16 @@ export class Walkthrough {
 
   /** Whether nothing more is asked for: what is on the screen may be enough. */
   get #rests() {
-    return this.frozen || ((this.saving || document.hidden) && this.client.missing() === 0);
+    return this.frozen || ((this.saving || document.hidden) && this.client.missing(true) === 0);
   }
 
   /** Tells how far the first picture is: the room, then the coarse levels of what is seen of it. */
   #begin() {
-    const { catalogue: { T, K, levels }, memory, present, stream } = this;
+    const { catalogue: { T, K, levels }, client, memory, present, stream } = this;
     let loaded = +stream.records.has(this.cell) + +stream.shapes.has(this.cell), total = 2;
     for (let t = 0; t < T; t++) {
-      const wanted = present && present[t * K + 1] > 0 ? Math.min(FIRST_LEVELS, levels[t]) : 0;
+      const seen = present && present[t * K + 1] > 0 && !client.downloads.rests("texture", t);
+      const wanted = seen ? Math.min(FIRST_LEVELS, levels[t]) : 0;
       total += wanted;
       loaded += Math.min(memory.held[t], wanted);
     }
@@ -253,8 +256,15 @@ export class Walkthrough {
     this.#frames = [...this.#frames.filter((at) => at > now - 1), now];
   }
 
+  /** @param {boolean} on whether texture memory stays as it is, and nothing is asked for */
+  freeze(on) {
+    this.frozen = on;
+    if (on) this.memory.hold();
+  }
+
   /** @param {boolean} on whether the right half shows what every level would */
   compare(on) {
+    if (this.gl.isContextLost()) return;
     this.comparison?.delete();
     this.comparison = on ? new Comparison(this) : null;
     this.touch();
@@ -330,7 +340,7 @@ export class Walkthrough {
   #drawItems(camera, now) {
     if (!this.items || this.items.busy) return;
     this.#itemDrawn = now;
-    const { cells, textures } = this.site.index;
+    const { cells, textures } = this.index;
     this.items.draw({
       camera,
       aspect: this.aspect,
@@ -364,10 +374,9 @@ export class Walkthrough {
     if (comparison) comparison.settle();
     if (this.frozen) return;
     reserve.enter(this.cell, this.budget);
-    do {
-      client.budget = this.budget - reserve.bytes;
-      client.look({ now, cell: this.cell, frustum, still });
-    } while (reserve.grow(client.column));
+    client.budget = this.budget - reserve.bytes;
+    client.look({ now, cell: this.cell, frustum, still });
+    while (reserve.grow(client.column) && client.fit(this.budget - reserve.bytes));
     memory.budget = this.budget;
     memory.settle(client.column, this.#priority());
   }

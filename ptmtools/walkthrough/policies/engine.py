@@ -85,6 +85,8 @@ class EngineClient(Client):
         self._items, self._looked = Items(self), -math.inf
         #: With what is there twice while it grows.
         self._all = budget
+        # Of a browser: what is kept free, and the cell in which it began.
+        self._reserve, self._since = 0, -1
         self.frustum = world.frustum(0)
 
     # What policies look at.
@@ -144,8 +146,10 @@ class EngineClient(Client):
 
     def settle(self) -> None:
         """See `Client.settle`."""
-        if self.world.browser:
-            self.budget = self._all - self._reserve()
+        here = int(self.world.cell[self.frame])
+        if here != self._since:
+            self._reserve, self._since = 0, here
+        self.budget = self._all - self._reserve
         self._weigh()
         if self._worth is None:
             return
@@ -157,6 +161,9 @@ class EngineClient(Client):
         stock = self.world.catalogue
         worth = hold + HELD_ON * self._kept + HELD_ON**2 * stock.differences
         allocate(worth, stock.memory, self.have, self.budget, self.column, exact)
+        while self.world.browser and self._grow():
+            self.budget = self._all - self._reserve
+            allocate(worth, stock.memory, self.have, self.budget, self.column, exact)
 
     def arrived(self, request: Request) -> None:
         """See `Client.arrived`."""
@@ -167,11 +174,16 @@ class EngineClient(Client):
             self._items.note()
             self._weigh()
 
-    def _reserve(self) -> int:
-        """Bytes of what is there twice while it grows: at most the greatest texture, less its
-        finest level."""
+    def _grow(self) -> bool:
+        """Whether more must be kept free for what is there twice while it grows: the greatest
+        texture less its finest level, at most half. From now on it is, for as long as the client
+        is in the cell, lest a level go in and out."""
         column, memory = self.column, self.world.catalogue.memory
-        return int(memory[np.arange(len(column)), np.maximum(column - 1, 0)].max(initial=0))
+        need = int(memory[np.arange(len(column)), np.maximum(column - 1, 0)].max(initial=0))
+        more = min(need, self._all // 2)
+        grown = more > self._reserve
+        self._reserve = max(more, self._reserve)
+        return grown
 
     def _weigh(self) -> None:
         if self.cell >= 0 and (self.files[Kind.STATISTICS].whole[0] or not self._statistics):

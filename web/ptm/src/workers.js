@@ -214,12 +214,15 @@ export class DecoderWorkers {
   }
 
   /**
-   * A decoder of a file, in the worker that has the fewest.
+   * A decoder of a file, in the worker that has the fewest, of those that have not failed.
    * @param {Header} header
    * @param {DecoderOptions} [options]
    */
   decoder(header, options = {}) {
-    const lane = this.lanes.reduce((one, other) => (other.decoders < one.decoders ? other : one));
+    const able = this.lanes.filter(({ failure }) => !failure);
+    const lane = (able.length ? able : this.lanes).reduce(
+      (one, other) => (other.decoders < one.decoders ? other : one),
+    );
     lane.decoders++;
     const number = this.#decoders++;
     lane.tell({ decoder: number, header, options });

@@ -27,9 +27,10 @@ const ITEMS = { SCALAR: 1, VEC2: 2, VEC3: 3 };
 /**
  * The cell that a GLB is of, and its shapes; throws what is damaged.
  * @param {ArrayBuffer} buffer
+ * @param {number} [textures] that there are
  * @returns {{cell: number, shapes: Shape[]}}
  */
-export function readGlb(buffer) {
+export function readGlb(buffer, textures = Infinity) {
   const view = new DataView(buffer);
   if (buffer.byteLength < 20 || view.getUint32(0, true) !== GLTF) throw new Error("is not a GLB");
   if (view.getUint32(8, true) !== buffer.byteLength) throw new Error("is cut short");
@@ -60,11 +61,19 @@ export function readGlb(buffer) {
       const textured = texture >= 0 && attributes.TEXCOORD_0 !== undefined;
       const index = /** @type {Uint16Array | Uint32Array} */ (accessor(indices));
       const positions = /** @type {Float32Array} */ (accessor(attributes.POSITION));
-      for (const n of index) if (3 * n >= positions.length) throw new Error("has a wrong index");
+      const uvs = textured ? /** @type {Float32Array} */ (accessor(attributes.TEXCOORD_0)) : null;
+      if (texture >= textures) throw new Error("has a texture that the index has not");
+      if (![min, max].every((corner) => corner?.length === 3 && corner.every(Number.isFinite))) {
+        throw new Error("does not say how large it is");
+      }
+      if (uvs && 3 * uvs.length !== 2 * positions.length) throw new Error("has too few coordinates");
+      let greatest = -1;
+      for (let k = 0; k < index.length; k++) if (index[k] > greatest) greatest = index[k];
+      if (3 * greatest >= positions.length) throw new Error("has a wrong index");
       shapes.push({
         name: node.name ?? "",
         positions,
-        uvs: textured ? /** @type {Float32Array} */ (accessor(attributes.TEXCOORD_0)) : null,
+        uvs,
         indices: index,
         texture: textured ? texture : -1,
         clampU: wrapS === CLAMP,

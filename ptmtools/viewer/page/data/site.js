@@ -102,6 +102,25 @@ export class Site {
 }
 
 /**
+ * An index without the levels that a GPU cannot hold.
+ * @param {Index} index
+ * @param {number} side texels at most
+ * @returns {Index}
+ */
+export function fitting(index, side) {
+  const textures = index.textures.map((row) => {
+    let beyond = 0;
+    while (Math.max(row.width, row.height) >> beyond > side) beyond++;
+    const kept = row.ends.length - beyond;
+    return beyond === 0 ? row : {
+      ...row, width: row.width >> beyond, height: row.height >> beyond,
+      ends: row.ends.slice(0, kept), differences: row.differences.slice(0, kept),
+    };
+  });
+  return { ...index, textures };
+}
+
+/**
  * The sizes of a texture's levels, coarsest first, and the bytes of a texel on the GPU.
  * @param {TextureRow} row
  */

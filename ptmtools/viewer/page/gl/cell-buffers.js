@@ -26,22 +26,27 @@ export class CellBuffers {
     for (const shape of shapes) {
       const { texture, clampU, clampV, factor, blends, twoSided } = shape;
       const key = [texture, clampU, clampV, factor, blends, twoSided].join();
-      groups.set(key, [...(groups.get(key) ?? []), shape]);
+      const group = groups.get(key);
+      if (group) group.push(shape);
+      else groups.set(key, [shape]);
     }
     const vertices = shapes.reduce((sum, { positions }) => sum + positions.length / 3, 0);
     const count = shapes.reduce((sum, { indices }) => sum + indices.length, 0);
     const data = new Float32Array(5 * vertices);
-    const index = vertices > 65536 ? new Uint32Array(count) : new Uint16Array(count);
+    // 65535 begins another strip.
+    const index = vertices > 65535 ? new Uint32Array(count) : new Uint16Array(count);
     /** @type {Batch[]} */
     this.batches = [];
     let vertex = 0, at = 0;
     for (const group of groups.values()) {
       const first = at;
       for (const { positions, uvs, indices } of group) {
-        for (const k of indices) index[at++] = vertex + k;
+        for (let k = 0; k < indices.length; k++) index[at++] = vertex + indices[k];
         for (let k = 0; k < positions.length / 3; k++, vertex++) {
-          data.set(positions.subarray(3 * k, 3 * k + 3), 5 * vertex);
-          if (uvs) data.set(uvs.subarray(2 * k, 2 * k + 2), 5 * vertex + 3);
+          for (let n = 0; n < 3; n++) data[5 * vertex + n] = positions[3 * k + n];
+          if (!uvs) continue;
+          data[5 * vertex + 3] = uvs[2 * k];
+          data[5 * vertex + 4] = uvs[2 * k + 1];
         }
       }
       const factor = group[0].factor;

@@ -3,10 +3,11 @@
 
 /** Screens finer than this are drawn at so many pixels for one of CSS. */
 const MOST = 2;
-/** Shares of the full number of lines, and seconds a frame beyond which the next is taken. */
-const SHARES = [1, 0.7, 0.5], SLOW = 0.045;
-/** Frames whose mean is judged. */
-const FRAMES = 6;
+/** Shares of the full number of lines. */
+const SHARES = [1, 0.7, 0.5];
+/** Seconds a frame beyond which the next share is taken, and below which the one before, for the next
+ * movement; and frames whose median is judged. */
+const SLOW = 0.045, FAST = 0.018, FRAMES = 6;
 
 export class Sharpness {
   #step = 0;
@@ -36,12 +37,17 @@ export class Sharpness {
    */
   settle(seconds, moving) {
     const { canvas } = this;
-    this.#times = moving ? [...this.#times, seconds].slice(-FRAMES) : [];
-    const mean = this.#times.reduce((sum, time) => sum + time, 0) / FRAMES;
-    if (this.#times.length === FRAMES && mean > SLOW && this.#step < SHARES.length - 1) {
-      this.#step++;
-      this.#times = [];
+    if (moving) this.#times = [...this.#times, seconds].slice(-FRAMES);
+    if (this.#times.length === FRAMES) {
+      const median = [...this.#times].sort((a, b) => a - b)[FRAMES / 2];
+      if (moving && median > SLOW && this.#step < SHARES.length - 1) {
+        this.#step++;
+        this.#times = [];
+      } else if (!moving && median < FAST && this.#step > 0) {
+        this.#step--;
+      }
     }
+    if (!moving) this.#times = [];
     const [width, height] = this.#size(moving ? SHARES[this.#step] : 1);
     if (canvas.width === width && canvas.height === height) return false;
     Object.assign(canvas, { width, height });

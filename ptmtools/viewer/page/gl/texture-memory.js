@@ -86,11 +86,24 @@ export class TextureMemory {
     this.#priority = priority;
     for (let t = 0; t < want.length; t++) if (want[t] === 0 && this.held[t]) this.#clear(t);
     // The budget became less: there may be no room to shrink in.
-    while (this.bytes > this.budget) {
-      const worst = this.#best((t) => this.held[t] > want[t], (t) => -priority[t]);
-      if (worst < 0) break;
-      this.#clear(worst);
+    const shrinking = [...want.keys()].filter((t) => this.held[t] > want[t]);
+    shrinking.sort((a, b) => priority[a] - priority[b]);
+    const moving = [...this.#underWay.values()].some(({ storage }) => storage);
+    const least = Math.min(...shrinking.map((t) => this.#size(t, want[t])));
+    for (const t of shrinking) {
+      if (this.bytes <= this.budget && (moving || this.bytes + least <= this.budget)) break;
+      this.#clear(t);
     }
+    this.#next();
+  }
+
+  /** What is there stays, and comes back if it is lost; nothing else does. */
+  hold() {
+    this.#want = Int32Array.from(this.held);
+  }
+
+  /** What was wanted before the context was lost comes back. */
+  resume() {
     this.#next();
   }
 
@@ -112,9 +125,11 @@ export class TextureMemory {
     const { held } = this, want = this.#want, priority = this.#priority;
     for (;;) {
       const under = [...this.#underWay.values()];
-      if (under.length >= UNDER_WAY || under.filter(({ images }) => !images).length >= DECODING) return;
+      if (under.filter(({ images }) => !images).length >= DECODING) return;
+      // What shrinks makes room for those that wait.
+      const all = under.length < UNDER_WAY;
       const next = this.#best(
-        (t) => want[t] > 0 && want[t] !== held[t] && !this.#underWay.has(t),
+        (t) => want[t] > 0 && (want[t] < held[t] || (all && want[t] > held[t])) && !this.#underWay.has(t),
         (t) => priority[t] + +(want[t] < held[t]),
       );
       if (next < 0) return;

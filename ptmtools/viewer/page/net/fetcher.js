@@ -27,6 +27,9 @@ export class Fetcher {
   /** @param {(message: string) => void} notice told once that the host ignores ranges */
   constructor(notice) {
     this.notice = notice;
+    /** Told of each answer: when, s, it was asked for, began and ended, and how many bytes it had.
+     * @type {((asked: number, began: number, ended: number, bytes: number) => void) | null} */
+    this.measured = null;
     this.requests = 0;
     this.bytes = 0;
     this.pending = 0;
@@ -43,7 +46,7 @@ export class Fetcher {
    * @returns {Promise<T>}
    */
   whole(url, read, progress) {
-    return this.#persist(url, "default", async (cache) => {
+    return this.#persist(url, "default", progress, async (cache) => {
       const { response, body } = await this.#get(url, { cache }, progress);
       if (response.status !== 200) throw refused(url, response.status);
       try {
@@ -67,7 +70,7 @@ export class Fetcher {
    */
   range(url, begin, end, size, progress, cache = "default") {
     const range = `bytes=${begin}-${end - 1}`;
-    return this.#persist(url, cache, async (cache) => {
+    return this.#persist(url, cache, progress, async (cache) => {
       const { response, body } = await this.#get(url, { cache, headers: { range } }, progress);
       if (response.status === 200) {
         if (body.length !== size) throw new Passing(`${body.length} of ${size} bytes`, true);
@@ -95,13 +98,20 @@ export class Fetcher {
    * @template T
    * @param {string} url
    * @param {RequestCache} cache
+   * @param {{left: number} | undefined} progress
    * @param {(cache: RequestCache) => Promise<T>} ask
    * @returns {Promise<T>}
    */
-  async #persist(url, cache, ask) {
+  async #persist(url, cache, progress, ask) {
+    const left = progress?.left ?? 0;
     let reason = "";
     for (let tried = 0; tried < TRIES; tried++) {
-      if (tried) await wait(FIRST_WAIT * 2 ** (tried - 1));
+      if (tried) {
+        // Nothing is on the way meanwhile.
+        if (progress) progress.left = 0;
+        await wait(FIRST_WAIT * 2 ** (tried - 1));
+      }
+      if (progress) progress.left = left;
       this.pending++;
       try {
         return await ask(cache);
@@ -127,13 +137,19 @@ export class Fetcher {
     const late = new Passing(`nothing came for ${PATIENCE} s`);
     let timer = setTimeout(() => giveUp.abort(late), 1000 * PATIENCE);
     try {
+      const asked = clock();
       const response = await fetch(url, { ...options, signal: giveUp.signal });
+      const began = clock();
       const reader = response.body?.getReader();
       /** @type {Uint8Array[]} */
       const parts = [];
       for (;;) {
         const { done, value } = (await reader?.read()) ?? { done: true, value: undefined };
-        if (done || !value) return { response, body: joined(parts) };
+        if (done || !value) {
+          const body = joined(parts);
+          this.measured?.(asked, began, clock(), body.length);
+          return { response, body };
+        }
         clearTimeout(timer);
         timer = setTimeout(() => giveUp.abort(late), 1000 * PATIENCE);
         parts.push(value);
@@ -175,7 +191,12 @@ function nameOf(url) {
 /** Waits, or until there is a connection again. @param {number} seconds */
 function wait(seconds) {
   return new Promise((resolve) => {
-    setTimeout(resolve, 1000 * seconds);
-    addEventListener("online", resolve, { once: true });
+    const done = () => {
+      clearTimeout(timer);
+      removeEventListener("online", done);
+      resolve(undefined);
+    };
+    const timer = setTimeout(done, 1000 * seconds);
+    addEventListener("online", done);
   });
 }

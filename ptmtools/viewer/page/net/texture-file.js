@@ -1,6 +1,7 @@
 // The beginning of a `.ptm` that is here, and its levels, decoded in a worker.
 
 import { PtmError, readHeader } from "../../decoder/src/index.js";
+import { levelsOf } from "../data/site.js";
 
 /** @typedef {import("../../decoder/src/level-decoder.js").Image} Image */
 /** @typedef {import("../../decoder/src/workers.js").DecoderWorkers} DecoderWorkers */
@@ -56,9 +57,11 @@ export class TextureFile {
     let decoder = null;
     try {
       const header = readHeader(this.#bytes.subarray(0, this.length));
-      if (header.levels.some(({ offset, length }, n) => offset + length !== ends[n])) {
-        throw new PtmError("PTM-I105", "another file than the index says");
-      }
+      const { sizes } = levelsOf(this.row);
+      const other = header.levels.length !== ends.length || header.components !== components
+        || header.levels.some(({ offset, length, width, height }, n) => offset + length !== ends[n]
+          || width !== sizes[n].width || height !== sizes[n].height);
+      if (other) throw new PtmError("PTM-I105", "another file than the index says");
       decoder = this.workers.decoder(header, { format: components < 3 ? "native" : "rgba" });
       const groups = header.levels.slice(0, levels);
       return await decoder.refineAll(

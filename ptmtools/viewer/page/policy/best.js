@@ -83,14 +83,19 @@ export class Best {
   }
 
   look() {
-    const { catalogue, cell, have, budget, column, downloads } = this.#client;
+    const { cell, downloads } = this.#client;
     if (cell < 0) return;
     this.#weigh();
     const fading = 0.5 ** ((downloads.now - this.#looked) / HELD_SECONDS);
     this.#looked = downloads.now;
     const kept = this.#kept, hold = this.#hold;
     for (let i = 0; i < kept.length; i++) kept[i] = Math.max(kept[i] * fading, hold[i]);
-    allocate(this.#holding(), catalogue.memory, have, budget, column);
+    this.fit();
+  }
+
+  fit() {
+    const { catalogue, cell, have, budget, column } = this.#client;
+    if (cell >= 0) allocate(this.#holding(), catalogue.memory, have, budget, column);
   }
 
   /** (T × K) what each column is worth in texture memory. */
@@ -114,23 +119,24 @@ export class Best {
     allocate(this.#fetch, memory, levels, budget, this.target);
   }
 
-  missing() {
+  /** @param {(kind: import("./downloads.js").Kind, number: number) => boolean} counts */
+  missing(counts) {
     const { catalogue, sight, cell, here, frustum, have, known, hidden, downloads, budget } =
       this.#client;
     const { T, K, memory, levels, low, high } = catalogue;
     let count = 0;
-    if (!downloads.there("record", here)) count++;
+    if (!downloads.there("record", here) && counts("record", here)) count++;
     if (cell < 0 || !frustum) return count;
     this.#weigh();
     for (const c of known[cell]?.visible ?? []) {
       const seen = c === here || hidden[c] > 0 || meetsBox(frustum, low, high, 3 * c);
-      if (seen && !downloads.there("geometry", c)) count++;
+      if (seen && !downloads.there("geometry", c) && counts("geometry", c)) count++;
     }
     allocate(this.#holding(), memory, levels, budget, this.#wanted);
     for (let t = 0; t < T; t++) {
       let k = have[t] + 1;
       while (k <= this.#wanted[t] && !(sight[t * K + k] > 0)) k++;
-      if (k <= this.#wanted[t]) count++;
+      if (k <= this.#wanted[t] && counts("texture", t)) count++;
     }
     return count;
   }

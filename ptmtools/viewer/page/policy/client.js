@@ -5,6 +5,7 @@ import { Downloads } from "./downloads.js";
 import { knownOf, shapesOf } from "./knowledge.js";
 
 /** @typedef {import("./catalogue.js").Catalogue} Catalogue */
+/** @typedef {import("./downloads.js").Kind} Kind */
 /** @typedef {import("./downloads.js").Request} Request */
 /** @typedef {import("./estimate.js").Belief} Belief */
 /** @typedef {import("./knowledge.js").Known} Known */
@@ -20,7 +21,9 @@ import { knownOf, shapesOf } from "./knowledge.js";
  * @property {() => void} look the walker is somewhere: sets `client.column`
  * @property {() => void} learned there is a record, geometry or item buffer that was not there
  * @property {(estimate: Belief) => Request | null} next
- * @property {() => number} missing
+ * @property {(counts: (kind: Kind, number: number) => boolean) => number} missing how much of what
+ *   counts is not there
+ * @property {() => void} [fit] chooses `client.column` once more at the same look, for another budget
  */
 
 /**
@@ -138,9 +141,25 @@ export class Client {
     this.#policy.look();
   }
 
-  /** How much that this view could use, and that fits into the budget, is not there yet. */
-  missing() {
-    return this.#policy.missing();
+  /**
+   * Another budget at the same look; false from a policy that comes to it by and by.
+   * @param {number} bytes
+   */
+  fit(bytes) {
+    this.budget = bytes;
+    if (!this.#policy.fit) return false;
+    this.#policy.fit();
+    return true;
+  }
+
+  /**
+   * How much that this view could use, and that fits into the budget, is not there yet.
+   * @param {boolean} [free] whether to leave out what was asked for, or cannot be now
+   */
+  missing(free = false) {
+    const { downloads } = this;
+    return this.#policy.missing((kind, number) =>
+      free ? downloads.free(kind, number) : !downloads.gone(kind, number));
   }
 
   /**

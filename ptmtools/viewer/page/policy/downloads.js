@@ -53,6 +53,16 @@ export class Downloads {
     return this.#state[kind][number] === ABSENT && this.#rests[kind][number] <= this.now;
   }
 
+  /** Whether a request for it has failed, and it is not to be asked for now. @param {Kind} kind @param {number} number */
+  rests(kind, number) {
+    return this.#rests[kind][number] > this.now;
+  }
+
+  /** Whether it cannot be had: nothing is missing that does not exist. @param {Kind} kind @param {number} number */
+  gone(kind, number) {
+    return this.#rests[kind][number] === Infinity;
+  }
+
   /** Whether all of a record or of geometry is there. @param {Kind} kind @param {number} number */
   there(kind, number) {
     return this.#state[kind][number] === THERE;

@@ -80,14 +80,15 @@ export class Paper {
     return !!frustum && meetsBox(frustum, catalogue.low, catalogue.high, 3 * c);
   }
 
-  missing() {
+  /** @param {(kind: Kind, number: number) => boolean} counts */
+  missing(counts) {
     const { cell, here, known, downloads } = this.#client;
-    let count = downloads.there("record", here) ? 0 : 1;
+    let count = downloads.there("record", here) || !counts("record", here) ? 0 : 1;
     for (const c of known[cell]?.visible ?? []) {
       const seen = c === cell || this.#boxed(c);
-      if (seen && !downloads.there("geometry", c)) count++;
+      if (seen && !downloads.there("geometry", c) && counts("geometry", c)) count++;
     }
-    return count + this.#asks.length;
+    return count + this.#asks.filter((t) => counts("texture", t)).length;
   }
 
   /** @param {Belief} estimate */

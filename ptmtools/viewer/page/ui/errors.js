@@ -34,8 +34,11 @@ export function showError(root, { code, message }) {
 
 /** The walk has begun after all. @param {Document} root */
 function hideError(root) {
-  find(root, "#error").hidden = true;
+  const panel = find(root, "#error");
+  if (panel.hidden) return;
+  panel.hidden = true;
   for (const name of BEHIND) find(root, name).inert = false;
+  find(root, "#view").focus();
 }
 
 /** Says something in passing. @param {Document} root @param {...(string | Node)} message */

@@ -31,7 +31,7 @@ export function attachSettings(root, app) {
   const policies = POLICIES.map((one) => make("option", { selected: one === policy }, one));
   const choice = make("select", {}, ...policies);
   const seconds = (/** @type {number} */ value) => `${value.toPrecision(2)} s`;
-  const waiting = slider("Patience, δt", [0.0625, 4], patience, seconds, app.setPatience);
+  const waiting = slider("Patience, δt", [0.0625, 4], patience, seconds, (s) => app.setPatience(s));
   // Only the paper's policy goes by it.
   waiting.hidden = policy !== "paper";
   choice.onchange = () => {
@@ -57,7 +57,7 @@ export function attachSettings(root, app) {
   root.append(
     make("h3", {}, "Settings"),
     make("label", { className: "switch" }, "Data saver: only what is in view", saver),
-    slider("Texture memory", [4 * MIB, 4096 * MIB], budgetBytes, inMemory, app.setBudget),
+    slider("Texture memory", [4 * MIB, 4096 * MIB], budgetBytes, inMemory, (bytes) => app.setBudget(bytes)),
     make("label", {}, "Policy", choice),
     waiting,
     make("p", { className: "row" }, freeze, compare),

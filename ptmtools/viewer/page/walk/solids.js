@@ -17,7 +17,7 @@ const DEEP = 0.25, WIDER = 0.1;
 const INSIDE = 0.03;
 const FEW = 4;
 /** Triangles that are looked at without a pause. */
-const AT_ONCE = 64;
+const AT_ONCE = 64, MANY = 1 << 14;
 
 /**
  * How far a point is inside a polygon (negative: outside), if it is near enough to its plane for a
@@ -92,7 +92,8 @@ class Tree {
         if (this.kinds[count] > 0) count++;
       }
     }
-    this.order = Uint32Array.from({ length: count }, (_, k) => k);
+    this.order = new Uint32Array(count);
+    for (let k = 0; k < count; k++) this.order[k] = k;
     this.boxes = new Float32Array(12 * count + 6);
     this.next = new Uint32Array(2 * count + 1);
     this.ranges = new Uint32Array(4 * count + 2);
@@ -105,7 +106,7 @@ class Tree {
         continue;
       }
       yield;
-      const node = this.count, split = this.#node(begin, end);
+      const node = this.count, split = yield* this.#node(begin, end);
       left.push({ begin, end, over: node });
       if (split < end) left.push({ begin: split, end, over: -1 }, { begin, end: split, over: -1 });
     }
@@ -114,11 +115,13 @@ class Tree {
   /**
    * Makes a node of triangles, and where they fall into two; `end`, if they do not.
    * @param {number} begin @param {number} end
+   * @returns {Generator<void, number, void>}
    */
-  #node(begin, end) {
+  *#node(begin, end) {
     const { corners, order } = this, node = this.count++;
     const box = this.boxes.subarray(6 * node, 6 * node + 6).fill(Infinity, 0, 3).fill(-Infinity, 3);
     for (let k = begin; k < end; k++) {
+      if ((k - begin) % MANY === MANY - 1) yield;
       for (let n = 0; n < 9; n++) {
         const value = corners[9 * order[k] + n], axis = n % 3;
         if (value < box[axis]) box[axis] = value;
@@ -134,6 +137,7 @@ class Tree {
     const axis = sizes.indexOf(Math.max(...sizes)), middle = 1.5 * (box[axis] + box[3 + axis]);
     let split = begin;
     for (let k = begin; k < end; k++) {
+      if ((k - begin) % MANY === MANY - 1) yield;
       const one = order[k], at = 9 * one + axis;
       if (corners[at] + corners[at + 3] + corners[at + 6] >= middle) continue;
       order[k] = order[split];
@@ -178,10 +182,11 @@ export class Solids {
     return true;
   }
 
-  /** @param {number} cell */
-  remove(cell) {
-    this.#trees.delete(cell);
-    this.#growing.delete(cell);
+  /** Forgets all but some. @param {Set<number>} cells */
+  keep(cells) {
+    for (const trees of [this.#trees, this.#growing]) {
+      for (const cell of trees.keys()) if (!cells.has(cell)) trees.delete(cell);
+    }
   }
 
   /** @param {number} cell */
