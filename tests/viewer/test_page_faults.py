@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ import pytest
 from ptmtools.server.throttle import Throttle
 from ptmtools.viewer.site import Site
 
+DOCS = Path(__file__).parents[2] / "docs/publish.md"
 TEXTURES = re.compile(r"\.ptm$")
 
 
@@ -278,4 +280,22 @@ def test_links_and_questions_that_mean_nothing(visit: Callable[..., Any], museum
     assert state["policy"] == "best"
     assert state["cell"] == museum.index["viewpoints"][0]["cell"]
     assert state["budgetBytes"] == 4096 << 20
+    assert visitor.messages == []
+
+
+def test_the_policy_of_the_docs(visit: Callable[..., Any], museum: Site) -> None:
+    """With the Content-Security-Policy of docs/publish.md nothing is refused."""
+    told = re.search(r"^ *Content-Security-Policy: (.+)$", DOCS.read_text(), re.MULTILINE)
+    assert told
+
+    def strict(page: Any) -> None:
+        def handle(route: Any) -> None:
+            answer = route.fetch()
+            headers = {**answer.headers, "content-security-policy": told[1]}
+            route.fulfill(response=answer, headers=headers)
+
+        page.route(lambda url: url.endswith("/"), handle)
+
+    with visit(museum, prepare=strict) as visitor:
+        visitor.complete()
     assert visitor.messages == []
