@@ -85,6 +85,11 @@ const failing = new DecoderWorkers({ count: 1, create, wasm: Promise.reject(new 
 const alone = failing.decoder(ptm.header, { format: "native" });
 told.alone = [digest(await alone.refine(group(0))), failing.lanes[0].engine !== ""];
 failing.close();
+// One of two has failed: the other has all the work.
+const halved = new DecoderWorkers({ count: 2, create, wasm });
+halved.lanes[0].fail(new Error("did not start"));
+told.halved = [await digests(ptm, { workers: halved }), await digests(ptm, { workers: halved })];
+halved.close();
 const busy = workers.decoder(ptm.header, {});
 const lane = busy.lane;
 const before = workers.decoder(ptm.header, {});

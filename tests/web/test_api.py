@@ -77,6 +77,7 @@ def test_a_cut_file_ends_with_its_last_whole_level(told: dict[str, Any], levels:
 def test_workers_give_the_same(told: dict[str, Any], levels: list[str]) -> None:
     assert told["workers"] == [levels, levels[:5]]
     assert told["names"] == ["wasm", "wasm"]
+    assert told["halved"] == [levels, levels]
 
 
 def test_bytes_can_be_given_again(told: dict[str, Any], levels: list[str]) -> None:
