@@ -4,8 +4,9 @@ import { make } from "./elements.js";
 
 /** @typedef {import("./all.js").App} App */
 
-/** Floors that differ by less are of one storey, m; pixels around the plan; ms between pictures. */
-const STOREY = 1.8, RIM = 10, OFTEN = 100;
+/** Floors that differ by less are of one storey, m, which has at least such a share of the area of the
+ * largest, unlike a landing; pixels around the plan; ms between pictures. */
+const STOREY = 1.8, SHARE = 0.2, RIM = 10, OFTEN = 100;
 const HERE = "#ffc766", SEEN = "#7fa8d8", REST = "#ffffff24", WALLS = "#f4f1ea8c";
 
 /** @param {HTMLElement} root the panel @param {App} app */
@@ -26,8 +27,7 @@ export function attachMinimap(root, app) {
     if (!width || now === last || !cells.length) return;
     last = now;
 
-    const floors = cells.map(({ low }) => low[1]).sort((a, b) => a - b);
-    const storeys = floors.filter((floor, k) => k === 0 || floor - floors[k - 1] > STOREY);
+    const storeys = storeysOf(cells);
     const number = Math.max(1, storeys.filter((floor) => floor < eye[1]).length);
     storey.textContent = storeys.length > 1 ? `storey ${number} of ${storeys.length}` : "";
     plan.ariaLabel = `Plan of storey ${number}, you are in cell ${here}`;
@@ -72,4 +72,22 @@ export function attachMinimap(root, app) {
     draw();
   });
   root.addEventListener("close", () => clearInterval(timer));
+}
+
+/** The lowest floor of each storey. @param {{low: number[], high: number[]}[]} cells */
+function storeysOf(cells) {
+  /** @type {{lowest: number, highest: number, area: number}[]} */
+  const found = [];
+  for (const { low, high } of [...cells].sort((a, b) => a.low[1] - b.low[1])) {
+    const last = found[found.length - 1], floor = low[1];
+    const area = (high[0] - low[0]) * (high[2] - low[2]);
+    if (last && floor - last.highest <= STOREY) {
+      last.highest = floor;
+      last.area += area;
+    } else {
+      found.push({ lowest: floor, highest: floor, area });
+    }
+  }
+  const least = SHARE * Math.max(...found.map(({ area }) => area));
+  return found.filter(({ area }) => area >= least).map(({ lowest }) => lowest);
 }
