@@ -308,14 +308,14 @@ export class Walkthrough {
   #bring(until) {
     const { renderer, visible } = this;
     if (!renderer) return;
-    const wanted = new Set(visible);
-    for (const cell of [...renderer.cells.keys()]) if (!wanted.has(cell)) renderer.remove(cell);
+    renderer.keep(new Set(visible));
+    const late = () => clock() > until;
     for (const cell of visible) {
       const shapes = this.stream.shapes.get(cell);
       if (!shapes || renderer.cells.has(cell)) continue;
-      renderer.add(cell, shapes);
+      if (!renderer.add(cell, shapes, late)) break;
       this.touch();
-      if (clock() > until) break;
+      if (late()) break;
     }
   }
 

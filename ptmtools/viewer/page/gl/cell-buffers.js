@@ -14,51 +14,76 @@
  * @property {number[]} high
  */
 
+/**
+ * @typedef {object} Packed
+ * @property {Float32Array} data x, y, z, u, v of each vertex
+ * @property {Uint16Array | Uint32Array} index
+ * @property {Batch[]} batches
+ */
+
+/** Vertices and indices that are packed without a pause. */
+const AT_ONCE = 1 << 14;
+
+/**
+ * Packs shapes by their looks, step by step: a million triangles take longer than a frame.
+ * @param {Shape[]} shapes
+ * @returns {Generator<void, Packed, void>}
+ */
+export function* pack(shapes) {
+  /** @type {Map<string, Shape[]>} */
+  const groups = new Map();
+  for (const shape of shapes) {
+    const { texture, clampU, clampV, factor, blends, twoSided } = shape;
+    const key = [texture, clampU, clampV, factor, blends, twoSided].join();
+    const group = groups.get(key);
+    if (group) group.push(shape);
+    else groups.set(key, [shape]);
+  }
+  const vertices = shapes.reduce((sum, { positions }) => sum + positions.length / 3, 0);
+  const count = shapes.reduce((sum, { indices }) => sum + indices.length, 0);
+  const data = new Float32Array(5 * vertices);
+  // 65535 begins another strip.
+  const index = vertices > 65535 ? new Uint32Array(count) : new Uint16Array(count);
+  /** @type {Batch[]} */
+  const batches = [];
+  let vertex = 0, at = 0;
+  for (const group of groups.values()) {
+    const first = at;
+    for (const { positions, uvs, indices } of group) {
+      yield;
+      for (let k = 0; k < indices.length; k++) {
+        if (k % AT_ONCE === AT_ONCE - 1) yield;
+        index[at++] = vertex + indices[k];
+      }
+      for (let k = 0; k < positions.length / 3; k++, vertex++) {
+        if (k % AT_ONCE === AT_ONCE - 1) yield;
+        for (let n = 0; n < 3; n++) data[5 * vertex + n] = positions[3 * k + n];
+        if (!uvs) continue;
+        data[5 * vertex + 3] = uvs[2 * k];
+        data[5 * vertex + 4] = uvs[2 * k + 1];
+      }
+    }
+    const factor = group[0].factor;
+    batches.push({
+      look: group[0],
+      first: first * index.BYTES_PER_ELEMENT,
+      count: at - first,
+      color: [...factor.slice(0, 3).map(encoded), factor[3]],
+      low: [0, 1, 2].map((k) => Math.min(...group.map(({ low }) => low[k]))),
+      high: [0, 1, 2].map((k) => Math.max(...group.map(({ high }) => high[k]))),
+    });
+  }
+  return { data, index, batches };
+}
+
 export class CellBuffers {
   /**
    * @param {WebGL2RenderingContext} gl
-   * @param {Shape[]} shapes
+   * @param {Packed} packed
    */
-  constructor(gl, shapes) {
+  constructor(gl, { data, index, batches }) {
     this.gl = gl;
-    /** @type {Map<string, Shape[]>} */
-    const groups = new Map();
-    for (const shape of shapes) {
-      const { texture, clampU, clampV, factor, blends, twoSided } = shape;
-      const key = [texture, clampU, clampV, factor, blends, twoSided].join();
-      const group = groups.get(key);
-      if (group) group.push(shape);
-      else groups.set(key, [shape]);
-    }
-    const vertices = shapes.reduce((sum, { positions }) => sum + positions.length / 3, 0);
-    const count = shapes.reduce((sum, { indices }) => sum + indices.length, 0);
-    const data = new Float32Array(5 * vertices);
-    // 65535 begins another strip.
-    const index = vertices > 65535 ? new Uint32Array(count) : new Uint16Array(count);
-    /** @type {Batch[]} */
-    this.batches = [];
-    let vertex = 0, at = 0;
-    for (const group of groups.values()) {
-      const first = at;
-      for (const { positions, uvs, indices } of group) {
-        for (let k = 0; k < indices.length; k++) index[at++] = vertex + indices[k];
-        for (let k = 0; k < positions.length / 3; k++, vertex++) {
-          for (let n = 0; n < 3; n++) data[5 * vertex + n] = positions[3 * k + n];
-          if (!uvs) continue;
-          data[5 * vertex + 3] = uvs[2 * k];
-          data[5 * vertex + 4] = uvs[2 * k + 1];
-        }
-      }
-      const factor = group[0].factor;
-      this.batches.push({
-        look: group[0],
-        first: first * index.BYTES_PER_ELEMENT,
-        count: at - first,
-        color: [...factor.slice(0, 3).map(encoded), factor[3]],
-        low: [0, 1, 2].map((k) => Math.min(...group.map(({ low }) => low[k]))),
-        high: [0, 1, 2].map((k) => Math.max(...group.map(({ high }) => high[k]))),
-      });
-    }
+    this.batches = batches;
     this.bytes = data.byteLength + index.byteLength;
     this.type = index instanceof Uint32Array ? gl.UNSIGNED_INT : gl.UNSIGNED_SHORT;
     this.vertexArray = gl.createVertexArray();

@@ -1,6 +1,6 @@
 // Draws the cells: what is opaque cell by cell, then what one sees through, the farthest first.
 
-import { CellBuffers } from "./cell-buffers.js";
+import { CellBuffers, pack } from "./cell-buffers.js";
 import { aim, programOf } from "./program.js";
 
 /** @typedef {import("./cell-buffers.js").Batch} Batch */
@@ -19,6 +19,8 @@ const SKY = [0.16, 0.17, 0.19, 1];
 export class Renderer {
   /** @type {Map<number, CellBuffers>} */
   cells = new Map();
+  /** Of cells that are not there yet. @type {Map<number, ReturnType<typeof pack>>} */
+  #packing = new Map();
 
   /**
    * @param {WebGL2RenderingContext} gl
@@ -33,21 +35,36 @@ export class Renderer {
   }
 
   /**
+   * Adds a cell, or as much of it as there is time for; true once it is there.
    * @param {number} cell
    * @param {import("../data/glb.js").Shape[]} shapes
+   * @param {() => boolean} late whether the time has come
    */
-  add(cell, shapes) {
-    if (!this.cells.has(cell)) this.cells.set(cell, new CellBuffers(this.gl, shapes));
+  add(cell, shapes, late) {
+    const steps = this.#packing.get(cell) ?? pack(shapes);
+    this.#packing.set(cell, steps);
+    let step = steps.next();
+    while (!step.done) {
+      if (late()) return false;
+      step = steps.next();
+    }
+    this.#packing.delete(cell);
+    this.cells.set(cell, new CellBuffers(this.gl, step.value));
+    return true;
   }
 
-  /** @param {number} cell */
-  remove(cell) {
-    this.cells.get(cell)?.delete();
-    this.cells.delete(cell);
+  /** Removes all cells but some. @param {Set<number>} wanted */
+  keep(wanted) {
+    for (const [cell, buffers] of this.cells) {
+      if (wanted.has(cell)) continue;
+      buffers.delete();
+      this.cells.delete(cell);
+    }
+    for (const cell of this.#packing.keys()) if (!wanted.has(cell)) this.#packing.delete(cell);
   }
 
   delete() {
-    for (const cell of [...this.cells.keys()]) this.remove(cell);
+    this.keep(new Set());
     this.gl.deleteProgram(this.surface.program);
   }
 
