@@ -221,7 +221,7 @@ def test_settings(desk: Any) -> None:
         ["compare", True],
         ["compare", False],
     ]
-    assert "of 91 MiB" in panel.inner_text()
+    panel.get_by_text("of 91 MiB").wait_for()
     desk.keyboard.press("Escape")
     assert not panel.is_visible()
     assert desk.evaluate("document.activeElement.textContent") == "Details"
