@@ -1,10 +1,10 @@
 """How soon a view is there, by the walk page and by what people do otherwise.
 
-    python -m benchmarks.web_rivals [DB] [--bandwidth 4M,16M] [--only ptm,glb-png,…]
+    python -m benchmarks.web_rivals [DB] [--bandwidth 4M,16M] [--latency 100ms] [--only ptm,glb-png,…]
     python -m benchmarks.web_rivals [DB] --memory
 
 Of each page (``entrants.py``), opened at the first viewpoint of a database over a link of so much
-bandwidth and 100 ms, with an empty cache: seconds and bytes until (a) FLIP is at most 0.05 for
+bandwidth and latency, with an empty cache: seconds and bytes until (a) FLIP is at most 0.05 for
 good, (b) at most 0.01, (c) the page has all that it asks for. FLIP is against the page's own full
 picture, which is kind to lossy ones; *lossy* is how far that is from the picture of ``glb-png``,
 which ``ptm`` is not compared with. In parentheses: how many times as long as the walk page, or else
@@ -37,11 +37,10 @@ from benchmarks.web_rivals import memory  # noqa: E402
 from benchmarks.web_rivals.entrants import RIVALS, WALK, Entrant, rival, walk_page  # noqa: E402
 from benchmarks.web_rivals.tables import memory_table, times_table  # noqa: E402
 from benchmarks.web_rivals.timeline import Timeline, chromium, watch  # noqa: E402
-from ptmtools.quantities import parse_bandwidth  # noqa: E402
+from ptmtools.quantities import parse_bandwidth, parse_duration  # noqa: E402
 from ptmtools.server.throttle import Throttle  # noqa: E402
 from ptmtools.walkthrough.served import read_served  # noqa: E402
 
-LATENCY = 0.1
 #: Of the second table, bytes; the last holds everything.
 BUDGETS = tuple(kib << 10 for kib in (256, 512, 1024, 2048, 4096, 8192, 16384, 1 << 30))
 
@@ -51,6 +50,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.web_rivals")
     parser.add_argument("database", nargs="?", type=Path, default=database_of("museum"))
     parser.add_argument("--bandwidth", default="512k,4M,16M")
+    parser.add_argument("--latency", default="100ms")
     parser.add_argument("--patience", type=float, default=100, help="seconds")
     parser.add_argument("--only", default=",".join((WALK, *RIVALS)), help="of these pages")
     parser.add_argument("--memory", action="store_true", help="the table of texture memory")
@@ -66,13 +66,14 @@ def main() -> None:
         for name in given.only.split(",")
     ]
     bandwidths = sorted((speed(text) for text in given.bandwidth.split(",")), reverse=True)
+    latency = parse_duration(given.latency)
     runs: dict[str, list[Timeline]] = {}
     with chromium() as browser:
         for entrant in entrants:
-            links = [Throttle(bandwidth, LATENCY) for bandwidth in bandwidths]
+            links = [Throttle(bandwidth, latency) for bandwidth in bandwidths]
             runs[entrant.name] = list(timelines(browser, entrant, links, given.patience))
     for k, bandwidth in enumerate(bandwidths):
-        title = f"{given.database.stem}, {bandwidth / 1e6:g} Mbit/s, {1000 * LATENCY:.0f} ms"
+        title = f"{given.database.stem}, {bandwidth / 1e6:g} Mbit/s, {1000 * latency:.0f} ms"
         print(f"\n{title}\n\n{times_table({name: rows[k] for name, rows in runs.items()})}")
 
 
