@@ -1,6 +1,6 @@
 """How soon a view is there, by the walk page and by what people do otherwise.
 
-    python -m benchmarks.web_rivals [DB] [--bandwidth 4M,16M] [--latency 100ms] [--only ptm,glb-png,…]
+    python -m benchmarks.web_rivals [DB] [--bandwidth 4M,16M] [--latency 100ms] [--only ptm,glb-png]
     python -m benchmarks.web_rivals [DB] --memory
 
 Of each page (``entrants.py``), opened at the first viewpoint of a database over a link of so much
