@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from os import PathLike
 from pathlib import Path
 from threading import Lock
@@ -32,8 +33,7 @@ def files_of(folder: str | PathLike[str]) -> Lookup:
 
 class _Database:
     """The files of a database, which may be built again meanwhile: the site is made anew for the
-    next who asks for its page. Until then what its old names stood for may be other bytes, and is
-    not served."""
+    next who asks for its page."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -46,11 +46,7 @@ class _Database:
     def __call__(self, name: str) -> Entry | None:
         if name == INDEX and self._made[1] != self._stamp():
             self._renew()
-        site, built = self._made
-        entry = site(name)
-        if entry and isinstance(entry.source, Path) and built != self._stamp():
-            raise BlockingIOError(f"{name}: the database has been built again")
-        return entry or self._others(name)
+        return self._made[0](name) or self._others(name)
 
     def _renew(self) -> None:
         with self._making:
@@ -59,8 +55,9 @@ class _Database:
                 return
             try:
                 self._made = self._site(), built
-            except PtmError as fault:
-                raise BlockingIOError(f"the database is being built: {fault}") from None
+            except (PtmError, OSError) as fault:
+                print(f"ptm: {fault}", file=sys.stderr)
+                raise BlockingIOError("the database is being built, or damaged") from None
 
     def _stamp(self) -> tuple[int, int]:
         """Changes whenever a stage is finished."""

@@ -16,7 +16,7 @@ from anyio.to_thread import run_sync
 
 from ptmtools.database.served import compressed
 from ptmtools.files import open_regular
-from ptmtools.viewer.entry import Entry
+from ptmtools.viewer.entry import Entry, state_of
 
 #: Bytes that are read, or handed on, at a time.
 PIECE = 1 << 18
@@ -69,13 +69,21 @@ class Stored:
 
 
 def stored(entry: Entry) -> Stored:
-    """The bytes of an entry; OSError if its file is gone, or none.
+    """The bytes of an entry. OSError if its file is gone, BlockingIOError if it is another one.
 
     A name that changes with the content is the tag, too: nothing is read for it.
     """
     source = entry.source
     tag = f'"{quote(entry.name, safe="/%")}"' if entry.forever else None
-    return Stored(source if isinstance(source, bytes) else open_regular(source), tag)
+    if isinstance(source, bytes):
+        return Stored(source, tag)
+    file = open_regular(source)
+    if entry.state and entry.state != state_of(os.fstat(file.fileno())):
+        file.close()
+        raise BlockingIOError(
+            f"{entry.name}: the database has been built again; load the page again"
+        )
+    return Stored(file, tag)
 
 
 class Copies:

@@ -29,7 +29,7 @@ from ptmtools.progress import Progress, silent
 from ptmtools.store.folder import DatabaseFolder, damaged
 from ptmtools.store.layout import SERVED, sha256
 from ptmtools.store.manifest import BUILD
-from ptmtools.viewer.entry import Entry
+from ptmtools.viewer.entry import Entry, state_of
 from ptmtools.viewer.program import DIGITS, page, program_files
 from ptmtools.viewer.textures import web_texture
 from ptmtools.walkthrough.served import FORM, Served, read_served
@@ -258,7 +258,8 @@ class _Making:
         """Adds a file of the data; its URL relative to the index."""
         digest = sha256(source) if isinstance(source, bytes) else digest
         name = f"{_STRANGE.sub('_', stem)[:64]}-{digest[:DIGITS]}{suffix}"
-        entry = Entry(f"{DATA}/{name}", source, media, forever=True, compressed=compressed)
+        state = state_of(source.stat()) if isinstance(source, Path) else None
+        entry = Entry(f"{DATA}/{name}", source, media, True, compressed, state)
         self._entries[entry.name] = entry
         return name
 

@@ -299,3 +299,34 @@ def test_the_policy_of_the_docs(visit: Callable[..., Any], museum: Site) -> None
     with visit(museum, prepare=strict) as visitor:
         visitor.complete()
     assert visitor.messages == []
+
+
+def test_a_missing_first_room(visit: Callable[..., Any], museum: Site) -> None:
+    """Is said, and stays said, whatever else comes."""
+    first = museum.index["cells"][museum.index["viewpoints"][0]["cell"]]["geometry"]
+    entries = {name: e for name, e in museum.entries.items() if not name.endswith(first)}
+    with visit(Site(entries, museum.index)) as visitor:
+        visitor.page.locator("#error").wait_for()
+        visitor.page.wait_for_timeout(3000)
+        assert visitor.page.locator("#error-code").inner_text() == "PTM-V103"
+        assert visitor.page.locator("#error").is_visible()
+
+
+def test_a_graphics_card_that_holds_small_textures_alone(
+    visit: Callable[..., Any], museum: Site
+) -> None:
+    """The levels beyond are left out, also where records tell of them."""
+
+    def small(page: Any) -> None:
+        page.add_init_script(
+            "const { getParameter } = WebGL2RenderingContext.prototype;"
+            "WebGL2RenderingContext.prototype.getParameter = function (name) {"
+            "  return name === this.MAX_TEXTURE_SIZE ? 64 : getParameter.call(this, name);"
+            "};"
+        )
+
+    with visit(museum, prepare=small) as visitor:
+        state = visitor.complete()
+        assert max(state["held"]) == 7
+        assert visitor.page.evaluate("window.ptm.errors") == []
+    assert visitor.messages == []

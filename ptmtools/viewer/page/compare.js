@@ -3,10 +3,7 @@
 
 import { Renderer } from "./gl/renderer.js";
 import { TextureMemory } from "./gl/texture-memory.js";
-import { room } from "./policy/best.js";
-
-/** A request takes so many seconds of the link, and at least so many bytes, lest the walk wait for it. */
-const RANGE_SECONDS = 0.2, RANGE = 65536;
+import { RANGE_BYTES, RANGE_SECONDS, room } from "./policy/best.js";
 
 export class Comparison {
   /** @param {import("./walkthrough.js").Walkthrough} walk */
@@ -24,22 +21,25 @@ export class Comparison {
     const { T, K, levels, ends } = catalogue;
     if (!present) return false;
     const want = new Int32Array(T), share = new Float64Array(T);
-    let whole = true;
+    const { downloads } = client, most = Math.max(RANGE_BYTES, RANGE_SECONDS * estimate.bandwidth / 8);
+    /** @type {{texture: number, end: number}[]} */
+    const missing = [];
     for (let t = 0; t < T; t++) {
       share[t] = present[t * K + 1];
       let column = levels[t];
       while (column > 0 && !(present[t * K + column] > 0)) column--;
       want[t] = Math.min(column, client.have[t]);
-      whole &&= want[t] === column && memory.held[t] >= column;
-      const { downloads } = client;
-      if (column > client.have[t] && downloads.free("texture", t) && room(estimate, downloads.waiting)) {
-        const most = downloads.bytes[t] + Math.max(RANGE, RANGE_SECONDS * estimate.bandwidth / 8);
-        const end = Math.min(ends[t * K + column], Math.floor(most));
-        walk.stream.ask(downloads.ask("texture", t, share[t], end));
-      }
+      if (want[t] < column || memory.held[t] < column) missing.push({ texture: t, end: ends[t * K + column] });
     }
     memory.settle(want, share);
-    return whole;
+    missing.sort((a, b) => share[b.texture] - share[a.texture]);
+    for (const { texture, end } of missing) {
+      if (!room(estimate, downloads.waiting)) break;
+      const part = Math.min(end, Math.floor(downloads.bytes[texture] + most));
+      if (part <= downloads.bytes[texture] || !downloads.free("texture", texture)) continue;
+      walk.stream.ask(downloads.ask("texture", texture, share[texture], part));
+    }
+    return missing.length === 0;
   }
 
   /** Gives all of it back. */

@@ -2,6 +2,7 @@
 
 import { PtmError } from "../decoder/src/index.js";
 import { readGlb } from "./data/glb.js";
+import { readRecord } from "./data/record.js";
 import { PageError } from "./net/errors.js";
 import { clock } from "./net/fetcher.js";
 import { TextureFile } from "./net/texture-file.js";
@@ -23,7 +24,8 @@ export class Stream {
   news = false;
   /** @type {Request[]} */
   #queue = [];
-  #sent = 0;
+  /** @type {Set<Request>} */
+  #sent = new Set();
   /** The level at which a texture was found to be damaged. @type {Map<number, number>} */
   #suspect = new Map();
   #cannotDecode = false;
@@ -45,6 +47,7 @@ export class Stream {
     this.locator = locator;
     this.estimate = estimate;
     this.fetcher = fetcher;
+    this.workers = workers;
     this.rests = rests;
     this.report = report;
     this.files = site.index.textures.map((row) => new TextureFile(row, workers));
@@ -69,13 +72,15 @@ export class Stream {
   }
 
   #send() {
-    while (this.#sent < CONNECTIONS && this.#queue.length) {
+    // Those that wait to be made again take no connection.
+    const busy = () => [...this.#sent].filter(({ left }) => left > 0).length;
+    while (busy() < CONNECTIONS && this.#queue.length) {
       const { priority } = this.#queue.reduce((a, b) => (b.priority > a.priority ? b : a));
       const first = this.#queue.findIndex((request) => request.priority === priority);
       const [request] = this.#queue.splice(first, 1);
-      this.#sent++;
+      this.#sent.add(request);
       this.#fetch(request).finally(() => {
-        this.#sent--;
+        this.#sent.delete(request);
         this.#send();
         this.pump();
       });
@@ -151,10 +156,10 @@ export class Stream {
     } catch (fault) {
       // Who cannot decode at all knows nothing of the file.
       if (!(fault instanceof PtmError)) {
-        if (!this.#cannotDecode) {
+        if (!this.#cannotDecode && this.workers.failed) {
           this.report(new PageError("PTM-V106", `Textures cannot be decoded: ${fault}`), "decoder", 0);
         }
-        this.#cannotDecode = true;
+        this.#cannotDecode ||= this.workers.failed;
         throw fault;
       }
       // Somebody else has found it out.
@@ -175,28 +180,6 @@ export class Stream {
       throw fault;
     }
   }
-}
-
-/**
- * @param {Uint8Array} body
- * @param {number} cell
- * @param {number} cells that there are
- * @param {number} textures
- * @returns {CellRecord}
- */
-function readRecord(body, cell, cells, textures) {
-  const record = JSON.parse(new TextDecoder().decode(body));
-  if (record.cell !== cell) throw new Error("is of another cell");
-  /** @param {unknown} list @param {number} count */
-  const names = (list, count) =>
-    Array.isArray(list) && list.every((n) => Number.isInteger(n) && n >= 0 && n < count);
-  const { visible, adjacent, ach, leaves, portals } = record;
-  const whole = names(visible, cells) && names(adjacent, cells) && ach?.length === visible.length
-    && Array.isArray(leaves) && Array.isArray(portals)
-    && portals.every(({ neighbour }) => names([neighbour], cells))
-    && Array.isArray(record.textures) && record.textures.every((/** @type {unknown} */ list) => names(list, textures));
-  if (!whole) throw new Error("is not as it should be");
-  return record;
 }
 
 /**

@@ -48,6 +48,8 @@ export class Walkthrough {
   frozen = false;
   /** Whether nothing is fetched but what is on the screen. */
   saving = false;
+  /** Whether both halves are to be seen, and what that takes. */
+  comparing = false;
   /** @type {Comparison | null} */
   comparison = null;
   /** @type {import("./recorder.js").Recorder | null} */
@@ -123,7 +125,7 @@ export class Walkthrough {
     canvas.addEventListener("webglcontextrestored", () => {
       this.#make();
       this.memory.resume();
-      if (this.comparison) this.comparison = new Comparison(this);
+      this.comparison = this.comparing ? new Comparison(this) : null;
     });
   }
 
@@ -214,24 +216,27 @@ export class Walkthrough {
     this.stream.pump();
   }
 
-  /** Whether nothing more is asked for: what is on the screen may be enough. */
+  /** Whether nothing more is asked for: what is on the screen may be enough, or all that there is time for. */
   get #rests() {
-    return this.frozen || ((this.saving || document.hidden) && this.client.missing(true) === 0);
+    const enough = this.saving || document.hidden || this.comparing;
+    return this.frozen || (enough && this.client.missing(true) === 0);
   }
 
   /** Tells how far the first picture is: the room, then the coarse levels of what is seen of it. */
   #begin() {
     const { catalogue: { T, K, levels }, client, memory, present, stream } = this;
-    let loaded = +stream.records.has(this.cell) + +stream.shapes.has(this.cell), total = 2;
+    const parts = +stream.records.has(this.cell) + +stream.shapes.has(this.cell);
+    let loaded = parts, total = 2;
     for (let t = 0; t < T; t++) {
       const seen = present && present[t * K + 1] > 0 && !client.downloads.rests("texture", t);
       const wanted = seen ? Math.min(FIRST_LEVELS, levels[t]) : 0;
       total += wanted;
       loaded += Math.min(memory.held[t], wanted);
     }
-    const room = loaded < 2 || total === 2;
+    const room = parts < 2 || total === 2;
     this.emit("progress", { stage: room ? "Loading the room" : "Loading textures", loaded, total: room ? 12 : total });
-    if ((room || loaded < total) && !this.complete) return;
+    // Whatever else is there: without the room there is no picture.
+    if (parts < 2 || ((room || loaded < total) && !this.complete)) return;
     this.begun = true;
     this.emit("first-picture", undefined);
   }
@@ -264,6 +269,7 @@ export class Walkthrough {
 
   /** @param {boolean} on whether the right half shows what every level would */
   compare(on) {
+    this.comparing = on;
     if (this.gl.isContextLost()) return;
     this.comparison?.delete();
     this.comparison = on ? new Comparison(this) : null;
@@ -371,6 +377,7 @@ export class Walkthrough {
     this.#looked = now;
     this.stream.news = false;
     const { client, memory, reserve, comparison } = this;
+    client.downloads.now = now;
     if (comparison) comparison.settle();
     if (this.frozen) return;
     reserve.enter(this.cell, this.budget);

@@ -213,6 +213,11 @@ export class DecoderWorkers {
     this.lanes = Array.from({ length: count }, () => new Lane(make(), wasm));
   }
 
+  /** Whether nothing can be decoded any more. */
+  get failed() {
+    return this.lanes.every(({ failure }) => failure);
+  }
+
   /**
    * A decoder of a file, in the worker that has the fewest, of those that have not failed.
    * @param {Header} header

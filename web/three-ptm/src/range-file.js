@@ -5,6 +5,8 @@
 /** How often in a row a request may fail, and the pause after the first time, ms. */
 const ATTEMPTS = 3;
 const PAUSE = 500;
+/** Bytes that are worth waiting for. */
+const SHORT = 65536;
 
 /** Hosts that were seen to ignore ranges. */
 const rangeless = new Set();
@@ -60,13 +62,14 @@ export class RangeFile {
   }
 
   /**
-   * Lets go of the connection. The rest of what was asked for is awaited, so that no byte is fetched
-   * again; that is all of the file where a host ignores ranges.
+   * Lets go of the connection. A short rest of what was asked for is awaited, so that it is not
+   * fetched again, and all of the file where a host ignores ranges.
    * @param {AbortSignal} [signal]
    */
   settle(signal) {
     return this.#inTurn(async () => {
-      if (this.#body && !signal?.aborted) await this.#fill(this.#body.end, signal);
+      const body = this.#body, short = body && (body.all || body.end - body.at <= SHORT);
+      if (short && !signal?.aborted) await this.#fill(body.end, signal).catch(() => this.#stop());
       else this.#stop();
     });
   }

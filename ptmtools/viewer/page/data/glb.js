@@ -62,7 +62,13 @@ export function readGlb(buffer, textures = Infinity) {
       const index = /** @type {Uint16Array | Uint32Array} */ (accessor(indices));
       const positions = /** @type {Float32Array} */ (accessor(attributes.POSITION));
       const uvs = textured ? /** @type {Float32Array} */ (accessor(attributes.TEXCOORD_0)) : null;
-      if (texture >= textures) throw new Error("has a texture that the index has not");
+      if (!Number.isInteger(texture) || texture >= textures) {
+        throw new Error("has a texture that the index has not");
+      }
+      const factor = base.baseColorFactor ?? [1, 1, 1, 1];
+      if (!Array.isArray(factor) || factor.length !== 4 || !factor.every(Number.isFinite)) {
+        throw new Error("has a colour that is none");
+      }
       if (![min, max].every((corner) => corner?.length === 3 && corner.every(Number.isFinite))) {
         throw new Error("does not say how large it is");
       }
@@ -78,7 +84,7 @@ export function readGlb(buffer, textures = Infinity) {
         texture: textured ? texture : -1,
         clampU: wrapS === CLAMP,
         clampV: wrapT === CLAMP,
-        factor: base.baseColorFactor ?? [1, 1, 1, 1],
+        factor,
         blends: look.alphaMode === "BLEND",
         twoSided: look.doubleSided === true,
         low: min,

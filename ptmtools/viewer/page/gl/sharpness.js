@@ -7,7 +7,7 @@ const MOST = 2;
 const SHARES = [1, 0.7, 0.5];
 /** Seconds a frame beyond which the next share is taken, and below which the one before, for the next
  * movement; and frames whose median is judged. */
-const SLOW = 0.045, FAST = 0.018, FRAMES = 6;
+const SLOW = 0.045, FAST = 0.035, FRAMES = 6;
 
 export class Sharpness {
   #step = 0;

@@ -50,6 +50,7 @@ export class TextureMemory {
   #want = new Int32Array(0);
   /** @type {Float64Array} */
   #priority = new Float64Array(0);
+  #lost;
 
   /**
    * @param {WebGL2RenderingContext} gl
@@ -63,6 +64,8 @@ export class TextureMemory {
     this.#storages = rows.map(() => null);
     /** Columns on the GPU: so many levels of each texture. */
     this.held = new Int32Array(rows.length);
+    /** Columns that went with the context, and were not chosen anew. */
+    this.#lost = new Int32Array(rows.length);
     this.budget = Infinity;
     this.bytes = 0;
     /** The most that was ever held. */
@@ -83,9 +86,10 @@ export class TextureMemory {
    */
   settle(want, priority) {
     this.#want = want;
+    this.#lost.fill(0);
     this.#priority = priority;
     for (let t = 0; t < want.length; t++) if (want[t] === 0 && this.held[t]) this.#clear(t);
-    // The budget became less: there may be no room to shrink in.
+    // There may be no room to shrink in.
     const shrinking = [...want.keys()].filter((t) => this.held[t] > want[t]);
     shrinking.sort((a, b) => priority[a] - priority[b]);
     const moving = [...this.#underWay.values()].some(({ storage }) => storage);
@@ -97,9 +101,9 @@ export class TextureMemory {
     this.#next();
   }
 
-  /** What is there stays, and comes back if it is lost; nothing else does. */
+  /** What is there, or was before the context was lost, stays and comes back; nothing else does. */
   hold() {
-    this.#want = Int32Array.from(this.held);
+    this.#want = this.held.map((held, t) => Math.max(held, Math.min(this.#want[t] ?? 0, this.#lost[t])));
   }
 
   /** What was wanted before the context was lost comes back. */
@@ -248,8 +252,9 @@ export class TextureMemory {
     for (let t = 0; t < this.rows.length; t++) this.#clear(t);
   }
 
-  /** All is gone with the context: it comes back by `settle`. */
+  /** All is gone with the context: it comes back by `resume`. */
   lose() {
+    this.#lost = this.held.map((held, t) => Math.max(held, this.#lost[t]));
     this.#storages.fill(null);
     this.#underWay.clear();
     this.held.fill(0);

@@ -38,13 +38,14 @@ function byDistance({ catalogue, shapes, frustum }) {
  * @param {Float64Array} around
  */
 export function lookAround(client, around) {
+  // Records may tell of levels that the GPU cannot hold, and the catalogue has not.
   const { T, K, levels } = client.catalogue;
   const near = byDistance(client), need = client.known[client.cell]?.need;
   around.fill(0);
   for (const [texture, first, ...shares] of need ?? []) {
     const at = texture * K + 1;
-    around.fill(shares[0], at, at + first);
-    around.set(shares, at + first);
+    around.fill(shares[0], at, at + Math.min(first, levels[texture]));
+    around.set(shares.slice(0, Math.max(levels[texture] - first, 0)), at + Math.min(first, K - 1));
   }
   for (let t = 0; t < T; t++) {
     for (let k = 1, at = t * K + 1; k <= levels[t]; k++, at++) {

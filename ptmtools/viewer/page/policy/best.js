@@ -14,7 +14,8 @@ import { meetsBox } from "../space/frustum.js";
 /** @typedef {import("./estimate.js").Belief} Belief */
 
 // A range takes so many seconds of the link, and at least so many bytes.
-const RANGE_SECONDS = 0.2, RANGE_BYTES = 8000;
+export const RANGE_SECONDS = 0.2;
+export const RANGE_BYTES = 8000;
 const CONNECTIONS = 6;
 // The most bytes that waiting counts, of links without a limit.
 const LONGEST_WAIT = 2 ** 20;
@@ -36,7 +37,7 @@ export function room(estimate, waiting) {
   let left = 0, count = 0;
   for (const request of waiting) {
     left += Math.max(request.left, 0);
-    count++;
+    count += +(request.left > 0);
   }
   const ahead = estimate.latency + RANGE_SECONDS / 2;
   return count < CONNECTIONS && (left === 0 || 8 * left < ahead * estimate.bandwidth);

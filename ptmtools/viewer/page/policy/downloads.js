@@ -134,6 +134,6 @@ export class Downloads {
     const { kind, number } = request;
     this.waiting.delete(request);
     if (this.#state[kind][number] === ASKED) this.lost(kind, number);
-    this.#rests[kind][number] = until;
+    this.#rests[kind][number] = Math.max(this.#rests[kind][number], until);
   }
 }

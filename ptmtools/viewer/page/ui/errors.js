@@ -8,7 +8,7 @@ const REMEDIES = {
   "PTM-V101": "Use a current Chrome, Edge or Firefox, or Safari 15 or newer, with hardware acceleration on.",
   "PTM-V103": TELL,
   "PTM-V104": "Check your connection and reload the page.",
-  "PTM-V106": "Update the browser, or allow this page to use web workers.",
+  "PTM-V106": "Update the browser, or allow this page to use web workers and more memory.",
   "PTM-V105": TELL,
 };
 const OTHERWISE = "Reload the page. If that does not help, tell the owner of this site.";

@@ -76,17 +76,13 @@ export function attachMinimap(root, app) {
 
 /** The lowest floor of each storey. @param {{low: number[], high: number[]}[]} cells */
 function storeysOf(cells) {
-  /** @type {{lowest: number, highest: number, area: number}[]} */
+  /** @type {{lowest: number, area: number}[]} */
   const found = [];
   for (const { low, high } of [...cells].sort((a, b) => a.low[1] - b.low[1])) {
     const last = found[found.length - 1], floor = low[1];
     const area = (high[0] - low[0]) * (high[2] - low[2]);
-    if (last && floor - last.highest <= STOREY) {
-      last.highest = floor;
-      last.area += area;
-    } else {
-      found.push({ lowest: floor, highest: floor, area });
-    }
+    if (last && floor - last.lowest <= STOREY) last.area += area;
+    else found.push({ lowest: floor, area });
   }
   const least = SHARE * Math.max(...found.map(({ area }) => area));
   return found.filter(({ area }) => area >= least).map(({ lowest }) => lowest);

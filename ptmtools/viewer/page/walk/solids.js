@@ -18,6 +18,8 @@ const INSIDE = 0.03;
 const FEW = 4;
 /** Triangles that are looked at without a pause. */
 const AT_ONCE = 64, MANY = 1 << 14;
+/** Cells out of sight are kept until there are so many. */
+const MOST = 64;
 
 /**
  * How far a point is inside a polygon (negative: outside), if it is near enough to its plane for a
@@ -182,8 +184,9 @@ export class Solids {
     return true;
   }
 
-  /** Forgets all but some. @param {Set<number>} cells */
+  /** Forgets all but some cells, once there are many. @param {Set<number>} cells */
   keep(cells) {
+    if (this.#trees.size < MOST) return;
     for (const trees of [this.#trees, this.#growing]) {
       for (const cell of trees.keys()) if (!cells.has(cell)) trees.delete(cell);
     }
