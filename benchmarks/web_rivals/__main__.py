@@ -34,7 +34,7 @@ from render import load  # noqa: E402
 from walk_scenes import database_of  # noqa: E402
 
 from benchmarks.web_rivals import memory  # noqa: E402
-from benchmarks.web_rivals.entrants import RIVALS, WALK, Entrant, rival, walk_page  # noqa: E402
+from benchmarks.web_rivals.entrants import RIVALS, WALK, Entrant, require, rival, walk_page  # noqa: E402
 from benchmarks.web_rivals.tables import memory_table, times_table  # noqa: E402
 from benchmarks.web_rivals.timeline import Timeline, chromium, watch  # noqa: E402
 from ptmtools.quantities import parse_bandwidth, parse_duration  # noqa: E402
@@ -61,6 +61,7 @@ def main() -> None:
         rows = memory.measured(read_served(given.database), scene, viewpoint, BUDGETS)
         print(memory_table(rows))
         return
+    require(given.only.split(","))
     entrants = [
         walk_page(given.database) if name == WALK else rival(name, scene, viewpoint)
         for name in given.only.split(",")

@@ -20,7 +20,7 @@ import json
 import os
 import subprocess
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -28,7 +28,7 @@ from typing import Any
 
 from benchmarks.web_rivals.images import MEDIA, in_form
 from benchmarks.web_rivals.models import whole_glb
-from benchmarks.web_rivals.packages import ESBUILD, THREE
+from benchmarks.web_rivals.packages import ESBUILD, KTX2, THREE
 from ptmtools.scene.model import Scene
 from ptmtools.viewer.entry import Entry
 
@@ -55,6 +55,16 @@ class Entrant:
     files: Mapping[str, Entry]
     complete: str = "window.rival?.complete"
     steady: bool = True
+
+
+def require(names: Iterable[str]) -> None:
+    """Raises SystemExit with the remedy for what is not installed, before anything is made."""
+    forms = {name.removeprefix("glb-") for name in names if name != WALK}
+    if forms:
+        THREE.require()
+        ESBUILD.require()
+    if any(MEDIA.get(form) == "image/ktx2" for form in forms):
+        KTX2.require()
 
 
 def rival(name: str, scene: Scene, viewpoint: Mapping[str, Any]) -> Entrant:
@@ -122,8 +132,6 @@ def _of_three(suffix: str) -> bytes:
 @cache
 def _joined(script: str) -> bytes:
     """A script of `PAGES` with what it imports, shortened."""
-    THREE.require()
-    ESBUILD.require()
     with tempfile.TemporaryDirectory(prefix="joined-") as folder:
         out = Path(folder) / "page.js"
         options = ["--bundle", "--minify", "--format=esm", "--target=esnext", "--log-level=error"]
