@@ -1,6 +1,7 @@
 // The walk: each frame where the visitor is, what is drawn, what goes into texture memory and what is
 // asked for next (docs/client.md).
 
+import { beginningOf } from "./beginning.js";
 import { Comparison } from "./compare.js";
 import { fitting, levelsOf } from "./data/site.js";
 import { cameraOf } from "./gl/camera.js";
@@ -19,6 +20,7 @@ import { sightOf } from "./policy/sight.js";
 import { distance, frustumOf, meetsBox } from "./space/frustum.js";
 import { Locator } from "./space/locating.js";
 import { Stream } from "./stream.js";
+import { Stillness } from "./walk/stillness.js";
 
 /** Seconds between item buffers, and between looks of the client. */
 const ITEM_EVERY = 0.1, LOOK_EVERY = 0.2;
@@ -26,13 +28,8 @@ const ITEM_EVERY = 0.1, LOOK_EVERY = 0.2;
 const PAINT_EVERY = 0.05, RESTING = 0.4;
 /** Seconds of a frame for uploads, and for geometry that comes into view. */
 const UPLOAD_TIME = 0.004, GEOMETRY_TIME = 0.004;
-/** Levels of a texture that make a first picture. */
-const FIRST_LEVELS = 5;
 /** The widest that a view is upright on a narrow screen, radians. */
 const TALLEST = 1.4;
-/** Who has moved less than this for a second is still: metres and radians. */
-const STILL = { seconds: 1, metres: 1e-3, radians: 0.0175 };
-
 /** @typedef {import("./gl/camera.js").Pose} Pose */
 /** @typedef {import("./gl/renderer.js").Drawn} Drawn */
 
@@ -60,8 +57,6 @@ export class Walkthrough {
   #looked = -1;
   #before = 0;
   #itemDrawn = -1;
-  #moved = { at: 0, eye: [0, 0, 0], yaw: 0, pitch: 0 };
-  #place = "";
   /** @type {import("./policy/sight.js").Sight | null} */
   #sight = null;
   #sightDrawn = -1;
@@ -90,6 +85,7 @@ export class Walkthrough {
     this.catalogue = catalogueOf(index);
     this.reserve = new Reserve(this.catalogue);
     this.sharpness = new Sharpness(canvas);
+    this.stillness = new Stillness();
     this.estimate = new Estimate();
     this.fetcher = new Fetcher((message) => emit("notice", { message }));
     watchLink(this.estimate, this.fetcher);
@@ -195,8 +191,9 @@ export class Walkthrough {
     const now = clock(), { gl } = this;
     if (gl.isContextLost()) return;
     this.locate(pose);
-    const still = this.#still(pose, now);
-    if (this.sharpness.settle(now - this.#before, now - this.#moved.at < RESTING)) this.touch();
+    const { stillness } = this;
+    if (stillness.takes(pose, now)) this.touch();
+    if (this.sharpness.settle(now - this.#before, now - stillness.moved < RESTING)) this.touch();
     this.#before = now;
     const frustum = frustumOf(pose, this.tall, this.aspect);
     this.#bring(now + GEOMETRY_TIME);
@@ -204,41 +201,28 @@ export class Walkthrough {
     const until = clock() + UPLOAD_TIME, late = () => clock() > until;
     if (this.memory.pump(now, late) || this.comparison?.memory.pump(now, late)) this.touch();
     this.#read();
-    if (this.stream.news || now - this.#looked >= LOOK_EVERY) this.#look(now, frustum, still);
+    if (this.stream.news || now - this.#looked >= LOOK_EVERY) this.#look(now, frustum, stillness.lasts(now));
     const camera = cameraOf(pose, this.tall, this.aspect, this.far);
-    const waits = this.#moved.at < this.#painted && now - this.#painted < PAINT_EVERY;
+    const waits = stillness.moved < this.#painted && now - this.#painted < PAINT_EVERY;
     if (this.#changed > this.#painted && !waits) this.#paint(camera, now);
     if (this.#changed > this.#itemDrawn && now - this.#itemDrawn >= ITEM_EVERY) {
       this.#drawItems(camera, now);
     }
-    if (!this.begun) this.#begin();
+    if (!this.begun) {
+      const { progress, over } = beginningOf(this);
+      this.emit("progress", progress);
+      this.begun = over;
+      if (over) this.emit("first-picture", undefined);
+    }
     this.recorder?.frame(now, frustum, this.#sightDrawn);
     this.stream.pump();
   }
 
-  /** Whether nothing more is asked for: what is on the screen may be enough, or all that there is time for. */
+  /** Whether nothing more is asked for: what is on the screen may be enough, or the rest of the link
+   * be for the comparison. */
   get #rests() {
     const enough = this.saving || document.hidden || this.comparing;
     return this.frozen || (enough && this.client.missing(true) === 0);
-  }
-
-  /** Tells how far the first picture is: the room, then the coarse levels of what is seen of it. */
-  #begin() {
-    const { catalogue: { T, K, levels }, client, memory, present, stream } = this;
-    const parts = +stream.records.has(this.cell) + +stream.shapes.has(this.cell);
-    let loaded = parts, total = 2;
-    for (let t = 0; t < T; t++) {
-      const seen = present && present[t * K + 1] > 0 && !client.downloads.rests("texture", t);
-      const wanted = seen ? Math.min(FIRST_LEVELS, levels[t]) : 0;
-      total += wanted;
-      loaded += Math.min(memory.held[t], wanted);
-    }
-    const room = parts < 2 || total === 2;
-    this.emit("progress", { stage: room ? "Loading the room" : "Loading textures", loaded, total: room ? 12 : total });
-    // Whatever else is there: without the room there is no picture.
-    if (parts < 2 || ((room || loaded < total) && !this.complete)) return;
-    this.begun = true;
-    this.emit("first-picture", undefined);
   }
 
   /**
@@ -286,24 +270,6 @@ export class Walkthrough {
   /** What the view wants of each texture, or null before anything was seen. */
   get present() {
     return this.#sight?.present ?? null;
-  }
-
-  /**
-   * Whether the eye has not moved for a second.
-   * @param {Pose} pose
-   * @param {number} now
-   */
-  #still({ eye, yaw, pitch }, now) {
-    const place = [...eye, yaw, pitch].join();
-    if (place !== this.#place) this.touch();
-    this.#place = place;
-    const before = this.#moved;
-    const way = Math.hypot(...eye.map((x, k) => x - before.eye[k]));
-    const turn = Math.max(Math.abs(yaw - before.yaw), Math.abs(pitch - before.pitch));
-    if (way > STILL.metres || turn > STILL.radians) {
-      this.#moved = { at: now, eye: [...eye], yaw, pitch };
-    }
-    return now - this.#moved.at >= STILL.seconds;
   }
 
   /**

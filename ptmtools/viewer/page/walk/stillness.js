@@ -1,0 +1,32 @@
+// Since when who walks has not moved.
+
+/** Who has moved less than this for a second is still: metres and radians. */
+const STILL = { seconds: 1, metres: 1e-3, radians: 0.0175 };
+
+/** @typedef {import("./walker.js").Pose} Pose */
+
+export class Stillness {
+  /** When the last movement was, s. */
+  moved = 0;
+  /** @type {Pose} */
+  #from = { eye: [0, 0, 0], yaw: 0, pitch: 0 };
+  #place = "";
+
+  /** Whether the pose is another one than before, be it by a hair. @param {Pose} pose @param {number} now s */
+  takes({ eye, yaw, pitch }, now) {
+    const from = this.#from, way = Math.hypot(...eye.map((x, k) => x - from.eye[k]));
+    const turn = Math.max(Math.abs(yaw - from.yaw), Math.abs(pitch - from.pitch));
+    if (way > STILL.metres || turn > STILL.radians) {
+      this.moved = now;
+      this.#from = { eye: [...eye], yaw, pitch };
+    }
+    const place = [...eye, yaw, pitch].join(), other = place !== this.#place;
+    this.#place = place;
+    return other;
+  }
+
+  /** Whether the eye has not moved for a second. @param {number} now */
+  lasts(now) {
+    return now - this.moved >= STILL.seconds;
+  }
+}
