@@ -73,7 +73,7 @@ export class Stream {
 
   #send() {
     // Those that wait to be made again take no connection.
-    const busy = () => [...this.#sent].filter(({ left }) => left > 0).length;
+    const busy = () => [...this.#sent].filter(({ waits }) => !waits).length;
     while (busy() < CONNECTIONS && this.#queue.length) {
       const { priority } = this.#queue.reduce((a, b) => (b.priority > a.priority ? b : a));
       const first = this.#queue.findIndex((request) => request.priority === priority);

@@ -108,10 +108,10 @@ export class Fetcher {
     for (let tried = 0; tried < TRIES; tried++) {
       if (tried) {
         // Nothing is on the way meanwhile.
-        if (progress) progress.left = 0;
+        if (progress) Object.assign(progress, { left: 0, waits: true });
         await wait(FIRST_WAIT * 2 ** (tried - 1));
       }
-      if (progress) progress.left = left;
+      if (progress) Object.assign(progress, { left, waits: false });
       this.pending++;
       try {
         return await ask(cache);

@@ -31,13 +31,13 @@ const HELD_ON = 1e-3, HELD_SECONDS = 7;
 /**
  * Whether the link would run dry before a request made later could be answered.
  * @param {Belief} estimate
- * @param {Iterable<{left: number}>} waiting requests on the way
+ * @param {Iterable<{left: number, waits?: boolean}>} waiting requests on the way
  */
 export function room(estimate, waiting) {
   let left = 0, count = 0;
   for (const request of waiting) {
     left += Math.max(request.left, 0);
-    count += +(request.left > 0);
+    count += +!request.waits;
   }
   const ahead = estimate.latency + RANGE_SECONDS / 2;
   return count < CONNECTIONS && (left === 0 || 8 * left < ahead * estimate.bandwidth);

@@ -15,6 +15,7 @@
  * @property {number} priority the greater, the sooner; it may grow
  * @property {number} left bytes that are yet to come, headers included: for whoever receives them
  *   to keep up to date
+ * @property {boolean} [waits] whether nothing is on the way, until it is made again
  */
 
 /** Bytes of the headers of a request. */
