@@ -160,7 +160,8 @@ def watch(browser: Any, entrant: Entrant, link: Throttle, *, seconds: float = 60
         sent=meter.at(clock + stamps),
         pictures=tuple(_unpacked(one) for one in taken),
         done=math.inf if done is None else 1e-3 * done,
-        everything=float(meter.at(np.array([clock + 1e-3 * (done or now)]))[0]),
+        # What was complete may be seen a moment later, and bytes between two looks are guessed.
+        everything=float(meter.at(clock + max(1e-3 * (done or now), *stamps))),
         requests=len(visits),
         messages=tuple(said for said in messages if RECORDING not in said),
     )

@@ -3,7 +3,9 @@ and latency analysis performed for some recent downloadings").
 
 Bandwidth is bytes over the time during which any were arriving, both forgotten with a half-life of
 such time: so a pause, in which nothing was asked for, neither lowers the estimate nor ages it, and
-parallel requests are not counted against each other. Latency is the mean of the last few, of
+parallel requests are not counted against each other. What arrives between two looks is taken to
+arrive evenly, and fades from where it arrives, so that the estimate does not depend on how often
+one looks. Latency is the mean of the last few, of
 requests whose response did not have to wait for those of others: on `h2` the others tell nothing of
 the network. (A client sees it: another response ended as this one began.)
 """
@@ -44,9 +46,10 @@ class Estimate:
         """To be called after each `Link.advance`, with what that returned."""
         carried, busy = self._link.carried, self._link.busy
         seconds = busy - self._seen[1]
-        fading = 0.5 ** (seconds / HALF_LIFE)
-        self._bytes = self._bytes * fading + carried - self._seen[0]
-        self._seconds = self._seconds * fading + seconds
+        age = math.log(2) * seconds / HALF_LIFE
+        fading, kept = math.exp(-age), -math.expm1(-age) / age if age else 1.0
+        self._bytes = self._bytes * fading + kept * (carried - self._seen[0])
+        self._seconds = self._seconds * fading + kept * seconds
         self._seen = (carried, busy)
         if finished and finished.sent is not None and finished.first_byte == finished.starts:
             if self._guessed:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 from ptmtools.arrays import Floats
 from ptmtools.walkthrough.allocation import allocate, next_fetch
@@ -115,13 +115,13 @@ def test_how_the_paper_shares_out(tmp_path: Path) -> None:
     assert same(called(tmp_path, calls), expected)
 
 
-@settings(max_examples=20)
+@settings(max_examples=50)
 @given(SEEDS, st.sampled_from(["h1", "h2"]))
+@example(570, "h1")
 def test_what_is_believed_of_a_link(
     tmp_path_factory: pytest.TempPathFactory, seed: int, protocol: str
 ) -> None:
-    """As Python's, of the same arrivals; but what fades between two moments depends on how many
-    there are, and a browser knows of more."""
+    """As Python's, of the same arrivals, though a browser knows of more moments."""
     random = np.random.default_rng(seed)
     latency = float(random.uniform(0.01, 0.3))
     link = Link(Conditions(float(random.uniform(2e4, 2e7)), latency, protocol=protocol))
@@ -162,7 +162,7 @@ def test_what_is_believed_of_a_link(
     told = called(folder, [("estimate", {"calls": calls, "size": 5000})])[0]
     known = [(a, b) for a, b in zip(told, expected, strict=True) if b]
     for found, wanted in known:
-        assert found == pytest.approx(wanted, rel=0.05)
+        assert found == pytest.approx(wanted)
 
 
 def test_the_catalogue_of_an_index(tmp_path: Path, world: World) -> None:

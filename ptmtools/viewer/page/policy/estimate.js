@@ -1,6 +1,7 @@
 // What a client believes of its link, from what it has downloaded lately. Bandwidth is bytes over
 // the time during which any were arriving, both forgotten with a half-life of such time: a pause
 // neither lowers the estimate nor ages it, and parallel requests do not count against each other.
+// What comes between two looks fades as if it came evenly, so it does not matter how often one looks.
 // Latency is the mean of the last few, of requests whose response did not wait for those of others.
 
 /**
@@ -42,7 +43,7 @@ export class Estimate {
 
   /** Its response begins. @param {unknown} id @param {number} now */
   firstByte(id, now) {
-    this.bytes(now, 0);
+    if (!this.#arriving) this.#seen = Math.max(this.#seen, now);
     const request = this.#requests.get(id);
     if (!request || request.waited >= 0) return;
     const behind = this.#ended > request.sent && Math.abs(now - this.#ended) < AT_ONCE;
@@ -53,10 +54,11 @@ export class Estimate {
   /** So many bytes have come since it was last called. @param {number} now @param {number} count */
   bytes(now, count) {
     const seconds = this.#arriving > 0 ? Math.max(now - this.#seen, 0) : 0;
-    const fading = 0.5 ** (seconds / HALF_LIFE);
+    const age = Math.LN2 * seconds / HALF_LIFE;
+    const fading = Math.exp(-age), kept = age ? -Math.expm1(-age) / age : 1;
     this.#seen = Math.max(this.#seen, now);
-    this.#bytes = this.#bytes * fading + count;
-    this.#seconds = this.#seconds * fading + seconds;
+    this.#bytes = this.#bytes * fading + kept * count;
+    this.#seconds = this.#seconds * fading + kept * seconds;
   }
 
   /** It came to its end, whole or not. @param {unknown} id @param {number} now */
