@@ -21,7 +21,7 @@ from ptmtools.progress import Progress, silent
 from ptmtools.scene.faces import KeptFaces, keep_faces
 from ptmtools.scene.facing import TURNED_AWAY, turned_away
 from ptmtools.scene.images import ImageStore
-from ptmtools.scene.model import Camera, Material, Scene, Space
+from ptmtools.scene.model import Camera, Material, Scene, Space, Storey
 from ptmtools.scene.options import IngestOptions
 from ptmtools.scene.orientation import tolerance_of
 from ptmtools.scene.signs import Named
@@ -154,6 +154,9 @@ def ingest(
         tolerance=tolerance_of(points, triangles),
         images=store.images,
         cameras=tuple(_camera(camera, space) for camera in source.cameras),
+        colors=None if source.colors is None else source.colors[kept.source],
+        kinds=tuple(source.kinds[i] for i in used_object.tolist()) if source.kinds else (),
+        storeys=_storeys(source, space),
         space=space,
         notes=findings.notes,
         files=tuple(findings.folder.sought),
@@ -227,6 +230,13 @@ def _two_sided(kept: KeptFaces, source: Source) -> NDArray[np.bool_]:
         backed[source.triangle_material[standing]],
     )
     return result & ~kept.paired
+
+
+def _storeys(source: Source, space: Space) -> tuple[Storey, ...]:
+    """Its storeys, the lowest first."""
+    floor = space.origin[1 if space.up == "y" else 2]
+    raised = [Storey(s.name, (s.height - floor) * space.metres) for s in source.storeys]
+    return tuple(sorted(raised, key=lambda storey: storey.height))
 
 
 def _camera(camera: Camera, space: Space) -> Camera:

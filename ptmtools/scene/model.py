@@ -20,6 +20,9 @@ from ptmtools.store.checked import Stored
 from ptmtools.tolerance import Tolerance
 
 Wrap = Literal["repeat", "clamp"]
+#: What an object is by the class that its format gives it: a part of the structure, never a part of
+#: it, a door leaf, or "" where that is left to its shape and name.
+Kind = Literal["structural", "detail", "door", ""]
 
 
 @dataclass(frozen=True)
@@ -99,6 +102,14 @@ class Camera:
 
 
 @dataclass(frozen=True)
+class Storey:
+    """A storey as the model names it, and the height of its floor in world metres."""
+
+    name: str
+    height: float
+
+
+@dataclass(frozen=True)
 class Note:
     """Something ingest did or missed: stable code, one line of text, where, and how often."""
 
@@ -124,6 +135,10 @@ class Scene:
     objects: names, unique not required.
     tolerance: what counts as equal, as flat and as open; derived here, once, for all stages.
     materials, images, cameras: see their classes.
+    colors: (T, 3, 3) uint8 sRGB per corner, multiplied with the material's and the image's; None if
+        no corner has a colour of its own.
+    kinds: (of `objects`) what each is by its class; empty if the format knows no classes.
+    storeys: those that the model names, from the lowest.
     space: how the model was brought to world coordinates.
     notes: what was dropped, missed or guessed, in the order of the model file.
     files: what was read or looked for beside the model file, relative to its folder, "/" between
@@ -141,6 +156,9 @@ class Scene:
     tolerance: Tolerance
     images: tuple[SourceImage, ...] = ()
     cameras: tuple[Camera, ...] = ()
+    colors: NDArray[np.uint8] | None = None
+    kinds: tuple[Kind, ...] = ()
+    storeys: tuple[Storey, ...] = ()
     space: Space = Space((0.0, 0.0, 0.0), 1.0, "y")
     notes: tuple[Note, ...] = ()
     files: tuple[str, ...] = field(default=(), compare=False)
@@ -169,9 +187,12 @@ class Scene:
             "cameras": [vars(c) for c in self.cameras],
             "space": vars(self.space),
             "notes": [vars(n) for n in self.notes],
+            **({"kinds": self.kinds} if self.kinds else {}),
+            **({"storeys": [vars(s) for s in self.storeys]} if self.storeys else {}),
         }
+        colors = {} if self.colors is None else {"colors": self.colors}
         text = json.dumps(about, sort_keys=True, ensure_ascii=False)
-        return {
+        return colors | {
             "points": self.points,
             "triangles": self.triangles,
             "uv": self.uv,
@@ -207,14 +228,23 @@ class Scene:
             triangle_object=stored.indices("triangle_object", np.int32, n, high=len(objects)),
             triangle_material=stored.indices("triangle_material", np.int32, n, high=len(materials)),
             two_sided=stored.array("two_sided", np.bool_, n),
+            colors=stored.array("colors", np.uint8, n, 3, 3) if "colors" in arrays else None,
             objects=objects,
             materials=materials,
             tolerance=Tolerance.for_extent(stored.array("extent", np.float64, finite=True).item()),
             images=images,
             cameras=tuple(Camera(**_fields(row)) for row in about["cameras"]),
+            kinds=_kinds(about.get("kinds", []), len(objects)),
+            storeys=tuple(Storey(**row) for row in about.get("storeys", [])),
             space=Space(**_fields(about["space"])),
             notes=tuple(Note(**row) for row in about["notes"]),
         )
+
+
+def _kinds(given: Sequence[Kind], objects: int) -> tuple[Kind, ...]:
+    if given and len(given) != objects:
+        raise ValueError("there are not as many kinds as objects")
+    return tuple(given)
 
 
 def _fields(row: Mapping[str, Any]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ cleaned.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, LimitError
 from ptmtools.files import open_regular
-from ptmtools.scene.model import Camera, Note, Wrap
+from ptmtools.scene.model import Camera, Kind, Note, Storey, Wrap
 from ptmtools.scene.reference import Folder
 
 #: `Scene.triangles` is int32: more vertices cannot be numbered.
@@ -122,6 +122,8 @@ class SourceMaterial:
 class Source:
     """Triangles in the file's units and axes.
 
+    What a format does not say is left out: its default.
+
     Attributes
     ----------
     points: (P, 3) float64, may be non-finite, unused or repeated.
@@ -130,6 +132,10 @@ class Source:
     triangle_object, triangle_material: (T,) int64.
     objects, materials, cameras: see `ptmtools.scene.model`; cameras in the file's space.
     metres, up: fixed by the format (glTF), else None.
+    colors: (T, 3, 3) uint8 sRGB per corner, multiplied with the material's; None where no surface
+        has any.
+    kinds: what each object is by its class (IFC); empty where the format knows no classes.
+    storeys: named by the file, their heights along its up axis in its units.
     """
 
     points: NDArray[np.float64]
@@ -142,6 +148,9 @@ class Source:
     cameras: tuple[Camera, ...] = ()
     metres: float | None = None
     up: Literal["y", "z"] | None = None
+    colors: NDArray[np.uint8] | None = None
+    kinds: tuple[Kind, ...] = ()
+    storeys: tuple[Storey, ...] = ()
 
 
 class Findings:
@@ -187,6 +196,16 @@ class Findings:
         elif found.outcome == "elsewhere":
             self.say("PTM-N208", f"{what}: found as {self.folder.label(found.path)}", place)
         return found.path
+
+    def told(self) -> list[tuple[str, str, str, int, bool]]:
+        """All of them, for `take` in another process."""
+        missed = set(self._misses)
+        return [(*key, count, key in missed) for key, count in self._notes.items()]
+
+    def take(self, told: Iterable[tuple[str, str, str, int, bool]]) -> None:
+        """Record what others have `told`."""
+        for code, message, place, count, missed in told:
+            (self.miss if missed else self.say)(code, message, place, count)
 
     @property
     def notes(self) -> tuple[Note, ...]:

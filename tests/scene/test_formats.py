@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ptmtools.errors import InputError, LimitError, MissingComponentError
-from ptmtools.scene import ingest, meshlab
+from ptmtools.scene import apart, ingest, meshlab
 from ptmtools.scene.formats import read_other
 from ptmtools.scene.source import Findings
 
@@ -137,7 +137,12 @@ def test_heads_that_lie(put: Put, pymeshlab: None, name: str) -> None:
         ("import os; os.abort()", "it ended with status -6"),
         ("print('noise')", "it ended with status 0"),
         ("import time; time.sleep(60)", "it did not end in 1 s"),
-        ("print('noise', '{\"fault\": \"no\"}', sep='\\n')", "cannot read it (no)"),
+        ("print('noise\\nptmtools answers: {\"fault\": \"no\"}')", "cannot read it (no)"),
+        (
+            "print('ptmtools answers: {\"error\": [\"InputError\", {\"code\": \"PTM-I254\", '"
+            "'\"message\": \"is no good\", \"file\": \"a.dae\"}]}')",
+            "a.dae: is no good",
+        ),
     ],
 )
 def test_a_reader_that_fails_does_no_harm(
@@ -147,7 +152,7 @@ def test_a_reader_that_fails_does_no_harm(
     command = put("python", f"#!{sys.executable}\n{program}\n")
     command.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(command))
-    monkeypatch.setattr(meshlab, "_SECONDS", 1.0)
+    monkeypatch.setattr(apart, "_SECONDS", 1.0)
     with pytest.raises(InputError, match=r"a\.dae.*PTM-I254") as caught:
         ingest(path)
     assert message in str(caught.value)
