@@ -26,7 +26,7 @@ MAGIC, JSON, BINARY = b"glTF", b"JSON", b"BIN\0"
 _HEADER, _CHUNK = struct.Struct("<4sII"), struct.Struct("<I4s")
 #: Component types, and how many components an element has.
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-ITEMS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
+ITEMS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
 
 def glb(chunks: Iterable[tuple[bytes, bytes]]) -> bytes:

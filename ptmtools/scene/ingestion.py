@@ -188,7 +188,7 @@ def _read(model: Path, findings: Findings, progress: Progress, max_triangles: in
 
             return read_obj(model, findings, progress, max_triangles)
         if suffix in (".glb", ".gltf"):
-            from ptmtools.scene.gltf import read_gltf
+            from ptmtools.scene.gltf.reader import read_gltf
 
             return read_gltf(model, findings, max_triangles)
         from ptmtools.scene.formats import read_other

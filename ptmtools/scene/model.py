@@ -19,7 +19,7 @@ from ptmtools.scene.orientation import tolerance_of
 from ptmtools.store.checked import Stored
 from ptmtools.tolerance import Tolerance
 
-Wrap = Literal["repeat", "clamp"]
+Wrap = Literal["repeat", "clamp", "mirror"]
 #: What an object is by the class that its format gives it: a part of the structure, never a part of
 #: it, a door leaf, or "" where that is left to its shape and name.
 Kind = Literal["structural", "detail", "door", ""]

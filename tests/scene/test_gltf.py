@@ -298,18 +298,10 @@ DAMAGED: dict[str, tuple[str, bytes]] = {
     "negative child": ("PTM-I249", broken(lambda d: d.tree["nodes"][0].update(children=[-1]))),
     "a ring of nodes": ("PTM-I249", broken(lambda d: d.tree["nodes"][0].update(children=[0]))),
     "a matrix of 3": ("PTM-I249", broken(lambda d: d.tree["nodes"][0].update(matrix=[1, 2, 3]))),
-    "sparse": ("PTM-I255", broken(lambda d: d.tree["accessors"][0].update(sparse={"count": 1}))),
-    "compressed": (
+    "sparse": ("PTM-I249", broken(lambda d: d.tree["accessors"][0].update(sparse={"count": 1}))),
+    "unknown": (
         "PTM-I255",
-        broken(lambda d: d.tree.update(extensionsRequired=["EXT_meshopt_compression"])),
-    ),
-    "draco": (
-        "PTM-I255",
-        broken(
-            lambda d: d.tree["meshes"][0]["primitives"][0].update(
-                extensions={"KHR_draco_mesh_compression": {}}
-            )
-        ),
+        broken(lambda d: d.tree.update(extensionsRequired=["EXT_texture_avif"])),
     ),
     "types all wrong": ("PTM-I249", broken(lambda d: d.tree.update(meshes={"a": 1}))),
 }

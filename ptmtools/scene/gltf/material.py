@@ -7,6 +7,7 @@ texel then differs from the linear product for partial tints, and the conversion
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 from urllib.parse import unquote
@@ -14,11 +15,14 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.scene.gltf_document import Document, data_uri
+from ptmtools.scene.colors import to_srgb
+from ptmtools.scene.gltf.document import Document, data_uri
+from ptmtools.scene.ktx2 import TranscodedBytes
 from ptmtools.scene.model import Wrap
 from ptmtools.scene.source import FileRange, Findings, HeldBytes, SourceMaterial, Texture
 
-_CLAMP, _MIRROR = 33071, 33648
+_KTX2 = "image/ktx2"
+_WRAPS: dict[int | None, Wrap] = {33071: "clamp", 33648: "mirror"}
 
 
 @dataclass(frozen=True)
@@ -30,11 +34,13 @@ class Painted:
     index: into `MaterialReader.materials`.
     coords: the attribute with its texture coordinates.
     matrix: (2, 3) KHR_texture_transform, origin at the upper left as glTF has it.
+    see_through: whether it has an alpha mode other than opaque.
     """
 
     index: int
     coords: str
     matrix: NDArray[np.float64]
+    see_through: bool
 
 
 class MaterialReader:
@@ -71,6 +77,7 @@ class MaterialReader:
         r, g, b, a = (min(max(float(value), 0.0), 1.0) for value in factor)
         if (r, g, b) != (1.0, 1.0, 1.0):
             self._findings.say("PTM-N226", f"{name}: colour factor converted to sRGB", place)
+        red, green, blue = to_srgb(np.array([r, g, b], dtype=np.float64)).tolist()
         mode = entry.get("alphaMode", "OPAQUE")
         see_through = mode in ("MASK", "BLEND")
         if extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0) > 0:
@@ -90,22 +97,23 @@ class MaterialReader:
         self._materials.append(
             SourceMaterial(
                 name=name,
-                color=(_encoded(r), _encoded(g), _encoded(b)),
+                color=(red, green, blue),
                 opacity=a if mode == "BLEND" else 1.0,
                 see_through=see_through,
+                cutoff=_cutoff(entry, a) if mode == "MASK" else None,
                 two_sided=bool(entry.get("doubleSided", False)),
                 texture=texture,
             )
         )
-        return Painted(len(self._materials) - 1, coords, matrix)
+        return Painted(len(self._materials) - 1, coords, matrix, see_through)
 
     def _texture(self, index: int, place: str) -> Texture | None:
         tree = self._document.tree
         texture = tree["textures"][index]
         sampler = tree["samplers"][texture["sampler"]] if "sampler" in texture else {}
-        source = texture.get("source")
-        for name in ("EXT_texture_webp", "KHR_texture_basisu"):
-            source = texture.get("extensions", {}).get(name, {}).get("source", source)
+        sources = [texture, *texture.get("extensions", {}).values()]
+        # The texture's own image is that for programs without extensions, with the least loss.
+        source = next((each["source"] for each in sources if "source" in each), None)
         what = f"texture {index}"
         if source is None:
             self._findings.miss("PTM-N204", f"{what}: names no image", place)
@@ -115,7 +123,7 @@ class MaterialReader:
         label = str(image.get("name") or f"image_{source}")
         if "bufferView" in image:
             buffer, start, length = self._document.view(image["bufferView"])
-            read = buffer.part(start, length)
+            read: Callable[[], bytes] = buffer.part(start, length)
         elif uri is not None and uri.startswith("data:"):
             read = HeldBytes(data_uri(self._document.path, uri, f"image {source}"))
         else:
@@ -124,26 +132,21 @@ class MaterialReader:
             if file is None:
                 return None
             read, label = FileRange(file), file.name
+        packed = image.get("mimeType") == _KTX2 or label.lower().endswith(".ktx2")
         return Texture(
-            read=read,
+            read=TranscodedBytes(read) if packed else read,
             label=label,
             what=what,
             place=place,
-            wrap_s=self._wrap(sampler.get("wrapS"), what, place),
-            wrap_t=self._wrap(sampler.get("wrapT"), what, place),
+            wrap_s=_WRAPS.get(sampler.get("wrapS"), "repeat"),
+            wrap_t=_WRAPS.get(sampler.get("wrapT"), "repeat"),
         )
 
-    def _wrap(self, mode: int | None, what: str, place: str) -> Wrap:
-        if mode == _MIRROR:
-            self._findings.say("PTM-N222", f"{what}: mirrored repeat becomes repeat", place)
-        return "clamp" if mode == _CLAMP else "repeat"
 
-
-def _encoded(linear: float) -> float:
-    """Linear light to sRGB (IEC 61966-2-1)."""
-    if linear <= 0.0031308:
-        return 12.92 * linear
-    return 1.0 if linear >= 1 else float(1.055 * linear ** (1 / 2.4) - 0.055)
+def _cutoff(entry: dict[str, Any], alpha: float) -> float:
+    """The least alpha of a texel that is drawn, where all are multiplied with ``alpha``."""
+    least = float(entry.get("alphaCutoff", 0.5))
+    return min(max(least / alpha, 0.0), 1.0) if alpha > 0 else 1.0
 
 
 def _transform(given: dict[str, Any]) -> NDArray[np.float64]:

@@ -2,7 +2,8 @@
 
 GLB chunks, data URIs and separate files all become `Buffer`s; sizes and ranges are checked
 before anything is made of them (glTF 2.0, sections 3.6 and 4.4). A file that several buffers name
-is read once, and no more of it than the longest of them.
+is read once, and no more of it than the longest of them. A buffer may have no bytes where all its
+views are compressed (`meshopt`): these are decompressed when they are first asked for.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import binascii
 import json
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,14 +22,27 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import InputError
+from ptmtools.errors import InputError, LimitError
 from ptmtools.files import open_regular
-from ptmtools.glb import BINARY, MAGIC, elements, glb_chunks, meaning, natural
+from ptmtools.glb import (
+    BINARY,
+    COMPONENTS,
+    ITEMS,
+    MAGIC,
+    elements,
+    glb_chunks,
+    meaning,
+    natural,
+)
+from ptmtools.scene.gltf.meshopt import EXTENSIONS, decode as decode_view
 from ptmtools.scene.reference import Folder
 from ptmtools.scene.source import FileRange, HeldBytes, decode
 
 #: How JSON writes halves of characters of UTF-16, of which one alone is no text.
 _HALF = re.compile(r"\\u[dD][89a-fA-F]")
+#: All that is compressed may take so many bytes, and so many for each byte of the buffers besides:
+#: attributes that are all alike take a thousandth of what they are decompressed to.
+_DECODED, _DECODED_PER_BYTE = 1 << 30, 100
 
 
 @dataclass(frozen=True)
@@ -46,35 +60,94 @@ class Buffer:
         return FileRange(self.path, self.offset + start, length)
 
 
-@dataclass(frozen=True)
 class Document:
-    """A glTF model: its file, the parsed JSON and its buffers in order."""
+    """A glTF model: its file, the parsed JSON and its buffers in order, None where one has no
+    bytes of its own."""
 
-    path: Path
-    tree: dict[str, Any]
-    buffers: tuple[Buffer, ...]
+    def __init__(self, path: Path, tree: dict[str, Any], buffers: Sequence[Buffer | None]) -> None:
+        self.path, self.tree = path, tree
+        self._buffers = buffers
+        self._decoded: dict[int, Buffer] = {}
+        there = sum(len(buffer.data) for buffer in buffers if buffer is not None)
+        self._left = _DECODED + _DECODED_PER_BYTE * there
 
     def view(self, index: int) -> tuple[Buffer, int, int]:
-        """Buffer, start and length of a buffer view; ValueError if it leaves the buffer."""
+        """Buffer, start and length of a buffer view; ValueError if it leaves the buffer or is
+        damaged, LimitError PTM-L205."""
         view = self.tree["bufferViews"][natural(index)]
-        buffer = self.buffers[natural(view["buffer"])]
-        start, length = natural(view.get("byteOffset", 0)), natural(view["byteLength"])
+        extensions = view.get("extensions", {})
+        compressed = next((extensions[name] for name in EXTENSIONS if name in extensions), None)
+        if compressed is None:
+            return self._part(view, f"buffer view {index}")
+        if index not in self._decoded:
+            self._decoded[index] = self._decompressed(index, compressed)
+        buffer = self._decoded[index]
+        length = natural(view["byteLength"])
+        if length > len(buffer.data):
+            raise ValueError(f"buffer view {index} ends beyond what it decompresses to")
+        return buffer, 0, length
+
+    def _decompressed(self, index: int, compressed: dict[str, Any]) -> Buffer:
+        size = natural(compressed["count"]) * natural(compressed["byteStride"])
+        self._left -= size
+        if self._left < 0:
+            raise LimitError(
+                "PTM-L205",
+                f"decompresses to {size >> 20:,} MiB, and more than can be meant with what is "
+                "decompressed before",
+                file=self.path,
+                place=f"buffer view {index}",
+                remedy="export it without compression",
+            )
+        buffer, start, length = self._part(compressed, f"buffer view {index}")
+        return Buffer(decode_view(buffer.data[start : start + length], compressed), None)
+
+    def _part(self, part: dict[str, Any], place: str) -> tuple[Buffer, int, int]:
+        number = natural(part["buffer"])
+        buffer = self._buffers[number]
+        start, length = natural(part.get("byteOffset", 0)), natural(part["byteLength"])
+        if buffer is None:
+            raise ValueError(f"buffer {number} has no bytes")
         if start + length > len(buffer.data):
-            raise ValueError(f"buffer view {index} ends beyond its buffer")
+            raise ValueError(f"{place} ends beyond its buffer")
         return buffer, start, length
 
     def values(self, index: int) -> NDArray[np.float64]:
-        """(count, items) the numbers of an accessor. Raises ValueError, LookupError or TypeError
-        if it is damaged, NotImplementedError if it is sparse or has no buffer view."""
+        """(count, items) the numbers of an accessor (section 3.6.2), of which a sparse one has some
+        others than its buffer view, or than 0.
+
+        Raises ValueError, LookupError or TypeError if it is damaged, LimitError PTM-L205.
+        """
         accessor = self.tree["accessors"][natural(index)]
-        if "sparse" in accessor or "bufferView" not in accessor:
-            raise NotImplementedError(f"accessor {index} is sparse or has no buffer view")
-        view = self.tree["bufferViews"][natural(accessor["bufferView"])]
         try:
-            stored = elements(accessor, view, self.buffers[natural(view["buffer"])].data)
+            if "bufferView" in accessor:
+                stored = self._elements(accessor, accessor["bufferView"])
+            else:
+                shape = natural(accessor["count"]), ITEMS[accessor["type"]]
+                stored = np.zeros(shape, np.dtype(COMPONENTS[accessor["componentType"]]))
+            if "sparse" in accessor:
+                stored = self._with_others(stored, accessor)
         except ValueError as error:
             raise ValueError(f"accessor {index}: {error}") from None
         return meaning(stored, bool(accessor.get("normalized")))
+
+    def _with_others(self, stored: NDArray[Any], accessor: dict[str, Any]) -> NDArray[Any]:
+        """The elements of a sparse accessor (section 3.6.2.3)."""
+        sparse = accessor["sparse"]
+        count = natural(sparse["count"])
+        form = sparse["indices"] | {"count": count, "type": "SCALAR"}
+        place = self._elements(form, form["bufferView"]).ravel()
+        if not (np.diff(place.astype(np.int64)) > 0).all() or place[-1] >= len(stored):
+            raise ValueError("its sparse indices do not rise, or end beyond its elements")
+        form = accessor | {"count": count, "byteOffset": sparse["values"].get("byteOffset", 0)}
+        found = stored.copy()
+        found[place] = self._elements(form, sparse["values"]["bufferView"])
+        return found
+
+    def _elements(self, accessor: dict[str, Any], view: int) -> NDArray[Any]:
+        buffer, start, length = self.view(view)
+        place = {"byteOffset": start, "byteLength": length}
+        return elements(accessor, self.tree["bufferViews"][view] | place, buffer.data)
 
 
 def damaged(path: Path, what: str, place: str | None = None) -> InputError:
@@ -131,18 +204,20 @@ def _no_constant(name: str) -> float:
 
 def _buffers(
     path: Path, tree: dict[str, Any], folder: Folder, binary: Buffer | None
-) -> list[Buffer]:
-    """The buffers of a document, in order."""
-    found: list[Buffer | Path] = []
+) -> list[Buffer | None]:
+    """The buffers of a document, in order; None for those that only stand for what is compressed
+    elsewhere."""
+    found: list[Buffer | Path | None] = []
     lengths: list[int] = []
     longest: dict[Path, int] = {}
     for index, entry in enumerate(tree.get("buffers", [])):
         place = f"buffer {index}"
         lengths.append(natural(entry["byteLength"]))
-        if "uri" not in entry:
-            if binary is None or index:
-                raise damaged(path, "a buffer has no bytes", place)
-            found.append(binary)
+        extensions = entry.get("extensions", {})
+        if any(extensions.get(name, {}).get("fallback") for name in EXTENSIONS):
+            found.append(None)
+        elif "uri" not in entry:
+            found.append(None if index else binary)
         elif str(entry["uri"]).startswith("data:"):
             found.append(Buffer(data_uri(path, entry["uri"], place), None))
         else:
@@ -156,7 +231,7 @@ def _buffers(
             read[file] = Buffer(stream.read(min(length, os.fstat(stream.fileno()).st_size)), file)
     buffers = [read[entry] if isinstance(entry, Path) else entry for entry in found]
     for index, (buffer, length) in enumerate(zip(buffers, lengths, strict=True)):
-        if len(buffer.data) < length:
+        if buffer is not None and len(buffer.data) < length:
             raise damaged(
                 path, f"{length} bytes expected, {len(buffer.data)} found", f"buffer {index}"
             )

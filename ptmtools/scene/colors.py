@@ -1,0 +1,20 @@
+"""Linear light and sRGB (IEC 61966-2-1)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Floats
+
+
+def to_srgb(light: Floats) -> Floats:
+    """Linear light, any shape, as it is encoded in sRGB, both from 0 to 1; what is outside, and
+    what is no number, is brought into that."""
+    held = np.clip(np.nan_to_num(light, nan=0.0), 0.0, 1.0)
+    return np.where(held <= 0.0031308, 12.92 * held, 1.055 * held ** (1 / 2.4) - 0.055)
+
+
+def encoded(light: Floats) -> NDArray[np.uint8]:
+    """Linear light as bytes of sRGB."""
+    return np.rint(255 * to_srgb(light)).astype(np.uint8)

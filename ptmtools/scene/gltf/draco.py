@@ -1,0 +1,78 @@
+"""Decodes primitives compressed with Draco (KHR_draco_mesh_compression), in a process of its own.
+
+As a program: ``python -P -m ptmtools.scene.gltf.draco MEMORY FOLDER COUNT`` reads ``0.drc``, … in
+the folder and writes ``0.npz``, …
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.errors import MissingComponentError
+from ptmtools.scene.apart import run_apart, serve
+from ptmtools.scene.gltf.document import Document
+from ptmtools.store.archive import pack_arrays, unpack_arrays
+
+EXTENSION = "KHR_draco_mesh_compression"
+
+
+@dataclass(frozen=True)
+class Decoded:
+    """A primitive: (m, 3) ``triangles``, and attributes by their ids, (n, items) as stored."""
+
+    triangles: NDArray[np.int64]
+    attributes: dict[int, NDArray[Any]]
+
+
+def decode_primitives(document: Document, views: Iterable[int]) -> dict[int, Decoded]:
+    """The primitives that these buffer views hold.
+
+    Raises ValueError for a view that leaves its buffer, InputError PTM-I254 for what cannot be
+    decoded, MissingComponentError PTM-M203 without DracoPy.
+    """
+    wanted = sorted(set(views))
+    if not wanted:
+        return {}
+    if find_spec("DracoPy") is None:
+        raise MissingComponentError(
+            "PTM-M203",
+            "DracoPy is needed for meshes compressed with Draco",
+            file=document.path,
+            remedy="pip install DracoPy",
+        )
+    found = {}
+    with tempfile.TemporaryDirectory() as scratch:
+        for k, view in enumerate(wanted):
+            buffer, start, length = document.view(view)
+            Path(scratch, f"{k}.drc").write_bytes(buffer.data[start : start + length])
+        run_apart(__name__, "Draco", document.path, scratch, str(len(wanted)))
+        for k, view in enumerate(wanted):
+            file = Path(scratch, f"{k}.npz")
+            arrays = unpack_arrays(file.read_bytes(), file=file)
+            triangles = arrays.pop("triangles").astype(np.int64)
+            attributes = {int(name.removeprefix("id_")): array for name, array in arrays.items()}
+            found[view] = Decoded(triangles, attributes)
+    return found
+
+
+def _decode_here(folder: str, count: str) -> None:
+    import DracoPy
+
+    for k in range(int(count)):
+        mesh = DracoPy.decode(Path(folder, f"{k}.drc").read_bytes())
+        arrays = {f"id_{row['unique_id']}": np.asarray(row["data"]) for row in mesh.attributes}
+        faces = getattr(mesh, "faces", np.zeros((0, 3)))
+        arrays["triangles"] = np.asarray(faces, dtype=np.uint32).reshape(-1, 3)
+        Path(folder, f"{k}.npz").write_bytes(pack_arrays(arrays))
+
+
+if __name__ == "__main__":
+    serve(_decode_here)
