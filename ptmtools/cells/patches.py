@@ -31,6 +31,8 @@ def patches(scene: Scene, triangle: Ints, corner: Ints, may: Bools, tolerance: T
     """
     edge, one, other = _opposite(corner)
     corners, uv = scene.corners[triangle], scene.uv[triangle]
+    if scene.colors is not None:  # they differ where they are a level of 255 apart
+        uv = np.concatenate([uv, 2 * _UV * scene.colors[triangle].astype(np.float64)], axis=2)
     flat, same = _continues(corners, uv, one // 3, other // 3, tolerance)
     back = _continues(corners, uv, other // 3, one // 3, tolerance)
     flat, same = flat & back[0], same & back[1]
@@ -80,7 +82,7 @@ def _continues(
     corners: Floats, uv: Floats, one: Ints, other: Ints, tolerance: Tolerance
 ) -> tuple[Bools, Bools]:
     """Whether triangles ``other`` lie in the planes of triangles ``one`` and face the same way, and
-    whether they have the texture coordinates that these would have there."""
+    whether they have the texture coordinates (and colours) that these would have there."""
     origin = corners[one, 0]
     a, b = corners[one, 1] - origin, corners[one, 2] - origin
     aa, ab, bb = (np.einsum("ij,ij->i", p, q) for p, q in ((a, a), (a, b), (b, b)))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
 from ptmtools.database.floats import single
+from ptmtools.scene.mapping import gradients
 from ptmtools.scene.model import Scene
 
 
@@ -29,6 +30,7 @@ class Shape:
     two_sided: whether both sides are seen.
     point, uv: (n,), (k,) rows of `Geometry.point` and `Geometry.uv`.
     triangle, uv_triangle: (m, 3) indices into `point` and `uv`.
+    color: (m, 3, 3) uint8 sRGB of the corners, None where all are white.
     """
 
     object: int
@@ -38,6 +40,7 @@ class Shape:
     uv: NDArray[np.int64]
     triangle: NDArray[np.int64]
     uv_triangle: NDArray[np.int64]
+    color: NDArray[np.uint8] | None = None
 
 
 class Geometry:
@@ -55,6 +58,7 @@ class Geometry:
     triangle_start: (S + 1,) the triangles of each shape.
     shape_point, point_start: (P,) rows of `point`, ascending; (S + 1,) those of each shape.
     shape_uv, uv_start: the same for `uv`.
+    color: (M, 3, 3) uint8 sRGB of the corners of triangles; None if the scene has no colours.
     collapsed: pieces dropped by the rounding, over all cells.
     """
 
@@ -85,6 +89,7 @@ class Geometry:
         self.shape_point, self.point_start, self.triangle = _indexed(
             corner[order], shape, len(first), len(self.point)
         )
+        self.color = _corner_colors(scene, cells, piece[order])
         uv_corner = uv_of[cells.triangle[piece[order]]].reshape(-1, 3)
         self.shape_uv, self.uv_start, self.uv_triangle = _indexed(
             uv_corner, shape, len(first), len(self.uv)
@@ -115,11 +120,26 @@ class Geometry:
             self.shape_uv[uvs],
             self.triangle[rows],
             self.uv_triangle[rows],
+            None if self.color is None or (self.color[rows] == 255).all() else self.color[rows],
         )
 
     def shapes(self, cell: int) -> Iterator[Shape]:
         """The shapes of a cell."""
         return map(self.shape, range(*self.cell_start[cell : cell + 2].tolist()))
+
+
+def _corner_colors(
+    scene: Scene, cells: Cells, piece: NDArray[np.integer]
+) -> NDArray[np.uint8] | None:
+    """(M, 3, 3) the colours of pieces' corners, each as its triangle of the scene goes on there;
+    None if the scene has none."""
+    if scene.colors is None:
+        return None
+    source = cells.triangle_source[piece]
+    corners, colors = scene.corners[source], scene.colors[source].astype(np.float64)
+    away = cells.vertex[cells.triangle[piece]] - corners[:, :1]
+    found = colors[:, :1] + np.einsum("mkx,mcx->mck", gradients(corners, colors), away)
+    return np.asarray(np.clip(np.rint(found), 0, 255).astype(np.uint8))
 
 
 def _indexed(

@@ -18,3 +18,20 @@ def to_srgb(light: Floats) -> Floats:
 def encoded(light: Floats) -> NDArray[np.uint8]:
     """Linear light as bytes of sRGB."""
     return np.rint(255 * to_srgb(light)).astype(np.uint8)
+
+
+def to_linear(encoded: Floats) -> Floats:
+    """The inverse of `to_srgb`."""
+    held = np.clip(encoded, 0.0, 1.0)
+    return np.where(held <= 0.04045, held / 12.92, ((held + 0.055) / 1.055) ** 2.4)
+
+
+def packed(colors: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """(...,) a number for each of (..., 3) colours."""
+    red, green, blue = np.moveaxis(colors.astype(np.int64), -1, 0)
+    return np.asarray(red << 16 | green << 8 | blue)
+
+
+def unpacked(numbers: NDArray[np.int64]) -> NDArray[np.uint8]:
+    """The inverse of `packed`."""
+    return np.stack([numbers >> 16, numbers >> 8, numbers], axis=-1).astype(np.uint8)

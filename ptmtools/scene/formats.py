@@ -10,6 +10,7 @@ from __future__ import annotations
 import tempfile
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,8 +85,6 @@ def _read_trimesh(path: Path, findings: Findings) -> Source:
         local = np.asarray(mesh.vertices, dtype=np.float64)
         if len(faces) and not 0 <= faces.min() <= faces.max() < len(local):
             raise InputError("PTM-I246", "a face names a vertex that does not exist", file=path)
-        if getattr(mesh.visual, "kind", None) in ("vertex", "face"):
-            findings.say("PTM-N223", "colours of vertices and faces are not carried over")
         parts.append(
             Source(
                 points=local @ matrix[:3, :3].T + matrix[:3, 3],
@@ -95,11 +94,23 @@ def _read_trimesh(path: Path, findings: Findings) -> Source:
                 triangle_material=np.zeros(len(faces), dtype=np.int64),
                 objects=(path.stem if len(scene.geometry) == 1 else str(geometry),),
                 materials=(SourceMaterial("default"),),
+                colors=_colors(mesh, faces),
             )
         )
     joined = _joined(path, parts)
     material = np.zeros_like(joined.triangle_material)
     return replace(joined, materials=joined.materials[:1], triangle_material=material)
+
+
+def _colors(mesh: Any, faces: NDArray[np.int64]) -> NDArray[np.uint8] | None:
+    """(T, 3, 3) sRGB of corners, if vertices or faces have colours of their own."""
+    kind = getattr(mesh.visual, "kind", None)
+    if kind == "vertex":
+        return np.asarray(mesh.visual.vertex_colors, dtype=np.uint8)[faces, :3]
+    if kind == "face":
+        each = np.asarray(mesh.visual.face_colors, dtype=np.uint8)[:, None, :3]
+        return np.repeat(each, 3, axis=1)
+    return None
 
 
 def _read_meshlab(path: Path, findings: Findings, max_triangles: int) -> Source:
@@ -133,4 +144,15 @@ def _joined(path: Path, parts: list[Source]) -> Source:
         triangle_material=counted_on("triangle_material", "materials"),
         objects=tuple(name for part in parts for name in part.objects),
         materials=tuple(material for part in parts for material in part.materials),
+        colors=_joined_colors(parts),
+    )
+
+
+def _joined_colors(parts: list[Source]) -> NDArray[np.uint8] | None:
+    """Those of all parts, white in parts that have none."""
+    if all(part.colors is None for part in parts):
+        return None
+    white = (np.full((len(part.triangles), 3, 3), 255, np.uint8) for part in parts)
+    return np.concatenate(
+        [w if part.colors is None else part.colors for w, part in zip(white, parts, strict=True)]
     )

@@ -13,8 +13,15 @@ from typing import Any
 import numpy as np
 
 from ptmtools.scene.apart import run_apart, unreadable
-from ptmtools.scene.model import Camera, Storey, Wrap
-from ptmtools.scene.source import FileRange, Findings, Source, SourceMaterial, Texture
+from ptmtools.scene.model import Camera, Storey
+from ptmtools.scene.source import (
+    FileRange,
+    Findings,
+    Source,
+    SourceMaterial,
+    SourceWrap,
+    Texture,
+)
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.checked import Stored
 
@@ -37,8 +44,8 @@ class NamedImage:
 
     name: str
     place: str
-    wrap_s: Wrap = "repeat"
-    wrap_t: Wrap = "repeat"
+    wrap_s: SourceWrap = "repeat"
+    wrap_t: SourceWrap = "repeat"
     offset: int | None = None
     length: int | None = None
 

@@ -110,7 +110,7 @@ class ImageStore:
         self._index: dict[str, int] = {}
         self._images: list[SourceImage] = []
         self._files: list[set[str]] = []
-        self._masks: set[str] = set()
+        self._parts: set[str] = set()
         self._stems: set[str] = set()
 
     @property
@@ -118,7 +118,7 @@ class ImageStore:
         return tuple(
             replace(
                 image,
-                plain=image.plain and self._masks.isdisjoint(files),
+                plain=image.plain and self._parts.isdisjoint(files),
                 files=tuple(sorted(files)),
             )
             for image, files in zip(self._images, self._files, strict=True)
@@ -162,14 +162,22 @@ class ImageStore:
         name = Path(os.path.relpath(read.path, folder.root)).as_posix()
         return name if name in folder.sought else None
 
-    def mask_holes(self, mask: Texture) -> NDArray[np.bool_] | None:
-        """(H, W) which texels of a mask (``map_d``) are not opaque; all, if it is unreadable."""
-        if file := self._whole_file(mask):
-            self._masks.add(file)
+    def made_into_another(self, texture: Texture) -> None:
+        """To be told of an image of whose texels another one is made."""
+        if file := self._whole_file(texture):
+            self._parts.add(file)
+
+    def masks(self, mask: Texture) -> bool | None:
+        """Whether some texel of a mask (``map_d``) is not opaque; None (and a miss is recorded) if
+        it cannot be decoded."""
         found = self._sound(mask, mask.channel)
-        if found is None:
-            return np.ones((1, 1), dtype=bool)
-        return found.holes
+        return None if found is None else found.bits is not None
+
+    def has_alpha(self, texture: Texture) -> bool | None:
+        """Whether an image has an alpha channel; None (and a miss is recorded) if it cannot be
+        decoded."""
+        found = self._sound(texture)
+        return None if found is None else found.alpha
 
     def _sound(self, texture: Texture, channel: str | None = None) -> _Examined | None:
         """What `_examine` finds, once; None (and a miss is recorded) if that is a fault."""

@@ -21,13 +21,15 @@ from ptmtools.progress import Progress, silent
 from ptmtools.scene.faces import KeptFaces, keep_faces
 from ptmtools.scene.facing import TURNED_AWAY, turned_away
 from ptmtools.scene.images import ImageStore
+from ptmtools.scene.masks import masked
 from ptmtools.scene.model import Camera, Material, Scene, Space, Storey
 from ptmtools.scene.options import IngestOptions
 from ptmtools.scene.orientation import tolerance_of
 from ptmtools.scene.signs import Named
-from ptmtools.scene.source import MAX_VERTICES, Findings, Source
+from ptmtools.scene.source import MAX_VERTICES, Findings, Source, SourceMaterial
 from ptmtools.scene.space import Said, parse_unit, settle, to_world, turned
 from ptmtools.scene.texels import uses_holes
+from ptmtools.scene.wrapping import told, unmirrored
 
 #: Colours where the model gives none: plain faces, and a tint that leaves an image as it is.
 PLAIN, WHITE = (0.8, 0.8, 0.8), (1.0, 1.0, 1.0)
@@ -121,14 +123,19 @@ def ingest(
         source.triangle_object[kept.source], return_inverse=True
     )
     store = ImageStore(findings, options.limit << 20)
-    given = [source.materials[index].texture for index in used_material.tolist()]
-    store.examine((texture for texture in given if texture is not None), workers, progress)
-    materials = []
     grouped = np.argsort(triangle_material, kind="stable")
     faces = np.split(grouped, np.cumsum(np.bincount(triangle_material))[:-1])
+    source = masked(source, used_material, store, findings)
+    source, uv = unmirrored(source, used_material, faces, uv, store, findings)
+    textures = [source.materials[index].texture for index in used_material.tolist()]
+    store.examine((texture for texture in textures if texture is not None), workers, progress)
+    colors = None if source.colors is None else source.colors[kept.source]
+    materials = []
     for done, index in enumerate(used_material.tolist()):
         progress(done, len(used_material), "materials")
-        materials.append(_material(source, index, uv, faces[done], store, findings))
+        painted = colors is not None and bool((colors[faces[done]] != 255).any())
+        given = source.materials[index]
+        materials.append(_material(given, painted, uv[faces[done]], store, findings))
     progress(len(used_material), len(used_material), "materials")
     points, triangles = to_world(kept.points, space), kept.triangles.astype(np.int32)
     two_sided = ~kept.paired if options.two_sided else _two_sided(kept, source)
@@ -154,7 +161,7 @@ def ingest(
         tolerance=tolerance_of(points, triangles),
         images=store.images,
         cameras=tuple(_camera(camera, space) for camera in source.cameras),
-        colors=None if source.colors is None else source.colors[kept.source],
+        colors=colors,
         kinds=tuple(source.kinds[i] for i in used_object.tolist()) if source.kinds else (),
         storeys=_storeys(source, space),
         space=space,
@@ -246,15 +253,14 @@ def _camera(camera: Camera, space: Space) -> Camera:
 
 
 def _material(
-    source: Source,
-    index: int,
+    given: SourceMaterial,
+    painted: bool,
     uv: NDArray[np.float64],
-    faces: NDArray[np.int64],
     store: ImageStore,
     findings: Findings,
 ) -> Material:
-    """The material as its kept ``faces`` (indices of triangles) need it."""
-    given = source.materials[index]
+    """The material as its kept faces, of these (n, 3, 2) coordinates, need it; ``painted`` if they
+    have colours of their own."""
     texture = given.texture
     image = -1
     transparent = given.see_through or given.opacity < 1
@@ -263,26 +269,17 @@ def _material(
         if decoded is not None:
             image, holes = decoded
             if holes is not None and not transparent:
-                transparent = uses_holes(holes, uv[faces], texture.wrap_s, texture.wrap_t)
-    if given.mask is not None:
-        mask = given.mask
-        holes = store.mask_holes(mask)
-        if holes is not None and uses_holes(holes, uv[faces], mask.wrap_s, mask.wrap_t):
-            transparent = True
-            if texture is None or mask.label != texture.label:
-                findings.say(
-                    "PTM-N217",
-                    f"{mask.what}: makes the material transparent; the mask itself is not written",
-                    mask.place,
-                )
+                wraps = told(texture.wrap_s), told(texture.wrap_t)
+                transparent = uses_holes(holes, uv, *wraps)
     if given.opacity == 0:
         findings.say("PTM-N231", f"material {given.name} is invisible (opacity 0)")
     return Material(
         name=given.name,
-        color=given.color or (PLAIN if image < 0 else WHITE),
+        color=given.color or (WHITE if image >= 0 or painted else PLAIN),
         opacity=given.opacity,
         image=image,
-        wrap_s=texture.wrap_s if texture else "repeat",
-        wrap_t=texture.wrap_t if texture else "repeat",
+        wrap_s=told(texture.wrap_s) if texture else "repeat",
+        wrap_t=told(texture.wrap_t) if texture else "repeat",
         transparent=transparent,
+        cutoff=given.cutoff if image >= 0 else None,
     )

@@ -1,4 +1,4 @@
-"""How textures lie on triangles.
+"""How textures and colours lie on triangles.
 
 Tried: inverting the Gram matrix of two edges. It squares what is lost to rounding on slivers, of
 which one model of furniture had gradients that were off by 2e-9, and gives the same levels.
@@ -12,12 +12,12 @@ from ptmtools.arrays import Floats
 
 
 def gradients(corners: Floats, uv: Floats) -> Floats:
-    """(T, 2, 3) how the texture coordinates u and v change along the plane of each triangle, per
-    metre; 0 for triangles without area.
+    """(T, k, 3) how the texture coordinates u and v, or other values of corners, change along the
+    plane of each triangle, per metre; 0 for triangles without area.
 
     Parameters
     ----------
-    corners: (T, 3, 3) metres. uv: (T, 3, 2).
+    corners: (T, 3, 3) metres. uv: (T, 3, k).
     """
     ab, ac = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(ab, ac)

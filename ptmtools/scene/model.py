@@ -19,7 +19,7 @@ from ptmtools.scene.orientation import tolerance_of
 from ptmtools.store.checked import Stored
 from ptmtools.tolerance import Tolerance
 
-Wrap = Literal["repeat", "clamp", "mirror"]
+Wrap = Literal["repeat", "clamp"]
 #: What an object is by the class that its format gives it: a part of the structure, never a part of
 #: it, a door leaf, or "" where that is left to its shape and name.
 Kind = Literal["structural", "detail", "door", ""]
@@ -57,6 +57,8 @@ class Material:
     wrap_s, wrap_t: what the image does beyond [0, 1].
     transparent: never occludes: `opacity` < 1, alpha blending or testing, or a used texel with
         alpha < 255.
+    cutoff: texels with less alpha than this, in [0, 1], are not drawn, and all others are opaque;
+        None where they are blended.
     """
 
     name: str
@@ -66,6 +68,7 @@ class Material:
     wrap_s: Wrap = "repeat"
     wrap_t: Wrap = "repeat"
     transparent: bool = False
+    cutoff: float | None = None
 
 
 @dataclass(frozen=True)
@@ -79,8 +82,8 @@ class SourceImage:
     load: returns the bytes.
     files: the files that hold it and nothing else, relative to the model's folder, "/" between
         names; none if it is part of a larger file.
-    plain: nothing of the scene but this image depends on its texels: it has no alpha channel and
-        is no mask.
+    plain: nothing of the scene but this image depends on its texels: it has no alpha channel, and
+        no other image is made of it.
     """
 
     name: str
@@ -183,7 +186,7 @@ class Scene:
         not depend on them."""
         about = {
             "objects": self.objects,
-            "materials": [vars(m) for m in self.materials],
+            "materials": [_said(m) for m in self.materials],
             "cameras": [vars(c) for c in self.cameras],
             "space": vars(self.space),
             "notes": [vars(n) for n in self.notes],
@@ -239,6 +242,11 @@ class Scene:
             space=Space(**_fields(about["space"])),
             notes=tuple(Note(**row) for row in about["notes"]),
         )
+
+
+def _said(material: Material) -> dict[str, Any]:
+    """The fields of a material; of what few have, only what it has."""
+    return {name: v for name, v in vars(material).items() if name != "cutoff" or v is not None}
 
 
 def _kinds(given: Sequence[Kind], objects: int) -> tuple[Kind, ...]:

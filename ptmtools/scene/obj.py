@@ -4,9 +4,10 @@ A reader of our own rather than trimesh's, because trimesh (5.2) reads the first
 knows neither ``d``, ``Tr`` and ``map_d`` nor the options of ``map_Kd``, cuts concave quads and
 polygons as fans, joins the names of objects and materials into one, passes over missing files in
 silence, and forgets which line anything came from. Statements are read line by line into flat
-arrays: 1,002,528 triangles (65 MB) take 9 s of one core and 0.5 GB, cleaning included. Normals,
-smoothing groups and vertex colours are not used by later stages and are skipped; curves, lines
-and points are skipped and counted.
+arrays: 1,002,528 triangles (65 MB) take 9 s of one core and 0.5 GB, cleaning included. Normals and
+smoothing groups are not used by later stages and are skipped; curves, lines and points are skipped
+and counted. Vertices may have colours (``v x y z r g b``), which no specification has and many
+scanners write; where one has, these take the place of ``Kd``.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from ptmtools.errors import InputError, LimitError
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Wrap
 from ptmtools.scene.mtl import MapStatement, MtlMaterial, read_mtl
+from ptmtools.scene.painting import painted
 from ptmtools.scene.polygon import triangulate
 from ptmtools.scene.source import (
     MAX_VERTICES,
@@ -62,6 +64,8 @@ class _Statements:
     first stands."""
 
     points: array[float] = field(default_factory=lambda: array("d"))
+    colored: array[int] = field(default_factory=lambda: array("q"))
+    colors: array[float] = field(default_factory=lambda: array("d"))
     coords: array[float] = field(default_factory=lambda: array("d"))
     corner_point: array[int] = field(default_factory=lambda: array("q"))
     corner_coord: array[int] = field(default_factory=lambda: array("q"))
@@ -149,14 +153,21 @@ def read_obj(
                 f"{path.name}:{line[bare[0]]}",
                 len(bare),
             )
+    triangles = corner_point[cut.corner]
+    colors = None
+    if said.colored:
+        colored = np.frombuffer(said.colored, dtype=np.int64)
+        given = np.frombuffer(said.colors, dtype=np.float64).reshape(-1, 3)
+        materials, colors = painted(materials, triangles, triangle_material, colored, given)
     return Source(
         points=points,
-        triangles=corner_point[cut.corner],
+        triangles=triangles,
         uv=uv,
         triangle_object=np.frombuffer(said.face_object, dtype=np.int64)[cut.polygon],
         triangle_material=triangle_material,
         objects=tuple(said.objects),
         materials=materials,
+        colors=colors,
     )
 
 
@@ -225,6 +236,9 @@ def _read_statements(
                 words = line[: line.index("#")].split()
             try:
                 if key == "v":
+                    if len(words) >= 7:
+                        said.colored.append(len(points) // 3)
+                        said.colors.extend(map(float, words[4:7]))
                     points.extend(map(float, words[1:4]))
                     if len(words) < 4:
                         raise ValueError("a vertex has three coordinates")
@@ -311,7 +325,8 @@ def _materials(
     for text, line in said.libraries:
         place = f"{path.name}:{line}"
         for name in _library_names(text):
-            file = findings.locate(name, f"mtllib {name}", place, "PTM-N203")
+            suggestion = _suggestion(path, name)
+            file = findings.locate(name, f"mtllib {name}", place, "PTM-N203", hint=suggestion)
             if file is None or (real := file.resolve()) in read:
                 continue
             read.add(real)
@@ -346,6 +361,15 @@ def _materials(
             )
         )
     return tuple(materials), maps
+
+
+def _suggestion(path: Path, name: str) -> str:
+    """What to do about a missing library: a model that was renamed still asks for what its
+    library was called."""
+    beside = [p.name for p in path.absolute().parent.glob("*") if p.suffix.lower() == ".mtl"]
+    if len(beside) != 1:
+        return ""
+    return f"; if {beside[0]} beside the model is meant, rename it to {Path(name).name}"
 
 
 def _texture(

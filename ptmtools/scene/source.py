@@ -21,6 +21,7 @@ from ptmtools.files import open_regular
 from ptmtools.scene.model import Camera, Kind, Note, Storey, Wrap
 from ptmtools.scene.reference import Folder
 
+SourceWrap = Literal[Wrap, "mirror"]
 #: `Scene.triangles` is int32: more vertices cannot be numbered.
 MAX_VERTICES = 2**31 - 1
 
@@ -82,7 +83,7 @@ class Texture:
     label: the name the emitted file is called after.
     what: how the model speaks of it ("map_Kd bricks.png"), for notes.
     place: where it does ("museum.mtl:12").
-    wrap_s, wrap_t: beyond [0, 1].
+    wrap_s, wrap_t: beyond [0, 1]; "mirror" is a repetition of which every other is mirrored.
     channel: the channel that a mask takes its values from: "m" (matte), "l" (luminance), "r",
         "g", "b", or "" for matte where there is one and luminance elsewhere.
     """
@@ -91,8 +92,8 @@ class Texture:
     label: str
     what: str
     place: str
-    wrap_s: Wrap = "repeat"
-    wrap_t: Wrap = "repeat"
+    wrap_s: SourceWrap = "repeat"
+    wrap_t: SourceWrap = "repeat"
     channel: str = ""
 
 
@@ -188,14 +189,16 @@ class Findings:
         place: str,
         missing: str = "PTM-N204",
         base: Path | None = None,
+        hint: str = "",
     ) -> Path | None:
-        """`Folder.find` with a note of where the file is or why there is none."""
+        """`Folder.find` with a note of where the file is or why there is none, and a ``hint`` for
+        what is missing."""
         found = self.folder.find(name, base)
         if found.path is None:
             if found.outcome == "outside":
                 self.miss("PTM-N205", f"{what}: lies outside the model's folder", place)
             else:
-                self.miss(missing, f"{what}: not found", place)
+                self.miss(missing, f"{what}: not found{hint}", place)
         elif found.outcome == "elsewhere":
             self.say("PTM-N208", f"{what}: found as {self.folder.label(found.path)}", place)
         return found.path

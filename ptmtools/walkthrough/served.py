@@ -25,6 +25,7 @@ from ptmtools.database.gltf.reader import ReadGlb, ReadPrimitive, read_glb
 from ptmtools.database.names import HINTS
 from ptmtools.errors import DatabaseError
 from ptmtools.files import open_regular
+from ptmtools.scene.colors import to_srgb
 from ptmtools.store.layout import SERVED
 from ptmtools.walkthrough.locating import Locator
 from ptmtools.walkthrough.sides import sides
@@ -46,7 +47,8 @@ class Surfaces:
     ----------
     corner: (n, 3, 3) float64 world metres. uv: (n, 3, 2) float64, origin at the upper left.
     cell, shape, texture: (n,) int32; the shape counts over all cells, the texture is -1 without.
-    color: (n, 3) what multiplies the texel, encoded as sRGB, 0 to 1.
+    color: (n, 3) what multiplies the texel, encoded as sRGB, 0 to 1; of corners of several colours
+        their mean.
     two_sided, glass: (n,) seen from both sides; without texture and not opaque.
     clamped: (n, 2) whether u and v stop at the edge of the texture instead of repeating it.
     seen: (n, 2) of each the one that is seen in its place from where its normal points to, and from
@@ -254,13 +256,14 @@ def _surfaces(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
     corner = joined([p.point.astype(np.float64)[p.triangle] for _, p in shapes], 3)
     cell = spread([cell for cell, _ in shapes], np.int32)
     two_sided = spread([m.two_sided for m in looks], np.bool_)
+    mean = joined([_colors(p) for _, p in shapes], 3).mean(axis=1)
     return Surfaces(
         corner=corner,
         uv=joined([_texture_points(p) for _, p in shapes], 2),
         cell=cell,
         shape=np.repeat(np.arange(len(shapes), dtype=np.int32), count),
         texture=spread(texture, np.int32),
-        color=spread([[_encoded(c) for c in m.factor[:3]] for m in looks], np.float64, 3),
+        color=to_srgb(spread([m.factor[:3] for m in looks], np.float64, 3)) * mean,
         two_sided=two_sided,
         glass=spread([m.blends and t < 0 for m, t in zip(looks, texture, strict=True)], np.bool_),
         clamped=spread([[w == clamp for w in m.wrap] for m in looks], np.bool_, 2),
@@ -274,6 +277,8 @@ def _texture_points(primitive: ReadPrimitive) -> Floats:
     return primitive.uv.astype(np.float64)[primitive.triangle]
 
 
-def _encoded(light: float) -> float:
-    """A component of linear light as sRGB encodes it (IEC 61966-2-1)."""
-    return 12.92 * light if light <= 0.0031308 else 1.055 * light ** (1 / 2.4) - 0.055
+def _colors(primitive: ReadPrimitive) -> Floats:
+    """(m, 3, 3) of the corners of triangles, as sRGB encodes them."""
+    if primitive.color is None:
+        return np.ones((len(primitive.triangle), 3, 3))
+    return to_srgb(primitive.color)[primitive.triangle]

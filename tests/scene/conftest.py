@@ -79,6 +79,7 @@ class Gltf:
 
     def __init__(self) -> None:
         self.blob = b""
+        self.spare: list[dict[str, Any]] = []
         self.tree: dict[str, Any] = {
             "asset": {"version": "2.0"},
             "bufferViews": [],
@@ -133,7 +134,7 @@ class Gltf:
         self.tree["scenes"] = [{"nodes": list(range(len(self.tree["nodes"])))}]
 
     def glb(self) -> bytes:
-        self.tree["buffers"] = [{"byteLength": len(self.blob)}]
+        self.tree["buffers"] = [{"byteLength": len(self.blob)}, *self.spare]
         text = json.dumps(self.tree).encode()
         text += b" " * (-len(text) % 4)
         blob = self.blob + b"\0" * (-len(self.blob) % 4)

@@ -2,10 +2,10 @@
 
 The shapes are those of the VRML file, in its order. Triangles are indexed; a vertex is a position
 with, where the material has an image, its texture coordinates, whose origin is the upper left in
-glTF. There are no normals: the scene has none, and surfaces without are flat (glTF 2.0, section
-3.7.2.1). Each shape has positions of its own: with one accessor for the whole cell the files of the
-sample museum are 13 % smaller, those of the hospital 5 %, but clients take its bounds for the
-shape's, and some copy all of it for each shape.
+glTF, and with its colour where the shape has several. There are no normals: the scene has none, and
+surfaces without are flat (glTF 2.0, section 3.7.2.1). Each shape has positions of its own: with one
+accessor for the whole cell the files of the sample museum are 13 % smaller, those of the hospital
+5 %, but clients take its bounds for the shape's, and some copy all of it for each.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from ptmtools.database.gltf.buffer import BufferWriter
 from ptmtools.database.gltf.container import pack
 from ptmtools.database.gltf.material import MaterialWriter
 from ptmtools.database.names import GLTF_FILES, cell_name, path_of
+from ptmtools.scene.colors import packed, to_linear, unpacked
 from ptmtools.scene.model import Scene
 
 
@@ -78,14 +79,21 @@ def _primitive(
     materials: MaterialWriter,
 ) -> dict[str, Any]:
     textured = scene.materials[shape.material].image >= 0
-    # A vertex for each distinct pair of position and texture coordinates.
+    # A vertex for each that differs in position, texture coordinates or colour.
     width = len(shape.uv) if textured else 1
     corner = shape.triangle * width + (shape.uv_triangle if textured else 0)
+    if shape.color is not None:
+        corner = corner << 24 | packed(shape.color)
     vertex, triangle = _by_first_use(corner)
+    color = vertex & 0xFFFFFF
+    if shape.color is not None:
+        vertex >>= 24
     attributes = {"POSITION": buffer.positions(geometry.point[shape.point[vertex // width]])}
     if textured:
         uv = geometry.uv[shape.uv[vertex % width]]
         attributes["TEXCOORD_0"] = buffer.coordinates(flipped(uv))
+    if shape.color is not None:
+        attributes["COLOR_0"] = buffer.colors(to_linear(unpacked(color) / 255))
     return {
         "attributes": attributes,
         "indices": buffer.indices(triangle, len(vertex)),

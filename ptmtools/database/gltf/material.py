@@ -9,11 +9,12 @@ baseColorTexture                   the fallback image, by URI; nothing where the
 metallicFactor 0, roughness 1      nothing known: matt
 doubleSided                        the shape's sidedness
 alphaMode BLEND                    opacity below 1, or a used texel with alpha below 255
+alphaMode MASK, alphaCutoff        such texels of a material that tests them against a cutoff
 extras.ptm, extras.texture         the image's `.ptm`, and its place in the hints' textures
 extras.wrapS, extras.wrapT         the sampler's, for clients with textures of their own
 =================================  =======================================================
 
-The scene keeps no alpha cutoff, so MASK becomes BLEND. (Tried: the texture as emissiveTexture
+(Tried: the texture as emissiveTexture
 over black, which shows it texel for texel as VRML does, without KHR_materials_unlit. Clients then
 find no base colour texture to put their own in, and alpha still needs one.)
 """
@@ -88,10 +89,11 @@ class MaterialWriter:
         factor = [*map(linear, material.color), float(str(np.float32(alpha)))]
         surface: dict[str, Any] = {} if factor == WHITE else {"baseColorFactor": factor}
         extras: dict[str, Any] = {}
-        blends = alpha < 1
+        blends, cutoff = alpha < 1, None
         if material.image >= 0:
             place, record = self._records[material.image]
-            blends |= material.transparent and record.components in (2, 4)
+            if material.transparent and record.components in (2, 4):
+                blends, cutoff = True, material.cutoff
             extras = {"ptm": UP + quote(record.file), "texture": place}
             extras |= _wrap(material.wrap_s, material.wrap_t)
             if self._fallback and record.fallback is not None:
@@ -99,7 +101,9 @@ class MaterialWriter:
                 surface["baseColorTexture"] = {"index": index}
         found: dict[str, Any] = {"name": material.name}
         found["pbrMetallicRoughness"] = surface | {"metallicFactor": 0}
-        if blends:
+        if cutoff is not None:
+            found |= {"alphaMode": "MASK", "alphaCutoff": cutoff}
+        elif blends:
             found["alphaMode"] = "BLEND"
         if two_sided:
             found["doubleSided"] = True

@@ -17,7 +17,7 @@ from ptmtools import schemas
 from ptmtools.database.fault import FileError
 from ptmtools.database.gltf.container import unpack
 from ptmtools.database.gltf.material import WHITE, WRAPS
-from ptmtools.glb import COMPONENTS, ITEMS, elements
+from ptmtools.glb import COMPONENTS, ITEMS, elements, meaning
 
 _VERTICES, _INDICES, _FLOAT = 34962, 34963, 5126
 
@@ -29,7 +29,8 @@ class ReadMaterial:
     Attributes
     ----------
     factor: (r, g, b, a), linear light.
-    two_sided, blends: `doubleSided`; whether `alphaMode` is BLEND.
+    two_sided, blends: `doubleSided`; whether `alphaMode` is not OPAQUE.
+    cutoff: `alphaCutoff` if `alphaMode` is MASK, else None.
     image: URI of the base colour texture, or None.
     ptm, texture: URI of the `.ptm` and its place in the hints, or None.
     wrap: numbers of the sampler for s and t.
@@ -38,6 +39,7 @@ class ReadMaterial:
     factor: tuple[float, ...]
     two_sided: bool
     blends: bool
+    cutoff: float | None
     image: str | None
     ptm: str | None
     texture: int | None
@@ -53,12 +55,14 @@ class ReadPrimitive:
     place: of the primitive in the document.
     point: (n, 3) float32.
     uv: (n, 2) float32, origin at the upper left, or None.
+    color: (n, 3) linear light, or None.
     triangle: (m, 3) int64 indices into `point` and `uv`.
     """
 
     place: str
     point: NDArray[np.float32]
     uv: NDArray[np.float32] | None
+    color: NDArray[np.float64] | None
     triangle: NDArray[np.int64]
     material: ReadMaterial
 
@@ -130,12 +134,26 @@ class _Reader:
             uv = self._vertices(attributes["TEXCOORD_0"], "VEC2")
             if len(uv) != len(point):
                 _foreign(place, f"{len(uv)} texture coordinates for {len(point)} positions")
+        color = self._colors(attributes, len(point), place)
         index = self._elements(primitive["indices"], "SCALAR", (5123, 5125), _INDICES).ravel()
         if len(index) % 3 or int(index.max()) >= len(point):
             message = f"{len(index)} indices up to {index.max()} into {len(point)} vertices"
             raise FileError("PTM-D734", place, message)
         triangle = index.astype(np.int64).reshape(-1, 3)
-        return ReadPrimitive(place, point, uv, triangle, self._material(primitive["material"]))
+        material = self._material(primitive["material"])
+        return ReadPrimitive(place, point, uv, color, triangle, material)
+
+    def _colors(
+        self, attributes: dict[str, int], count: int, place: str
+    ) -> NDArray[np.float64] | None:
+        if "COLOR_0" not in attributes:
+            return None
+        index = attributes["COLOR_0"]
+        rows = self._elements(index, "VEC4", (5123,), _VERTICES)
+        normalized = self._tree["accessors"][index].get("normalized", False)
+        if len(rows) != count or not normalized or (rows[:, 3] != 65535).any():
+            _foreign(place, f"{len(rows)} colours for {count} positions, or other than opaque ones")
+        return meaning(rows[:, :3], normalized=True)
 
     def _vertices(self, index: int, form: str) -> NDArray[np.float32]:
         rows = self._elements(index, form, (_FLOAT,), _VERTICES)
@@ -193,7 +211,10 @@ class _Reader:
         return ReadMaterial(
             factor=tuple(factor),
             two_sided=material.get("doubleSided", False),
-            blends=material.get("alphaMode") == "BLEND",
+            blends=material.get("alphaMode", "OPAQUE") != "OPAQUE",
+            cutoff=material.get("alphaCutoff", 0.5)
+            if material.get("alphaMode") == "MASK"
+            else None,
             image=image,
             ptm=extras.get("ptm"),
             texture=extras.get("texture"),

@@ -212,8 +212,13 @@ def _check_colours(shape: Node, count: int, at: Place) -> None:
     geometry, color = shape.at("geometry"), shape.at("geometry", "color")
     if color:
         index = geometry.get("colorIndex", np.zeros(0, np.int64))
-        in_range = ((index >= 0) & (index < len(color["color"]))).all()
-        if geometry.get("colorPerVertex", True) or len(index) != count or not in_range:
+        if geometry.get("colorPerVertex", True):
+            corners = _loops(index, len(color["color"]))
+            given = corners is not None and len(corners) == count
+        else:
+            in_range = (index >= 0) & (index < len(color["color"]))
+            given = bool(in_range.all()) and len(index) == count
+        if not given:
             at.add("PTM-D682", f"colorIndex does not give a colour to each of {count} faces")
     values = [*shape.at("appearance", "material").values(), *color.values()]
     if any(((v < 0) | (v > 1)).any() for v in values):

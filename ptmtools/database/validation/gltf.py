@@ -15,14 +15,17 @@ from numpy.typing import NDArray
 
 from ptmtools.database.gltf.cell import flipped
 from ptmtools.database.gltf.material import WRAPS, linear
-from ptmtools.database.gltf.reader import ReadGlb, ReadMaterial, read_glb
+from ptmtools.database.gltf.reader import ReadGlb, ReadMaterial, ReadPrimitive, read_glb
 from ptmtools.database.names import CELL_FOLDER, GLTF_FOLDER, UP, cell_name
 from ptmtools.database.validation.findings import Place
 from ptmtools.database.validation.served import ServedDatabase
 from ptmtools.database.vrml.reader import Document, Node
+from ptmtools.scene.colors import to_srgb
 
 #: How far a colour may be off that went through the decimals of VRML.
 _SLACK = 1e-5
+#: Half a level of 255, and what is lost in 16 bits of linear light.
+_LEVEL = 0.6 / 255
 
 
 #: The form of the index that these files are.
@@ -99,7 +102,7 @@ def _compare_shapes(cell: ReadGlb, shapes: list[Node], at: Place) -> None:
             same = uv is not None and np.array_equal(flipped(mapped.astype(np.float32)), uv)
         if not same:
             here.add("PTM-D738", f"not the texture coordinates of {shape.name}")
-        if fault := _other_look(primitive.material, shape):
+        if fault := _other_colors(primitive, shape) or _other_look(primitive.material, shape):
             here.add("PTM-D739", f"{fault} {shape.name}")
 
 
@@ -118,6 +121,8 @@ def _other_look(material: ReadMaterial, shape: Node) -> str:
     if material.wrap != wrap:
         return "does not wrap as"
     faces = shape.at("geometry", "color").get("color", np.ones((1, 3)))
+    if shape.at("geometry").get("colorPerVertex", True):  # of corners, which are no tint
+        faces = np.ones((1, 3))
     color = surface.get("diffuseColor", faces)
     alpha = 1 - surface.get("transparency", np.zeros(1))
     wanted = np.array([*(linear(float(c)) for c in np.ravel(color)[:3]), *alpha])
@@ -128,12 +133,28 @@ def _other_look(material: ReadMaterial, shape: Node) -> str:
     return ""
 
 
-def _corners(shape: Node, values: str, index: str) -> NDArray[np.float64] | None:
+def _other_colors(primitive: ReadPrimitive, shape: Node) -> str:
+    """The same of the colours of their corners."""
+    geometry = shape.at("geometry")
+    painted = "colorIndex" in geometry and geometry.get("colorPerVertex", True)
+    if painted != (primitive.color is not None):
+        return "not the colours of the corners of"
+    colors = _corners(shape, "color", "colorIndex", "color") if painted else None
+    if colors is None or primitive.color is None:
+        return ""
+    held = to_srgb(primitive.color)[primitive.triangle]
+    same = held.shape == colors.shape and np.abs(held - colors).max(initial=0.0) <= _LEVEL
+    return "" if same else "not the colours of the corners of"
+
+
+def _corners(
+    shape: Node, values: str, index: str, field: str = "point"
+) -> NDArray[np.float64] | None:
     """(m, 3, k) the points of a shape's triangles; None without, or if the indices are wrong,
     which the check of the VRML file reports."""
     try:
         rows = shape.at("geometry")[index].reshape(-1, 4)[:, :3]
-        corners: NDArray[np.float64] = shape.at("geometry", values)["point"][rows]
+        corners: NDArray[np.float64] = shape.at("geometry", values)[field][rows]
     except (KeyError, ValueError, IndexError):
         return None
     return corners

@@ -16,6 +16,8 @@ no texture                        Material (diffuseColor, transparency): lit by 
                                   and a quarter as bright by itself (emissiveColor). A
                                   headlight alone leaves floors, ceilings and corridor walls
                                   black, since it shines along them
+colours of corners                Color and colorIndex, in place of the diffuse colour; with a
+                                  texture unlit, multiplied
 ================================  ==================================================
 
 (Tried: baking the colour into a second image. It is not lossless, and costs a texture. Ambient
@@ -36,10 +38,14 @@ from ptmtools.database.names import DefNames, cell_file, cell_name
 from ptmtools.database.vrml.hull import convex_hull
 from ptmtools.database.vrml.pattern import CELL, CELL_OF_LEAVES, HEADER, declaration
 from ptmtools.database.vrml.text import chosen, field, listed, loops, quoted
+from ptmtools.scene.colors import packed, unpacked
 from ptmtools.scene.model import Material
 
 #: How bright an untextured surface is without light, as a share of its colour.
 _GLOW = 0.25
+#: Decimals of a colour of a corner, which is one of 256 levels.
+_DIGITS = 3
+_WHOLE = np.ones(3)
 
 
 class CellWriter:
@@ -109,7 +115,7 @@ class CellWriter:
         material = self._materials[s.material]
         parts = [
             f"DEF {name} Shape {{\n  appearance Appearance {{\n",
-            _surface(material),
+            _surface(material, s.color),
             self._texture(material, names, textures),
             "  }\n  geometry IndexedFaceSet {\n",
             "    solid FALSE\n" if s.two_sided else "",
@@ -120,10 +126,16 @@ class CellWriter:
             uv = chosen(self._uv, s.uv)
             parts.append(f"    texCoord TextureCoordinate {{ point {uv} }}\n")
             parts.append(f"    texCoordIndex {loops(s.uv_triangle)}\n")
-            if material.opacity >= 1 and material.color != (1.0, 1.0, 1.0):
+            tinted = material.opacity >= 1 and material.color != (1.0, 1.0, 1.0)
+            if tinted and s.color is None:
                 zeros = field(["0"] * len(s.triangle), 48, " ")
                 parts.append(f"    color Color {{ color [ {_color(material)} ] }}\n")
                 parts.append(f"    colorIndex {zeros}\n    colorPerVertex FALSE\n")
+        if s.color is not None:
+            colors, place = np.unique(packed(s.color), return_inverse=True)
+            rows = row_texts(single(np.round(unpacked(colors) / 255, _DIGITS), "colours"))
+            parts.append(f"    color Color {{ color {field(rows)} }}\n")
+            parts.append(f"    colorIndex {loops(place.reshape(-1, 3))}\n")
         parts.append("  }\n}\n")
         return "".join(parts)
 
@@ -143,20 +155,23 @@ class CellWriter:
         return f"    texture DEF {name} ImageTexture {{ {self._urls[material.image]}{wrap} }}\n"
 
 
-def _surface(material: Material) -> str:
-    """The material of an Appearance; "" where it is that of no Material node."""
+def _surface(material: Material, colors: NDArray[np.uint8] | None) -> str:
+    """The material of an Appearance; "" where it is that of no Material node. Of a shape with
+    ``colors`` of its own these take the place of the diffuse colour, and their mean glows."""
     if material.image >= 0 and material.opacity >= 1:
         return ""
     fields = f"diffuseColor {_color(material)}"
     if material.image < 0:
-        fields += f" emissiveColor {_color(material, _GLOW)}"
+        mean = np.ones(3) if colors is None else colors.mean(axis=(0, 1)) / 255
+        fields += f" emissiveColor {_color(material, _GLOW * mean)}"
     if material.opacity < 1:
         fields += f" transparency {decimal(1 - min(max(material.opacity, 0.0), 1.0))}"
     return f"    material Material {{ {fields} }}\n"
 
 
-def _color(material: Material, share: float = 1.0) -> str:
-    return " ".join(decimal(share * min(max(c, 0.0), 1.0)) for c in material.color)
+def _color(material: Material, share: NDArray[np.float64] = _WHOLE) -> str:
+    held = (s * min(max(c, 0.0), 1.0) for c, s in zip(material.color, share, strict=True))
+    return " ".join(map(decimal, held))
 
 
 def _urls(record: TextureRecord, fallback: bool) -> list[str]:

@@ -18,11 +18,17 @@ from numpy.typing import NDArray
 from ptmtools.scene.colors import to_srgb
 from ptmtools.scene.gltf.document import Document, data_uri
 from ptmtools.scene.ktx2 import TranscodedBytes
-from ptmtools.scene.model import Wrap
-from ptmtools.scene.source import FileRange, Findings, HeldBytes, SourceMaterial, Texture
+from ptmtools.scene.source import (
+    FileRange,
+    Findings,
+    HeldBytes,
+    SourceMaterial,
+    SourceWrap,
+    Texture,
+)
 
 _KTX2 = "image/ktx2"
-_WRAPS: dict[int | None, Wrap] = {33071: "clamp", 33648: "mirror"}
+_WRAPS: dict[int | None, SourceWrap] = {33071: "clamp", 33648: "mirror"}
 
 
 @dataclass(frozen=True)
@@ -35,12 +41,14 @@ class Painted:
     coords: the attribute with its texture coordinates.
     matrix: (2, 3) KHR_texture_transform, origin at the upper left as glTF has it.
     see_through: whether it has an alpha mode other than opaque.
+    light: (3,) its base colour, linear light, by which colours of vertices are multiplied.
     """
 
     index: int
     coords: str
     matrix: NDArray[np.float64]
     see_through: bool
+    light: NDArray[np.float64]
 
 
 class MaterialReader:
@@ -49,21 +57,22 @@ class MaterialReader:
     def __init__(self, document: Document, findings: Findings) -> None:
         self._document = document
         self._findings = findings
-        self._painted: dict[int | None, Painted] = {}
+        self._painted: dict[tuple[int | None, bool], Painted] = {}
         self._materials: list[SourceMaterial] = []
 
     @property
     def materials(self) -> tuple[SourceMaterial, ...]:
         return tuple(self._materials)
 
-    def read(self, index: int | None) -> Painted:
-        """The material of a primitive; None is the default material of the format."""
-        if index not in self._painted:
+    def read(self, index: int | None, colored: bool) -> Painted:
+        """The material of a primitive; None is the default material of the format. Vertices that
+        are ``colored`` have its base colour in theirs, so that the two are multiplied as light."""
+        if (index, colored) not in self._painted:
             entry = {} if index is None else self._document.tree["materials"][index]
-            self._painted[index] = self._read(entry, index)
-        return self._painted[index]
+            self._painted[index, colored] = self._read(entry, index, colored)
+        return self._painted[index, colored]
 
-    def _read(self, entry: dict[str, Any], index: int | None) -> Painted:
+    def _read(self, entry: dict[str, Any], index: int | None, colored: bool) -> Painted:
         place = f"material {index}"
         name = str(entry.get("name") or ("default" if index is None else place))
         extensions = entry.get("extensions", {})
@@ -77,7 +86,8 @@ class MaterialReader:
         r, g, b, a = (min(max(float(value), 0.0), 1.0) for value in factor)
         if (r, g, b) != (1.0, 1.0, 1.0):
             self._findings.say("PTM-N226", f"{name}: colour factor converted to sRGB", place)
-        red, green, blue = to_srgb(np.array([r, g, b], dtype=np.float64)).tolist()
+        light = np.array([r, g, b], dtype=np.float64)
+        red, green, blue = (1.0, 1.0, 1.0) if colored else to_srgb(light).tolist()
         mode = entry.get("alphaMode", "OPAQUE")
         see_through = mode in ("MASK", "BLEND")
         if extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0) > 0:
@@ -105,7 +115,7 @@ class MaterialReader:
                 texture=texture,
             )
         )
-        return Painted(len(self._materials) - 1, coords, matrix, see_through)
+        return Painted(len(self._materials) - 1, coords, matrix, see_through, light)
 
     def _texture(self, index: int, place: str) -> Texture | None:
         tree = self._document.tree
@@ -150,7 +160,11 @@ def _cutoff(entry: dict[str, Any], alpha: float) -> float:
 
 
 def _transform(given: dict[str, Any]) -> NDArray[np.float64]:
-    """(2, 3) matrix of KHR_texture_transform: scale, then rotation, then offset."""
+    """(2, 3) matrix of KHR_texture_transform: scale, then rotation, then offset.
+
+    Turned as its text, its test model and the viewers have it; its sample of GLSL, read by columns,
+    turns the other way.
+    """
     offset = np.array(given.get("offset", [0.0, 0.0]), dtype=np.float64)
     scale = np.array(given.get("scale", [1.0, 1.0]), dtype=np.float64)
     c, s = np.cos(given.get("rotation", 0.0)), np.sin(given.get("rotation", 0.0))

@@ -89,7 +89,9 @@ def _read(document: Document, findings: Findings, max_triangles: int) -> Source:
     if not draws:
         raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with triangles")
     painter = MaterialReader(document, findings)
-    painted = [painter.read(draw.primitive.get("material")) for draw in draws]
+    painted = [
+        painter.read(draw.primitive.get("material"), "COLOR_0" in draw.attributes) for draw in draws
+    ]
     compressed = [_compressed(document, draw) for draw in draws]
     decoded = decode_primitives(document, (c["bufferView"] for c in compressed if c is not None))
     points: list[Floats] = []
@@ -241,8 +243,8 @@ def _mesh(values: _Values, draw: _Draw, paint: Painted, findings: Findings) -> _
         moved = raw @ paint.matrix[:, :2].T + paint.matrix[:, 2]
         uv = np.stack([moved[:, 0], 1.0 - moved[:, 1]], axis=1)
     colors, raw = None, values.attribute("COLOR_0", len(points))
-    if raw is not None and not (raw[:, :3] == 1).all():
-        colors = encoded(raw[:, :3])[triangles]
+    if raw is not None:
+        colors = encoded(raw[:, :3] * paint.light)[triangles]
     if raw is not None and paint.see_through and not (raw[:, 3:] == 1).all():
         findings.say("PTM-N223", "opacities of vertices are not carried over", draw.place)
     return _Mesh(points, triangles, uv[triangles], colors)

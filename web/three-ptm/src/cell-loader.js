@@ -49,12 +49,13 @@ export class CellLoader {
   }
 
   /** @param {import("three").Material} material the loader's, with the extras as `userData` */
-  #look({ color, opacity, transparent, side, userData }) {
+  #look({ color, opacity, transparent, alphaTest, vertexColors, side, userData }) {
     const { texture, wrapS, wrapT } = userData;
     const wrap = (/** @type {number} */ n) => (n === CLAMP ? ClampToEdgeWrapping : RepeatWrapping);
     const map = texture === undefined ? null : this.#textureOf(texture, wrap(wrapS), wrap(wrapT));
     const depthWrite = !transparent;
-    return new MeshBasicMaterial({ color, opacity, transparent, side, depthWrite, map });
+    const drawn = { opacity, transparent, alphaTest, vertexColors, side, depthWrite };
+    return new MeshBasicMaterial({ color, map, ...drawn });
   }
 }
 

@@ -57,6 +57,8 @@ export class Material {
   color: Color;
   opacity: number;
   transparent: boolean;
+  alphaTest: number;
+  vertexColors: boolean;
   side: number;
   userData: { texture?: number; wrapS: number; wrapT: number };
   dispose(): void;
@@ -66,6 +68,8 @@ export class MeshBasicMaterial extends Material {
     color?: Color;
     opacity?: number;
     transparent?: boolean;
+    alphaTest?: number;
+    vertexColors?: boolean;
     side?: number;
     depthWrite?: boolean;
     map?: Texture | null;

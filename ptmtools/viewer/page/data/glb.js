@@ -6,12 +6,14 @@
  * @property {string} name of the object that they are of
  * @property {Float32Array} positions x, y, z of each vertex, world metres
  * @property {Float32Array | null} uvs u, v of each vertex, from the top left; null without a texture
+ * @property {Uint16Array | null} colors r, g, b, 1 of each vertex in linear light, of 65535; null if white
  * @property {Uint16Array | Uint32Array} indices three for each triangle
  * @property {number} texture its place in the index, or -1
  * @property {boolean} clampU whether u stops at the edge of the texture instead of repeating it
  * @property {boolean} clampV
  * @property {number[]} factor r, g, b in linear light, and opacity
  * @property {boolean} blends whether what is behind shows through
+ * @property {number} cutoff texels of less alpha are not drawn, all others are opaque; 0 if it blends
  * @property {boolean} twoSided
  * @property {number[]} low corner of their box
  * @property {number[]} high
@@ -22,7 +24,7 @@ const CLAMP = 33071;
 /** @type {Record<number, typeof Float32Array | typeof Uint16Array | typeof Uint32Array>} */
 const ARRAYS = { 5126: Float32Array, 5123: Uint16Array, 5125: Uint32Array };
 /** @type {Record<string, number>} */
-const ITEMS = { SCALAR: 1, VEC2: 2, VEC3: 3 };
+const ITEMS = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 
 /**
  * The cell that a GLB is of, and its shapes; throws what is damaged.
@@ -62,6 +64,8 @@ export function readGlb(buffer, textures = Infinity) {
       const index = /** @type {Uint16Array | Uint32Array} */ (accessor(indices));
       const positions = /** @type {Float32Array} */ (accessor(attributes.POSITION));
       const uvs = textured ? /** @type {Float32Array} */ (accessor(attributes.TEXCOORD_0)) : null;
+      const painted = attributes.COLOR_0 !== undefined;
+      const colors = painted ? /** @type {Uint16Array} */ (accessor(attributes.COLOR_0)) : null;
       if (!Number.isInteger(texture) || texture >= textures) {
         throw new Error("has a texture that the index has not");
       }
@@ -73,6 +77,7 @@ export function readGlb(buffer, textures = Infinity) {
         throw new Error("does not say how large it is");
       }
       if (uvs && 3 * uvs.length !== 2 * positions.length) throw new Error("has too few coordinates");
+      if (colors && 3 * colors.length !== 4 * positions.length) throw new Error("has too few colours");
       let greatest = -1;
       for (let k = 0; k < index.length; k++) if (index[k] > greatest) greatest = index[k];
       if (3 * greatest >= positions.length) throw new Error("has a wrong index");
@@ -80,12 +85,14 @@ export function readGlb(buffer, textures = Infinity) {
         name: node.name ?? "",
         positions,
         uvs,
+        colors,
         indices: index,
         texture: textured ? texture : -1,
         clampU: wrapS === CLAMP,
         clampV: wrapT === CLAMP,
         factor,
         blends: look.alphaMode === "BLEND",
+        cutoff: look.alphaMode === "MASK" ? Number(look.alphaCutoff) || 0 : 0,
         twoSided: look.doubleSided === true,
         low: min,
         high: max,

@@ -16,7 +16,9 @@
 
 /**
  * @typedef {object} Packed
- * @property {Float32Array} data x, y, z, u, v of each vertex
+ * @property {Float32Array} data x, y, z, u, v of each vertex, and its colour if any has one: r, g, b, 1
+ *   as sRGB encodes them, in the bytes of one number
+ * @property {boolean} painted whether they have
  * @property {Uint16Array | Uint32Array} index
  * @property {Batch[]} batches
  */
@@ -33,15 +35,16 @@ export function* pack(shapes) {
   /** @type {Map<string, Shape[]>} */
   const groups = new Map();
   for (const shape of shapes) {
-    const { texture, clampU, clampV, factor, blends, twoSided } = shape;
-    const key = [texture, clampU, clampV, factor, blends, twoSided].join();
+    const { texture, clampU, clampV, factor, blends, cutoff, twoSided } = shape;
+    const key = [texture, clampU, clampV, factor, blends, cutoff, twoSided].join();
     const group = groups.get(key);
     if (group) group.push(shape);
     else groups.set(key, [shape]);
   }
   const vertices = shapes.reduce((sum, { positions }) => sum + positions.length / 3, 0);
   const count = shapes.reduce((sum, { indices }) => sum + indices.length, 0);
-  const data = new Float32Array(5 * vertices);
+  const painted = shapes.some(({ colors }) => colors), width = painted ? 6 : 5;
+  const data = new Float32Array(width * vertices), bytes = new Uint8Array(data.buffer);
   // 65535 begins another strip.
   const index = vertices > 65535 ? new Uint32Array(count) : new Uint16Array(count);
   /** @type {Batch[]} */
@@ -49,7 +52,7 @@ export function* pack(shapes) {
   let vertex = 0, at = 0;
   for (const group of groups.values()) {
     const first = at;
-    for (const { positions, uvs, indices } of group) {
+    for (const { positions, uvs, colors, indices } of group) {
       yield;
       for (let k = 0; k < indices.length; k++) {
         if (k % AT_ONCE === AT_ONCE - 1) yield;
@@ -57,10 +60,13 @@ export function* pack(shapes) {
       }
       for (let k = 0; k < positions.length / 3; k++, vertex++) {
         if (k % AT_ONCE === AT_ONCE - 1) yield;
-        for (let n = 0; n < 3; n++) data[5 * vertex + n] = positions[3 * k + n];
+        for (let n = 0; n < 3; n++) data[width * vertex + n] = positions[3 * k + n];
+        for (let n = 0; painted && n < 4; n++) {
+          bytes[24 * vertex + 20 + n] = colors ? 255 * encoded(colors[4 * k + n] / 65535) + 0.5 : 255;
+        }
         if (!uvs) continue;
-        data[5 * vertex + 3] = uvs[2 * k];
-        data[5 * vertex + 4] = uvs[2 * k + 1];
+        data[width * vertex + 3] = uvs[2 * k];
+        data[width * vertex + 4] = uvs[2 * k + 1];
       }
     }
     const factor = group[0].factor;
@@ -73,7 +79,7 @@ export function* pack(shapes) {
       high: [0, 1, 2].map((k) => Math.max(...group.map(({ high }) => high[k]))),
     });
   }
-  return { data, index, batches };
+  return { data, painted, index, batches };
 }
 
 export class CellBuffers {
@@ -81,7 +87,7 @@ export class CellBuffers {
    * @param {WebGL2RenderingContext} gl
    * @param {Packed} packed
    */
-  constructor(gl, { data, index, batches }) {
+  constructor(gl, { data, painted, index, batches }) {
     this.gl = gl;
     this.batches = batches;
     this.bytes = data.byteLength + index.byteLength;
@@ -93,10 +99,16 @@ export class CellBuffers {
     gl.bufferData(gl.ARRAY_BUFFER, data, gl.STATIC_DRAW);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.buffers[1]);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, index, gl.STATIC_DRAW);
+    const stride = painted ? 24 : 20;
     gl.enableVertexAttribArray(0);
-    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 20, 0);
+    gl.vertexAttribPointer(0, 3, gl.FLOAT, false, stride, 0);
     gl.enableVertexAttribArray(1);
-    gl.vertexAttribPointer(1, 2, gl.FLOAT, false, 20, 12);
+    gl.vertexAttribPointer(1, 2, gl.FLOAT, false, stride, 12);
+    gl.vertexAttrib4f(2, 1, 1, 1, 1);
+    if (painted) {
+      gl.enableVertexAttribArray(2);
+      gl.vertexAttribPointer(2, 4, gl.UNSIGNED_BYTE, true, stride, 20);
+    }
     gl.bindVertexArray(null);
   }
 

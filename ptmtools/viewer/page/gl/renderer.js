@@ -122,9 +122,11 @@ export class Renderer {
    * @param {number} now
    */
   #draw(buffers, batch, now) {
-    const { gl } = this, { at } = this.surface, { texture, clampU, clampV, twoSided } = batch.look;
+    const { gl } = this, { at } = this.surface;
+    const { texture, clampU, clampV, cutoff, twoSided } = batch.look;
     (twoSided ? gl.disable : gl.enable).call(gl, gl.CULL_FACE);
     gl.uniform4fv(at.color, batch.color);
+    gl.uniform1f(at.cutoff, cutoff);
     gl.uniform1i(at.textured, +(texture >= 0));
     const storage = texture < 0 ? null : this.memory.of(texture);
     gl.uniform1i(at.channels, storage?.channels ?? 0);

@@ -8,9 +8,12 @@ uniform mat3 turn;
 uniform vec4 lens; // 1/tan across, 1/tan up, and of depth: scale, offset
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec2 place;
+layout(location = 2) in vec4 paint;
 out vec3 seen;
 out vec2 uv;
+out vec3 painted;
 void main() {
+  painted = paint.rgb;
   seen = turn * (position - eye);
   uv = place;
   gl_Position = vec4(seen.xy * lens.xy, seen.z * lens.z + lens.w, -seen.z);
@@ -38,6 +41,8 @@ const SURFACE = `#version 300 es
 precision highp float;
 in vec3 seen;
 in vec2 uv;
+in vec3 painted;
+uniform float cutoff;
 out vec4 shown;
 ${TEXEL}
 void main() {
@@ -49,8 +54,9 @@ void main() {
     light = 0.25 + 0.75 * (size > 0.0 ? abs(dot(normal, normalize(seen))) / size : 1.0);
     found = vec4(1.0);
   }
-  shown = vec4(found.rgb * color.rgb * light, found.a * color.a);
-  if (shown.a < 0.004) discard;
+  shown = vec4(found.rgb * color.rgb * painted * light, found.a * color.a);
+  if (shown.a < max(cutoff, 0.004)) discard;
+  if (cutoff > 0.0) shown.a = 1.0;
 }`;
 
 /** Numbers of 16 bits in two channels of 8. */

@@ -1,0 +1,798 @@
+"""Small models, one for each feature of a format and each trap, and what becomes of it.
+
+Outcomes are those of the formats' specifications: glTF 2.0 and its extensions, the OBJ and MTL
+appendices of Wavefront's manual, and, for colours of vertices in OBJ, what scanners write.
+`docs/prepare.md` has them as a table, which `test_features.py` holds against these.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from PIL import Image
+
+from ptmtools.scene import Scene
+
+from .conftest import FACE, QUAD, Gltf, Put, png
+
+Outcome = Literal["carried over", "baked", "noted", "refused"]
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A model with one feature.
+
+    Attributes
+    ----------
+    form: of the file, as the table's columns are called.
+    name: of the feature, as its rows are called.
+    outcome: what becomes of it.
+    make: writes the model into the test's folder and returns its name.
+    check: of the scene that it becomes; of one that is refused, of the error's text.
+    codes: of the notes or the error that tell of it, the first of the feature itself.
+    """
+
+    form: str
+    name: str
+    outcome: Outcome
+    make: Callable[[Put], str]
+    check: Callable[[Any], object]
+    codes: tuple[str, ...] = ()
+
+
+FEATURES: list[Feature] = []
+
+
+def feature(
+    form: str, name: str, outcome: Outcome, check: Callable[[Any], object], *codes: str
+) -> Callable[[Callable[[Put], str]], Callable[[Put], str]]:
+    """Makes a feature of a function that writes its model."""
+
+    def add(make: Callable[[Put], str]) -> Callable[[Put], str]:
+        FEATURES.append(Feature(form, name, outcome, make, check, codes))
+        return make
+
+    return add
+
+
+# -- What is seen -------------------------------------------------------------------------------
+
+
+def the_quad(scene: Scene) -> None:
+    """10 × 4 m, of two triangles that face the same way."""
+    assert len(scene.triangles) == 2
+    assert sorted(np.ptp(scene.points, axis=0).round(5)) == [0, 4, 10]
+    normals = np.cross(*np.moveaxis(scene.corners[:, 1:] - scene.corners[:, :1], 1, 0))
+    assert np.allclose(normals[0], normals[1])
+
+
+def at_corners(scene: Scene, values: np.ndarray) -> dict[tuple[float, ...], tuple[float, ...]]:
+    """Values of corners by place: metres from the lower left corner of the model."""
+    low = scene.points.min(axis=0)
+    places = (scene.corners - low).reshape(-1, 3).round(4).tolist()
+    rows = values.reshape(len(places), -1).round(4).tolist()
+    return {tuple(p): tuple(v) for p, v in zip(places, rows, strict=True)}
+
+
+def shown(scene: Scene, u: float, v: float) -> list[int]:
+    """The texel of the first material at a place of the model, of 10 × 4 m, from its lower left:
+    what a viewer would show there, nearest."""
+    at = at_corners(scene, scene.uv)
+    origin, right, up = (np.array(at[place]) for place in ((0, 0, 0), (10, 0, 0), (0, 4, 0)))
+    place = origin + u * (right - origin) + v * (up - origin)
+    material = scene.materials[0]
+    with Image.open(io.BytesIO(scene.images[material.image].load())) as image:
+        pixels = np.asarray(image)
+    height, width = pixels.shape[:2]
+    x, y = int(np.floor(place[0] * width)), int(np.floor((1 - place[1]) * height))
+    x = int(np.clip(x, 0, width - 1)) if material.wrap_s == "clamp" else x % width
+    y = int(np.clip(y, 0, height - 1)) if material.wrap_t == "clamp" else y % height
+    return pixels[y, x].tolist()
+
+
+#: 2 × 2 texels: red and green above, blue and white below.
+RED, GREEN, BLUE, WHITE = [255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]
+FOUR = np.array([[RED, GREEN], [BLUE, WHITE]], np.uint8)
+
+
+def four(scene: Scene) -> None:
+    """The image, upright, over the whole quad."""
+    the_quad(scene)
+    quarters = [shown(scene, u, v)[:3] for u, v in ((0.2, 0.8), (0.8, 0.8), (0.2, 0.2), (0.8, 0.2))]
+    assert quarters == [RED, GREEN, BLUE, WHITE]
+
+
+# -- OBJ ----------------------------------------------------------------------------------------
+
+
+def obj(put: Put, mtl: str = "", lines: str = FACE, head: str = "", **files: bytes) -> str:
+    put("a.mtl", f"newmtl wall\n{mtl}\n")
+    for name, data in files.items():
+        put(name.replace("_png", ".png"), data)
+    put("a.obj", f"mtllib a.mtl\n{head}{QUAD}usemtl wall\n{lines}")
+    return "a.obj"
+
+
+@feature("OBJ", "textures", "carried over", four)
+def _(put: Put) -> str:
+    return obj(put, "map_Kd four.png", four_png=png(FOUR))
+
+
+def tinted(scene: Scene) -> None:
+    assert scene.materials[0].color == (1.0, 0.5, 0.0)
+
+
+@feature("OBJ", "colours of materials", "carried over", tinted)
+def _(put: Put) -> str:
+    return obj(put, "Kd 1 0.5 0")
+
+
+COLORED = "v 0 0 0 1 0 0\nv 10 0 0 0 1 0\nv 10 4 0 0 0 1\nv 0 4 0 0 0 0\n"
+
+
+def painted(scene: Scene) -> None:
+    the_quad(scene)
+    assert scene.colors is not None
+    assert at_corners(scene, scene.colors) == {
+        (0, 0, 0): (255, 0, 0),
+        (10, 0, 0): (0, 255, 0),
+        (10, 4, 0): (0, 0, 255),
+        (0, 4, 0): (0, 0, 0),
+    }
+    assert scene.materials[0].color == (1, 1, 1)
+
+
+@feature("OBJ", "colours of vertices", "carried over", painted)
+def _(put: Put) -> str:
+    put("a.obj", COLORED + "f 1 2 3 4\n")
+    return "a.obj"
+
+
+@feature("OBJ", "colours of vertices", "carried over", painted)
+def _colours_to_255(put: Put) -> str:
+    """As some scanners write them; and they take the place of Kd."""
+    put("a.mtl", "newmtl wall\nKd 0.2 0.2 0.2\n")
+    rows = "v 0 0 0 255 0 0\nv 10 0 0 0 255 0\nv 10 4 0 0 0 255\nv 0 4 0 0 0 0\n"
+    put("a.obj", f"mtllib a.mtl\n{rows}usemtl wall\nf 1 2 3 4\n")
+    return "a.obj"
+
+
+def half(scene: Scene) -> None:
+    assert scene.materials[0].opacity == 0.5
+    assert not scene.opaque.any()
+
+
+@feature("OBJ", "opacity", "carried over", half)
+def _(put: Put) -> str:
+    return obj(put, "d 0.5")
+
+
+def cut_out(scene: Scene) -> None:
+    four(scene)
+    assert scene.materials[0].transparent
+    alpha = [shown(scene, u, v)[3] for u, v in ((0.2, 0.8), (0.8, 0.8), (0.2, 0.2), (0.8, 0.2))]
+    assert alpha == [0, 255, 255, 51]
+
+
+ALPHA = np.array([[0, 255], [255, 51]], np.uint8)
+
+
+@feature("OBJ", "alpha of textures", "carried over", cut_out)
+def _(put: Put) -> str:
+    return obj(put, "map_Kd four.png", four_png=png(np.dstack([FOUR, ALPHA])))
+
+
+@feature("OBJ", "images of opacities", "baked", cut_out, "PTM-N217")
+def _(put: Put) -> str:
+    return obj(put, "map_Kd four.png\nmap_d mask.png", four_png=png(FOUR), mask_png=png(ALPHA))
+
+
+def stencil(scene: Scene) -> None:
+    """A mask without an image: the material's colour with its alpha."""
+    assert scene.materials[0].color == (1.0, 0.5, 0.0)
+    assert [shown(scene, u, 0.8) for u in (0.2, 0.8)] == [[255, 0], [255, 255]]
+
+
+@feature("OBJ", "images of opacities", "baked", stencil, "PTM-N217")
+def _mask_alone(put: Put) -> str:
+    return obj(put, "Kd 1 0.5 0\nmap_d mask.png", mask_png=png(ALPHA))
+
+
+def twice(scene: Scene) -> None:
+    the_quad(scene)
+    assert [shown(scene, u, 0.8) for u in (0.1, 0.4, 0.6, 0.9)] == [RED, GREEN, RED, GREEN]
+
+
+@feature("OBJ", "moved and scaled textures", "baked", twice, "PTM-N216")
+def _(put: Put) -> str:
+    return obj(put, "map_Kd -s 2 1 1 four.png", four_png=png(FOUR))
+
+
+def clamped(scene: Scene) -> None:
+    assert [shown(scene, u, 0.9) for u in (0.2, 0.4, 0.9)] == [RED, GREEN, GREEN]
+
+
+@feature("OBJ", "clamped textures", "carried over", clamped, "PTM-N216")
+def _(put: Put) -> str:
+    return obj(put, "map_Kd -clamp on -s 2 1 1 four.png", four_png=png(FOUR))
+
+
+def untextured(scene: Scene) -> None:
+    the_quad(scene)
+    assert scene.materials[0].image < 0
+
+
+@feature("OBJ", "a texture that is missing", "noted", untextured, "PTM-N204")
+def _(put: Put) -> str:
+    return obj(put, "map_Kd gone.png")
+
+
+def suggested(scene: Scene) -> None:
+    untextured(scene)
+    (message,) = [note.message for note in scene.notes if note.code == "PTM-N203"]
+    assert message == (
+        "mtllib house.mtl: not found; if a.mtl beside the model is meant, rename it to house.mtl"
+    )
+
+
+@feature("OBJ", "a material library that is missing", "noted", suggested, "PTM-N203", "PTM-N207")
+def _(put: Put) -> str:
+    obj(put, "map_Kd four.png", four_png=png(FOUR))
+    put("a.obj", f"mtllib house.mtl\n{QUAD}usemtl wall\n{FACE}")
+    return "a.obj"
+
+
+def not_suggested(scene: Scene) -> None:
+    (message,) = [note.message for note in scene.notes if note.code == "PTM-N203"]
+    assert message == "mtllib house.mtl: not found"
+
+
+@feature(
+    "OBJ", "a material library that is missing", "noted", not_suggested, "PTM-N203", "PTM-N207"
+)
+def _several_libraries(put: Put) -> str:
+    """Which of them is meant nobody knows."""
+    put("b.mtl", "newmtl wall\n")
+    obj(put)
+    put("a.obj", f"mtllib house.mtl\n{QUAD}usemtl wall\n{FACE}")
+    return "a.obj"
+
+
+@feature("OBJ", "points and lines", "noted", the_quad, "PTM-N219")
+def _(put: Put) -> str:
+    return obj(put, lines=f"l 1 2\np 1\n{FACE}")
+
+
+@feature("OBJ", "polygons", "carried over", the_quad)
+def _(put: Put) -> str:
+    return obj(put)
+
+
+# -- glTF ---------------------------------------------------------------------------------------
+
+
+def glb(put: Put, doc: Gltf, name: str = "a.glb") -> str:
+    put(name, doc.glb())
+    return name
+
+
+def with_texture(
+    doc: Gltf, data: bytes, use: dict[str, Any] | None = None, **material: Any
+) -> dict[str, Any]:
+    """Gives the document an image and a material that shows it."""
+    doc.tree["images"] = [{"bufferView": doc.view(data), "mimeType": "image/png"}]
+    doc.tree["textures"] = [{"source": 0}]
+    base = {"baseColorTexture": {"index": 0, **(use or {})}}
+    doc.tree["materials"] = [{"pbrMetallicRoughness": base, **material}]
+    return {"material": 0}
+
+
+@feature("glTF", "textures", "carried over", four)
+def _(put: Put) -> str:
+    doc = Gltf()
+    doc.place(doc.quad(**with_texture(doc, png(FOUR))))
+    return glb(put, doc)
+
+
+def orange(scene: Scene) -> None:
+    assert np.allclose(scene.materials[0].color, (1.0, 0.735357, 0.0), atol=1e-6)
+
+
+@feature("glTF", "colours of materials", "carried over", orange, "PTM-N226")
+def _(put: Put) -> str:
+    """Linear light of a half is 0.735 in sRGB (IEC 61966-2-1)."""
+    doc = Gltf()
+    doc.tree["materials"] = [{"pbrMetallicRoughness": {"baseColorFactor": [1, 0.5, 0, 1]}}]
+    doc.place(doc.quad(material=0))
+    return glb(put, doc)
+
+
+CORNERS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]], np.float32)
+
+
+@feature("glTF", "colours of vertices", "carried over", painted)
+def _(put: Put) -> str:
+    doc = Gltf()
+    quad = doc.quad()
+    quad["attributes"]["COLOR_0"] = doc.add(CORNERS)
+    doc.place(quad)
+    return glb(put, doc)
+
+
+@feature("glTF", "colours of vertices", "carried over", painted)
+def _colours_of_bytes(put: Put) -> str:
+    """Normalised, with an alpha that an opaque material does not heed."""
+    doc = Gltf()
+    quad = doc.quad()
+    rows = np.hstack([255 * CORNERS, [[9]] * 4]).astype(np.uint8)
+    quad["attributes"]["COLOR_0"] = doc.add(rows, normalized=True)
+    doc.place(quad)
+    return glb(put, doc)
+
+
+def multiplied(scene: Scene) -> None:
+    """A quarter of the light: 0.537 in sRGB, 137 of 255."""
+    assert scene.colors is not None
+    assert set(scene.colors.ravel().tolist()) == {137}
+    assert scene.materials[0].color == (1, 1, 1)
+
+
+@feature("glTF", "colours of vertices", "carried over", multiplied, "PTM-N226")
+def _colours_times_a_factor(put: Put) -> str:
+    doc = Gltf()
+    doc.tree["materials"] = [{"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1]}}]
+    quad = doc.quad(material=0)
+    quad["attributes"]["COLOR_0"] = doc.add(np.full((4, 3), 0.5, np.float32))
+    doc.place(quad)
+    return glb(put, doc)
+
+
+@feature("glTF", "opacity", "carried over", half)
+def _(put: Put) -> str:
+    doc = Gltf()
+    base = {"baseColorFactor": [1, 1, 1, 0.5]}
+    doc.tree["materials"] = [{"pbrMetallicRoughness": base, "alphaMode": "BLEND"}]
+    doc.place(doc.quad(material=0))
+    return glb(put, doc)
+
+
+@feature("glTF", "alpha of textures", "carried over", cut_out)
+def _(put: Put) -> str:
+    doc = Gltf()
+    image = png(np.dstack([FOUR, ALPHA]))
+    doc.place(doc.quad(**with_texture(doc, image, alphaMode="BLEND")))
+    return glb(put, doc)
+
+
+def tested(cutoff: float) -> Callable[[Scene], None]:
+    def check(scene: Scene) -> None:
+        cut_out(scene)
+        assert scene.materials[0].cutoff == cutoff
+        assert scene.materials[0].opacity == 1
+
+    return check
+
+
+@feature("glTF", "alpha cutoff", "carried over", tested(0.25))
+def _(put: Put) -> str:
+    doc = Gltf()
+    image = png(np.dstack([FOUR, ALPHA]))
+    doc.place(doc.quad(**with_texture(doc, image, alphaMode="MASK", alphaCutoff=0.25)))
+    return glb(put, doc)
+
+
+@feature("glTF", "alpha cutoff", "carried over", tested(0.5))
+def _default_cutoff(put: Put) -> str:
+    doc = Gltf()
+    image = png(np.dstack([FOUR, ALPHA]))
+    doc.place(doc.quad(**with_texture(doc, image, alphaMode="MASK")))
+    return glb(put, doc)
+
+
+@feature("glTF", "moved and scaled textures", "baked", twice, "PTM-N216")
+def _(put: Put) -> str:
+    doc = Gltf()
+    use = {"extensions": {"KHR_texture_transform": {"scale": [2, 1]}}}
+    doc.place(doc.quad(**with_texture(doc, png(FOUR), use)))
+    return glb(put, doc)
+
+
+def turned(scene: Scene) -> None:
+    """By a quarter, clockwise."""
+    quarters = [shown(scene, u, v)[:3] for u, v in ((0.2, 0.8), (0.8, 0.8), (0.2, 0.2), (0.8, 0.2))]
+    assert quarters == [BLUE, RED, WHITE, GREEN]
+
+
+@feature("glTF", "moved and scaled textures", "baked", turned, "PTM-N216")
+def _turned_texture(put: Put) -> str:
+    """u' = cos·u + sin·v + offset, v' = −sin·u + cos·v + offset (KHR_texture_transform)."""
+    doc = Gltf()
+    moved = {"rotation": float(np.pi / 2), "offset": [0, 1]}
+    use = {"extensions": {"KHR_texture_transform": moved}}
+    doc.place(doc.quad(**with_texture(doc, png(FOUR), use)))
+    return glb(put, doc)
+
+
+@feature("glTF", "clamped textures", "carried over", clamped, "PTM-N216")
+def _(put: Put) -> str:
+    doc = Gltf()
+    use = {"extensions": {"KHR_texture_transform": {"scale": [2, 1]}}}
+    material = with_texture(doc, png(FOUR), use)
+    doc.tree["samplers"] = [{"wrapS": 33071}]
+    doc.tree["textures"][0]["sampler"] = 0
+    doc.place(doc.quad(**material))
+    return glb(put, doc)
+
+
+def mirrored(scene: Scene) -> None:
+    the_quad(scene)
+    row = [shown(scene, u, 0.9) for u in (0.05, 0.3, 0.42, 0.55, 0.7, 0.95)]
+    assert row == [RED, GREEN, GREEN, GREEN, RED, RED]
+    column = [shown(scene, 0.05, v) for v in (0.9, 0.6, 0.4, 0.1)]
+    assert column == [RED, BLUE, BLUE, RED]
+
+
+def repeating(doc: Gltf, scale: list[float]) -> dict[str, Any]:
+    material = with_texture(
+        doc, png(FOUR), {"extensions": {"KHR_texture_transform": {"scale": scale}}}
+    )
+    doc.tree["samplers"] = [{"wrapS": 33648, "wrapT": 33648}]
+    doc.tree["textures"][0]["sampler"] = 0
+    return material
+
+
+@feature("glTF", "mirrored textures", "baked", mirrored, "PTM-N222", "PTM-N216")
+def _(put: Put) -> str:
+    """Three repetitions across and two down: the image beside its mirror images."""
+    doc = Gltf()
+    doc.place(doc.quad(**repeating(doc, [2.5, 2])))
+    return glb(put, doc)
+
+
+def folded(scene: Scene) -> None:
+    assert len(scene.images) == 1
+    with Image.open(io.BytesIO(scene.images[0].load())) as image:
+        assert image.size == (2, 2)
+    quarters = [shown(scene, u, v)[:3] for u, v in ((0.2, 0.8), (0.8, 0.8), (0.2, 0.2), (0.8, 0.2))]
+    assert quarters == [GREEN, RED, WHITE, BLUE]
+
+
+@feature("glTF", "mirrored textures", "baked", folded, "PTM-N222", "PTM-N216")
+def _mirrored_within_a_repetition(put: Put) -> str:
+    """The second one: the coordinates are mirrored, and the image stays."""
+    doc = Gltf()
+    material = repeating(doc, [1, 1])
+    use = doc.tree["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]
+    use["extensions"]["KHR_texture_transform"] = {"offset": [1, 0]}
+    doc.place(doc.quad(**material))
+    return glb(put, doc)
+
+
+@feature("glTF", "WebP", "carried over", four)
+def _(put: Put) -> str:
+    stream = io.BytesIO()
+    Image.fromarray(FOUR.repeat(8, 0).repeat(8, 1)).save(stream, "webp", lossless=True)
+    doc = Gltf()
+    material = with_texture(doc, stream.getvalue())
+    doc.tree["textures"] = [{"extensions": {"EXT_texture_webp": {"source": 0}}}]
+    doc.tree["extensionsRequired"] = ["EXT_texture_webp"]
+    doc.place(doc.quad(**material))
+    return glb(put, doc)
+
+
+def first_image(scene: Scene) -> None:
+    assert len(scene.images) == 1
+    four(scene)
+
+
+@feature("glTF", "WebP", "carried over", first_image)
+def _webp_beside_png(put: Put) -> str:
+    """The image for those without the extension has lost less."""
+    doc = Gltf()
+    material = with_texture(doc, png(FOUR))
+    doc.tree["images"].append({"bufferView": doc.view(b"RIFF"), "mimeType": "image/webp"})
+    doc.tree["textures"] = [{"source": 0, "extensions": {"EXT_texture_webp": {"source": 1}}}]
+    doc.place(doc.quad(**material))
+    return glb(put, doc)
+
+
+def three_quads(scene: Scene) -> None:
+    """One as it is, one turned by half about z in front of it, one twice as wide behind."""
+    assert scene.objects == ("wall",) * 3
+    model = scene.corners + scene.space.origin
+    boxes = [
+        (q.reshape(-1, 3).min(axis=0), q.reshape(-1, 3).max(axis=0))
+        for q in (model[:2], model[2:4], model[4:])
+    ]
+    expected = [([0, 0, 0], [10, 4, 0]), ([-10, -4, 5], [0, 0, 5]), ([0, 0, -5], [20, 4, -5])]
+    assert np.allclose(boxes, expected, atol=1e-3)
+
+
+@feature("glTF", "instances", "carried over", three_quads)
+def _(put: Put) -> str:
+    doc = Gltf()
+    moved = np.array([[0, 0, 0], [0, 0, 5], [0, 0, -5]], np.float32)
+    turns = np.array([[0, 0, 0, 32767], [0, 0, 32767, 0], [0, 0, 0, 32767]], np.int16)
+    scales = np.array([[1, 1, 1], [1, 1, 1], [2, 1, 1]], np.float32)
+    attributes = {
+        "TRANSLATION": doc.add(moved),
+        "ROTATION": doc.add(turns, normalized=True),
+        "SCALE": doc.add(scales),
+    }
+    doc.place(doc.quad(), extensions={"EXT_mesh_gpu_instancing": {"attributes": attributes}})
+    doc.tree["extensionsRequired"] = ["EXT_mesh_gpu_instancing"]
+    return glb(put, doc)
+
+
+@feature("glTF", "sparse accessors", "carried over", the_quad)
+def _(put: Put) -> str:
+    """Two of four corners are written over what the buffer has."""
+    doc = Gltf()
+    quad = doc.quad()
+    wrong = np.array([[0, 0, 0], [9, 9, 9], [10, 4, 0], [9, 9, 9]], np.float32)
+    right = np.array([[10, 0, 0], [0, 4, 0]], np.float32)
+    sparse = {
+        "count": 2,
+        "indices": {
+            "bufferView": doc.view(np.array([1, 3], np.uint16).tobytes()),
+            "componentType": 5123,
+        },
+        "values": {"bufferView": doc.view(right.tobytes())},
+    }
+    quad["attributes"]["POSITION"] = doc.add(wrong, sparse=sparse)
+    doc.place(quad)
+    return glb(put, doc)
+
+
+@feature("glTF", "sparse accessors", "carried over", the_quad)
+def _sparse_over_nothing(put: Put) -> str:
+    """What is not written is 0."""
+    doc = Gltf()
+    quad = doc.quad()
+    right = np.array([[10, 0, 0], [10, 4, 0], [0, 4, 0]], np.float32)
+    index = doc.view(np.array([1, 2, 3], np.uint8).tobytes())
+    doc.tree["accessors"].append(
+        {
+            "componentType": 5126,
+            "count": 4,
+            "type": "VEC3",
+            "sparse": {
+                "count": 3,
+                "indices": {"bufferView": index, "componentType": 5121},
+                "values": {"bufferView": doc.view(right.tobytes())},
+            },
+        }
+    )
+    quad["attributes"]["POSITION"] = len(doc.tree["accessors"]) - 1
+    doc.place(quad)
+    return glb(put, doc)
+
+
+@feature("glTF", "quantised meshes", "carried over", four)
+def _(put: Put) -> str:
+    """Positions of 16 bits, as they are and normalised coordinates (KHR_mesh_quantization)."""
+    doc = Gltf()
+    quad = doc.quad(**with_texture(doc, png(FOUR)))
+    corners = np.array([[0, 0, 0], [1000, 0, 0], [1000, 400, 0], [0, 400, 0]], np.int16)
+    coords = np.array([[0, 65535], [65535, 65535], [65535, 0], [0, 0]], np.uint16)
+    quad["attributes"]["POSITION"] = doc.add(corners)
+    quad["attributes"]["TEXCOORD_0"] = doc.add(coords, normalized=True)
+    doc.place(quad, scale=[0.01, 0.01, 0.01])
+    doc.tree["extensionsRequired"] = ["KHR_mesh_quantization"]
+    return glb(put, doc)
+
+
+def compressed(doc: Gltf, extension: str = "EXT_meshopt_compression", version: int = 0) -> Gltf:
+    """With all its buffer views of vertices and indices compressed, and nothing in their place."""
+    import meshopt
+
+    accessors = {a["bufferView"]: a for a in doc.tree["accessors"]}
+    blob = b""
+    for number, view in enumerate(doc.tree["bufferViews"]):
+        data = doc.blob[view["byteOffset"] :][: view["byteLength"]]
+        start = len(blob)
+        if number not in accessors:  # an image
+            blob += data + b"\0" * (-len(data) % 4)
+            view["byteOffset"] = start
+            continue
+        count = accessors[number]["count"]
+        stride = len(data) // count
+        if stride == 2:
+            index, mode = np.frombuffer(data, np.uint16).astype(np.uint32), "TRIANGLES"
+            stream = meshopt.encode_index_buffer(index)
+        else:
+            rows, mode = np.frombuffer(data, np.uint8).reshape(count, stride), "ATTRIBUTES"
+            stream = meshopt.encode_vertex_buffer_level(rows, 2, version)
+        told = {"buffer": 0, "byteOffset": start, "byteLength": len(stream), "count": count}
+        view |= {
+            "buffer": 1,
+            "extensions": {extension: told | {"byteStride": stride, "mode": mode}},
+        }
+        if mode == "ATTRIBUTES":
+            view["byteStride"] = stride
+        blob += stream + b"\0" * (-len(stream) % 4)
+    size, doc.blob = len(doc.blob), blob
+    doc.tree |= {"extensionsUsed": [extension], "extensionsRequired": [extension]}
+    doc.spare = [{"byteLength": size, "extensions": {extension: {"fallback": True}}}]
+    return doc
+
+
+@feature("glTF", "meshopt compression", "carried over", four)
+def _(put: Put) -> str:
+    doc = Gltf()
+    doc.place(doc.quad(**with_texture(doc, png(FOUR))))
+    return glb(put, compressed(doc))
+
+
+@feature("glTF", "meshopt compression", "carried over", four)
+def _meshopt_of_khronos(put: Put) -> str:
+    doc = Gltf()
+    doc.place(doc.quad(**with_texture(doc, png(FOUR))))
+    return glb(put, compressed(doc, "KHR_meshopt_compression", 1))
+
+
+def draco(doc: Gltf, quad: dict[str, Any]) -> dict[str, Any]:
+    """A primitive like that, compressed with Draco, and nothing in its place."""
+    import DracoPy
+
+    corners = np.array([[0, 0, 0], [10, 0, 0], [10, 4, 0], [0, 4, 0]], np.float64)
+    coords = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float64)
+    faces = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+    data = DracoPy.encode(corners, faces, quantization_bits=20, tex_coord=coords)
+    ids = {row["attribute_type"]: row["unique_id"] for row in DracoPy.decode(data).attributes}
+    told = {"bufferView": doc.view(data), "attributes": {"POSITION": ids[0], "TEXCOORD_0": ids[3]}}
+    for accessor in (*quad["attributes"].values(), quad["indices"]):
+        del doc.tree["accessors"][accessor]["bufferView"]
+    doc.tree["extensionsRequired"] = ["KHR_draco_mesh_compression"]
+    return quad | {"extensions": {"KHR_draco_mesh_compression": told}}
+
+
+@feature("glTF", "Draco compression", "carried over", four)
+def _(put: Put) -> str:
+    doc = Gltf()
+    doc.place(draco(doc, doc.quad(**with_texture(doc, png(FOUR)))))
+    return glb(put, doc)
+
+
+@feature("glTF", "Draco compression", "carried over", the_quad)
+def _draco_beside_plain_data(put: Put) -> str:
+    """What is compressed need not be read, and here cannot be."""
+    doc = Gltf()
+    quad = doc.quad()
+    told = {"bufferView": doc.view(b"DRACO"), "attributes": {"POSITION": 0}}
+    doc.place(quad | {"extensions": {"KHR_draco_mesh_compression": told}})
+    return glb(put, doc)
+
+
+@feature("glTF", "unlit materials", "carried over", four)
+def _(put: Put) -> str:
+    doc = Gltf()
+    material = with_texture(doc, png(FOUR), extensions={"KHR_materials_unlit": {}})
+    doc.tree["extensionsRequired"] = ["KHR_materials_unlit"]
+    doc.place(doc.quad(**material))
+    return glb(put, doc)
+
+
+@feature("glTF", "specular-glossiness materials", "carried over", four)
+def _(put: Put) -> str:
+    doc = Gltf()
+    with_texture(doc, png(FOUR))
+    glossy = {"diffuseTexture": {"index": 0}}
+    doc.tree["materials"] = [{"extensions": {"KHR_materials_pbrSpecularGlossiness": glossy}}]
+    doc.tree["extensionsRequired"] = ["KHR_materials_pbrSpecularGlossiness"]
+    doc.place(doc.quad(material=0))
+    return glb(put, doc)
+
+
+def through(scene: Scene) -> None:
+    assert not scene.opaque.any()
+
+
+@feature("glTF", "transmission", "noted", through, "PTM-N224")
+def _(put: Put) -> str:
+    doc = Gltf()
+    glass = {"KHR_materials_transmission": {"transmissionFactor": 0.9}}
+    doc.tree["materials"] = [{"extensions": glass}]
+    doc.place(doc.quad(material=0))
+    return glb(put, doc)
+
+
+@feature("glTF", "triangle strips and fans", "carried over", the_quad)
+def _(put: Put) -> str:
+    doc = Gltf()
+    doc.place(doc.quad() | {"mode": 6, "indices": doc.add(np.array([0, 1, 2, 3], np.uint16))})
+    return glb(put, doc)
+
+
+@feature("glTF", "triangle strips and fans", "carried over", the_quad)
+def _strip(put: Put) -> str:
+    doc = Gltf()
+    doc.place(doc.quad() | {"mode": 5, "indices": doc.add(np.array([0, 1, 3, 2], np.uint16))})
+    return glb(put, doc)
+
+
+@feature("glTF", "points and lines", "noted", the_quad, "PTM-N219")
+def _(put: Put) -> str:
+    doc = Gltf()
+    doc.place(doc.quad(), doc.quad() | {"mode": 1})
+    return glb(put, doc)
+
+
+@feature("glTF", "nodes that are hidden", "noted", the_quad, "PTM-N224")
+def _(put: Put) -> str:
+    doc = Gltf.wall()
+    hidden = {"extensions": {"KHR_node_visibility": {"visible": False}}, "children": [2]}
+    doc.tree["nodes"] += [{"mesh": 0, "translation": [99, 0, 0], **hidden}, {"mesh": 0}]
+    doc.tree["scenes"] = [{"nodes": [0, 1]}]
+    return glb(put, doc)
+
+
+@feature("glTF", "skins and morph targets", "noted", the_quad, "PTM-N224")
+def _(put: Put) -> str:
+    doc = Gltf()
+    target = doc.add(np.zeros((4, 3), np.float32))
+    doc.place(doc.quad(targets=[{"POSITION": target}]))
+    return glb(put, doc)
+
+
+def seen(scene: Scene) -> None:
+    (camera,) = scene.cameras
+    assert np.allclose(camera.direction, [0, 0, -1])
+    assert camera.field_of_view == 0.8
+
+
+@feature("glTF", "cameras", "carried over", seen)
+def _(put: Put) -> str:
+    doc = Gltf.wall()
+    doc.tree["cameras"] = [{"type": "perspective", "perspective": {"yfov": 0.8, "znear": 0.1}}]
+    doc.tree["nodes"].append({"camera": 0, "translation": [5, 2, 5]})
+    doc.tree["scenes"] = [{"nodes": [0, 1]}]
+    return glb(put, doc)
+
+
+def asked(text: str) -> None:
+    assert "needs the glTF extension EXT_texture_avif, which is not read; run `npx" in text
+
+
+@feature("glTF", "an extension that is required and not known", "refused", asked, "PTM-I255")
+def _(put: Put) -> str:
+    doc = Gltf.wall()
+    doc.tree["extensionsRequired"] = ["EXT_texture_avif"]
+    return glb(put, doc)
+
+
+@feature("glTF", "an extension that is optional and not known", "noted", the_quad, "PTM-N224")
+def _(put: Put) -> str:
+    doc = Gltf.wall()
+    doc.tree["extensionsUsed"] = ["MSFT_lod"]
+    return glb(put, doc)
+
+
+# -- PLY ----------------------------------------------------------------------------------------
+
+
+PLY_ROWS = "".join(
+    f"{place} {color}\n"
+    for place, color in (
+        ("0 0 0", "255 0 0"),
+        ("10 0 0", "0 255 0"),
+        ("10 4 0", "0 0 255"),
+        ("0 4 0", "0 0 0"),
+    )
+)
+
+
+@feature("PLY", "colours of vertices", "carried over", painted)
+def _(put: Put) -> str:
+    colors = "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
+    axes = "".join(f"property float {axis}\n" for axis in "xyz")
+    head = f"ply\nformat ascii 1.0\nelement vertex 4\n{axes}{colors}element face 2\n"
+    put(
+        "a.ply",
+        f"{head}property list uchar int vertex_indices\nend_header\n{PLY_ROWS}3 0 1 2\n3 0 2 3\n",
+    )
+    return "a.ply"
