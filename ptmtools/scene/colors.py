@@ -12,7 +12,8 @@ def to_srgb(light: Floats) -> Floats:
     """Linear light, any shape, as it is encoded in sRGB, both from 0 to 1; what is outside, and
     what is no number, is brought into that."""
     held = np.clip(np.nan_to_num(light, nan=0.0), 0.0, 1.0)
-    return np.where(held <= 0.0031308, 12.92 * held, 1.055 * held ** (1 / 2.4) - 0.055)
+    bright = np.where(held < 1, 1.055 * held ** (1 / 2.4) - 0.055, 1.0)  # 1 is 1, to the last bit
+    return np.where(held <= 0.0031308, 12.92 * held, bright)
 
 
 def encoded(light: Floats) -> NDArray[np.uint8]:

@@ -149,7 +149,7 @@ FAULTS: list[tuple[str, str, Damage]] = [
     ("PTM-D732", "component type", of_accessor("componentType", 5122)),
     ("PTM-D732", "no bounds", of_accessor("min", [])),
     ("PTM-D732", "no max", treed(lambda t: [a.pop("max", 0) for a in t["accessors"]])),
-    ("PTM-D732", "a mask", treed(lambda t: t["materials"][0].update(alphaMode="MASK"))),
+    ("PTM-D732", "a dither", treed(lambda t: t["materials"][0].update(alphaMode="DITHER"))),
     ("PTM-D732", "stride", treed(lambda t: t["bufferViews"][0].update(byteStride=16))),
     ("PTM-D732", "an embedded buffer", treed(lambda t: t["buffers"][0].update(uri="data:,"))),
     (
