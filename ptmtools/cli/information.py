@@ -1,4 +1,4 @@
-"""`ptm info`: what is in a database or a `.ptm` file."""
+"""`ptm info`: what is in a model, a database or a `.ptm` file."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ import click
 from ptmtools.cli.batch import STANDARD, no_name, standard_input
 from ptmtools.cli.common import as_json, voiced
 from ptmtools.cli.output import Voice
+from ptmtools.cli.parameters import options_of, take
 from ptmtools.errors import InputError, naming
 from ptmtools.quantities import count, size
+from ptmtools.scene.options import SUFFIXES, IngestOptions
 from ptmtools.texture.model import Description, PtmHeader, gpu_texel_bytes
 
 #: Of a stage whose record has another recipe.
@@ -23,18 +25,25 @@ _OLD = "made by another release of ptmtools"
 
 
 @click.command("info")
-@click.argument("target", metavar="FILE|DB", type=click.Path())
+@click.argument("target", metavar="MODEL|FILE|DB", type=click.Path())
+@options_of(IngestOptions)
 @as_json
 @voiced
-def info(voice: Voice, target: str, as_json: bool) -> None:
-    """Show what is in a database, or level by level in a .ptm file (- for stdin).
+def info(voice: Voice, target: str, as_json: bool, **values: Any) -> None:
+    """Show what a model is before anything is built of it, what is in a database, or level by level
+    in a .ptm file (- for stdin).
 
-    Only the head of a .ptm is read.
+    A model is read as build-scene reads it, with the options that follow. Only the head of a .ptm
+    is read.
     """
     if not target:
         raise no_name()
     if target != STANDARD and Path(target).is_dir():
         _info_database(voice, target, as_json)
+    elif Path(target).suffix.lower() in SUFFIXES:
+        from ptmtools.cli.models import info_model
+
+        info_model(voice, target, take(IngestOptions, values), as_json)
     else:
         _info_ptm(voice, target, as_json)
 

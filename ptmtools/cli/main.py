@@ -29,7 +29,7 @@ COMMANDS = {
     "build-scene": ("stages", "build_scene", "Build or update a database from a model."),
     "status": ("status", "status", "Show which stages of a database are up to date."),
     "validate": ("reports", "validate", "Check a database or a .ptm file."),
-    "info": ("information", "info", "Show what is in a database or a .ptm file."),
+    "info": ("information", "info", "Show what is in a model, a database or a .ptm file."),
     "plot": ("reports", "plot", "Draw the floor plan of a database."),
     "tradeoff": ("tradeoff", "tradeoff", "Measure what settings cost, and what they are worth."),
     "path": ("path", "path", "Make a walk through every room of a database."),

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
 from ptmtools.scene.meshlab import convert
+from ptmtools.scene.options import SUFFIXES, TRIMESH
 from ptmtools.scene.source import (
     MAX_VERTICES,
     Findings,
@@ -25,9 +26,6 @@ from ptmtools.scene.source import (
     too_many_triangles,
 )
 
-TRIMESH = (".ply", ".stl", ".off")
-MESHLAB = (".3ds", ".3mf", ".ctm", ".dae", ".wrl", ".x3d")
-SUPPORTED = (".obj", ".glb", ".gltf", *TRIMESH, *MESHLAB)
 #: Enough of a PLY file for its header.
 _HEADER = 1 << 14
 
@@ -40,12 +38,12 @@ def read_other(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES
     imported.
     """
     suffix = path.suffix.lower()
-    if suffix not in SUPPORTED:
+    if suffix not in SUFFIXES:
         raise InputError(
             "PTM-I243",
             f"models of type {suffix or '(no suffix)'} are not supported",
             file=path,
-            remedy=f"give one of {' '.join(SUPPORTED)}",
+            remedy=f"give one of {' '.join(SUFFIXES)}",
         )
     if suffix not in TRIMESH or (suffix == ".ply" and _textured_ply(path)):
         return _read_meshlab(path, findings, max_triangles)

@@ -63,7 +63,7 @@ def _transcode_here(given: str, made: str) -> None:
     from PIL import Image
 
     texture = opengl_basisu.open(given)
-    texels = texture.transcode("RGBA32").data
+    texels = texture.transcode("rgba8").data
     shown = Image.fromarray(texels.reshape(texture.height, texture.width, 4), "RGBA")
     (shown if texture.has_alpha else shown.convert("RGB")).save(made)
 

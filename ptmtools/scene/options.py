@@ -7,6 +7,12 @@ from typing import Literal
 
 from ptmtools.errors import InputError
 
+#: Of the files that are read: by readers of our own, through trimesh, through pymeshlab.
+OWN = (".obj", ".glb", ".gltf")
+TRIMESH = (".ply", ".stl", ".off")
+MESHLAB = (".3ds", ".3mf", ".ctm", ".dae", ".wrl", ".x3d")
+SUFFIXES = (*OWN, *TRIMESH, *MESHLAB)
+
 
 @dataclass(frozen=True)
 class IngestOptions:

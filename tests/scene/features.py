@@ -7,6 +7,7 @@ appendices of Wavefront's manual, and, for colours of vertices in OBJ, what scan
 
 from __future__ import annotations
 
+import base64
 import io
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -496,6 +497,28 @@ def _webp_beside_png(put: Put) -> str:
     material = with_texture(doc, png(FOUR))
     doc.tree["images"].append({"bufferView": doc.view(b"RIFF"), "mimeType": "image/webp"})
     doc.tree["textures"] = [{"source": 0, "extensions": {"EXT_texture_webp": {"source": 1}}}]
+    doc.place(doc.quad(**material))
+    return glb(put, doc)
+
+
+#: The four colours on 8 × 8 texels, as UASTC.
+KTX2 = base64.b64decode(
+    "q0tUWCAyMLsNChoKAAAAAAEAAAAIAAAACAAAAAAAAAAAAAAAAQAAAAQAAAACAAAAsAAAACwAAADcAAAAJAAA"
+    "AAAAAAAAAAAAAAAAAAAAAABLAQAAAAAAAC8AAAAAAAAAQAAAAAAAAAAyAQAAAAAAABkAAAAAAAAAEAAAAAAA"
+    "AAAZAQAAAAAAABkAAAAAAAAAEAAAAAAAAAAAAQAAAAAAABkAAAAAAAAAEAAAAAAAAAAsAAAAAAAAAAIAKACm"
+    "AQIAAwMAABAAAAAAAAAAAAB/AAAAAAAAAAAA/////x8AAABLVFh3cml0ZXIAQmFzaXMgVW5pdmVyc2FsIDIu"
+    "NTAAACi1L/0gEIEAABcQEPAfQAgBAAAAAAAAAAAotS/9IBCBAABTfCsAAAAASZAAQID//38AKLUv/SAQgQAA"
+    "U/IOAAAAIAAQJEEAgP9/ACi1L/0gQDUBAOD3HwDgH3oAF+Af4B8CDwDg/x8C4AH3////H3zvBEAHoAAycxcg"
+)
+
+
+@feature("glTF", "KTX2", "carried over", four)
+def _(put: Put) -> str:
+    doc = Gltf()
+    material = with_texture(doc, KTX2)
+    doc.tree["images"][0]["mimeType"] = "image/ktx2"
+    doc.tree["textures"] = [{"extensions": {"KHR_texture_basisu": {"source": 0}}}]
+    doc.tree["extensionsRequired"] = ["KHR_texture_basisu"]
     doc.place(doc.quad(**material))
     return glb(put, doc)
 

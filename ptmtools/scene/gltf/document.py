@@ -166,6 +166,20 @@ def open_document(path: Path, folder: Folder) -> Document:
 
     Raises InputError where the container is damaged or a buffer is missing.
     """
+    tree, binary = _opened(path)
+    version = str(tree["asset"].get("version", ""))
+    if not version.startswith("2."):
+        raise damaged(path, f"version {version!r}")
+    return Document(path, tree, _buffers(path, tree, folder, binary))
+
+
+def document_json(path: Path) -> dict[str, Any]:
+    """The JSON of a .glb or .gltf file. Raises InputError where the container is damaged."""
+    return _opened(path)[0]
+
+
+def _opened(path: Path) -> tuple[dict[str, Any], Buffer | None]:
+    """The JSON, and the buffer of a GLB."""
     data = path.read_bytes()
     binary: Buffer | None = None
     if data.startswith(MAGIC) or path.suffix.lower() == ".glb":
@@ -183,11 +197,7 @@ def open_document(path: Path, folder: Folder) -> Document:
         raise damaged(path, f"its JSON cannot be read ({error})") from None
     if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
         raise damaged(path, "its JSON is not a glTF document")
-    version = str(tree["asset"].get("version", ""))
-    if not version.startswith("2."):
-        raise damaged(path, f"version {version!r}")
-
-    return Document(path, tree, tuple(_buffers(path, tree, folder, binary)))
+    return tree, binary
 
 
 def _parsed(text: str) -> Any:

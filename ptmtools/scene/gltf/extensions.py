@@ -44,7 +44,17 @@ KNOWN: dict[str, Outcome] = {
 _REMEDIES = {
     "EXT_texture_avif": "npx @gltf-transform/cli png IN.glb OUT.glb",
 }
+_WORDS: dict[Outcome, str] = {
+    "read": "read",
+    "silent": "does not change what is drawn",
+    "noted": "not carried over",
+}
 _ANY = "open it in Blender and export it as glTF again"
+
+
+def outcome_of(name: str) -> str:
+    """What becomes of an extension, in words."""
+    return _WORDS[KNOWN.get(name, "noted")]
 
 
 def check_extensions(tree: dict[str, object], findings: Findings) -> None:

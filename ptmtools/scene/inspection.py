@@ -1,0 +1,149 @@
+"""What a model is, before anything is made of it."""
+
+from __future__ import annotations
+
+import io
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ptmtools.progress import Progress, silent
+from ptmtools.scene.gltf.document import document_json
+from ptmtools.scene.gltf.extensions import outcome_of
+from ptmtools.scene.ingestion import ingest
+from ptmtools.scene.model import Scene, SourceImage
+from ptmtools.scene.options import IngestOptions
+from ptmtools.scene.readings import Reading, readings
+from ptmtools.scene.signs import Named, Up, looks
+
+#: The formats by the suffixes of their files.
+_FORMATS = {
+    ".3ds": "3D Studio",
+    ".3mf": "3MF",
+    ".ctm": "OpenCTM",
+    ".dae": "COLLADA",
+    ".glb": "glTF binary",
+    ".gltf": "glTF",
+    ".ifc": "IFC",
+    ".ifczip": "IFC",
+    ".obj": "Wavefront OBJ",
+    ".off": "OFF",
+    ".ply": "PLY",
+    ".stl": "STL",
+    ".usd": "USD",
+    ".usda": "USD",
+    ".usdc": "USD",
+    ".usdz": "USDZ",
+    ".wrl": "VRML",
+    ".x3d": "X3D",
+}
+
+
+@dataclass(frozen=True)
+class ImageFacts:
+    """An image that some face uses: its format as Pillow calls it, size in texels and bytes."""
+
+    name: str
+    format: str
+    width: int
+    height: int
+    bytes: int
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A reading of the model (`readings`): what it would be, why, and how unusual that is."""
+
+    unit: str
+    up: Up
+    size: str
+    reasons: tuple[str, ...]
+    cost: float
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What a model file holds.
+
+    Attributes
+    ----------
+    format, generator: of the file, and what wrote it, "" if that is not known.
+    extensions: of glTF, by name, with what becomes of each.
+    objects: by name, with the triangles of all objects of that name, those with most first.
+    images: that faces use, in the order of the file.
+    best, runner_up: the likeliest reading of its looks, and the next that has another unit or axis.
+    scene: all of it as it would be built.
+    """
+
+    format: str
+    generator: str
+    bytes: int
+    extensions: dict[str, str]
+    objects: dict[str, int]
+    images: tuple[ImageFacts, ...]
+    best: Guess
+    runner_up: Guess
+    scene: Scene
+
+
+def inspect(
+    path: Path,
+    options: IngestOptions = IngestOptions(),  # noqa: B008 - a frozen value
+    progress: Progress = silent,
+    *,
+    workers: int = 1,
+) -> Inspection:
+    """Read a model and say what it is. Raises what `ingest` raises."""
+    scene = ingest(path, options, progress, workers=workers)
+    suffix = path.suffix.lower()
+    tree = document_json(path) if suffix in (".glb", ".gltf") else {}
+    version = str(tree.get("asset", {}).get("version", ""))
+    count = Counter[str]()
+    for index, triangles in enumerate(np.bincount(scene.triangle_object).tolist()):
+        count[scene.objects[index]] += triangles
+    best, runner_up = _guesses(scene)
+    return Inspection(
+        format=" ".join(part for part in (_FORMATS.get(suffix, suffix), version) if part),
+        generator=str(tree.get("asset", {}).get("generator", "")),
+        bytes=path.stat().st_size,
+        extensions={name: outcome_of(name) for name in sorted(map(str, _listed(tree)))},
+        objects=dict(count.most_common()),
+        images=tuple(map(_facts, scene.images)),
+        best=best,
+        runner_up=runner_up,
+        scene=scene,
+    )
+
+
+def _listed(tree: dict[str, Any]) -> set[Any]:
+    return {*tree.get("extensionsUsed", []), *tree.get("extensionsRequired", [])}
+
+
+def _facts(image: SourceImage) -> ImageFacts:
+    from PIL import Image
+
+    data = image.load()
+    with Image.open(io.BytesIO(data)) as opened:  # it has been decoded before
+        return ImageFacts(image.name, opened.format or "", *opened.size, len(data))
+
+
+def _guesses(scene: Scene) -> tuple[Guess, Guess]:
+    """The likeliest reading by the looks of the model, in its own unit and axes, and the next."""
+    space = scene.space
+    points = scene.points / space.metres
+    if space.up == "z":  # the way back from `space.turned`
+        points = np.stack([points[:, 0], -points[:, 2], points[:, 1]], axis=1)
+    named = Named.of(
+        (scene.objects, scene.triangle_object),
+        ([material.name for material in scene.materials], scene.triangle_material),
+    )
+    best, runner_up = readings(looks(points, scene.triangles, named))[:2]
+    return _guess(best, runner_up), _guess(runner_up, best)
+
+
+def _guess(reading: Reading, other: Reading) -> Guess:
+    reasons = tuple(reading.reasons(other))
+    return Guess(reading.unit, reading.up, reading.size, reasons, round(reading.cost, 3))
