@@ -18,7 +18,7 @@ from pxr import Usd, UsdGeom
 from ptmtools.arrays import Floats
 from ptmtools.scene.source import Findings
 from ptmtools.scene.usd_layers import TIME
-from ptmtools.scene.usd_mesh import array, triangles_of, unfit
+from ptmtools.scene.usd_mesh import array, is_cut, triangles_of, unfit
 
 _HIDDEN = (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
 
@@ -116,7 +116,7 @@ class Traversal:
             elif prim.IsA(UsdGeom.Gprim):
                 if purpose in _HIDDEN:
                     self._leave_out(f"of purpose {purpose}", 1)
-                elif prim.IsA(UsdGeom.Mesh):
+                elif is_cut(prim):
                     group.parts.append((*self._place(prim, prototype), prim))
                     group.triangles += triangles_of(prim)
                     group.places += 1

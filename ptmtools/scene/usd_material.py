@@ -56,8 +56,8 @@ class Surface:
 def encoded(linear: Floats) -> Floats:
     """Linear light, cut to [0, 1], to sRGB (IEC 61966-2-1); what is no number is 0."""
     light = np.clip(np.nan_to_num(linear, nan=0.0), 0.0, 1.0)
-    curve = 1.055 * light ** (1 / 2.4) - 0.055
-    return np.minimum(np.where(light <= 0.0031308, 12.92 * light, curve), 1.0)
+    curve = np.where(light < 1, 1.055 * light ** (1 / 2.4) - 0.055, 1.0)
+    return np.where(light <= 0.0031308, 12.92 * light, curve)
 
 
 def tint(linear: Any) -> Color:

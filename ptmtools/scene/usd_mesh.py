@@ -1,7 +1,8 @@
 """Meshes of USD as triangles, and their primvars at the corners of these.
 
 A mesh is drawn as its control cage: subdividing it would need another library, and buildings have
-none that is meant to be smooth.
+little that is meant to be smooth. Of the solids of USD those with flat faces are meshes, too;
+balls, cylinders and the like, of which the library knows no mesh, are not.
 """
 
 from __future__ import annotations
@@ -19,6 +20,21 @@ from ptmtools.errors import InputError
 from ptmtools.scene.polygon import triangulate
 from ptmtools.scene.source import Findings
 from ptmtools.scene.usd_layers import TIME
+
+#: The corners of a cube of two units, and its faces.
+_CUBE = np.array([[x, y, z] for x in (-1.0, 1) for y in (-1.0, 1) for z in (-1.0, 1)])
+_CUBE_FACES = np.array(
+    [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+)
+#: A square of two units, and where the width and the length of a plane with this axis go. All of
+#: them face along their axis, so where that is not the first side's product with the second, the
+#: square is turned over.
+_SQUARE = np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+_PLANE_SIDES = {
+    "X": ((0, 0, 1), (0, 1, 0)),
+    "Y": ((1, 0, 0), (0, 0, 1)),
+    "Z": ((1, 0, 0), (0, 1, 0)),
+}
 
 
 @dataclass(frozen=True)
@@ -53,34 +69,60 @@ def array(value: Any, kind: Any, *shape: int) -> NDArray[Any]:
     return np.asarray(value).astype(kind).reshape(-1, *shape)
 
 
+def is_cut(prim: Any) -> bool:
+    """Whether a prim is drawn: a mesh, a cube or a plane."""
+    return any(prim.IsA(kind) for kind in (UsdGeom.Mesh, UsdGeom.Cube, UsdGeom.Plane))
+
+
 def triangles_of(prim: Any) -> int:
-    """How many triangles a mesh has at most, before it is cut."""
-    counts = array(UsdGeom.Mesh(prim).GetFaceVertexCountsAttr().Get(TIME), np.int64)
-    return int(np.maximum(counts - 2, 0).sum())
+    """How many triangles a prim has at most, before it is cut."""
+    return int(np.maximum(_faces(prim)[1] - 2, 0).sum())
+
+
+def _faces(prim: Any) -> tuple[Floats, Ints, Ints]:
+    """(P, 3) points, (F,) how many corners each face has, and (C,) the points of these."""
+    if prim.IsA(UsdGeom.Cube):
+        half = (UsdGeom.Cube(prim).GetSizeAttr().Get(TIME) or 0.0) / 2
+        return _CUBE * half, np.full(6, 4), _CUBE_FACES.ravel()
+    if prim.IsA(UsdGeom.Plane):
+        plane = UsdGeom.Plane(prim)
+        half_width = (plane.GetWidthAttr().Get(TIME) or 0.0) / 2
+        half_length = (plane.GetLengthAttr().Get(TIME) or 0.0) / 2
+        axis = str(plane.GetAxisAttr().Get(TIME))
+        along = _PLANE_SIDES.get(axis, _PLANE_SIDES["Z"])
+        points = _SQUARE @ (np.array(along, dtype=np.float64) * [[half_width], [half_length]])
+        corners = np.arange(4)[::-1] if axis in ("X", "Y") else np.arange(4)
+        return points, np.array([4]), corners
+    mesh = UsdGeom.Mesh(prim)
+    return (
+        array(mesh.GetPointsAttr().Get(TIME), np.float64, 3),
+        array(mesh.GetFaceVertexCountsAttr().Get(TIME), np.int64),
+        array(mesh.GetFaceVertexIndicesAttr().Get(TIME), np.int64),
+    )
 
 
 def cut(prim: Any, findings: Findings, model: Path) -> Shape:
-    """Cuts a mesh. Raises InputError PTM-I246 or PTM-I270 where its arrays do not fit together."""
-    mesh, place = UsdGeom.Mesh(prim), str(prim.GetPath())
-    points = array(mesh.GetPointsAttr().Get(TIME), np.float64, 3)
-    counts = array(mesh.GetFaceVertexCountsAttr().Get(TIME), np.int64)
-    vertex = array(mesh.GetFaceVertexIndicesAttr().Get(TIME), np.int64)
+    """Cuts what `is_cut`. Raises InputError PTM-I246 or PTM-I270 where its arrays do not fit
+    together."""
+    place = str(prim.GetPath())
+    points, counts, vertex = _faces(prim)
     if (counts < 0).any() or counts.sum() != len(vertex):
         raise unfit(model, place, f"its faces have {counts.sum()} corners of {len(vertex)}")
     if len(vertex) and not 0 <= vertex.min() <= vertex.max() < len(points):
         raise InputError(
             "PTM-I246", "a face names a point that does not exist", file=model, place=place
         )
-    start = np.concatenate([[0], np.cumsum(counts)])
     kept = counts >= 3
     if short := int((~kept).sum()):
         findings.miss("PTM-N220", "faces of fewer than three corners", place, short)
-    holes = array(mesh.GetHoleIndicesAttr().Get(TIME), np.int64)
-    kept[holes[(holes >= 0) & (holes < len(counts))]] = False
+    if prim.IsA(UsdGeom.Mesh):
+        holes = array(UsdGeom.Mesh(prim).GetHoleIndicesAttr().Get(TIME), np.int64)
+        kept[holes[(holes >= 0) & (holes < len(counts))]] = False
+        _note(prim, UsdGeom.Mesh(prim), findings)
     face = np.flatnonzero(kept)
     corner = np.arange(len(vertex))[np.repeat(kept, counts)]
-    cut_start = np.concatenate([[0], np.cumsum(counts[face])])
-    made = triangulate(points[vertex[corner]], cut_start)
+    start = np.concatenate([[0], np.cumsum(counts[face])])
+    made = triangulate(points[vertex[corner]], start)
     if made.tangled:
         findings.say(
             "PTM-N221",
@@ -89,10 +131,9 @@ def cut(prim: Any, findings: Findings, model: Path) -> Shape:
             made.tangled,
         )
     result = corner[made.corner]
-    if mesh.GetOrientationAttr().Get(TIME) == UsdGeom.Tokens.leftHanded:
+    if UsdGeom.Gprim(prim).GetOrientationAttr().Get(TIME) == UsdGeom.Tokens.leftHanded:
         result = result[:, ::-1]
-    _note(prim, mesh, findings)
-    return Shape(points, vertex, result, face[made.polygon], len(start) - 1)
+    return Shape(points, vertex, result, face[made.polygon], len(counts))
 
 
 def unfit(model: Path, place: str, what: str) -> InputError:
