@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
+from ptmtools.scene import usd
 from ptmtools.scene.meshlab import convert
 from ptmtools.scene.source import (
     MAX_VERTICES,
@@ -27,8 +28,7 @@ from ptmtools.scene.source import (
 
 TRIMESH = (".ply", ".stl", ".off")
 MESHLAB = (".3ds", ".3mf", ".ctm", ".dae", ".wrl", ".x3d")
-USD = (".usd", ".usda", ".usdc", ".usdz")
-SUPPORTED = (".obj", ".glb", ".gltf", *TRIMESH, *MESHLAB, *USD)
+SUPPORTED = (".obj", ".glb", ".gltf", *TRIMESH, *MESHLAB, *usd.SUFFIXES)
 #: Enough of a PLY file for its header.
 _HEADER = 1 << 14
 
@@ -48,10 +48,8 @@ def read_other(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES
             file=path,
             remedy=f"give one of {' '.join(SUPPORTED)}",
         )
-    if suffix in USD:
-        from ptmtools.scene.usd import read_usd
-
-        return read_usd(path, findings, max_triangles)
+    if suffix in usd.SUFFIXES:
+        return usd.read_usd(path, findings, max_triangles)
     if suffix not in TRIMESH or (suffix == ".ply" and _textured_ply(path)):
         return _read_meshlab(path, findings, max_triangles)
     try:

@@ -77,14 +77,20 @@ def hand_over(
 
 
 def take_over(
-    module: str, library: str, model: Path, findings: Findings, scratch: str, *arguments: str
+    module: str,
+    library: str,
+    model: Path,
+    findings: Findings,
+    scratch: str,
+    *arguments: str,
+    beside: int = 0,
 ) -> Source:
     """What a module's reader, called with the folder ``scratch``, the model and ``arguments``, has
-    handed over.
+    handed over; ``beside`` as of `run_apart`.
 
     Raises the reader's own `PtmError`, and InputError PTM-I254 for what the library cannot read.
     """
-    answer = run_apart(module, library, model, scratch, model.absolute(), *arguments)
+    answer = run_apart(module, library, model, scratch, model.absolute(), *arguments, beside=beside)
     try:
         file = Path(scratch, _ARRAYS)
         arrays = unpack_arrays(file.read_bytes(), file=file)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,10 @@ from ptmtools.errors import MissingComponentError
 from ptmtools.scene.apart import serve
 from ptmtools.scene.handed import hand_over, take_over
 from ptmtools.scene.source import MAX_VERTICES, Findings, Source
+
+SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
+#: So many files of the model's folder are looked at for their size.
+_MOST_FILES = 100_000
 
 
 def read_usd(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) -> Source:
@@ -37,7 +42,30 @@ def read_usd(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) 
         )
     outside = "outside" if findings.folder.allow_outside else ""
     with tempfile.TemporaryDirectory() as scratch:
-        return take_over(__name__, "usd-core", path, findings, scratch, str(max_triangles), outside)
+        return take_over(
+            __name__,
+            "usd-core",
+            path,
+            findings,
+            scratch,
+            str(max_triangles),
+            outside,
+            beside=_bytes_of_layers(findings.folder.root),
+        )
+
+
+def _bytes_of_layers(folder: Path) -> int:
+    """How large all layers in a folder are: a model is often a small one that refers to others."""
+    total, left = 0, _MOST_FILES
+    for parent, _, names in os.walk(folder):
+        for name in names:
+            if name.lower().endswith(SUFFIXES):
+                with suppress(OSError):
+                    total += os.stat(os.path.join(parent, name)).st_size
+        left -= len(names) + 1
+        if left < 0:
+            break
+    return total
 
 
 def _read_here(scratch: str, model: str, most: str, outside: str) -> dict[str, Any]:

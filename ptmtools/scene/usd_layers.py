@@ -20,6 +20,8 @@ from ptmtools.scene.source import Findings
 
 #: What the library is called in messages.
 LIBRARY = "usd-core"
+#: So much of a message of the library is passed on, in characters.
+_LONGEST = 300
 #: An attribute that changes has its first value, one that does not change its only one.
 TIME = Usd.TimeCode.EarliestTime()
 
@@ -39,7 +41,7 @@ def open_stage(path: Path, findings: Findings) -> tuple[Any, list[str]]:
     with Ar.ResolverContextBinder(context):
         layers = _gathered(layer, files, absent, findings)
         try:
-            stage = Usd.Stage.Open(layer, context)
+            stage = Usd.Stage.Open(layer, None, context)  # without a session
         except Tf.ErrorException as error:
             raise unreadable(LIBRARY, path, reason(error)) from None
     for used in stage.GetUsedLayers(includeClipLayers=True):
@@ -138,8 +140,7 @@ def _note_faults(
 ) -> dict[str, None]:
     """Misses what the composed stage lacks; the names of files among it."""
     missed: dict[str, None] = {}
-    for error in stage.GetCompositionErrors():
-        text = str(error).splitlines()[0]
+    for text in sorted(" ".join(str(error).split()) for error in stage.GetCompositionErrors()):
         known = next((names for each, names in absent.items() if f"@{each}@" in text), None)
         if known is not None:
             name, place = known
@@ -147,5 +148,5 @@ def _note_faults(
             missed[name] = None
         else:
             text = text.replace(f"{findings.folder.root}{os.sep}", "")
-            findings.miss("PTM-N260", text)
+            findings.miss("PTM-N260", text[:_LONGEST])
     return missed

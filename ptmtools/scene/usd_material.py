@@ -23,6 +23,7 @@ from ptmtools.scene.usd_layers import TIME
 
 #: What UsdPreviewSurface has where nothing is said (its specification, "Core Nodes").
 _DIFFUSE = (0.18, 0.18, 0.18)
+_ONES, _ZEROS = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.0)
 #: A network deeper than this goes round in a circle.
 _DEEPEST = 32
 
@@ -61,8 +62,8 @@ def encoded(linear: Floats) -> Floats:
 
 
 def tint(linear: Any) -> Color:
-    """A colour of the library's in sRGB."""
-    r, g, b = encoded(np.array(linear, dtype=np.float64).reshape(3)).tolist()
+    """A colour of three numbers in sRGB."""
+    r, g, b = encoded(np.array(linear, dtype=np.float64)).tolist()
     return r, g, b
 
 
@@ -91,9 +92,9 @@ class MaterialReader:
         opacity, see_through, from_image = self._opacity(shader, name, place)
         value, source, output = _followed(shader.GetInput("diffuseColor"))
         if source is None:
-            given = _DIFFUSE if value is None else value
+            color = tint(_numbers(value, _DIFFUSE))
             self._findings.say("PTM-N226", f"{name}: colour factor converted to sRGB", place)
-            return Surface(name, tint(given), opacity, see_through or from_image is not None)
+            return Surface(name, color, opacity, see_through or from_image is not None)
         kind = str(source.GetIdAttr().Get(TIME))
         if kind.startswith("UsdPrimvarReader_float"):
             painted = str(_followed(source.GetInput("varname"))[0] or "")
@@ -142,9 +143,9 @@ class MaterialReader:
         if "<UDIM>" in path:
             self._findings.miss("PTM-N264", f"{path}: tiles of UDIM are not carried over", place)
             return None
-        scale = _followed(texture.GetInput("scale"))[0]
-        bias = _followed(texture.GetInput("bias"))[0]
-        if any(x != 1 for x in scale or ()) or any(x != 0 for x in bias or ()):
+        scale = _numbers(_followed(texture.GetInput("scale"))[0], _ONES)
+        bias = _numbers(_followed(texture.GetInput("bias"))[0], _ZEROS)
+        if scale != _ONES or bias != _ZEROS:
             self._findings.say("PTM-N215", f"{path}: ignored scale and bias", place)
         wrap_s, wrap_t = (self._wrap(texture, key, path, place) for key in ("wrapS", "wrapT"))
         return self._named(file, place, wrap_s, wrap_t)
@@ -223,6 +224,15 @@ def _number(value: Any, otherwise: float) -> float:
     return number if math.isfinite(number) else otherwise
 
 
+def _numbers(value: Any, otherwise: tuple[float, ...]) -> tuple[float, ...]:
+    """As many numbers as there are otherwise; what is of another type says nothing."""
+    try:
+        numbers = tuple(float(each) for each in value)
+    except (TypeError, ValueError):
+        return otherwise
+    return numbers if len(numbers) == len(otherwise) else otherwise
+
+
 def _path_of(file: Any) -> str:
     return str(file.path) if isinstance(file, Sdf.AssetPath) else ""
 
@@ -231,6 +241,6 @@ def _transform(shader: Any) -> Floats:
     """(3, 3) of UsdTransform2d: scale, then rotation, counter-clockwise, then translation."""
     angle = math.radians(_number(_followed(shader.GetInput("rotation"))[0], 0.0))
     c, s = math.cos(angle), math.sin(angle)
-    sx, sy = _followed(shader.GetInput("scale"))[0] or (1.0, 1.0)
-    tx, ty = _followed(shader.GetInput("translation"))[0] or (0.0, 0.0)
+    sx, sy = _numbers(_followed(shader.GetInput("scale"))[0], (1.0, 1.0))
+    tx, ty = _numbers(_followed(shader.GetInput("translation"))[0], (0.0, 0.0))
     return np.array([[c * sx, -s * sy, tx], [s * sx, c * sy, ty], [0.0, 0.0, 1.0]])

@@ -71,9 +71,13 @@ class Painter:
         face_surface = np.zeros(shape.faces, dtype=np.int64)
         surfaces: list[Surface | None] = []
         prims = [prim, *(subset.GetPrim() for subset in subsets)]
-        materials, _ = UsdShade.MaterialBindingAPI.ComputeBoundMaterials(prims)
-        for material in materials:
-            surfaces.append(self._reader.read(material) if material else None)
+        materials, full = (
+            UsdShade.MaterialBindingAPI.ComputeBoundMaterials(prims, purpose)[0]
+            for purpose in (UsdShade.Tokens.preview, UsdShade.Tokens.full)
+        )
+        for material, other in zip(materials, full, strict=True):
+            bound = material or other
+            surfaces.append(self._reader.read(bound) if bound else None)
         for number, subset in enumerate(subsets, start=1):
             index = array(subset.GetIndicesAttr().Get(TIME), np.int64)
             face_surface[index[(index >= 0) & (index < shape.faces)]] = number
@@ -108,7 +112,7 @@ class Painter:
     ) -> tuple[Color | None, NDArray[np.uint8] | None]:
         """The colour of a mesh, or those of its corners, by a primvar."""
         primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
-        if not primvar or not primvar.HasValue():
+        if not primvar or not primvar.HasValue() or not primvar.Get(TIME):
             return None, None
         known = (key, key_of(primvar.GetAttr().GetPrim()), name)
         if known not in self._colors:
@@ -117,10 +121,10 @@ class Painter:
             found: Any = None, None
             if values is None or values.shape[2] != 3:
                 self._findings.miss("PTM-N265", f"{name}: does not fit the mesh, ignored", place)
-            elif primvar.GetInterpolation() == UsdGeom.Tokens.constant and len(values):
+            elif primvar.GetInterpolation() == UsdGeom.Tokens.constant:
                 self._findings.say("PTM-N226", f"{name}: colour factor converted to sRGB")
                 found = tint(values[0, 0]), None
-            elif len(values):
+            else:
                 self._findings.say("PTM-N226", f"{name}: colour factor converted to sRGB")
                 rounded = np.rint(encoded(values) * 255).astype(np.uint8)
                 found = (1.0, 1.0, 1.0), rounded

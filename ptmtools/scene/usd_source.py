@@ -129,7 +129,7 @@ def _cameras(found: list[tuple[str, Floats, Any]], findings: Findings) -> tuple[
     cameras: list[Camera] = []
     for name, matrix, prim in found:
         camera = UsdGeom.Camera(prim)
-        direction, position = -matrix[2, :3], matrix[3, :3]
+        direction, position = 0.0 - matrix[2, :3], matrix[3, :3]
         with np.errstate(all="ignore"):
             length = float(np.linalg.norm(direction))
         height = camera.GetVerticalApertureAttr().Get(TIME) or 0.0

@@ -656,6 +656,19 @@ def test_bindings_are_inherited_and_of_collections(read: Any) -> None:
     }
 
 
+@pytest.mark.parametrize(
+    ("purposes", "shown"),
+    [(("", "full", "preview"), "preview"), (("", "full"), "all"), (("full",), "full")],
+)
+def test_of_bindings_that_for_previews_counts(read: Any, purposes: Any, shown: str) -> None:
+    on = made.stage()
+    wall = made.mesh(on)
+    for purpose in purposes:
+        paint = made.material(on, f"/World/{purpose or 'all'}")
+        made.bind(wall, paint, materialPurpose=purpose or UsdShade.Tokens.allPurpose)
+    assert [m.name for m in read(on).source.materials] == [shown]
+
+
 def test_subsets_of_faces(read: Any) -> None:
     on = made.stage()
     hall = made.box(on, "/World/hall", (0, 0, 0), (1, 1, 1))
@@ -834,6 +847,28 @@ def test_scale_and_bias_that_change_nothing(read: Any) -> None:
     assert not read(on).says("PTM-N215")
 
 
+@pytest.mark.parametrize(("name", "kind"), [("diffuseColor", "String"), ("opacity", "Token")])
+def test_values_of_another_type_say_nothing(read: Any, name: str, kind: str) -> None:
+    on = made.stage()
+    paint = made.material(on, "/World/paint")
+    surface = UsdShade.Shader.Get(on, "/World/paint/surface")
+    surface.CreateInput(name, getattr(Sdf.ValueTypeNames, kind)).Set("red")
+    made.bind(made.mesh(on), paint)
+    (material,) = read(on).source.materials
+    assert material.color == pytest.approx((0.461356,) * 3, abs=1e-6)
+    assert material.opacity == 1
+
+
+def test_shaders_in_a_circle(read: Any) -> None:
+    on = made.stage()
+    move = made.shader(on, "/World/paint/move", "UsdTransform2d")
+    moved = move.CreateOutput("result", Sdf.ValueTypeNames.Float2)
+    move.CreateInput("in", Sdf.ValueTypeNames.Float2).ConnectToSource(moved)
+    made.textured(on, st=made.CORNERS)
+    UsdShade.Shader.Get(on, "/World/paint/image").GetInput("st").ConnectToSource(moved)
+    assert read(on).count("PTM-N229") == 2
+
+
 @pytest.mark.parametrize("file", ["brick.<UDIM>.png", ""])
 def test_what_is_no_image(read: Any, file: str) -> None:
     on = made.stage()
@@ -928,6 +963,14 @@ def test_displayed_colours_reach_the_scene(tmp_path: Path) -> None:
     colors = ingest(tmp_path / "a.usda").colors
     assert colors is not None
     assert colors[0].tolist() == [[255, 0, 0], [0, 255, 0], [0, 0, 255]]
+
+
+def test_no_displayed_colours(read: Any) -> None:
+    on = made.stage()
+    made.colors(made.mesh(on), [], "vertex")
+    got = read(on)
+    assert got.source.materials[0].color is None
+    assert not got.codes
 
 
 def test_inherited_colours(read: Any) -> None:
@@ -1089,6 +1132,17 @@ def test_what_is_missing_is_noted(tmp_path: Path) -> None:
     assert scene.files == ("none.usda",)
     with pytest.raises(InputError, match="PTM-I203"):
         ingest(tmp_path / "a.usda", IngestOptions(strict=True))
+
+
+def test_prims_that_refer_to_themselves_are_noted_alike_each_time(tmp_path: Path) -> None:
+    on = made.stage(tmp_path / "a.usda")
+    made.mesh(on)
+    on.DefinePrim("/World/it").GetReferences().AddInternalReference("/World")
+    on.GetRootLayer().Save()
+    first, second = (ingest(tmp_path / "a.usda").notes for _ in range(2))
+    assert first == second
+    assert [note.code for note in first] == ["PTM-N260"]
+    assert "\n" not in first[0].message
 
 
 def test_variants_that_are_not_chosen_may_lack_their_files(tmp_path: Path) -> None:
