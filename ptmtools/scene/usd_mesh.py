@@ -43,23 +43,21 @@ class Shape:
 
     Attributes
     ----------
-    points: (P, 3) float64 in the space of its prim.
-    vertex: (C,) int64 the point of each corner of the mesh's faces.
-    corner: (T, 3) int64 corners of the mesh's faces, counter-clockwise seen from the front.
+    points: (P, 3) float64 in the space of its prim, those that are used.
+    triangles: (T, 3) int64 into `points`, counter-clockwise seen from the front.
+    corner: (T, 3) int64 the same into the corners of the mesh's faces.
+    vertex: (C,) int64 the point of the mesh at each corner of its faces.
     face: (T,) int64 the mesh's face of each triangle.
-    faces: how many faces the mesh has.
+    vertices, faces: how many points and faces the mesh has.
     """
 
     points: Floats
-    vertex: Ints
+    triangles: Ints
     corner: Ints
+    vertex: Ints
     face: Ints
+    vertices: int
     faces: int
-
-    @property
-    def triangles(self) -> Ints:
-        """(T, 3) int64 into `points`."""
-        return self.vertex[self.corner]
 
 
 def array(value: Any, kind: Any, *shape: int) -> NDArray[Any]:
@@ -133,7 +131,17 @@ def cut(prim: Any, findings: Findings, model: Path) -> Shape:
     result = corner[made.corner]
     if UsdGeom.Gprim(prim).GetOrientationAttr().Get(TIME) == UsdGeom.Tokens.leftHanded:
         result = result[:, ::-1]
-    return Shape(points, vertex, result, face[made.polygon], len(counts))
+    # Points that no face uses would be there as often as the mesh is shown.
+    used, triangles = np.unique(vertex[result], return_inverse=True)
+    return Shape(
+        points=points[used],
+        triangles=triangles.reshape(-1, 3),
+        corner=result,
+        vertex=vertex,
+        face=face[made.polygon],
+        vertices=len(points),
+        faces=len(counts),
+    )
 
 
 def unfit(model: Path, place: str, what: str) -> InputError:
@@ -166,7 +174,7 @@ def at_corners(primvar: Any, shape: Shape) -> Floats | None:
         UsdGeom.Tokens.constant: (np.zeros_like(shape.corner), 1),
         UsdGeom.Tokens.uniform: (np.repeat(shape.face[:, None], 3, axis=1), shape.faces),
         UsdGeom.Tokens.faceVarying: (shape.corner, len(shape.vertex)),
-    }.get(kind, (shape.triangles, len(shape.points)))
+    }.get(kind, (shape.vertex[shape.corner], shape.vertices))
     return values[rows] if len(values) >= needed else None
 
 

@@ -579,6 +579,20 @@ def test_triangles_are_counted_before_they_are_made(tmp_path: Path) -> None:
         ingest(tmp_path / "a.usda")
 
 
+def test_points_that_no_face_uses_are_not_multiplied(read: Any) -> None:
+    on = made.stage()
+    many = UsdGeom.PointInstancer.Define(on, "/World/many")
+    many.CreatePrototypesRel().SetTargets(["/World/many/it"])
+    many.CreateProtoIndicesAttr([0] * 1000)
+    many.CreatePositionsAttr([(x, 0, 0) for x in range(1000)])
+    points = [(9, 9, 9)] * 10_000 + made.QUAD
+    it = made.mesh(on, "/World/many/it", points, indices=range(10_000, 10_004))
+    made.colors(it, [(0, 0, 0)] * 10_000 + [(1, 0, 0)] * 4, "vertex")
+    source = read(on).source
+    assert len(source.points) == 4000
+    assert (source.colors == [255, 0, 0]).all()
+
+
 @pytest.mark.parametrize("instanceable", [True, False])
 def test_instances_count_as_often_as_they_are_shown(read: Any, instanceable: bool) -> None:
     assert len(read(chairs(instanceable), 72).source.triangles) == 3 * 2 * 12
@@ -879,10 +893,17 @@ def test_what_is_no_image(read: Any, file: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("file", "output", "see_through"),
-    [("brick.png", "a", False), ("brick.png", "r", True), ("mask.png", "r", True)],
+    ("file", "output", "threshold", "see_through"),
+    [
+        ("brick.png", "a", 0.0, False),
+        ("brick.png", "a", 0.5, True),
+        ("brick.png", "r", 0.0, True),
+        ("mask.png", "r", 0.0, True),
+    ],
 )
-def test_opacity_by_an_image(read: Any, file: str, output: str, see_through: bool) -> None:
+def test_opacity_by_an_image(
+    read: Any, file: str, output: str, threshold: float, see_through: bool
+) -> None:
     on = made.stage()
     made.textured(on)
     mask = made.texture(on, "/World/paint/mask", file)
@@ -890,9 +911,10 @@ def test_opacity_by_an_image(read: Any, file: str, output: str, see_through: boo
     surface.CreateInput("opacity", Sdf.ValueTypeNames.Float).ConnectToSource(
         mask.CreateOutput(output, Sdf.ValueTypeNames.Float)
     )
+    surface.CreateInput("opacityThreshold", Sdf.ValueTypeNames.Float).Set(threshold)
     got = read(on)
     assert got.source.materials[0].see_through is see_through
-    assert ("PTM-N217" in got.codes) is see_through
+    assert ("PTM-N217" in got.codes) is (see_through and not threshold)
     assert got.source.materials[0].opacity == 1
 
 
