@@ -9,6 +9,7 @@ stage, and are looked at there. Layers are files: of the library's resolvers non
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,6 +21,8 @@ from ptmtools.scene.source import Findings
 
 #: What the library is called in messages.
 LIBRARY = "usd-core"
+#: What the library calls its own functions by.
+_INNER = re.compile(r"pxrInternal\w*::")
 #: So much of a message of the library is passed on, in characters.
 _LONGEST = 300
 #: An attribute that changes has its first value, one that does not change its only one.
@@ -80,7 +83,7 @@ def reason(error: Any) -> str:
     """What an error of the library says, in a line without the places of its own source."""
     for fault in error.args:
         if lines := str(getattr(fault, "commentary", fault)).strip().splitlines():
-            return lines[0]
+            return _INNER.sub("", lines[0])[:_LONGEST]
     return type(error).__name__
 
 

@@ -12,15 +12,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import UsdGeom
+from pxr import Tf, UsdGeom
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError
+from ptmtools.scene.apart import unreadable
 from ptmtools.scene.handed import NamedImage
 from ptmtools.scene.model import Camera
 from ptmtools.scene.source import Findings, Source, too_many_triangles
 from ptmtools.scene.usd_drawn import Placed, Traversal
-from ptmtools.scene.usd_layers import TIME, metres_of, open_stage, up_of
+from ptmtools.scene.usd_layers import LIBRARY, TIME, metres_of, open_stage, reason, up_of
 from ptmtools.scene.usd_material import MaterialReader
 from ptmtools.scene.usd_mesh import Shape, cut
 from ptmtools.scene.usd_paint import Painter, key_of
@@ -90,6 +91,15 @@ def make_source(
     """The model without textures; the images of its materials by number; and the names of the files
     that it is composed of. Raises what `ptmtools.scene.usd.read_usd` does.
     """
+    try:
+        return _make(path, findings, most)
+    except Tf.ErrorException as error:  # damage that shows when a value is asked for
+        raise unreadable(LIBRARY, path, reason(error)) from None
+
+
+def _make(
+    path: Path, findings: Findings, most: int
+) -> tuple[Source, dict[int, NamedImage], list[str]]:
     stage, files = open_stage(path, findings)
     traversal = Traversal(stage, findings, path)
     group = traversal.group()
