@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Ar, Sdf, UsdShade
+from pxr import Ar, Sdf, Usd, UsdShade
 
 from ptmtools.arrays import Floats
 from ptmtools.scene.handed import NamedImage
@@ -24,6 +24,8 @@ from ptmtools.scene.usd_layers import TIME
 #: What UsdPreviewSurface has where nothing is said (its specification, "Core Nodes").
 _DIFFUSE = (0.18, 0.18, 0.18)
 _ONES, _ZEROS = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.0)
+#: Where the library has its reader of packages, and where it had it in older releases.
+_ARCHIVES = Sdf.ZipFile if hasattr(Sdf, "ZipFile") else Usd.ZipFile
 #: A network deeper than this goes round in a circle.
 _DEEPEST = 32
 
@@ -166,7 +168,7 @@ class MaterialReader:
             entry, deeper = rest, ""
             if Ar.IsPackageRelativePath(rest):
                 entry, deeper = Ar.SplitPackageRelativePathOuter(rest)
-            archive = Sdf.ZipFile.Open(whole)
+            archive = _ARCHIVES.Open(whole)
             info = archive.GetFileInfo(entry) if archive else None
             if info is None or info.compressionMethod or info.encrypted:
                 self._findings.miss(

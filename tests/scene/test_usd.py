@@ -579,6 +579,19 @@ def test_triangles_are_counted_before_they_are_made(tmp_path: Path) -> None:
         ingest(tmp_path / "a.usda")
 
 
+def test_instances_of_an_instancer_count_as_often_as_they_are_shown(read: Any) -> None:
+    on = made.stage()
+    many = UsdGeom.PointInstancer.Define(on, "/World/many")
+    many.CreatePrototypesRel().SetTargets(["/World/many/box"])
+    made.box(on, "/World/many/box", (0, 0, 0), (1, 1, 1))
+    many.CreateProtoIndicesAttr([0] * 4)
+    many.CreatePositionsAttr([(2 * x, 0, 0) for x in range(4)])
+    many.CreateInvisibleIdsAttr([3])
+    assert len(read(on, 36).source.triangles) == 36
+    with pytest.raises(LimitError, match="PTM-L203"):
+        read(on, 35)
+
+
 def test_points_that_no_face_uses_are_not_multiplied(read: Any) -> None:
     on = made.stage()
     many = UsdGeom.PointInstancer.Define(on, "/World/many")
@@ -801,6 +814,14 @@ def test_coordinates_that_do_not_fit(read: Any, kind: str, values: Any, index: A
     assert not got.source.uv.any()
 
 
+def test_coordinates_for_fewer_points_than_there_are(read: Any) -> None:
+    on = made.stage()
+    made.textured(on)
+    wall = made.mesh(on, points=[*made.QUAD, *made.QUAD], indices=[4, 5, 6, 7])
+    made.coords(wall, made.CORNERS)
+    assert "st" in read(on).says("PTM-N265")
+
+
 def test_other_names_of_coordinates(read: Any) -> None:
     on = made.stage()
     wall = made.mesh(on, st=[(0, 0)] * 4)
@@ -846,6 +867,17 @@ def test_a_transformation_of_coordinates_is_baked(read: Any) -> None:
     got = read(on)
     assert got.uv_at(10, 4) == [10 - 3, 20 + 2]
     assert "PTM-N216" in got.codes
+
+
+def test_transformations_of_coordinates_follow_each_other(read: Any) -> None:
+    on = made.stage()
+    result = made.reader(on, "/World/paint/st", "st")
+    for n, inputs in enumerate(({"translation": (1, 2)}, {"scale": (10, 100)})):
+        move = made.shader(on, f"/World/paint/m{n}", "UsdTransform2d", in_=result, **inputs)
+        result = move.CreateOutput("result", Sdf.ValueTypeNames.Float2)
+    made.textured(on)
+    UsdShade.Shader.Get(on, "/World/paint/image").GetInput("st").ConnectToSource(result)
+    assert read(on).uv_at(10, 4) == [20, 300]
 
 
 @pytest.mark.parametrize("inputs", [{"scale": (0.5, 0.5, 0.5, 1)}, {"bias": (0.1, 0, 0, 0)}])
@@ -1218,6 +1250,13 @@ def test_layers_outside_are_refused(tmp_path: Path, how: str) -> None:
     ):
         ingest(model)
     assert len(ingest(model, IngestOptions(allow_outside=True)).triangles) in (2, 4)
+
+
+def test_layers_outside_are_refused_before_they_are_opened(put: Put, tmp_path: Path) -> None:
+    put("secret.usda", "nothing that the library could read")
+    refers(tmp_path / "model/a.usda", "../secret.usda")
+    with pytest.raises(InputError, match="PTM-I205"):
+        ingest(tmp_path / "model/a.usda")
 
 
 def test_images_outside_are_not_read(put: Put, tmp_path: Path) -> None:
