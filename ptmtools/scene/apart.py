@@ -30,14 +30,21 @@ _MARK = "ptmtools answers: "
 _ERRORS = {kind.__name__: kind for kind in (InputError, LimitError, MissingComponentError)}
 
 
-def run_apart(module: str, library: str, model: Path, *arguments: str | os.PathLike[str]) -> Any:
+def run_apart(
+    module: str,
+    library: str,
+    model: Path,
+    *arguments: str | os.PathLike[str],
+    beside: int = 0,
+) -> Any:
     """What a module's reader answers.
 
-    ``library`` is what the reader is called in messages; ``model`` the file whose size bounds
-    memory and time, and that is at fault. Raises the reader's own `PtmError`, and InputError
-    PTM-I254 where it raises anything else, crashes, or takes too long.
+    ``library`` is what the reader is called in messages; ``model`` the file that is at fault, and
+    whose size bounds memory and time, with the ``beside`` bytes of other files of the model. Raises
+    the reader's own `PtmError`, and InputError PTM-I254 where it raises anything else, crashes, or
+    takes too long.
     """
-    size = model.stat().st_size
+    size = model.stat().st_size + beside
     home = os.fspath(Path(ptmtools.__file__).parent.parent)
     known = os.environ.get("PYTHONPATH")
     command = [sys.executable, "-P", "-m", module, str(_MEMORY + _MEMORY_PER_BYTE * size)]

@@ -6,6 +6,7 @@ may be read, and where they are, is judged here (`reference`).
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -40,6 +41,7 @@ class NamedImage:
     place: where in the model, for notes.
     wrap_s, wrap_t: beyond [0, 1].
     offset, length: bytes of the model's own file that hold it (USDZ); None for a file beside it.
+    package: the file beside the model that these are bytes of, if it is not the model's own.
     """
 
     name: str
@@ -48,14 +50,20 @@ class NamedImage:
     wrap_t: SourceWrap = "repeat"
     offset: int | None = None
     length: int | None = None
+    package: str = ""
 
 
 def hand_over(
-    source: Source, images: dict[int, NamedImage], findings: Findings, scratch: str
+    source: Source,
+    images: dict[int, NamedImage],
+    findings: Findings,
+    scratch: str,
+    files: Iterable[str] = (),
 ) -> dict[str, Any]:
     """The answer for `take_over`.
 
-    ``source`` has materials without textures; ``images`` are those of its materials, by number.
+    ``source`` has materials without textures; ``images`` are those of its materials, by number;
+    ``files`` are named that it was read from, or should have been, beside the model.
     """
     arrays = {name: getattr(source, name) for name in _NAMES}
     if source.colors is not None:
@@ -71,18 +79,25 @@ def hand_over(
         "metres": source.metres,
         "up": source.up,
         "findings": findings.told(),
+        "files": list(files),
     }
 
 
 def take_over(
-    module: str, library: str, model: Path, findings: Findings, scratch: str, *arguments: str
+    module: str,
+    library: str,
+    model: Path,
+    findings: Findings,
+    scratch: str,
+    *arguments: str,
+    beside: int = 0,
 ) -> Source:
     """What a module's reader, called with the folder ``scratch``, the model and ``arguments``, has
-    handed over.
+    handed over; ``beside`` as of `run_apart`.
 
     Raises the reader's own `PtmError`, and InputError PTM-I254 for what the library cannot read.
     """
-    answer = run_apart(module, library, model, scratch, model.absolute(), *arguments)
+    answer = run_apart(module, library, model, scratch, model.absolute(), *arguments, beside=beside)
     try:
         file = Path(scratch, _ARRAYS)
         arrays = unpack_arrays(file.read_bytes(), file=file)
@@ -91,6 +106,8 @@ def take_over(
         triangles = stored.indices("triangles", np.int64, None, 3, high=len(points))
         n = len(triangles)
         findings.take(answer["findings"])
+        for name in answer["files"]:
+            findings.folder.find(name)
         materials = [SourceMaterial(**_tuples(row)) for row in answer["materials"]]
         for number, row in answer["images"].items():
             texture = _texture(NamedImage(**row), model, findings)
@@ -122,7 +139,12 @@ def _texture(image: NamedImage, model: Path, findings: Findings) -> Texture | No
             return None
         read, label = FileRange(file), file.name
     else:
-        read, label = FileRange(model, image.offset, image.length), image.name
+        package: Path | None = model
+        if image.package:
+            package = findings.locate(image.package, image.package, image.place)
+        if package is None:
+            return None
+        read, label = FileRange(package, image.offset, image.length), image.name
     return Texture(
         read=read,
         label=label,

@@ -7,11 +7,12 @@ from typing import Literal
 
 from ptmtools.errors import InputError
 
-#: Of the files that are read: by readers of our own, through trimesh, through pymeshlab.
+#: Of the files that are read: by readers of our own, through trimesh, pymeshlab and usd-core.
 OWN = (".obj", ".glb", ".gltf")
 TRIMESH = (".ply", ".stl", ".off")
 MESHLAB = (".3ds", ".3mf", ".ctm", ".dae", ".wrl", ".x3d")
-SUFFIXES = (*OWN, *TRIMESH, *MESHLAB)
+USD = (".usd", ".usda", ".usdc", ".usdz")
+SUFFIXES = (*OWN, *TRIMESH, *MESHLAB, *USD)
 
 
 @dataclass(frozen=True)

@@ -171,10 +171,12 @@ def _judge_unit(ranked: list[Reading], by_format: float | None, findings: Findin
                 f"unit guessed: {best.unit} (it would be {best.size}); give --unit to override",
             )
         return best.metres
-    if best.metres != by_format:
+    known = by_format in UNITS.values()  # others are not among the readings
+    if known and best.metres != by_format:
+        unit = "metres" if by_format == 1 else f"units of {by_format:g} m"
         findings.say(
             "PTM-N227",
-            f"the format is in metres, but {best.unit} would be more likely (it would be "
+            f"the format is in {unit}, but {best.unit} would be more likely (it would be "
             f"{best.size}); give --unit to override",
         )
     return by_format
