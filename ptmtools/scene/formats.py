@@ -47,7 +47,7 @@ def read_other(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES
             remedy=f"give one of {' '.join(SUFFIXES)}",
         )
     if suffix in USD:
-        from ptmtools.scene.usd import read_usd
+        from ptmtools.scene.usd.reader import read_usd
 
         return read_usd(path, findings, max_triangles)
     if suffix not in TRIMESH or (suffix == ".ply" and _textured_ply(path)):

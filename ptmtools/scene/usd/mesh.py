@@ -19,7 +19,7 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError
 from ptmtools.scene.polygon import triangulate
 from ptmtools.scene.source import Findings
-from ptmtools.scene.usd_layers import TIME
+from ptmtools.scene.usd.layers import TIME
 
 #: The corners of a cube of two units, and its faces.
 _CUBE = np.array([[x, y, z] for x in (-1.0, 1) for y in (-1.0, 1) for z in (-1.0, 1)])

@@ -18,16 +18,15 @@ from ptmtools.scene import IngestOptions, ingest
 from ptmtools.scene.formats import read_other
 from ptmtools.scene.handed import NamedImage
 from ptmtools.scene.source import MAX_VERTICES, FileRange, Findings, Source
-
-from .conftest import Put, noise, png
+from tests.scene.conftest import Put, noise, png
 
 if TYPE_CHECKING:
-    from tests.scene import usd_models as made
+    from tests.scene.usd import usd_models as made
 
 if find_spec("pxr") is not None:
     from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdSkel
 
-    from tests.scene import usd_models as made
+    from tests.scene.usd import usd_models as made
 
 
 @pytest.fixture(autouse=True)
@@ -40,7 +39,7 @@ class Read:
     """What a stage becomes, made here and not in a process of its own."""
 
     def __init__(self, stage: Any, folder: Path, most: int = MAX_VERTICES) -> None:
-        from ptmtools.scene.usd_source import make_source
+        from ptmtools.scene.usd.source import make_source
 
         path = folder / f"{len(os.listdir(folder))}.usda"
         stage.GetRootLayer().Export(str(path))
@@ -746,7 +745,7 @@ def test_a_texture(read: Any, put: Put) -> None:
     [
         ("repeat", "repeat", 0),
         ("clamp", "clamp", 0),
-        ("mirror", "repeat", 1),
+        ("mirror", "mirror", 0),
         ("black", "clamp", 1),
         ("useMetadata", "clamp", 1),
     ],
@@ -948,6 +947,8 @@ def test_opacity_by_an_image(
     assert got.source.materials[0].see_through is see_through
     assert ("PTM-N217" in got.codes) is (see_through and not threshold)
     assert got.source.materials[0].opacity == 1
+    tested = threshold if (file, output) == ("brick.png", "a") else 0
+    assert got.source.materials[0].cutoff == (tested or None)
 
 
 def test_holes_in_an_image(put: Put, tmp_path: Path) -> None:

@@ -20,11 +20,11 @@ from ptmtools.scene.apart import unreadable
 from ptmtools.scene.handed import NamedImage
 from ptmtools.scene.model import Camera
 from ptmtools.scene.source import Findings, Source, too_many_triangles
-from ptmtools.scene.usd_drawn import Placed, Traversal
-from ptmtools.scene.usd_layers import LIBRARY, TIME, metres_of, open_stage, reason, up_of
-from ptmtools.scene.usd_material import MaterialReader
-from ptmtools.scene.usd_mesh import Shape, cut
-from ptmtools.scene.usd_paint import Painter, key_of
+from ptmtools.scene.usd.drawn import Placed, Traversal
+from ptmtools.scene.usd.layers import LIBRARY, TIME, metres_of, open_stage, reason, up_of
+from ptmtools.scene.usd.material import MaterialReader
+from ptmtools.scene.usd.mesh import Shape, cut
+from ptmtools.scene.usd.paint import Painter, key_of
 
 
 @dataclass

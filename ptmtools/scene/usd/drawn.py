@@ -17,8 +17,8 @@ from pxr import Usd, UsdGeom
 
 from ptmtools.arrays import Floats
 from ptmtools.scene.source import Findings
-from ptmtools.scene.usd_layers import TIME
-from ptmtools.scene.usd_mesh import array, is_cut, triangles_of, unfit
+from ptmtools.scene.usd.layers import TIME
+from ptmtools.scene.usd.mesh import array, is_cut, triangles_of, unfit
 
 _HIDDEN = (UsdGeom.Tokens.guide, UsdGeom.Tokens.proxy)
 

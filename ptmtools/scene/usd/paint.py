@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from pxr import UsdGeom, UsdShade
 
 from ptmtools.arrays import Floats, Ints
+from ptmtools.scene.colors import encoded
 from ptmtools.scene.handed import NamedImage
 from ptmtools.scene.source import Findings, SourceMaterial
-from ptmtools.scene.usd_layers import TIME
-from ptmtools.scene.usd_material import Color, MaterialReader, Surface, encoded, tint
-from ptmtools.scene.usd_mesh import Shape, array, at_corners
+from ptmtools.scene.usd.layers import TIME
+from ptmtools.scene.usd.material import Color, MaterialReader, Surface, tint
+from ptmtools.scene.usd.mesh import Shape, array, at_corners
 
 
 class Painter:
@@ -101,6 +102,7 @@ class Painter:
                 color=color,
                 opacity=opacity,
                 see_through=see_through,
+                cutoff=surface.cutoff,
                 two_sided=two_sided,
             ),
             surface.image,
@@ -126,8 +128,7 @@ class Painter:
                 found = tint(values[0, 0]), None
             else:
                 self._findings.say("PTM-N226", f"{name}: colour factor converted to sRGB")
-                rounded = np.rint(encoded(values) * 255).astype(np.uint8)
-                found = (1.0, 1.0, 1.0), rounded
+                found = (1.0, 1.0, 1.0), encoded(values)
             self._colors[known] = found
         found = self._colors[known]
         return found[0], found[1]

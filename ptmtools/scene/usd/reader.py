@@ -1,10 +1,10 @@
 """Reads USD (.usd, .usda, .usdc and .usdz) through usd-core, in a process of its own (`apart`).
 
-The library composes the stage of layers (`usd_layers`). What of it is drawn, and where, is found by
-`usd_drawn`, and made into triangles by `usd_source`. As a program:
-``python -P -m ptmtools.scene.usd MEMORY SCRATCH MODEL MOST OUTSIDE``, where ``MOST`` is the number
-of triangles that may be, and ``OUTSIDE`` empty if files outside of the model's folder may not be
-read.
+The library composes the stage of layers (`layers`). What of it is drawn, and where, is found by
+`drawn`, and made into triangles by `source`. As a program:
+``python -P -m ptmtools.scene.usd.reader MEMORY SCRATCH MODEL MOST OUTSIDE``, where ``MOST`` is the
+number of triangles that may be, and ``OUTSIDE`` empty if files outside of the model's folder may
+not be read.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def _bytes_of_layers(folder: Path) -> int:
 def _read_here(scratch: str, model: str, most: str, outside: str) -> dict[str, Any]:
     # Each thread takes memory that none of them needs: most of the work is ours.
     os.environ["PXR_WORK_THREAD_LIMIT"] = "1"
-    from ptmtools.scene.usd_source import make_source
+    from ptmtools.scene.usd.source import make_source
 
     findings = Findings(Path(model), bool(outside))
     source, images, files = make_source(Path(model), findings, int(most))

@@ -1,6 +1,6 @@
 """Materials of USD: what UsdPreviewSurface says of the colour and opacity of a surface.
 
-Colours of USD are linear light and are converted to sRGB, as in glTF (`gltf_material`). Of networks
+Colours of USD are linear light and are converted to sRGB, as in glTF. Of networks
 of shaders in other languages (MaterialX, MDL, OSL) nothing is read.
 """
 
@@ -16,16 +16,17 @@ import numpy as np
 from pxr import Ar, Sdf, Usd, UsdShade
 
 from ptmtools.arrays import Floats
+from ptmtools.scene.colors import to_srgb
 from ptmtools.scene.handed import NamedImage
-from ptmtools.scene.model import Wrap
-from ptmtools.scene.source import Findings
-from ptmtools.scene.usd_layers import TIME
+from ptmtools.scene.source import Findings, SourceWrap
+from ptmtools.scene.usd.layers import TIME
 
 #: What UsdPreviewSurface has where nothing is said (its specification, "Core Nodes").
 _DIFFUSE = (0.18, 0.18, 0.18)
 _ONES, _ZEROS = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 0.0)
 #: Where the library has its reader of packages, and where it had it in older releases.
 _ARCHIVES = Sdf.ZipFile if hasattr(Sdf, "ZipFile") else Usd.ZipFile
+_WRAPS: dict[str, SourceWrap] = {"repeat": "repeat", "clamp": "clamp", "mirror": "mirror"}
 #: A network deeper than this goes round in a circle.
 _DEEPEST = 32
 
@@ -39,7 +40,7 @@ class Surface:
     Attributes
     ----------
     color: sRGB; of an image white, and None where the material says nothing that is read.
-    opacity, see_through: see `ptmtools.scene.source.SourceMaterial`.
+    opacity, see_through, cutoff: see `ptmtools.scene.source.SourceMaterial`.
     image: as the stage names it.
     coords: the primvar with the image's coordinates, "" if there is none.
     matrix: (2, 3) by which they are transformed.
@@ -50,22 +51,16 @@ class Surface:
     color: Color | None = None
     opacity: float = 1.0
     see_through: bool = False
+    cutoff: float | None = None
     image: NamedImage | None = None
     coords: str = ""
     matrix: tuple[tuple[float, float, float], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     painted: str = ""
 
 
-def encoded(linear: Floats) -> Floats:
-    """Linear light, cut to [0, 1], to sRGB (IEC 61966-2-1); what is no number is 0."""
-    light = np.clip(np.nan_to_num(linear, nan=0.0), 0.0, 1.0)
-    curve = np.where(light < 1, 1.055 * light ** (1 / 2.4) - 0.055, 1.0)
-    return np.where(light <= 0.0031308, 12.92 * light, curve)
-
-
 def tint(linear: Any) -> Color:
     """A colour of three numbers in sRGB."""
-    r, g, b = encoded(np.array(linear, dtype=np.float64)).tolist()
+    r, g, b = to_srgb(np.array(linear, dtype=np.float64)).tolist()
     return r, g, b
 
 
@@ -120,12 +115,13 @@ class MaterialReader:
         coords, matrix = self._coords(source, name, place)
         turned = tuple((float(a), float(b), float(c)) for a, b, c in matrix.tolist())
         white = (1.0, 1.0, 1.0)
-        return Surface(name, white, opacity, see_through, image, coords, turned)
+        cutoff = _threshold(shader) if from_image == (_path_of(file), "a") else 0.0
+        return Surface(name, white, opacity, see_through, cutoff or None, image, coords, turned)
 
     def _opacity(self, shader: Any, name: str, place: str) -> tuple[float, bool, Any]:
         """The opacity; whether it is not the same everywhere, other than by an image; and of an
         image the path and the output."""
-        threshold = _number(_followed(shader.GetInput("opacityThreshold"))[0], 0.0)
+        threshold = _threshold(shader)
         value, source, output = _followed(shader.GetInput("opacity"))
         if source is None:
             opacity = min(max(_number(value, 1.0), 0.0), 1.0)
@@ -152,7 +148,9 @@ class MaterialReader:
         wrap_s, wrap_t = (self._wrap(texture, key, path, place) for key in ("wrapS", "wrapT"))
         return self._named(file, place, wrap_s, wrap_t)
 
-    def _named(self, file: Any, place: str, wrap_s: Wrap, wrap_t: Wrap) -> NamedImage | None:
+    def _named(
+        self, file: Any, place: str, wrap_s: SourceWrap, wrap_t: SourceWrap
+    ) -> NamedImage | None:
         """An image by its name relative to the model's folder, or in a package."""
         found = file.resolvedPath
         if not found:
@@ -182,13 +180,11 @@ class MaterialReader:
             inner, place, wrap_s, wrap_t, offset, length, Path(beside).as_posix() if beside else ""
         )
 
-    def _wrap(self, texture: Any, key: str, path: str, place: str) -> Wrap:
+    def _wrap(self, texture: Any, key: str, path: str, place: str) -> SourceWrap:
         mode = str(_followed(texture.GetInput(key))[0] or "useMetadata")
-        if mode == "mirror":
-            self._findings.say("PTM-N222", f"{path}: mirrored repeat becomes repeat", place)
-        elif mode not in ("repeat", "clamp"):  # without metadata it is black, too
+        if mode not in _WRAPS:  # without metadata it is black, too
             self._findings.say("PTM-N222", f"{path}: black beyond its edge becomes clamp", place)
-        return "repeat" if mode in ("repeat", "mirror") else "clamp"
+        return _WRAPS.get(mode, "clamp")
 
     def _coords(self, texture: Any, name: str, place: str) -> tuple[str, Floats]:
         """The primvar that a texture's coordinates come from, and how they are transformed."""
@@ -204,6 +200,11 @@ class MaterialReader:
         if source is None or source.GetIdAttr().Get(TIME) != "UsdPrimvarReader_float2":
             return "", matrix[:2]
         return str(_followed(source.GetInput("varname"))[0] or ""), matrix[:2]
+
+
+def _threshold(shader: Any) -> float:
+    """Texels of less opacity are not drawn; 0 where they are blended."""
+    return _number(_followed(shader.GetInput("opacityThreshold"))[0], 0.0)
 
 
 def _followed(given: Any) -> tuple[Any, Any, str]:
