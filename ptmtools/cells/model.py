@@ -208,8 +208,8 @@ class Cells:
         names = ("walker", "closed", "notes", "visible", "owners")
         about = {name: arrays.pop(name) for name in names}
         text = json.dumps(about, sort_keys=True, ensure_ascii=False)
-        extent = np.array(arrays.pop("tolerance").extent)
-        return {**arrays, "extent": extent, "about": np.frombuffer(text.encode(), dtype=np.uint8)}
+        arrays |= arrays.pop("tolerance").to_arrays()
+        return {**arrays, "about": np.frombuffer(text.encode(), dtype=np.uint8)}
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, NDArray[np.generic]]) -> Cells:
@@ -270,7 +270,7 @@ class Cells:
             triangle=triangle,
             triangle_source=stored.indices("triangle_source", np.int32, n, high=1 << 31),
             triangle_cell=stored.indices("triangle_cell", np.int32, n, 2, low=-1, high=cells),
-            tolerance=Tolerance.for_extent(stored.array("extent", np.float64, finite=True).item()),
+            tolerance=Tolerance.from_arrays(arrays),
             eye_floor=stored.array("eye_floor", np.float64, None, 3, 3, finite=True),
             left_out=stored.array("left_out", np.float64, None, 3, 3, finite=True),
             walker=Walker(*map(float, about["walker"])),

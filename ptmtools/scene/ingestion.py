@@ -158,7 +158,7 @@ def ingest(
         two_sided=two_sided,
         objects=tuple(source.objects[i] for i in used_object.tolist()),
         materials=tuple(materials),
-        tolerance=tolerance_of(points, triangles),
+        tolerance=tolerance_of(points, triangles, _step(source, space, points)),
         images=store.images,
         cameras=tuple(_camera(camera, space) for camera in source.cameras),
         colors=colors,
@@ -237,6 +237,13 @@ def _two_sided(kept: KeptFaces, source: Source) -> NDArray[np.bool_]:
         backed[source.triangle_material[standing]],
     )
     return result & ~kept.paired
+
+
+def _step(source: Source, space: Space, points: NDArray[np.float64]) -> float:
+    """The step of the grid of its coordinates, metres: on one that is as coarse as the model is
+    large nothing depends."""
+    step = source.step * space.metres
+    return step if 0 < step < float(np.ptp(points, axis=0).max()) else 0.0
 
 
 def _storeys(source: Source, space: Space) -> tuple[Storey, ...]:

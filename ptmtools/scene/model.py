@@ -179,7 +179,9 @@ class Scene:
 
     def with_points(self, points: NDArray[np.float64]) -> Scene:
         """The same triangles over (V, 3) other points, with the tolerances of those."""
-        return replace(self, points=points, tolerance=tolerance_of(points, self.triangles))
+        return replace(
+            self, points=points, tolerance=tolerance_of(points, self.triangles, self.tolerance.step)
+        )
 
     def to_arrays(self) -> dict[str, NDArray[np.generic]]:
         """The scene as plain arrays, without its images: what is made of the arrays alone does
@@ -195,16 +197,19 @@ class Scene:
         }
         colors = {} if self.colors is None else {"colors": self.colors}
         text = json.dumps(about, sort_keys=True, ensure_ascii=False)
-        return colors | {
-            "points": self.points,
-            "triangles": self.triangles,
-            "uv": self.uv,
-            "triangle_object": self.triangle_object,
-            "triangle_material": self.triangle_material,
-            "two_sided": self.two_sided,
-            "extent": np.array(self.tolerance.extent),
-            "about": np.frombuffer(text.encode(), dtype=np.uint8),
-        }
+        return (
+            colors
+            | self.tolerance.to_arrays()
+            | {
+                "points": self.points,
+                "triangles": self.triangles,
+                "uv": self.uv,
+                "triangle_object": self.triangle_object,
+                "triangle_material": self.triangle_material,
+                "two_sided": self.two_sided,
+                "about": np.frombuffer(text.encode(), dtype=np.uint8),
+            }
+        )
 
     @staticmethod
     def from_arrays(
@@ -234,7 +239,7 @@ class Scene:
             colors=stored.array("colors", np.uint8, n, 3, 3) if "colors" in arrays else None,
             objects=objects,
             materials=materials,
-            tolerance=Tolerance.for_extent(stored.array("extent", np.float64, finite=True).item()),
+            tolerance=Tolerance.from_arrays(arrays),
             images=images,
             cameras=tuple(Camera(**_fields(row)) for row in about["cameras"]),
             kinds=_kinds(about.get("kinds", []), len(objects)),

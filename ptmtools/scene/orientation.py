@@ -22,9 +22,12 @@ _AT_ONCE = 4096
 _SQUARE = 1e-3
 
 
-def tolerance_of(points: NDArray[np.float64], triangles: NDArray[np.integer]) -> Tolerance:
-    """The tolerances for a scene of (T, 3) triangles over (V, 3) points."""
-    return Tolerance.for_points(points @ main_axes(points[triangles]).T)
+def tolerance_of(
+    points: NDArray[np.float64], triangles: NDArray[np.integer], step: float = 0.0
+) -> Tolerance:
+    """The tolerances for a scene of (T, 3) triangles over (V, 3) points, which the file has on a
+    grid of this ``step``."""
+    return Tolerance.for_points(points @ main_axes(points[triangles]).T, step)
 
 
 def main_axes(corners: NDArray[np.float64]) -> NDArray[np.float64]:

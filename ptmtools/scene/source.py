@@ -138,6 +138,7 @@ class Source:
     metres, up: fixed by the format (glTF), else None.
     colors: (T, 3, 3) uint8 sRGB per corner, multiplied with the material's; None where no surface
         has any.
+    step: of the coarsest grid that points lie on, in the file's units; 0 where it is float32's.
     kinds: what each object is by its class (IFC); empty where the format knows no classes.
     storeys: named by the file, their heights along its up axis in its units.
     """
@@ -153,6 +154,7 @@ class Source:
     metres: float | None = None
     up: Literal["y", "z"] | None = None
     colors: NDArray[np.uint8] | None = None
+    step: float = 0.0
     kinds: tuple[Kind, ...] = ()
     storeys: tuple[Storey, ...] = ()
 

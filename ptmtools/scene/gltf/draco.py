@@ -6,6 +6,8 @@ the folder and writes ``0.npz``, …
 
 from __future__ import annotations
 
+import math
+import struct
 import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -22,14 +24,41 @@ from ptmtools.scene.gltf.document import Document
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 
 EXTENSION = "KHR_draco_mesh_compression"
+#: Of the grid of an attribute: its width, and bits of which Draco has at most so many.
+_GRID, _MOST_BITS = struct.Struct("<fB"), 30
 
 
 @dataclass(frozen=True)
 class Decoded:
-    """A primitive: (m, 3) ``triangles``, and attributes by their ids, (n, items) as stored."""
+    """A primitive.
+
+    Attributes
+    ----------
+    triangles: (m, 3).
+    attributes: by their ids, (n, items) as stored.
+    data: what it was decoded from.
+    """
 
     triangles: NDArray[np.int64]
     attributes: dict[int, NDArray[Any]]
+    data: bytes
+
+    def step(self, attribute: int) -> float:
+        """The step of the grid that an attribute was rounded to, 0 if that is not known.
+
+        The stream has where the grid begins, its width and its bits one after the other. It begins
+        with the least number of each component, by which it is found.
+        """
+        values = self.attributes.get(attribute)
+        if values is None or values.dtype != np.float32 or not len(values):
+            return 0.0
+        low = values.min(axis=0).astype("<f4").tobytes()
+        at = self.data.find(low) + len(low)
+        if at < len(low) or at + _GRID.size > len(self.data):
+            return 0.0
+        width, bits = _GRID.unpack_from(self.data, at)
+        sound = math.isfinite(width) and width > 0 and 1 <= bits <= _MOST_BITS
+        return float(width) / ((1 << bits) - 1) if sound else 0.0
 
 
 def decode_primitives(document: Document, views: Iterable[int]) -> dict[int, Decoded]:
@@ -59,7 +88,8 @@ def decode_primitives(document: Document, views: Iterable[int]) -> dict[int, Dec
             arrays = unpack_arrays(file.read_bytes(), file=file)
             triangles = arrays.pop("triangles").astype(np.int64)
             attributes = {int(name.removeprefix("id_")): array for name, array in arrays.items()}
-            found[view] = Decoded(triangles, attributes)
+            data = Path(scratch, f"{k}.drc").read_bytes()
+            found[view] = Decoded(triangles, attributes, data)
     return found
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError, LimitError
-from ptmtools.glb import meaning, natural
+from ptmtools.glb import COMPONENTS, meaning, natural
 from ptmtools.scene.colors import encoded
 from ptmtools.scene.gltf.document import Document, damaged, open_document
 from ptmtools.scene.gltf.draco import EXTENSION as DRACO, Decoded, decode_primitives
@@ -101,12 +101,13 @@ def _read(document: Document, findings: Findings, max_triangles: int) -> Source:
     materials: list[Ints] = []
     first: dict[int, int] = {}
     names: list[str] = []
-    total = 0
+    total, step = 0, 0.0
     for draw, paint, told in zip(draws, painted, compressed, strict=True):
         try:
             values = _Values(document, draw, told, decoded)
             mesh = _mesh(values, draw, paint, findings)
             placed = instances(document, draw.node)
+            grid = values.step("POSITION")
         except ValueError as error:
             raise damaged(path, str(error), draw.place) from None
         if draw.node not in first:
@@ -116,6 +117,7 @@ def _read(document: Document, findings: Findings, max_triangles: int) -> Source:
             with np.errstate(all="ignore"):
                 matrix = world_of[draw.node] @ local
                 points.append(mesh.points @ matrix[:3, :3].T + matrix[:3, 3])
+                step = max(step, grid * float(np.linalg.norm(matrix[:3, :3], axis=0).max()))
                 turned = np.linalg.det(matrix[:3, :3]) < 0  # a mirror turns faces over (3.7.4)
             meshes.append(_turned(mesh) if turned else mesh)
             triangles.append(meshes[-1].triangles + total)
@@ -134,6 +136,7 @@ def _read(document: Document, findings: Findings, max_triangles: int) -> Source:
         metres=1.0,
         up="y",
         colors=_colors(meshes),
+        step=step if np.isfinite(step) else 0.0,
     )
 
 
@@ -219,6 +222,16 @@ class _Values:
         if stored is None or stored.ndim != 2 or len(stored) != told:
             raise ValueError(f"Draco has other elements of {name} than the accessor says")
         return meaning(stored, bool(accessor.get("normalized")))
+
+    def step(self, name: str) -> float:
+        """The step of the grid that an attribute lies on, as its accessor has it; 0 for floats."""
+        if self._decoded is not None and name in self._ids:
+            return self._decoded.step(self._ids[name])
+        accessor = self._document.tree["accessors"][self._draw.attributes[name]]
+        kind = np.dtype(COMPONENTS[accessor["componentType"]])
+        if kind.kind == "f":
+            return 0.0
+        return 1 / float(np.iinfo(kind).max) if accessor.get("normalized") else 1.0
 
     def indices(self, count: int) -> Ints:
         """(k,) of the corners over ``count`` vertices."""
