@@ -1,4 +1,5 @@
-"""Reads the other formats: PLY, STL and OFF through trimesh, the rest through pymeshlab.
+"""Reads the other formats: PLY, STL and OFF through trimesh, IFC through IfcOpenShell (`ifc`), the
+rest through pymeshlab.
 
 What pymeshlab reads it converts to OBJ in a temporary folder (`ptmtools.scene.meshlab`), and our
 own reader reads that. The same way is taken where trimesh gives up (mixed polygons in OFF) and for
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
+from ptmtools.scene.ifc import IFC, read_ifc
 from ptmtools.scene.meshlab import convert
 from ptmtools.scene.source import (
     MAX_VERTICES,
@@ -26,7 +28,7 @@ from ptmtools.scene.source import (
 
 TRIMESH = (".ply", ".stl", ".off")
 MESHLAB = (".3ds", ".3mf", ".ctm", ".dae", ".wrl", ".x3d")
-SUPPORTED = (".obj", ".glb", ".gltf", *TRIMESH, *MESHLAB)
+SUPPORTED = (".obj", ".glb", ".gltf", *IFC, *TRIMESH, *MESHLAB)
 #: Enough of a PLY file for its header.
 _HEADER = 1 << 14
 
@@ -35,8 +37,8 @@ def read_other(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES
     """Read a file that is neither OBJ nor glTF, by its suffix.
 
     Raises InputError for unknown suffixes and for what no library can read, LimitError PTM-L203 for
-    more than ``max_triangles``, and MissingComponentError if pymeshlab is needed and cannot be
-    imported.
+    more than ``max_triangles``, and MissingComponentError if pymeshlab or IfcOpenShell is needed
+    and cannot be imported.
     """
     suffix = path.suffix.lower()
     if suffix not in SUPPORTED:
@@ -46,6 +48,8 @@ def read_other(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES
             file=path,
             remedy=f"give one of {' '.join(SUPPORTED)}",
         )
+    if suffix in IFC:
+        return read_ifc(path, findings, max_triangles)
     if suffix not in TRIMESH or (suffix == ".ply" and _textured_ply(path)):
         return _read_meshlab(path, findings, max_triangles)
     try:

@@ -1,0 +1,231 @@
+"""The products of an IFC file as one object each, through IfcOpenShell, in a process of its own.
+
+Each product is made in its own coordinates and placed in float64, so that buildings in the
+coordinates of a land register, thousands of kilometres from their origin, keep their millimetres.
+The kernel gives metres whatever the file's unit is, and makes shapes in any order and on several
+threads: they are sorted by the number of their product in the file.
+
+As a program: ``python -P -m ptmtools.scene.ifc_products MEMORY FOLDER MODEL FILE TRIANGLES`` reads
+FILE, the model or what was packed in it, and hands over what `handed.take_over` takes.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ptmtools.arrays import Floats, Ints
+from ptmtools.errors import InputError
+from ptmtools.lazy import component
+from ptmtools.scene.apart import serve
+from ptmtools.scene.handed import hand_over
+from ptmtools.scene.ifc_classes import drawn, is_part, kind_of
+from ptmtools.scene.ifc_names import called, one_line
+from ptmtools.scene.ifc_space import length_unit, storeys
+from ptmtools.scene.ifc_styles import UNSTYLED, material_of, note_lost
+from ptmtools.scene.model import Kind
+from ptmtools.scene.source import Findings, Source, SourceMaterial, too_many_triangles
+
+#: Threads make no difference to the result; each takes address space, which is bounded.
+_MOST_THREADS = 4
+#: Representations that are no bodies: nothing of them is drawn.
+_NO_BODY = frozenset(
+    ["Annotation", "Axis", "Box", "Clearance", "CoG", "FootPrint", "Plan", "Profile", "Reference"]
+)
+#: Of several representations of a product, bodies come first.
+_BODY = "Body"
+#: A line of the library's log: how grave it is, a code, when, and what about.
+_LOGGED = re.compile(
+    r"\[(?P<level>\w+)\]\s*(\[[A-Z]+\d+\]\s*)?\[[^]]*\]\s*(\{(?P<guid>[^}]*)\}\s*)?(?P<what>.*)"
+)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What is drawn of a product."""
+
+    product: Any
+    points: Floats  # (V, 3) metres
+    triangles: Ints  # (T, 3)
+    materials: tuple[SourceMaterial, ...]
+    material: Ints  # (T,) indices into them
+
+
+def read_products(file: Any, findings: Findings, max_triangles: int) -> Source:
+    """What an IfcOpenShell file has to draw.
+
+    Raises InputError PTM-I247 if that is nothing, LimitError PTM-L203.
+    """
+    unit, metres = length_unit(file)
+    if metres is None:
+        findings.say("PTM-N241", "the file says no unit of length")
+    elif metres != 1:
+        findings.say("PTM-N240", f"lengths are in {unit} ({metres:g} m), and read as metres")
+    products = _shown(file, findings)
+    shapes = _shapes(file, products, max_triangles, findings.model) if products else []
+    _note_products(products, shapes, findings)
+    note_lost(file, findings)
+    shapes = [shape for shape in shapes if len(shape.triangles)]
+    if not shapes:
+        raise InputError(
+            "PTM-I247",
+            "no faces" if products else "no product that is drawn",
+            remedy="export it with the geometry of its building elements",
+        )
+    known: dict[SourceMaterial, int] = {}
+    material = [
+        np.array([known.setdefault(m, len(known)) for m in shape.materials])[shape.material]
+        for shape in shapes
+    ]
+    points = [shape.points for shape in shapes]
+    first = np.cumsum([0, *map(len, points)])
+    size = [len(shape.triangles) for shape in shapes]
+    return Source(
+        points=np.concatenate(points),
+        triangles=np.concatenate([s.triangles + n for s, n in zip(shapes, first, strict=False)]),
+        uv=np.zeros((sum(size), 3, 2)),
+        triangle_object=np.repeat(np.arange(len(shapes)), size),
+        triangle_material=np.concatenate(material),
+        objects=tuple(called(shape.product) for shape in shapes),
+        materials=tuple(known),
+        metres=None if metres is None else 1.0,
+        up="z",
+        kinds=tuple(_kind(shape.product) for shape in shapes),
+        storeys=storeys(file, metres or 1.0),
+    )
+
+
+def _kind(product: Any) -> Kind:
+    if is_part(product.is_a):
+        for relation in product.Decomposes:
+            return kind_of(relation.RelatingObject.is_a)
+    return kind_of(product.is_a)
+
+
+def _shown(file: Any, findings: Findings) -> list[Any]:
+    """The products to draw, and notes on those that are not."""
+    shown, hidden = [], Counter[str]()
+    for product in sorted(file.by_type("IfcProduct"), key=lambda product: int(product.id())):
+        if product.Representation is None:
+            continue
+        if not drawn(product.is_a):
+            hidden[product.is_a()] += 1
+        elif not _has_body(product):
+            findings.say("PTM-N243", _lines_only(product))
+        else:
+            shown.append(product)
+    for name, count in hidden.items():
+        findings.say("PTM-N242", f"{name}: not drawn", "", count)
+    return shown
+
+
+def _lines_only(product: Any) -> str:
+    return f"{product.is_a()}: has no surface, only lines"
+
+
+def _has_body(product: Any) -> bool:
+    every = product.Representation.Representations or ()
+    return any(one.RepresentationIdentifier not in _NO_BODY for one in every)
+
+
+def _shapes(file: Any, products: list[Any], most: int, model: Path) -> list[Shape]:
+    """One shape of each product that has any, in the order of their numbers."""
+    from ifcopenshell import geom
+
+    settings = geom.settings()
+    settings.set("apply-default-materials", False)
+    threads = min(_MOST_THREADS, os.cpu_count() or 1)
+    made: dict[int, tuple[tuple[bool, bool, str], Shape]] = {}
+    count = 0
+    for element in geom.iterator(settings, file, threads, include=products):
+        shape = _shape(file, element)
+        size = len(shape.triangles)
+        rank = not size, element.context != _BODY, _padded(element.geometry.id)
+        if element.id in made:
+            other, replaced = made[element.id]
+            if other <= rank:
+                continue
+            count -= len(replaced.triangles)
+        count += size
+        if count > most:
+            raise too_many_triangles(most, model)
+        made[element.id] = rank, shape
+    return [shape for _, (_, shape) in sorted(made.items())]
+
+
+def _padded(name: str) -> str:
+    """A name that begins with a number, so that the least number comes first."""
+    number, *rest = name.split("-")
+    return f"{number:>12}-{rest}"
+
+
+def _shape(file: Any, element: Any) -> Shape:
+    """A copy of what the kernel has made: its own is gone with the next shape."""
+    geometry = element.geometry
+    placed = np.array(element.transformation.matrix, dtype=np.float64).reshape(4, 4).T
+    local = np.frombuffer(geometry.verts_buffer, dtype=np.float64).reshape(-1, 3)
+    triangles = np.frombuffer(geometry.faces_buffer, dtype=np.int32).reshape(-1, 3)
+    style = np.frombuffer(geometry.material_ids_buffer, dtype=np.int32)  # -1 for none
+    return Shape(
+        file.by_id(element.id),
+        local @ placed[:3, :3].T + placed[:3, 3],
+        triangles.astype(np.int64),
+        (UNSTYLED, *(material_of(file, one) for one in geometry.materials)),
+        style.astype(np.int64) + 1,
+    )
+
+
+def _note_products(products: list[Any], shapes: list[Shape], findings: Findings) -> None:
+    """Misses: what has no shape in spite of its body, and what lacks a part of it."""
+    import ifcopenshell
+
+    made = {shape.product.id(): len(shape.triangles) for shape in shapes}
+    faults: dict[str, str] = {}
+    for line in ifcopenshell.get_log().splitlines():
+        logged = _LOGGED.match(line)
+        if logged and logged["level"].lower() == "error" and logged["guid"]:
+            faults.setdefault(logged["guid"], one_line(logged["what"]))
+    for product in products:
+        guid = one_line(product.GlobalId)
+        why = f" ({faults[guid]})" if guid in faults else ""
+        if product.id() not in made:
+            message = f"{called(product)}: its geometry cannot be made{why}"
+            findings.miss("PTM-N244", message, f"GlobalId {guid}")
+        elif not made[product.id()]:
+            findings.say("PTM-N243", _lines_only(product))
+        elif why:
+            message = f"{called(product)}: a part of its geometry cannot be made{why}"
+            findings.miss("PTM-N245", message, f"GlobalId {guid}")
+
+
+def _open(path: str, findings: Findings) -> Any:
+    """Raises InputError PTM-I263 for an unknown schema."""
+    library = component("ifcopenshell", "PTM-M201", "IFC is read through ifcopenshell", "ifc")
+    try:
+        file = library.open(path)
+    except library.SchemaError as error:
+        raise InputError(
+            "PTM-I263", one_line(error), remedy="export it as IFC2X3, IFC4 or IFC4X3_ADD2"
+        ) from None
+    faults = [found for line in library.get_log().splitlines() if (found := _LOGGED.match(line))]
+    wrong = [one_line(fault["what"]) for fault in faults if fault["level"].lower() == "error"]
+    if wrong:
+        message = f"statements of the file are wrong and left out, the first: {wrong[0]}"
+        findings.miss("PTM-N246", message, "", len(wrong))
+    return file
+
+
+def _read_here(scratch: str, model: str, path: str, most: str) -> dict[str, Any]:
+    findings = Findings(Path(model))
+    source = read_products(_open(path, findings), findings, int(most))
+    return hand_over(source, {}, findings, scratch)
+
+
+if __name__ == "__main__":
+    serve(_read_here)
