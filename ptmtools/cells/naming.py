@@ -1,11 +1,16 @@
 """Which triangles may bound a leaf, and which are of doors, by the names of their objects and
-materials."""
+materials, and by the classes of their objects.
+
+A class counts as an option that names the object, `--structural`, `--detail` or `--door`. Where
+the user names a triangle in any of these, its class says nothing.
+"""
 
 from __future__ import annotations
 
 import re
 import unicodedata
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 import numpy as np
@@ -34,10 +39,28 @@ _WORD = re.compile(r"[^\W\d_]+")
 _HUMP = re.compile(r"(?<=[^\W\d_A-ZÀ-ÖØ-Þ])(?=[A-ZÀ-ÖØ-Þ])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
-def may_occlude(scene: Scene, options: SubdivideOptions) -> Bools:
-    """(T,) which triangles are opaque and not called detail by name."""
-    detail = named(scene, options.detail) & ~named(scene, options.structural)
-    return scene.opaque & ~detail
+@dataclass(frozen=True)
+class Designated:
+    """Which triangles are said to be what; none is both structural and something else."""
+
+    structural: Bools  # (T,)
+    detail: Bools  # (T,)
+    door: Bools  # (T,)
+
+    @staticmethod
+    def of(scene: Scene, options: SubdivideOptions) -> Designated:
+        """As the user says, and else as the classes of objects do."""
+        structural, detail, door = (
+            named(scene, patterns)
+            for patterns in (options.structural, options.detail, options.door)
+        )
+        if scene.kinds:
+            untold = ~(structural | detail | door)
+            kind = np.array(scene.kinds)[scene.triangle_object]
+            structural = structural | (untold & (kind == "structural"))
+            detail = detail | (untold & (kind == "detail"))
+            door = door | (untold & (kind == "door"))
+        return Designated(structural, detail & ~structural, door & ~structural)
 
 
 def named(scene: Scene, patterns: Sequence[str]) -> Bools:

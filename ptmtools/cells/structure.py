@@ -27,7 +27,7 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bins import Bins, Tries
 from ptmtools.cells.detail import recognised
 from ptmtools.cells.facets import UPWARD, Facets
-from ptmtools.cells.naming import may_occlude, named
+from ptmtools.cells.naming import Designated
 from ptmtools.cells.nearby import Nearby
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
@@ -82,7 +82,7 @@ class Structure:
     again."""
 
     corners: Floats  # (T, 3, 3) metres
-    forced: Bools  # (T,) whether `SubdivideOptions.structural` names them
+    forced: Bools  # (T,) whether they are said to be structural, see `naming`
     planes: Floats  # (T, 4) and
     areas: Floats  # (T,), see `planes_of`
     region: Ints  # (T,) the flat region that each is of
@@ -145,9 +145,9 @@ class Structure:
 def structural_triangles(
     scene: Scene, options: SubdivideOptions, opened: NDArray[np.integer] | None = None
 ) -> Bools:
-    """(T,) which triangles occlude: opaque, detail neither by name nor by shape, and none of the
-    door leaves that are ``opened`` (see `Cells.opened`). Of triangles that are the same, the first
-    may stand for all."""
+    """(T,) which triangles occlude: opaque, detail neither by name, class nor shape, and none of
+    the door leaves that are ``opened`` (see `Cells.opened`). Of triangles that are the same, the
+    first may stand for all."""
     opaque = Opaque.of(scene, options)
     found = np.zeros(len(scene.triangles), dtype=bool)
     found[opaque.source[~opaque.detail]] = True
@@ -157,22 +157,23 @@ def structural_triangles(
 
 
 class Opaque(NamedTuple):
-    """What is opaque in a scene and not called detail."""
+    """What is opaque in a scene and not said to be detail."""
 
     facets: Facets
     source: Ints  # (n,) the triangles of the scene that its mesh consists of, ascending
     detail: Bools  # (n,) which of them are detail by their shape
-    forced: Bools  # (n,) which `SubdivideOptions.structural` names
+    forced: Bools  # (n,) which are said to be structural, see `naming`
     tolerance: Tolerance  # the scene's
 
     @staticmethod
     def of(scene: Scene, options: SubdivideOptions) -> Opaque:
         """Of a scene."""
-        candidates = np.flatnonzero(may_occlude(scene, options))
+        said = Designated.of(scene, options)
+        candidates = np.flatnonzero(scene.opaque & ~said.detail)
         mesh = Welded.of(scene.points, scene.triangles[candidates])
         source = candidates[mesh.source]
         facets = Facets.of(mesh, scene.tolerance)
-        forced = named(scene, options.structural)[source]
+        forced = said.structural[source]
         detail = np.zeros(len(source), dtype=bool)
         if options.detail_by_shape:
             detail = recognised(facets, scene.triangle_object[source], options.wall_area)
