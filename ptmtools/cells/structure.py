@@ -82,7 +82,7 @@ class Structure:
     again."""
 
     corners: Floats  # (T, 3, 3) metres
-    forced: Bools  # (T,) whether they are said to be structural, see `naming`
+    forced: Bools  # (T,) whether `SubdivideOptions.structural` names them
     planes: Floats  # (T, 4) and
     areas: Floats  # (T,), see `planes_of`
     region: Ints  # (T,) the flat region that each is of
@@ -162,7 +162,7 @@ class Opaque(NamedTuple):
     facets: Facets
     source: Ints  # (n,) the triangles of the scene that its mesh consists of, ascending
     detail: Bools  # (n,) which of them are detail by their shape
-    forced: Bools  # (n,) which are said to be structural, see `naming`
+    forced: Bools  # (n,) which `SubdivideOptions.structural` names
     tolerance: Tolerance  # the scene's
 
     @staticmethod
@@ -173,12 +173,11 @@ class Opaque(NamedTuple):
         mesh = Welded.of(scene.points, scene.triangles[candidates])
         source = candidates[mesh.source]
         facets = Facets.of(mesh, scene.tolerance)
-        forced = said.structural[source]
         detail = np.zeros(len(source), dtype=bool)
         if options.detail_by_shape:
             detail = recognised(facets, scene.triangle_object[source], options.wall_area)
-            detail &= ~forced
-        return Opaque(facets, source, detail, forced, scene.tolerance)
+            detail &= ~said.structural[source]
+        return Opaque(facets, source, detail, said.forced[source], scene.tolerance)
 
 
 def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:

@@ -137,10 +137,10 @@ def test_heads_that_lie(put: Put, pymeshlab: None, name: str) -> None:
         ("import os; os.abort()", "it ended with status -6"),
         ("print('noise')", "it ended with status 0"),
         ("import time; time.sleep(60)", "it did not end in 1 s"),
-        ("print('noise\\nptmtools answers: {\"fault\": \"no\"}')", "cannot read it (no)"),
+        ('print(\'noise\\nptmtools answers: {"fault": "no"}\')', "cannot read it (no)"),
         (
-            "print('ptmtools answers: {\"error\": [\"InputError\", {\"code\": \"PTM-I254\", '"
-            "'\"message\": \"is no good\", \"file\": \"a.dae\"}]}')",
+            'print(\'ptmtools answers: {"error": ["InputError", {"code": "PTM-I254", \''
+            '\'"message": "is no good", "file": "a.dae"}]}\')',
             "a.dae: is no good",
         ),
     ],
