@@ -47,8 +47,8 @@ def read_ifc(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) 
 
     Raises
     ------
-    InputError: PTM-I260 no STEP file, PTM-I261 not all of one, PTM-I262 an archive without one,
-        PTM-I263 of a schema that is not known, PTM-I247 nothing to draw, and PTM-I254 for what
+    InputError: PTM-I266 no STEP file, PTM-I267 not all of one, PTM-I268 an archive without one,
+        PTM-I269 of a schema that is not known, PTM-I247 nothing to draw, and PTM-I254 for what
         IfcOpenShell cannot read.
     LimitError: PTM-L203 more than ``max_triangles``, PTM-L260 an archive that unpacks to more than
         1 GiB.
@@ -78,7 +78,7 @@ def _check(file: Path) -> None:
     with open_regular(file) as stream:
         if not _BEGINS.match(stream.read(_MARGIN)):
             raise InputError(
-                "PTM-I260",
+                "PTM-I266",
                 "is not an IFC file (a STEP file begins with ISO-10303-21)",
                 remedy="export it again, as IFC-SPF",
             )
@@ -86,7 +86,7 @@ def _check(file: Path) -> None:
         stream.seek(max(0, end - _MARGIN))
         if not _ENDS.search(stream.read()):
             raise InputError(
-                "PTM-I261",
+                "PTM-I267",
                 "is not whole (a STEP file ends with END-ISO-10303-21)",
                 remedy="copy or export it again",
             )
@@ -99,7 +99,7 @@ def _unpacked(path: Path, folder: Path) -> Path:
             names = [n for n in archive.namelist() if PurePosixPath(n).suffix.lower() == ".ifc"]
             if len(names) != 1:
                 raise InputError(
-                    "PTM-I262",
+                    "PTM-I268",
                     f"holds {len(names) or 'no'} IFC files instead of one",
                     remedy="unpack it, and give the .ifc file",
                 )
@@ -109,7 +109,7 @@ def _unpacked(path: Path, folder: Path) -> Path:
             return file
     except _DAMAGED as error:
         raise InputError(
-            "PTM-I262", f"is no archive that can be unpacked ({error})", remedy="pack it again"
+            "PTM-I268", f"is no archive that can be unpacked ({error})", remedy="pack it again"
         ) from None
 
 

@@ -38,6 +38,10 @@ _MOST_THREADS = 4
 _NO_BODY = frozenset(
     ["Annotation", "Axis", "Box", "Clearance", "CoG", "FootPrint", "Plan", "Profile", "Reference"]
 )
+#: Items that have no surface.
+_LINES = ("IfcCurve", "IfcPoint", "IfcGeometricCurveSet", "IfcTextLiteral", "IfcAnnotationFillArea")
+#: Representations repeat others, which repeat others; a damaged file has them in a circle.
+_DEEPEST = 16
 #: Of several representations of a product, bodies come first.
 _BODY = "Body"
 #: A line of the library's log: how grave it is, a code, when, and what about.
@@ -71,7 +75,6 @@ def read_products(file: Any, findings: Findings, max_triangles: int) -> Source:
     shapes = _shapes(file, products, max_triangles, findings.model) if products else []
     _note_products(products, shapes, findings)
     note_lost(file, findings)
-    shapes = [shape for shape in shapes if len(shape.triangles)]
     if not shapes:
         raise InputError(
             "PTM-I247",
@@ -117,7 +120,7 @@ def _shown(file: Any, findings: Findings) -> list[Any]:
         if not drawn(product.is_a):
             hidden[product.is_a()] += 1
         elif not _has_body(product):
-            findings.say("PTM-N243", _lines_only(product))
+            findings.say("PTM-N243", f"{product.is_a()}: has no surface, only lines")
         else:
             shown.append(product)
     for name, count in hidden.items():
@@ -125,13 +128,23 @@ def _shown(file: Any, findings: Findings) -> list[Any]:
     return shown
 
 
-def _lines_only(product: Any) -> str:
-    return f"{product.is_a()}: has no surface, only lines"
-
-
 def _has_body(product: Any) -> bool:
     every = product.Representation.Representations or ()
-    return any(one.RepresentationIdentifier not in _NO_BODY for one in every)
+    return any(
+        one.RepresentationIdentifier not in _NO_BODY and _has_surface(one, _DEEPEST)
+        for one in every
+    )
+
+
+def _has_surface(representation: Any, deep: int) -> bool:
+    """Whether a representation, or one that it repeats, is more than lines."""
+    for item in representation.Items or ():
+        if item.is_a("IfcMappedItem") and deep:
+            if _has_surface(item.MappingSource.MappedRepresentation, deep - 1):
+                return True
+        elif not any(map(item.is_a, _LINES)):
+            return True
+    return False
 
 
 def _shapes(file: Any, products: list[Any], most: int, model: Path) -> list[Shape]:
@@ -141,12 +154,14 @@ def _shapes(file: Any, products: list[Any], most: int, model: Path) -> list[Shap
     settings = geom.settings()
     settings.set("apply-default-materials", False)
     threads = min(_MOST_THREADS, os.cpu_count() or 1)
-    made: dict[int, tuple[tuple[bool, bool, str], Shape]] = {}
+    made: dict[int, tuple[tuple[bool, str], Shape]] = {}
     count = 0
     for element in geom.iterator(settings, file, threads, include=products):
         shape = _shape(file, element)
         size = len(shape.triangles)
-        rank = not size, element.context != _BODY, _padded(element.geometry.id)
+        if not size:
+            continue
+        rank = element.context != _BODY, _padded(element.geometry.id)
         if element.id in made:
             other, replaced = made[element.id]
             if other <= rank:
@@ -185,7 +200,7 @@ def _note_products(products: list[Any], shapes: list[Shape], findings: Findings)
     """Misses: what has no shape in spite of its body, and what lacks a part of it."""
     import ifcopenshell
 
-    made = {shape.product.id(): len(shape.triangles) for shape in shapes}
+    made = {shape.product.id() for shape in shapes}
     faults: dict[str, str] = {}
     for line in ifcopenshell.get_log().splitlines():
         logged = _LOGGED.match(line)
@@ -196,28 +211,26 @@ def _note_products(products: list[Any], shapes: list[Shape], findings: Findings)
         why = f" ({faults[guid]})" if guid in faults else ""
         if product.id() not in made:
             message = f"{called(product)}: its geometry cannot be made{why}"
-            findings.miss("PTM-N244", message, f"GlobalId {guid}")
-        elif not made[product.id()]:
-            findings.say("PTM-N243", _lines_only(product))
+            findings.miss("PTM-N253", message, f"GlobalId {guid}")
         elif why:
             message = f"{called(product)}: a part of its geometry cannot be made{why}"
-            findings.miss("PTM-N245", message, f"GlobalId {guid}")
+            findings.miss("PTM-N259", message, f"GlobalId {guid}")
 
 
 def _open(path: str, findings: Findings) -> Any:
-    """Raises InputError PTM-I263 for an unknown schema."""
+    """Raises InputError PTM-I269 for an unknown schema."""
     library = component("ifcopenshell", "PTM-M201", "IFC is read through ifcopenshell", "ifc")
     try:
         file = library.open(path)
     except library.SchemaError as error:
         raise InputError(
-            "PTM-I263", one_line(error), remedy="export it as IFC2X3, IFC4 or IFC4X3_ADD2"
+            "PTM-I269", one_line(error), remedy="export it as IFC2X3, IFC4 or IFC4X3_ADD2"
         ) from None
     faults = [found for line in library.get_log().splitlines() if (found := _LOGGED.match(line))]
     wrong = [one_line(fault["what"]) for fault in faults if fault["level"].lower() == "error"]
     if wrong:
         message = f"statements of the file are wrong and left out, the first: {wrong[0]}"
-        findings.miss("PTM-N246", message, "", len(wrong))
+        findings.miss("PTM-N244", message, "", len(wrong))
     return file
 
 

@@ -41,7 +41,7 @@ def note_lost(file: Any, findings: Findings) -> None:
         except RuntimeError:  # no class of this schema
             continue
         if count:
-            findings.say("PTM-N247", what, "", count)
+            findings.say("PTM-N245", what, "", count)
 
 
 def _shade(color: tuple[float, float, float] | None) -> str:
