@@ -11,7 +11,6 @@ FILE, the model or what was packed in it, and hands over what `handed.take_over`
 
 from __future__ import annotations
 
-import os
 import re
 from collections import Counter
 from dataclasses import dataclass
@@ -26,22 +25,19 @@ from ptmtools.lazy import component
 from ptmtools.scene.apart import serve
 from ptmtools.scene.handed import hand_over
 from ptmtools.scene.ifc_classes import drawn, is_part, kind_of
+from ptmtools.scene.ifc_kernel import elements, items
 from ptmtools.scene.ifc_names import called, one_line
 from ptmtools.scene.ifc_space import length_unit, storeys
 from ptmtools.scene.ifc_styles import UNSTYLED, material_of, note_lost
 from ptmtools.scene.model import Kind
 from ptmtools.scene.source import Findings, Source, SourceMaterial, too_many_triangles
 
-#: Threads make no difference to the result; each takes address space, which is bounded.
-_MOST_THREADS = 4
 #: Representations that are no bodies: nothing of them is drawn.
 _NO_BODY = frozenset(
     ["Annotation", "Axis", "Box", "Clearance", "CoG", "FootPrint", "Plan", "Profile", "Reference"]
 )
 #: Items that have no surface.
 _LINES = ("IfcCurve", "IfcPoint", "IfcGeometricCurveSet", "IfcTextLiteral", "IfcAnnotationFillArea")
-#: Representations repeat others, which repeat others; a damaged file has them in a circle.
-_DEEPEST = 16
 #: Of several representations of a product, bodies come first.
 _BODY = "Body"
 #: A line of the library's log: how grave it is, a code, when, and what about.
@@ -130,33 +126,15 @@ def _shown(file: Any, findings: Findings) -> list[Any]:
 
 def _has_body(product: Any) -> bool:
     every = product.Representation.Representations or ()
-    return any(
-        one.RepresentationIdentifier not in _NO_BODY and _has_surface(one, _DEEPEST)
-        for one in every
-    )
-
-
-def _has_surface(representation: Any, deep: int) -> bool:
-    """Whether a representation, or one that it repeats, is more than lines."""
-    for item in representation.Items or ():
-        if item.is_a("IfcMappedItem") and deep:
-            if _has_surface(item.MappingSource.MappedRepresentation, deep - 1):
-                return True
-        elif not any(map(item.is_a, _LINES)):
-            return True
-    return False
+    bodies = (one for one in every if one.RepresentationIdentifier not in _NO_BODY)
+    return any(not any(map(item.is_a, _LINES)) for one in bodies for item in items(one))
 
 
 def _shapes(file: Any, products: list[Any], most: int, model: Path) -> list[Shape]:
     """One shape of each product that has any, in the order of their numbers."""
-    from ifcopenshell import geom
-
-    settings = geom.settings()
-    settings.set("apply-default-materials", False)
-    threads = min(_MOST_THREADS, os.cpu_count() or 1)
     made: dict[int, tuple[tuple[bool, str], Shape]] = {}
     count = 0
-    for element in geom.iterator(settings, file, threads, include=products):
+    for element in elements(file, products):
         shape = _shape(file, element)
         size = len(shape.triangles)
         if not size:

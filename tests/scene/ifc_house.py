@@ -50,8 +50,8 @@ class Ifc:
         self.building = self.entity("IfcBuilding", "House")
         aggregate.assign_object(self.file, products=[self.site], relating_object=top)
         aggregate.assign_object(self.file, products=[self.building], relating_object=self.site)
-        self.site.ObjectPlacement = self._placement(None, origin)
-        self.building.ObjectPlacement = self._placement(self.site.ObjectPlacement, (0, 0, 0))
+        self.site.ObjectPlacement = self.placement(None, origin)
+        self.building.ObjectPlacement = self.placement(self.site.ObjectPlacement, (0, 0, 0))
 
     def entity(self, kind: str, name: str | None = None) -> Any:
         from ifcopenshell.api import root
@@ -63,7 +63,7 @@ class Ifc:
         from ifcopenshell.api import aggregate
 
         storey = self.entity("IfcBuildingStorey", name)
-        storey.ObjectPlacement = self._placement(self.building.ObjectPlacement, (0, 0, height))
+        storey.ObjectPlacement = self.placement(self.building.ObjectPlacement, (0, 0, height))
         storey.Elevation = self.long(height if elevation is None else elevation)
         aggregate.assign_object(self.file, products=[storey], relating_object=self.building)
         return storey
@@ -83,7 +83,7 @@ class Ifc:
 
         product = self.entity(kind, name)
         below = storey.ObjectPlacement if storey else self.building.ObjectPlacement
-        product.ObjectPlacement = self._placement(below, low)
+        product.ObjectPlacement = self.placement(below, low)
         size = np.subtract(high, low).tolist()
         solid = self._extruded(size)
         if style:
@@ -150,7 +150,7 @@ class Ifc:
         self.file.write(str(path))
         return path
 
-    def _placement(self, parent: Any, place: Sequence[float]) -> Any:
+    def placement(self, parent: Any, place: Sequence[float]) -> Any:
         axes = self.file.create_entity("IfcAxis2Placement3D", self.point(*place))
         return self.file.create_entity("IfcLocalPlacement", parent, axes)
 

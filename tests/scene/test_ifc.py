@@ -8,6 +8,7 @@ import zipfile
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -384,6 +385,7 @@ class TestNames:
             (r"\X2\D800\X0\half", None),
             ("$x_{", "$x_{"),
             ("it''s", "it's"),
+            ("T\xfcr", None),
         ],
     )
     def test_strange(self, tmp_path: Path, written: str, name: str | None) -> None:
@@ -391,7 +393,7 @@ class TestNames:
         made = Ifc()
         made.box("IfcWall", "NAME", (0, 0, 0), (1, 1, 1))
         file = made.write(tmp_path / "wall.ifc")
-        file.write_text(file.read_text().replace("'NAME'", f"'{written}'"))
+        file.write_bytes(file.read_bytes().replace(b"'NAME'", f"'{written}'".encode("latin-1")))
         scene = ingest(file)
         assert Scene.from_arrays(scene.to_arrays()).objects == scene.objects
         if name:
@@ -442,20 +444,104 @@ def test_what_cannot_be_made_is_missed(tmp_path: Path) -> None:
         ingest(file, IngestOptions(strict=True))
 
 
-def test_twice_the_same_arrays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever the number of threads."""
+def test_twice_the_same_arrays(tmp_path: Path) -> None:
+    path = house(Ifc()).write(tmp_path / "house.ifc")
+    first, second = read(path)[0], read(path)[0]
+    for name, value in vars(first).items():
+        assert np.array_equal(value, getattr(second, name)), name
+
+
+def test_the_order_is_that_of_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In whatever order the kernel makes the shapes."""
     import ifcopenshell as library
 
     path = house(Ifc()).write(tmp_path / "house.ifc")
-    found = [read(path)[0], read(path)[0]]
-    for threads in (1, 4):
-        monkeypatch.setattr(ifc_products, "_MOST_THREADS", threads)
-        monkeypatch.setattr(ifc_products.os, "cpu_count", lambda: 4)
-        file = library.open(str(path))
-        found.append(ifc_products.read_products(file, Findings(path), MAX_VERTICES))
-    for other in found[1:]:
-        for name, value in vars(found[0]).items():
-            assert np.array_equal(value, getattr(other, name)), name
+    plain = ifc_products.elements
+    monkeypatch.setattr(ifc_products, "elements", lambda *all_: list(plain(*all_))[::-1])
+    findings = Findings(path)
+    turned = ifc_products.read_products(library.open(str(path)), findings, MAX_VERTICES)
+    for name, value in vars(read(path)[0]).items():
+        assert np.array_equal(value, getattr(turned, name)), name
+
+
+class TestTriangles:
+    """The parallelepiped of 1, 2 and 3 m, as the formats of IFC have it, moved by 5 m along x."""
+
+    CORNERS = [(x, y, z) for x in (0, 1) for y in (0, 2) for z in (0, 3)]  # noqa: RUF012
+    QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]  # noqa: RUF012
+    HALVES = [half for a, b, c, d in QUADS for half in ([a, b, c], [a, c, d])]  # noqa: RUF012
+
+    def face_set(self, made: Ifc, faces: list[list[int]]) -> Any:
+        points = [[made.long(c) for c in corner] for corner in self.CORNERS]
+        listed = made.file.create_entity("IfcCartesianPointList3D", points)
+        index = [[i + 1 for i in face] for face in faces]
+        if len(faces) == 12:
+            return made.file.create_entity(
+                "IfcTriangulatedFaceSet", Coordinates=listed, CoordIndex=index
+            )
+        polygons = [made.file.create_entity("IfcIndexedPolygonalFace", face) for face in index]
+        return made.file.create_entity(
+            "IfcPolygonalFaceSet", Coordinates=listed, Closed=True, Faces=polygons
+        )
+
+    def brep(self, made: Ifc, faces: list[list[int]]) -> Any:
+        points = [made.point(*corner) for corner in self.CORNERS]
+        create = made.file.create_entity
+        loops = [create("IfcPolyLoop", [points[i] for i in face]) for face in faces]
+        bounds = [create("IfcFaceOuterBound", loop, True) for loop in loops]
+        shell = create("IfcClosedShell", [create("IfcFace", [bound]) for bound in bounds])
+        return create("IfcFacetedBrep", shell)
+
+    @pytest.mark.parametrize("mapped", [False, True])
+    @pytest.mark.parametrize("item", ["face_set", "brep"])
+    @pytest.mark.parametrize("cut", [False, True])
+    @pytest.mark.parametrize("halves", [False, True])
+    def test_solids(self, tmp_path: Path, item: str, halves: bool, cut: bool, mapped: bool) -> None:
+        made = Ifc()
+        wall = made.entity("IfcWall", "Wall")
+        wall.ObjectPlacement = made.placement(made.building.ObjectPlacement, (5, 0, 0))
+        solid = getattr(self, item)(made, self.HALVES if halves else self.QUADS)
+        style = made.style("Blue", (0, 0, 1))
+        made.file.create_entity("IfcStyledItem", solid, [style])
+        made.represent(wall, solid, "Brep")
+        if mapped:
+            body = wall.Representation.Representations[0]
+            axes = made.file.create_entity("IfcAxis2Placement3D", made.point(0, 0, 0))
+            source = made.file.create_entity("IfcRepresentationMap", axes, body)
+            move = made.file.create_entity(
+                "IfcCartesianTransformationOperator3D",
+                LocalOrigin=made.point(0, 1, 0),
+                Scale=1.0,
+            )
+            again = made.file.create_entity("IfcMappedItem", source, move)
+            made.represent(wall, again, "MappedRepresentation")
+        if cut:
+            made.opening(wall, (4, 0, 0), (7, 4, 1))
+        source, findings = read(made.write(tmp_path / "solid.ifc"))
+        found = corners(source, "IfcWall Wall")
+        low = [5, mapped, cut]
+        assert np.allclose(found.reshape(-1, 3).min(axis=0), low, rtol=0, atol=1e-9)
+        assert size(found) == [1, 2, 3 - cut]
+        assert np.isclose(volume(found), 6 - 2 * cut)
+        assert [source.materials[i].name for i in np.unique(source.triangle_material)] == ["Blue"]
+        assert not [note for note in findings.notes if note.code > "PTM-N242"]
+
+    def test_a_concave_polygon(self, tmp_path: Path) -> None:
+        """No fan: an area of 4 m², not of 12."""
+        made = Ifc()
+        points = [(0, 0, 0), (4, 0, 0), (4, 4, 0), (3, 1, 0)]
+        listed = [[made.long(c) for c in point] for point in points]
+        surface = made.file.create_entity(
+            "IfcPolygonalFaceSet",
+            Coordinates=made.file.create_entity("IfcCartesianPointList3D", listed),
+            Faces=[made.file.create_entity("IfcIndexedPolygonalFace", [1, 2, 3, 4])],
+        )
+        slab = made.entity("IfcSlab", "Slab")
+        slab.ObjectPlacement = made.building.ObjectPlacement
+        made.represent(slab, surface, "Tessellation")
+        source, _ = read(made.write(tmp_path / "slab.ifc"))
+        a, b, c = np.moveaxis(corners(source, "IfcSlab Slab"), 1, 0)
+        assert np.isclose(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2, 4)
 
 
 def test_triangles_are_counted(tmp_path: Path) -> None:
