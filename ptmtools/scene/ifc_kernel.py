@@ -1,8 +1,8 @@
 """The shapes that IfcOpenShell's geometry kernels make of products.
 
-Open CASCADE makes them all, but some 5,000 triangles a second of what is triangles already: each
-becomes a face with edges, is sewn to its neighbours, and taken apart again. So products of nothing
-but triangles go through the kernel `passthrough` where there is one (IfcOpenShell 0.9): an office of
+Open CASCADE makes them all, but of what is triangles already some 5,000 a second: each becomes a
+face with edges, is sewn to its neighbours, and taken apart again. So products of nothing but
+triangles go through the kernel `passthrough` where there is one (IfcOpenShell 0.9): an office of
 2,450 products and 1.4 million triangles, most of them of chairs, is read in 18 s instead of 319.
 Other polygons do not: it cuts concave ones as fans. (Tried: two threads, which took more time than
 one.)
