@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import sys
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -457,7 +457,12 @@ def test_the_order_is_that_of_the_file(tmp_path: Path, monkeypatch: pytest.Monke
 
     path = house(Ifc()).write(tmp_path / "house.ifc")
     plain = ifc_products.elements
-    monkeypatch.setattr(ifc_products, "elements", lambda *all_: list(plain(*all_))[::-1])
+
+    def backwards(file: Any, products: list[Any]) -> Iterator[Any]:
+        for product in reversed(products):
+            yield from plain(file, [product])
+
+    monkeypatch.setattr(ifc_products, "elements", backwards)
     findings = Findings(path)
     turned = ifc_products.read_products(library.open(str(path)), findings, MAX_VERTICES)
     for name, value in vars(read(path)[0]).items():
@@ -591,12 +596,12 @@ class TestArchives:
             read(tmp_path / "a.ifczip")
 
 
-class TestDamage:
-    @pytest.fixture(scope="class")
-    def whole(self, tmp_path_factory: pytest.TempPathFactory) -> bytes:
-        file = tmp_path_factory.mktemp("whole") / "house.ifc"
-        return house(Ifc(), ["EG"]).write(file).read_bytes()
+@pytest.fixture
+def whole(tmp_path: Path) -> bytes:
+    return house(Ifc(), ["EG"]).write(tmp_path / "whole.ifc").read_bytes()
 
+
+class TestDamage:
     @pytest.mark.parametrize(
         ("content", "code"),
         [
@@ -611,7 +616,7 @@ class TestDamage:
         with pytest.raises(InputError, match=code):
             ingest(put("a.ifc", content))
 
-    @pytest.mark.parametrize("schema", [b"IFC5", b"IFC4X1", b"AUTOMOTIVE_DESIGN"])
+    @pytest.mark.parametrize("schema", [b"IFC5", b"AUTOMOTIVE_DESIGN"])
     def test_other_schemas(self, put: Put, whole: bytes, schema: bytes) -> None:
         file = put("a.ifc", whole.replace(b"'IFC4'", b"'" + schema + b"'"))
         with pytest.raises(InputError, match=rf"{schema.decode()}.*IFC4X3_ADD2.*PTM-I269"):
