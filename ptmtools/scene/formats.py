@@ -28,7 +28,7 @@ from ptmtools.scene.source import (
 
 TRIMESH = (".ply", ".stl", ".off")
 MESHLAB = (".3ds", ".3mf", ".ctm", ".dae", ".wrl", ".x3d")
-SUPPORTED = (".obj", ".glb", ".gltf", *IFC, *TRIMESH, *MESHLAB)
+SUPPORTED = (".obj", ".glb", ".gltf", *TRIMESH, *MESHLAB, *IFC)
 #: Enough of a PLY file for its header.
 _HEADER = 1 << 14
 

@@ -13,6 +13,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from ptmtools.scene.ifc_names import FAULTS
+
 _PLAIN, _DIRECT = "opencascade", "passthrough"
 _THREADS = 1
 _TRIANGLE = 3
@@ -52,8 +54,11 @@ def items(representation: Any, deep: int = _DEEPEST) -> Iterator[Any]:
 
 def _of_triangles(product: Any) -> bool:
     """Whether nothing of a product is anything but triangles."""
-    every = product.Representation.Representations or ()
-    return all(_is_triangles(item) for one in every for item in items(one))
+    try:
+        every = product.Representation.Representations or ()
+        return all(_is_triangles(item) for one in every for item in items(one))
+    except FAULTS:
+        return False
 
 
 def _is_triangles(item: Any) -> bool:

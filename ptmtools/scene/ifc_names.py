@@ -1,8 +1,11 @@
-"""What things are called in an IFC file."""
+"""What things are called in an IFC file, and what is raised where it is wrong about them."""
 
 from __future__ import annotations
 
 from typing import Any
+
+#: What is raised over an attribute that is not of its type: the kernel may do without it.
+FAULTS = (AttributeError, LookupError, RuntimeError, TypeError, ValueError)
 
 
 def one_line(text: object) -> str:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,11 +23,11 @@ import numpy as np
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError
 from ptmtools.lazy import component
-from ptmtools.scene.apart import serve
+from ptmtools.scene.apart import serve, unreadable
 from ptmtools.scene.handed import hand_over
 from ptmtools.scene.ifc_classes import drawn, is_part, kind_of
 from ptmtools.scene.ifc_kernel import elements, items
-from ptmtools.scene.ifc_names import called, one_line
+from ptmtools.scene.ifc_names import FAULTS, called, one_line
 from ptmtools.scene.ifc_space import length_unit, storeys
 from ptmtools.scene.ifc_styles import UNSTYLED, material_of, note_lost
 from ptmtools.scene.model import Kind
@@ -125,9 +126,12 @@ def _shown(file: Any, findings: Findings) -> list[Any]:
 
 
 def _has_body(product: Any) -> bool:
-    every = product.Representation.Representations or ()
-    bodies = (one for one in every if one.RepresentationIdentifier not in _NO_BODY)
-    return any(not any(map(item.is_a, _LINES)) for one in bodies for item in items(one))
+    try:
+        every = product.Representation.Representations or ()
+        bodies = (one for one in every if one.RepresentationIdentifier not in _NO_BODY)
+        return any(not any(map(item.is_a, _LINES)) for one in bodies for item in items(one))
+    except FAULTS:
+        return True  # and missed if nothing can be made of it
 
 
 def _shapes(file: Any, products: list[Any], most: int, model: Path) -> list[Shape]:
@@ -176,14 +180,10 @@ def _shape(file: Any, element: Any) -> Shape:
 
 def _note_products(products: list[Any], shapes: list[Shape], findings: Findings) -> None:
     """Misses: what has no shape in spite of its body, and what lacks a part of it."""
-    import ifcopenshell
-
     made = {shape.product.id() for shape in shapes}
     faults: dict[str, str] = {}
-    for line in ifcopenshell.get_log().splitlines():
-        logged = _LOGGED.match(line)
-        if logged and logged["level"].lower() == "error" and logged["guid"]:
-            faults.setdefault(logged["guid"], one_line(logged["what"]))
+    for guid, what in _errors():
+        faults.setdefault(guid, what)
     for product in products:
         guid = one_line(product.GlobalId)
         why = f" ({faults[guid]})" if guid in faults else ""
@@ -195,8 +195,18 @@ def _note_products(products: list[Any], shapes: list[Shape], findings: Findings)
             findings.miss("PTM-N259", message, f"GlobalId {guid}")
 
 
+def _errors() -> Iterator[tuple[str, str]]:
+    """What the library has said of errors since it was last asked: of which GlobalId, and what."""
+    import ifcopenshell
+
+    for line in ifcopenshell.get_log().splitlines():
+        logged = _LOGGED.match(line)
+        if logged and logged["level"].lower() == "error":
+            yield logged["guid"] or "", one_line(logged["what"])
+
+
 def _open(path: str, findings: Findings) -> Any:
-    """Raises InputError PTM-I269 for an unknown schema."""
+    """Raises InputError PTM-I269 for an unknown schema, PTM-I254 for what is none."""
     library = component("ifcopenshell", "PTM-M201", "IFC is read through ifcopenshell", "ifc")
     try:
         file = library.open(path)
@@ -204,9 +214,10 @@ def _open(path: str, findings: Findings) -> Any:
         raise InputError(
             "PTM-I269", one_line(error), remedy="export it as IFC2X3, IFC4 or IFC4X3_ADD2"
         ) from None
-    faults = [found for line in library.get_log().splitlines() if (found := _LOGGED.match(line))]
-    wrong = [one_line(fault["what"]) for fault in faults if fault["level"].lower() == "error"]
-    if wrong:
+    except library.Error as error:
+        wrong = [what for _, what in _errors()]
+        raise unreadable("ifcopenshell", findings.model, one_line([*wrong, error][0])) from None
+    if wrong := [what for _, what in _errors()]:
         message = f"statements of the file are wrong and left out, the first: {wrong[0]}"
         findings.miss("PTM-N244", message, "", len(wrong))
     return file

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from ptmtools.scene.ifc_names import name_of, one_line
+from ptmtools.scene.ifc_names import FAULTS, name_of, one_line
 from ptmtools.scene.model import Storey
 
 
@@ -44,12 +44,15 @@ def _name(storey: Any) -> str:
 
 
 def _placed(product: Any) -> float | None:
-    """How high a product is placed, in the file's unit; None if it is not."""
+    """How high a product is placed, in the file's unit; None if nothing says it."""
     from ifcopenshell.util import placement
 
     if product.ObjectPlacement is None:
         return None
-    return float(placement.get_local_placement(product.ObjectPlacement)[2][3])
+    try:
+        return float(placement.get_local_placement(product.ObjectPlacement)[2][3])
+    except FAULTS:
+        return None
 
 
 def _stated(storey: Any) -> float | None:

@@ -665,6 +665,22 @@ class TestDamage:
         assert str(file) in said
         assert "\n" not in said
 
+    def test_a_product_that_is_damaged(self, tmp_path: Path) -> None:
+        """All others are drawn, and storeys with no sound placement have their elevations."""
+        made = house(Ifc(), ["EG", "OG"])
+        made.file.by_type("IfcBuildingStorey")[1].ObjectPlacement = None
+        text = made.file.to_string()
+        door = made.file.by_type("IfcDoor")[0]
+        text = text.replace(f"#{door.Representation.id()},$", "1.5,$")
+        assert "1.5," in text
+        file = tmp_path / "damaged.ifc"
+        file.write_text(text)
+        scene = ingest(file)
+        assert "IfcDoor D0" not in scene.objects
+        assert "IfcWall Inner" in scene.objects
+        assert [storey.name for storey in scene.storeys] == ["EG", "OG"]
+        assert [note.code for note in scene.notes if note.code > "PTM-N245"] == ["PTM-N253"]
+
     def test_wrong_statements_are_missed(self, put: Put, whole: bytes) -> None:
         spoilt = whole.replace(b"IFCFURNITURE(", b"IFCFURNICHER(")
         scene = ingest(put("a.ifc", spoilt))
