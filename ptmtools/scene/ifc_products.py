@@ -2,8 +2,9 @@
 
 Each product is made in its own coordinates and placed in float64, so that buildings in the
 coordinates of a land register, thousands of kilometres from their origin, keep their millimetres.
-The kernel gives metres whatever the file's unit is, and makes shapes in any order and on several
-threads: they are sorted by the number of their product in the file.
+The kernel (`ifc_kernel`) gives metres whatever the file's unit is, and makes shapes in any order:
+they are sorted by the number of their product in the file. A product may come in several
+representations, of which one is drawn.
 
 As a program: ``python -P -m ptmtools.scene.ifc_products MEMORY FOLDER MODEL FILE TRIANGLES`` reads
 FILE, the model or what was packed in it, and hands over what `handed.take_over` takes.

@@ -18,7 +18,7 @@ def length_unit(file: Any) -> tuple[str, float | None]:
         for one in context.Units or ():
             if getattr(one, "UnitType", None) == "LENGTHUNIT":
                 prefix = getattr(one, "Prefix", None) or ""
-                name = f"{prefix}{one.Name or ''}".lower()
+                name = f"{prefix}{name_of(one)}".lower()
                 return name, float(unit.calculate_unit_scale(file))
     return "", None
 
