@@ -1,11 +1,11 @@
 """Door leaves: what fills a doorway, and is no wall.
 
 A leaf is an upright slab of the size of a door. It is told by its name, if it has the size; by what
-it does, if it closes an opening in a wall (`doorways`); or by the user, whatever its shape. What is
-looked at are connected pieces of what is called door, and flat rectangles: of a leaf that is one
-piece with its frame or its handle, the rectangles tell, of one made of planks the piece does.
-Pieces and rectangles that are the two faces, the edge or the panels of one slab are one leaf, and
-so is what lies within it.
+it does, if it closes an opening in a wall (`doorways`); or by the user or its class, whatever its
+shape. What is looked at are connected pieces of what is called door, and flat rectangles: of a leaf
+that is one piece with its frame or its handle, the rectangles tell, of one made of planks the piece
+does. Pieces and rectangles that are the two faces, the edge or the panels of one slab are one leaf,
+and so is what lies within it.
 
 A name alone is not enough: a wall of 6 m called `wall_with_door`, a frame, a mat and a hatch in the
 floor are no slabs of such a size, and what hangs on a wall or stands open against it parts nothing.
@@ -24,7 +24,7 @@ from ptmtools.cells.detail import connected_pieces
 from ptmtools.cells.doorways import RELIEF, closing, parting
 from ptmtools.cells.facets import Facets
 from ptmtools.cells.merging import connected
-from ptmtools.cells.naming import called, named, says_door
+from ptmtools.cells.naming import Designated, called, says_door
 from ptmtools.cells.nearby import Nearby
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.slabs import Slabs
@@ -80,8 +80,9 @@ def find_doors(
     scene: Scene, opaque: Opaque, structure: Structure, options: SubdivideOptions
 ) -> list[DoorLeaf]:
     """The door leaves of a scene, in the order in which its file begins them."""
-    asked = named(scene, options.door) & ~named(scene, options.structural)
-    free = asked | ~named(scene, (*options.structural, *options.detail))
+    said = Designated.of(scene, options)
+    asked = said.door
+    free = asked | ~(said.structural | said.detail)
     so_called = called(scene, says_door) & free
     slack = structure.tolerance.plane
     told = _pieces(scene, np.flatnonzero(asked))

@@ -1,11 +1,21 @@
 """Which triangles may bound a leaf, and which are of doors, by the names of their objects and
-materials."""
+materials, and by the classes of their objects.
+
+A class counts as an option that names the object, `--structural`, `--detail` or `--door`. Where
+the user names a triangle in any of these, its class says nothing. There is one difference: what is
+structural by its class is never detail and never a door leaf, but divides the building only as far
+as its area says, like everything else. (Tried: whatever its area, as with `--structural`. Then each
+tread and riser of a stair does: an office building of 8 storeys with a stair of 18 steps in each
+had 836 leaves instead of 353, 2,170 portals instead of 506, 19.4 % of the volume at hand instead of
+15.3, and visibility took 23 s instead of 0.2.)
+"""
 
 from __future__ import annotations
 
 import re
 import unicodedata
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 import numpy as np
@@ -34,10 +44,30 @@ _WORD = re.compile(r"[^\W\d_]+")
 _HUMP = re.compile(r"(?<=[^\W\d_A-ZÀ-ÖØ-Þ])(?=[A-ZÀ-ÖØ-Þ])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
-def may_occlude(scene: Scene, options: SubdivideOptions) -> Bools:
-    """(T,) which triangles are opaque and not called detail by name."""
-    detail = named(scene, options.detail) & ~named(scene, options.structural)
-    return scene.opaque & ~detail
+@dataclass(frozen=True)
+class Designated:
+    """Which triangles are said to be what; none is both structural and something else."""
+
+    forced: Bools  # (T,) which divide the building whatever their area
+    structural: Bools  # (T,) these and others
+    detail: Bools  # (T,)
+    door: Bools  # (T,)
+
+    @staticmethod
+    def of(scene: Scene, options: SubdivideOptions) -> Designated:
+        """As the user says, and else as the classes of objects do."""
+        forced, detail, door = (
+            named(scene, patterns)
+            for patterns in (options.structural, options.detail, options.door)
+        )
+        structural = forced
+        if scene.kinds:
+            untold = ~(forced | detail | door)
+            kind = np.array(scene.kinds)[scene.triangle_object]
+            structural = structural | (untold & (kind == "structural"))
+            detail = detail | (untold & (kind == "detail"))
+            door = door | (untold & (kind == "door"))
+        return Designated(forced, structural, detail & ~structural, door & ~structural)
 
 
 def named(scene: Scene, patterns: Sequence[str]) -> Bools:

@@ -24,7 +24,7 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.clearance import CORNERS, PLAN, clear_of, halves, united_by
 from ptmtools.cells.detail import recognised
 from ptmtools.cells.facets import Facets
-from ptmtools.cells.naming import named
+from ptmtools.cells.naming import Designated
 from ptmtools.cells.options import SubdivideOptions, Walker
 from ptmtools.cells.planar import Geometry, delaunay, intersection
 from ptmtools.cells.reach import FLOOR_COSINE
@@ -79,10 +79,10 @@ class Floors:
 
 def detail_of(scene: Scene, structure: Structure, options: SubdivideOptions) -> Bools:
     """(T,) which triangles are detail, of glass as well."""
-    structural = named(scene, options.structural)
-    detail = named(scene, options.detail) & ~structural
+    said = Designated.of(scene, options)
+    detail = said.detail.copy()
     detail[structure.detail] = True
-    glass = np.flatnonzero(~(scene.opaque | detail | structural))
+    glass = np.flatnonzero(~(scene.opaque | detail | said.structural))
     if options.detail_by_shape and len(glass):
         mesh = Welded.of(scene.points, scene.triangles[glass])
         source, facets = glass[mesh.source], Facets.of(mesh, scene.tolerance)

@@ -27,7 +27,7 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.bins import Bins, Tries
 from ptmtools.cells.detail import recognised
 from ptmtools.cells.facets import UPWARD, Facets
-from ptmtools.cells.naming import may_occlude, named
+from ptmtools.cells.naming import Designated
 from ptmtools.cells.nearby import Nearby
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, neighbours, unite
@@ -145,9 +145,9 @@ class Structure:
 def structural_triangles(
     scene: Scene, options: SubdivideOptions, opened: NDArray[np.integer] | None = None
 ) -> Bools:
-    """(T,) which triangles occlude: opaque, detail neither by name nor by shape, and none of the
-    door leaves that are ``opened`` (see `Cells.opened`). Of triangles that are the same, the first
-    may stand for all."""
+    """(T,) which triangles occlude: opaque, detail neither by name, class nor shape, and none of
+    the door leaves that are ``opened`` (see `Cells.opened`). Of triangles that are the same, the
+    first may stand for all."""
     opaque = Opaque.of(scene, options)
     found = np.zeros(len(scene.triangles), dtype=bool)
     found[opaque.source[~opaque.detail]] = True
@@ -157,7 +157,7 @@ def structural_triangles(
 
 
 class Opaque(NamedTuple):
-    """What is opaque in a scene and not called detail."""
+    """What is opaque in a scene and not said to be detail."""
 
     facets: Facets
     source: Ints  # (n,) the triangles of the scene that its mesh consists of, ascending
@@ -168,16 +168,16 @@ class Opaque(NamedTuple):
     @staticmethod
     def of(scene: Scene, options: SubdivideOptions) -> Opaque:
         """Of a scene."""
-        candidates = np.flatnonzero(may_occlude(scene, options))
+        said = Designated.of(scene, options)
+        candidates = np.flatnonzero(scene.opaque & ~said.detail)
         mesh = Welded.of(scene.points, scene.triangles[candidates])
         source = candidates[mesh.source]
         facets = Facets.of(mesh, scene.tolerance)
-        forced = named(scene, options.structural)[source]
         detail = np.zeros(len(source), dtype=bool)
         if options.detail_by_shape:
             detail = recognised(facets, scene.triangle_object[source], options.wall_area)
-            detail &= ~forced
-        return Opaque(facets, source, detail, forced, scene.tolerance)
+            detail &= ~said.structural[source]
+        return Opaque(facets, source, detail, said.forced[source], scene.tolerance)
 
 
 def find_walls(structure: Structure, wall_area: float) -> list[WallPlane]:

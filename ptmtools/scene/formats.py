@@ -1,5 +1,5 @@
-"""Reads the other formats: PLY, STL and OFF through trimesh, USD through usd-core (`usd`), the rest
-through pymeshlab.
+"""Reads the other formats: PLY, STL and OFF through trimesh, IFC through IfcOpenShell (`ifc`), USD
+through usd-core (`usd`), the rest through pymeshlab.
 
 What pymeshlab reads it converts to OBJ in a temporary folder (`ptmtools.scene.meshlab`), and our
 own reader reads that. The same way is taken where trimesh gives up (mixed polygons in OFF) and for
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
 from ptmtools.scene.meshlab import convert
-from ptmtools.scene.options import SUFFIXES, TRIMESH, USD
+from ptmtools.scene.options import IFC, SUFFIXES, TRIMESH, USD
 from ptmtools.scene.source import (
     MAX_VERTICES,
     Findings,
@@ -35,8 +35,8 @@ def read_other(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES
     """Read a file that is neither OBJ nor glTF, by its suffix.
 
     Raises InputError for unknown suffixes and for what no library can read, LimitError PTM-L203 for
-    more than ``max_triangles``, and MissingComponentError if pymeshlab or usd-core is needed and
-    cannot be imported.
+    more than ``max_triangles``, and MissingComponentError if a library is needed and cannot be
+    imported.
     """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
@@ -46,6 +46,10 @@ def read_other(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES
             file=path,
             remedy=f"give one of {' '.join(SUFFIXES)}",
         )
+    if suffix in IFC:
+        from ptmtools.scene.ifc.reader import read_ifc
+
+        return read_ifc(path, findings, max_triangles)
     if suffix in USD:
         from ptmtools.scene.usd.reader import read_usd
 

@@ -52,7 +52,7 @@ def ingest(
 
     Parameters
     ----------
-    path: an OBJ, GLB, glTF, PLY, STL, OFF, DAE, 3DS, 3MF, X3D, VRML, CTM or USD file.
+    path: an OBJ, GLB, glTF, IFC, USD, PLY, STL, OFF, DAE, 3DS, 3MF, X3D, VRML or CTM file.
     options: see `IngestOptions`.
     progress: called with bytes while reading, then with images and materials.
     workers: threads that decode images; never changes the result.

@@ -8,7 +8,8 @@ from ptmtools.scene.model import Note
 
 #: The codes of warnings, in the order in which they are told. All numbers are wrong in a model that
 #: lies on its side or has another unit; nothing is seen in one that is inside out; surfaces are
-#: plain without their materials and images, and there are holes where faces are missing.
+#: plain without their materials and images, and there are holes where faces, or whole products, are
+#: missing.
 WARNINGS = (
     "PTM-N234",
     "PTM-N232",
@@ -21,6 +22,9 @@ WARNINGS = (
     "PTM-N206",
     "PTM-N207",
     "PTM-N210",
+    "PTM-N253",
+    "PTM-N259",
+    "PTM-N244",
 )
 
 

@@ -7,12 +7,14 @@ from typing import Literal
 
 from ptmtools.errors import InputError
 
-#: Of the files that are read: by readers of our own, through trimesh, pymeshlab and usd-core.
+#: Of the files that are read: by readers of our own, through trimesh, pymeshlab,
+#: IfcOpenShell and usd-core.
 OWN = (".obj", ".glb", ".gltf")
 TRIMESH = (".ply", ".stl", ".off")
 MESHLAB = (".3ds", ".3mf", ".ctm", ".dae", ".wrl", ".x3d")
+IFC = (".ifc", ".ifczip")
 USD = (".usd", ".usda", ".usdc", ".usdz")
-SUFFIXES = (*OWN, *TRIMESH, *MESHLAB, *USD)
+SUFFIXES = (*OWN, *TRIMESH, *MESHLAB, *IFC, *USD)
 
 
 @dataclass(frozen=True)

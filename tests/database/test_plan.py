@@ -15,6 +15,7 @@ from ptmtools.database.plans.hatched import LEFT_OUT, VIEW_ONLY
 from ptmtools.database.plans.leaks import LEAK
 from ptmtools.database.plans.ways import WAY
 from ptmtools.errors import InputError, MissingComponentError, OutputError
+from ptmtools.scene.model import Storey
 
 SMALL = PlotOptions(width=6, dpi=60)
 
@@ -49,6 +50,32 @@ def test_what_is_drawn(artifacts, tmp_path: Path) -> None:
     assert pixels(chosen, "#eaf0f4") < 500, "every cell is shaded"
     assert pixels(plain, "#b0125b") == 0
     assert pixels(chosen, "#b0125b") > 200, "the chosen cell's outline"
+
+
+@pytest.mark.parametrize("name", ["Obergeschoß", "$2^{nd", r"\frac{1}{0}$"])
+def test_storeys_have_their_names(
+    artifacts, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """Those of the model that are near; whatever is in them, it is no formula."""
+    from matplotlib.axes import Axes
+
+    titles: list[str] = []
+    plain = Axes.set_title
+
+    def overheard(self: Axes, text: str, **style: object) -> object:
+        titles.append(text)
+        return plain(self, text, **style)
+
+    monkeypatch.setattr(Axes, "set_title", overheard)
+    for height in (0.5, 0.9):
+        scene = replace(artifacts.scene, storeys=(Storey("Cellar", -3.0), Storey(name, height)))
+        draw(replace(artifacts, scene=scene), tmp_path / f"{height}.png")
+    draw(artifacts, tmp_path / "unnamed.png")
+    first = "floor +0.00 m, cut at +1.20 m: 3 cells"
+    assert titles == [f"{name}: {first}", first, first]
+    plain_bytes = (tmp_path / "unnamed.png").read_bytes()
+    assert (tmp_path / "0.9.png").read_bytes() == plain_bytes
+    assert (tmp_path / "0.5.png").read_bytes() != plain_bytes
 
 
 def test_a_walk_is_drawn(artifacts, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, strategies as st
 
+from ptmtools.cells.model import Cells
 from ptmtools.database import EmitOptions, GivenViewpoint
 from ptmtools.database.plans.storeys import storeys
 from ptmtools.database.section import area, leaf_section, polygon_section, triangle_section
@@ -16,7 +17,7 @@ from ptmtools.database.viewpoints.outlook import lengths
 from ptmtools.database.viewpoints.placement import orientation, place_viewpoints
 from ptmtools.database.viewpoints.tour import storey_numbers, walk
 from ptmtools.errors import InputError
-from ptmtools.scene.model import Camera
+from ptmtools.scene.model import Camera, Scene, Storey
 
 
 def turned(v: np.ndarray, turn: tuple[float, float, float, float]) -> np.ndarray:
@@ -116,8 +117,8 @@ def test_a_low_opening_is_a_long_way(room_row) -> None:
     assert walk(cells, 0, [], 1.6) == []
 
 
-def test_storeys_one_after_the_other(room_row) -> None:
-    """Every second room is lifted by a storey: those of the lower one come first."""
+def two_storeys(room_row) -> tuple[Scene, Cells]:
+    """Four rooms, every second lifted by a storey."""
     scene, cells = room_row(4)
     corner = cells.leaf_point.copy()
     corner[8:16, 1] += 4
@@ -125,8 +126,12 @@ def test_storeys_one_after_the_other(room_row) -> None:
     lifted = replace(cells, leaf_point=corner, root_box=np.array([[0, 0, -2], [16, 8, 2.0]]))
     floor = np.array([[0, 4, -2], [0, 4, 2], [4, 4, 2], [4, 4, -2]])
     quads = [floor * [1, 0, 1] + [4 * i, 4 * (i % 2), 0] for i in range(4)]
-    level = replace(scene, points=np.concatenate([*quads, scene.points[16:] * 0]))
-    views, _ = place_viewpoints(level, lifted, EmitOptions())
+    return replace(scene, points=np.concatenate([*quads, scene.points[16:] * 0])), lifted
+
+
+def test_storeys_one_after_the_other(room_row) -> None:
+    """Those of the lower one come first."""
+    views, _ = place_viewpoints(*two_storeys(room_row), EmitOptions())
     assert [v.description for v in views] == [
         "Storey 1, room 1",
         "Storey 1, room 2",
@@ -135,6 +140,37 @@ def test_storeys_one_after_the_other(room_row) -> None:
     ]
     assert [v.cell for v in views] == [0, 2, 1, 3]
     assert [v.position[1] for v in views] == [1.6, 1.6, 5.6, 5.6]
+
+
+@pytest.mark.parametrize(
+    ("named", "called"),
+    [
+        ([("EG", -0.1), ("OG", 4.2)], ("EG", "OG")),
+        ([("EG", 0), ("Mezzanine", 2), ("OG", 4)], ("EG", "OG")),
+        ([("OG", 4)], ("Storey 1", "OG")),
+        ([("Cellar", -3), ("Roof", 8)], ("Storey 1", "Storey 2")),
+        ([("Parking", 0.5), ("EG", 0.1)], ("EG", "Storey 2")),
+    ],
+)
+def test_storeys_with_names(room_row, named, called: tuple[str, str]) -> None:
+    """The nearest to a floor, if it is near."""
+    scene, cells = two_storeys(room_row)
+    scene = replace(scene, storeys=tuple(Storey(*storey) for storey in named))
+    views, _ = place_viewpoints(scene, cells, EmitOptions())
+    low, high = called
+    assert [v.description for v in views] == [
+        f"{low}, room 1",
+        f"{low}, room 2",
+        f"{high}, room 1",
+        f"{high}, room 2",
+    ]
+
+
+def test_one_storey_needs_no_name(room_row) -> None:
+    scene, cells = room_row(2)
+    scene = replace(scene, storeys=(Storey("EG", 0.0), Storey("OG", 4.0)))
+    views, _ = place_viewpoints(scene, cells, EmitOptions())
+    assert [v.description for v in views] == ["Room 1", "Room 2"]
 
 
 def test_storeys_of_heights() -> None:

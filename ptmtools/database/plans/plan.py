@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
 from ptmtools.database.model import PlotOptions, PlotReport
+from ptmtools.database.named_storeys import storey_name
 from ptmtools.database.plans.hatched import draw_left_out, draw_view_only, hatches
 from ptmtools.database.plans.leaks import LEAK, draw_leaks, leaks_by_portal
 from ptmtools.database.plans.storeys import cut_height, storeys
@@ -116,6 +117,7 @@ class _Plan:
         floors: Sequence[float],
         way: Way | None,
     ) -> None:
+        self._scene = scene
         self._cells = cells
         self._pvs = pvs
         self._options = options
@@ -208,12 +210,15 @@ class _Plan:
         self._numbers(axis, sections, 72 * panel / float(self._high[0] - self._low[0]))
         self._scale_bar(axis)
         numbers = len({cell for cell, _ in sections})
+        name = storey_name(self._scene, floor, self._options.storey_gap)
         axis.set_title(
-            f"floor {floor:+.2f} m, cut at {height:+.2f} m: {count(numbers, 'cell')}",
+            f"{name}{': ' if name else ''}floor {floor:+.2f} m, cut at {height:+.2f} m: "
+            f"{count(numbers, 'cell')}",
             fontsize=9,
             color=_INK,
             loc="left",
             pad=6,
+            parse_math=False,  # a name may have dollar signs
         )
 
     def _sections(self, height: float) -> Iterator[tuple[int, NDArray[np.float64]]]:

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from ptmtools.cells.model import Cells
 from ptmtools.database.model import EmitOptions, TextureRecord, Viewpoint
+from ptmtools.database.named_storeys import storey_name
 from ptmtools.database.viewpoints.ground import Ground
 from ptmtools.database.viewpoints.outlook import Outlook
 from ptmtools.database.viewpoints.rooms import largest_leaves, places
@@ -55,7 +56,7 @@ def place_viewpoints(
     else:
         begun = _cameras(scene, cells, ground, options, notes)
     if options.viewpoint_count or not begun:
-        begun = [*begun, *_touring(cells, ground, outlook, options, begun)]
+        begun = [*begun, *_touring(scene, cells, ground, outlook, options, begun)]
     return tuple(replace(v, name=f"VP_{i}") for i, v in enumerate(begun)), tuple(notes)
 
 
@@ -170,7 +171,12 @@ def _given(cells: Cells, ground: Ground, outlook: Outlook, options: EmitOptions)
 
 
 def _touring(
-    cells: Cells, ground: Ground, outlook: Outlook, options: EmitOptions, begun: Sequence[Viewpoint]
+    scene: Scene,
+    cells: Cells,
+    ground: Ground,
+    outlook: Outlook,
+    options: EmitOptions,
+    begun: Sequence[Viewpoint],
 ) -> list[Viewpoint]:
     """One for each room that has none yet, in the order of a walk from the first."""
     taken = {v.cell for v in begun}
@@ -186,16 +192,32 @@ def _touring(
     storey = storey_numbers([place.floor for place in found], eye)
     first = list(dict.fromkeys(storey[i] for i in order))
     order.sort(key=lambda i: first.index(storey[i]))
-    number: Counter[int] = Counter()
+    called = _storey_names(scene, [place.floor for place in found], storey, eye)
+    number: Counter[str] = Counter()
     views: list[Viewpoint] = []
     for i in order:
-        number[storey[i]] += 1
-        name = f"Room {number[storey[i]]}"
-        if len(first) > 1:
-            name = f"Storey {storey[i] + 1}, {name.lower()}"
         place, field = found[i], options.field_of_view
+        level = called[i] if len(first) > 1 else ""
+        number[level] += 1
+        name = f"{level}, room {number[level]}" if level else f"Room {number[level]}"
         views.append(_viewpoint(name, place.position, _heading(place.yaw), field, place.cell))
     return views
+
+
+def _storey_names(
+    scene: Scene, floors: Sequence[float], storey: Sequence[int], gap: float
+) -> list[str]:
+    """What the storey of each floor is called: by its own height, else by that of the lowest floor
+    there, else by its number."""
+    lowest: dict[int, float] = {}
+    for floor, number in zip(floors, storey, strict=True):
+        lowest[number] = min(floor, lowest.get(number, floor))
+    return [
+        storey_name(scene, floor, gap)
+        or storey_name(scene, lowest[number], gap)
+        or f"Storey {number + 1}"
+        for floor, number in zip(floors, storey, strict=True)
+    ]
 
 
 def _anywhere(cells: Cells, outlook: Outlook, options: EmitOptions) -> Viewpoint:

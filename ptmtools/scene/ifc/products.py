@@ -1,0 +1,234 @@
+"""The products of an IFC file as one object each, through IfcOpenShell, in a process of its own.
+
+Each product is made in its own coordinates and placed in float64, so that buildings in the
+coordinates of a land register, thousands of kilometres from their origin, keep their millimetres.
+The kernel (`kernel`) gives metres whatever the file's unit is, and makes shapes in any order:
+they are sorted by the number of their product in the file. A product may come in several
+representations, of which one is drawn.
+
+As a program: ``python -P -m ptmtools.scene.ifc.products MEMORY FOLDER MODEL FILE TRIANGLES`` reads
+FILE, the model or what was packed in it, and hands over what `handed.take_over` takes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ptmtools.arrays import Floats, Ints
+from ptmtools.errors import InputError
+from ptmtools.lazy import component
+from ptmtools.scene.apart import serve, unreadable
+from ptmtools.scene.handed import hand_over
+from ptmtools.scene.ifc.classes import drawn, is_part, kind_of
+from ptmtools.scene.ifc.kernel import elements, items
+from ptmtools.scene.ifc.names import FAULTS, called, one_line
+from ptmtools.scene.ifc.space import length_unit, storeys
+from ptmtools.scene.ifc.styles import UNSTYLED, material_of, note_lost
+from ptmtools.scene.model import Kind
+from ptmtools.scene.source import Findings, Source, SourceMaterial, too_many_triangles
+
+#: Representations that are no bodies: nothing of them is drawn.
+_NO_BODY = frozenset(
+    ["Annotation", "Axis", "Box", "Clearance", "CoG", "FootPrint", "Plan", "Profile", "Reference"]
+)
+#: Items that have no surface.
+_LINES = ("IfcCurve", "IfcPoint", "IfcGeometricCurveSet", "IfcTextLiteral", "IfcAnnotationFillArea")
+#: Of several representations of a product, bodies come first.
+_BODY = "Body"
+#: A line of the library's log: how grave it is, a code, when, and what about.
+_LOGGED = re.compile(
+    r"\[(?P<level>\w+)\]\s*(\[[A-Z]+\d+\]\s*)?\[[^]]*\]\s*(\{(?P<guid>[^}]*)\}\s*)?(?P<what>.*)"
+)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What is drawn of a product."""
+
+    product: Any
+    points: Floats  # (V, 3) metres
+    triangles: Ints  # (T, 3)
+    materials: tuple[SourceMaterial, ...]
+    material: Ints  # (T,) indices into them
+
+
+def read_products(file: Any, findings: Findings, max_triangles: int) -> Source:
+    """What an IfcOpenShell file has to draw.
+
+    Raises InputError PTM-I247 if that is nothing, LimitError PTM-L203.
+    """
+    unit, metres = length_unit(file)
+    if metres is None:
+        findings.say("PTM-N241", "the file says no unit of length")
+    elif metres != 1:
+        findings.say("PTM-N240", f"lengths are in {unit} ({metres:g} m), and read as metres")
+    products = _shown(file, findings)
+    shapes = _shapes(file, products, max_triangles, findings.model) if products else []
+    _note_products(products, shapes, findings)
+    note_lost(file, findings)
+    if not shapes:
+        raise InputError(
+            "PTM-I247",
+            "no faces" if products else "no product that is drawn",
+            remedy="export it with the geometry of its building elements",
+        )
+    known: dict[SourceMaterial, int] = {}
+    material = [
+        np.array([known.setdefault(m, len(known)) for m in shape.materials])[shape.material]
+        for shape in shapes
+    ]
+    points = [shape.points for shape in shapes]
+    first = np.cumsum([0, *map(len, points)])
+    size = [len(shape.triangles) for shape in shapes]
+    return Source(
+        points=np.concatenate(points),
+        triangles=np.concatenate([s.triangles + n for s, n in zip(shapes, first, strict=False)]),
+        uv=np.zeros((sum(size), 3, 2)),
+        triangle_object=np.repeat(np.arange(len(shapes)), size),
+        triangle_material=np.concatenate(material),
+        objects=tuple(called(shape.product) for shape in shapes),
+        materials=tuple(known),
+        metres=None if metres is None else 1.0,
+        up="z",
+        kinds=tuple(_kind(shape.product) for shape in shapes),
+        storeys=storeys(file, metres or 1.0),
+    )
+
+
+def _kind(product: Any) -> Kind:
+    if is_part(product.is_a):
+        for relation in product.Decomposes:
+            return kind_of(relation.RelatingObject.is_a)
+    return kind_of(product.is_a)
+
+
+def _shown(file: Any, findings: Findings) -> list[Any]:
+    """The products to draw, and notes on those that are not."""
+    shown, hidden = [], Counter[str]()
+    for product in sorted(file.by_type("IfcProduct"), key=lambda product: int(product.id())):
+        if product.Representation is None:
+            continue
+        if not drawn(product.is_a):
+            hidden[product.is_a()] += 1
+        elif not _has_body(product):
+            findings.say("PTM-N243", f"{product.is_a()}: has no surface, only lines")
+        else:
+            shown.append(product)
+    for name, count in hidden.items():
+        findings.say("PTM-N242", f"{name}: not drawn", "", count)
+    return shown
+
+
+def _has_body(product: Any) -> bool:
+    try:
+        every = product.Representation.Representations or ()
+        bodies = (one for one in every if one.RepresentationIdentifier not in _NO_BODY)
+        return any(not any(map(item.is_a, _LINES)) for one in bodies for item in items(one))
+    except FAULTS:
+        return True  # and missed if nothing can be made of it
+
+
+def _shapes(file: Any, products: list[Any], most: int, model: Path) -> list[Shape]:
+    """One shape of each product that has any, in the order of their numbers."""
+    made: dict[int, tuple[tuple[bool, str], Shape]] = {}
+    count = 0
+    for element in elements(file, products):
+        shape = _shape(file, element)
+        size = len(shape.triangles)
+        if not size:
+            continue
+        rank = element.context != _BODY, _padded(element.geometry.id)
+        if element.id in made:
+            other, replaced = made[element.id]
+            if other <= rank:
+                continue
+            count -= len(replaced.triangles)
+        count += size
+        if count > most:
+            raise too_many_triangles(most, model)
+        made[element.id] = rank, shape
+    return [shape for _, (_, shape) in sorted(made.items())]
+
+
+def _padded(name: str) -> str:
+    """A name that begins with a number, so that the least number comes first."""
+    number, *rest = name.split("-")
+    return f"{number:>12}-{rest}"
+
+
+def _shape(file: Any, element: Any) -> Shape:
+    """A copy of what the kernel has made: its own is gone with the next shape."""
+    geometry = element.geometry
+    placed = np.array(element.transformation.matrix, dtype=np.float64).reshape(4, 4).T
+    local = np.frombuffer(geometry.verts_buffer, dtype=np.float64).reshape(-1, 3)
+    triangles = np.frombuffer(geometry.faces_buffer, dtype=np.int32).reshape(-1, 3)
+    style = np.frombuffer(geometry.material_ids_buffer, dtype=np.int32)  # -1 for none
+    return Shape(
+        file.by_id(element.id),
+        local @ placed[:3, :3].T + placed[:3, 3],
+        triangles.astype(np.int64),
+        (UNSTYLED, *(material_of(file, one) for one in geometry.materials)),
+        style.astype(np.int64) + 1,
+    )
+
+
+def _note_products(products: list[Any], shapes: list[Shape], findings: Findings) -> None:
+    """Misses: what has no shape in spite of its body, and what lacks a part of it."""
+    made = {shape.product.id() for shape in shapes}
+    faults: dict[str, str] = {}
+    for guid, what in _errors():
+        faults.setdefault(guid, what)
+    for product in products:
+        guid = one_line(product.GlobalId)
+        why = f" ({faults[guid]})" if guid in faults else ""
+        if product.id() not in made:
+            message = f"{called(product)}: its geometry cannot be made{why}"
+            findings.miss("PTM-N253", message, f"GlobalId {guid}")
+        elif why:
+            message = f"{called(product)}: a part of its geometry cannot be made{why}"
+            findings.miss("PTM-N259", message, f"GlobalId {guid}")
+
+
+def _errors() -> Iterator[tuple[str, str]]:
+    """What the library has said of errors since it was last asked: of which GlobalId, and what."""
+    import ifcopenshell
+
+    for line in ifcopenshell.get_log().splitlines():
+        logged = _LOGGED.match(line)
+        if logged and logged["level"].lower() == "error":
+            yield logged["guid"] or "", one_line(logged["what"])
+
+
+def _open(path: str, findings: Findings) -> Any:
+    """Raises InputError PTM-I269 for an unknown schema, PTM-I254 for what is none."""
+    library = component("ifcopenshell", "PTM-M201", "IFC is read through ifcopenshell", "ifc")
+    try:
+        file = library.open(path)
+    except library.SchemaError as error:
+        raise InputError(
+            "PTM-I269", one_line(error), remedy="export it as IFC2X3, IFC4 or IFC4X3_ADD2"
+        ) from None
+    except library.Error as error:
+        wrong = [what for _, what in _errors()]
+        raise unreadable("ifcopenshell", findings.model, one_line([*wrong, error][0])) from None
+    if wrong := [what for _, what in _errors()]:
+        message = f"statements of the file are wrong and left out, the first: {wrong[0]}"
+        findings.miss("PTM-N244", message, "", len(wrong))
+    return file
+
+
+def _read_here(scratch: str, model: str, path: str, most: str) -> dict[str, Any]:
+    findings = Findings(Path(model))
+    source = read_products(_open(path, findings), findings, int(most))
+    return hand_over(source, {}, findings, scratch)
+
+
+if __name__ == "__main__":
+    serve(_read_here)

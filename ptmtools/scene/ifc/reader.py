@@ -1,0 +1,125 @@
+"""Reads IFC, the exchange format of building information models (ISO 16739), as STEP files.
+
+What can be told without a library is told here: whether it is a STEP file, and all of it. The
+rest is read through IfcOpenShell (LGPL-3, extra `ifc`) in a process of its own, see
+`products`.
+"""
+
+from __future__ import annotations
+
+import lzma
+import re
+import tempfile
+import zipfile
+import zlib
+from importlib.util import find_spec
+from pathlib import Path, PurePosixPath
+from typing import IO
+
+from ptmtools.errors import InputError, LimitError, MissingComponentError, naming
+from ptmtools.files import open_regular
+from ptmtools.scene.handed import take_over
+from ptmtools.scene.source import MAX_VERTICES, Findings, Source
+
+#: ISO 10303-21: how such a file begins, and how it ends.
+_BEGINS = re.compile(rb"(\xef\xbb\xbf)?\s*ISO-10303-21\s*;")
+_ENDS = re.compile(rb"END-ISO-10303-21\s*;")
+#: Bytes in which its beginning and its end are looked for.
+_MARGIN = 1 << 12
+#: GiB that a file unpacked from an archive may have.
+_LARGEST = 1
+_CHUNK = 1 << 20
+_DAMAGED = (
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    EOFError,
+    NotImplementedError,  # packed in a way of its own
+    RuntimeError,  # with a password
+)
+
+
+def read_ifc(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) -> Source:
+    """Read an IFC file, or the one in a `.ifczip`.
+
+    Points are in metres, Z up, in the file's own coordinate system; openings are cut out.
+
+    Raises
+    ------
+    InputError: PTM-I266 no STEP file, PTM-I267 not all of one, PTM-I268 an archive without one,
+        PTM-I269 of a schema that is not known, PTM-I247 nothing to draw, and PTM-I254 for what
+        IfcOpenShell cannot read.
+    LimitError: PTM-L203 more than ``max_triangles``, PTM-L260 an archive that unpacks to more than
+        1 GiB.
+    MissingComponentError: PTM-M201 IfcOpenShell is not installed.
+    """
+    with naming(path), tempfile.TemporaryDirectory() as scratch:
+        file = path.absolute()
+        if path.suffix.lower() == ".ifczip":
+            file = _unpacked(path, Path(scratch))
+        _check(file)
+        if not find_spec("ifcopenshell"):
+            raise missing()
+        arguments = str(file), str(max_triangles)
+        module = "ptmtools.scene.ifc.products"
+        return take_over(module, "ifcopenshell", path, findings, scratch, *arguments)
+
+
+def missing() -> MissingComponentError:
+    """The error where the library is not there, PTM-M201."""
+    return MissingComponentError(
+        "PTM-M201", "IFC is read through ifcopenshell", remedy="pip install 'ptmtools[ifc]'"
+    )
+
+
+def _check(file: Path) -> None:
+    """Raises InputError unless a file begins and ends as STEP files do."""
+    with open_regular(file) as stream:
+        if not _BEGINS.match(stream.read(_MARGIN)):
+            raise InputError(
+                "PTM-I266",
+                "is not an IFC file (a STEP file begins with ISO-10303-21)",
+                remedy="export it again, as IFC-SPF",
+            )
+        end = stream.seek(0, 2)
+        stream.seek(max(0, end - _MARGIN))
+        if not _ENDS.search(stream.read()):
+            raise InputError(
+                "PTM-I267",
+                "is not whole (a STEP file ends with END-ISO-10303-21)",
+                remedy="copy or export it again",
+            )
+
+
+def _unpacked(path: Path, folder: Path) -> Path:
+    """The file in an archive, unpacked into a folder."""
+    try:
+        with open_regular(path) as stream, zipfile.ZipFile(stream) as archive:
+            names = [n for n in archive.namelist() if PurePosixPath(n).suffix.lower() == ".ifc"]
+            if len(names) != 1:
+                raise InputError(
+                    "PTM-I268",
+                    f"holds {len(names) or 'no'} IFC files instead of one",
+                    remedy="unpack it, and give the .ifc file",
+                )
+            file = folder / "model.ifc"
+            with archive.open(names[0]) as packed, open(file, "wb") as unpacked:
+                _copy(packed, unpacked)
+            return file
+    except _DAMAGED as error:
+        raise InputError(
+            "PTM-I268", f"is no archive that can be unpacked ({error})", remedy="pack it again"
+        ) from None
+
+
+def _copy(packed: IO[bytes], unpacked: IO[bytes]) -> None:
+    size = 0
+    while chunk := packed.read(_CHUNK):
+        size += len(chunk)
+        if size > _LARGEST << 30:
+            raise LimitError(
+                "PTM-L260",
+                f"unpacks to more than {_LARGEST} GiB",
+                remedy="unpack it, and give the .ifc file",
+            )
+        unpacked.write(chunk)

@@ -1,0 +1,213 @@
+"""IFC files of small buildings, written with IfcOpenShell's API. Lengths are in metres; the file
+has them in its unit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+Point = tuple[float, float, float]
+
+
+class Ifc:
+    """A project with a site, a building and storeys.
+
+    ``unit`` is the word for the file's length unit in IfcOpenShell, ``metres`` its length; with
+    ``unit=None`` the file says none. ``origin`` is where the site is placed.
+    """
+
+    def __init__(
+        self,
+        schema: str = "IFC4",
+        unit: str | None = "MILLIMETERS",
+        metres: float = 1e-3,
+        origin: Point = (0, 0, 0),
+    ) -> None:
+        from ifcopenshell.api import aggregate, context, project, unit as units
+
+        self.metres = metres
+        self.file: Any = project.create_file(version=schema)
+        if schema == "IFC2X3":
+            self._owner()
+        top = self.entity("IfcProject", "Museum")
+        if unit == "FOOT":
+            foot = units.add_conversion_based_unit(self.file, name="foot")
+            units.assign_unit(self.file, units=[foot])
+        elif unit:
+            units.assign_unit(self.file, length={"is_metric": True, "raw": unit})
+        model = context.add_context(self.file, context_type="Model")
+        self.body = context.add_context(
+            self.file,
+            context_type="Model",
+            context_identifier="Body",
+            target_view="MODEL_VIEW",
+            parent=model,
+        )
+        self.site = self.entity("IfcSite", "Site")
+        self.building = self.entity("IfcBuilding", "House")
+        aggregate.assign_object(self.file, products=[self.site], relating_object=top)
+        aggregate.assign_object(self.file, products=[self.building], relating_object=self.site)
+        self.site.ObjectPlacement = self.placement(None, origin)
+        self.building.ObjectPlacement = self.placement(self.site.ObjectPlacement, (0, 0, 0))
+
+    def entity(self, kind: str, name: str | None = None) -> Any:
+        from ifcopenshell.api import root
+
+        return root.create_entity(self.file, ifc_class=kind, name=name)
+
+    def storey(self, name: str | None, height: float, elevation: float | None = None) -> Any:
+        """A storey placed at a height in its building, with that elevation or another."""
+        from ifcopenshell.api import aggregate
+
+        storey = self.entity("IfcBuildingStorey", name)
+        storey.ObjectPlacement = self.placement(self.building.ObjectPlacement, (0, 0, height))
+        storey.Elevation = self.long(height if elevation is None else elevation)
+        aggregate.assign_object(self.file, products=[storey], relating_object=self.building)
+        return storey
+
+    def box(
+        self,
+        kind: str,
+        name: str | None,
+        low: Point,
+        high: Point,
+        storey: Any = None,
+        style: Any = None,
+        whole: Any = None,
+    ) -> Any:
+        """A product that fills a box, in the coordinates of its storey; part of a ``whole``."""
+        from ifcopenshell.api import aggregate, spatial
+
+        product = self.entity(kind, name)
+        below = storey.ObjectPlacement if storey else self.building.ObjectPlacement
+        product.ObjectPlacement = self.placement(below, low)
+        size = np.subtract(high, low).tolist()
+        solid = self._extruded(size)
+        if style:
+            self.file.create_entity("IfcStyledItem", Item=solid, Styles=self._presented(style))
+        self.represent(product, solid, "SweptSolid")
+        if whole:
+            aggregate.assign_object(self.file, products=[product], relating_object=whole)
+        elif storey and product.is_a("IfcElement") and not product.is_a("IfcFeatureElement"):
+            spatial.assign_container(self.file, products=[product], relating_structure=storey)
+        return product
+
+    def represent(self, product: Any, item: Any, kind: str, identifier: str = "Body") -> None:
+        """Gives a product one representation of one item."""
+        shape = self.file.create_entity(
+            "IfcShapeRepresentation", self.body, identifier, kind, [item]
+        )
+        product.Representation = self.file.create_entity(
+            "IfcProductDefinitionShape", Representations=[shape]
+        )
+
+    def opening(self, wall: Any, low: Point, high: Point, storey: Any = None) -> Any:
+        """Cuts a box, in the coordinates of the storey, out of a wall."""
+        opening = self.box("IfcOpeningElement", None, low, high, storey)
+        self.file.create_entity(
+            "IfcRelVoidsElement",
+            GlobalId=self.guid(),
+            OwnerHistory=wall.OwnerHistory,
+            RelatingBuildingElement=wall,
+            RelatedOpeningElement=opening,
+        )
+        return opening
+
+    def style(
+        self, name: str | None, color: Sequence[float], transparency: float | None = None
+    ) -> Any:
+        tint = self.file.create_entity("IfcColourRgb", None, *color)
+        shading = self.file.create_entity(
+            "IfcSurfaceStyleRendering", tint, transparency, ReflectanceMethod="NOTDEFINED"
+        )
+        return self.file.create_entity("IfcSurfaceStyle", name, "BOTH", [shading])
+
+    def _owner(self) -> None:
+        """Whoever makes things in IFC2X3 must be named."""
+        from ifcopenshell.api import owner
+
+        person = owner.add_person(self.file)
+        firm = owner.add_organisation(self.file)
+        owner.add_person_and_organisation(self.file, person=person, organisation=firm)
+        owner.add_application(self.file, application_developer=firm)
+
+    def guid(self) -> str:
+        import ifcopenshell
+
+        return str(ifcopenshell.guid.new())
+
+    def long(self, length: float) -> float:
+        """Metres in the file's unit."""
+        return float(length) / self.metres
+
+    def point(self, *place: float) -> Any:
+        return self.file.create_entity("IfcCartesianPoint", [self.long(c) for c in place])
+
+    def write(self, path: Path) -> Path:
+        self.file.write(str(path))
+        return path
+
+    def placement(self, parent: Any, place: Sequence[float]) -> Any:
+        axes = self.file.create_entity("IfcAxis2Placement3D", self.point(*place))
+        return self.file.create_entity("IfcLocalPlacement", parent, axes)
+
+    def _extruded(self, size: Sequence[float]) -> Any:
+        width, depth, height = size
+        middle = self.file.create_entity("IfcAxis2Placement2D", self.point(width / 2, depth / 2))
+        profile = self.file.create_entity(
+            "IfcRectangleProfileDef", "AREA", None, middle, self.long(width), self.long(depth)
+        )
+        return self.file.create_entity(
+            "IfcExtrudedAreaSolid",
+            profile,
+            self.file.create_entity("IfcAxis2Placement3D", self.point(0, 0, 0)),
+            self.file.create_entity("IfcDirection", (0.0, 0.0, 1.0)),
+            self.long(height),
+        )
+
+    def _presented(self, style: Any) -> list[Any]:
+        if self.file.schema != "IFC2X3":
+            return [style]
+        return [self.file.create_entity("IfcPresentationStyleAssignment", [style])]
+
+
+#: Of the house: inner width, depth and height of a room, and the thickness of all walls and slabs.
+WIDE, DEEP, HIGH, THICK = 5.0, 4.0, 2.8, 0.2
+#: From floor to floor.
+STOREY = HIGH + THICK
+
+
+def house(ifc: Ifc, storeys: Sequence[str] = ("Ground floor", "Upper floor")) -> Ifc:
+    """Storeys of two rooms each, one west and one east of a wall with a door in it, and, on the
+    lowest, a window to the north and a table in the east. Rooms begin at the site's origin."""
+    glass = ifc.style("Glass", (0.6, 0.8, 0.9), 0.7)
+    brick = ifc.style("Brick", (0.6, 0.3, 0.2))
+    span, t = 2 * WIDE + THICK, THICK
+    for number, name in enumerate(storeys):
+        at = ifc.storey(name, number * STOREY)
+        ifc.box("IfcSlab", f"Slab {number}", (-t, -t, -t), (span + t, DEEP + t, 0), at)
+        ifc.box("IfcWall", "South", (-t, -t, 0), (span + t, 0, HIGH), at, brick)
+        north = ifc.box("IfcWall", "North", (-t, DEEP, 0), (span + t, DEEP + t, HIGH), at, brick)
+        ifc.box("IfcWall", "Outer", (-t, 0, 0), (0, DEEP, HIGH), at, brick)
+        ifc.box("IfcWall", "Outer", (span, 0, 0), (span + t, DEEP, HIGH), at, brick)
+        inner = ifc.box("IfcWall", "Inner", (WIDE, 0, 0), (WIDE + t, DEEP, HIGH), at)
+        ifc.opening(inner, (WIDE - t, 1.5, 0), (WIDE + 2 * t, 2.4, 2.1), at)
+        ifc.box("IfcDoor", f"D{number}", (WIDE + 0.08, 1.5, 0), (WIDE + 0.12, 2.4, 2.1), at)
+        for room, west in (("West", 0.0), ("East", WIDE + t)):
+            ifc.box("IfcSpace", room, (west, 0, 0), (west + WIDE, DEEP, HIGH), at)
+        if number == 0:
+            ifc.opening(north, (1, DEEP - t, 1), (3, DEEP + 2 * t, 2), at)
+            ifc.box("IfcWindow", "W1", (1, DEEP + 0.08, 1), (3, DEEP + 0.12, 2), at, glass)
+            table = "IfcFurnishingElement" if ifc.file.schema == "IFC2X3" else "IfcFurniture"
+            ifc.box(table, "Table", (8, 2, 0), (9, 3, 0.7), at)
+    top = len(storeys) * STOREY
+    roof = ifc.box("IfcSlab", "Flat roof", (-t, -t, top - t), (span + t, DEEP + t, top))
+    ifc.entity("IfcAnnotation", "no geometry")
+    note = ifc.entity("IfcAnnotation", "Dimension")
+    note.ObjectPlacement = roof.ObjectPlacement
+    line = ifc.file.create_entity("IfcPolyline", [ifc.point(0, 0, 0), ifc.point(1, 0, 0)])
+    ifc.represent(note, line, "Curve3D", "Annotation")
+    return ifc
