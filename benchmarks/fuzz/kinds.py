@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from benchmarks.fuzz.databases import Interrupted, ManifestText, Npz, Served, Vrml
-from benchmarks.fuzz.models import Gltf, Mesh, Mtl, Obj
+from benchmarks.fuzz.models import Gltf, Handed, Mesh, Meshopt, Mtl, Obj
 from benchmarks.fuzz.textures import Images, Ptm
 
 
@@ -26,6 +26,8 @@ KINDS: dict[str, Kind] = {
     "mtl": Kind(Mtl, 12),
     "obj": Kind(Obj, 14),
     "gltf": Kind(Gltf, 8),
+    "meshopt": Kind(Meshopt, 8),
+    "handed": Kind(Handed, 4),
     "mesh": Kind(Mesh, 3),
     "image": Kind(Images, 10),
     "vrml": Kind(Vrml, 3),

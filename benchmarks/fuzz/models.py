@@ -184,8 +184,16 @@ class Mtl:
         return ingested(self._path)
 
 
+#: The corners of a quad, 10 × 4, as 32-bit floats, by the encoder of meshoptimizer.
+MESHOPT = bytes.fromhex(
+    "a000000133000000403f013300000082810000010c000000ff010c000000800000000000000000000000"
+    "00000000000000000000000000000000000000000000000000"
+)
+
+
 def document() -> tuple[dict[str, Any], bytes]:
-    """A glTF document of two textured quads, a strip, a camera and an image in the buffer."""
+    """A glTF document of two textured quads, a strip, a fan of colours, instances, a camera and an
+    image in the buffer; with views that are compressed with meshopt, and a sparse accessor."""
     blob = b""
     views: list[dict[str, int]] = []
     accessors: list[dict[str, Any]] = []
@@ -213,14 +221,35 @@ def document() -> tuple[dict[str, Any], bytes]:
     accessors[bytes_]["normalized"] = True
     noise = np.random.default_rng(5).integers(0, 255, (8, 8, 4), np.uint8)
     image = view(png_bytes(noise))
+    packed = add(corners, 5126)
+    part = {"buffer": 0, "byteOffset": len(blob), "byteLength": len(MESHOPT)}
+    blob += MESHOPT
+    told = part | {"mode": "ATTRIBUTES", "count": 4, "byteStride": 12, "filter": "NONE"}
+    views[accessors[packed]["bufferView"]] |= {"extensions": {"EXT_meshopt_compression": told}}
+    colored = add((corners / 10).astype(np.float32), 5126)
+    accessors[colored]["sparse"] = {
+        "count": 2,
+        "indices": {"bufferView": view(bytes([1, 3])), "componentType": 5121},
+        "values": {"bufferView": view(corners[:2].tobytes())},
+    }
+    moved = add(np.array([[0, 0, 9], [0, 0, 5]], np.float32), 5126)
+    turned = add(np.array([[0, 0, 0, 1], [0, 1, 0, 0]], np.float32), 5126)
+    where_from = {"TRANSLATION": moved, "ROTATION": turned, "SCALE": moved}
     tree = {
         "asset": {"version": "2.0"},
         "scene": 0,
-        "scenes": [{"nodes": [0, 2]}],
+        "scenes": [{"nodes": [0, 2, 3]}],
         "nodes": [
             {"mesh": 0, "name": "wall", "children": [1], "translation": [0, 0, 1]},
             {"mesh": 1, "rotation": [0, 1, 0, 0], "scale": [1, 2, 1]},
             {"camera": 0, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 1, 5, 1]},
+            {
+                "mesh": 2,
+                "extensions": {
+                    "EXT_mesh_gpu_instancing": {"attributes": where_from},
+                    "KHR_node_visibility": {"visible": True},
+                },
+            },
         ],
         "cameras": [{"type": "perspective", "perspective": {"yfov": 0.8, "znear": 0.1}}],
         "meshes": [
@@ -229,6 +258,11 @@ def document() -> tuple[dict[str, Any], bytes]:
                 "name": "strip",
                 "primitives": [
                     {"attributes": {**where, "TEXCOORD_1": bytes_}, "mode": 5, "material": 1}
+                ],
+            },
+            {
+                "primitives": [
+                    {"attributes": {"POSITION": packed, "COLOR_0": colored}, "mode": 6},
                 ],
             },
         ],
@@ -253,7 +287,8 @@ def document() -> tuple[dict[str, Any], bytes]:
             {"bufferView": image, "mimeType": "image/png", "name": "own"},
             {"uri": "wall.png"},
         ],
-        "extensionsUsed": ["KHR_texture_transform"],
+        "extensionsUsed": ["KHR_texture_transform", "EXT_meshopt_compression"],
+        "extensionsRequired": ["EXT_mesh_gpu_instancing"],
         "bufferViews": views,
         "accessors": accessors,
         "buffers": [{"byteLength": len(blob)}],
@@ -356,3 +391,104 @@ def _words(rng: Random, data: bytes) -> bytes:
 
 def _no_meshlab(path: Path, scratch: Path) -> NoReturn:
     raise InputError("PTM-I254", "pymeshlab is left out", file=path)
+
+
+class Meshopt:
+    """The decoder of what is compressed with meshopt in glTF."""
+
+    limit = 1 << 26
+
+    def __init__(self, folder: Path, outside: Path) -> None:
+        import meshopt
+
+        rng = np.random.default_rng(5)
+        walk = np.cumsum(rng.integers(-9, 9, (300, 4)), axis=0)
+        rows = np.hstack([walk.astype(np.uint8), rng.random((300, 2), np.float32).view(np.uint8)])
+        index = (np.arange(400)[:, None] + [0, 1, 2]).astype(np.uint32).ravel()
+        encode = meshopt.encode_vertex_buffer_level
+        self._streams = [
+            (encode(np.ascontiguousarray(rows), 3, 0), "ATTRIBUTES", 300, 12),
+            (encode(np.ascontiguousarray(rows), 3, 1), "ATTRIBUTES", 300, 12),
+            (encode(np.ascontiguousarray(rows[:, :4]), 2, 1), "ATTRIBUTES", 300, 4),
+            (meshopt.encode_index_buffer(index), "TRIANGLES", len(index), 4),
+            (meshopt.encode_index_sequence(index), "INDICES", len(index), 2),
+        ]
+        self._filters = ("NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR")
+
+    def make(self, rng: Random) -> Case:
+        """Other bytes, and sometimes another layout than they have."""
+        data, mode, count, stride = rng.choice(self._streams)
+        others = [stream for stream, *_ in self._streams]
+        told = {"mode": mode, "count": count, "byteStride": stride}
+        if rng.random() < 0.3:
+            told["filter"] = rng.choice(self._filters)
+        if rng.random() < 0.3:
+            told[rng.choice(("count", "byteStride"))] = rng.choice((0, 3, 4, 8, 256, *NUMBERS))
+        return Case(damaged(rng, data, rng.choice(others)), told)
+
+    def read(self, case: Case) -> str:
+        """Decodes it, as the reader of glTF does."""
+        from ptmtools.scene.gltf.meshopt import decode
+
+        try:
+            found = decode(case.data, case.told)
+        except ValueError as error:
+            raise InputError("PTM-I249", str(error)) from None
+        assert len(found) == case.told["count"] * case.told["byteStride"]
+        return case.told["mode"].lower()
+
+
+class Handed:
+    """What a process apart hands over of a model that it has read (IFC, USD)."""
+
+    limit = 1 << 26
+
+    def __init__(self, folder: Path, outside: Path) -> None:
+        from ptmtools.scene import handed
+        from ptmtools.scene.source import Findings, Source, SourceMaterial
+
+        self._names = furnished(folder, outside)
+        self._model, self._scratch = folder / "a.usda", folder / "scratch"
+        self._model.write_bytes(b"#usda 1.0")
+        self._scratch.mkdir(exist_ok=True)
+        source = Source(
+            points=np.eye(3) * 10,
+            triangles=np.array([[0, 1, 2], [2, 1, 0]]),
+            uv=np.zeros((2, 3, 2)),
+            triangle_object=np.array([0, 1]),
+            triangle_material=np.array([0, 0]),
+            objects=("a", "b"),
+            materials=(SourceMaterial("paint", (1.0, 0.5, 0.0)),),
+            metres=1.0,
+            up="z",
+            colors=np.zeros((2, 3, 3), np.uint8),
+            kinds=("door", ""),
+        )
+        images = {0: handed.NamedImage("wall.png", "/a")}
+        findings = Findings(self._model)
+        findings.say("PTM-N224", "left out", "/b")
+        self._answer = handed.hand_over(source, images, findings, str(self._scratch))
+        self._arrays = (self._scratch / "source.npz").read_bytes()
+        self._handed = handed
+
+    def make(self, rng: Random) -> Case:
+        """Another answer, or other arrays."""
+        if rng.random() < 0.3:
+            return Case(damaged(rng, self._arrays), self._answer)
+        answer = json.loads(json.dumps(self._answer))
+        try:
+            told = json.loads(dumped(rng, twisted(rng, answer, self._names)))
+        except (ValueError, RecursionError):
+            told = answer
+        return Case(self._arrays, told)
+
+    def read(self, case: Case) -> str:
+        """Takes it over."""
+        from ptmtools.scene.source import Findings
+
+        (self._scratch / "source.npz").write_bytes(case.data)
+        self._handed.run_apart = lambda *given, **options: case.told
+        taken = self._handed.take_over(
+            "", "the library", self._model, Findings(self._model), str(self._scratch)
+        )
+        return f"{len(taken.triangles)} triangles"

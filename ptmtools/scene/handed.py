@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from ptmtools import schemas
+from ptmtools.errors import DatabaseError
 from ptmtools.scene.apart import run_apart, unreadable
 from ptmtools.scene.model import Camera, Storey
 from ptmtools.scene.source import (
@@ -28,7 +30,7 @@ from ptmtools.store.checked import Stored
 
 _ARRAYS = "source.npz"
 _NAMES = ("points", "triangles", "uv", "triangle_object", "triangle_material")
-_FAULTS = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+_FAULTS = (ArithmeticError, LookupError, OSError, TypeError, ValueError, DatabaseError)
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,7 @@ def take_over(
     """
     answer = run_apart(module, library, model, scratch, model.absolute(), *arguments, beside=beside)
     try:
+        schemas.check(answer, schemas.HANDED)
         file = Path(scratch, _ARRAYS)
         arrays = unpack_arrays(file.read_bytes(), file=file)
         stored = Stored(arrays)
