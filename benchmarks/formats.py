@@ -80,7 +80,9 @@ def document(points: np.ndarray, faces: np.ndarray) -> dict[str, Any]:
 
 
 def plain(points: np.ndarray, coords: np.ndarray, faces: np.ndarray) -> bytes:
-    views = [(each.tobytes(), {}) for each in (points, coords, faces)]
+    views: list[tuple[bytes, dict[str, Any]]] = [
+        (each.tobytes(), {}) for each in (points, coords, faces)
+    ]
     return glb(views, document(points, faces))
 
 
