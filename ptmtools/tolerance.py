@@ -3,9 +3,9 @@
 All geometry behind ingest is float64 in metres with its origin at the centre of the model's
 floor, so the extent of the scene bounds every coordinate. A tolerance is a fixed share of that
 extent: the same building in other units, or moved, is treated alike. Where a file has its
-coordinates on a grid that is coarser (compressed glTF), that grid counts instead: two faces of one
-plane lie up to a step apart. Ingest derives them once (`scene.orientation`); `Scene.tolerance` and
-`Cells.tolerance` hand them on to every stage.
+coordinates on a grid that is coarser (compressed glTF), that grid counts instead, up to `COARSEST`:
+two faces of one plane lie up to a step apart. Ingest derives them once (`scene.orientation`);
+`Scene.tolerance` and `Cells.tolerance` hand them on to every stage.
 """
 
 from __future__ import annotations
@@ -43,6 +43,9 @@ NOISE_SHARE = 1e-14
 #: lie in it may be, how wide a crack may be, and how thin a cell. (A museum of 26 m, compressed
 #: with Draco at 14 bits: 51 cells, with planes of .75 of a step 35, from 1.1 on 21, as plain.)
 PLANE_STEPS, HAIRLINE_STEPS, THIN_STEPS = 1.5, 2.0, 2.0
+#: A step counts as this at most, metres. On coarser grids lie terrains, and models that are made of
+#: blocks, whose coordinates are meant as they are.
+COARSEST = 0.01
 #: Rounding of float64 arithmetic on coordinates and their intersections, with a margin.
 ROUNDING_SHARE = 1e-10
 #: Polygons of one plane are united and cut on a grid of this step (`cells.planar`): well above the
@@ -97,7 +100,8 @@ class Tolerance:
     def for_points(points: NDArray[np.float64], step: float = 0.0) -> Tolerance:
         """Tolerances for the (n, 3) points of a scene; an empty scene counts as 1 m."""
         extent = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
-        return Tolerance.for_extent(extent if extent > 0 else 1.0, step)
+        extent = extent if extent > 0 else 1.0
+        return Tolerance.for_extent(extent, min(step, COARSEST, CLUSTER_SHARE * extent))
 
     def for_walls(self, thickness: float) -> Tolerance:
         """The same where walls are up to ``thickness`` metres thick; 0 changes nothing. However

@@ -95,7 +95,7 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
     ) -> None:
         """Build a database from MODEL, or bring it up to date.
 
-        MODEL is an OBJ, glTF or GLB file, or in a format that trimesh, pymeshlab or usd-core
+        MODEL is an OBJ, glTF or GLB file, or in a format that trimesh, pymeshlab, IfcOpenShell or usd-core
         reads. The database is a folder: museum.obj makes museum.db, unless -o names another. Only
         what has changed since the last build is computed again.
         """

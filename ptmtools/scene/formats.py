@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ptmtools.errors import InputError
 from ptmtools.scene.meshlab import convert
 from ptmtools.scene.options import IFC, SUFFIXES, TRIMESH, USD
+from ptmtools.scene.rows import joined_colors
 from ptmtools.scene.source import (
     MAX_VERTICES,
     Findings,
@@ -54,7 +55,7 @@ def read_other(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES
         from ptmtools.scene.usd.reader import read_usd
 
         return read_usd(path, findings, max_triangles)
-    if suffix not in TRIMESH or (suffix == ".ply" and _textured_ply(path)):
+    if suffix not in TRIMESH or (suffix == ".ply" and _textured_ply(path, findings)):
         return _read_meshlab(path, findings, max_triangles)
     try:
         source = _read_trimesh(path, findings)
@@ -74,9 +75,13 @@ def read_other(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES
     return source
 
 
-def _textured_ply(path: Path) -> bool:
+def _textured_ply(path: Path, findings: Findings) -> bool:
     with open(path, "rb") as stream:
-        return b"texturefile" in stream.read(_HEADER).split(b"end_header")[0].lower()
+        head = stream.read(_HEADER).split(b"end_header")[0].lower()
+    textured = b"texturefile" in head
+    if textured and b" red" in head:
+        findings.say("PTM-N223", "colours of vertices are not carried over beside textures")
+    return textured
 
 
 def _read_trimesh(path: Path, findings: Findings) -> Source:
@@ -101,7 +106,7 @@ def _read_trimesh(path: Path, findings: Findings) -> Source:
                 triangle_material=np.zeros(len(faces), dtype=np.int64),
                 objects=(path.stem if len(scene.geometry) == 1 else str(geometry),),
                 materials=(SourceMaterial("default"),),
-                colors=_colors(mesh, faces),
+                colors=_colors(mesh, faces, findings),
             )
         )
     joined = _joined(path, parts)
@@ -109,15 +114,16 @@ def _read_trimesh(path: Path, findings: Findings) -> Source:
     return replace(joined, materials=joined.materials[:1], triangle_material=material)
 
 
-def _colors(mesh: Any, faces: NDArray[np.int64]) -> NDArray[np.uint8] | None:
+def _colors(mesh: Any, faces: NDArray[np.int64], findings: Findings) -> NDArray[np.uint8] | None:
     """(T, 3, 3) sRGB of corners, if vertices or faces have colours of their own."""
     kind = getattr(mesh.visual, "kind", None)
-    if kind == "vertex":
-        return np.asarray(mesh.visual.vertex_colors, dtype=np.uint8)[faces, :3]
-    if kind == "face":
-        each = np.asarray(mesh.visual.face_colors, dtype=np.uint8)[:, None, :3]
-        return np.repeat(each, 3, axis=1)
-    return None
+    if kind not in ("vertex", "face"):
+        return None
+    own = mesh.visual.vertex_colors if kind == "vertex" else mesh.visual.face_colors
+    rows = np.asarray(own, dtype=np.uint8)
+    if (rows[:, 3:] < 255).any():
+        findings.say("PTM-N223", "opacities of vertices and faces are not carried over")
+    return rows[faces, :3] if kind == "vertex" else np.repeat(rows[:, None, :3], 3, axis=1)
 
 
 def _read_meshlab(path: Path, findings: Findings, max_triangles: int) -> Source:
@@ -151,15 +157,5 @@ def _joined(path: Path, parts: list[Source]) -> Source:
         triangle_material=counted_on("triangle_material", "materials"),
         objects=tuple(name for part in parts for name in part.objects),
         materials=tuple(material for part in parts for material in part.materials),
-        colors=_joined_colors(parts),
-    )
-
-
-def _joined_colors(parts: list[Source]) -> NDArray[np.uint8] | None:
-    """Those of all parts, white in parts that have none."""
-    if all(part.colors is None for part in parts):
-        return None
-    white = (np.full((len(part.triangles), 3, 3), 255, np.uint8) for part in parts)
-    return np.concatenate(
-        [w if part.colors is None else part.colors for w, part in zip(white, parts, strict=True)]
+        colors=joined_colors([p.colors for p in parts], [len(p.triangles) for p in parts]),
     )

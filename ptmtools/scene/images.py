@@ -105,7 +105,7 @@ class ImageStore:
 
     def __init__(self, findings: Findings, limit: int) -> None:
         self._findings = findings
-        self._limit = limit
+        self.limit = limit
         self._examined: dict[tuple[Callable[[], bytes], str | None], _Examined] = {}
         self._index: dict[str, int] = {}
         self._images: list[SourceImage] = []
@@ -129,10 +129,11 @@ class ImageStore:
 
         Raises LimitError PTM-L104, PTM-L106, as do the others.
         """
-        wanted = {texture.read: texture for texture in reversed([*textures])}
+        unknown = [texture for texture in textures if (texture.read, None) not in self._examined]
+        wanted = {texture.read: texture for texture in reversed(unknown)}
         wanted = dict(reversed(wanted.items()))
         with _unwarned(), ThreadPoolExecutor(workers) as pool:
-            examined = pool.map(lambda texture: _examine(texture, self._limit), wanted.values())
+            examined = pool.map(lambda texture: _examine(texture, self.limit), wanted.values())
             for done, (read, found) in enumerate(zip(wanted, examined, strict=True)):
                 progress(done, len(wanted), "images")
                 self._examined[read, None] = found
@@ -184,7 +185,7 @@ class ImageStore:
         key = texture.read, channel
         if key not in self._examined:
             with _unwarned():
-                self._examined[key] = _examine(texture, self._limit, channel)
+                self._examined[key] = _examine(texture, self.limit, channel)
         if fault := self._examined[key].fault:
             self._findings.miss("PTM-N206", f"{texture.what}: {fault}", texture.place)
             return None

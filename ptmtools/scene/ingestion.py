@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import errno
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -133,9 +134,13 @@ def ingest(
     materials = []
     for done, index in enumerate(used_material.tolist()):
         progress(done, len(used_material), "materials")
-        painted = colors is not None and bool((colors[faces[done]] != 255).any())
         given = source.materials[index]
-        materials.append(_material(given, painted, uv[faces[done]], store, findings))
+        if colors is not None and (colors[faces[done]] != 255).any():
+            # What has colours of its own has a white material: one kind of tint is enough.
+            tint = np.array(given.color or WHITE)
+            colors[faces[done]] = np.rint(colors[faces[done]] * tint).astype(np.uint8)
+            given = replace(given, color=WHITE)
+        materials.append(_material(given, uv[faces[done]], store, findings))
     progress(len(used_material), len(used_material), "materials")
     points, triangles = to_world(kept.points, space), kept.triangles.astype(np.int32)
     two_sided = ~kept.paired if options.two_sided else _two_sided(kept, source)
@@ -146,6 +151,14 @@ def ingest(
             f"the model seems to be inside out: {away:.0%} of what bounds its rooms is turned away "
             "from them and not seen; give --two-sided to draw every face from both sides, or turn "
             "the normals",
+        )
+    tolerance = tolerance_of(points, triangles, source.step * space.metres)
+    if tolerance.step:
+        step, plane = 1000 * tolerance.step, 1000 * tolerance.plane
+        findings.say(
+            "PTM-N237",
+            f"compressed: coordinates are rounded to {step:.2g} mm, so what is less than "
+            f"{plane:.2g} mm from a plane counts as in it",
         )
     if options.strict:
         findings.enforce()
@@ -158,7 +171,7 @@ def ingest(
         two_sided=two_sided,
         objects=tuple(source.objects[i] for i in used_object.tolist()),
         materials=tuple(materials),
-        tolerance=tolerance_of(points, triangles, _step(source, space, points)),
+        tolerance=tolerance,
         images=store.images,
         cameras=tuple(_camera(camera, space) for camera in source.cameras),
         colors=colors,
@@ -239,13 +252,6 @@ def _two_sided(kept: KeptFaces, source: Source) -> NDArray[np.bool_]:
     return result & ~kept.paired
 
 
-def _step(source: Source, space: Space, points: NDArray[np.float64]) -> float:
-    """The step of the grid of its coordinates, metres: on one that is as coarse as the model is
-    large nothing depends."""
-    step = source.step * space.metres
-    return step if 0 < step < float(np.ptp(points, axis=0).max()) else 0.0
-
-
 def _storeys(source: Source, space: Space) -> tuple[Storey, ...]:
     """Its storeys, the lowest first."""
     floor = space.origin[1 if space.up == "y" else 2]
@@ -260,14 +266,9 @@ def _camera(camera: Camera, space: Space) -> Camera:
 
 
 def _material(
-    given: SourceMaterial,
-    painted: bool,
-    uv: NDArray[np.float64],
-    store: ImageStore,
-    findings: Findings,
+    given: SourceMaterial, uv: NDArray[np.float64], store: ImageStore, findings: Findings
 ) -> Material:
-    """The material as its kept faces, of these (n, 3, 2) coordinates, need it; ``painted`` if they
-    have colours of their own."""
+    """The material as its kept faces, of these (n, 3, 2) coordinates, need it."""
     texture = given.texture
     image = -1
     transparent = given.see_through or given.opacity < 1
@@ -282,7 +283,7 @@ def _material(
         findings.say("PTM-N231", f"material {given.name} is invisible (opacity 0)")
     return Material(
         name=given.name,
-        color=given.color or (WHITE if image >= 0 or painted else PLAIN),
+        color=given.color or (PLAIN if image < 0 else WHITE),
         opacity=given.opacity,
         image=image,
         wrap_s=told(texture.wrap_s) if texture else "repeat",

@@ -18,6 +18,8 @@ from ptmtools.scene.model import Scene, SourceImage
 from ptmtools.scene.options import IngestOptions
 from ptmtools.scene.readings import Reading, readings
 from ptmtools.scene.signs import Named, Up, looks
+from ptmtools.texture.images.opening import opened
+from ptmtools.texture.model import Limits
 
 #: The formats by the suffixes of their files.
 _FORMATS = {
@@ -109,25 +111,26 @@ def inspect(
         format=" ".join(part for part in (_FORMATS.get(suffix, suffix), version) if part),
         generator=str(tree.get("asset", {}).get("generator", "")),
         bytes=path.stat().st_size,
-        extensions={name: outcome_of(name) for name in sorted(map(str, _listed(tree)))},
+        extensions={name: outcome_of(name) for name in sorted(_listed(tree))},
         objects=dict(count.most_common()),
-        images=tuple(map(_facts, scene.images)),
+        images=tuple(_facts(image, options) for image in scene.images),
         best=best,
         runner_up=runner_up,
         scene=scene,
     )
 
 
-def _listed(tree: dict[str, Any]) -> set[Any]:
-    return {*tree.get("extensionsUsed", []), *tree.get("extensionsRequired", [])}
+def _listed(tree: dict[str, Any]) -> set[str]:
+    return {
+        *map(str, tree.get("extensionsUsed", [])),
+        *map(str, tree.get("extensionsRequired", [])),
+    }
 
 
-def _facts(image: SourceImage) -> ImageFacts:
-    from PIL import Image
-
+def _facts(image: SourceImage, options: IngestOptions) -> ImageFacts:
     data = image.load()
-    with Image.open(io.BytesIO(data)) as opened:  # it has been decoded before
-        return ImageFacts(image.name, opened.format or "", *opened.size, len(data))
+    found = opened(io.BytesIO(data), Limits(options.limit << 20))  # it has been decoded before
+    return ImageFacts(image.name, found.format or "", *found.size, len(data))
 
 
 def _guesses(scene: Scene) -> tuple[Guess, Guess]:

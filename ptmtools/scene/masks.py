@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Ints
+from ptmtools.errors import InputError
 from ptmtools.scene.images import ImageStore
 from ptmtools.scene.source import Findings, Source, SourceMaterial
+from ptmtools.texture.model import Description, Limits
 
 _BANDS = {"r": 0, "g": 1, "b": 2}
 
@@ -24,25 +26,23 @@ class MaskedBytes:
     """The bytes of a PNG with the colours of an image, white without one, and the opacities of a
     mask, times its own alpha; as large as the image.
 
-    ``channel`` is that of the mask, see `Texture`. Raises what reading raises, and InputError or
-    LimitError for what cannot be decoded.
+    ``channel`` is that of the mask, see `Texture`, and ``limit`` as of `ImageStore`. Raises what
+    reading raises, and InputError or LimitError for what cannot be decoded or has no 8 or 16 bits.
     """
 
     read: Callable[[], bytes] | None
     mask: Callable[[], bytes]
     channel: str
+    limit: int
 
     def __call__(self) -> bytes:
         from ptmtools.texture.images.png import png_bytes
-        from ptmtools.texture.images.reading import load_image
 
-        mask = load_image(self.mask()).texels
-        opacity = _opacities(mask[0 : mask.shape[0]], self.channel)
+        opacity = _opacities(_texels(self.mask(), self.limit)[0], self.channel)
         if self.read is None:
             white = np.full_like(opacity, 255)
             return png_bytes(np.stack([white, opacity], axis=2))
-        picture = load_image(self.read())
-        texels = picture.texels[0 : picture.texels.shape[0]]
+        texels, description = _texels(self.read(), self.limit)
         alpha = _resized(opacity, texels.shape[1], texels.shape[0]) / 255
         components = texels.shape[2]
         if components in (2, 4):
@@ -51,9 +51,17 @@ class MaskedBytes:
         else:
             alpha *= np.iinfo(texels.dtype).max
         held = np.rint(alpha).astype(texels.dtype)[..., None]
-        return png_bytes(
-            np.concatenate([texels[..., :components], held], axis=2), picture.description
-        )
+        return png_bytes(np.concatenate([texels[..., :components], held], axis=2), description)
+
+
+def _texels(data: bytes, limit: int) -> tuple[NDArray[Any], Description]:
+    """(h, w, c) integers, and what else the image says."""
+    from ptmtools.texture.images.reading import load_image
+
+    picture = load_image(data, Limits(limit))
+    if picture.texels.dtype.kind != "u":
+        raise InputError("PTM-I126", "its samples are floats, which have no opacity beside them")
+    return picture.texels[0 : picture.texels.shape[0]], picture.description
 
 
 def _opacities(texels: NDArray[Any], channel: str) -> NDArray[np.uint8]:
@@ -106,11 +114,13 @@ def _masked(given: SourceMaterial, store: ImageStore, findings: Findings) -> Sou
         return without  # it is the image's own alpha
     if not through:
         return without
-    read = MaskedBytes(
-        None if matte is None or texture is None else texture.read, mask.read, mask.channel
-    )
+    colors = None if matte is None or texture is None else texture.read
+    read = MaskedBytes(colors, mask.read, mask.channel, store.limit)
+    made = replace(texture or mask, read=read, what=mask.what, place=mask.place)
+    if store.has_alpha(made) is None:  # which the store has said of the mask
+        return replace(without, see_through=True)
     for part in (texture, mask):
         if part is not None:
             store.made_into_another(part)
     findings.say("PTM-N217", f"{mask.what}: is baked into an image as its alpha", mask.place)
-    return replace(without, texture=replace(texture or mask, read=read))
+    return replace(without, texture=made)

@@ -138,8 +138,8 @@ class Scene:
     objects: names, unique not required.
     tolerance: what counts as equal, as flat and as open; derived here, once, for all stages.
     materials, images, cameras: see their classes.
-    colors: (T, 3, 3) uint8 sRGB per corner, multiplied with the material's and the image's; None if
-        no corner has a colour of its own.
+    colors: (T, 3, 3) uint8 sRGB per corner, multiplied with the image's; None if no corner has a
+        colour of its own. Materials of triangles with colours other than white are white.
     kinds: (of `objects`) what each is by its class; empty if the format knows no classes.
     storeys: those that the model names, from the lowest.
     space: how the model was brought to world coordinates.

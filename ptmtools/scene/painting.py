@@ -12,6 +12,8 @@ from ptmtools.arrays import Floats, Ints
 from ptmtools.scene.source import SourceMaterial
 
 _WHITE = (1.0, 1.0, 1.0)
+#: With a number from here on colours go to 255: those to 1 may exceed it by rounding.
+_BYTES = 2.0
 
 
 def painted(
@@ -28,7 +30,7 @@ def painted(
     of a material has one.
     """
     finite = np.nan_to_num(given, nan=0.0, posinf=0.0, neginf=0.0)
-    scale = 1.0 if finite.max(initial=0.0) > 1.0 else 255.0
+    scale = 1.0 if finite.max(initial=0.0) >= _BYTES else 255.0
     count = int(max(triangles.max(initial=-1), colored.max(initial=-1))) + 1
     has, color = np.zeros(count, dtype=bool), np.zeros((count, 3), dtype=np.uint8)
     has[colored] = True

@@ -14,28 +14,35 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ptmtools.arrays import Floats, Ints
+from ptmtools.errors import InputError
 from ptmtools.scene.images import ImageStore
 from ptmtools.scene.model import Wrap
-from ptmtools.scene.source import Findings, Source, SourceMaterial, SourceWrap
+from ptmtools.scene.source import Findings, Source, SourceWrap, Texture
+from ptmtools.texture.model import Limits
 
 
 @dataclass(frozen=True)
 class MirroredBytes:
     """The bytes of a PNG of an image beside its mirror images, ``across``, ``down`` or both.
 
-    Raises what reading raises, and InputError or LimitError for what cannot be decoded.
+    ``limit`` as of `ImageStore`. Raises what reading raises, and InputError or LimitError for what
+    cannot be decoded; InputError PTM-I125 for what would be too large.
     """
 
     read: Callable[[], bytes]
     across: bool
     down: bool
+    limit: int
 
     def __call__(self) -> bytes:
         from ptmtools.texture.images.png import png_bytes
         from ptmtools.texture.images.reading import load_image
 
-        picture = load_image(self.read())
-        texels = picture.texels[0 : picture.texels.shape[0]]
+        picture = load_image(self.read(), Limits(self.limit))
+        height, width, _ = picture.texels.shape
+        if 4 * height * width * (1 + self.across) * (1 + self.down) > self.limit:
+            raise InputError("PTM-I125", "would be too large with its mirror images")
+        texels = picture.texels[0:height]
         if self.across:
             texels = np.concatenate([texels, texels[:, ::-1]], axis=1)
         if self.down:
@@ -53,27 +60,36 @@ def unmirrored(
 ) -> tuple[Source, Floats]:
     """The same without textures that are mirrored, and their coordinates.
 
-    ``faces`` are the rows of ``uv``, (T, 3, 2), of each material that is ``used``, by number.
+    ``faces`` are the rows of ``uv``, (T, 3, 2), of each material that is ``used``, by number. A
+    texture that cannot be made so repeats as it is, and a miss is recorded.
     """
     materials = list(source.materials)
-    for index, rows in zip(used.tolist(), faces, strict=True):
-        texture = materials[index].texture
-        if texture is not None and "mirror" in (texture.wrap_s, texture.wrap_t):
-            store.made_into_another(texture)
-            uv = uv.copy()
-            materials[index], uv[rows] = _unmirrored(materials[index], uv[rows])
-            findings.say(
-                "PTM-N222", f"{texture.what}: its mirrored repeat is baked in", texture.place
-            )
+    wanted = [
+        (index, rows)
+        for index, rows in zip(used.tolist(), faces, strict=True)
+        if (texture := materials[index].texture) is not None
+        and "mirror" in (texture.wrap_s, texture.wrap_t)
+    ]
+    uv = uv.copy() if wanted else uv
+    for index, rows in wanted:
+        given = materials[index].texture
+        assert given is not None
+        made, coords = _unmirrored(given, uv[rows], store.limit)
+        if made.read != given.read:
+            if store.has_alpha(made) is None:
+                wraps = told(given.wrap_s), told(given.wrap_t)
+                made, coords = replace(given, wrap_s=wraps[0], wrap_t=wraps[1]), uv[rows]
+            else:
+                store.made_into_another(given)
+        materials[index], uv[rows] = replace(materials[index], texture=made), coords
+        findings.say("PTM-N222", f"{given.what}: its mirrored repeat is baked in", given.place)
     return replace(source, materials=tuple(materials)), uv
 
 
-def _unmirrored(material: SourceMaterial, uv: Floats) -> tuple[SourceMaterial, Floats]:
-    texture = material.texture
-    assert texture is not None
+def _unmirrored(texture: Texture, uv: Floats, limit: int) -> tuple[Texture, Floats]:
+    """The texture, and its (n, 3, 2) coordinates, which are changed."""
     wraps: list[SourceWrap] = [texture.wrap_s, texture.wrap_t]
     doubled = [False, False]
-    uv = uv.copy()
     for axis in (0, 1):
         if wraps[axis] != "mirror":
             continue
@@ -83,13 +99,12 @@ def _unmirrored(material: SourceMaterial, uv: Floats) -> tuple[SourceMaterial, F
             uv[..., axis] /= 2
         else:
             wraps[axis], uv[..., axis] = "clamp", folded
-    if any(doubled):
-        # From the lower left: its own half is the upper one of an image made longer downwards.
-        if doubled[1]:
-            uv[..., 1] += 0.5
-        texture = replace(texture, read=MirroredBytes(texture.read, *doubled))
-    texture = replace(texture, wrap_s=wraps[0], wrap_t=wraps[1])
-    return replace(material, texture=texture), uv
+    if doubled[1]:  # from the lower left: its own half is the upper one
+        uv[..., 1] += 0.5
+    read = (
+        MirroredBytes(texture.read, doubled[0], doubled[1], limit) if any(doubled) else texture.read
+    )
+    return replace(texture, read=read, wrap_s=wraps[0], wrap_t=wraps[1]), uv
 
 
 def _folded(coordinate: Floats) -> Floats | None:

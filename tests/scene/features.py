@@ -154,6 +154,13 @@ def _(put: Put) -> str:
 
 
 @feature("OBJ", "colours of vertices", "carried over", painted)
+def _colours_beyond_1(put: Put) -> str:
+    """By rounding, and of a vertex that no face has."""
+    put("a.obj", COLORED.replace("0 1 0 0", "0 1.000001 0 0", 1) + "f 1 2 3 4\nv 0 0 9 1.4 0 0\n")
+    return "a.obj"
+
+
+@feature("OBJ", "colours of vertices", "carried over", painted)
 def _colours_to_255(put: Put) -> str:
     """As some scanners write them; and they take the place of Kd."""
     put("a.mtl", "newmtl wall\nKd 0.2 0.2 0.2\n")
@@ -391,6 +398,21 @@ def _default_cutoff(put: Put) -> str:
     doc = Gltf()
     image = png(np.dstack([FOUR, ALPHA]))
     doc.place(doc.quad(**with_texture(doc, image, alphaMode="MASK")))
+    return glb(put, doc)
+
+
+def invisible(scene: Scene) -> None:
+    assert scene.materials[0].opacity == 0
+    assert not scene.opaque.any()
+
+
+@feature("glTF", "alpha cutoff", "carried over", invisible, "PTM-N231")
+def _below_the_cutoff(put: Put) -> str:
+    """The factor's alpha alone is less than the cutoff."""
+    doc = Gltf()
+    material = with_texture(doc, png(FOUR), alphaMode="MASK")
+    doc.tree["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = [1, 1, 1, 0.3]
+    doc.place(doc.quad(**material))
     return glb(put, doc)
 
 

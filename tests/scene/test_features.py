@@ -15,7 +15,7 @@ from .conftest import Put
 from .features import FEATURES, Feature
 
 #: Codes of what is done by the way, and says nothing of the feature.
-BY_THE_WAY = {"PTM-N226", "PTM-N227", "PTM-N232", "PTM-N234"}
+BY_THE_WAY = {"PTM-N226", "PTM-N227", "PTM-N232", "PTM-N234", "PTM-N237"}
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 
 from ptmtools.database import validate_database
 from ptmtools.database.gltf.reader import ReadPrimitive, read_glb
+from ptmtools.glb import glb_chunks
 from ptmtools.scene.colors import to_linear, to_srgb
 from ptmtools.viewer.site import Site, SiteOptions, site_of
 from tests.scene.conftest import Gltf, png
@@ -113,6 +115,17 @@ def test_the_vrml_files_have_the_same(database: Path, tmp_path: Path, ptm: Any) 
     text = "".join(file.read_text() for file in database.glob("www/cells/*.wrl"))
     assert "color Color { color [ " in text
     assert "colorPerVertex" not in text
+    # And is told where they differ.
+    glb = database / "www" / "gltf" / "c0000.glb"
+    (_, _, tree), (_, at, _) = glb_chunks(glb.read_bytes())
+    document = json.loads(tree)
+    attributes = document["meshes"][0]["primitives"][0]["attributes"]
+    accessor = document["accessors"][attributes["COLOR_0"]]
+    at += document["bufferViews"][accessor["bufferView"]]["byteOffset"]
+    data = bytearray(glb.read_bytes())
+    data[at : at + 2] = b"\0\0"
+    glb.write_bytes(data)
+    assert "PTM-D739" in {issue.code for issue in validate_database(database).errors}
 
 
 def test_the_page_shows_them(visit: Callable[..., Any], colored: Site) -> None:

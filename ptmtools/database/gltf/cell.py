@@ -82,18 +82,17 @@ def _primitive(
     # A vertex for each that differs in position, texture coordinates or colour.
     width = len(shape.uv) if textured else 1
     corner = shape.triangle * width + (shape.uv_triangle if textured else 0)
-    if shape.color is not None:
-        corner = corner << 24 | packed(shape.color)
     vertex, triangle = _by_first_use(corner)
-    color = vertex & 0xFFFFFF
+    color = None
     if shape.color is not None:
-        vertex >>= 24
+        both, triangle = _by_first_use(triangle << 24 | packed(shape.color))
+        vertex, color = vertex[both >> 24], unpacked(both & 0xFFFFFF)
     attributes = {"POSITION": buffer.positions(geometry.point[shape.point[vertex // width]])}
     if textured:
         uv = geometry.uv[shape.uv[vertex % width]]
         attributes["TEXCOORD_0"] = buffer.coordinates(flipped(uv))
-    if shape.color is not None:
-        attributes["COLOR_0"] = buffer.colors(to_linear(unpacked(color) / 255))
+    if color is not None:
+        attributes["COLOR_0"] = buffer.colors(to_linear(color / 255))
     return {
         "attributes": attributes,
         "indices": buffer.indices(triangle, len(vertex)),

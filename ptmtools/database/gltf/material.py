@@ -30,6 +30,7 @@ import numpy as np
 
 from ptmtools.database.model import TextureRecord
 from ptmtools.database.names import UP
+from ptmtools.scene.colors import to_linear
 from ptmtools.scene.model import Material, Wrap
 
 #: A sampler's number for each way to go on beyond [0, 1]; the first is the default.
@@ -40,9 +41,7 @@ WHITE = [1.0, 1.0, 1.0, 1.0]
 @lru_cache(maxsize=4096)
 def linear(color: float) -> float:
     """A component encoded as sRGB (IEC 61966-2-1) as linear light, single precision."""
-    held = min(max(color, 0.0), 1.0)
-    light = held / 12.92 if held <= 0.04045 else ((held + 0.055) / 1.055) ** 2.4
-    return float(str(np.float32(light)))
+    return float(str(np.float32(to_linear(np.array(color)))))
 
 
 class MaterialWriter:

@@ -45,7 +45,8 @@ def _summary(n: Mapping[str, Any]) -> str:
 SCENE: Stage[Scene] = Stage(
     name="scene",
     about="Read a model.",
-    recipe=5,
+    recipe=6,
+    changed="colours of vertices, alpha cutoffs, masks and mirrored textures are kept",
     options=IngestOptions,
     artifact=Lazy("ptmtools.scene.model:Scene"),
     counts=_counts,

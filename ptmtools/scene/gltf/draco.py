@@ -6,7 +6,6 @@ the folder and writes ``0.npz``, …
 
 from __future__ import annotations
 
-import math
 import struct
 import tempfile
 from collections.abc import Iterable
@@ -26,6 +25,9 @@ from ptmtools.store.archive import pack_arrays, unpack_arrays
 EXTENSION = "KHR_draco_mesh_compression"
 #: Of the grid of an attribute: its width, and bits of which Draco has at most so many.
 _GRID, _MOST_BITS = struct.Struct("<fB"), 30
+#: What the width may differ by from what is decoded, in units of the last place of the largest
+#: number: rounding of float32.
+_WIDTH_ULPS = 4
 
 
 @dataclass(frozen=True)
@@ -43,22 +45,30 @@ class Decoded:
     attributes: dict[int, NDArray[Any]]
     data: bytes
 
-    def step(self, attribute: int) -> float:
-        """The step of the grid that an attribute was rounded to, 0 if that is not known.
+    def step(self, attribute: int) -> float | None:
+        """The step of the grid that an attribute was rounded to, 0 if that is not known; None for
+        integers, which were not rounded here.
 
-        The stream has where the grid begins, its width and its bits one after the other. It begins
-        with the least number of each component, by which it is found.
+        The stream has where the grid begins, its width and its bits one after the other. Encoders
+        let it begin with the least number of each component, by which it is found; a grid that the
+        user has set is not.
         """
         values = self.attributes.get(attribute)
+        if values is not None and values.dtype.kind != "f":
+            return None
         if values is None or values.dtype != np.float32 or not len(values):
             return 0.0
-        low = values.min(axis=0).astype("<f4").tobytes()
-        at = self.data.find(low) + len(low)
-        if at < len(low) or at + _GRID.size > len(self.data):
-            return 0.0
-        width, bits = _GRID.unpack_from(self.data, at)
-        sound = math.isfinite(width) and width > 0 and 1 <= bits <= _MOST_BITS
-        return float(width) / ((1 << bits) - 1) if sound else 0.0
+        low, widest = values.min(axis=0), float(np.ptp(values, axis=0).max())
+        mark, at = low.astype("<f4").tobytes(), -1
+        slack = _WIDTH_ULPS * float(np.spacing(np.abs(values).max()))
+        while (at := self.data.find(mark, at + 1)) >= 0:
+            place = at + len(mark)
+            if place + _GRID.size > len(self.data):
+                break
+            width, bits = _GRID.unpack_from(self.data, place)
+            if 1 <= bits <= _MOST_BITS and abs(width - widest) <= slack:
+                return widest / float((1 << bits) - 1)
+        return 0.0
 
 
 def decode_primitives(document: Document, views: Iterable[int]) -> dict[int, Decoded]:

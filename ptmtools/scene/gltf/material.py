@@ -89,6 +89,9 @@ class MaterialReader:
         light = np.array([r, g, b], dtype=np.float64)
         red, green, blue = (1.0, 1.0, 1.0) if colored else to_srgb(light).tolist()
         mode = entry.get("alphaMode", "OPAQUE")
+        tested = mode == "MASK"
+        cutoff = float(entry.get("alphaCutoff", 0.5)) if tested else 0.0
+        opacity = {"BLEND": a, "MASK": float(a >= cutoff)}.get(mode, 1.0)
         see_through = mode in ("MASK", "BLEND")
         if extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0) > 0:
             self._findings.say("PTM-N224", f"{name}: transmits light, never occludes", place)
@@ -108,9 +111,10 @@ class MaterialReader:
             SourceMaterial(
                 name=name,
                 color=(red, green, blue),
-                opacity=a if mode == "BLEND" else 1.0,
+                opacity=opacity,
                 see_through=see_through,
-                cutoff=_cutoff(entry, a) if mode == "MASK" else None,
+                # Of a texel, where all are multiplied with the factor's alpha.
+                cutoff=max(cutoff / a, 0.0) if tested and opacity and a > 0 else None,
                 two_sided=bool(entry.get("doubleSided", False)),
                 texture=texture,
             )
@@ -151,12 +155,6 @@ class MaterialReader:
             wrap_s=_WRAPS.get(sampler.get("wrapS"), "repeat"),
             wrap_t=_WRAPS.get(sampler.get("wrapT"), "repeat"),
         )
-
-
-def _cutoff(entry: dict[str, Any], alpha: float) -> float:
-    """The least alpha of a texel that is drawn, where all are multiplied with ``alpha``."""
-    least = float(entry.get("alphaCutoff", 0.5))
-    return min(max(least / alpha, 0.0), 1.0) if alpha > 0 else 1.0
 
 
 def _transform(given: dict[str, Any]) -> NDArray[np.float64]:

@@ -25,6 +25,7 @@ from ptmtools.scene.gltf.draco import EXTENSION as DRACO, Decoded, decode_primit
 from ptmtools.scene.gltf.extensions import check_extensions
 from ptmtools.scene.gltf.material import MaterialReader, Painted
 from ptmtools.scene.gltf.nodes import cameras, instance_count, instances, world_matrices
+from ptmtools.scene.rows import Rows
 from ptmtools.scene.source import MAX_VERTICES, Findings, Source, too_many_triangles
 
 #: What is raised where a document is malformed: one this deep has no end of ways to be that.
@@ -94,14 +95,7 @@ def _read(document: Document, findings: Findings, max_triangles: int) -> Source:
     ]
     compressed = [_compressed(document, draw) for draw in draws]
     decoded = decode_primitives(document, (c["bufferView"] for c in compressed if c is not None))
-    points: list[Floats] = []
-    triangles: list[Ints] = []
-    meshes: list[_Mesh] = []
-    things: list[Ints] = []
-    materials: list[Ints] = []
-    first: dict[int, int] = {}
-    names: list[str] = []
-    total, step = 0, 0.0
+    rows, first, step = Rows(), dict[int, int](), 0.0
     for draw, paint, told in zip(draws, painted, compressed, strict=True):
         try:
             values = _Values(document, draw, told, decoded)
@@ -111,31 +105,20 @@ def _read(document: Document, findings: Findings, max_triangles: int) -> Source:
         except ValueError as error:
             raise damaged(path, str(error), draw.place) from None
         if draw.node not in first:
-            first[draw.node] = len(names)
-            names += [draw.name] * draw.times
-        for k, local in enumerate(placed):
-            with np.errstate(all="ignore"):
-                matrix = world_of[draw.node] @ local
-                points.append(mesh.points @ matrix[:3, :3].T + matrix[:3, 3])
-                step = max(step, grid * float(np.linalg.norm(matrix[:3, :3], axis=0).max()))
-                turned = np.linalg.det(matrix[:3, :3]) < 0  # a mirror turns faces over (3.7.4)
-            meshes.append(_turned(mesh) if turned else mesh)
-            triangles.append(meshes[-1].triangles + total)
-            things.append(np.full(len(mesh.triangles), first[draw.node] + k))
-            materials.append(np.full(len(mesh.triangles), paint.index))
-            total += len(mesh.points)
-    return Source(
-        points=np.concatenate(points),
-        triangles=np.concatenate(triangles),
-        uv=np.concatenate([mesh.uv for mesh in meshes]),
-        triangle_object=np.concatenate(things),
-        triangle_material=np.concatenate(materials),
-        objects=tuple(names),
+            first[draw.node] = len(rows.names)
+            rows.names += [draw.name] * draw.times
+        with np.errstate(all="ignore"):
+            frames = world_of[draw.node] @ placed
+            if grid:
+                step = max(step, grid * float(np.linalg.norm(frames[:, :3, :3], axis=1).max()))
+        rows.add(
+            frames, mesh.points, mesh.triangles, mesh.uv, paint.index, mesh.colors, first[draw.node]
+        )
+    return rows.source(
         materials=painter.materials,
         cameras=cameras(tree, world_of, findings),
         metres=1.0,
         up="y",
-        colors=_colors(meshes),
         step=step if np.isfinite(step) else 0.0,
     )
 
@@ -223,10 +206,17 @@ class _Values:
             raise ValueError(f"Draco has other elements of {name} than the accessor says")
         return meaning(stored, bool(accessor.get("normalized")))
 
+    @property
+    def decoded(self) -> bool:
+        """Whether it was compressed with Draco."""
+        return self._decoded is not None
+
     def step(self, name: str) -> float:
         """The step of the grid that an attribute lies on, as its accessor has it; 0 for floats."""
         if self._decoded is not None and name in self._ids:
-            return self._decoded.step(self._ids[name])
+            step = self._decoded.step(self._ids[name])
+            if step is not None:
+                return step
         accessor = self._document.tree["accessors"][self._draw.attributes[name]]
         kind = np.dtype(COMPONENTS[accessor["componentType"]])
         if kind.kind == "f":
@@ -237,6 +227,9 @@ class _Values:
         """(k,) of the corners over ``count`` vertices."""
         if self._decoded is not None:
             index = self._decoded.triangles.ravel()
+            told = self._document.tree["accessors"][self._draw.primitive["indices"]]["count"]
+            if len(index) != told:
+                raise ValueError(f"Draco has {len(index)} indices, the accessor {told}")
         elif "indices" in self._draw.primitive:
             index = self._document.values(self._draw.primitive["indices"]).ravel().astype(np.int64)
         else:
@@ -250,7 +243,9 @@ def _mesh(values: _Values, draw: _Draw, paint: Painted, findings: Findings) -> _
     points = values.attribute("POSITION")
     if points is None:
         raise KeyError("POSITION")
-    triangles = _triangles(values.indices(len(points)), draw.mode)
+    # Draco has triangles, whatever the primitive was.
+    mode = _TRIANGLES if values.decoded else draw.mode
+    triangles = _triangles(values.indices(len(points)), mode)
     uv, raw = np.zeros((len(points), 2)), values.attribute(paint.coords, len(points))
     if raw is not None:
         moved = raw @ paint.matrix[:, :2].T + paint.matrix[:, 2]
@@ -272,20 +267,3 @@ def _triangles(index: Ints, mode: int) -> Ints:
     strip = np.stack([index[:-2], index[1:-1], index[2:]], axis=1)
     strip[1::2] = strip[1::2, ::-1]
     return strip
-
-
-def _turned(mesh: _Mesh) -> _Mesh:
-    """With all faces turned over."""
-    colors = None if mesh.colors is None else mesh.colors[:, ::-1]
-    return _Mesh(mesh.points, mesh.triangles[:, ::-1], mesh.uv[:, ::-1], colors)
-
-
-def _colors(meshes: list[_Mesh]) -> NDArray[np.uint8] | None:
-    """Of all corners, white where there is none; None if none has one."""
-    if all(mesh.colors is None for mesh in meshes):
-        return None
-    parts = (
-        np.full((len(mesh.triangles), 3, 3), 255, np.uint8) if mesh.colors is None else mesh.colors
-        for mesh in meshes
-    )
-    return np.concatenate(list(parts))

@@ -62,7 +62,8 @@ def read_ifc(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) 
             raise missing()
         arguments = str(file), str(max_triangles)
         module = "ptmtools.scene.ifc.products"
-        return take_over(module, "ifcopenshell", path, findings, scratch, *arguments)
+        beside = 0 if file == path.absolute() else file.stat().st_size
+        return take_over(module, "ifcopenshell", path, findings, scratch, *arguments, beside=beside)
 
 
 def missing() -> MissingComponentError:

@@ -47,13 +47,23 @@ def open_stage(path: Path, findings: Findings) -> tuple[Any, list[str]]:
             stage = Usd.Stage.Open(layer, None, context)  # without a session
         except Tf.ErrorException as error:
             raise unreadable(LIBRARY, path, reason(error)) from None
+    files.update(_note_faults(stage, absent, findings))
+    del layers  # held so long, so that the stage did not read them again
+    return stage, list(files | used_files(stage, path, findings))
+
+
+def used_files(stage: Any, path: Path, findings: Findings) -> dict[str, None]:
+    """What a stage was read from beside the model, relative to its folder.
+
+    Clips are opened as their values are asked for: what is used is known for sure in the end only.
+    Raises InputError PTM-I205 for what lies outside of that folder.
+    """
+    files: dict[str, None] = {}
     for used in stage.GetUsedLayers(includeClipLayers=True):
         if not used.anonymous:
             files[_inside(file_of(used.realPath), findings)] = None
     files.pop(path.name, None)
-    files.update(_note_faults(stage, absent, findings))
-    del layers  # held so long, so that the stage did not read them again
-    return stage, list(files)
+    return files
 
 
 def metres_of(stage: Any) -> float | None:

@@ -6,83 +6,32 @@ What a mesh and all of its instances have in common is made once.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pxr import Tf, UsdGeom
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
 from ptmtools.scene.apart import unreadable
 from ptmtools.scene.handed import NamedImage
 from ptmtools.scene.model import Camera
+from ptmtools.scene.rows import Rows
 from ptmtools.scene.source import Findings, Source, too_many_triangles
-from ptmtools.scene.usd.drawn import Placed, Traversal
-from ptmtools.scene.usd.layers import LIBRARY, TIME, metres_of, open_stage, reason, up_of
+from ptmtools.scene.usd.drawn import Traversal
+from ptmtools.scene.usd.layers import (
+    LIBRARY,
+    TIME,
+    metres_of,
+    open_stage,
+    reason,
+    up_of,
+    used_files,
+)
 from ptmtools.scene.usd.material import MaterialReader
 from ptmtools.scene.usd.mesh import Shape, cut
 from ptmtools.scene.usd.paint import Painter, key_of
-
-
-@dataclass
-class _Rows:
-    """What has been made so far, an entry for each mesh."""
-
-    points: list[Floats] = field(default_factory=list)
-    triangles: list[Ints] = field(default_factory=list)
-    uv: list[Floats] = field(default_factory=list)
-    colors: list[NDArray[np.uint8] | None] = field(default_factory=list)
-    object: list[Ints] = field(default_factory=list)
-    material: list[Ints] = field(default_factory=list)
-    names: list[str] = field(default_factory=list)
-    count: int = 0
-
-    def add(
-        self,
-        placed: Placed,
-        shape: Shape,
-        material: Ints,
-        uv: Floats,
-        colors: NDArray[np.uint8] | None,
-    ) -> None:
-        """A mesh at each of its places, each of them an object."""
-        frames, triangles = placed.frames, shape.triangles
-        k, p, t = len(frames), len(shape.points), len(triangles)
-        with np.errstate(all="ignore"):
-            points = shape.points @ frames[:, :3, :3] + frames[:, 3:, :3]
-            mirrored = np.linalg.det(frames[:, :3, :3]) < 0
-        first = self.count + p * np.arange(k)
-        each = triangles + first[:, None, None]
-        each_uv = np.broadcast_to(uv, (k, t, 3, 2)).copy()
-        each_colors = None if colors is None else np.broadcast_to(colors, (k, t, 3, 3)).copy()
-        # A mirror turns faces over.
-        each[mirrored] = each[mirrored][..., ::-1]
-        each_uv[mirrored] = each_uv[mirrored][..., ::-1, :]
-        if each_colors is not None:
-            each_colors[mirrored] = each_colors[mirrored][..., ::-1, :]
-            each_colors = each_colors.reshape(-1, 3, 3)
-        self.points.append(points.reshape(-1, 3))
-        self.triangles.append(each.reshape(-1, 3))
-        self.uv.append(each_uv.reshape(-1, 3, 2))
-        self.colors.append(each_colors)
-        self.object.append(np.repeat(len(self.names) + np.arange(k), t))
-        self.material.append(np.tile(material, k))
-        self.names += [placed.name] * k
-        self.count += k * p
-
-    def all_colors(self) -> NDArray[np.uint8] | None:
-        """(T, 3, 3); None if no mesh has any."""
-        if all(each is None for each in self.colors):
-            return None
-        return np.concatenate(
-            [
-                np.full((len(rows), 3, 3), 255, np.uint8) if each is None else each
-                for each, rows in zip(self.colors, self.triangles, strict=True)
-            ]
-        )
 
 
 def make_source(
@@ -109,30 +58,27 @@ def _make(
         raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with meshes")
     painter = Painter(MaterialReader(findings, path), findings)
     shapes: dict[str, Shape] = {}
-    rows = _Rows()
+    rows = Rows()
     for placed in group.placed(np.eye(4)[None]):
         key = key_of(placed.prim)
         if key not in shapes:
             shapes[key] = cut(placed.prim, findings, path)
         shape = shapes[key]
         if len(shape.corner):
-            rows.add(placed, shape, *painter.paint(placed.prim, shape, key))
+            material, uv, colors = painter.paint(placed.prim, shape, key)
+            frames = placed.frames.transpose(0, 2, 1)  # of the library, for rows of coordinates
+            first = len(rows.names)
+            rows.names += [placed.name] * len(frames)
+            rows.add(frames, shape.points, shape.triangles, uv, material, colors, first)
     if not rows.names:
         raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with meshes")
-    source = Source(
-        points=np.concatenate(rows.points),
-        triangles=np.concatenate(rows.triangles),
-        uv=np.concatenate(rows.uv),
-        triangle_object=np.concatenate(rows.object),
-        triangle_material=np.concatenate(rows.material),
-        objects=tuple(rows.names),
+    source = rows.source(
         materials=painter.materials,
         cameras=_cameras(traversal.cameras, findings),
         metres=metres_of(stage),
         up=up_of(stage),
-        colors=rows.all_colors(),
     )
-    return source, painter.images, files
+    return source, painter.images, list(dict.fromkeys(files) | used_files(stage, path, findings))
 
 
 def _cameras(found: list[tuple[str, Floats, Any]], findings: Findings) -> tuple[Camera, ...]:

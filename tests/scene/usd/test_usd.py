@@ -1376,3 +1376,36 @@ def test_a_package_becomes_a_database(put: Put, tmp_path: Path) -> None:
     assert main(["-q", "build-scene", model, "-o", str(db), "-j", "1", "--two-sided"]) == 0
     assert [file.name for file in (db / "www/textures").glob("*.ptm")] == ["brick.ptm"]
     assert main(["-q", "validate", str(db)]) == 0
+
+
+@pytest.mark.parametrize("outside", [False, True])
+def test_clips_are_files_of_the_model(tmp_path: Path, outside: bool) -> None:
+    """They are opened when a value is asked for, after the layers have been gone through."""
+    folder = tmp_path / "in"
+    folder.mkdir()
+    where = tmp_path if outside else folder
+    points = "[(0, 0, 0), (10, 0, 0), (10, 4, 0), (0, 4, 0)]"
+    (where / "clip.usda").write_text(
+        f'#usda 1.0\ndef Mesh "wall" {{\n  point3f[] points.timeSamples = {{ 0: {points} }}\n}}\n'
+    )
+    (where / "manifest.usda").write_text('#usda 1.0\ndef Mesh "wall" {\n  point3f[] points\n}\n')
+    up = "../" if outside else "./"
+    root = folder / "a.usda"
+    root.write_text(
+        "#usda 1.0\n"
+        'def Mesh "wall" (\n  clips = { dictionary default = {\n'
+        f"    asset[] assetPaths = [@{up}clip.usda@]\n"
+        f"    asset manifestAssetPath = @{up}manifest.usda@\n"
+        '    string primPath = "/wall"\n    double2[] active = [(0, 0)]\n'
+        "    double2[] times = [(0, 0)]\n  } }\n) {\n"
+        "  int[] faceVertexCounts = [4]\n  int[] faceVertexIndices = [0, 1, 2, 3]\n}\n"
+    )
+    from ptmtools.scene.usd.source import make_source
+
+    if outside:
+        with pytest.raises(InputError, match="PTM-I205"):
+            make_source(root, Findings(root), MAX_VERTICES)
+        return
+    source, _, files = make_source(root, Findings(root), MAX_VERTICES)
+    assert len(source.triangles) == 2
+    assert {"clip.usda", "manifest.usda"} <= set(files)
