@@ -95,9 +95,9 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
     ) -> None:
         """Build a database from MODEL, or bring it up to date.
 
-        MODEL is an OBJ, glTF or GLB file, or in a format that trimesh, pymeshlab, IfcOpenShell or usd-core
-        reads. The database is a folder: museum.obj makes museum.db, unless -o names another. Only
-        what has changed since the last build is computed again.
+        MODEL is an OBJ, glTF or GLB file, or in a format that trimesh, pymeshlab, IfcOpenShell or
+        usd-core reads. The database is a folder: museum.obj makes museum.db, unless -o names
+        another. Only what has changed since the last build is computed again.
         """
         options: list[Any] = [take(stage.options, values) for stage in stages]
         if dry_run:
