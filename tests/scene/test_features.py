@@ -10,12 +10,24 @@ import pytest
 
 from ptmtools.errors import InputError
 from ptmtools.scene import IngestOptions, ingest
+from tests.scene.conftest import Put
+from tests.scene.features.registry import Feature, all_features
 
-from .conftest import Put
-from .features import FEATURES, Feature
-
+FEATURES = all_features()
 #: Codes of what is done by the way, and says nothing of the feature.
-BY_THE_WAY = {"PTM-N226", "PTM-N227", "PTM-N232", "PTM-N234", "PTM-N237"}
+BY_THE_WAY = {"PTM-N226", "PTM-N227", "PTM-N232", "PTM-N234", "PTM-N237", "PTM-N240"}
+
+
+#: What a format or a feature needs: module, and how to get it.
+NEEDED = (
+    ("meshopt compression", "meshopt", "meshopt"),
+    ("Draco compression", "DracoPy", "DracoPy"),
+    ("KTX2", "opengl_basisu", "'ptmtools[basisu]'"),
+    ("USD", "pxr", "'ptmtools[usd]'"),
+    ("IFC", "ifcopenshell", "'ptmtools[ifc]'"),
+)
+#: Formats that say their unit and axis.
+SAYS = ("glTF", "USD", "IFC")
 
 
 @pytest.mark.parametrize(
@@ -24,12 +36,9 @@ BY_THE_WAY = {"PTM-N226", "PTM-N227", "PTM-N232", "PTM-N234", "PTM-N237"}
 def test_what_becomes_of_it(
     put: Put, feature: Feature, require: Callable[[str, str], None]
 ) -> None:
-    if "meshopt" in feature.name and find_spec("meshopt") is None:
-        require("meshopt", "pip install meshopt")
-    if "Draco" in feature.name and find_spec("DracoPy") is None:
-        require("DracoPy", "pip install DracoPy")
-    if feature.name == "KTX2" and find_spec("opengl_basisu") is None:
-        require("opengl_basisu", "pip install 'ptmtools[basisu]'")
+    for word, module, remedy in NEEDED:
+        if word in (feature.form, feature.name) and find_spec(module) is None:
+            require(module, f"pip install {remedy}")
     path = put("folder", b"").parent / feature.make(put)
     if feature.outcome == "refused":
         with pytest.raises(InputError) as caught:
@@ -37,7 +46,7 @@ def test_what_becomes_of_it(
         assert caught.value.code == feature.codes[0]
         feature.check(str(caught.value))
         return
-    given = {} if feature.form == "glTF" else {"unit": "m", "up": "y"}
+    given = {} if feature.form in SAYS else {"unit": "m", "up": "y"}
     scene = ingest(path, IngestOptions(**given))
     feature.check(scene)
     told = {note.code for note in scene.notes} - BY_THE_WAY

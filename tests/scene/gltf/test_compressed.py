@@ -12,7 +12,7 @@ import pytest
 from ptmtools.cells import Cells, subdivide
 from ptmtools.scene import Scene, ingest
 from tests.scene.conftest import Gltf, Put, noise, png
-from tests.scene.features import compressed
+from tests.scene.features.gltf import compressed
 from tests.scene.made import HIGH, WIDE, house
 
 #: Bits of the grid that encoders take where nobody says otherwise.

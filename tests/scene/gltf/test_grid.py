@@ -100,7 +100,7 @@ def test_a_coarse_mesh_beside_a_small_one_that_is_turned(put: Put) -> None:
 
 def test_draco_of_more_than_the_accessor_says(put: Put) -> None:
     """Nothing is drawn more often than was counted."""
-    from tests.scene.features import draco
+    from tests.scene.features.gltf import draco
 
     doc = Gltf()
     quad = draco(doc, doc.quad())
@@ -111,7 +111,8 @@ def test_draco_of_more_than_the_accessor_says(put: Put) -> None:
 
 
 def test_draco_of_a_strip_has_triangles(put: Put) -> None:
-    from tests.scene.features import draco, the_quad
+    from tests.scene.features.gltf import draco
+    from tests.scene.features.registry import the_quad
 
     doc = Gltf()
     doc.place(draco(doc, doc.quad()) | {"mode": 5})

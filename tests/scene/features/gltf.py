@@ -1,286 +1,37 @@
-"""Small models, one for each feature of a format and each trap, and what becomes of it.
-
-Outcomes are those of the formats' specifications: glTF 2.0 and its extensions, the OBJ and MTL
-appendices of Wavefront's manual, and, for colours of vertices in OBJ, what scanners write.
-`docs/prepare.md` has them as a table, which `test_features.py` holds against these.
-"""
+"""Features of glTF and its extensions."""
 
 from __future__ import annotations
 
 import base64
 import io
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from PIL import Image
 
 from ptmtools.scene import Scene
-
-from .conftest import FACE, QUAD, Gltf, Put, png
-
-Outcome = Literal["carried over", "baked", "noted", "refused"]
-
-
-@dataclass(frozen=True)
-class Feature:
-    """A model with one feature.
-
-    Attributes
-    ----------
-    form: of the file, as the table's columns are called.
-    name: of the feature, as its rows are called.
-    outcome: what becomes of it.
-    make: writes the model into the test's folder and returns its name.
-    check: of the scene that it becomes; of one that is refused, of the error's text.
-    codes: of the notes or the error that tell of it, the first of the feature itself.
-    """
-
-    form: str
-    name: str
-    outcome: Outcome
-    make: Callable[[Put], str]
-    check: Callable[[Any], object]
-    codes: tuple[str, ...] = ()
-
-
-FEATURES: list[Feature] = []
-
-
-def feature(
-    form: str, name: str, outcome: Outcome, check: Callable[[Any], object], *codes: str
-) -> Callable[[Callable[[Put], str]], Callable[[Put], str]]:
-    """Makes a feature of a function that writes its model."""
-
-    def add(make: Callable[[Put], str]) -> Callable[[Put], str]:
-        FEATURES.append(Feature(form, name, outcome, make, check, codes))
-        return make
-
-    return add
-
-
-# -- What is seen -------------------------------------------------------------------------------
-
-
-def the_quad(scene: Scene) -> None:
-    """10 × 4 m, of two triangles that face the same way."""
-    assert len(scene.triangles) == 2
-    assert sorted(np.ptp(scene.points, axis=0).round(5)) == [0, 4, 10]
-    normals = np.cross(*np.moveaxis(scene.corners[:, 1:] - scene.corners[:, :1], 1, 0))
-    assert np.allclose(normals[0], normals[1])
-
-
-def at_corners(scene: Scene, values: np.ndarray) -> dict[tuple[float, ...], tuple[float, ...]]:
-    """Values of corners by place: metres from the lower left corner of the model."""
-    low = scene.points.min(axis=0)
-    places = (scene.corners - low).reshape(-1, 3).round(4).tolist()
-    rows = values.reshape(len(places), -1).round(4).tolist()
-    return {tuple(p): tuple(v) for p, v in zip(places, rows, strict=True)}
-
-
-def shown(scene: Scene, u: float, v: float) -> list[int]:
-    """The texel of the first material at a place of the model, of 10 × 4 m, from its lower left:
-    what a viewer would show there, nearest."""
-    at = at_corners(scene, scene.uv)
-    origin, right, up = (np.array(at[place]) for place in ((0, 0, 0), (10, 0, 0), (0, 4, 0)))
-    place = origin + u * (right - origin) + v * (up - origin)
-    material = scene.materials[0]
-    with Image.open(io.BytesIO(scene.images[material.image].load())) as image:
-        pixels = np.asarray(image)
-    height, width = pixels.shape[:2]
-    x, y = int(np.floor(place[0] * width)), int(np.floor((1 - place[1]) * height))
-    x = int(np.clip(x, 0, width - 1)) if material.wrap_s == "clamp" else x % width
-    y = int(np.clip(y, 0, height - 1)) if material.wrap_t == "clamp" else y % height
-    return pixels[y, x].tolist()
-
-
-#: 2 × 2 texels: red and green above, blue and white below.
-RED, GREEN, BLUE, WHITE = [255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]
-FOUR = np.array([[RED, GREEN], [BLUE, WHITE]], np.uint8)
-
-
-def four(scene: Scene) -> None:
-    """The image, upright, over the whole quad."""
-    the_quad(scene)
-    quarters = [shown(scene, u, v)[:3] for u, v in ((0.2, 0.8), (0.8, 0.8), (0.2, 0.2), (0.8, 0.2))]
-    assert quarters == [RED, GREEN, BLUE, WHITE]
-
-
-# -- OBJ ----------------------------------------------------------------------------------------
-
-
-def obj(put: Put, mtl: str = "", lines: str = FACE, head: str = "", **files: bytes) -> str:
-    put("a.mtl", f"newmtl wall\n{mtl}\n")
-    for name, data in files.items():
-        put(name.replace("_png", ".png"), data)
-    put("a.obj", f"mtllib a.mtl\n{head}{QUAD}usemtl wall\n{lines}")
-    return "a.obj"
-
-
-@feature("OBJ", "textures", "carried over", four)
-def _(put: Put) -> str:
-    return obj(put, "map_Kd four.png", four_png=png(FOUR))
-
-
-def tinted(scene: Scene) -> None:
-    assert scene.materials[0].color == (1.0, 0.5, 0.0)
-
-
-@feature("OBJ", "colours of materials", "carried over", tinted)
-def _(put: Put) -> str:
-    return obj(put, "Kd 1 0.5 0")
-
-
-COLORED = "v 0 0 0 1 0 0\nv 10 0 0 0 1 0\nv 10 4 0 0 0 1\nv 0 4 0 0 0 0\n"
-
-
-def painted(scene: Scene) -> None:
-    the_quad(scene)
-    assert scene.colors is not None
-    assert at_corners(scene, scene.colors) == {
-        (0, 0, 0): (255, 0, 0),
-        (10, 0, 0): (0, 255, 0),
-        (10, 4, 0): (0, 0, 255),
-        (0, 4, 0): (0, 0, 0),
-    }
-    assert scene.materials[0].color == (1, 1, 1)
-
-
-@feature("OBJ", "colours of vertices", "carried over", painted)
-def _(put: Put) -> str:
-    put("a.obj", COLORED + "f 1 2 3 4\n")
-    return "a.obj"
-
-
-@feature("OBJ", "colours of vertices", "carried over", painted)
-def _colours_beyond_1(put: Put) -> str:
-    """By rounding, and of a vertex that no face has."""
-    put("a.obj", COLORED.replace("0 1 0 0", "0 1.000001 0 0", 1) + "f 1 2 3 4\nv 0 0 9 1.4 0 0\n")
-    return "a.obj"
-
-
-@feature("OBJ", "colours of vertices", "carried over", painted)
-def _colours_to_255(put: Put) -> str:
-    """As some scanners write them; and they take the place of Kd."""
-    put("a.mtl", "newmtl wall\nKd 0.2 0.2 0.2\n")
-    rows = "v 0 0 0 255 0 0\nv 10 0 0 0 255 0\nv 10 4 0 0 0 255\nv 0 4 0 0 0 0\n"
-    put("a.obj", f"mtllib a.mtl\n{rows}usemtl wall\nf 1 2 3 4\n")
-    return "a.obj"
-
-
-def half(scene: Scene) -> None:
-    assert scene.materials[0].opacity == 0.5
-    assert not scene.opaque.any()
-
-
-@feature("OBJ", "opacity", "carried over", half)
-def _(put: Put) -> str:
-    return obj(put, "d 0.5")
-
-
-def cut_out(scene: Scene) -> None:
-    four(scene)
-    assert scene.materials[0].transparent
-    alpha = [shown(scene, u, v)[3] for u, v in ((0.2, 0.8), (0.8, 0.8), (0.2, 0.2), (0.8, 0.2))]
-    assert alpha == [0, 255, 255, 51]
-
-
-ALPHA = np.array([[0, 255], [255, 51]], np.uint8)
-
-
-@feature("OBJ", "alpha of textures", "carried over", cut_out)
-def _(put: Put) -> str:
-    return obj(put, "map_Kd four.png", four_png=png(np.dstack([FOUR, ALPHA])))
-
-
-@feature("OBJ", "images of opacities", "baked", cut_out, "PTM-N217")
-def _(put: Put) -> str:
-    return obj(put, "map_Kd four.png\nmap_d mask.png", four_png=png(FOUR), mask_png=png(ALPHA))
-
-
-def stencil(scene: Scene) -> None:
-    """A mask without an image: the material's colour with its alpha."""
-    assert scene.materials[0].color == (1.0, 0.5, 0.0)
-    assert [shown(scene, u, 0.8) for u in (0.2, 0.8)] == [[255, 0], [255, 255]]
-
-
-@feature("OBJ", "images of opacities", "baked", stencil, "PTM-N217")
-def _mask_alone(put: Put) -> str:
-    return obj(put, "Kd 1 0.5 0\nmap_d mask.png", mask_png=png(ALPHA))
-
-
-def twice(scene: Scene) -> None:
-    the_quad(scene)
-    assert [shown(scene, u, 0.8) for u in (0.1, 0.4, 0.6, 0.9)] == [RED, GREEN, RED, GREEN]
-
-
-@feature("OBJ", "moved and scaled textures", "baked", twice, "PTM-N216")
-def _(put: Put) -> str:
-    return obj(put, "map_Kd -s 2 1 1 four.png", four_png=png(FOUR))
-
-
-def clamped(scene: Scene) -> None:
-    assert [shown(scene, u, 0.9) for u in (0.2, 0.4, 0.9)] == [RED, GREEN, GREEN]
-
-
-@feature("OBJ", "clamped textures", "carried over", clamped, "PTM-N216")
-def _(put: Put) -> str:
-    return obj(put, "map_Kd -clamp on -s 2 1 1 four.png", four_png=png(FOUR))
-
-
-def untextured(scene: Scene) -> None:
-    the_quad(scene)
-    assert scene.materials[0].image < 0
-
-
-@feature("OBJ", "a texture that is missing", "noted", untextured, "PTM-N204")
-def _(put: Put) -> str:
-    return obj(put, "map_Kd gone.png")
-
-
-def suggested(scene: Scene) -> None:
-    untextured(scene)
-    (message,) = [note.message for note in scene.notes if note.code == "PTM-N203"]
-    assert message == (
-        "mtllib house.mtl: not found; if a.mtl beside the model is meant, rename it to house.mtl"
-    )
-
-
-@feature("OBJ", "a material library that is missing", "noted", suggested, "PTM-N203", "PTM-N207")
-def _(put: Put) -> str:
-    obj(put, "map_Kd four.png", four_png=png(FOUR))
-    put("a.obj", f"mtllib house.mtl\n{QUAD}usemtl wall\n{FACE}")
-    return "a.obj"
-
-
-def not_suggested(scene: Scene) -> None:
-    (message,) = [note.message for note in scene.notes if note.code == "PTM-N203"]
-    assert message == "mtllib house.mtl: not found"
-
-
-@feature(
-    "OBJ", "a material library that is missing", "noted", not_suggested, "PTM-N203", "PTM-N207"
+from tests.scene.conftest import Gltf, Put, png
+from tests.scene.features.registry import (
+    ALPHA,
+    BLUE,
+    FOUR,
+    GREEN,
+    RED,
+    WHITE,
+    clamped,
+    cut_out,
+    feature,
+    four,
+    half,
+    mirrored,
+    painted,
+    seen,
+    shown,
+    the_quad,
+    three_quads,
+    twice,
 )
-def _several_libraries(put: Put) -> str:
-    """Which of them is meant nobody knows."""
-    put("b.mtl", "newmtl wall\n")
-    obj(put)
-    put("a.obj", f"mtllib house.mtl\n{QUAD}usemtl wall\n{FACE}")
-    return "a.obj"
-
-
-@feature("OBJ", "points and lines", "noted", the_quad, "PTM-N219")
-def _(put: Put) -> str:
-    return obj(put, lines=f"l 1 2\np 1\n{FACE}")
-
-
-@feature("OBJ", "polygons", "carried over", the_quad)
-def _(put: Put) -> str:
-    return obj(put)
-
-
-# -- glTF ---------------------------------------------------------------------------------------
 
 
 def glb(put: Put, doc: Gltf, name: str = "a.glb") -> str:
@@ -451,14 +202,6 @@ def _(put: Put) -> str:
     return glb(put, doc)
 
 
-def mirrored(scene: Scene) -> None:
-    the_quad(scene)
-    row = [shown(scene, u, 0.9) for u in (0.05, 0.3, 0.42, 0.55, 0.7, 0.95)]
-    assert row == [RED, GREEN, GREEN, GREEN, RED, RED]
-    column = [shown(scene, 0.05, v) for v in (0.9, 0.6, 0.4, 0.1)]
-    assert column == [RED, BLUE, BLUE, RED]
-
-
 def repeating(doc: Gltf, scale: list[float]) -> dict[str, Any]:
     material = with_texture(
         doc, png(FOUR), {"extensions": {"KHR_texture_transform": {"scale": scale}}}
@@ -543,18 +286,6 @@ def _(put: Put) -> str:
     doc.tree["extensionsRequired"] = ["KHR_texture_basisu"]
     doc.place(doc.quad(**material))
     return glb(put, doc)
-
-
-def three_quads(scene: Scene) -> None:
-    """One as it is, one turned by half about z in front of it, one twice as wide behind."""
-    assert scene.objects == ("wall",) * 3
-    model = scene.corners + scene.space.origin
-    boxes = [
-        (q.reshape(-1, 3).min(axis=0), q.reshape(-1, 3).max(axis=0))
-        for q in (model[:2], model[2:4], model[4:])
-    ]
-    expected = [([0, 0, 0], [10, 4, 0]), ([-10, -4, 5], [0, 0, 5]), ([0, 0, -5], [20, 4, -5])]
-    assert np.allclose(boxes, expected, atol=1e-3)
 
 
 @feature("glTF", "instances", "carried over", three_quads)
@@ -784,12 +515,6 @@ def _(put: Put) -> str:
     return glb(put, doc)
 
 
-def seen(scene: Scene) -> None:
-    (camera,) = scene.cameras
-    assert np.allclose(camera.direction, [0, 0, -1])
-    assert camera.field_of_view == 0.8
-
-
 @feature("glTF", "cameras", "carried over", seen)
 def _(put: Put) -> str:
     doc = Gltf.wall()
@@ -815,29 +540,3 @@ def _(put: Put) -> str:
     doc = Gltf.wall()
     doc.tree["extensionsUsed"] = ["MSFT_lod"]
     return glb(put, doc)
-
-
-# -- PLY ----------------------------------------------------------------------------------------
-
-
-PLY_ROWS = "".join(
-    f"{place} {color}\n"
-    for place, color in (
-        ("0 0 0", "255 0 0"),
-        ("10 0 0", "0 255 0"),
-        ("10 4 0", "0 0 255"),
-        ("0 4 0", "0 0 0"),
-    )
-)
-
-
-@feature("PLY", "colours of vertices", "carried over", painted)
-def _(put: Put) -> str:
-    colors = "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
-    axes = "".join(f"property float {axis}\n" for axis in "xyz")
-    head = f"ply\nformat ascii 1.0\nelement vertex 4\n{axes}{colors}element face 2\n"
-    put(
-        "a.ply",
-        f"{head}property list uchar int vertex_indices\nend_header\n{PLY_ROWS}3 0 1 2\n3 0 2 3\n",
-    )
-    return "a.ply"

@@ -1,0 +1,78 @@
+"""Features of IFC."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ptmtools.scene import Scene
+from tests.scene.conftest import Put
+from tests.scene.features.registry import feature, half
+
+
+def written(put: Put, made: Any, name: str = "a.ifc") -> str:
+    made.write(put(name, ""))
+    return name
+
+
+def building() -> Any:
+    from tests.scene.ifc.ifc_house import Ifc
+
+    return Ifc()
+
+
+def brick(scene: Scene) -> None:
+    assert scene.materials[0].color == (1.0, 0.5, 0.0)
+
+
+@feature("IFC", "colours of materials", "carried over", brick)
+def _(put: Put) -> str:
+    made = building()
+    made.box("IfcWall", "W", (0, 0, 0), (5, 1, 3), style=made.style("Brick", (1.0, 0.5, 0.0), None))
+    return written(put, made)
+
+
+@feature("IFC", "opacity", "carried over", half)
+def _(put: Put) -> str:
+    made = building()
+    made.box("IfcWall", "W", (0, 0, 0), (5, 1, 3), style=made.style("Glass", (1.0, 1, 1), 0.5))
+    return written(put, made)
+
+
+def told(scene: Scene) -> None:
+    kinds = dict(zip(scene.objects, scene.kinds, strict=True))
+    assert kinds == {"IfcWall W": "structural", "IfcDoor D": "door", "IfcRailing R": "detail"}
+
+
+@feature("IFC", "what a product is to the building", "carried over", told)
+def _(put: Put) -> str:
+    made = building()
+    for n, (kind, name) in enumerate((("IfcWall", "W"), ("IfcDoor", "D"), ("IfcRailing", "R"))):
+        made.box(kind, name, (6 * n, 0, 0), (6 * n + 5, 1, 3))
+    return written(put, made)
+
+
+def two_storeys(scene: Scene) -> None:
+    found = [(storey.name, round(storey.height, 6)) for storey in scene.storeys]
+    assert found == [("EG", 0.0), ("OG", 3.0)]
+
+
+@feature("IFC", "names of storeys", "carried over", two_storeys)
+def _(put: Put) -> str:
+    made = building()
+    for name, height in (("EG", 0.0), ("OG", 3.0)):
+        storey = made.storey(name, height)
+        made.box("IfcWall", f"W {name}", (0, 0, 0), (5, 1, 2.5), storey)
+    return written(put, made)
+
+
+def one_wall(scene: Scene) -> None:
+    assert scene.objects == ("IfcWall W",)
+
+
+@feature("IFC", "nodes that are hidden", "noted", one_wall, "PTM-N242")
+def _(put: Put) -> str:
+    """A space, which is no thing."""
+    made = building()
+    made.box("IfcWall", "W", (0, 0, 0), (5, 1, 3))
+    made.box("IfcSpace", "S", (0, 1, 0), (5, 5, 3))
+    return written(put, made)

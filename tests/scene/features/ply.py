@@ -1,0 +1,28 @@
+"""Features of PLY."""
+
+from __future__ import annotations
+
+from tests.scene.conftest import Put
+from tests.scene.features.registry import feature, painted
+
+PLY_ROWS = "".join(
+    f"{place} {color}\n"
+    for place, color in (
+        ("0 0 0", "255 0 0"),
+        ("10 0 0", "0 255 0"),
+        ("10 4 0", "0 0 255"),
+        ("0 4 0", "0 0 0"),
+    )
+)
+
+
+@feature("PLY", "colours of vertices", "carried over", painted)
+def _(put: Put) -> str:
+    colors = "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
+    axes = "".join(f"property float {axis}\n" for axis in "xyz")
+    head = f"ply\nformat ascii 1.0\nelement vertex 4\n{axes}{colors}element face 2\n"
+    put(
+        "a.ply",
+        f"{head}property list uchar int vertex_indices\nend_header\n{PLY_ROWS}3 0 1 2\n3 0 2 3\n",
+    )
+    return "a.ply"
