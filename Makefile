@@ -136,10 +136,12 @@ bench: $(VENV)/.installed-dev
 	@[ ! -d build/museum.db ] || { set -x; $(BIN)/python benchmarks/false_negatives.py build/museum.db; }
 	$(BIN)/python benchmarks/ach.py sample_data/two_rooms/two_rooms.obj --only presets speed
 	$(BIN)/python benchmarks/emission.py
+	$(BIN)/python benchmarks/formats.py
 	$(BIN)/python -m benchmarks.fuzz --count 5000 --jobs $(JOBS)
 
 fuzz: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks.fuzz --jobs $(JOBS)
+	$(BIN)/python -m benchmarks.fuzz.foreign --count 200 --jobs $(JOBS)
 
 docs-tables: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/docs_tables.py

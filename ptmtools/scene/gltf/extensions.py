@@ -42,7 +42,7 @@ KNOWN: dict[str, Outcome] = {
 }
 #: A free program that turns a model into one without an extension, by extension.
 _REMEDIES = {
-    "EXT_texture_avif": "npx @gltf-transform/cli png IN.glb OUT.glb",
+    "EXT_texture_avif": "npx @gltf-transform/cli png --formats '*' IN.glb OUT.glb",
 }
 _WORDS: dict[Outcome, str] = {
     "read": "read",
