@@ -4,7 +4,7 @@ All geometry behind ingest is float64 in metres with its origin at the centre of
 floor, so the extent of the scene bounds every coordinate. A tolerance is a fixed share of that
 extent: the same building in other units, or moved, is treated alike. Where a file has its
 coordinates on a grid that is coarser (compressed glTF), that grid counts instead, up to `COARSEST`:
-two faces of one plane lie up to a step apart. Ingest derives them once (`scene.orientation`);
+two faces of one plane lie up to a step apart there. Ingest derives them once (`scene.orientation`);
 `Scene.tolerance` and `Cells.tolerance` hand them on to every stage.
 """
 
@@ -72,7 +72,8 @@ class Tolerance:
     Attributes
     ----------
     extent: largest side of the scene's bounding box, metres.
-    step: of the grid that the file has its coordinates on, metres; 0 where that is float32's.
+    step: what the step of the grid that the file has its coordinates on counts as, metres
+        (`COARSEST` at most); 0 where that is float32's.
     plane: a point nearer than this to a plane lies in it.
     cluster: parallel planes nearer than this count as one wall.
     file: coordinates in model files are rounded by so much.

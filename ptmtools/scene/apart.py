@@ -63,9 +63,11 @@ def run_apart(
         answer = json.loads(text) if found else {}
     except ValueError:
         answer = {}
+    if not isinstance(answer, dict):
+        answer = {}
     if "error" in answer:
         kind, fields = answer["error"]
-        raise _ERRORS[kind](**fields)
+        raise _ERRORS.get(kind, InputError)(**fields)
     if "answer" not in answer:
         why = answer.get("fault") or f"it ended with status {run.returncode}"
         raise unreadable(library, model, why)

@@ -21,18 +21,18 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, cast
+from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import InputError, LimitError, naming
+from ptmtools.errors import InputError, LimitError, MissingComponentError, naming
 from ptmtools.progress import Progress
 from ptmtools.scene.model import SourceImage
 from ptmtools.scene.source import FileRange, Findings, Texture
 from ptmtools.texture.images.declared import check_bytes
 from ptmtools.texture.images.picture import check_size
-from ptmtools.texture.model import Limits
+from ptmtools.texture.model import Description, Limits
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -218,8 +218,8 @@ def _examine(texture: Texture, limit: int, channel: str | None = None) -> _Exami
     read = texture.read
     try:
         with naming(texture.label, place=texture.place):
-            if isinstance(read, FileRange):
-                check_bytes(read.size(), Limits(limit))
+            if size := getattr(read, "size", None):
+                check_bytes(size(), Limits(limit))
             data = read()
             opened = _decode(data, limit)
             with pillow_faults():
@@ -237,6 +237,23 @@ def _examine(texture: Texture, limit: int, channel: str | None = None) -> _Exami
         opened.width,
         bits,
     )
+
+
+def integers(data: bytes, limit: int) -> tuple[NDArray[Any], Description]:
+    """(h, w, c) texels of 8 or 16 bits, and what else an image says, to make another of it.
+
+    ``limit`` as of `ImageStore`. Raises InputError if it cannot be decoded, or has other samples,
+    LimitError PTM-L104, PTM-L106.
+    """
+    from ptmtools.texture.images.reading import load_image
+
+    try:
+        picture = load_image(data, Limits(limit))
+    except MissingComponentError as error:
+        raise InputError(error.code, error.message) from None
+    if picture.texels.dtype.kind != "u":
+        raise InputError("PTM-I126", "its samples are floats, of which no other image is made")
+    return picture.texels[0 : picture.texels.shape[0]], picture.description
 
 
 def is_plain(data: bytes, name: str, limit: int) -> bool:

@@ -31,6 +31,7 @@ from ptmtools.scene.source import MAX_VERTICES, Findings, Source, SourceMaterial
 from ptmtools.scene.space import Said, parse_unit, settle, to_world, turned
 from ptmtools.scene.texels import uses_holes
 from ptmtools.scene.wrapping import told, unmirrored
+from ptmtools.tolerance import PLANE_SHARE
 
 #: Colours where the model gives none: plain faces, and a tint that leaves an image as it is.
 PLAIN, WHITE = (0.8, 0.8, 0.8), (1.0, 1.0, 1.0)
@@ -131,6 +132,8 @@ def ingest(
     textures = [source.materials[index].texture for index in used_material.tolist()]
     store.examine((texture for texture in textures if texture is not None), workers, progress)
     colors = None if source.colors is None else source.colors[kept.source]
+    if colors is not None and (colors == 255).all():
+        colors = None
     materials = []
     for done, index in enumerate(used_material.tolist()):
         progress(done, len(used_material), "materials")
@@ -153,8 +156,8 @@ def ingest(
             "the normals",
         )
     tolerance = tolerance_of(points, triangles, source.step * space.metres)
-    if tolerance.step:
-        step, plane = 1000 * tolerance.step, 1000 * tolerance.plane
+    if tolerance.plane > PLANE_SHARE * tolerance.extent:
+        step, plane = 1000 * source.step * space.metres, 1000 * tolerance.plane
         findings.say(
             "PTM-N237",
             f"compressed: coordinates are rounded to {step:.2g} mm, so what is less than "

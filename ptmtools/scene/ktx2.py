@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from ptmtools.errors import InputError
+from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.scene.apart import run_apart, serve
+from ptmtools.scene.source import FileRange
 
 MAGIC = b"\xabKTX 20\xbb\r\n\x1a\n"
 #: Where the header has width and height, in texels.
@@ -27,10 +28,14 @@ _MOST = 1 << 14
 class TranscodedBytes:
     """The bytes of a PNG made of those of a KTX2 image; of any other image, its own.
 
-    Raises InputError PTM-I258 where that cannot be.
+    Raises what `transcoded` does.
     """
 
     read: Callable[[], bytes]
+
+    def size(self) -> int:
+        """How many bytes are read for it. Raises OSError."""
+        return self.read.size() if isinstance(self.read, FileRange) else 0
 
     def __call__(self) -> bytes:
         data = self.read()
@@ -38,15 +43,21 @@ class TranscodedBytes:
 
 
 def transcoded(data: bytes) -> bytes:
-    """A PNG of the first image of a KTX2 file. Raises InputError PTM-I258."""
+    """A PNG of the first image of a KTX2 file.
+
+    Raises InputError PTM-I258, and MissingComponentError PTM-M204 without opengl-basisu.
+    """
     if len(data) < _SIZE_AT + _SIZE.size:
         raise InputError("PTM-I258", "is cut short")
     width, height = _SIZE.unpack_from(data, _SIZE_AT)
     if not (0 < width <= _MOST and 0 < height <= _MOST):
         raise InputError("PTM-I258", f"{width} x {height} texels in a KTX2 image")
     if find_spec("opengl_basisu") is None:
-        raise InputError(
-            "PTM-I258", "KTX2 is read with the extra basisu: pip install 'ptmtools[basisu]'"
+        raise MissingComponentError(
+            "PTM-M204",
+            "opengl-basisu is needed for KTX2 textures",
+            remedy="pip install 'ptmtools[basisu]', or "
+            "run `npx @gltf-transform/cli ktxdecompress IN.glb OUT.glb`",
         )
     with tempfile.TemporaryDirectory() as scratch:
         given, made = Path(scratch, "image.ktx2"), Path(scratch, "image.png")

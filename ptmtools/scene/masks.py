@@ -13,10 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Ints
-from ptmtools.errors import InputError
-from ptmtools.scene.images import ImageStore
+from ptmtools.scene.images import ImageStore, integers
 from ptmtools.scene.source import Findings, Source, SourceMaterial
-from ptmtools.texture.model import Description, Limits
 
 _BANDS = {"r": 0, "g": 1, "b": 2}
 
@@ -38,11 +36,11 @@ class MaskedBytes:
     def __call__(self) -> bytes:
         from ptmtools.texture.images.png import png_bytes
 
-        opacity = _opacities(_texels(self.mask(), self.limit)[0], self.channel)
+        opacity = _opacities(integers(self.mask(), self.limit)[0], self.channel)
         if self.read is None:
             white = np.full_like(opacity, 255)
             return png_bytes(np.stack([white, opacity], axis=2))
-        texels, description = _texels(self.read(), self.limit)
+        texels, description = integers(self.read(), self.limit)
         alpha = _resized(opacity, texels.shape[1], texels.shape[0]) / 255
         components = texels.shape[2]
         if components in (2, 4):
@@ -52,16 +50,6 @@ class MaskedBytes:
             alpha *= np.iinfo(texels.dtype).max
         held = np.rint(alpha).astype(texels.dtype)[..., None]
         return png_bytes(np.concatenate([texels[..., :components], held], axis=2), description)
-
-
-def _texels(data: bytes, limit: int) -> tuple[NDArray[Any], Description]:
-    """(h, w, c) integers, and what else the image says."""
-    from ptmtools.texture.images.reading import load_image
-
-    picture = load_image(data, Limits(limit))
-    if picture.texels.dtype.kind != "u":
-        raise InputError("PTM-I126", "its samples are floats, which have no opacity beside them")
-    return picture.texels[0 : picture.texels.shape[0]], picture.description
 
 
 def _opacities(texels: NDArray[Any], channel: str) -> NDArray[np.uint8]:
@@ -117,10 +105,10 @@ def _masked(given: SourceMaterial, store: ImageStore, findings: Findings) -> Sou
     colors = None if matte is None or texture is None else texture.read
     read = MaskedBytes(colors, mask.read, mask.channel, store.limit)
     made = replace(texture or mask, read=read, what=mask.what, place=mask.place)
-    if store.has_alpha(made) is None:  # which the store has said of the mask
-        return replace(without, see_through=True)
     for part in (texture, mask):
         if part is not None:
             store.made_into_another(part)
+    if store.has_alpha(made) is None:  # which the store has said of the mask
+        return replace(without, see_through=True)
     findings.say("PTM-N217", f"{mask.what}: is baked into an image as its alpha", mask.place)
     return replace(without, texture=made)

@@ -15,10 +15,9 @@ import numpy as np
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError
-from ptmtools.scene.images import ImageStore
+from ptmtools.scene.images import ImageStore, integers
 from ptmtools.scene.model import Wrap
 from ptmtools.scene.source import Findings, Source, SourceWrap, Texture
-from ptmtools.texture.model import Limits
 
 
 @dataclass(frozen=True)
@@ -36,18 +35,16 @@ class MirroredBytes:
 
     def __call__(self) -> bytes:
         from ptmtools.texture.images.png import png_bytes
-        from ptmtools.texture.images.reading import load_image
 
-        picture = load_image(self.read(), Limits(self.limit))
-        height, width, _ = picture.texels.shape
+        texels, description = integers(self.read(), self.limit)
+        height, width, _ = texels.shape
         if 4 * height * width * (1 + self.across) * (1 + self.down) > self.limit:
-            raise InputError("PTM-I125", "would be too large with its mirror images")
-        texels = picture.texels[0:height]
+            raise InputError("PTM-I125", "would be too large beside its mirror images; it repeats")
         if self.across:
             texels = np.concatenate([texels, texels[:, ::-1]], axis=1)
         if self.down:
             texels = np.concatenate([texels, texels[::-1]], axis=0)
-        return png_bytes(texels, picture.description)
+        return png_bytes(texels, description)
 
 
 def unmirrored(
@@ -76,11 +73,11 @@ def unmirrored(
         assert given is not None
         made, coords = _unmirrored(given, uv[rows], store.limit)
         if made.read != given.read:
-            if store.has_alpha(made) is None:
-                wraps = told(given.wrap_s), told(given.wrap_t)
-                made, coords = replace(given, wrap_s=wraps[0], wrap_t=wraps[1]), uv[rows]
-            else:
-                store.made_into_another(given)
+            store.made_into_another(given)  # also where it fails: another image may not
+            if store.has_alpha(given) is None or store.has_alpha(made) is None:
+                plain = replace(given, wrap_s=told(given.wrap_s), wrap_t=told(given.wrap_t))
+                materials[index] = replace(materials[index], texture=plain)
+                continue
         materials[index], uv[rows] = replace(materials[index], texture=made), coords
         findings.say("PTM-N222", f"{given.what}: its mirrored repeat is baked in", given.place)
     return replace(source, materials=tuple(materials)), uv

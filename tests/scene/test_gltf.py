@@ -303,6 +303,29 @@ DAMAGED: dict[str, tuple[str, bytes]] = {
         "PTM-I255",
         broken(lambda d: d.tree.update(extensionsRequired=["EXT_texture_avif"])),
     ),
+    "no instances": (
+        "PTM-I249",
+        broken(
+            lambda d: (
+                d.tree["accessors"].append({"count": 0, "type": "VEC3", "componentType": 5126}),
+                d.tree["accessors"][0].update(count=3 * 10**9),
+                d.tree["nodes"][0].update(
+                    extensions={"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": 3}}}
+                ),
+            )
+        ),
+    ),
+    "a factor that is a word": (
+        "PTM-I249",
+        broken(
+            lambda d: (
+                d.tree.update(
+                    materials=[{"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, "nan"]}}]
+                ),
+                d.tree["meshes"][0]["primitives"][0].update(material=0),
+            )
+        ),
+    ),
     "types all wrong": ("PTM-I249", broken(lambda d: d.tree.update(meshes={"a": 1}))),
 }
 

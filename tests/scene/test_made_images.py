@@ -152,7 +152,42 @@ def test_what_would_be_too_large_repeats(put: Put) -> None:
     assert texture is not None
     assert (texture.wrap_s, texture.wrap_t) == ("repeat", "repeat")
     assert source.uv[0].tolist() == uv
-    assert "PTM-N206" in {note.code for note in findings.notes}
+    assert {note.code for note in findings.notes} == {"PTM-N206"}
+
+
+def test_what_could_not_be_made_may_be_when_the_file_changes(textured: Textured) -> None:
+    """So an image of which another was to be made is not plain, either."""
+    floats = tiff(np.linspace(0, 1, 4, dtype=np.float32).reshape(2, 2))
+    scene = ingest(textured("map_Kd w.tif\nmap_d m.png", {"w.tif": floats, "m.png": png(MASK)}))
+    assert [image.plain for image in scene.images] == [False]
+
+
+def test_floats_are_not_mirrored(put: Put) -> None:
+    from tests.scene.conftest import Gltf
+    from tests.scene.features.gltf import repeating
+
+    doc = Gltf()
+    doc.place(doc.quad(**repeating(doc, [2.5, 2])))
+    (view,) = [image["bufferView"] for image in doc.tree["images"]]
+    doc.tree["bufferViews"][view] = doc.tree["bufferViews"][
+        doc.view(tiff(np.linspace(0, 1, 4, dtype=np.float32).reshape(2, 2)))
+    ]
+    scene = ingest(put("a.glb", doc.glb()))
+    assert scene.materials[0].wrap_s == "repeat"
+    (note,) = [note for note in scene.notes if note.code == "PTM-N206"]
+    assert "floats" in note.message
+
+
+def test_ktx2_without_its_library(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An error: a scene without its textures would stay as it is when the library comes."""
+    from ptmtools.errors import MissingComponentError
+    from ptmtools.scene import ktx2
+    from tests.scene.features.gltf import KTX2
+
+    monkeypatch.setattr(ktx2, "find_spec", lambda name: None)
+    with pytest.raises(MissingComponentError, match=r"PTM-M204"):
+        ktx2.transcoded(KTX2)
+    assert ktx2.TranscodedBytes(lambda: b"\x89PNG")() == b"\x89PNG"
 
 
 def test_a_mask_counts_for_the_limit(textured: Textured) -> None:

@@ -124,6 +124,8 @@ class Document:
                 stored = self._elements(accessor, accessor["bufferView"])
             else:
                 shape = natural(accessor["count"]), ITEMS[accessor["type"]]
+                if not shape[0]:
+                    raise ValueError("no elements")
                 stored = np.zeros(shape, np.dtype(COMPONENTS[accessor["componentType"]]))
             if "sparse" in accessor:
                 stored = self._with_others(stored, accessor)

@@ -6,11 +6,13 @@ the folder and writes ``0.npz``, …
 
 from __future__ import annotations
 
+import re
 import struct
 import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.util import find_spec
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +25,10 @@ from ptmtools.scene.gltf.document import Document
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 
 EXTENSION = "KHR_draco_mesh_compression"
-#: Of the grid of an attribute: its width, and bits of which Draco has at most so many.
-_GRID, _MOST_BITS = struct.Struct("<fB"), 30
+#: Of the grid of an attribute: its width, and its bits, of which Draco has 30 at most.
+_GRID, _GRID_MARK = struct.Struct("<fB"), b"(.{4}[\x01-\x1e])"
+#: So many places are looked at, as a hostile stream may have its beginning everywhere.
+_TRIES = 1000
 #: What the width may differ by from what is decoded, in units of the last place of the largest
 #: number: rounding of float32.
 _WIDTH_ULPS = 4
@@ -58,15 +62,15 @@ class Decoded:
             return None
         if values is None or values.dtype != np.float32 or not len(values):
             return 0.0
-        low, widest = values.min(axis=0), float(np.ptp(values, axis=0).max())
-        mark, at = low.astype("<f4").tobytes(), -1
-        slack = _WIDTH_ULPS * float(np.spacing(np.abs(values).max()))
-        while (at := self.data.find(mark, at + 1)) >= 0:
-            place = at + len(mark)
-            if place + _GRID.size > len(self.data):
-                break
-            width, bits = _GRID.unpack_from(self.data, place)
-            if 1 <= bits <= _MOST_BITS and abs(width - widest) <= slack:
+        with np.errstate(all="ignore"):
+            low, high = values.min(axis=0), values.max(axis=0)
+            widest = float((high.astype(np.float64) - low).max())
+            slack = _WIDTH_ULPS * float(np.spacing(np.abs(values).max()))
+        mark = re.escape(low.astype("<f4").tobytes())
+        grids = re.compile(b"(?=" + mark + _GRID_MARK + b")", re.DOTALL)
+        for found in islice(grids.finditer(self.data), _TRIES):
+            width, bits = _GRID.unpack(found[1])
+            if abs(width - widest) <= slack:
                 return widest / float((1 << bits) - 1)
         return 0.0
 

@@ -7,6 +7,7 @@ texel then differs from the linear product for partial tints, and the conversion
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -83,7 +84,7 @@ class MaterialReader:
         if glossy is not None:
             factor = glossy.get("diffuseFactor", [1.0, 1.0, 1.0, 1.0])
             use = glossy.get("diffuseTexture")
-        r, g, b, a = (min(max(float(value), 0.0), 1.0) for value in factor)
+        r, g, b, a = (_share(value) for value in factor)
         if (r, g, b) != (1.0, 1.0, 1.0):
             self._findings.say("PTM-N226", f"{name}: colour factor converted to sRGB", place)
         light = np.array([r, g, b], dtype=np.float64)
@@ -155,6 +156,13 @@ class MaterialReader:
             wrap_s=_WRAPS.get(sampler.get("wrapS"), "repeat"),
             wrap_t=_WRAPS.get(sampler.get("wrapT"), "repeat"),
         )
+
+
+def _share(value: Any) -> float:
+    """A number, brought into [0, 1]; ValueError for what is none."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ValueError(f"{value!r} is no number")
+    return min(max(float(value), 0.0), 1.0)
 
 
 def _transform(given: dict[str, Any]) -> NDArray[np.float64]:

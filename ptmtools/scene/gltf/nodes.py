@@ -91,7 +91,10 @@ def instance_count(document: Document, node: int) -> int:
     counts = {natural(accessors[natural(accessor)]["count"]) for accessor in attributes.values()}
     if len(counts) != 1:
         raise ValueError(f"node {node}: its instances have attributes of {len(counts)} lengths")
-    return counts.pop()
+    count = counts.pop()
+    if not count:
+        raise ValueError(f"node {node}: no instances")
+    return count
 
 
 def instances(document: Document, node: int) -> Floats:

@@ -9,7 +9,7 @@ minutes for a file of 100 KB). Metres and Y up are fixed by the format.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +44,7 @@ class _Draw:
     primitive: dict[str, Any]
     place: str
     times: int
+    triangles: int = 0
 
     @property
     def attributes(self) -> dict[str, int]:
@@ -109,8 +110,8 @@ def _read(document: Document, findings: Findings, max_triangles: int) -> Source:
             rows.names += [draw.name] * draw.times
         with np.errstate(all="ignore"):
             frames = world_of[draw.node] @ placed
-            if grid:
-                step = max(step, grid * float(np.linalg.norm(frames[:, :3, :3], axis=1).max()))
+            scale = np.linalg.norm(frames[:, :3, :3], axis=1)
+            step = max(step, grid * float(scale[np.isfinite(scale)].max(initial=0.0)))
         rows.add(
             frames, mesh.points, mesh.triangles, mesh.uv, paint.index, mesh.colors, first[draw.node]
         )
@@ -119,7 +120,7 @@ def _read(document: Document, findings: Findings, max_triangles: int) -> Source:
         cameras=cameras(tree, world_of, findings),
         metres=1.0,
         up="y",
-        step=step if np.isfinite(step) else 0.0,
+        step=step,
     )
 
 
@@ -154,8 +155,11 @@ def _limited(document: Document, draws: Iterable[_Draw], max_triangles: int) -> 
         points = corners = natural(accessors[draw.attributes["POSITION"]]["count"])
         if "indices" in draw.primitive:
             corners = natural(accessors[draw.primitive["indices"]]["count"])
+        each = max(1, corners // 3 if draw.mode == _TRIANGLES else corners)
+        if DRACO in draw.primitive.get("extensions", {}) and "indices" not in draw.primitive:
+            each = max(1, 2 * points)  # it has its own; a surface has no more, by Euler
         vertices += points * draw.times
-        triangles += max(1, corners // 3 if draw.mode == _TRIANGLES else corners) * draw.times
+        triangles += each * draw.times
         if triangles > max_triangles:
             raise too_many_triangles(max_triangles, document.path)
         if vertices > most:
@@ -165,7 +169,7 @@ def _limited(document: Document, draws: Iterable[_Draw], max_triangles: int) -> 
                 file=document.path,
                 remedy="raise the limit (--max-triangles), or split the model",
             )
-        yield draw
+        yield replace(draw, triangles=each)
 
 
 def _compressed(document: Document, draw: _Draw) -> dict[str, Any] | None:
@@ -227,9 +231,10 @@ class _Values:
         """(k,) of the corners over ``count`` vertices."""
         if self._decoded is not None:
             index = self._decoded.triangles.ravel()
-            told = self._document.tree["accessors"][self._draw.primitive["indices"]]["count"]
-            if len(index) != told:
-                raise ValueError(f"Draco has {len(index)} indices, the accessor {told}")
+            if len(index) // 3 > self._draw.triangles:
+                raise ValueError(
+                    f"Draco has {len(index) // 3} triangles, the accessors {self._draw.triangles}"
+                )
         elif "indices" in self._draw.primitive:
             index = self._document.values(self._draw.primitive["indices"]).ravel().astype(np.int64)
         else:
