@@ -97,12 +97,16 @@ def _read(document: Document, findings: Findings, max_triangles: int) -> Source:
     compressed = [_compressed(document, draw) for draw in draws]
     decoded = decode_primitives(document, (c["bufferView"] for c in compressed if c is not None))
     rows, first, step = Rows(), dict[int, int](), 0.0
+    grids: dict[tuple[bool, int], float] = {}
     for draw, paint, told in zip(draws, painted, compressed, strict=True):
         try:
             values = _Values(document, draw, told, decoded)
             mesh = _mesh(values, draw, paint, findings)
             placed = instances(document, draw.node)
-            grid = values.step("POSITION")
+            key = (True, told["bufferView"]) if told else (False, draw.attributes["POSITION"])
+            if key not in grids:
+                grids[key] = values.step("POSITION")
+            grid = grids[key]
         except ValueError as error:
             raise damaged(path, str(error), draw.place) from None
         if draw.node not in first:
