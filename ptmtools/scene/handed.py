@@ -16,7 +16,7 @@ import numpy as np
 from ptmtools import schemas
 from ptmtools.errors import DatabaseError
 from ptmtools.scene.apart import run_apart, unreadable
-from ptmtools.scene.model import Camera, Storey
+from ptmtools.scene.model import Camera, Storey, fields_of
 from ptmtools.scene.source import (
     FileRange,
     Findings,
@@ -111,7 +111,7 @@ def take_over(
         findings.take(answer["findings"])
         for name in answer["files"]:
             findings.folder.find(name)
-        materials = [SourceMaterial(**_tuples(row)) for row in answer["materials"]]
+        materials = [SourceMaterial(**fields_of(row)) for row in answer["materials"]]
         for number, row in answer["images"].items():
             texture = _texture(NamedImage(**row), model, findings)
             materials[int(number)] = replace(materials[int(number)], texture=texture)
@@ -124,7 +124,7 @@ def take_over(
             triangle_material=stored.indices("triangle_material", np.int64, n, high=len(materials)),
             objects=objects,
             materials=tuple(materials),
-            cameras=tuple(Camera(**_tuples(row)) for row in answer["cameras"]),
+            cameras=tuple(Camera(**fields_of(row)) for row in answer["cameras"]),
             metres=answer["metres"],
             up=answer["up"],
             colors=stored.array("colors", np.uint8, n, 3, 3) if "colors" in arrays else None,
@@ -156,8 +156,3 @@ def _texture(image: NamedImage, model: Path, findings: Findings) -> Texture | No
         wrap_s=image.wrap_s,
         wrap_t=image.wrap_t,
     )
-
-
-def _tuples(row: dict[str, Any]) -> dict[str, Any]:
-    """The fields of a dataclass, of which JSON has made tuples lists."""
-    return {name: tuple(v) if isinstance(v, list) else v for name, v in row.items()}

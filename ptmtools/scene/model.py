@@ -223,7 +223,7 @@ class Scene:
         text = stored.array("about", np.uint8, None).tobytes()
         about = schemas.read(text, schemas.SCENE)
         objects, images = tuple(about["objects"]), tuple(images)
-        materials = tuple(Material(**_fields(row)) for row in about["materials"])
+        materials = tuple(Material(**fields_of(row)) for row in about["materials"])
         if any(material.image >= len(images) for material in materials):
             raise ValueError("a material has an image that is not there")
         points = stored.array("points", np.float64, None, 3, finite=True)
@@ -241,10 +241,10 @@ class Scene:
             materials=materials,
             tolerance=Tolerance.from_arrays(arrays),
             images=images,
-            cameras=tuple(Camera(**_fields(row)) for row in about["cameras"]),
+            cameras=tuple(Camera(**fields_of(row)) for row in about["cameras"]),
             kinds=_kinds(about.get("kinds", []), len(objects)),
             storeys=tuple(Storey(**row) for row in about.get("storeys", [])),
-            space=Space(**_fields(about["space"])),
+            space=Space(**fields_of(about["space"])),
             notes=tuple(Note(**row) for row in about["notes"]),
         )
 
@@ -260,6 +260,6 @@ def _kinds(given: Sequence[Kind], objects: int) -> tuple[Kind, ...]:
     return tuple(given)
 
 
-def _fields(row: Mapping[str, Any]) -> dict[str, Any]:
+def fields_of(row: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of a dataclass, of which JSON has made tuples lists."""
     return {name: tuple(v) if isinstance(v, list) else v for name, v in row.items()}

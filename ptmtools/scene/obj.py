@@ -12,7 +12,6 @@ scanners write; where one has, these take the place of ``Kd``.
 
 from __future__ import annotations
 
-import re
 from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -21,21 +20,16 @@ from pathlib import Path
 from typing import TextIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, LimitError
 from ptmtools.progress import Progress, silent
-from ptmtools.scene.model import Wrap
-from ptmtools.scene.mtl import MapStatement, MtlMaterial, read_mtl
+from ptmtools.scene.obj_materials import resolved
 from ptmtools.scene.painting import painted
 from ptmtools.scene.polygon import triangulate
 from ptmtools.scene.source import (
     MAX_VERTICES,
-    FileRange,
     Findings,
     Source,
-    SourceMaterial,
-    Texture,
     too_many_triangles,
 )
 
@@ -49,8 +43,6 @@ _SILENT = frozenset({
 # fmt: on
 #: Statements that would draw something that is not a surface of triangles.
 _NOT_DRAWN = {"l": "lines", "p": "points", "curv": "curves", "curv2": "curves", "surf": "surfaces"}
-#: The next file of a mtllib statement, which ends as such files do, or all that is left.
-_LIBRARIES = re.compile(r".*?\.mtl[\"']*(?: |$)|.+", re.IGNORECASE)
 _LINES_A_TICK = 1 << 16
 #: Longest line, with those that a backslash joins to it, in characters.
 LONGEST_LINE = 1 << 24
@@ -138,7 +130,8 @@ def read_obj(
     uv = np.zeros((len(coord), 3, 2))
     uv[coord >= 0] = coords[coord[coord >= 0]]
     face_material = np.frombuffer(said.face_material, dtype=np.int64)
-    materials, maps = _materials(path, said, findings, np.unique(face_material))
+    used = set(np.unique(face_material).tolist())
+    materials, maps = resolved(path, said.libraries, said.materials, used, findings)
     triangle_material = face_material[cut.polygon]
     ends = np.cumsum(np.bincount(triangle_material, minlength=len(materials)))
     grouped = np.split(np.argsort(triangle_material, kind="stable"), ends[:-1])
@@ -309,96 +302,3 @@ def _face(said: _Statements, words: list[str]) -> None:
         said.corner_point.append(point - 1)
         said.corner_coord.append(-1 if coord is None else coord - 1)
     said.face_start.append(len(said.corner_point))
-
-
-def _library_names(text: str) -> list[str]:
-    """The files of a mtllib statement: several, divided by blanks that names may contain too."""
-    return [name.strip() for name in _LIBRARIES.findall(text) if name.strip()]
-
-
-def _materials(
-    path: Path, said: _Statements, findings: Findings, used: NDArray[np.int64]
-) -> tuple[tuple[SourceMaterial, ...], dict[int, MapStatement]]:
-    """All materials, and the map_Kd of those that have one."""
-    defined: dict[str, MtlMaterial] = {}
-    read: set[Path] = set()
-    for text, line in said.libraries:
-        place = f"{path.name}:{line}"
-        for name in _library_names(text):
-            suggestion = _suggestion(path, name)
-            file = findings.locate(name, f"mtllib {name}", place, "PTM-N203", hint=suggestion)
-            if file is None or (real := file.resolve()) in read:
-                continue
-            read.add(real)
-            for key, material in read_mtl(file, findings).items():
-                defined.setdefault(key, material)
-
-    materials: list[SourceMaterial] = []
-    maps: dict[int, MapStatement] = {}
-    wanted = set(used.tolist())
-    for name, (index, line) in said.materials.items():
-        known = defined.get(name)
-        if known is None:
-            if name and index in wanted:
-                findings.miss("PTM-N207", f"usemtl {name}: no such material", f"{path.name}:{line}")
-            materials.append(SourceMaterial(name or "default"))
-            continue
-        texture = mask = None
-        if index in wanted:
-            texture = _texture(known, "map_Kd", known.map_kd, findings)
-            mask = _texture(known, "map_d", known.map_d, findings)
-        if texture is not None and known.map_kd is not None:
-            maps[index] = known.map_kd
-        materials.append(
-            SourceMaterial(
-                name=name,
-                color=known.color,
-                opacity=known.dissolve,
-                # A mask that cannot be read: better see too much than too little.
-                see_through=known.dissolve < 1 or (known.map_d is not None and mask is None),
-                texture=texture,
-                mask=mask,
-            )
-        )
-    return tuple(materials), maps
-
-
-def _suggestion(path: Path, name: str) -> str:
-    """What to do about a missing library: a model that was renamed still asks for what its
-    library was called."""
-    beside = [p.name for p in path.absolute().parent.glob("*") if p.suffix.lower() == ".mtl"]
-    if len(beside) != 1:
-        return ""
-    return f"; if {beside[0]} beside the model is meant, rename it to {Path(name).name}"
-
-
-def _texture(
-    material: MtlMaterial, key: str, statement: MapStatement | None, findings: Findings
-) -> Texture | None:
-    if statement is None:
-        return None
-    place = f"{findings.folder.label(material.library)}:{statement.line}"
-    what = f"{key} {statement.file}"
-    file = findings.locate(statement.file, what, place, base=material.library.parent)
-    if file is None:
-        return None
-    if statement.ignored:
-        findings.say("PTM-N215", f"{what}: ignored {' '.join(statement.ignored)}", place)
-    if statement.scale != (1.0, 1.0) or statement.offset != (0.0, 0.0):
-        if key == "map_Kd":
-            findings.say("PTM-N216", f"{what}: -s and -o are baked into its faces", place)
-        elif material.map_kd is None or (statement.scale, statement.offset) != (
-            material.map_kd.scale,
-            material.map_kd.offset,
-        ):
-            findings.say("PTM-N215", f"{what}: ignored -s -o", place)
-    wrap: Wrap = "clamp" if statement.clamp else "repeat"
-    return Texture(
-        read=FileRange(file),
-        label=file.name,
-        what=what,
-        place=place,
-        wrap_s=wrap,
-        wrap_t=wrap,
-        channel=statement.channel,
-    )

@@ -27,6 +27,7 @@ from ptmtools.scene import (
     ingest,
     mtl as mtl_module,
     obj as obj_module,
+    obj_materials as materials_module,
 )
 from ptmtools.scene.gltf import document as gltf_document
 from ptmtools.scene.images import ImageStore
@@ -325,8 +326,8 @@ def test_limits_are_no_part_of_what_a_stage_was_told() -> None:
 
 
 def test_a_library_is_read_once(put: Put, monkeypatch: pytest.MonkeyPatch) -> None:
-    read = Mock(wraps=obj_module.read_mtl)
-    monkeypatch.setattr(obj_module, "read_mtl", read)
+    read = Mock(wraps=materials_module.read_mtl)
+    monkeypatch.setattr(materials_module, "read_mtl", read)
     put("a.mtl", "newmtl a\nKd 1 0 0\n")
     put("x/b.mtl", "newmtl b\n")
     names = ["a.mtl", "A.MTL", "./a.mtl", "x/../a.mtl", "/tmp/a.mtl"] * 200

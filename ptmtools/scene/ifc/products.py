@@ -23,7 +23,6 @@ import numpy as np
 
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError
-from ptmtools.lazy import component
 from ptmtools.scene.apart import serve, unreadable
 from ptmtools.scene.handed import hand_over
 from ptmtools.scene.ifc.classes import drawn, is_part, kind_of
@@ -208,7 +207,8 @@ def _errors() -> Iterator[tuple[str, str]]:
 
 def _open(path: str, findings: Findings) -> Any:
     """Raises InputError PTM-I269 for an unknown schema, PTM-I254 for what is none."""
-    library = component("ifcopenshell", "PTM-M201", "IFC is read through ifcopenshell", "ifc")
+    import ifcopenshell as library
+
     try:
         file = library.open(path)
     except library.SchemaError as error:

@@ -59,18 +59,16 @@ def read_ifc(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) 
             file = _unpacked(path, Path(scratch))
         _check(file)
         if not find_spec("ifcopenshell"):
-            raise missing()
+            raise MissingComponentError(
+                "PTM-M201",
+                "IFC is read through ifcopenshell",
+                file=path,
+                remedy="pip install 'ptmtools[ifc]'",
+            )
         arguments = str(file), str(max_triangles)
         module = "ptmtools.scene.ifc.products"
         beside = 0 if file == path.absolute() else file.stat().st_size
         return take_over(module, "ifcopenshell", path, findings, scratch, *arguments, beside=beside)
-
-
-def missing() -> MissingComponentError:
-    """The error where the library is not there, PTM-M201."""
-    return MissingComponentError(
-        "PTM-M201", "IFC is read through ifcopenshell", remedy="pip install 'ptmtools[ifc]'"
-    )
 
 
 def _check(file: Path) -> None:

@@ -42,22 +42,22 @@ def building() -> tuple[Gltf, list[np.ndarray]]:
     return doc, parts
 
 
-def plain(put: Put) -> Scene:
+def floats() -> Gltf:
+    """All as it is."""
     doc, parts = building()
     for n, part in enumerate(parts):
         points = part.reshape(-1, 3).astype(np.float32)
         where = {"POSITION": doc.add(points), "TEXCOORD_0": doc.add(points[:, :2].copy())}
         doc.place({"attributes": where, "material": n % 2}, name=f"part {n}")
-    return ingest(put("plain.glb", doc.glb()))
+    return doc
+
+
+def plain(put: Put) -> Scene:
+    return ingest(put("plain.glb", floats().glb()))
 
 
 def by_meshopt(put: Put) -> Scene:
-    doc, parts = building()
-    for n, part in enumerate(parts):
-        points = part.reshape(-1, 3).astype(np.float32)
-        where = {"POSITION": doc.add(points), "TEXCOORD_0": doc.add(points[:, :2].copy())}
-        doc.place({"attributes": where, "material": n % 2}, name=f"part {n}")
-    return ingest(put("meshopt.glb", compressed(doc, "KHR_meshopt_compression", 1).glb()))
+    return ingest(put("meshopt.glb", compressed(floats(), "KHR_meshopt_compression", 1).glb()))
 
 
 def by_draco(put: Put) -> Scene:
