@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from ptmtools.database import (
         EmitOptions as EmitOptions,
         PlotOptions as PlotOptions,
-        ValidationReport as ValidationReport,
         emit as emit,
         plot_plan as plot_plan,
     )
@@ -42,6 +41,7 @@ if TYPE_CHECKING:
         OutputError as OutputError,
         PtmError as PtmError,
     )
+    from ptmtools.findings import ValidationReport as ValidationReport
     from ptmtools.pipeline import (
         Artifacts as Artifacts,
         BuildReport as BuildReport,

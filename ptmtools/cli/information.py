@@ -1,4 +1,4 @@
-"""`ptm info`: what is in a model, a database or a `.ptm` file."""
+"""`ptm info`: what is in a model, a database, another folder that `ptm` wrote, or a `.ptm` file."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from ptmtools.cli.common import as_json, voiced
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
 from ptmtools.errors import InputError, naming
+from ptmtools.pipeline.folders import FolderKind, kind_of
 from ptmtools.quantities import count, size
 from ptmtools.scene.options import SUFFIXES, IngestOptions
 from ptmtools.texture.model import Description, PtmHeader, gpu_texel_bytes
@@ -39,13 +40,26 @@ def info(voice: Voice, target: str, as_json: bool, **values: Any) -> None:
     if not target:
         raise no_name()
     if target != STANDARD and Path(target).is_dir():
-        _info_database(voice, target, as_json)
+        if kind := kind_of(Path(target)):
+            _info_folder(voice, Path(target), kind, as_json)
+        else:
+            _info_database(voice, target, as_json)
     elif Path(target).suffix.lower() in SUFFIXES:
         from ptmtools.cli.models import info_model
 
         info_model(voice, target, take(IngestOptions, values), as_json)
     else:
         _info_ptm(voice, target, as_json)
+
+
+def _info_folder(voice: Voice, folder: Path, kind: FolderKind, as_json: bool) -> None:
+    lines, record = kind.describe.load()(folder)
+    if as_json:
+        voice.emit_json(record)
+        return
+    voice.say(f"{folder}: {kind.about}")
+    for line in lines:
+        voice.say(line)
 
 
 def _info_database(voice: Voice, target: str, as_json: bool) -> None:

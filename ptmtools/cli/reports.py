@@ -1,4 +1,4 @@
-"""The commands that check a database or a `.ptm` file, and that draw a database."""
+"""The commands that check what was written, and that draw a database."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ from ptmtools.cli.batch import no_name
 from ptmtools.cli.common import as_json, database, forced, limited, voiced, workers
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
-from ptmtools.database import PlotOptions, ValidationReport
+from ptmtools.database import PlotOptions
 from ptmtools.database.validation.findings import NOT_BUILT, SEEN_BY_BUILD
 from ptmtools.errors import CheckError
+from ptmtools.findings import ValidationReport
 from ptmtools.pipeline import Artifacts, shoot_segments, validate as check
 from ptmtools.pipeline.command import build_command, open_database
+from ptmtools.pipeline.folders import FOLDERS, kind_of
 from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Limits
@@ -34,7 +36,9 @@ def _print_codes(context: click.Context, option: click.Option, asked: bool) -> N
     if asked:
         from ptmtools.database.validation.findings import CODES
 
-        for code, (severity, meaning) in sorted(CODES.items()):
+        tables = (CODES, *(kind.codes.load() for kind in FOLDERS.values()))
+        every = {code: found for table in tables for code, found in table.items()}
+        for code, (severity, meaning) in sorted(every.items()):
             click.echo(f"{code}  {severity:<7}  {meaning}")
         context.exit()
 
@@ -71,7 +75,7 @@ def validate(
     workers: int,
     as_json: bool,
 ) -> None:
-    """Check a database or a .ptm file.
+    """Check a database, another folder that ptm has written, or a .ptm file.
 
     Prints the worst finding of each file first, and ends with the command that repairs them. The
     exit status is 8 if there is an error.
@@ -198,6 +202,8 @@ def _repair(target: str, report: ValidationReport) -> str | None:
     if not Path(target).is_dir():
         again = f"ptm encode IMAGE -o {shlex.quote(target)} --force"
         return again if target.endswith(".ptm") else None
+    if kind := kind_of(Path(target)):
+        return f"{kind.again} -o {shlex.quote(target)} --force"
     if "PTM-D650" in codes:
         return f"{build_command(target)} --rebuild --force"
     # A file that is as it was written is made again only when that is asked for.

@@ -12,11 +12,9 @@ if TYPE_CHECKING:
         EmitOptions as EmitOptions,
         EmitReport as EmitReport,
         GivenViewpoint as GivenViewpoint,
-        Issue as Issue,
         PlotOptions as PlotOptions,
         PlotReport as PlotReport,
         TextureRecord as TextureRecord,
-        ValidationReport as ValidationReport,
         Viewpoint as Viewpoint,
     )
     from ptmtools.database.plans.plan import plot_plan as plot_plan

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from ptmtools.database.emitters import EMITTERS, chosen_emitters
 from ptmtools.errors import InputError
@@ -207,75 +207,6 @@ class EmitReport:
     first_look: int
     visit: Visit
     notes: tuple[str, ...] = ()
-
-
-Severity = Literal["error", "warning"]
-
-
-@dataclass(frozen=True)
-class Issue:
-    """One finding of a validation; the codes stand in docs/database.md.
-
-    Attributes
-    ----------
-    code: stable identifier, PTM-D650 and up.
-    severity: an error makes the file wrong, a warning makes it doubtful.
-    file: relative to the database, or the path that was given.
-    place: where in the file, "" for all of it.
-    message: one line.
-    count: faults that it stands for, see `ptmtools.database.validation`.
-    """
-
-    code: str
-    severity: Severity
-    file: str
-    place: str
-    message: str
-    count: int = 1
-
-    def __str__(self) -> str:
-        where = f"{self.file}: {self.place}" if self.place else self.file
-        return f"{where}: {self.severity}: {self.message} [{self.code}]"
-
-
-@dataclass(frozen=True)
-class ValidationReport:
-    """
-    Attributes
-    ----------
-    issues: errors and warnings, by file, the worst of each first.
-    files: how many files were read.
-    bytes: how many bytes they hold.
-    notes: what else there is to say, one line each.
-    """
-
-    issues: tuple[Issue, ...]
-    files: int
-    bytes: int
-    notes: tuple[str, ...] = ()
-
-    @property
-    def errors(self) -> tuple[Issue, ...]:
-        return tuple(i for i in self.issues if i.severity == "error")
-
-    @property
-    def warnings(self) -> tuple[Issue, ...]:
-        return tuple(i for i in self.issues if i.severity == "warning")
-
-    @property
-    def error_count(self) -> int:
-        """Errors, those summed up included."""
-        return sum(i.count for i in self.errors)
-
-    @property
-    def warning_count(self) -> int:
-        """Warnings, likewise."""
-        return sum(i.count for i in self.warnings)
-
-    @property
-    def ok(self) -> bool:
-        """Whether there is no error."""
-        return not self.errors
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ import os
 from collections.abc import Collection
 from typing import Any
 
-from ptmtools.database.model import Issue
-from ptmtools.database.validation.findings import Findings
+from ptmtools.database.validation.findings import CODES
 from ptmtools.errors import DatabaseError
+from ptmtools.findings import Findings, Issue
 from ptmtools.pipeline.run import Artifacts
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import STAGES
@@ -25,7 +25,7 @@ from ptmtools.store.layout import MANIFEST
 def check_stages(db: DatabaseFolder, astray: Collection[str] = ()) -> tuple[Issue, ...]:
     """What is wrong with the stages that have run. ``astray`` are files of which that is known,
     relative to the database: what needs them is passed over."""
-    found = Findings()
+    found = Findings(CODES)
     for name in db.manifest.stages.keys() - STAGES.keys():
         found.add("PTM-D650", MANIFEST, f"stages.{name}", "this ptmtools has no such stage")
     together = Artifacts(db)

@@ -1,4 +1,4 @@
-"""The check of a database or a `.ptm` file, whichever it is given."""
+"""The check of a database, of another folder that ptmtools writes, or of a `.ptm` file."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells import Cells, structural_triangles
-from ptmtools.database import ValidationReport, validate_database, validate_ptm
-from ptmtools.database.validation.findings import worst_first
+from ptmtools.database import validate_database, validate_ptm
 from ptmtools.errors import DatabaseError
+from ptmtools.findings import ValidationReport, worst_first
 from ptmtools.pipeline.command import open_database
+from ptmtools.pipeline.folders import kind_of
 from ptmtools.pipeline.run import Artifacts
 from ptmtools.pipeline.stagecheck import check_stages
 from ptmtools.pipeline.stages import CELLS, PVS, SCENE
@@ -31,7 +32,7 @@ def validate(
     limits: Limits = _LIMITS,
     workers: int = 0,
 ) -> ValidationReport:
-    """Checks a database folder or a `.ptm` file; what is wrong stands in the report.
+    """Checks a database, a folder of `FOLDERS` or a `.ptm` file; what is wrong is in the report.
 
     ``limits`` and ``workers`` as for `validate_database`.
 
@@ -43,6 +44,8 @@ def validate(
     file = Path(target)
     if not file.is_dir() and (file.exists() or file.suffix == ".ptm"):
         return validate_ptm(target, limits=limits)
+    if kind := kind_of(file):
+        return kind.check.load()(file, limits)
     db = None
     try:
         db = open_database(target)

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.validation.findings import Place
 from ptmtools.database.validation.lists import check_list, check_shares
 from ptmtools.database.validation.solids import (
     MOST_CORNERS,
@@ -22,6 +21,7 @@ from ptmtools.database.validation.solids import (
 from ptmtools.database.vrml.hull import convex_hull
 from ptmtools.database.vrml.reader import Document, Node
 from ptmtools.errors import DatabaseError
+from ptmtools.findings import Place
 from ptmtools.tolerance import Tolerance
 
 #: How far the ach values as written, single precision, may sum up beside 1.

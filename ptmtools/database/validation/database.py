@@ -19,15 +19,16 @@ import numpy as np
 
 from ptmtools import schemas
 from ptmtools.database.emitters import Emitter, all_emitters, chosen_emitters, owner_of
-from ptmtools.database.model import EmitOptions, ValidationReport
+from ptmtools.database.model import EmitOptions
 from ptmtools.database.names import HINTS, TEXTURE_FOLDER
 from ptmtools.database.validation.files import check_names, served_files
-from ptmtools.database.validation.findings import Findings, one_line
+from ptmtools.database.validation.findings import CODES
 from ptmtools.database.validation.reading import FileReader
 from ptmtools.database.validation.served import ServedDatabase
 from ptmtools.database.validation.textures import ReadTexture, check_ptm
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.files import open_regular
+from ptmtools.findings import Findings, ValidationReport, one_line
 from ptmtools.progress import Progress, silent
 from ptmtools.quantities import count
 from ptmtools.store.layout import MANIFEST, SERVED
@@ -74,7 +75,7 @@ def validate_ptm(path: str | os.PathLike[str], *, limits: Limits = _LIMITS) -> V
 
     Raises InputError: PTM-I602 if it cannot be read. All else stands in the report.
     """
-    file, found = Path(path), Findings()
+    file, found = Path(path), Findings(CODES)
     at = found.at(os.fspath(path))
     try:
         size = os.stat(file).st_size
@@ -97,7 +98,7 @@ class _Check:
     """One validation of one database."""
 
     def __init__(self, folder: Path, limits: Limits) -> None:
-        self.found = Findings()
+        self.found = Findings(CODES)
         self.notes: tuple[str, ...] = ()
         self.files = 0
         self.bytes = 0

@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Iterable
 from pathlib import Path
 
-from ptmtools.database.validation.findings import Findings, Place
+from ptmtools.findings import Findings, Place
 from ptmtools.store.layout import SERVED
 
 #: What zlib calls a stream with the header and the checksum of gzip.

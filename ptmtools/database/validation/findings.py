@@ -1,12 +1,8 @@
-"""What a validation can find: every code with its severity and meaning, and who gathers them."""
+"""What a validation of a database can find: every code with its severity and meaning."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable
-from dataclasses import dataclass
-
-from ptmtools.database.model import Issue, Severity
+from ptmtools.findings import Severity
 
 #: Code → (severity, what it means). docs/database.md repeats this table.
 CODES: dict[str, tuple[Severity, str]] = {
@@ -98,75 +94,3 @@ CODES: dict[str, tuple[Severity, str]] = {
 SEEN_BY_BUILD = frozenset(f"PTM-D{n}" for n in (651, 652, 654, 655, 656, 740))
 #: What no build can mend: files of others, too little memory, and what the model is like.
 NOT_BUILT = frozenset(f"PTM-D{n}" for n in (653, 657, 658, 675, 703, 708, 713))
-
-
-class Findings:
-    """Gathers issues. The first few of one code in a file are kept one by one, the others counted.
-
-    Messages come from files that may hold anything: they are made printable, and cut.
-    """
-
-    #: Issues of one code kept one by one, per file.
-    MOST = 5
-    #: Characters of a place or message.
-    LONGEST = 300
-
-    def __init__(self) -> None:
-        self._issues: dict[tuple[str, str], list[Issue]] = {}
-        self._more: Counter[tuple[str, str]] = Counter()
-
-    def add(self, code: str, file: str, place: str, message: str) -> None:
-        """One issue; its severity is the code's."""
-        severity, _ = CODES[code]
-        self.take([Issue(code, severity, one_line(file), one_line(place), one_line(message))])
-
-    def at(self, file: str, place: str = "") -> Place:
-        """Who adds what is found there."""
-        return Place(self, file, place)
-
-    def take(self, issues: Iterable[Issue]) -> None:
-        """Issues that others found."""
-        for issue in issues:
-            key = (issue.file, issue.code)
-            kept = self._issues.setdefault(key, [])
-            if len(kept) < self.MOST and issue.count == 1:
-                kept.append(issue)
-            else:
-                self._more[key] += issue.count
-
-    def issues(self) -> tuple[Issue, ...]:
-        """All of them, see `worst_first`."""
-        found = [issue for kept in self._issues.values() for issue in kept]
-        for (file, code), more in self._more.items():
-            message = f"{more} more of these"
-            found.append(Issue(code, CODES[code][0], file, "", message, more))
-        return worst_first(found)
-
-
-@dataclass(frozen=True)
-class Place:
-    """A place in a file, relative to the database, or all of the file; and who is told of it."""
-
-    found: Findings
-    file: str
-    place: str = ""
-
-    def add(self, code: str, message: str, place: str = "") -> None:
-        """One issue, here or at another place in the file."""
-        self.found.add(code, self.file, place or self.place, message)
-
-    def at(self, place: str) -> Place:
-        """Another place in the file."""
-        return Place(self.found, self.file, place)
-
-
-def worst_first(issues: Iterable[Issue]) -> tuple[Issue, ...]:
-    """By file; of each the errors before the warnings, by code: what is wrong with a file as a
-    whole has the lowest ones."""
-    return tuple(sorted(issues, key=lambda i: (i.file, i.severity != "error", i.code, i.count > 1)))
-
-
-def one_line(text: str) -> str:
-    """Text on one line that any terminal prints."""
-    text = text if len(text) <= Findings.LONGEST else f"{text[: Findings.LONGEST]}…"
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

@@ -17,9 +17,9 @@ from ptmtools.database.gltf.cell import flipped
 from ptmtools.database.gltf.material import WRAPS, linear
 from ptmtools.database.gltf.reader import ReadGlb, ReadMaterial, ReadPrimitive, read_glb
 from ptmtools.database.names import CELL_FOLDER, GLTF_FOLDER, UP, cell_name
-from ptmtools.database.validation.findings import Place
 from ptmtools.database.validation.served import ServedDatabase
 from ptmtools.database.vrml.reader import Document, Node
+from ptmtools.findings import Place
 from ptmtools.scene.colors import to_srgb
 
 #: How far a colour may be off that went through the decimals of VRML.

@@ -16,13 +16,13 @@ from ptmtools.database.fault import FileError, shaped
 from ptmtools.database.hints.index import SCHEMA
 from ptmtools.database.hints.record import FORMAT
 from ptmtools.database.names import BUNDLE, HINTS, HINTS_FOLDER, STATISTICS, path_of
-from ptmtools.database.validation.findings import Place
 from ptmtools.database.validation.first_look import check_first_looks
 from ptmtools.database.validation.lists import check_graph, check_list, check_shares
 from ptmtools.database.validation.need import impossible_need
 from ptmtools.database.validation.served import ServedDatabase
 from ptmtools.database.validation.space import check_space
 from ptmtools.database.validation.textures import check_record
+from ptmtools.findings import Place
 
 #: How far sums of statistics, which are rounded, may be off.
 ROUNDED = 1e-3

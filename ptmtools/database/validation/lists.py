@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.validation.findings import Place
+from ptmtools.findings import Place
 
 
 def check_list(name: str, own: Any, entries: Sequence[Any], at: Place) -> None:

@@ -13,9 +13,10 @@ import numpy as np
 from ptmtools.database.emitters import GZIP, owner_of
 from ptmtools.database.fault import FileError
 from ptmtools.database.validation.files import check_gzip
-from ptmtools.database.validation.findings import Findings, Place
+from ptmtools.database.validation.findings import CODES
 from ptmtools.database.validation.textures import read_png, read_texture
 from ptmtools.files import open_regular
+from ptmtools.findings import Findings, Place
 from ptmtools.store.layout import SERVED
 from ptmtools.texture.model import Limits
 
@@ -61,7 +62,7 @@ class FileReader:
 
     def read(self, name: str) -> FileReading:
         """A file, named relative to the database."""
-        found = Findings()
+        found = Findings(CODES)
         reading, at = FileReading(found), found.at(name)
         served = name.startswith(f"{SERVED}/")
         if served and not self._is_served(name):

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.validation.findings import Place
 from ptmtools.database.vrml.pattern import PATTERN
 from ptmtools.database.vrml.reader import Document
+from ptmtools.findings import Place
 from ptmtools.tolerance import PARALLEL_COSINE
 
 

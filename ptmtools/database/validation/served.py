@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote_to_bytes
 
 from ptmtools.database.names import CELL_FOLDER
-from ptmtools.database.validation.findings import Findings, Place
 from ptmtools.database.validation.textures import ReadTexture
 from ptmtools.files import open_regular
+from ptmtools.findings import Findings, Place
 from ptmtools.store.layout import SERVED
 
 if TYPE_CHECKING:

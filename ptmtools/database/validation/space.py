@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.validation.findings import Place
 from ptmtools.database.validation.solids import (
     Planes,
     Points,
@@ -20,6 +19,7 @@ from ptmtools.database.validation.solids import (
     polygon_plane,
     solid_planes,
 )
+from ptmtools.findings import Place
 from ptmtools.tolerance import TIE_SHARE, Tolerance
 
 Row = Mapping[str, Any]

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.validation.findings import Place
 from ptmtools.errors import LimitError, PtmError
+from ptmtools.findings import Place
 from ptmtools.texture.model import gpu_texel_bytes
 
 if TYPE_CHECKING:
