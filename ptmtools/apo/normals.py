@@ -103,7 +103,7 @@ def _angles(cosine: Floats) -> Floats:
     x = np.minimum(np.abs(cosine), 1.0)
     a, b, c, d = ARCCOS
     angle = np.sqrt(1 - x) * (a + x * (b + x * (c + x * d)))
-    return np.where(cosine < 0, math.pi - angle, angle)
+    return np.asarray(np.where(cosine < 0, math.pi - angle, angle))
 
 
 @plain_kernel
