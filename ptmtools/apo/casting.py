@@ -1,4 +1,4 @@
-"""From a point of the simplified mesh to the point of the source that it stands for (paper 2, §3.1).
+"""From points of the simplified mesh to those of the source that they stand for (paper 2, §3.1).
 
 Rays go both ways along the normal; the nearest hit that faces the same way counts. A surface that
 faces away is the other side of something thin, or the far side of a hole, and is passed through.
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.apo.painting import Paint
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 
 #: Rays begin so far behind their point, and go on so far behind what they pass through: sixteen
@@ -32,13 +33,13 @@ class Source:
     ----------
     points: (V, 3) float32. triangles: (T, 3) int32.
     normals: (T, 3, 3) float32 unit normals of the corners.
-    colors: (T, 3, 3) uint8 sRGB of the corners, or None.
+    paint: of the triangles, if colours are kept.
     """
 
     points: Singles
     triangles: NDArray[np.int32]
     normals: Singles
-    colors: NDArray[np.uint8] | None = None
+    paint: Paint | None = None
 
     @cached_property
     def facing(self) -> Singles:

@@ -1,226 +1,126 @@
-"""From a mesh and its simplification to the octree of its normals (paper 2, §3.1).
+"""From a model of many triangles to a simplified mesh and the octree of its normals.
 
-The simplified mesh is sampled in blocks of the octree, each a task that needs no other: so memory
-stays bounded and processors share the work. What a block holds does not depend on who does it.
-Blocks begin at a fixed depth; the levels above are divided by the sums of the cells there.
+The steps of paper 2, §3.1: the mesh is brought into a cube and simplified; the simplified mesh is
+sampled, and rays find what of the source each sample stands for; the octree is divided until the
+normals in a leaf are alike.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ptmtools.apo.casting import Source, nearest
-from ptmtools.apo.cube import Codes, codes_of
-from ptmtools.apo.octree import (
-    Bounds,
-    Level,
-    Samples,
-    averaged,
-    divide,
-    joined,
-    popcount,
-    pruned,
-)
-from ptmtools.apo.sampling import at, spread
-from ptmtools.arrays import Floats, Ints
+from ptmtools.apo.blocks import Surface, Work, build
+from ptmtools.apo.casting import Source
+from ptmtools.apo.cube import Cube, cube_around
+from ptmtools.apo.model import ApoOptions, Octree
+from ptmtools.apo.normals import CREASE, corner_normals
+from ptmtools.apo.octree import Bounds
+from ptmtools.apo.painting import paint_of
+from ptmtools.apo.sampling import areas
+from ptmtools.apo.texels import octree_of
+from ptmtools.arrays import Floats
 from ptmtools.executors import Executor
 from ptmtools.progress import Progress, silent
+from ptmtools.scene.model import Scene
+from ptmtools.simplification import Mesh, SimplifyOptions, simplify
 
-#: Depth of the cells that blocks are made of: 1/16 of the cube wide.
-CELLS = 4
-#: Samples of a block, unless a single cell has more.
-MOST = 1 << 19
+#: The longest edge of a triangle that is sampled as one, as a share of the cube: two cells of the
+#: blocks, so that a triangle lies in few of them.
+_LONGEST = 0.125
 
 
 @dataclass(frozen=True)
-class Surface:
-    """What is sampled, in the cube.
+class Simple:
+    """A simplified mesh.
 
     Attributes
     ----------
-    corner, normal: (m, 3, 3) float64 corners, and their unit normals, of triangles.
+    points: (V, 3) float64, in the units of the source. triangles: (T, 3) int32.
+    normals: (T, 3, 3) float32 unit normals of the corners.
     """
 
-    corner: Floats
-    normal: Floats
-
-    def cut_up(self, longest: float) -> Surface:
-        """The same of triangles none of whose edges is longer."""
-        corner, normal, done = self.corner, self.normal, []
-        while len(corner):
-            edges = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2)
-            large = edges.max(axis=1) > longest
-            done.append((corner[~large], normal[~large]))
-            corner, normal = (_quartered(values[large]) for values in (corner, normal))
-        return Surface(*(np.concatenate(part) for part in zip(*done, strict=True)))
+    points: Floats
+    triangles: NDArray[np.int32]
+    normals: NDArray[np.float32]
 
 
 @dataclass(frozen=True)
-class Work:
-    """What all blocks share.
+class Made:
+    """What `make_apo` makes.
 
     Attributes
     ----------
-    source, surface: where normals come from, and what is sampled. spacing: of samples.
-    bounds: of the leaves. colored: whether colours are kept.
+    mesh, octree: see their classes.
+    source: triangles of the source.
+    deviation: of the simplified mesh from the source, in its units, as the quadrics estimate it.
+    missed: share of the samples from which no ray found the source.
+    options: what it was made with.
+    notes: what there is to say, one line each.
     """
 
-    source: Source
-    surface: Surface
-    spacing: float
-    bounds: Bounds
-    colored: bool
-
-    @property
-    def top(self) -> int:
-        """Depth of the cells."""
-        return min(CELLS, self.bounds.depth)
+    mesh: Simple
+    octree: Octree
+    source: int
+    deviation: float
+    missed: float
+    options: ApoOptions
+    notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Block:
-    """A range of cells, and the triangles that have samples in it."""
+def make_apo(
+    scene: Scene, options: ApoOptions, executor: Executor, progress: Progress = silent
+) -> Made:
+    """The simplified mesh and the octree texture of all triangles of a scene.
 
-    first: int
-    last: int
-    triangles: Ints
-
-
-@dataclass(frozen=True)
-class Found:
-    """What a block holds.
-
-    Attributes
-    ----------
-    levels: from the cells down. cells: sums of each, as samples of the depth of the cells.
-    missed: samples that no ray found the source from.
+    Raises
+    ------
+    LimitError: PTM-L840 the octree has too many texels.
+    MissingComponentError: PTM-M101 ``method`` asks for pymeshlab, which cannot be loaded.
     """
-
-    levels: list[Level]
-    cells: Samples
-    missed: int
-
-
-def build(work: Work, executor: Executor, progress: Progress = silent) -> tuple[list[Level], float]:
-    """The levels of the octree, from the root on, and the share of the samples that no ray found
-    the source from, whose normals are the simplified mesh's own."""
-    blocks = list(_blocks(work))
-    found = []
-    for done, each in enumerate(executor.each(_block, work, blocks)):
-        progress(done, len(blocks), "casting rays")
-        found.append(each)
-    progress(len(blocks), len(blocks), "casting rays")
-    cells = Samples(*(np.concatenate(rows) for rows in zip(*(f.cells for f in found), strict=True)))
-    width = cells.value.shape[1]
-    # The cells themselves are divided by their own samples, whatever is done above them.
-    above = divide(cells, 0, work.top, work.bounds)
-    kept = above[work.top].code if len(above) > work.top else np.zeros(0, np.uint64)
-    below = joined([pruned(each.levels, kept, 0) for each in found], width)
-    levels = [*above[: work.top], *(level for level in below if len(level.code))]
-    total = int(cells.count.sum())
-    return averaged(levels), sum(each.missed for each in found) / max(total, 1)
-
-
-def _quartered(values: Floats) -> Floats:
-    """(4m, 3, 3) values of the corners of the quarters of triangles."""
-    a, b, c = values[:, 0], values[:, 1], values[:, 2]
-    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
-    parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-    found: Floats = np.stack([np.stack(p, axis=1) for p in parts], axis=1).reshape(-1, 3, 3)
-    return found
-
-
-def _blocks(work: Work) -> Iterator[Block]:
-    corner = work.surface.corner
-    triangle, cell, count = [], [], []
-    for chosen in _batches(corner, work.spacing):
-        points = spread(corner[chosen], work.spacing)
-        code = codes_of(at(corner[chosen], points), work.top).astype(np.int64)
-        pairs = chosen[points.triangle] << (3 * CELLS) | code
-        both, n = np.unique(pairs, return_counts=True)
-        triangle.append(both >> (3 * CELLS))
-        cell.append(both & ((1 << 3 * CELLS) - 1))
-        count.append(n)
-    triangles, cells = np.concatenate(triangle), np.concatenate(cell)
-    samples = np.bincount(cells, np.concatenate(count), 1 << 3 * work.top)
-    first, held = 0, 0.0
-    for code in range(len(samples)):
-        if held and held + samples[code] > MOST:
-            yield Block(first, code, _touching(triangles, cells, first, code))
-            first, held = code, 0.0
-        held += samples[code]
-    yield Block(first, len(samples), _touching(triangles, cells, first, len(samples)))
-
-
-def _touching(triangles: Ints, cells: Ints, first: int, last: int) -> Ints:
-    return np.unique(triangles[(cells >= first) & (cells < last)])
-
-
-def _batches(corner: Floats, spacing: float) -> Iterator[Ints]:
-    """Triangles in runs of about `MOST` samples."""
-    area = np.linalg.norm(
-        np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1
+    points, triangles = welded(scene.points, scene.triangles)
+    progress(0, 1, "simplifying")
+    simplified = simplify(Mesh(points, triangles), SimplifyOptions(options.faces, options.method))
+    progress(1, 1, "simplifying")
+    mesh, cube = simplified.mesh, cube_around(np.concatenate([points, simplified.mesh.points]))
+    source = Source(
+        cube.inside(points).astype(np.float32),
+        triangles,
+        corner_normals(points, triangles).astype(np.float32),
+        paint_of(scene) if options.color else None,
     )
-    run = (np.cumsum(area / (2 * spacing**2) + 1) // MOST).astype(np.int64)
-    yield from np.split(np.arange(len(corner)), np.flatnonzero(np.diff(run)) + 1)
-
-
-def _block(work: Work, block: Block) -> Found:
-    corner, normal = (v[block.triangles] for v in (work.surface.corner, work.surface.normal))
-    points = spread(corner, work.spacing)
-    q = at(corner, points)
-    code = codes_of(q, work.bounds.depth)
-    cell = (code >> np.uint64(3 * (work.bounds.depth - work.top))).astype(np.int64)
-    here = np.flatnonzero((cell >= block.first) & (cell < block.last))
-    here = here[np.argsort(code[here], kind="stable")]
-    code, q = code[here], q[here]
-    own = _unit(at(normal, type(points)(points.triangle[here], points.weight[here])))
-    hits = nearest(work.source, q, own)
-    value = _values(work, hits.triangle, hits.weight, own)
-    square = (value[:, 3:] ** 2).sum(axis=1)
-    ones = np.ones(len(code), np.int64)
-    samples = Samples(code, ones, value, square)
-    levels = divide(samples, work.top, work.bounds.depth, work.bounds)
-    return Found(levels, _summed(samples, work), int((hits.triangle < 0).sum()))
-
-
-def _values(work: Work, triangle: Ints, weight: Floats, own: Floats) -> Floats:
-    """(n, k) unit normals and colours of the source; where no ray has hit, the mesh's own normal
-    and mid-grey."""
-    hit, source = triangle >= 0, work.source
-    found = np.full((len(triangle), 6 if work.colored else 3), 0.5)
-    found[:, :3] = own
-    of, share = triangle[hit], weight[hit].astype(np.float64)
-    normal = np.einsum("ij,ijk->ik", share, source.normals[of].astype(np.float64))
-    found[hit, :3] = _unit(normal, own[hit])
-    if work.colored and source.colors is not None:
-        found[hit, 3:] = np.einsum("ij,ijk->ik", share, source.colors[of] / 255.0)
-    return found
-
-
-def _unit(vectors: Floats, otherwise: Floats | None = None) -> Floats:
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    other = np.array([0.0, 1.0, 0.0]) if otherwise is None else otherwise
-    found: Floats = np.where(length > 0, vectors / np.where(length > 0, length, 1), other)
-    return found
-
-
-def _summed(samples: Samples, work: Work) -> Samples:
-    """The sums of the samples of each cell."""
-    cell: Codes = samples.code >> np.uint64(3 * (work.bounds.depth - work.top))
-    first = np.flatnonzero(np.diff(cell, prepend=~np.uint64(0)))
-    count, value, square = (
-        np.add.reduceat(v, first, axis=0) if len(first) else v[:0]
-        for v in (samples.count, samples.value, samples.square)
+    surface = surface_of(mesh.points, mesh.triangles, cube)
+    total = float(areas(surface.corner).sum())
+    work = Work(
+        source,
+        surface,
+        float(np.sqrt(total / (options.density * len(triangles)))),
+        Bounds(options.error, options.color_error, options.depth),
     )
-    return Samples(cell[first], count, value, square)
+    levels, missed = build(work, executor, progress)
+    normals = corner_normals(mesh.points, mesh.triangles, CREASE).astype(np.float32)
+    return Made(
+        Simple(mesh.points, mesh.triangles, normals),
+        octree_of(levels, cube),
+        len(triangles),
+        simplified.error,
+        missed,
+        options,
+        simplified.notes,
+    )
 
 
-def texel_count(levels: list[Level]) -> int:
-    """How many texels an octree takes."""
-    return sum(len(level.code) + int((level.children > 0).sum()) for level in levels)
+def surface_of(points: Floats, triangles: NDArray[np.int32], cube: Cube) -> Surface:
+    """What is sampled of a mesh. Its normals are smooth everywhere, creases too: between rays that
+    spread apart at an edge a part of the source would be left out."""
+    smooth = corner_normals(points, triangles, 180.0)
+    return Surface(cube.inside(points)[triangles], smooth).cut_up(_LONGEST)
 
 
+def welded(points: Floats, triangles: NDArray[np.int32]) -> tuple[Floats, NDArray[np.int32]]:
+    """The same triangles over points each of which is there once."""
+    rows = np.ascontiguousarray(points + 0.0).view([("", np.float64)] * 3).ravel()
+    _, first, number = np.unique(rows, return_index=True, return_inverse=True)
+    return points[first], number.reshape(-1)[triangles].astype(np.int32)

@@ -14,7 +14,6 @@ a node is a range of them, and its sums differences of running sums.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +34,8 @@ class Bounds:
     depth: int
 
 
-class Samples(NamedTuple):
+@dataclass(frozen=True)
+class Samples:
     """Samples, or groups of them, sorted by their codes.
 
     Attributes
@@ -68,8 +68,8 @@ class Level:
 
 
 def divide(samples: Samples, top: int, bottom: int, bounds: Bounds) -> list[Level]:
-    """The levels ``top`` to ``bottom`` below all nodes of the level ``top`` that hold samples, whose
-    codes are of the depth ``bottom``. Nodes of the last level have no children."""
+    """The levels ``top`` to ``bottom``, with every node of ``top`` that holds samples; their codes
+    are of the depth ``bottom``. Nodes of the last level have no children."""
     below = np.uint64(3 * (bottom - top))
     first = np.flatnonzero(np.diff(samples.code >> below, prepend=~np.uint64(0)))
     begin, end = first, np.append(first[1:], len(samples.code))
@@ -137,7 +137,8 @@ def joined(parts: list[list[Level]], width: int) -> list[Level]:
 
 def popcount(bits: NDArray[np.uint8]) -> Ints:
     """(n,) how many bits are set."""
-    return np.unpackbits(bits[:, None], axis=1).sum(axis=1, dtype=np.int64)
+    found: Ints = np.unpackbits(bits[:, None], axis=1).sum(axis=1, dtype=np.int64)
+    return found
 
 
 def _running(values: NDArray[np.generic]) -> NDArray[np.generic]:
@@ -174,6 +175,6 @@ def _edges(codes: Codes, node: Codes, begin: Ints, end: Ints, left: int) -> Ints
     if not len(node):
         return np.zeros((0, 9), np.int64)
     shift = np.uint64(3 * (left - 1)) if left else np.uint64(0)
-    child = (node[:, None] << np.uint64(3)) + np.arange(1, 8, dtype=np.uint64)
+    child: Codes = (node[:, None] << np.uint64(3)) + np.arange(1, 8, dtype=np.uint64)
     inner = np.searchsorted(codes, child << shift)
     return np.concatenate([begin[:, None], inner, end[:, None]], axis=1)

@@ -27,6 +27,13 @@ class Points(NamedTuple):
     weight: Floats
 
 
+def areas(corner: Floats) -> Floats:
+    """(m,) of (m, 3, 3) triangles."""
+    cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    found: Floats = np.linalg.norm(cross, axis=1) / 2
+    return found
+
+
 def longest_first(corner: Floats) -> Ints:
     """(m,) the corner at which the longest edge of each of (m, 3, 3) triangles begins."""
     edge = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2)
@@ -39,10 +46,9 @@ def spread(corner: Floats, spacing: float) -> Points:
     count = len(corner)
     first = longest_first(corner)
     each = np.arange(count)
-    a, b, c = (corner[each, (first + k) % 3] for k in range(3))
-    longest = np.linalg.norm(b - a, axis=1)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    height = np.divide(area, longest, out=np.zeros(count), where=longest > 0)
+    begin, end = (corner[each, (first + k) % 3] for k in range(2))
+    longest = np.linalg.norm(end - begin, axis=1)
+    height = np.divide(2 * areas(corner), longest, out=np.zeros(count), where=longest > 0)
     rows = np.maximum(np.rint(height / spacing), 1).astype(np.int64)
     row_triangle, row = _counted(rows)
     up = (row + 0.5) / rows[row_triangle]
