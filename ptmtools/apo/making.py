@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from ptmtools.apo.blocks import Surface, Work, build
 from ptmtools.apo.casting import Source
-from ptmtools.apo.cube import Cube, cube_around
+from ptmtools.apo.cube import cube_around
 from ptmtools.apo.model import ApoOptions, Octree
-from ptmtools.apo.normals import CREASE, corner_normals
+from ptmtools.apo.normals import corner_normals
 from ptmtools.apo.octree import Bounds
 from ptmtools.apo.painting import paint_of
 from ptmtools.apo.sampling import areas
 from ptmtools.apo.texels import octree_of
-from ptmtools.arrays import Floats
+from ptmtools.arrays import Floats, Singles
 from ptmtools.executors import Executor
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
@@ -39,12 +39,12 @@ class Simple:
     Attributes
     ----------
     points: (V, 3) float64, in the units of the source. triangles: (T, 3) int32.
-    normals: (T, 3, 3) float32 unit normals of the corners.
+    normals: (V, 3) float32 unit normals, smooth everywhere.
     """
 
     points: Floats
     triangles: NDArray[np.int32]
-    normals: NDArray[np.float32]
+    normals: Singles
 
 
 @dataclass(frozen=True)
@@ -84,14 +84,16 @@ def make_apo(
     progress(0, 1, "simplifying")
     simplified = simplify(Mesh(points, triangles), SimplifyOptions(options.faces, options.method))
     progress(1, 1, "simplifying")
-    mesh, cube = simplified.mesh, cube_around(np.concatenate([points, simplified.mesh.points]))
+    mesh = smooth(simplified.mesh)
+    cube = cube_around(np.concatenate([points, mesh.points]))
     source = Source(
         cube.inside(points).astype(np.float32),
         triangles,
         corner_normals(points, triangles).astype(np.float32),
         paint_of(scene) if options.color else None,
     )
-    surface = surface_of(mesh.points, mesh.triangles, cube)
+    corner = cube.inside(mesh.points)[mesh.triangles]
+    surface = Surface(corner, mesh.normals[mesh.triangles].astype(np.float64)).cut_up(_LONGEST)
     total = float(areas(surface.corner).sum())
     work = Work(
         source,
@@ -100,9 +102,8 @@ def make_apo(
         Bounds(options.error, options.color_error, options.depth),
     )
     levels, missed = build(work, executor, progress)
-    normals = corner_normals(mesh.points, mesh.triangles, CREASE).astype(np.float32)
     return Made(
-        Simple(mesh.points, mesh.triangles, normals),
+        mesh,
         octree_of(levels, cube),
         len(triangles),
         simplified.error,
@@ -112,11 +113,13 @@ def make_apo(
     )
 
 
-def surface_of(points: Floats, triangles: NDArray[np.int32], cube: Cube) -> Surface:
-    """What is sampled of a mesh. Its normals are smooth everywhere, creases too: between rays that
-    spread apart at an edge a part of the source would be left out."""
-    smooth = corner_normals(points, triangles, 180.0)
-    return Surface(cube.inside(points)[triangles], smooth).cut_up(_LONGEST)
+def smooth(mesh: Mesh) -> Simple:
+    """A mesh with normals that are smooth at creases too: between rays that spread apart there a
+    part of the source would be left out."""
+    corner = corner_normals(mesh.points, mesh.triangles, 180.0)
+    normals = np.zeros((len(mesh.points), 3), np.float32)
+    normals[mesh.triangles.ravel()] = corner.reshape(-1, 3)  # equal at all corners of a point
+    return Simple(mesh.points, mesh.triangles, normals)
 
 
 def welded(points: Floats, triangles: NDArray[np.int32]) -> tuple[Floats, NDArray[np.int32]]:

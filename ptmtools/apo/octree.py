@@ -175,6 +175,7 @@ def _edges(codes: Codes, node: Codes, begin: Ints, end: Ints, left: int) -> Ints
     if not len(node):
         return np.zeros((0, 9), np.int64)
     shift = np.uint64(3 * (left - 1)) if left else np.uint64(0)
-    child: Codes = (node[:, None] << np.uint64(3)) + np.arange(1, 8, dtype=np.uint64)
+    children = np.arange(1, 8).astype(np.uint64)
+    child = (node[:, None] << np.uint64(3)) + children
     inner = np.searchsorted(codes, child << shift)
     return np.concatenate([begin[:, None], inner, end[:, None]], axis=1)
