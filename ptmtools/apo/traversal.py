@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.apo.model import Octree
 from ptmtools.arrays import Bools, Floats, Ints
@@ -18,6 +19,8 @@ from ptmtools.compiled import plain_kernel
 
 #: Deeper than any octree: nothing stops there.
 NEVER = 127
+#: Texels in a row of the 2-D texture that the array is laid out in for graphics hardware.
+WIDTH = 4096
 
 
 @dataclass(frozen=True)
@@ -86,7 +89,16 @@ def stop_depth(step: Floats) -> Ints:
     return np.minimum(depth, NEVER).astype(np.int64)
 
 
-def unpacked(texels: np.ndarray) -> Floats:
+def rows_of(texels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """(n, 4) texels as (h, `WIDTH`, 4) rows of a texture, the end filled with zeros; texel a is in
+    row a div `WIDTH`."""
+    height = max(1, -(-len(texels) // WIDTH))
+    out = np.zeros((height * WIDTH, 4), dtype=np.uint8)
+    out[: len(texels)] = texels
+    return out.reshape(height, WIDTH, 4)
+
+
+def unpacked(texels: NDArray[np.uint8]) -> Floats:
     """(n, 3) unit normals of (n, 4) texels."""
     vector = texels[:, :3] / 127.5 - 1.0
     return np.asarray(vector / np.linalg.norm(vector, axis=1, keepdims=True))
@@ -116,7 +128,7 @@ def _ones(mask: int) -> int:
 
 
 @plain_kernel
-def _walk(texel: np.ndarray, q: Floats, limit: Ints, at: Ints, deep: Ints) -> None:
+def _walk(texel: NDArray[np.uint8], q: Floats, limit: Ints, at: Ints, deep: Ints) -> None:
     count = np.int64(len(texel))
     for i in range(len(q)):
         x, y, z = q[i, 0], q[i, 1], q[i, 2]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -66,3 +67,23 @@ def walk(octree: Octree, q: list[float], levels: int, stop: int) -> tuple[int, i
         first = r + 256 * g + 65536 * b
         address = first + (present & below).bit_count() + (inner & below).bit_count()
         depth = depth + 1
+
+
+@cache
+def ball(depth: int, low: tuple[float, ...] = (0, 0, 0), side: float = 1.0) -> Octree:
+    """Of the sphere of radius 0.45 around the middle of the cube, with its normals."""
+    middle, radius = np.full(3, 0.5), 0.45
+
+    def node(corner: np.ndarray, size: float, left: int) -> Node:
+        normal = corner + size / 2 - middle if size < 1 else np.array([0.0, 0, 1])
+        unit = normal / np.linalg.norm(normal)
+        color = tuple(np.rint((unit / 2 + 0.5) * 255).astype(int).tolist())
+        below = {}
+        for k in range(8 if left else 0):
+            first = corner + size / 2 * np.array([k & 1, k >> 1 & 1, k >> 2 & 1])
+            away = np.linalg.norm(first + size / 4 - middle)
+            if abs(away - radius) < size * 3**0.5 / 4 + 0.01:
+                below[k] = node(first, size / 2, left - 1)
+        return color, below
+
+    return octree_of(node(np.zeros(3), 1.0, depth), low, side)
