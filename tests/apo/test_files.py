@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import shutil
 import zlib
 from collections.abc import Callable
@@ -360,3 +361,9 @@ def test_frozen_folders() -> None:
         assert check(VECTORS / name).issues == ()
         with pytest.raises(PtmError):
             read_octree(VECTORS / name, octree.levels + 1)
+
+
+def test_the_documented_codes_are_those_that_there_are() -> None:
+    page = Path(__file__).resolve().parents[2] / "docs/format-apo.md"
+    rows = re.findall(r"^\| (PTM-D\d+) \| (\w+) \| (.*) \|$", page.read_text(), re.MULTILINE)
+    assert rows == [(code, *CODES[code]) for code in sorted(CODES)]
