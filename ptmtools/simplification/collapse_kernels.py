@@ -33,7 +33,7 @@ from ptmtools.tolerance import ROUNDING_SHARE
 #: The ways of a collapse: into the second end, into the first, to the best place; none.
 SECOND, FIRST, PLACED, NONE = 0, 1, 2, 3
 #: Share of the weight that pulls the best place to the middle of the edge.
-PULL = 1e-3
+PULL = 1e-5
 #: Share of weight times squared length that is added to the cost for the order alone: where
 #: everything is flat the shortest edges go first.
 SHORTEST = ROUNDING_SHARE

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats
 
-Method = Literal["quadric", "fast", "meshlab"]
+#: Our collapses, or those of pymeshlab, for plain meshes only.
+Method = Literal["quadric", "meshlab"]
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,7 @@ class Simplified:
     source: (T',) int32, the face of the given mesh that each face came from.
     error: the largest error of a collapse, as a distance in the unit of the points: the root of the
         mean square over the planes that met there, how far the texture moves counted in.
+        NaN where the method does not say.
     notes: what the user should know, such as a number of faces that could not be reached.
     """
 
@@ -73,3 +75,13 @@ class Simplified:
     source: NDArray[np.int32]
     error: float
     notes: tuple[str, ...] = ()
+
+
+def too_many(left: int, faces: int) -> tuple[str, ...]:
+    """The note for a mesh that has more faces than it should."""
+    if left <= faces:
+        return ()
+    return (
+        f"{left:,} faces are left, not {faces:,}: borders, seams and parts that cannot have fewer "
+        "do not allow it",
+    )
