@@ -5,7 +5,10 @@ the L2,1 metric of Cohen-Steiner et al. and a bound of 0.05; read as a root mean
 length of the difference, that gives textures of the paper's size (as a mean square, a tenth of it).
 
 A node of fewer than `ENOUGH` samples is not divided: its children would hold one or two each, and
-where the surface runs between these there would be none.
+where the surface runs between these there would be none. (Of a sphere with relief, 327,680
+triangles made 5,000, eight samples each: 2.54 MB and 2.18° of mean error with it; without it 3.92
+MB and 1.93°, and 2.7 % of the surface between children instead of 1.0 %. At the same size fewer
+samples without this rule are worse: 2.37 MB and 2.65°.)
 
 Everything is done level by level on whole arrays. Samples are sorted by their Morton code, so that
 a node is a range of them, and its sums differences of running sums.
