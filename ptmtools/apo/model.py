@@ -15,6 +15,14 @@ from ptmtools.errors import InputError
 ADDRESS_BITS = 24
 #: The greatest depth: Morton codes of three times as many bits stay within 63.
 DEEPEST = 20
+#: Option, least, most.
+_RANGES = (
+    ("faces", 4, 10_000_000),
+    ("error", 0.0, 2.0),
+    ("depth", 1, DEEPEST),
+    ("density", 0.01, 1000.0),
+    ("color_error", 0.0, 2.0),
+)
 
 
 @dataclass(frozen=True)
@@ -25,8 +33,8 @@ class ApoOptions:
     faces: of the simplified mesh, at most.
     error: leaves are divided while the normals in them deviate more than this from their mean: the
         root mean square of the length of the difference, 0 to 2.
-    depth: of the deepest leaves; a leaf of depth 13 is 1/8192 of the cube wide.
-    density: samples of the surface for each triangle of the source, on average.
+    depth: greatest depth of leaves; a leaf of depth 13 is 1/8192 of the cube wide.
+    density: samples for each triangle of the source, on average.
     color: also keep the colours of vertices or of the texture, which the paper leaves for later.
     color_error: the same for colours, as a share of the full range.
 
@@ -40,6 +48,16 @@ class ApoOptions:
     method: Literal["quadric", "meshlab"] = "quadric"
     color: bool = False
     color_error: float = 0.05
+
+    def __post_init__(self) -> None:
+        for name, least, most in _RANGES:
+            value = getattr(self, name)
+            if not least <= value <= most:
+                raise InputError(
+                    "PTM-I840",
+                    f"--{name.replace('_', '-')} {value:g} is not possible",
+                    remedy=f"give {least:g} to {most:g}",
+                )
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,7 @@ COMMANDS = {
     "publish": ("publish", "publish", "Write a walk for browsers, a folder for any web server."),
     "encode": ("images", "encode", "Encode images as .ptm files."),
     "decode": ("images", "decode", "Decode .ptm files to images."),
+    "apo": ("apo", "apo", "Make a light mesh and an octree texture of a heavy mesh."),
     "warm-up": ("warm_up", "warm_up", "Compile for this machine, before the first run."),
     "compare": ("comparing", "compare", "Compare .ptm with other image formats: size and speed."),
 }

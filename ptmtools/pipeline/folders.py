@@ -40,7 +40,19 @@ class FolderKind:
 
 
 #: By the name of the index.
-FOLDERS: dict[str, FolderKind] = {}
+FOLDERS: dict[str, FolderKind] = {
+    kind.index: kind
+    for kind in (
+        FolderKind(
+            index="apo.json",
+            about="octree texture",
+            again="ptm apo MESH",
+            codes=Lazy("ptmtools.apo.checking:CODES"),
+            check=Lazy("ptmtools.apo.checking:check_folder"),
+            describe=Lazy("ptmtools.apo.checking:describe"),
+        ),
+    )
+}
 
 
 def kind_of(folder: Path) -> FolderKind | None:

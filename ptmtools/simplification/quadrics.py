@@ -1,0 +1,159 @@
+"""Quadrics: sums of squared distances that a vertex has to what it stands for.
+
+Garland & Heckbert 1997: of the planes of the faces that met in a vertex, weighted by area, and of
+the lines of kept edges. Hoppe 1999 adds, for every wedge, how far its attributes are from those
+that the faces had in that place. Both are held relative to the vertex (and to the wedge's own
+values), so that what cancels is of the size of an edge, not of the mesh: details of a centimetre
+on a campus of a kilometre have all their digits.
+
+A quadric of a vertex at p is a row (`SIZE`): the six entries of the symmetric A from xx to zz,
+b, c and the sum w of all weights; its value for d = x - p is d·Ad + 2 b·d + c. One of a wedge is
+such a row without w, and for each attribute the sums of w g, w r and w (`PER_ATTRIBUTE`), where
+g·d + r is what a face has there: its value for d and s is Σ w (g·d + r - s)².
+
+Texture coordinates count as the distance by which the texture moves on the face, so that a shift
+of the bricks by a centimetre is as dear as a shift of the wall.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ptmtools.arrays import Floats
+from ptmtools.simplification.model import Mesh
+from ptmtools.simplification.surface import COLOR_SHARE, Surface
+
+SIZE = 11
+PER_ATTRIBUTE = 5
+#: What a kept edge weighs: this share of the square on it. Borders and seams show at once.
+LINE_WEIGHT = 4.0
+#: A face's scale of texture counts as at most so many times the mean, and as no less than that part
+#: of it: faces on which the texture does not change have none.
+SCALES = 32.0
+
+_ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+
+
+def vertex_quadrics(surface: Surface) -> Floats:
+    """(V, SIZE): of the planes and kept edges that meet in each vertex."""
+    count = len(surface.point)
+    a, b, c = (surface.point[surface.triangle[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    area = np.linalg.norm(normal, axis=1) / 2
+    normal /= np.where(area > 0, 2 * area, 1.0)[:, None]
+    quadric = np.zeros((count, SIZE))
+    vertex = surface.triangle.T.reshape(-1)
+    for column, (i, j) in enumerate(_ENTRIES):
+        quadric[:, column] = np.bincount(
+            vertex, np.tile(area * normal[:, i] * normal[:, j], 3), count
+        )
+    quadric[:, 10] = np.bincount(vertex, np.tile(area, 3), count)
+
+    faces, side = np.nonzero((surface.kept[:, None] >> np.arange(3)) & 1)
+    begin = surface.triangle[faces, side]
+    end = surface.triangle[faces, (side + 1) % 3]
+    along = surface.point[end] - surface.point[begin]
+    square = (along**2).sum(axis=1)
+    along /= np.sqrt(np.where(square > 0, square, 1.0))[:, None]
+    for column, (i, j) in enumerate(_ENTRIES):
+        across = LINE_WEIGHT * square * (float(i == j) - along[:, i] * along[:, j])
+        quadric[:, column] += np.bincount(begin, across, count) + np.bincount(end, across, count)
+    weight = LINE_WEIGHT * square
+    quadric[:, 10] += np.bincount(begin, weight, count) + np.bincount(end, weight, count)
+    return quadric
+
+
+def attributes(mesh: Mesh, surface: Surface) -> Floats:
+    """(W, m) values of each wedge: texture coordinates as they are, colours as distances."""
+    face, side = surface.source[surface.corner // 3], surface.corner % 3
+    parts: list[Floats] = [np.zeros((len(face), 0))]
+    if mesh.uv is not None:
+        parts.append(mesh.uv[face, side].astype(np.float64))
+    if mesh.colors is not None:
+        parts.append(mesh.colors[face, side].astype(np.float64) * (COLOR_SHARE / 255))
+    return np.concatenate(parts, axis=1)
+
+
+def wedge_quadrics(mesh: Mesh, surface: Surface, attribute: Floats) -> Floats:
+    """(W, 10 + PER_ATTRIBUTE m): of how the attributes of each wedge change over its faces."""
+    wedges, m = attribute.shape
+    quadric = np.zeros((wedges, 10 + PER_ATTRIBUTE * m))
+    if not m:
+        return quadric
+    a, b, c = (surface.point[surface.triangle[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    square = (normal**2).sum(axis=1)
+    area = np.sqrt(square) / 2
+    normal /= np.where(square > 0, square, 1.0)[:, None]
+    # What grows by one from the corner a to b, and from a to c.
+    to_b, to_c = np.cross(c - a, normal), np.cross(normal, b - a)
+    at = attribute[surface.wedge]
+    slope = (at[:, 1] - at[:, 0])[:, :, None] * to_b[:, None]
+    slope += (at[:, 2] - at[:, 0])[:, :, None] * to_c[:, None]
+    weight = np.repeat(area[:, None], m, axis=1)
+    if mesh.uv is not None:
+        weight[:, :2] *= _scales(slope[:, :2], area)[:, None]
+
+    wedge = surface.wedge.T.reshape(-1)
+
+    def total(each: Floats) -> Floats:
+        return np.bincount(wedge, np.tile(each, 3), wedges).astype(np.float64)
+
+    for column, (i, j) in enumerate(_ENTRIES):
+        quadric[:, column] = total((weight * slope[:, :, i] * slope[:, :, j]).sum(axis=1))
+    for k in range(m):
+        begin = 10 + PER_ATTRIBUTE * k
+        for i in range(3):
+            quadric[:, begin + i] = total(weight[:, k] * slope[:, k, i])
+        quadric[:, begin + 4] = total(weight[:, k])
+    return quadric
+
+
+def _scales(slope: Floats, area: Floats) -> Floats:
+    """(T,) the square of the distance over which texture coordinates change by one."""
+    steep = (slope**2).sum(axis=(1, 2)) / 2
+    mean = float((area * steep).sum() / max(float(area.sum()), np.finfo(float).tiny))
+    if not mean > 0:
+        return np.ones(len(area))
+    return np.asarray(1 / np.clip(steep, mean / SCALES**2, mean * SCALES**2))
+
+
+def value(quadric: Floats, d: Floats) -> float:
+    """Of one vertex's row, for a displacement: what `quadric_kernels.value_at` computes."""
+    return float(d @ _matrix(quadric) @ d + 2 * quadric[6:9] @ d + quadric[9])
+
+
+def shifted(quadric: Floats, d: Floats) -> Floats:
+    """The same quadric for a vertex that has moved by ``d``."""
+    moved = quadric.copy()
+    moved[6:9] = quadric[6:9] + _matrix(quadric) @ d
+    moved[9] = value(quadric, d)
+    return moved
+
+
+def attribute_value(quadric: Floats, d: Floats, s: Floats) -> float:
+    """Of one wedge's row, for displacements of the vertex and of its attributes."""
+    found = value(quadric, d)
+    for k, step in enumerate(s):
+        g, r, w = np.split(quadric[10 + PER_ATTRIBUTE * k :][:PER_ATTRIBUTE], [3, 4])
+        found += float(step * step * w[0] - 2 * step * (g @ d + r[0]))
+    return found
+
+
+def attribute_shifted(quadric: Floats, d: Floats, s: Floats) -> Floats:
+    """The same quadric for a wedge whose vertex has moved by ``d``, and its attributes by ``s``."""
+    moved = quadric.copy()
+    moved[6:9] = quadric[6:9] + _matrix(quadric) @ d
+    for k, step in enumerate(s):
+        begin = 10 + PER_ATTRIBUTE * k
+        moved[6:9] -= step * quadric[begin : begin + 3]
+        moved[begin + 3] += quadric[begin : begin + 3] @ d - step * quadric[begin + 4]
+    moved[9] = attribute_value(quadric, d, s)
+    return moved
+
+
+def _matrix(quadric: Floats) -> Floats:
+    matrix = np.empty((3, 3))
+    for entry, (i, j) in zip(quadric, _ENTRIES, strict=False):
+        matrix[i, j] = matrix[j, i] = entry
+    return matrix

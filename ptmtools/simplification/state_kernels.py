@@ -1,0 +1,132 @@
+"""A mesh between collapses, and compiled ways around it: corners at a vertex, faces at an edge.
+
+The corners at a vertex are a linked list, so that two lists become one at once, and memory is
+linear. Corners of faces that are gone stay in it until `prune`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Floats, Ints
+from ptmtools.compiled import plain_kernel as kernel
+
+#: So many faces at an edge at most; an edge with more does not collapse.
+MOST_AT_EDGE = 64
+
+#: Where `State.number` counts faces, entries of the heap, marks given out and collapses made.
+FACES, ENTRIES, MARKS, MADE = 0, 1, 2, 3
+
+
+class State(NamedTuple):
+    """A mesh between collapses, all of it changed in place.
+
+    Attributes
+    ----------
+    point, triangle, kept, wedge, freedom: as `Surface` has them; faces that are gone begin with -1.
+    quadric, texture, attribute: (V, SIZE), (W, 10 + 5 m) and (W, m), as `quadrics` has them.
+    head, tail: (V,) the first and the last corner at each vertex; beyond: (3 T,) the next one.
+    version: (V,) how often each vertex has changed.
+    moved: (V,) whether it has left its place.
+    number: (4,) counts, by `FACES` and so on.
+    limits: (3,) say when faces turn, such as `CAREFUL`.
+    worst: (1,) the largest error of a collapse, squared.
+    mark, place, shared, shown: (V,), (3,), (`MOST_AT_EDGE`, 6) and (2,), storage.
+    """
+
+    point: Floats
+    triangle: NDArray[np.int32]
+    kept: NDArray[np.uint8]
+    wedge: NDArray[np.int32]
+    freedom: NDArray[np.int8]
+    quadric: Floats
+    texture: Floats
+    attribute: Floats
+    head: NDArray[np.int32]
+    tail: NDArray[np.int32]
+    beyond: NDArray[np.int32]
+    version: NDArray[np.int32]
+    mark: Ints
+    moved: NDArray[np.bool_]
+    number: Ints
+    place: Floats
+    shared: NDArray[np.int32]
+    shown: Floats
+    limits: Floats
+    worst: Floats
+
+
+@kernel
+def link_corners(
+    triangle: NDArray[np.int32],
+    head: NDArray[np.int32],
+    tail: NDArray[np.int32],
+    beyond: NDArray[np.int32],
+) -> None:
+    """Makes the lists of corners at each vertex; heads and tails are -1 before."""
+    for t in range(len(triangle)):
+        for k in range(3):
+            corner, v = 3 * t + k, triangle[t, k]
+            beyond[corner] = -1
+            if head[v] < 0:
+                head[v] = corner
+            else:
+                beyond[tail[v]] = corner
+            tail[v] = corner
+
+
+@kernel
+def prune(state: State, v: int) -> None:
+    """Takes the corners of faces that are gone out of a vertex's list."""
+    triangle, head, tail, beyond = state.triangle, state.head, state.tail, state.beyond
+    last, corner = -1, head[v]
+    head[v] = -1
+    while corner >= 0:
+        if triangle[corner // 3, 0] >= 0:
+            if last < 0:
+                head[v] = corner
+            else:
+                beyond[last] = corner
+            last = corner
+        corner = beyond[corner]
+    tail[v] = last
+    if last >= 0:
+        beyond[last] = -1
+
+
+@kernel
+def meet(state: State, a: int, b: int) -> int:
+    """Finds the faces at an edge and returns how many they are, -1 if too many.
+
+    Into each row of ``shared``: the wedges at the two ends, the third vertex, and whether the edge
+    itself and those from its ends to that vertex are kept.
+    """
+    triangle, kept, wedge, shared = state.triangle, state.kept, state.wedge, state.shared
+    count, corner = 0, state.head[a]
+    while corner >= 0:
+        t, k = corner // 3, corner % 3
+        corner = state.beyond[corner]
+        if triangle[t, 0] < 0:
+            continue
+        after, last = (k + 1) % 3, (k + 2) % 3
+        other, third = after, last
+        if triangle[t, last] == b:
+            other, third = last, after
+        elif triangle[t, after] != b:
+            continue
+        if count == MOST_AT_EDGE:
+            return -1
+        # The edge after a corner has the corner's bit; the one before it that of the last.
+        to_other = k if other == after else last
+        to_third = last if other == after else k
+        shared[count, 0] = wedge[t, k]
+        shared[count, 1] = wedge[t, other]
+        shared[count, 2] = triangle[t, third]
+        shared[count, 3] = (kept[t] >> to_other) & 1
+        shared[count, 4] = (kept[t] >> to_third) & 1
+        shared[count, 5] = (kept[t] >> after) & 1
+        count += 1
+    return count
