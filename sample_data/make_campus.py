@@ -25,7 +25,9 @@ from campus_parts.furniture import furnish
 from campus_parts.ground import make_ground
 from campus_parts.layout import CURB_HEIGHT, FRONT, Street
 from campus_parts.materials import MATERIALS, Material
-from campus_parts.recipes import RECIPES, Recipe
+from campus_parts.monuments import HETEROGENEOUS
+from campus_parts.quarters import MIXED, residence
+from campus_parts.recipes import Recipe
 from campus_parts.textures import ALPHAS, IMAGES, mask, signs
 from campus_parts.way import way_text
 from museum_parts.files import HEAD, File, between, png, write
@@ -33,6 +35,9 @@ from museum_parts.mesh import Face, Thing
 from museum_parts.noise import bytes_of
 from museum_parts.obj import number, obj_text
 from PIL import Image
+
+#: What stands along the way, in its order: no two walls alike, then what recurs, then one kind.
+RECIPES = [*HETEROGENEOUS, *MIXED, *(residence(k) for k in range(14))]
 
 
 @dataclass(frozen=True)
@@ -60,18 +65,16 @@ def make_things(options: CampusOptions) -> tuple[list[Thing], Street, tuple[floa
     street = Street(options.buildings, options.length)
     recipes = chosen(options.buildings)
     things: list[Thing] = make_ground(street)
-    depths, widths = [], []
+    depths = []
     for plot, recipe in zip(street.plots, recipes, strict=True):
         built = build(recipe, generator(options.seed, 1, plot.number))
-        ring = built.rings[0]
-        depths.append(max(-z for _, z in ring))
-        widths.append(2 * max(x for x, _ in ring))
+        depths.append(max(-z for _, z in built.rings[0]))
         middle = (plot.low + plot.high) / 2 * street.segment_length
         back = FRONT + (plot.number * 7 % 5) * 0.8
         frame = street.frame(plot.segment, middle, plot.side * back, CURB_HEIGHT - 0.02, plot.side)
         faces = sorted(frame.placed(built.faces), key=lambda f: f.material)
         things.append(Thing(f"building_{plot.number + 1:02d}_{recipe.name}", faces))
-    things += furnish(street, recipes, depths, widths, generator(options.seed, 2))
+    things += furnish(street, recipes, depths, generator(options.seed, 2))
     xs, zs = ([p[i] for t in things for f in t.faces for p in f.points] for i in (0, 2))
     # Whole tenths of millimetres, so that rounding is that of the uncentred places.
     x, z = (round((min(c) + max(c)) / 2, 4) for c in (xs, zs))

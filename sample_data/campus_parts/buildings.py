@@ -228,18 +228,9 @@ def _above(
     ring, roof = rings[0], recipe.roof[1]
     top = look.top
     walls = walls_of(ring)
-    wing = walls[-2] if recipe.name != "law" else walls[2]
     depth = max(-z for _, z in ring)
     half = max(x for x, _ in ring)
-    band = min(depth, _wing(rings)) if len(rings) == 1 else _wing(rings)
-    # Along the middle of the widest part: behind the front, or at the back of a U.
-    z = (
-        -depth + band / 2
-        if recipe.door_wall == 2 and len(ring) == 8 and ring[0][1] == 0
-        else -band / 2
-    )
-    if len(ring) == 8 and ring[0][1] < 0:
-        z = (ring[0][1] - depth) / 2
+    z = _ridge(rings, depth)
     if "dormers" in extras:
         for wall in (w for w in walls if w.right[0] > 0 and w.length > 8):
             count = int(wall.length / 5.5)
@@ -267,8 +258,16 @@ def _above(
         faces += _dome((0.0, z), top - 0.7)
     if "belfry" in extras:
         faces += _belfry(look.wall, top)
-    del wing
     return faces
+
+
+def _ridge(rings: list[Ring], depth: float) -> float:
+    """The z along which the widest part of the building has its middle."""
+    ring, wing = rings[0], _wing(rings)
+    if len(ring) == 8 and ring[0][1] < 0:  # its middle comes forward
+        return (ring[0][1] - depth) / 2
+    back = len(ring) == 8 and ring[2][1] < 0 and ring[2][0] < 0  # a U, open to the front
+    return -depth + wing / 2 if back else -wing / 2
 
 
 def _dome(centre: Flat, y: float) -> list[Face]:

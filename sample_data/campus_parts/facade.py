@@ -175,7 +175,7 @@ def balcony(bay: Bay, material: str, railing: str) -> list[Face]:
         return faces + box(
             bay.wall, "metal", (u, top + 0.005, out - 0.07), (U, top + 0.045, out - 0.01)
         )
-    count = max(3, int((U - u) / 0.14))
+    count = max(3, int((U - u) / 0.17))
     for k in range(count + 1):
         x = u + 0.01 + (U - u - 0.05) * k / count
         faces += box(
@@ -201,7 +201,7 @@ def louvres(bay: Bay, material: str) -> list[Face]:
     for x in (u - 0.06, U + 0.02):
         faces += box(bay.wall, material, (x, v - 0.05, 0.1), (x + 0.04, V + 0.05, 0.3))
         faces += box(bay.wall, material, (x, V - 0.2, -0.02), (x + 0.04, V - 0.15, 0.12))
-    count = max(2, int((V - v) / 0.22))
+    count = max(2, int((V - v) / 0.3))
     for k in range(count):
         y = v + (V - v) * (k + 0.5) / count
         faces += box(bay.wall, material, (u - 0.03, y - 0.015, 0.13), (U + 0.03, y + 0.015, 0.27))

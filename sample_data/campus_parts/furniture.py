@@ -113,14 +113,13 @@ def furnish(
     street: Street,
     recipes: list[Recipe],
     depths: list[float],
-    widths: list[float],
     rng: np.random.Generator,
 ) -> list[Thing]:
-    """The furniture of every plot; ``depths`` and ``widths`` of the plots' buildings."""
+    """The furniture of every plot; ``depths`` of the plots' buildings."""
     place = _Placer()
     slots = max(p.slot for p in street.plots) + 1
-    for plot, recipe, depth, width in zip(street.plots, recipes, depths, widths, strict=True):
-        _garden(place, street, plot, recipe, depth, width, slots, rng)
+    for plot, recipe, depth in zip(street.plots, recipes, depths, strict=True):
+        _garden(place, street, plot, recipe, depth, slots, rng)
     return place.things
 
 
@@ -130,7 +129,6 @@ def _garden(
     plot: Plot,
     recipe: Recipe,
     depth: float,
-    width: float,
     slots: int,
     rng: np.random.Generator,
 ) -> None:
@@ -159,7 +157,7 @@ def _garden(
         )
     lamp_at = 0.24 if plot.side > 0 else 0.74
     place.put("lamp", frame(low + pitch * lamp_at, KERB + 0.5), lamp())
-    for share in (0.39, 0.61):
+    for share in (0.29, 0.71):
         place.put("bench", frame(low + pitch * share, PAVEMENT + 1.0), bench())
     label = f"_{recipe.name}"
     place.put("sign", frame(middle + 5.2, PAVEMENT + 0.6), sign(plot.number), label)
@@ -171,4 +169,3 @@ def _garden(
             place.put("hedge", frame(low + pitch * share, FRONT - 1.8), hedge(long, 0.9))
     if plot.slot % 4 == 2 and plot.side > 0:
         place.put("shelter", frame(low + pitch * 0.75, PAVEMENT - 1.1), shelter())
-    del width

@@ -65,7 +65,7 @@ MATERIALS: dict[str, Material] = {
     "roof_tiles": Material("roof_tiles", 2),
     "roof_slate": Material("roof_slate", 2),
     "roof_copper": Material("roof_copper", 3),
-    "roof_zinc": Material("roof_copper", 3, (0.95, 0.78, 0.82)),
+    "roof_zinc": Material("roof_copper", 3, (1, 0.78, 0.9)),
     "roof_gravel": Material("gravel", 3, (0.75, 0.75, 0.78)),
     # ground
     "asphalt": Material("asphalt", 4),
