@@ -90,6 +90,7 @@ HETEROGENEOUS = [
             "rubble",
             replace(ROUND, glass=("glass_curtains", "glass_dark"), trim="sandstone_red"),
             storeys=1,
+            height=8.4,
             ground_height=8.4,
             bay=4.2,
             ratio=0.45,

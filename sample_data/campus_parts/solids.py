@@ -73,9 +73,11 @@ def zipped(a: Sequence[Point], b: Sequence[Point]) -> list[tuple[Point, ...]]:
     s, t, i, j = shares(a), shares(b), 0, 0
     pieces: list[tuple[Point, ...]] = []
     while i < len(a) - 1 or j < len(b) - 1:
-        x = s[i + 1] if i < len(a) - 1 else 2.0
-        y = t[j + 1] if j < len(b) - 1 else 2.0
-        if abs(x - y) < 1e-6:
+        # By the middles of the next steps, so that both ends of a long one get their share.
+        x = (s[i] + s[i + 1]) / 2 if i < len(a) - 1 else 2.0
+        y = (t[j] + t[j + 1]) / 2 if j < len(b) - 1 else 2.0
+        ends = i < len(a) - 1 and j < len(b) - 1 and abs(s[i + 1] - t[j + 1]) < 0.02
+        if ends and abs(x - y) < 0.02:
             pieces.append((a[i], a[i + 1], b[j + 1], b[j]))
             i, j = i + 1, j + 1
         elif x < y:
