@@ -12,7 +12,7 @@ import os
 import re
 import stat
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -76,6 +76,8 @@ def interlace(
         notes.append("turned upright, as its EXIF orientation says")
     if _coloured(picture.description):
         notes.append("the files carry no colour profile or gamma: texels are as they were stored")
+    if len(picture.texels.shape) == 2:  # an .npy of grey
+        picture = replace(picture, texels=picture.array())
     old_height, old_width, components = picture.texels.shape
     kind = picture.texels.dtype.name
     width, height = nearest_power(old_width), nearest_power(old_height)
