@@ -282,6 +282,12 @@ def test_every_code_is_found_somewhere() -> None:
     assert found | {"PTM-D806", "PTM-D807", "PTM-D808"} == set(CODES)
 
 
+def test_the_page_lists_the_codes() -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs/format-interlace.md").read_text("utf-8")
+    rows = re.findall(r"^\| (PTM-D\d+) \| (\w+) \| (.*) \|$", page, re.MULTILINE)
+    assert {code: (severity, meaning) for code, severity, meaning in rows} == dict(CODES)
+
+
 def test_no_manifest_however_damaged_ends_in_a_traceback(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
