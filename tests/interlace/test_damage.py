@@ -17,7 +17,7 @@ import pytest
 from PIL import Image
 
 from ptmtools.cli.main import main
-from ptmtools.interlace import validate_interlaced
+from ptmtools.interlace import deinterlace, validate_interlaced
 from ptmtools.interlace.checking import CODES
 from ptmtools.texture import Limits
 from ptmtools.texture.images import png_bytes
@@ -275,6 +275,27 @@ def test_warnings(tmp_path: Path) -> None:
         ("PTM-D806", "notes.txt"),
     ]
     assert report.ok
+
+
+def test_other_axes_are_joined_as_they_say(tmp_path: Path) -> None:
+    """Such as a set of two files, or one that begins with rows; the check points it out."""
+    texels = image(16, 32)
+    folder = folder_of(tmp_path / "folder", texels, smallest=16)
+    data = [png_bytes(np.ascontiguousarray(part)) for part in (texels[::2], texels[1::2])]
+
+    def edit(document: dict[str, Any]) -> None:
+        joined = [{"width": 32, "height": height} for height in (8, 16)]
+        document["files"] = [
+            {"name": f"{n + 1}.png", "width": 32, "height": 8, "bytes": len(data[n])}
+            | {"crc32": zlib.crc32(data[n]), "axis": (None, "rows")[n], "joined": joined[n]}
+            for n in range(2)
+        ]
+
+    for number, part in enumerate(data, 1):
+        (folder / f"{number}.png").write_bytes(part)
+    edited(edit)(folder)
+    np.testing.assert_array_equal(deinterlace(folder), texels)
+    assert [issue.code for issue in validate_interlaced(folder).issues] == ["PTM-D808"]
 
 
 def test_every_code_is_found_somewhere() -> None:
