@@ -38,6 +38,8 @@ COMMANDS = {
     "publish": ("publish", "publish", "Write a walk for browsers, a folder for any web server."),
     "encode": ("images", "encode", "Encode images as .ptm files."),
     "decode": ("images", "decode", "Decode .ptm files to images."),
+    "interlace": ("interlacing", "interlace", "Split an image into files that sharpen it."),
+    "deinterlace": ("interlacing", "deinterlace", "Join the files of an interlaced image."),
     "warm-up": ("warm_up", "warm_up", "Compile for this machine, before the first run."),
     "compare": ("comparing", "compare", "Compare .ptm with other image formats: size and speed."),
 }

@@ -40,7 +40,16 @@ class FolderKind:
 
 
 #: By the name of the index.
-FOLDERS: dict[str, FolderKind] = {}
+FOLDERS: dict[str, FolderKind] = {
+    "interlace.json": FolderKind(
+        "interlace.json",
+        "interlaced image",
+        "ptm interlace IMAGE",
+        Lazy("ptmtools.interlace.checking:CODES"),
+        Lazy("ptmtools.interlace.checking:validate_interlaced"),
+        Lazy("ptmtools.interlace.reading:describe"),
+    ),
+}
 
 
 def kind_of(folder: Path) -> FolderKind | None:

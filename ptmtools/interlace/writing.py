@@ -1,0 +1,232 @@
+"""An image as an interlaced folder: scaled to powers of two, split, each part a file, a manifest.
+
+The folder is written beside its target and renamed, so that it is never seen half done. One that
+`ptm interlace` wrote before is replaced with ``force``; whatever else is in the way stays.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import stat
+import zlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ptmtools.errors import InputError, OutputError
+from ptmtools.files import open_regular, refuse_existing, writing
+from ptmtools.interlace.containers import CONTAINERS, check_held
+from ptmtools.interlace.model import (
+    FORMAT,
+    INDEX,
+    Interlaced,
+    InterlaceOptions,
+    Part,
+    axes_of,
+    sizes_of,
+)
+from ptmtools.interlace.scaling import nearest_power, scaled
+from ptmtools.interlace.steps import split
+from ptmtools.texture.images import Picture
+from ptmtools.texture.images.picture import check_size
+from ptmtools.texture.model import MAX_SIDE, Description, Limits
+
+_OPTIONS, _LIMITS = InterlaceOptions(), Limits()
+#: What a folder of ours holds besides its index.
+_OURS = re.compile(r"[1-9][0-9]?\.(" + "|".join(CONTAINERS) + ")")
+#: How the index begins, in so many first bytes.
+_HEAD = 128
+
+
+@dataclass(frozen=True)
+class Written:
+    """An interlaced image, ready to be written.
+
+    Attributes
+    ----------
+    interlaced: the manifest.
+    files: bytes of each file, in its order.
+    notes: what was changed on the way, one line each.
+    """
+
+    interlaced: Interlaced
+    files: tuple[bytes, ...]
+    notes: tuple[str, ...]
+
+
+def interlace(
+    picture: Picture, options: InterlaceOptions = _OPTIONS, limits: Limits = _LIMITS
+) -> Written:
+    """The files of an image; they are exactly its texels if its sides are powers of two and the
+    container is lossless.
+
+    Raises
+    ------
+    InputError: PTM-I827 an option out of range; PTM-I828 samples that the container does not hold.
+    LimitError: PTM-L820 a side that it does not hold; PTM-L104 more than ``limits`` allow, scaled.
+    """
+    _check_options(options)
+    notes = []
+    if picture.description.orientation != 1:
+        picture = picture.upright()
+        notes.append("turned upright, as its EXIF orientation says")
+    if _coloured(picture.description):
+        notes.append("the files carry no colour profile or gamma: texels are as they were stored")
+    if len(picture.texels.shape) == 2:  # an .npy of grey
+        picture = replace(picture, texels=picture.array())
+    old_height, old_width, components = picture.texels.shape
+    kind = picture.texels.dtype.name
+    width, height = nearest_power(old_width), nearest_power(old_height)
+    axes = axes_of(width, height, options.min)
+    sizes = sizes_of(width, height, axes)
+    check_held(options.format, *sizes[-1][0], components, kind)
+    check_size(width, height, components * picture.texels.dtype.itemsize, limits)
+    if (width, height) == (old_width, old_height):
+        image = picture.array()
+    else:
+        image = scaled(picture.texels, width, height)
+        notes.append(
+            f"scaled from {old_width} x {old_height} to {width} x {height}, the nearest powers of "
+            "two; the files hold the scaled image"
+        )
+    container = CONTAINERS[options.format]
+    parts, files = [], []
+    for number, texels in enumerate(split(image, axes)):
+        data = container.write(np.ascontiguousarray(texels), options.quality)
+        own, joined = sizes[number]
+        axis = axes[number - 1] if number else None
+        name = f"{number + 1}.{options.format}"
+        parts.append(Part(name, *own, len(data), zlib.crc32(data), axis, joined))
+        files.append(data)
+    interlaced = Interlaced(
+        width,
+        height,
+        (old_width, old_height),
+        options.format,
+        container.lossless,
+        components,
+        kind,
+        options.min,
+        tuple(parts),
+    )
+    return Written(interlaced, tuple(files), tuple(notes))
+
+
+def _coloured(description: Description) -> bool:
+    """Whether colours are said to be others than those of sRGB, which untagged files have."""
+    described = description.gamma is not None or description.chromaticities is not None
+    return description.icc is not None or (described and description.srgb is None)
+
+
+def _check_options(options: InterlaceOptions) -> None:
+    for name, value, most in (("min", options.min, MAX_SIDE), ("quality", options.quality, 100)):
+        if not 1 <= value <= most:
+            raise InputError(
+                "PTM-I827", f"--{name} {value} is not possible", remedy=f"give 1 to {most}"
+            )
+    if options.format not in CONTAINERS:
+        raise InputError(
+            "PTM-I827",
+            f"--format {options.format[:20]} is not known",
+            remedy=f"give one of {', '.join(CONTAINERS)}",
+        )
+
+
+def write_folder(folder: str | os.PathLike[str], written: Written, *, force: bool = False) -> None:
+    """Write an interlaced image to a folder, whole or not at all.
+
+    Raises OutputError: what `check_folder` raises; PTM-O002, PTM-O003 it cannot be written.
+    """
+    # A link was chosen by whoever named it; what it leads to is replaced.
+    target = Path(os.path.realpath(folder))
+    check_folder(folder, force=force)
+    marked = f".{target.name[:200]}.{os.urandom(6).hex()}"
+    beside, old = target.with_name(f"{marked}.part"), target.with_name(f"{marked}.old")
+    text = json.dumps(written.interlaced.document(), indent=1) + "\n"
+    with writing(folder):
+        try:
+            beside.mkdir()
+            for part, data in zip(written.interlaced.parts, written.files, strict=True):
+                _put(beside / part.name, data)
+            _put(beside / INDEX, text.encode())
+            replaced = os.path.lexists(target)
+            if replaced:
+                os.rename(target, old)
+            try:
+                os.rename(beside, target)
+            except OSError:
+                if replaced:
+                    os.rename(old, target)
+                raise
+        finally:
+            _remove(beside)
+        _remove(old)
+
+
+def check_folder(folder: str | os.PathLike[str], *, force: bool = False) -> None:
+    """Whether a folder can be written: nothing is there, or nothing in it, or with ``force`` an
+    interlaced image that `ptm interlace` wrote.
+
+    Raises OutputError: PTM-O001 it is there already; PTM-O820 it is something else; PTM-O821 it
+    holds other files too; PTM-O002 it cannot be looked into.
+    """
+    with writing(folder):
+        target = Path(os.path.realpath(folder))
+        if not os.path.lexists(target):
+            return
+        names = sorted(os.listdir(target)) if target.is_dir() else None
+        if names == []:
+            return
+        if names is None or not _is_ours(target / INDEX):
+            raise OutputError(
+                "PTM-O820",
+                "is not a folder that `ptm interlace` wrote, and was not changed",
+                file=folder,
+                remedy="name another with -o; --force does not replace it either",
+            )
+        other = [n for n in names if not (n == INDEX or _OURS.fullmatch(n)) or _odd(target / n)]
+        if other:
+            raise OutputError(
+                "PTM-O821",
+                f"holds {other[0][:80]}, which `ptm interlace` did not write; nothing was changed",
+                file=folder,
+                remedy="move it away, or name another folder with -o",
+            )
+        if not force:
+            refuse_existing(folder, "use --force to replace it, or name another folder")
+
+
+def _is_ours(index: Path) -> bool:
+    """Whether an index begins as ours do; the rest of it may be damaged."""
+    try:
+        with open_regular(index) as file:
+            return f'"format": "{FORMAT}"'.encode() in file.read(_HEAD)
+    except OSError:
+        return False
+
+
+def _odd(path: Path) -> bool:
+    return not stat.S_ISREG(os.lstat(path).st_mode)
+
+
+def _put(path: Path, data: bytes) -> None:
+    with open(path, "xb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _remove(folder: Path) -> None:
+    """A folder of ours, and nothing else that has come to be in it."""
+    if not folder.is_dir():
+        return
+    for name in os.listdir(folder):
+        if name == INDEX or _OURS.fullmatch(name):
+            with contextlib.suppress(OSError):
+                (folder / name).unlink()
+    with contextlib.suppress(OSError):
+        folder.rmdir()
