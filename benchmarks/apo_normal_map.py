@@ -16,8 +16,8 @@ source's normal is taken at one point of a pixel, so that far away, where a pixe
 triangles, neither can come near 0: both show a mean.
 
 "At equal error" reads between the sizes of the map, on logarithmic scales; – where no level of the
-octree is within the errors of the maps. The octree's error ends near the bound that it was made with
-(0.05 is 2.9°): a lower one is what compares with large maps.
+octree is within the errors of the maps. The octree's error ends near the bound that it was made
+with (0.05 is 2.9°): a lower one is what compares with large maps.
 """
 
 from __future__ import annotations
