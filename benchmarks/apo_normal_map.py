@@ -249,12 +249,12 @@ def map_shows(
     image: NDArray[np.uint8], simple: Simple, low: Floats, side: float, uv: Floats
 ) -> Show:
     """As graphics hardware shows it: linear within and between levels, of which each is the mean of
-    the next (as `.ptm` has them, rounded down)."""
+    the next, rounded (the levels of a `.ptm` are rounded down, which turns normals a little)."""
     levels = [image]
     while len(levels[-1]) > 1:
         a = levels[-1].astype(np.int64)
         four = a[::2, ::2] + a[1::2, ::2] + a[::2, 1::2] + a[1::2, 1::2]
-        levels.append((four // 4).astype(np.uint8))
+        levels.append(((four + 2) // 4).astype(np.uint8))
     corners = ((simple.points - low) / side)[simple.triangles]
     size = len(image)
 
