@@ -16,8 +16,8 @@ source's normal is taken at one point of a pixel, so that far away, where a pixe
 triangles, neither can come near 0: both show a mean.
 
 "At equal error" reads between the sizes of the map, on logarithmic scales; – where no level of the
-octree is within the errors of the maps. The octree's error ends near the bound that it was made with
-(0.05 is 2.9°): a lower one is what compares with large maps.
+octree is within the errors of the maps. The octree's error ends near the bound that it was made
+with (0.05 is 2.9°): a lower one is what compares with large maps.
 """
 
 from __future__ import annotations
@@ -249,12 +249,12 @@ def map_shows(
     image: NDArray[np.uint8], simple: Simple, low: Floats, side: float, uv: Floats
 ) -> Show:
     """As graphics hardware shows it: linear within and between levels, of which each is the mean of
-    the next (as `.ptm` has them, rounded down)."""
+    the next, rounded (the levels of a `.ptm` are rounded down, which turns normals a little)."""
     levels = [image]
     while len(levels[-1]) > 1:
         a = levels[-1].astype(np.int64)
         four = a[::2, ::2] + a[1::2, ::2] + a[::2, 1::2] + a[1::2, 1::2]
-        levels.append((four // 4).astype(np.uint8))
+        levels.append(((four + 2) // 4).astype(np.uint8))
     corners = ((simple.points - low) / side)[simple.triangles]
     size = len(image)
 
