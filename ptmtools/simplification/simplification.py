@@ -21,6 +21,8 @@ beside ours:
 
 from __future__ import annotations
 
+from math import inf
+
 import numpy as np
 
 from ptmtools.progress import Progress, silent
@@ -39,6 +41,7 @@ from ptmtools.simplification.state_kernels import (
     link_corners,
 )
 from ptmtools.simplification.surface import Surface, check, surface_of
+from ptmtools.tolerance import FILE_SHARE
 
 #: Progress is told after so many parts of the work.
 PARTS = 50
@@ -62,8 +65,13 @@ def simplify(
     if options.method == "meshlab":
         return by_meshlab(mesh, surface, options.faces)
     state = _state(mesh, surface)
+    state.worst[1] = _square(options.error / surface.scale)
     _collapse(state, options.faces, progress)
     return _result(mesh, surface, state, options)
+
+
+def _square(error: float) -> float:
+    return error * error if error < 1 / FILE_SHARE else inf
 
 
 def _state(mesh: Mesh, surface: Surface) -> State:
@@ -92,7 +100,7 @@ def _state(mesh: Mesh, surface: Surface) -> State:
         shared=np.empty((MOST_AT_EDGE, 6), np.int32),
         shown=np.empty(2),
         limits=np.array(CAREFUL),
-        worst=np.zeros(1),
+        worst=np.zeros(2),
     )
 
 

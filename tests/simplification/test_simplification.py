@@ -188,6 +188,20 @@ def test_many_parts() -> None:
     assert least.notes
 
 
+def test_no_collapse_has_a_greater_error_than_allowed() -> None:
+    given = sphere(20)
+    for error in (1e-3, 1e-2):
+        found = simplify(given, SimplifyOptions(1, error=error))
+        assert error / 2 < found.error <= error
+        assert found.notes
+    box_again = simplify(box(5), SimplifyOptions(1, error=0.0))
+    assert len(box_again.mesh.triangles) == 12
+    free = simplify(given, SimplifyOptions(1000, error=1e300))
+    assert bytes_of(free.mesh) == bytes_of(to(1000, given).mesh)
+    with pytest.raises(ValueError, match="no error"):
+        SimplifyOptions(error=float("nan"))
+
+
 def test_lone_triangles_stay() -> None:
     corners = np.random.default_rng(3).uniform(size=(20, 3, 3))
     found = to(1, Mesh(corners.reshape(-1, 3), np.arange(60, dtype=np.int32).reshape(-1, 3)))
