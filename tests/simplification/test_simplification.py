@@ -94,6 +94,21 @@ def test_windows_keep_their_outline_and_bricks_their_texture() -> None:
     assert (low % 2 == 1).all()
 
 
+@pytest.mark.parametrize("painted", [False, True])
+def test_materials_or_colours_alone_make_seams(painted: bool) -> None:
+    given = replace(facade(2, 2, 4), uv=None)
+    assert given.material is not None
+    if painted:
+        colors = np.repeat(given.material, 9).reshape(-1, 3, 3).astype(np.uint8) * 200
+        given = replace(given, material=None, colors=colors)
+    found = to(2 * 4 + (2 * 4 * 4 + 4 - 2), given)
+    assert not found.notes
+    mesh = found.mesh
+    kind = mesh.material if mesh.colors is None else mesh.colors[:, 0, 0] // 200
+    assert (np.abs(normals(mesh)[:, 2]) / 2)[kind == 1].sum() == pytest.approx(4)
+    assert mesh.colors is None or (mesh.colors == mesh.colors[:, :1, :1]).all()
+
+
 def test_a_texture_that_bends_is_dear() -> None:
     """On one flat wall, faces stay where the texture is not affine."""
     triangles = grid(40, 10)
