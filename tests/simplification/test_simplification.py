@@ -106,6 +106,9 @@ def test_materials_or_colours_alone_make_seams(painted: bool) -> None:
     mesh = found.mesh
     kind = mesh.material if mesh.colors is None else mesh.colors[:, 0, 0] // 200
     assert (np.abs(normals(mesh)[:, 2]) / 2)[kind == 1].sum() == pytest.approx(4)
+    # The corners of the wall and of four windows.
+    assert len(mesh.points) == 4 + 4 * 4
+    assert (mesh.points == np.round(mesh.points)).all()
     assert mesh.colors is None or (mesh.colors == mesh.colors[:, :1, :1]).all()
 
 
