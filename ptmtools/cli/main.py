@@ -38,6 +38,7 @@ COMMANDS = {
     "publish": ("publish", "publish", "Write a walk for browsers, a folder for any web server."),
     "encode": ("images", "encode", "Encode images as .ptm files."),
     "decode": ("images", "decode", "Decode .ptm files to images."),
+    "campus": ("campus", "campus", "Write a model as objects with levels of detail."),
     "warm-up": ("warm_up", "warm_up", "Compile for this machine, before the first run."),
     "compare": ("comparing", "compare", "Compare .ptm with other image formats: size and speed."),
 }

@@ -40,7 +40,19 @@ class FolderKind:
 
 
 #: By the name of the index.
-FOLDERS: dict[str, FolderKind] = {}
+FOLDERS: dict[str, FolderKind] = {
+    kind.index: kind
+    for kind in (
+        FolderKind(
+            "campus.json",
+            "a campus",
+            "ptm campus MODEL",
+            Lazy("ptmtools.campus.validation:CODES"),
+            Lazy("ptmtools.campus.validation:check_campus"),
+            Lazy("ptmtools.campus.description:describe_campus"),
+        ),
+    )
+}
 
 
 def kind_of(folder: Path) -> FolderKind | None:
