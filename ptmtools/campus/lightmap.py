@@ -1,8 +1,9 @@
 """The lightmaps of an object: light in every texel of an atlas, in three sizes.
 
-The least is computed texel by texel. Each larger one takes over what four texels below agree on, as
-their bilinear mean, and computes the rest anew: light is smooth but for where surfaces meet. What
-was computed is smoothed with its eight neighbours on the same chart. The gaps between charts take
+One of half the least size is computed texel by texel. Each larger one takes over what the four
+texels below agree on, as their bilinear mean, and computes the rest anew: light is smooth but for
+where surfaces meet. At the edge of a chart those of the four count that lie on it, if they have
+half of the weight. What was computed is smoothed with its eight neighbours on the same chart. The gaps between charts take
 the value of what is nearest, so that no filter brings in what is not there and JPEG has few edges
 to code.
 """
@@ -21,6 +22,11 @@ from ptmtools.campus.model import LIGHT_SIZES
 
 #: Four texels agree if none differs from another by more.
 AGREE = 8 / 255
+#: Points are moved so far towards the middle of their face: a row of texels whose centres are the
+#: lower edge of a wall would lie in the ground, and be black.
+_INWARD = 1e-3
+#: The share of the bilinear weight that texels of the same chart must have.
+_ENOUGH = 0.5
 #: By which the directions are turned from texel to texel: far apart in both directions
 #: (Roberts' R2 sequence).
 _TURN = 0.7548776662466927, 0.5698402909980532
@@ -44,6 +50,7 @@ def bake(
 
     ``sizes`` ascend, each twice the one before.
     """
+    sizes = (sizes[0] // 2, *sizes)
     found: list[Lit] = []
     below: tuple[Singles, NDArray[np.int32]] | None = None
     for size in sizes:
@@ -61,7 +68,8 @@ def bake(
         smooth = _smoothed(value, chart)
         value[row, column] = smooth[row, column]
         below = value, chart
-        found.append(Lit(fill(value, owner >= 0), len(row), int((owner >= 0).sum())))
+        if size > sizes[0]:
+            found.append(Lit(fill(value, owner >= 0), len(row), int((owner >= 0).sum())))
     return found
 
 
@@ -91,6 +99,7 @@ def _positions(
     area = _cross(b - a, c - a)
     second, third = _cross(at - a, c - a) / area, _cross(b - a, at - a) / area
     share = np.stack([1 - second - third, second, third], axis=1)
+    share += _INWARD * (1 / 3 - share)
     return np.asarray(np.einsum("nk,nkx->nx", share, corner[face]))
 
 
@@ -102,25 +111,27 @@ def _enlarged(
     value: Singles, chart: NDArray[np.int32], larger: NDArray[np.int32]
 ) -> tuple[Singles, Bools]:
     """A lightmap of twice the size as bilinear filtering has it, and where that can be believed:
-    the four texels are of the same chart as the one between them, and agree."""
+    enough of the four texels are of the same chart as the one between them, and those agree."""
     size = len(larger)
     place = (np.arange(size) + 0.5) / 2 - 0.5
     first = np.clip(np.floor(place).astype(np.int64), 0, len(value) - 2)
-    share = (place - first).astype(np.float32)
+    share = np.clip(place - first, 0, 1).astype(np.float32)
     rows, columns = (first, first + 1), (first, first + 1)
     mean = np.zeros((size, size), np.float32)
     least, most = np.full_like(mean, np.inf), np.full_like(mean, -np.inf)
-    same = larger >= 0
+    weight = np.zeros_like(mean)
     for i, row in enumerate(rows):
         for j, column in enumerate(columns):
             four = value[row[:, None], column]
-            same &= chart[row[:, None], column] == larger
-            weight = np.abs(1 - i - share)[:, None] * np.abs(1 - j - share)
-            mean += weight * four
-            np.minimum(least, four, out=least)
-            np.maximum(most, four, out=most)
-    same &= (most - least <= AGREE) & (share >= 0) & (share[:, None] >= 0)
-    return mean, same
+            same = chart[row[:, None], column] == larger
+            part = np.where(same, np.abs(1 - i - share)[:, None] * np.abs(1 - j - share), 0)
+            weight += part
+            mean += part * four
+            np.minimum(least, four, out=least, where=same)
+            np.maximum(most, four, out=most, where=same)
+    believed = (larger >= 0) & (weight >= _ENOUGH)
+    believed[believed] = (most - least)[believed] <= AGREE
+    return mean / np.maximum(weight, np.finfo(np.float32).tiny), believed
 
 
 def _smoothed(value: Singles, chart: NDArray[np.int32]) -> Singles:

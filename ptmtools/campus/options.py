@@ -33,7 +33,7 @@ class CampusOptions:
     lods: int = 2
     ratio: float = 0.1
     faces: int = 100
-    small: float = 5.0
+    small: float = 10.0
     lightmaps: Literal["bake", "model", "none"] = "bake"
     samples: int = 64
     reach: float = 20.0

@@ -21,7 +21,7 @@ POINTS = 8
 #: Corners in one place share a light where their faces turn by no more than this (a dot product).
 SMOOTH = 0.8
 #: How much a vertex wants the mean of its own points, beside what fits them best.
-_STEADY = 0.1
+_STEADY = 0.01
 _ROUNDS = 24
 
 
