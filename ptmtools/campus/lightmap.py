@@ -3,9 +3,9 @@
 One of half the least size is computed texel by texel. Each larger one takes over what the four
 texels below agree on, as their bilinear mean, and computes the rest anew: light is smooth but for
 where surfaces meet. At the edge of a chart those of the four count that lie on it, if they have
-half of the weight. What was computed is smoothed with its eight neighbours on the same chart. The gaps between charts take
-the value of what is nearest, so that no filter brings in what is not there and JPEG has few edges
-to code.
+half of the weight. What was computed is smoothed with its eight neighbours on the same chart. The
+gaps between charts take the value of what is nearest, so that no filter brings in what is not there
+and JPEG has few edges to code.
 """
 
 from __future__ import annotations
@@ -65,8 +65,7 @@ def bake(
         point = _positions(atlas.uv, corner, face, row, column, size)
         turn = (column * _TURN[0] + row * _TURN[1]) % 1.0
         value[row, column] = look(face, point, turn)
-        smooth = _smoothed(value, chart)
-        value[row, column] = smooth[row, column]
+        value[row, column] = _smoothed(value, chart, row, column)
         below = value, chart
         if size > sizes[0]:
             found.append(Lit(fill(value, owner >= 0), len(row), int((owner >= 0).sum())))
@@ -131,18 +130,19 @@ def _enlarged(
             np.maximum(most, four, out=most, where=same)
     believed = (larger >= 0) & (weight >= _ENOUGH)
     believed[believed] = (most - least)[believed] <= AGREE
-    return mean / np.maximum(weight, np.finfo(np.float32).tiny), believed
+    mean /= np.maximum(weight, np.finfo(np.float32).tiny)
+    return mean, believed
 
 
-def _smoothed(value: Singles, chart: NDArray[np.int32]) -> Singles:
-    """The binomial mean of each texel and its neighbours on the same chart."""
+def _smoothed(value: Singles, chart: NDArray[np.int32], row: Ints, column: Ints) -> Singles:
+    """(n,) the binomial mean of some texels and their neighbours on the same chart."""
     held, charts = np.pad(value, 1), np.pad(chart, 1, constant_values=-2)
-    total, weight = np.zeros_like(value), np.zeros_like(value)
-    height, width = value.shape
+    total, weight = np.zeros(len(row), np.float32), np.zeros(len(row), np.float32)
+    here = chart[row, column]
     for i, down in _KERNEL:
         for j, across in _KERNEL:
-            part = np.s_[1 + i : 1 + i + height, 1 + j : 1 + j + width]
-            share = np.where(charts[part] == chart, np.float32(down * across), np.float32(0))
-            total += share * held[part]
+            place = row + 1 + i, column + 1 + j
+            share = np.where(charts[place] == here, np.float32(down * across), np.float32(0))
+            total += share * held[place]
             weight += share
-    return np.asarray(total / np.maximum(weight, np.finfo(np.float32).tiny), np.float32)
+    return np.asarray(total / weight)

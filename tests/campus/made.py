@@ -91,7 +91,7 @@ def write_campus(folder: Path, *, houses: int = 2, steps: int = 6) -> Path:
         objects.append((f"House {i + 1}", house(20 * i, 0, 12, 8, 9, steps)))
     objects.append(("Fence", {"fence": wall((-10, 15), (30, 15), 2)}))
     for i in range(3):
-        objects.append((f"bin {i}", house(14 + 0.8 * i, 10, 0.5, 0.5, 1, 1)))
+        objects.append((f"bin {i}", house(17 + 0.8 * i, 10, 0.5, 0.5, 1, 1)))
     write_obj(folder / "campus.obj", objects)
     return folder / "campus.obj"
 
