@@ -33,7 +33,7 @@ from ptmtools.tolerance import ROUNDING_SHARE
 #: The ways of a collapse: into the second end, into the first, to the best place; none.
 SECOND, FIRST, PLACED, NONE = 0, 1, 2, 3
 #: Share of the weight that pulls the best place to the middle of the edge.
-PULL = 1e-3
+PULL = 1e-5
 #: Share of weight times squared length that is added to the cost for the order alone: where
 #: everything is flat the shortest edges go first.
 SHORTEST = ROUNDING_SHARE
@@ -239,6 +239,9 @@ def collapse_edges(state: State, heap: Heap, faces: int) -> None:
             continue
         way = weigh(state, a, b, tried)
         cost = state.shown[0]
+        weight = state.quadric[a, 10] + state.quadric[b, 10]
+        if cost > state.worst[1] * weight:
+            continue
         u, v = (a, b) if way == SECOND else (b, a)
         px, py, pz = state.point[v, 0], state.point[v, 1], state.point[v, 2]
         if way == PLACED:
@@ -252,7 +255,6 @@ def collapse_edges(state: State, heap: Heap, faces: int) -> None:
         if not fits or (way == PLACED and not keeps_faces(state, v, u, px, py, pz)):
             push(state, heap, a, b, tried | (1 << way))
             continue
-        weight = state.quadric[u, 10] + state.quadric[v, 10]
         if cost > state.worst[0] * weight:
             state.worst[0] = cost / weight
         state.moved[v] |= way == PLACED

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Literal
 
 import numpy as np
@@ -10,7 +11,8 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats
 
-Method = Literal["quadric", "fast", "meshlab"]
+#: Our collapses, or those of pymeshlab, for plain meshes only.
+Method = Literal["quadric", "meshlab"]
 
 
 @dataclass(frozen=True)
@@ -45,15 +47,20 @@ class SimplifyOptions:
     Attributes
     ----------
     faces: keep at most so many, where seams and borders allow it.
+    error: make no collapse with a greater error (`Simplified.error`), in the unit of the points,
+        even if more faces are left; for `quadric` alone.
     method: what makes them fewer.
     """
 
     faces: int = 10_000
+    error: float = inf
     method: Method = "quadric"
 
     def __post_init__(self) -> None:
         if self.faces < 1:
             raise ValueError(f"{self.faces} faces are too few")
+        if not self.error >= 0:
+            raise ValueError(f"{self.error} is no error")
 
 
 @dataclass(frozen=True)
@@ -66,6 +73,7 @@ class Simplified:
     source: (T',) int32, the face of the given mesh that each face came from.
     error: the largest error of a collapse, as a distance in the unit of the points: the root of the
         mean square over the planes that met there, how far the texture moves counted in.
+        NaN where the method does not say.
     notes: what the user should know, such as a number of faces that could not be reached.
     """
 
@@ -73,3 +81,13 @@ class Simplified:
     source: NDArray[np.int32]
     error: float
     notes: tuple[str, ...] = ()
+
+
+def too_many(left: int, faces: int) -> tuple[str, ...]:
+    """The note for a mesh that has more faces than it should."""
+    if left <= faces:
+        return ()
+    return (
+        f"{left:,} faces are left, not {faces:,}: borders, seams, small parts or the greatest "
+        "error do not allow it",
+    )

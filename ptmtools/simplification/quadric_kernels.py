@@ -6,6 +6,10 @@ from ptmtools.arrays import Floats
 from ptmtools.compiled import plain_kernel as kernel
 from ptmtools.simplification.quadrics import PER_ATTRIBUTE
 
+#: Steps to the best place, each of which leaves the pull's share of the way: vertices on the edges
+#: of a box stay there.
+STEPS = 3
+
 
 @kernel
 def value_at(quadric: Floats, row: int, x: float, y: float, z: float) -> float:
@@ -94,17 +98,18 @@ def best_place(
     c = p[9] + value_at(quadric, b, -x, -y, -z)
     w = pull * (p[10] + q[10])
     ax, ay, az = xx + w, yy + w, zz + w
-    rx, ry, rz = 0.5 * w * x - bx, 0.5 * w * y - by, 0.5 * w * z - bz
     # By the adjugate: the matrix is symmetric, and positive by the pull.
     i, j, k = ay * az - yz * yz, xz * yz - xy * az, xy * yz - ay * xz
     l, m, n = ax * az - xz * xz, xz * xy - ax * yz, ax * ay - xy * xy
     det = ax * i + xy * j + xz * k
-    if det <= 0.0:
-        place[0], place[1], place[2] = 0.5 * x, 0.5 * y, 0.5 * z
-    else:
-        place[0] = (i * rx + j * ry + k * rz) / det
-        place[1] = (j * rx + l * ry + m * rz) / det
-        place[2] = (k * rx + m * ry + n * rz) / det
+    place[0], place[1], place[2] = 0.5 * x, 0.5 * y, 0.5 * z
+    if det > 0.0:
+        # Pulled to where the last step led: what the planes do say is left as it is.
+        for _ in range(STEPS):
+            rx, ry, rz = w * place[0] - bx, w * place[1] - by, w * place[2] - bz
+            place[0] = (i * rx + j * ry + k * rz) / det
+            place[1] = (j * rx + l * ry + m * rz) / det
+            place[2] = (k * rx + m * ry + n * rz) / det
     u, v, t = place[0], place[1], place[2]
     square = xx * u * u + yy * v * v + zz * t * t
     mixed = xy * u * v + xz * u * t + yz * v * t + bx * u + by * v + bz * t

@@ -1,6 +1,27 @@
-"""Fewer faces for the same surface: edges collapse, the one that changes it least first."""
+"""Fewer faces for the same surface: edges collapse, the one that changes it least first.
+
+After Garland & Heckbert, "Surface simplification using quadric error metrics", 1997, with the
+attributes of Hoppe, "New quadric metric for simplifying meshes with appearance attributes", 1999.
+
+Tried on made statues (`benchmarks/simplification.py`: 1,002,252 faces to 10,000), each
+beside ours:
+
+- fast-simplification 0.2 takes 0.11 of the time and leaves 2.0 times the mean distance and 1.6
+  times the mean angle: it collapses whatever is below a threshold, in the order of the file. It
+  knows no seams. The triangles are made once and looked at for years: not worth it.
+- pymeshlab 2025.7 takes 1.7 times as long, with 1.07 times the mean distance. It stays, for
+  plain meshes and on request, since the paper on octree textures used it.
+- A stronger pull to the middle of an edge (`collapse_kernels.PULL`): a thousand times leaves 1.13
+  times the mean distance (100,000 faces); none leaves flat parts without a best place.
+- Refusing thin faces outright: on flat walls collapses that cost nothing were refused, and dear
+  ones made instead. Now a thin face is refused where its normal turns, and only at first.
+- Penalties in place of a line's freedom (seams as steep quadrics, as for borders in 1997): texture
+  coordinates are then no longer exact.
+"""
 
 from __future__ import annotations
+
+from math import inf
 
 import numpy as np
 
@@ -8,7 +29,8 @@ from ptmtools.progress import Progress, silent
 from ptmtools.simplification.collapse_kernels import collapse_edges, fill
 from ptmtools.simplification.heap_kernels import Heap
 from ptmtools.simplification.legality_kernels import CAREFUL, CARELESS
-from ptmtools.simplification.model import Mesh, Simplified, SimplifyOptions
+from ptmtools.simplification.meshlab import by_meshlab
+from ptmtools.simplification.model import Mesh, Simplified, SimplifyOptions, too_many
 from ptmtools.simplification.quadrics import attributes, vertex_quadrics, wedge_quadrics
 from ptmtools.simplification.state_kernels import (
     ENTRIES,
@@ -19,6 +41,7 @@ from ptmtools.simplification.state_kernels import (
     link_corners,
 )
 from ptmtools.simplification.surface import Surface, check, surface_of
+from ptmtools.tolerance import FILE_SHARE
 
 #: Progress is told after so many parts of the work.
 PARTS = 50
@@ -32,16 +55,23 @@ def simplify(
     """A mesh with at most ``options.faces`` faces, where seams and borders allow it.
 
     A mesh that has no more is returned as it is. Raises ValueError for arrays that do not fit each
-    other, and for numbers that are not finite.
+    other, and for numbers that are not finite; for the method ``meshlab`` what `by_meshlab` raises.
     """
     check(mesh)
     count = len(mesh.triangles)
     if count <= options.faces:
         return Simplified(mesh, np.arange(count, dtype=np.int32), 0.0)
     surface = surface_of(mesh)
+    if options.method == "meshlab":
+        return by_meshlab(mesh, surface, options.faces)
     state = _state(mesh, surface)
+    state.worst[1] = _square(options.error / surface.scale)
     _collapse(state, options.faces, progress)
     return _result(mesh, surface, state, options)
+
+
+def _square(error: float) -> float:
+    return error * error if error < 1 / FILE_SHARE else inf
 
 
 def _state(mesh: Mesh, surface: Surface) -> State:
@@ -70,7 +100,7 @@ def _state(mesh: Mesh, surface: Surface) -> State:
         shared=np.empty((MOST_AT_EDGE, 6), np.int32),
         shown=np.empty(2),
         limits=np.array(CAREFUL),
-        worst=np.zeros(1),
+        worst=np.zeros(2),
     )
 
 
@@ -112,10 +142,5 @@ def _result(mesh: Mesh, surface: Surface, state: State, options: SimplifyOptions
         None if mesh.uv is None else mesh.uv[face, side],
         None if mesh.colors is None else mesh.colors[face, side],
     )
-    notes: tuple[str, ...] = ()
-    if len(source) > options.faces:
-        notes = (
-            f"{len(source):,} faces are left, not {options.faces:,}: borders, seams and parts that "
-            "cannot be fewer do not allow it",
-        )
+    notes = too_many(len(source), options.faces)
     return Simplified(left, source, float(np.sqrt(state.worst[0])) * surface.scale, notes)

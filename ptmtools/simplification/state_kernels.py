@@ -33,7 +33,7 @@ class State(NamedTuple):
     moved: (V,) whether it has left its place.
     number: (4,) counts, by `FACES` and so on.
     limits: (3,) say when faces turn, such as `CAREFUL`.
-    worst: (1,) the largest error of a collapse, squared.
+    worst: (2,) the largest error of a collapse, squared, and the largest that is allowed.
     mark, place, shared, shown: (V,), (3,), (`MOST_AT_EDGE`, 6) and (2,), storage.
     """
 

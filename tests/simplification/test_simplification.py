@@ -188,6 +188,42 @@ def test_many_parts() -> None:
     assert least.notes
 
 
+def test_no_collapse_has_a_greater_error_than_allowed() -> None:
+    given = sphere(20)
+    for error in (1e-3, 1e-2):
+        found = simplify(given, SimplifyOptions(1, error=error))
+        assert error / 2 < found.error <= error
+        assert found.notes
+    box_again = simplify(box(5), SimplifyOptions(1, error=0.0))
+    assert len(box_again.mesh.triangles) == 12
+    free = simplify(given, SimplifyOptions(1000, error=1e300))
+    assert bytes_of(free.mesh) == bytes_of(to(1000, given).mesh)
+    with pytest.raises(ValueError, match="no error"):
+        SimplifyOptions(error=float("nan"))
+
+
+def test_lone_triangles_stay() -> None:
+    corners = np.random.default_rng(3).uniform(size=(20, 3, 3))
+    found = to(1, Mesh(corners.reshape(-1, 3), np.arange(60, dtype=np.int32).reshape(-1, 3)))
+    assert sorted(map(bytes, found.mesh.points)) == sorted(map(bytes, corners.reshape(-1, 3)))
+    assert len(found.mesh.triangles) == 20
+
+
+def test_parts_that_touch_in_a_point_still_do() -> None:
+    """A sheet, the middle of whose border is a corner of an octahedron."""
+    x, y = (each.reshape(-1) for each in np.meshgrid(np.arange(11.0), np.arange(-5.0, 6.0)))
+    ends = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1.0]])
+    octahedron = [[a, b, c] for a in (0, 1) for b in (2, 3) for c in (4, 5)]
+    points = np.concatenate([np.stack([x, y, 0 * x], axis=1), ends * 3 - [3, 0, 0]])
+    faces = [[a, b, c] if (a + b + c) % 2 == 0 else [a, c, b] for a, b, c in octahedron]
+    triangles = np.concatenate([grid(10, 10), np.array(faces, np.int32) + len(x)])
+    found = to(1, Mesh(points, triangles)).mesh
+    at_origin = (found.points[found.triangles] == 0).all(axis=2).any(axis=1)
+    sheet = (found.points[found.triangles][:, :, 0] >= 0).all(axis=1)
+    assert (at_origin & sheet).any()
+    assert (at_origin & ~sheet).any()
+
+
 def test_the_source_of_each_face_is_where_it_is() -> None:
     mesh = replace(sphere(12), material=np.arange(12 * 144, dtype=np.int32) // 288)
     found = to(600, mesh)

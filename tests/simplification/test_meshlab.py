@@ -1,0 +1,44 @@
+"""Simplification by pymeshlab, and what is said where it cannot be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from ptmtools.errors import InputError, MissingComponentError
+from ptmtools.simplification import SimplifyOptions, meshlab, simplify
+from tests.simplification.shapes import sphere
+
+TO_500 = SimplifyOptions(500, method="meshlab")
+
+
+def test_a_sphere_stays_one(require: Callable[[str, str], None]) -> None:
+    if meshlab._absence() or not find_spec("pymeshlab"):
+        require("pymeshlab", "pip install pymeshlab; apt install libopengl0 libgl1")
+    given = sphere(20)
+    given = replace(given, points=given.points * 1e-3 + 5)
+    found = simplify(given, TO_500)
+    assert 490 <= len(found.mesh.triangles) <= 500
+    assert np.linalg.norm(found.mesh.points - 5, axis=1) == pytest.approx(1e-3, rel=0.02)
+    here = found.mesh.points[found.mesh.triangles].mean(axis=1)
+    there = given.points[given.triangles[found.source]].mean(axis=1)
+    assert np.linalg.norm(here - there, axis=1).max() < 3e-4
+    assert np.isnan(found.error)
+
+
+def test_painted_meshes_are_refused() -> None:
+    given = replace(sphere(20), material=np.zeros(4800, np.int32))
+    with pytest.raises(InputError, match="PTM-I290") as caught:
+        simplify(given, TO_500)
+    assert "quadric" in str(caught.value)
+
+
+def test_without_pymeshlab_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(meshlab, "find_spec", lambda name: None)
+    monkeypatch.setattr(meshlab.sys, "platform", "elsewhere")
+    with pytest.raises(MissingComponentError, match="PTM-M290"):
+        simplify(sphere(20), TO_500)
