@@ -87,7 +87,7 @@ def make_object(work: Work, task: tuple[str, Part]) -> ObjectMade:
         work.uv[faces],
         None if work.colors is None else work.colors[faces],
     )
-    lods = levels(mesh, options.lods, options.ratio, options.faces)
+    lods = levels(mesh, options.lods, options.ratio, options.faces, options.error)
     finest = lods[-1]
     lit = options.lightmaps != "none"
     place, lightmaps, notes = None, [], []
