@@ -93,9 +93,10 @@ def say_levels(folder: Path, made: Made) -> None:
     every, relative = every[np.isfinite(every)], relative[np.isfinite(relative)]
     metre, share = np.percentile(every, 95), np.percentile(relative, 95)
     print(
-        f"\nsimplified: {len(simplified):,} of {len(campus.objects):,} objects; from the finest mesh "
-        f"to the coarsest: mean {every.mean():.3g} m, 95 % within {metre:.3g} m; of the diagonal: "
-        f"mean {relative.mean():.2%}, 95 % within {share:.2%}; nothing found from {lost:.2%}"
+        f"\nsimplified: {len(simplified):,} of {len(campus.objects):,} objects; from the finest "
+        f"mesh to the coarsest: mean {every.mean():.3g} m, 95 % within {metre:.3g} m; of the "
+        f"diagonal: mean {relative.mean():.2%}, 95 % within {share:.2%}; "
+        f"nothing found from {lost:.2%}"
     )
 
 

@@ -57,8 +57,10 @@ def unwrap(points: Floats, triangles: NDArray[np.integer[Any]]) -> Atlas:
     corner = moved[triangles].astype(np.float64)
     across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     area = max(np.linalg.norm(across, axis=1).sum() / 2, np.finfo(np.float32).tiny)
+    length = max(float(np.linalg.norm(np.ptp(moved, axis=0))), np.finfo(np.float32).tiny)
     for side in LIGHT_SIZES:
-        wanted = side * math.sqrt(_FIRST / area)
+        # A street is longer than wide: no chart of it fits at the density that its area asks for.
+        wanted = side * min(math.sqrt(_FIRST / area), 1 / length)
         atlas, density = _packed(xatlas, moved, triangles, side, wanted)
         if density >= _WORTH * wanted:
             break

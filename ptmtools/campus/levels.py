@@ -2,8 +2,8 @@
 
 The finest mesh is the model's own; each coarser one has a share of the faces of the next finer, but
 never fewer than a floor, and no error beyond a bound: of a building few vertices can go for
-nothing, and the share alone takes corners off it. All are simplified from the model's own, so that errors do
-not add up.
+nothing, and the share alone takes corners off it. All are simplified from the model's own, so that
+errors do not add up.
 """
 
 from __future__ import annotations

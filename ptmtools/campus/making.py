@@ -150,7 +150,8 @@ def _look(work: Work, faces: Ints, finest: Level, level: Level) -> Look:
             finest.corner, painted.uv[faces], painted.image[faces], painted.images, level.source
         )
     both, options = work.two_sided[faces][level.source], work.options
-    return Rays.of(work.around, level.corner, both, options.samples, options.reach)
+    rays = options.samples, options.reach
+    return Rays.of(work.around, level.corner, both, *rays, level.error)
 
 
 def _light_source(work: Work, faces: Ints) -> tuple[int, int]:
