@@ -34,6 +34,9 @@ from ptmtools.campus.viewpoints import viewpoint
 from ptmtools.scene.colors import encoded, to_linear
 from ptmtools.simplification import Mesh
 
+#: A coarse face may lie so many times the error of its mesh, which is a mean, beneath the surface.
+_BENEATH = 2.0
+
 
 @dataclass(frozen=True)
 class Work:
@@ -151,7 +154,7 @@ def _look(work: Work, faces: Ints, finest: Level, level: Level) -> Look:
         )
     both, options = work.two_sided[faces][level.source], work.options
     rays = options.samples, options.reach
-    return Rays.of(work.around, level.corner, both, *rays, level.error)
+    return Rays.of(work.around, level.corner, both, *rays, _BENEATH * level.error)
 
 
 def _light_source(work: Work, faces: Ints) -> tuple[int, int]:
