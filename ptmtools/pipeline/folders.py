@@ -56,6 +56,14 @@ _LIST = (
         check=Lazy("ptmtools.apo.checking:check_folder"),
         describe=Lazy("ptmtools.apo.checking:describe"),
     ),
+    FolderKind(
+        index="campus.json",
+        about="campus",
+        again="ptm campus MODEL",
+        codes=Lazy("ptmtools.campus.validation:CODES"),
+        check=Lazy("ptmtools.campus.validation:check_campus"),
+        describe=Lazy("ptmtools.campus.description:describe_campus"),
+    ),
 )
 #: By the name of the index.
 FOLDERS = {kind.index: kind for kind in _LIST}

@@ -1,8 +1,9 @@
 """Reads MTL, the materials of an OBJ file.
 
-Only what the emitted files need is kept: ``Kd``, ``d``/``Tr``, ``map_Kd``, ``map_d``. The
-statements of physically based extensions (``Pr``, ``norm``, …) are passed over. The format has no
-quoting, so the name of a texture is all that follows the last option, spaces included.
+Only what the emitted files need is kept: ``Kd``, ``d``/``Tr``, ``map_Kd``, ``map_d``, and
+``map_Ks`` for a campus. The statements of physically based extensions (``Pr``, ``norm``, …) are
+passed over. The format has no quoting, so the name of a texture is all that follows the last
+option, spaces included.
 """
 
 from __future__ import annotations
@@ -115,6 +116,7 @@ class MtlMaterial:
     dissolve_given: bool = False
     map_kd: MapStatement | None = None
     map_d: MapStatement | None = None
+    map_ks: MapStatement | None = None
 
 
 def read_mtl(path: Path, findings: Findings) -> dict[str, MtlMaterial]:
@@ -180,3 +182,6 @@ def _statement(material: MtlMaterial, key: str, rest: str, line: int) -> None:
         material.map_kd = parse_map(rest, line)
     elif key == "map_d":
         material.map_d = parse_map(rest, line)
+    elif key == "map_ks":
+        with suppress(ValueError):  # few ask for it, and it is no miss
+            material.map_ks = parse_map(rest, line)

@@ -14,7 +14,7 @@ from ptmtools.scene.source import FileRange, Findings, SourceMaterial, Texture
 _LIBRARIES = re.compile(r".*?\.mtl[\"']*(?: |$)|.+", re.IGNORECASE)
 
 
-def _library_names(text: str) -> list[str]:
+def library_names(text: str) -> list[str]:
     """The files of a mtllib statement: several, divided by blanks that names may contain too."""
     return [name.strip() for name in _LIBRARIES.findall(text) if name.strip()]
 
@@ -40,7 +40,7 @@ def resolved(
     read: set[Path] = set()
     for text, line in libraries:
         place = f"{path.name}:{line}"
-        for name in _library_names(text):
+        for name in library_names(text):
             there = findings.folder.find(name).path is not None
             suggestion = "" if there else _suggestion(path, name)
             file = findings.locate(name, f"mtllib {name}", place, "PTM-N203", hint=suggestion)

@@ -28,6 +28,9 @@ from ptmtools.scene.source import (
     Texture,
 )
 
+#: A material of a document → a texture of it, with its texture coordinates.
+TextureOf = Callable[[dict[str, Any]], dict[str, Any] | None]
+
 _KTX2 = "image/ktx2"
 _WRAPS: dict[int | None, SourceWrap] = {33071: "clamp", 33648: "mirror"}
 
@@ -53,11 +56,18 @@ class Painted:
 
 
 class MaterialReader:
-    """Reads each material once, when a primitive first asks for it."""
+    """Reads each material once, when a primitive first asks for it.
 
-    def __init__(self, document: Document, findings: Findings) -> None:
+    ``texture_of`` says which texture of a material counts, as the document has it, or None; without
+    it, that of its base colour.
+    """
+
+    def __init__(
+        self, document: Document, findings: Findings, texture_of: TextureOf | None = None
+    ) -> None:
         self._document = document
         self._findings = findings
+        self._texture_of = texture_of
         self._painted: dict[tuple[int | None, bool], Painted] = {}
         self._materials: list[SourceMaterial] = []
 
@@ -84,6 +94,8 @@ class MaterialReader:
         if glossy is not None:
             factor = glossy.get("diffuseFactor", [1.0, 1.0, 1.0, 1.0])
             use = glossy.get("diffuseTexture")
+        if self._texture_of is not None:
+            use = self._texture_of(entry)
         r, g, b, a = (_share(value) for value in factor)
         if (r, g, b) != (1.0, 1.0, 1.0):
             self._findings.say("PTM-N226", f"{name}: colour factor converted to sRGB", place)

@@ -23,7 +23,7 @@ from ptmtools.scene.colors import encoded
 from ptmtools.scene.gltf.document import Document, damaged, open_document
 from ptmtools.scene.gltf.draco import EXTENSION as DRACO, Decoded, decode_primitives
 from ptmtools.scene.gltf.extensions import check_extensions
-from ptmtools.scene.gltf.material import MaterialReader, Painted
+from ptmtools.scene.gltf.material import MaterialReader, Painted, TextureOf
 from ptmtools.scene.gltf.nodes import cameras, instance_count, instances, world_matrices
 from ptmtools.scene.rows import Rows
 from ptmtools.scene.source import MAX_VERTICES, Findings, Source, too_many_triangles
@@ -67,8 +67,14 @@ class _Mesh:
     colors: NDArray[np.uint8] | None
 
 
-def read_gltf(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES) -> Source:
-    """Read a glTF model.
+def read_gltf(
+    path: Path,
+    findings: Findings,
+    max_triangles: int = MAX_VERTICES,
+    texture_of: TextureOf | None = None,
+) -> Source:
+    """Read a glTF model, painted with another texture than that of the base colour where
+    ``texture_of`` says so (`MaterialReader`).
 
     Raises InputError where it is damaged or needs what is not supported; LimitError for more
     vertices than int32 can number (PTM-L200) or more than ``max_triangles`` (PTM-L203), each as
@@ -76,13 +82,16 @@ def read_gltf(path: Path, findings: Findings, max_triangles: int = MAX_VERTICES)
     can be meant (PTM-L205).
     """
     try:
-        return _read(open_document(path, findings.folder), findings, max_triangles)
+        document = open_document(path, findings.folder)
+        return _read(document, findings, max_triangles, texture_of)
     except _FAULTS as error:
         what = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) else str(error)
         raise damaged(path, what.splitlines()[0] if what else type(error).__name__) from None
 
 
-def _read(document: Document, findings: Findings, max_triangles: int) -> Source:
+def _read(
+    document: Document, findings: Findings, max_triangles: int, texture_of: TextureOf | None
+) -> Source:
     path, tree = document.path, document.tree
     check_extensions(tree, findings)
     world_of = world_matrices(tree, findings)
@@ -90,7 +99,7 @@ def _read(document: Document, findings: Findings, max_triangles: int) -> Source:
     draws = list(_limited(document, drawn, max_triangles))
     if not draws:
         raise InputError("PTM-I247", "no faces", file=path, remedy="give a model with triangles")
-    painter = MaterialReader(document, findings)
+    painter = MaterialReader(document, findings, texture_of)
     painted = [
         painter.read(draw.primitive.get("material"), "COLOR_0" in draw.attributes) for draw in draws
     ]

@@ -1,0 +1,149 @@
+"""An atlas for a lightmap: every face of a mesh in a place of its own, by xatlas.
+
+xatlas packs into a square of about as many texels as it is asked for, and more where the gaps
+between charts take much. So it is asked again, with fewer texels to the metre, until all charts
+with their gaps fit the least lightmap. Where the gaps would take nearly all of it, as between
+thousands of charts of furniture, they are made for the next larger one, and neighbours run into
+each other in the smaller. All sizes have the same layout.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Floats, Singles
+from ptmtools.campus.model import LIGHT_SIZES
+from ptmtools.compiled import kernel
+from ptmtools.lazy import component
+
+#: Texels between charts, of the least lightmap: those of both sides that a bilinear lookup reads.
+GAP = 2
+#: How often xatlas is asked, and the share of the square that the first packing aims at.
+_TRIES, _FIRST = 8, 0.6
+#: An atlas with fewer texels to the metre than this share of those aimed at is mostly gaps.
+_WORTH = 0.4
+#: But where a chart is as long as this share of the side, as a street's is, its length decides.
+_LONG = 0.7
+
+
+@dataclass(frozen=True)
+class Atlas:
+    """Where each face lies.
+
+    Attributes
+    ----------
+    uv: (T, 3, 2) in [0, 1] per corner, origin at the lower left.
+    chart: (T,) int32; faces of one chart are connected.
+    side: of the least lightmap in which gaps between charts are `GAP` texels wide; None if there
+        are too many charts for any.
+    """
+
+    uv: Floats
+    chart: NDArray[np.int32]
+    side: int | None
+
+
+def unwrap(points: Floats, triangles: NDArray[np.integer[Any]]) -> Atlas:
+    """An atlas of (T, 3) triangles over (V, 3) points.
+
+    Raises MissingComponentError: PTM-M830 xatlas is not installed.
+    """
+    xatlas = component("xatlas", "PTM-M830", "baking lightmaps needs xatlas", "campus")
+    # Far from the origin single precision has no texels.
+    moved = (points - points.mean(axis=0)).astype(np.float32)
+    corner = moved[triangles].astype(np.float64)
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = max(np.linalg.norm(across, axis=1).sum() / 2, np.finfo(np.float32).tiny)
+    for side in LIGHT_SIZES:
+        wanted = side * math.sqrt(_FIRST / area)
+        atlas, density = _packed(xatlas, moved, triangles, side, wanted)
+        if density >= _WORTH * wanted or _longest(atlas) >= _LONG * side:
+            break
+    got = max(atlas.width, atlas.height)
+    _, index, uv = atlas.get_mesh(0)
+    scale = np.array([atlas.width, atlas.height]) / max(got, side)
+    placed = uv.astype(np.float64)[index.astype(np.int64)] * scale
+    placed[..., 1] = 1 - placed[..., 1]
+    chart = components(index.astype(np.int64), len(uv))
+    return Atlas(np.clip(placed, 0.0, 1.0), chart[index[:, 0]], side if got <= side else None)
+
+
+def _packed(
+    xatlas: Any, points: Singles, triangles: NDArray[np.integer[Any]], side: int, density: float
+) -> tuple[Any, float]:
+    """An atlas for a lightmap of that side, and its texels to the metre, ``density`` at most."""
+    for _ in range(_TRIES):
+        atlas = xatlas.Atlas()
+        atlas.add_mesh(points, triangles.astype(np.uint32))
+        packing = xatlas.PackOptions()
+        packing.padding, packing.bilinear, packing.texels_per_unit = GAP, True, density
+        atlas.generate(xatlas.ChartOptions(), packing)
+        got = max(atlas.width, atlas.height)
+        if got <= side:
+            break
+        density *= 0.97 * side / got
+    return atlas, density
+
+
+def _longest(atlas: Any) -> float:
+    """The longest side of the box of a chart, texels."""
+    _, index, uv = atlas.get_mesh(0)
+    chart = components(index.astype(np.int64), len(uv))
+    low, high = np.full((len(uv), 2), np.inf), np.full((len(uv), 2), -np.inf)
+    np.minimum.at(low, chart, uv)
+    np.maximum.at(high, chart, uv)
+    size = np.array([atlas.width, atlas.height])
+    return float(((high - low)[np.unique(chart)] * size).max())
+
+
+@kernel
+def components(triangle: NDArray[np.int64], count: int) -> NDArray[np.int32]:
+    """(count,) for each vertex the least one that (m, 3) triangles connect it with."""
+    root = np.arange(count).astype(np.int32)
+    for t in range(len(triangle)):
+        for k in range(2):
+            a, b = triangle[t, k], triangle[t, k + 1]
+            while root[a] != a:
+                a = int(np.int64(root[a]))
+            while root[b] != b:
+                b = int(np.int64(root[b]))
+            if a < b:
+                root[b] = a
+            else:
+                root[a] = b
+    for v in range(count):
+        # All before it are final, and none is connected with one after it by way of its root.
+        root[v] = root[root[v]]
+    return root
+
+
+@kernel
+def cover(uv: NDArray[np.float64], size: int) -> NDArray[np.int32]:
+    """(size, size) the face whose part of the atlas holds the centre of each texel, rows from the
+    top, -1 where there is none; the first of several. ``uv`` is (T, 3, 2), from the lower left."""
+    owner = np.full((size, size), -1, np.int32)
+    for t in range(len(uv)):
+        ax, ay = uv[t, 0, 0] * size, (1 - uv[t, 0, 1]) * size
+        bx, by = uv[t, 1, 0] * size, (1 - uv[t, 1, 1]) * size
+        cx, cy = uv[t, 2, 0] * size, (1 - uv[t, 2, 1]) * size
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if area == 0:
+            continue
+        left = max(0, int(np.ceil(min(ax, bx, cx) - 0.5)))
+        right = min(size - 1, int(np.floor(max(ax, bx, cx) - 0.5)))
+        top = max(0, int(np.ceil(min(ay, by, cy) - 0.5)))
+        bottom = min(size - 1, int(np.floor(max(ay, by, cy) - 0.5)))
+        for row in range(top, bottom + 1):
+            y = row + 0.5
+            for column in range(left, right + 1):
+                x = column + 0.5
+                u = ((bx - x) * (cy - y) - (by - y) * (cx - x)) / area
+                v = ((cx - x) * (ay - y) - (cy - y) * (ax - x)) / area
+                if u >= 0 and v >= 0 and u + v <= 1 and owner[row, column] < 0:
+                    owner[row, column] = t
+    return owner

@@ -1,0 +1,101 @@
+"""Where the light of a surface comes from: rays, or the lightmap of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Ints, Singles
+from ptmtools.campus.occlusion import Surroundings, light, lighter_side, normals, outermost
+
+#: (n,) faces, (n, 3) points on them, (n,) shares of a circle by which points differ → (n,) linear
+#: light from 0 to 1.
+Look = Callable[[Ints, Floats, Floats], Singles]
+
+
+@dataclass(frozen=True)
+class Rays:
+    """The light of (T, 3, 3) faces by rays along (T, 3) unit normals; see `light`.
+
+    Faces that are up to ``error`` metres off the surface that they stand for have its light.
+    """
+
+    around: Surroundings
+    normal: Floats
+    samples: int
+    reach: float
+    error: float = 0.0
+
+    @staticmethod
+    def of(
+        around: Surroundings,
+        corner: Floats,
+        both: Bools,
+        samples: int,
+        reach: float,
+        error: float = 0.0,
+    ) -> Rays:
+        """Of faces of which some have ``both`` sides: on these the lighter one counts."""
+        normal = lighter_side(around, corner, normals(corner), both, reach, error)
+        return Rays(around, normal, samples, reach, error)
+
+    def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
+        normal = self.normal[face]
+        place = outermost(self.around, point, normal, self.error)
+        return light(self.around, place, normal, turn, self.samples, self.reach)
+
+
+@dataclass(frozen=True)
+class Painted:
+    """The light of a model's own lightmap.
+
+    Attributes
+    ----------
+    corner, uv: (T, 3, 3) and (T, 3, 2), of the model's faces; uv from the lower left.
+    image: (T,) index into `images`, -1 for faces without, which are white.
+    images: (h, w) linear light, rows from the top.
+    source: (F,) for each face that is asked about the one of the model's that it came from.
+    """
+
+    corner: Floats
+    uv: Floats
+    image: NDArray[np.int32]
+    images: tuple[Singles, ...]
+    source: NDArray[np.integer[Any]]
+
+    def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
+        of = self.source[face]
+        a, b, c = np.moveaxis(self.corner[of], 1, 0)
+        u, v, w = b - a, c - a, point - a
+        uu, uv, vv = (np.einsum("nk,nk->n", p, q) for p, q in ((u, u), (u, v), (v, v)))
+        wu, wv = (np.einsum("nk,nk->n", w, q) for q in (u, v))
+        area = np.maximum(uu * vv - uv * uv, np.finfo(float).tiny)
+        share = np.stack([(vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area], axis=1)
+        # A coarse face may lie beyond the face that it came from.
+        share = np.clip(share, 0.0, 1.0)
+        share /= np.maximum(share.sum(axis=1, keepdims=True), 1.0)
+        corners = self.uv[of]
+        at = corners[:, 0] + share[:, :1] * (corners[:, 1] - corners[:, 0])
+        at += share[:, 1:] * (corners[:, 2] - corners[:, 0])
+        found = np.ones(len(point), np.float32)
+        for index, texels in enumerate(self.images):
+            these = self.image[of] == index
+            found[these] = _bilinear(texels, at[these])
+        return found
+
+
+def _bilinear(texels: Singles, at: Floats) -> Singles:
+    """(n,) of an image at (n, 2) coordinates from its lower left; its edges go on."""
+    height, width = texels.shape
+    x = np.clip(at[:, 0] * width - 0.5, 0, width - 1)
+    y = np.clip((1 - at[:, 1]) * height - 0.5, 0, height - 1)
+    column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    right, below = np.minimum(column + 1, width - 1), np.minimum(row + 1, height - 1)
+    s, t = x - column, y - row
+    upper = texels[row, column] * (1 - s) + texels[row, right] * s
+    lower = texels[below, column] * (1 - s) + texels[below, right] * s
+    return np.asarray(upper * (1 - t) + lower * t, np.float32)

@@ -1,0 +1,190 @@
+"""One object of a campus: its meshes, its lightmaps and its viewpoint.
+
+A task of an executor: everything that is needed lies in `Work`, which workers share.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.campus.atlas import unwrap
+from ptmtools.campus.levels import Level, levels
+from ptmtools.campus.lightmap import bake
+from ptmtools.campus.lights import Look, Painted, Rays
+from ptmtools.campus.meshes import Corners, mesh_bytes
+from ptmtools.campus.model import (
+    LIGHT_SIZES,
+    CampusMaterial,
+    CampusObject,
+    MeshFile,
+)
+from ptmtools.campus.names import mesh_file
+from ptmtools.campus.objects import Part
+from ptmtools.campus.occlusion import Surroundings, normals
+from ptmtools.campus.options import CampusOptions
+from ptmtools.campus.second_set import ModelLight
+from ptmtools.campus.textures import Written, light_files
+from ptmtools.campus.vertex_light import vertex_light
+from ptmtools.campus.viewpoints import viewpoint
+from ptmtools.scene.colors import encoded, to_linear
+from ptmtools.simplification import Mesh
+
+#: A coarse face may lie so many times the error of its mesh, which is a mean, beneath the surface.
+_BENEATH = 2.0
+
+
+@dataclass(frozen=True)
+class Work:
+    """What all objects have in common.
+
+    Attributes
+    ----------
+    points, triangles, uv, colors, two_sided: as of the scene.
+    material: (T,) indices into `materials`.
+    around: what takes light.
+    painted: the model's own lightmaps, if those are asked for.
+    """
+
+    points: Floats
+    triangles: NDArray[np.int32]
+    uv: Floats
+    colors: NDArray[np.uint8] | None
+    two_sided: Bools
+    material: NDArray[np.int32]
+    materials: tuple[CampusMaterial, ...]
+    around: Surroundings
+    options: CampusOptions
+    painted: ModelLight | None = None
+
+
+@dataclass(frozen=True)
+class ObjectMade:
+    """An object's record and its files; `notes` on it; how many texels of its lightmaps lie on
+    faces, and how many were computed."""
+
+    record: CampusObject
+    meshes: tuple[tuple[str, bytes], ...]
+    lightmaps: tuple[Written, ...]
+    notes: tuple[str, ...] = ()
+    covered: int = 0
+    computed: int = 0
+
+
+def make_object(work: Work, task: tuple[str, Part]) -> ObjectMade:
+    """An object by its name in files.
+
+    Raises what `unwrap` raises.
+    """
+    name, part = task
+    options, faces = work.options, part.triangles
+    used, index = np.unique(work.triangles[faces], return_inverse=True)
+    mesh = Mesh(
+        work.points[used],
+        index.reshape(-1, 3).astype(np.int32),
+        work.material[faces],
+        work.uv[faces],
+        None if work.colors is None else work.colors[faces],
+    )
+    lods = levels(mesh, options.lods, options.ratio, options.faces, options.error)
+    finest = lods[-1]
+    lit = options.lightmaps != "none"
+    place, lightmaps, notes = None, [], []
+    covered = computed = 0
+    if lit:
+        atlas = unwrap(mesh.points, mesh.triangles)
+        place = atlas.uv
+        maps = bake(_look(work, faces, finest, finest), finest.corner, atlas)
+        source = _light_source(work, faces)
+        texels = [(len(m.value), encoded(m.value.astype(np.float64)), source) for m in maps]
+        lightmaps = light_files(name, texels, options.quality)
+        covered, computed = sum(m.covered for m in maps), sum(m.computed for m in maps)
+        if atlas.side != LIGHT_SIZES[0]:
+            least = (
+                "any lightmap" if atlas.side is None else f"a lightmap of less than {atlas.side}"
+            )
+            notes.append(
+                f"{part.label}: too many charts for {least}; neighbours run into each other"
+            )
+    files, records = [], []
+    for lod, level in enumerate(lods):
+        fine = level is finest
+        color = None if level.color is None else to_linear(level.color / 255)
+        if lit and not fine:
+            held = vertex_light(
+                _look(work, faces, finest, level), level.corner, normals(level.corner)
+            )[..., None]
+            color = held * (np.ones(3) if color is None else color)
+        corners = Corners(level.corner, level.material, level.uv, place if fine else None, color)
+        data, file = mesh_bytes(corners, work.materials), mesh_file(name, lod)
+        files.append((file, data))
+        record = MeshFile(file, len(level.corner), len(data), zlib.crc32(data), _short(level.error))
+        records.append(record)
+    box = _box(lods)
+    return ObjectMade(
+        CampusObject(
+            name=name,
+            label=part.label,
+            parts=part.parts,
+            box=tuple(box.tolist()),
+            barycentre=_barycentre(finest.corner, box),
+            viewpoint=viewpoint(work.around, finest.corner, box),
+            materials=tuple(np.unique(work.material[faces]).tolist()),
+            lightmap=name if lit else None,
+            meshes=tuple(records),
+        ),
+        tuple(files),
+        tuple(lightmaps),
+        tuple(notes),
+        covered,
+        computed,
+    )
+
+
+def _look(work: Work, faces: Ints, finest: Level, level: Level) -> Look:
+    """The light on the faces of a level."""
+    if work.painted is not None:
+        painted = work.painted
+        return Painted(
+            finest.corner, painted.uv[faces], painted.image[faces], painted.images, level.source
+        )
+    both, options = work.two_sided[faces][level.source], work.options
+    rays = options.samples, options.reach
+    return Rays.of(work.around, level.corner, both, *rays, _BENEATH * level.error)
+
+
+def _light_source(work: Work, faces: Ints) -> tuple[int, int]:
+    """The size of what the lightmap is made of: the largest image, or rays as many as texels."""
+    if work.painted is None:
+        return LIGHT_SIZES[-1], LIGHT_SIZES[-1]
+    used = {i for i in np.unique(work.painted.image[faces]).tolist() if i >= 0}
+    sizes = [work.painted.images[i].shape for i in used] or [(1, 1)]
+    height, width = max(sizes)
+    return width, height
+
+
+def _box(lods: list[Level]) -> Floats:
+    """(6,) of the positions of all meshes as their files have them."""
+    held = [level.corner.astype(np.float32).reshape(-1, 3) for level in lods]
+    low, high = (np.array([f(p, axis=0) for p in held]) for f in (np.min, np.max))
+    return np.concatenate([low.min(axis=0), high.max(axis=0)]).astype(np.float64)
+
+
+def _barycentre(corner: Floats, box: Floats) -> tuple[float, float, float]:
+    """The centre of a surface; within its box, whatever rounding did."""
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = np.linalg.norm(across, axis=1)
+    weight = area if area.sum() > 0 else np.ones(len(area))
+    x, y, z = np.clip(
+        np.average(corner.mean(axis=1), axis=0, weights=weight), box[:3], box[3:]
+    ).tolist()
+    return x, y, z
+
+
+def _short(error: float) -> float:
+    """Six digits: what follows is noise."""
+    return float(f"{error:.6g}")

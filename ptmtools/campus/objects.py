@@ -1,0 +1,109 @@
+"""What counts as an object: those that the model names, and small ones together.
+
+An object has meshes, a lightmap and a place in the client's order of its own, so thousands of
+lamps and chairs would each take three lightmaps and a request. Objects smaller than a few metres
+are therefore joined with the small ones of the same square of a grid on the ground. Larger ones
+stay as they are, however many faces they have: where one object is all of the model, a client can
+only load all of it at once, and that is said. (Not done: cutting it up. Where a building ends is
+known to who made the model.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ptmtools.arrays import Floats, Ints
+from ptmtools.errors import LimitError
+from ptmtools.scene.model import Scene
+
+#: The grid's squares are so many times as large as what is small.
+SQUARE = 4
+#: Most objects of a campus.
+MAX_OBJECTS = 20_000
+#: An object with more than this share of all faces is spoken of.
+MOST_FACES = 0.8
+
+
+@dataclass(frozen=True)
+class Part:
+    """An object of the campus.
+
+    Attributes
+    ----------
+    label: for visitors.
+    parts: names of the model's objects in it.
+    triangles: (n,) int64 of the scene, ascending.
+    """
+
+    label: str
+    parts: tuple[str, ...]
+    triangles: Ints
+
+
+def parts_of(scene: Scene, small: float) -> tuple[Part, ...]:
+    """The objects of a scene, in the order of the model; ``small`` as in `CampusOptions`.
+
+    Raises LimitError: PTM-L830 there are more than `MAX_OBJECTS`.
+    """
+    count = len(scene.objects)
+    box = _boxes(scene.corners, scene.triangle_object, count)
+    group = np.arange(count)
+    diagonal = np.linalg.norm(box[:, 3:] - box[:, :3], axis=1)
+    tiny = np.flatnonzero(diagonal < small)
+    if len(tiny):
+        middle = (box[tiny, :3] + box[tiny, 3:]) / 2
+        square = np.floor(middle[:, [0, 2]] / (SQUARE * small))
+        _, first, place = np.unique(square, axis=0, return_index=True, return_inverse=True)
+        group[tiny] = tiny[first][place.ravel()]
+    kept, of_object = np.unique(group, return_inverse=True)
+    if len(kept) > MAX_OBJECTS:
+        raise LimitError(
+            "PTM-L830",
+            f"{len(kept):,} objects, more than {MAX_OBJECTS:,}",
+            remedy="join more of them with --small, or divide the model",
+        )
+    order = np.argsort(of_object[scene.triangle_object], kind="stable")
+    sizes = np.bincount(of_object[scene.triangle_object], minlength=len(kept))
+    members = np.argsort(of_object, kind="stable")
+    named = np.split(members, np.cumsum(np.bincount(of_object))[:-1])
+    found = []
+    for triangles, these in zip(np.split(order, np.cumsum(sizes)[:-1]), named, strict=True):
+        names = tuple(scene.objects[i] for i in these.tolist())
+        found.append(Part(_label(names), names, triangles))
+    return tuple(found)
+
+
+def notes_on(parts: Sequence[Part]) -> tuple[str, ...]:
+    """What there is to say of the division."""
+    joined = [part for part in parts if len(part.parts) > 1]
+    found = []
+    if joined:
+        objects = sum(len(part.parts) for part in joined)
+        found.append(
+            f"{objects:,} small objects of the model are {len(joined):,} of the campus (--small)"
+        )
+    faces = [len(part.triangles) for part in parts]
+    if max(faces) > MOST_FACES * sum(faces):
+        share = max(faces) / sum(faces)
+        label = parts[faces.index(max(faces))].label
+        found.append(
+            f"{label} has {share:.0%} of all faces, and a client loads objects as a whole; "
+            "divide it in the model if it is more than a building"
+        )
+    return tuple(found)
+
+
+def _boxes(corners: Floats, of: np.ndarray, count: int) -> Floats:
+    """(count, 6) bounding boxes of (T, 3, 3) triangles by what they are ``of``."""
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    np.minimum.at(low, of, corners.min(axis=1))
+    np.maximum.at(high, of, corners.max(axis=1))
+    return np.concatenate([low, high], axis=1)
+
+
+def _label(names: tuple[str, ...]) -> str:
+    others = len(names) - 1
+    return names[0] if not others else f"{names[0]} and {others:,} more"

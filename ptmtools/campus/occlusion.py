@@ -1,0 +1,229 @@
+"""How much light reaches a point: ambient occlusion by rays of Embree.
+
+Rays go out into the hemisphere over a point, denser by the cosine of their angle to the normal, and
+the light is the share of them that escape. The directions are a Hammersley set, turned about the
+normal by an angle that every point has of its own, so that what 64 rays leave of error is a grain
+and not bands. An object occludes itself and all others; so does a level ground under the scene.
+Transparent materials do not occlude.
+
+A ray that hits something at distance d counts d / reach, and 1 beyond (ambient obscurance, Zhukov,
+Iones and Kronin 1998): with plain occlusion, ``reach`` inf, every room is black, and every wall is
+half as light as a floor however high it stands, since half of its rays end on the ground.
+
+Embree computes in float32. Its tree is built around the middle of the scene, and rays begin as far
+above a surface as the scene's tolerance for planes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Singles
+from ptmtools.scene.model import Scene
+
+#: Rays that are cast together: their arrays stay within the processor's cache.
+RAYS = 2**17
+#: Rays by which the lighter side of a face with two is found.
+_SIDE_RAYS = 16
+_GOLDEN = 0.6180339887498949
+#: A line of sight ends so much before what it leads to, as a share of its length.
+_NEAR = 1e-3
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What occludes.
+
+    Attributes
+    ----------
+    points, triangles: (V, 3) metres and (T, 3) of what takes light.
+    middle: (3,) subtracted before anything goes to float32.
+    ground: height of the ground, metres.
+    lift: how far above its surface a ray begins, metres.
+    """
+
+    points: Floats
+    triangles: NDArray[np.int32]
+    middle: Floats
+    ground: float
+    lift: float
+
+    @staticmethod
+    def of(scene: Scene) -> Surroundings:
+        """Those of a scene's objects: its opaque faces."""
+        low, high = scene.points.min(axis=0), scene.points.max(axis=0)
+        return Surroundings(
+            scene.points,
+            scene.triangles[scene.opaque],
+            (low + high) / 2,
+            float(low[1]),
+            scene.tolerance.plane,
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "tree"}
+
+    @cached_property
+    def tree(self) -> Any:
+        """The committed Embree scene; None of no faces."""
+        if not len(self.triangles):
+            return None
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
+        tree = EmbreeScene(robust=True)
+        TriangleMesh(tree, (self.points - self.middle).astype(np.float32), self.triangles)
+        return tree
+
+    def free(self, origin: Floats, target: Floats) -> Bools:
+        """(n,) whether nothing lies between (n, 3) points, but what is at the target itself."""
+        way = target - origin
+        far = np.linalg.norm(way, axis=1)
+        if self.tree is None:
+            return np.ones(len(far), np.bool_)
+        along = (way / np.maximum(far, np.finfo(float).tiny)[:, None]).astype(np.float32)
+        start = (origin - self.middle).astype(np.float32)
+        # Not quite as far as the target, which lies on a surface.
+        short = (far * (1 - _NEAR) - self.lift).astype(np.float32)
+        return np.asarray(self.tree.run(start, along, dists=short, query="DISTANCE") >= short)
+
+    def below(self, point: Floats, far: float) -> float | None:
+        """The height of what lies first under a point, at most so ``far``; None for nothing."""
+        if self.tree is None:
+            return None
+        start = (point - self.middle).astype(np.float32)[None]
+        limit = np.array([far + self.lift], np.float32)
+        down = np.array([[0, -1, 0]], np.float32)
+        hit = self.tree.run(start, down, dists=limit.copy(), query="DISTANCE")
+        return float(point[1] - hit[0]) if hit[0] < limit[0] else None
+
+
+def outermost(around: Surroundings, point: Floats, normal: Floats, within: float) -> Floats:
+    """(n, 3) points moved to the outermost surface that is nearer than ``within`` metres along
+    their normals, before or behind; those where there is none stay.
+
+    The faces of a coarse mesh lie beneath the model's own, which would shade them.
+    """
+    if around.tree is None or within <= around.lift:
+        return point
+    start = (point + within * normal - around.middle).astype(np.float32)
+    limit = np.full(len(point), 2 * within, np.float32)
+    back = (-normal).astype(np.float32)
+    far = around.tree.run(start, back, dists=limit.copy(), query="DISTANCE")
+    moved = np.where(far < limit, within - far.astype(np.float64), 0.0)
+    return np.asarray(point + moved[:, None] * normal)
+
+
+def light(
+    around: Surroundings,
+    point: Floats,
+    normal: Floats,
+    turn: Floats,
+    samples: int,
+    reach: float,
+) -> Singles:
+    """(n,) light from 0 to 1 at (n, 3) points with (n, 3) unit normals.
+
+    Parameters
+    ----------
+    turn: (n,) in [0, 1), by which share of a circle the directions are turned.
+    samples, reach: as in `CampusOptions`.
+    """
+    fan = hemisphere(samples)
+    found = np.empty(len(point), np.float32)
+    step = max(1, RAYS // samples)
+    for at in range(0, len(point), step):
+        part = slice(at, at + step)
+        along = (fan @ _frames(normal[part], turn[part])).reshape(-1, 3)
+        lifted = point[part] + around.lift * normal[part]
+        origin = np.repeat((lifted - around.middle).astype(np.float32), samples, axis=0)
+        share = _escaping(around, origin, along, reach)
+        found[part] = share.reshape(-1, samples).mean(axis=1)
+    return found
+
+
+def lighter_side(
+    around: Surroundings,
+    corner: Floats,
+    normal: Floats,
+    both: Bools,
+    reach: float,
+    error: float = 0.0,
+) -> Floats:
+    """(T, 3) the normals, turned round where a face that has ``both`` sides is lighter behind; the
+    front counts where they are alike.
+
+    ``corner`` is (T, 3, 3), ``both`` (T,); ``error`` is that of `outermost`.
+    """
+    which = np.flatnonzero(both)
+    if not len(which):
+        return normal
+    middle, turn = corner[which].mean(axis=1), np.zeros(len(which))
+    front, back = (
+        light(around, outermost(around, middle, way, error), way, turn, _SIDE_RAYS, reach)
+        for way in (normal[which], -normal[which])
+    )
+    turned = normal.copy()
+    turned[which[back > front]] *= -1
+    return turned
+
+
+def hemisphere(samples: int) -> Singles:
+    """(samples, 3) directions over z, with a density in proportion to the cosine."""
+    number = np.arange(samples)
+    inverse, digit, rest = np.zeros(samples), 0.5, number.copy()
+    while rest.any():
+        inverse += digit * (rest & 1)
+        rest, digit = rest >> 1, digit / 2
+    share, angle = (number + 0.5) / samples, 2 * math.pi * inverse
+    out = np.sqrt(share)
+    along = [out * np.cos(angle), out * np.sin(angle), np.sqrt(1 - share)]
+    return np.stack(along, axis=1).astype(np.float32)
+
+
+def normals(corner: Floats) -> Floats:
+    """(T, 3) unit normals of (T, 3, 3) triangles; of those without area, up."""
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    return np.where(length > 0, across / np.where(length > 0, length, 1.0), [0.0, 1.0, 0.0])
+
+
+def turns(count: int) -> Floats:
+    """(count,) shares of a circle that are far apart in a row."""
+    return np.asarray(np.arange(count) * _GOLDEN % 1.0)
+
+
+def _frames(normal: Floats, turn: Floats) -> Singles:
+    """(n, 3, 3) rows: two tangents, turned, and the normal."""
+    # Duff et al. 2017, without a branch but for the sign.
+    x, y, z = normal.T
+    sign = np.where(z < 0, -1.0, 1.0)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    first = np.stack([1 + sign * x * x * a, sign * b, -sign * x], axis=1)
+    second = np.stack([b, sign + y * y * a, -y], axis=1)
+    angle = 2 * math.pi * turn
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    return np.stack([c * first + s * second, c * second - s * first, normal], axis=1).astype(
+        np.float32
+    )
+
+
+def _escaping(around: Surroundings, origin: Singles, along: Singles, reach: float) -> Singles:
+    """(n,) how much each ray counts."""
+    far = np.full(len(origin), min(reach, np.finfo(np.float32).max), np.float32)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        down = (np.float32(around.ground - around.middle[1]) - origin[:, 1]) / along[:, 1]
+    limit = np.where((along[:, 1] < 0) & (down < far), np.maximum(down, 0), far)
+    if around.tree is not None:
+        # A copy: Embree writes into what it is given.
+        limit = around.tree.run(origin, along, dists=limit.astype(np.float32), query="DISTANCE")
+    if math.isinf(reach):
+        return (limit >= far).astype(np.float32)
+    return np.minimum(limit / np.float32(reach), np.float32(1))

@@ -1,0 +1,163 @@
+"""The textures of a campus: each distinct image in three sizes, with a file for each channel.
+
+They are squares, as the paper has them: the aspect is in the texture coordinates, which are shares
+of the image. The set is complete: an image of 200 texels has a file of 512, too, which says no more
+than that of 256, and the index records what it was made of, so that a client may leave it out.
+Made smaller, a texel is the mean of what it covers, in the encoded values, as the levels of a
+`.ptm` are; made larger, it is interpolated. Alpha is a file of its own, and colours are not
+multiplied by it.
+"""
+
+from __future__ import annotations
+
+import io
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, BinaryIO, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.campus.model import ALPHA, DIFFUSE, MASK, SIZES, TextureFile
+from ptmtools.campus.names import texture_file
+from ptmtools.errors import naming
+from ptmtools.texture.images.opening import load, opened, pillow_faults
+from ptmtools.texture.images.picture import check_size
+from ptmtools.texture.model import Limits
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+    from ptmtools.scene.model import SourceImage
+
+#: A file's record and its bytes.
+Written = tuple[TextureFile, bytes]
+
+
+@dataclass(frozen=True)
+class Mask:
+    """Where a reflection mask comes from: `load` returns the bytes of an image, of which a band
+    (0 to 2, or -1 for the luminance) says how much is reflected, or where it is ``inverted`` how
+    little."""
+
+    load: Callable[[], bytes]
+    label: str
+    band: int = -1
+    inverted: bool = False
+
+
+@dataclass(frozen=True)
+class BaseImage:
+    """What the textures of one base name are made of; `alpha`: whether that channel is wanted."""
+
+    base: str
+    image: SourceImage | None
+    alpha: bool
+    mask: Mask | None = None
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Those that it has, in their order."""
+        there = (DIFFUSE, self.image), (ALPHA, self.alpha), (MASK, self.mask)
+        return tuple(channel for channel, wanted in there if wanted)
+
+
+def texture_files(limits: tuple[int, int], base: BaseImage) -> list[Written]:
+    """The files of a base name. ``limits``: the most bytes of a decoded image, and the quality.
+
+    Raises what decoding raises.
+    """
+    most, quality = limits
+    found: list[Written] = []
+    if base.image is not None:
+        image = _decoded(base.image.load(), most, base.image.name)
+        channels = {DIFFUSE: image.convert("RGB")}
+        if base.alpha:
+            channels[ALPHA] = image.getchannel("A") if "A" in image.getbands() else _white(image)
+        found += _files(base.base, channels, quality)
+    if base.mask is not None:
+        image = _decoded(base.mask.load(), most, base.mask.label)
+        held = np.asarray(
+            image.convert("L")
+            if base.mask.band < 0
+            else image.convert("RGB").getchannel(base.mask.band)
+        )
+        found += _files(
+            base.base, {MASK: _grey(255 - held if base.mask.inverted else held)}, quality
+        )
+    return found
+
+
+def light_files(
+    base: str, maps: list[tuple[int, NDArray[np.uint8], tuple[int, int]]], quality: int
+) -> list[Written]:
+    """The files of a lightmap, given as side, (side, side) or (side, side, 3) texels, source."""
+    return [
+        _written(base, size, "l", jpeg(_grey(texels), quality), source)
+        for size, texels, source in maps
+    ]
+
+
+def jpeg(image: Image.Image, quality: int) -> bytes:
+    """The bytes of a JPEG file, the same for the same texels."""
+    held = io.BytesIO()
+    image.save(held, "JPEG", quality=quality, optimize=True)
+    return held.getvalue()
+
+
+def squared(image: Image.Image, size: int) -> Image.Image:
+    """An image as a square: the mean where it becomes smaller, interpolated where it becomes
+    larger, along each axis by itself."""
+    from PIL.Image import Resampling
+
+    for axis in (0, 1):
+        if image.size[axis] != size:
+            shape = (size, image.height) if axis == 0 else (image.width, size)
+            less = size < image.size[axis]
+            image = image.resize(shape, Resampling.BOX if less else Resampling.BICUBIC)
+    return image
+
+
+def decoded_lightmap(data: bytes, most: int, label: str) -> Image.Image:
+    """An image as RGB. Raises what decoding raises."""
+    return _decoded(data, most, label).convert("RGB")
+
+
+def _files(base: str, channels: dict[str, Image.Image], quality: int) -> list[Written]:
+    return [
+        _written(base, size, channel, jpeg(squared(image, size), quality), image.size)
+        for size in SIZES
+        for channel, image in channels.items()
+    ]
+
+
+def _written(base: str, size: int, channel: str, data: bytes, source: tuple[int, int]) -> Written:
+    name, crc = texture_file(base, size, channel), zlib.crc32(data)
+    return TextureFile(name, base, size, channel, len(data), crc, source), data
+
+
+def _decoded(data: bytes, most: int, label: str) -> Image.Image:
+    """An image of 8 bits: L, RGB or RGBA."""
+    limits = Limits(most)
+    with naming(label), pillow_faults():
+        image = opened(cast("BinaryIO", io.BytesIO(data)), limits)
+        check_size(*image.size, 4, limits)
+        load(image)
+        if image.mode.startswith("I"):  # 16 bits, which convert() would clip
+            return _grey((np.asarray(image).astype(np.int64) >> 8).astype(np.uint8))
+        if image.has_transparency_data:
+            return image.convert("RGBA")
+        return image.convert("L" if image.mode in ("1", "L") else "RGB")
+
+
+def _grey(texels: NDArray[np.uint8]) -> Image.Image:
+    from PIL import Image
+
+    return Image.fromarray(np.ascontiguousarray(texels))
+
+
+def _white(image: Image.Image) -> Image.Image:
+    from PIL import Image
+
+    return Image.new("L", image.size, 255)

@@ -1,0 +1,215 @@
+"""Atlases and lightmaps: kernels against plain loops, known scenes, what larger ones take over."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+
+from ptmtools.arrays import Floats
+from ptmtools.campus.atlas import GAP, components, cover, unwrap
+from ptmtools.campus.lightmap import AGREE, bake, fill
+from ptmtools.campus.lights import Painted, Rays
+from ptmtools.campus.occlusion import Surroundings, normals
+from ptmtools.campus.vertex_light import vertex_light
+from tests.campus.made import house, level
+
+pytest.importorskip("xatlas", reason="pip install 'ptmtools[campus]'")
+
+
+def triangles_of(rows: Floats) -> Floats:
+    """(2 n, 3, 3) of the (4 n, 5) corners of quads."""
+    quads = rows[:, :3].reshape(-1, 4, 3)
+    return quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
+
+
+HOUSE = triangles_of(np.concatenate(list(house(0, 0, 12, 8, 9, 2).values())))
+GROUND = triangles_of(level((-30, -30), (40, 40), 0))
+
+
+def indexed(corner: Floats) -> tuple[Floats, np.ndarray]:
+    points, place = np.unique(corner.reshape(-1, 3), axis=0, return_inverse=True)
+    return points, place.reshape(-1, 3).astype(np.int32)
+
+
+def surroundings(*parts: Floats) -> Surroundings:
+    points, triangles = indexed(np.concatenate(parts))
+    return Surroundings(points, triangles, points.mean(axis=0), 0.0, 1e-4)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 12))
+def test_cover_is_a_test_of_every_texel(seed: int, faces: int) -> None:
+    uv = np.random.default_rng(seed).random((faces, 3, 2))
+    size = 16
+    wanted = np.full((size, size), -1)
+    for row, column in np.ndindex(size, size):
+        at = np.array([column + 0.5, size - row - 0.5]) / size
+        for t in range(faces):
+            sides = [
+                np.linalg.det([b - a, at - a])
+                for a, b in zip(uv[t], np.roll(uv[t], -1, 0), strict=True)
+            ]
+            if min(sides) > 1e-12 or max(sides) < -1e-12:
+                wanted[row, column] = t
+                break
+    assert (cover(uv, size) == wanted).mean() > 0.99
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 30))
+def test_components_are_those_of_a_flood(seed: int, faces: int) -> None:
+    triangle = np.random.default_rng(seed).integers(0, 25, (faces, 3))
+    label = np.arange(25)
+    for _ in range(25):
+        for t in triangle:
+            label[t] = label[t].min()
+    assert np.array_equal(components(triangle, 25), label)
+
+
+def test_an_atlas_gives_each_face_a_place_of_its_own() -> None:
+    points, triangles = indexed(HOUSE)
+    atlas = unwrap(points, triangles)
+    assert atlas.side == 512
+    assert atlas.uv.shape == (len(triangles), 3, 2)
+    assert ((atlas.uv >= 0) & (atlas.uv <= 1)).all()
+    owner = cover(atlas.uv, 512)
+    a, b, c = np.moveaxis(atlas.uv * 512, 1, 0)
+    area = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
+    held = np.bincount(owner[owner >= 0], minlength=len(triangles))
+    assert np.allclose(held, area, rtol=0.1, atol=40), "faces lie over each other"
+    assert (owner >= 0).mean() > 0.3
+    chart = np.where(owner >= 0, atlas.chart[owner], -1)
+    for down, across in ((0, 1), (1, 0), (1, 1)):
+        for step in range(1, GAP + 1):
+            one = chart[step * down :, step * across :]
+            other = chart[: 512 - step * down, : 512 - step * across]
+            assert not ((one != other) & (one >= 0) & (other >= 0)).any(), "no gap"
+
+
+def test_texels_are_as_large_as_the_surface_everywhere() -> None:
+    points, triangles = indexed(HOUSE)
+    uv = unwrap(points, triangles).uv
+    lengths = np.linalg.norm(HOUSE - np.roll(HOUSE, 1, axis=1), axis=2)
+    drawn = np.linalg.norm(uv - np.roll(uv, 1, axis=1), axis=2)
+    ratio = drawn / lengths
+    assert ratio.max() / ratio.min() < 1.1
+
+
+def test_too_many_charts_for_the_least_lightmap() -> None:
+    """Thousands of loose faces."""
+    random = np.random.default_rng(1)
+    corner = random.random((5000, 1, 3)) * 1000 + random.random((5000, 3, 3))
+    points, triangles = indexed(corner)
+    assert unwrap(points, triangles).side != 512
+
+
+def test_a_long_object_has_its_gaps_in_every_lightmap() -> None:
+    quads = [level((5 * i, 0), (5 * i + 5, 3), 0) for i in range(40)]
+    points, triangles = indexed(triangles_of(np.concatenate(quads)))
+    assert unwrap(points, triangles).side == 512
+
+
+def test_a_lightmap_of_a_house_on_the_ground() -> None:
+    points, triangles = indexed(HOUSE)
+    atlas = unwrap(points, triangles)
+    where = surroundings(HOUSE, GROUND)
+    look = Rays.of(where, HOUSE, np.zeros(len(HOUSE), bool), 64, 20.0)
+    maps = bake(look, HOUSE, atlas)
+    assert [len(m.value) for m in maps] == [512, 1024, 2048]
+    normal = normals(HOUSE)
+    owner = cover(atlas.uv, 512)
+    value = maps[0].value
+    assert value.min() >= 0
+    assert value.max() <= 1
+    roof = np.flatnonzero(normal[:, 1] > 0.9)
+    assert value[np.isin(owner, roof)].min() > 0.99, "the roof is in the open"
+    low = np.flatnonzero((normal[:, 1] < 0.1) & (HOUSE[..., 1].max(axis=1) < 5))
+    high = np.flatnonzero((normal[:, 1] < 0.1) & (HOUSE[..., 1].min(axis=1) > 4))
+    assert value[np.isin(owner, low)].mean() < value[np.isin(owner, high)].mean() - 0.05
+
+
+def test_larger_lightmaps_are_nearly_what_rays_say_everywhere(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    points, triangles = indexed(HOUSE)
+    atlas = unwrap(points, triangles)
+    where = surroundings(HOUSE, GROUND)
+    look = Rays.of(where, HOUSE, np.zeros(len(HOUSE), bool), 64, 20.0)
+    (taken,) = bake(look, HOUSE, atlas, (512,))
+
+    def nothing(value: object, chart: object, larger: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(larger.shape, np.float32), np.zeros(larger.shape, np.bool_)
+
+    monkeypatch.setattr("ptmtools.campus.lightmap._enlarged", nothing)
+    (whole,) = bake(look, HOUSE, atlas, (512,))
+    assert whole.computed == whole.covered
+    assert taken.computed < 0.05 * whole.computed
+    error = np.abs(taken.value - whole.value)[cover(atlas.uv, 512) >= 0]
+    assert np.sqrt((error**2).mean()) < AGREE / 10
+    assert error.max() < AGREE
+
+
+def test_no_row_of_texels_lies_in_the_ground() -> None:
+    """The lower edge of a wall that stands on it."""
+    points, triangles = indexed(HOUSE)
+    atlas = unwrap(points, triangles)
+    where = surroundings(HOUSE, GROUND)
+    look = Rays.of(where, HOUSE, np.zeros(len(HOUSE), bool), 64, 20.0)
+    (found,) = bake(look, HOUSE, atlas, (512,))
+    assert found.value.min() > 0.4
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 40), st.integers(1, 40))
+def test_gaps_take_what_is_near(seed: int, height: int, width: int) -> None:
+    random = np.random.default_rng(seed)
+    value = random.random((height, width)).astype(np.float32)
+    known = random.random((height, width)) < 0.2
+    found = fill(value, known)
+    assert np.array_equal(found[known], value[known])
+    if known.any():
+        assert found.min() >= value[known].min() - 1e-6
+        assert found.max() <= value[known].max() + 1e-6
+    else:
+        assert (found == 1).all()
+
+
+def test_a_gap_has_the_value_of_its_own_side() -> None:
+    value = np.zeros((32, 32), np.float32)
+    known = np.zeros((32, 32), bool)
+    known[:, :12] = known[:, 20:] = True
+    value[:, 20:] = 1
+    found = fill(value, known)
+    assert (found[:, 12:14] == 0).all()
+    assert (found[:, 18:20] == 1).all()
+
+
+def test_vertices_carry_the_light_of_their_faces() -> None:
+    """On a plane whose light is linear the fit is exact; noise is averaged."""
+    corner = triangles_of(level((0, 0), (10, 10), 0))
+
+    def look(face: object, point: Floats, turn: object) -> Floats:
+        return np.asarray(point[:, 0] / 10, np.float32)
+
+    found = vertex_light(look, corner, normals(corner))
+    assert np.allclose(found, corner[..., 0] / 10, atol=0.06)
+
+
+def test_a_corner_does_not_blacken_its_faces() -> None:
+    where = surroundings(HOUSE, GROUND)
+    look = Rays.of(where, HOUSE, np.zeros(len(HOUSE), bool), 64, 20.0)
+    found = vertex_light(look, HOUSE, normals(HOUSE))
+    roof = normals(HOUSE)[:, 1] > 0.9
+    assert found[roof].min() > 0.95
+    assert found.min() > 0.2
+
+
+def test_the_models_own_light_is_looked_up() -> None:
+    corner = triangles_of(level((0, 0), (10, 10), 0))
+    uv = np.stack([corner[..., 0] / 10, corner[..., 2] / 10], axis=2)
+    image = np.tile(np.linspace(0, 1, 64, dtype=np.float32), (64, 1))
+    look = Painted(corner, uv, np.zeros(2, np.int32), (image,), np.arange(2))
+    point = np.array([[2.0, 0, 3], [8, 0, 7]])
+    face = np.array([1 if z > x else 0 for x, _, z in point])
+    found = look(face, point, np.zeros(2))
+    assert np.allclose(found, [0.2, 0.8], atol=0.02)
+    white = Painted(corner, uv, np.full(2, -1, np.int32), (image,), np.arange(2))
+    assert (white(face, point, np.zeros(2)) == 1).all()
