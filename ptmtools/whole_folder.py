@@ -73,7 +73,17 @@ class FolderForm:
         *,
         force: bool = False,
     ) -> None:
-        """Writes a folder of (path, bytes), whole or not at all.
+        """Writes a folder of (path, bytes), whole or not at all; raises what `staged` raises."""
+        with self.staged(folder, force=force) as put:
+            for path, data in files:
+                put(path, data)
+
+    @contextlib.contextmanager
+    def staged(
+        self, folder: str | os.PathLike[str], *, force: bool = False
+    ) -> Iterator[Callable[[str, bytes], None]]:
+        """Takes files, by path and contents, which become the folder once the context ends; if
+        that fails nothing has changed.
 
         Raises OutputError: what `check` raises; PTM-O002, PTM-O003 it cannot be written.
         """
@@ -85,22 +95,22 @@ class FolderForm:
         with writing(folder):
             try:
                 beside.mkdir()
-                for path, data in files:
-                    if not leads_inside(path) or not self.owns(path):
-                        raise ValueError(f"{path!r} is no file of such a folder")
-                    _put(beside, path, data)
-                there = os.path.lexists(target)
-                if there:
-                    os.rename(target, old)
-                try:
-                    os.rename(beside, target)
-                except OSError:
-                    if there:
-                        os.rename(old, target)
-                    raise
+                yield lambda path, data: self._put(beside, path, data)
+                self.check(folder, force=force)  # something may have come to be there meanwhile
+                _replace(target, beside, old)
             finally:
                 self._remove(beside)
             self._remove(old)
+
+    def _put(self, folder: Path, path: str, data: bytes) -> None:
+        if not leads_inside(path) or not self.owns(path):
+            raise ValueError(f"{path!r} is no file of such a folder")
+        file = folder / path
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with open(file, "xb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
 
     def _is_ours(self, index: Path) -> bool:
         """Whether an index begins as ours do; the rest of it may be damaged."""
@@ -134,10 +144,14 @@ def _paths(folder: Path) -> Iterator[tuple[str, bool]]:
                 yield PurePosixPath(path.relative_to(folder)).as_posix(), stat.S_ISREG(mode)
 
 
-def _put(folder: Path, path: str, data: bytes) -> None:
-    file = folder / path
-    file.parent.mkdir(parents=True, exist_ok=True)
-    with open(file, "xb") as stream:
-        stream.write(data)
-        stream.flush()
-        os.fsync(stream.fileno())
+def _replace(target: Path, new: Path, old: Path) -> None:
+    """Gives a new folder its name, and what has it now another."""
+    there = os.path.lexists(target)
+    if there:
+        os.rename(target, old)
+    try:
+        os.rename(new, target)
+    except OSError:
+        if there:
+            os.rename(old, target)
+        raise
