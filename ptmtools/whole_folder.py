@@ -45,6 +45,7 @@ class FolderForm:
         """
         with writing(folder):
             target = Path(os.path.realpath(folder))
+            os.stat(target.parent)
             if not os.path.lexists(target) or (target.is_dir() and not os.listdir(target)):
                 return
             if not target.is_dir() or not self._is_ours(target / self.index):

@@ -2,13 +2,13 @@
 
 The simplified mesh is sampled in blocks of the octree, each a task that needs no other: so memory
 stays bounded and processors share the work. What a block holds does not depend on who does it.
-Blocks begin at a fixed depth; the levels above are divided by the sums of the cells there.
+Blocks begin at the depth of their cells; the levels above are divided by the sums of these.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,8 +29,9 @@ from ptmtools.arrays import Floats, Ints, Singles
 from ptmtools.executors import Executor
 from ptmtools.progress import Progress, silent
 
-#: Depth of the cells that blocks are made of: 1/16 of the cube wide.
-CELLS = 4
+#: Depths of the cells that blocks are made of: 1/16 of the cube wide, or 1/1024 where a block would
+#: be too large.
+DEPTHS = (4, 10)
 #: Samples of a block, unless a single cell has more.
 MOST = 1 << 19
 
@@ -54,7 +55,8 @@ class Surface:
             edges = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2)
             large = edges.max(axis=1) > longest
             done.append((corner[~large], normal[~large]))
-            corner, normal = (_quartered(values[large]) for values in (corner, normal))
+            side = edges[large].argmax(axis=1)
+            corner, normal = (_halved(values[large], side) for values in (corner, normal))
         return Surface(*(np.concatenate(part) for part in zip(*done, strict=True)))
 
 
@@ -65,18 +67,14 @@ class Work:
     Attributes
     ----------
     source, surface: where normals come from, and what is sampled. spacing: of samples.
-    bounds: of the leaves.
+    bounds: of the leaves. top: depth of the cells.
     """
 
     source: Source
     surface: Surface
     spacing: float
     bounds: Bounds
-
-    @property
-    def top(self) -> int:
-        """Depth of the cells."""
-        return min(CELLS, self.bounds.depth)
+    top: int = 0
 
 
 @dataclass(frozen=True)
@@ -109,7 +107,7 @@ def build(work: Work, executor: Executor, progress: Progress = silent) -> tuple[
 
     Raises LimitError PTM-L840: too many texels.
     """
-    blocks = list(_blocks(work))
+    work, blocks = divided(work)
     found, held = [], 0
     for done, each in enumerate(executor.each(_block, work, blocks)):
         progress(done, len(blocks), "casting rays")
@@ -134,40 +132,56 @@ def build(work: Work, executor: Executor, progress: Progress = silent) -> tuple[
     return averaged(levels), sum(each.missed for each in found) / max(total, 1)
 
 
-def _quartered(values: Floats) -> Floats:
-    """(4m, 3, 3) values of the corners of the quarters of triangles."""
-    a, b, c = values[:, 0], values[:, 1], values[:, 2]
-    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
-    parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-    found: Floats = np.stack([np.stack(p, axis=1) for p in parts], axis=1).reshape(-1, 3, 3)
+def _halved(values: Floats, side: Ints) -> Floats:
+    """(2m, 3, 3) values of the corners of the halves of triangles, cut in the middle of the edges
+    ``side``: 0 is the first corner's."""
+    each = np.arange(len(values))
+    a, b, c = (values[each, (side + k) % 3] for k in range(3))
+    middle = (a + b) / 2
+    found: Floats = np.stack([a, middle, c, middle, b, c], axis=1).reshape(-1, 3, 3)
     return found
 
 
-def _blocks(work: Work) -> Iterator[Block]:
-    corner = work.surface.corner
-    triangle, cell, count = [], [], []
+def divided(work: Work) -> tuple[Work, list[Block]]:
+    """The work with cells that are small enough, and its blocks."""
+    for depth in DEPTHS:
+        work = replace(work, top=min(depth, work.bounds.depth))
+        pairs, samples = _counted(work)
+        cells, place = np.unique(pairs[:, 1], return_inverse=True)
+        held = np.bincount(place, samples, len(cells))
+        if held.max() <= MOST:
+            break
+    # Runs of cells that hold about as many together.
+    first = np.flatnonzero(np.diff(np.cumsum(held) // MOST, prepend=-1))
+    begin = cells[first]
+    end = np.append(begin[1:], cells[-1] + 1)
+    order = np.argsort(pairs[:, 1], kind="stable")
+    triangle, cell = pairs[order].T
+    low, high = np.searchsorted(cell, begin), np.searchsorted(cell, end)
+    return work, [
+        Block(int(a), int(b), np.unique(triangle[i:j]))
+        for a, b, i, j in zip(begin, end, low, high, strict=True)
+    ]
+
+
+def _counted(work: Work) -> tuple[Ints, Ints]:
+    """(p, 2) a triangle and the code of a cell in which it has samples, and (p,) how many."""
+    corner, bits = work.surface.corner, 3 * work.top
+    pairs, counts = [], []
     for chosen in _batches(corner, work.spacing):
         points = spread(corner[chosen], work.spacing)
         code = codes_of(at(corner[chosen], points), work.top).astype(np.int64)
-        pairs = chosen[points.triangle] << (3 * CELLS) | code
-        both, n = np.unique(pairs, return_counts=True)
-        triangle.append(both >> (3 * CELLS))
-        cell.append(both & ((1 << 3 * CELLS) - 1))
-        count.append(n)
-    triangles, cells = np.concatenate(triangle), np.concatenate(cell)
-    held = np.bincount(cells, np.concatenate(count), 1 << 3 * work.top).tolist()
-    begin, taken = 0, 0.0
-    for end, samples in enumerate([*held, np.inf]):
-        if taken and taken + samples > MOST:
-            here = triangles[(cells >= begin) & (cells < end)]
-            yield Block(begin, end, np.unique(here))
-            begin, taken = end, 0.0
-        taken += samples
+        both, count = np.unique(chosen[points.triangle] << bits | code, return_counts=True)
+        pairs.append(np.stack([both >> bits, both & ((1 << bits) - 1)], axis=1))
+        counts.append(count)
+    return np.concatenate(pairs), np.concatenate(counts)
 
 
 def _batches(corner: Floats, spacing: float) -> Iterator[Ints]:
-    """Triangles in runs of about `MOST` samples."""
-    run = (np.cumsum(areas(corner) / spacing**2 + 1) // MOST).astype(np.int64)
+    """Triangles in runs of about `MOST` samples; thin ones have those of a row."""
+    edges = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2)
+    each = np.maximum(areas(corner) / spacing**2, edges.max(axis=1) / spacing) + 1
+    run = (np.cumsum(each) // MOST).astype(np.int64)
     yield from np.split(np.arange(len(corner)), np.flatnonzero(np.diff(run)) + 1)
 
 

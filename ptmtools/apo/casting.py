@@ -94,7 +94,7 @@ def _cast(source: Source, origin: Floats, along: Floats, normal: Floats, limit: 
     triangle, weight = np.full(count, -1, np.int64), np.zeros((count, 3), np.float32)
     distance = limit.copy()
     waiting, gone = np.arange(count), np.full(count, -STEP)
-    for _ in range(LAYERS):
+    for _ in range(LAYERS + 1):
         rays = along[waiting].astype(np.float32)
         begin = (origin[waiting] + gone[waiting, None] * along[waiting]).astype(np.float32)
         left = np.maximum(limit[waiting] - gone[waiting], 0).astype(np.float32)

@@ -12,10 +12,9 @@ import numpy as np
 
 from ptmtools.apo.files import COLORS, INDEX, MESH, NORMALS, OBJ
 from ptmtools.apo.mesh_files import mesh_of
-from ptmtools.apo.reading import Index, read_index, read_octree
+from ptmtools.apo.reading import Index, mesh_bytes, open_own, read_index, read_octree
 from ptmtools.apo.texels import fault_of
 from ptmtools.errors import InputError, PtmError
-from ptmtools.files import open_regular
 from ptmtools.findings import Findings, Severity, ValidationReport
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Limits
@@ -45,7 +44,8 @@ def check_folder(folder: Path, limits: Limits) -> ValidationReport:
     for name in there:
         if name not in _NAMES:
             found.add("PTM-D856", name, "", "is not part of an octree texture")
-    data = {name: _read(folder, name, found) for name in there if name in _NAMES}
+    sizes = {name: _size(folder, name, found) for name in there if name in _NAMES}
+    held = {name: bytes_ for name, bytes_ in sizes.items() if bytes_ is not None}
     try:
         index = read_index(folder)
     except PtmError as fault:
@@ -55,29 +55,27 @@ def check_folder(folder: Path, limits: Limits) -> ValidationReport:
         for name in wanted:
             if name not in there:
                 found.add("PTM-D850", name, "", "is missing")
-        _check_octree(folder, index, data, found)
-        _check_mesh(index, data.get(MESH), found)
-    held = [len(value) for value in data.values() if value is not None]
-    return ValidationReport(found.issues(), len(held), sum(held))
+        _check_octree(folder, index, held, found)
+        if MESH in held:
+            _check_mesh(folder, index, held[MESH], found)
+    return ValidationReport(found.issues(), len(held), sum(held.values()))
 
 
-def _read(folder: Path, name: str, found: Findings) -> bytes | None:
+def _size(folder: Path, name: str, found: Findings) -> int | None:
+    """Bytes of a file, if it is one."""
     try:
-        with open_regular(folder / name) as file:
-            return file.read()
+        with open_own(folder / name) as file:
+            return os.fstat(file.fileno()).st_size
     except OSError as fault:
         found.add("PTM-D850", name, "", f"cannot be read ({fault.strerror or fault})")
         return None
 
 
-def _check_octree(
-    folder: Path, index: Index, data: Mapping[str, bytes | None], found: Findings
-) -> None:
+def _check_octree(folder: Path, index: Index, held: Mapping[str, int], found: Findings) -> None:
     for stream in (index.normals, index.colors):
-        held = data.get(stream.file) if stream else None
-        if stream and held is not None and len(held) > stream.ends[-1]:
+        if stream and held.get(stream.file, 0) > stream.ends[-1]:
             found.add("PTM-D852", stream.file, "", "goes on behind the last level")
-    if data.get(NORMALS) is None or (index.colors and data.get(COLORS) is None):
+    if NORMALS not in held or (index.colors and COLORS not in held):
         return
     try:
         octree = read_octree(folder)
@@ -88,15 +86,17 @@ def _check_octree(
         found.add("PTM-D853", NORMALS, *wrong)
 
 
-def _check_mesh(index: Index, data: bytes | None, found: Findings) -> None:
-    if data is None:
-        return
-    if (len(data), zlib.crc32(data)) != (index.mesh["bytes"], index.mesh["crc32"]):
+def _check_mesh(folder: Path, index: Index, size: int, found: Findings) -> None:
+    if size != index.mesh["bytes"]:
         found.add("PTM-D854", MESH, "", "is not the file that apo.json describes")
         return
     try:
+        data = mesh_bytes(folder)
+        if zlib.crc32(data) != index.mesh["crc32"]:
+            found.add("PTM-D854", MESH, "", "is not the file that apo.json describes")
+            return
         mesh = mesh_of(data)
-    except InputError as fault:
+    except PtmError as fault:
         found.add("PTM-D854", MESH, "", fault.message)
         return
     if len(mesh.triangles) != index.mesh["faces"]:
@@ -106,6 +106,10 @@ def _check_mesh(index: Index, data: bytes | None, found: Findings) -> None:
         found.add("PTM-D855", MESH, "", f"{count(outside, 'point')} outside of the cube")
 
 
+def _about(deviation: float | None) -> str:
+    return "an unknown distance" if deviation is None else f"about {deviation:.3g} m"
+
+
 def describe(folder: Path) -> tuple[tuple[str, ...], Mapping[str, Any]]:
     """What `ptm info` prints of an octree texture, and its record."""
     index = read_index(folder)
@@ -113,7 +117,7 @@ def describe(folder: Path) -> tuple[tuple[str, ...], Mapping[str, Any]]:
     source, mesh = document["source"], index.mesh
     lines = [
         f"{'mesh':<9} {mesh['faces']:,} faces of {source['triangles']:,}, {size(mesh['bytes'])}; "
-        f"deviates by {source['deviation']:.3g} at most",
+        f"deviates by {_about(source['deviation'])}",
         f"{'octree':<9} {count(index.levels, 'level')}, {int(index.start[-1]):,} texels, "
         f"{size(4 * int(index.start[-1]) * len(streams))} of texture memory",
         f"{'level':>9} {'texels':>10} {'bytes':>10} {'up to here':>11}",

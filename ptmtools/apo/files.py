@@ -8,6 +8,7 @@ levels together cost some 5 bytes each.
 from __future__ import annotations
 
 import json
+import math
 import zlib
 from collections.abc import Iterator
 from dataclasses import asdict
@@ -55,7 +56,8 @@ def files_of(made: Made) -> Iterator[tuple[str, bytes]]:
     mesh = glb_of(made.mesh)
     yield MESH, mesh
     yield OBJ, obj_of(made.mesh)
-    yield INDEX, (json.dumps(_document(made, streams, mesh), indent=1) + "\n").encode()
+    document = json.dumps(_document(made, streams, mesh), indent=1, allow_nan=False)
+    yield INDEX, f"{document}\n".encode()
 
 
 def _document(made: Made, streams: dict[str, Any], mesh: bytes) -> dict[str, Any]:
@@ -63,6 +65,11 @@ def _document(made: Made, streams: dict[str, Any], mesh: bytes) -> dict[str, Any
     return {
         "format": FORMAT,
         "schema": SCHEMA,
+        "space": {
+            "origin": list(made.space.origin),
+            "unit": made.space.metres,
+            "up": made.space.up,
+        },
         "cube": {"low": octree.low.tolist(), "side": octree.side},
         "levels": np.diff(octree.start).tolist(),
         **streams,
@@ -74,7 +81,7 @@ def _document(made: Made, streams: dict[str, Any], mesh: bytes) -> dict[str, Any
         },
         "source": {
             "triangles": made.source,
-            "deviation": made.deviation,
+            "deviation": made.deviation if math.isfinite(made.deviation) else None,
             "missed": made.missed,
         },
         "options": asdict(made.options),

@@ -21,15 +21,16 @@ from ptmtools.apo.octree import Bounds
 from ptmtools.apo.painting import paint_of
 from ptmtools.apo.sampling import areas
 from ptmtools.apo.texels import octree_of
-from ptmtools.arrays import Floats, Singles
+from ptmtools.arrays import Floats, Ints, Singles
 from ptmtools.executors import Executor
 from ptmtools.progress import Progress, silent
-from ptmtools.scene.model import Scene
+from ptmtools.scene.model import Scene, Space
 from ptmtools.simplification import Mesh, SimplifyOptions, simplify
 
 #: The longest edge of a triangle that is sampled as one, as a share of the cube: two cells of the
 #: blocks, so that a triangle lies in few of them.
 _LONGEST = 0.125
+_TWICE = "faces that lie in the same place count once: a place has one normal"
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,7 @@ class Made:
     deviation: of the simplified mesh from the source, in its units, as the quadrics estimate it.
     missed: share of the samples from which no ray found the source.
     options: what it was made with.
+    space: how the model's coordinates became those of the mesh.
     notes: what there is to say, one line each.
     """
 
@@ -67,6 +69,7 @@ class Made:
     deviation: float
     missed: float
     options: ApoOptions
+    space: Space
     notes: tuple[str, ...] = ()
 
 
@@ -78,21 +81,20 @@ def make_apo(
     Raises
     ------
     LimitError: PTM-L840 the octree has too many texels.
-    MissingComponentError: PTM-M101 ``method`` asks for pymeshlab, which cannot be loaded.
+    MissingComponentError: PTM-M290 ``method`` asks for pymeshlab, which cannot be loaded.
     """
     points, triangles = welded(scene.points, scene.triangles)
-    progress(0, 1, "simplifying")
+    triangles, kept = once(triangles)
     simplified = simplify(
-        Mesh(points, triangles), SimplifyOptions(options.faces, method=options.method)
+        Mesh(points, triangles), SimplifyOptions(options.faces, method=options.method), progress
     )
-    progress(1, 1, "simplifying")
     mesh = smooth(simplified.mesh)
     cube = cube_around(np.concatenate([points, mesh.points]))
     source = Source(
         cube.inside(points).astype(np.float32),
         triangles,
         corner_normals(points, triangles).astype(np.float32),
-        paint_of(scene) if options.color else None,
+        paint_of(scene, kept) if options.color else None,
     )
     corner = cube.inside(mesh.points)[mesh.triangles]
     surface = Surface(corner, mesh.normals[mesh.triangles].astype(np.float64)).cut_up(_LONGEST)
@@ -100,7 +102,8 @@ def make_apo(
     work = Work(
         source,
         surface,
-        float(np.sqrt(total / (options.density * len(triangles)))),
+        # Closer than half a leaf of the greatest depth samples say nothing more.
+        max(float(np.sqrt(total / (options.density * len(triangles)))), 0.5 ** (options.depth + 1)),
         Bounds(options.error, options.color_error, options.depth),
     )
     levels, missed = build(work, executor, progress)
@@ -111,8 +114,17 @@ def make_apo(
         simplified.error,
         missed,
         options,
-        simplified.notes,
+        scene.space,
+        (*simplified.notes, *([_TWICE] if len(kept) < len(scene.triangles) else [])),
     )
+
+
+def once(triangles: NDArray[np.int32]) -> tuple[NDArray[np.int32], Ints]:
+    """Triangles of which none has the same corners as another, and their numbers: of a face with
+    two sides one is kept, since a place has one normal."""
+    _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
+    kept = np.sort(first)
+    return triangles[kept], kept
 
 
 def smooth(mesh: Mesh) -> Simple:

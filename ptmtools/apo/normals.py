@@ -144,19 +144,28 @@ def _corner_normals(
             for k in range(3):
                 e, f = edge[k], edge[(k + 2) % 3]
                 weight[t, k] = _angle(-(e[0] * f[0] + e[1] * f[1] + e[2] * f[2]))
+    whole = np.zeros(3)
     for p in range(len(start) - 1):
         first, last = start[p], start[p + 1]
         fan = last - first > FAN
+        if fan:
+            whole[:] = 0.0
+            for j in range(first, last):
+                s, turn = order[j] // 3, order[j] % 3
+                for c in range(3):
+                    whole[c] += weight[s, turn] * normal[s, c]
         for i in range(first, last):
             t, k = order[i] // 3, order[i] % 3
             n = normal[t]
             flat = n[0] == 0 and n[1] == 0 and n[2] == 0
-            x = y = z = 0.0
-            for j in range(first, last):
+            x, y, z = whole[0], whole[1], whole[2]
+            if not fan:
+                x = y = z = 0.0
+            for j in range(first, first if fan else last):
                 s, turn = order[j] // 3, order[j] % 3
                 m = normal[s]
                 near = m[0] * n[0] + m[1] * n[1] + m[2] * n[2] >= least
-                if near or fan or flat or s == t:
+                if near or flat or s == t:
                     w = weight[s, turn]
                     x, y, z = x + w * m[0], y + w * m[1], z + w * m[2]
             length = math.sqrt(x * x + y * y + z * z)

@@ -50,17 +50,19 @@ class Paint:
         return found
 
 
-def paint_of(scene: Scene) -> Paint:
-    """The paint of a scene; decodes its images. Raises what reading an image raises."""
+def paint_of(scene: Scene, kept: Ints) -> Paint:
+    """The paint of the triangles ``kept`` of a scene; decodes its images. Raises what reading an
+    image raises."""
     from ptmtools.errors import naming
     from ptmtools.texture.images import load_image
     from ptmtools.texture.samples import in_eight_bits
 
     materials = scene.materials
-    color = np.array([m.color for m in materials])[scene.triangle_material]
+    material = scene.triangle_material[kept]
+    color = np.array([m.color for m in materials])[material]
     corner = np.repeat(color[:, None], 3, axis=1)
     if scene.colors is not None:
-        corner = corner * (scene.colors / 255.0)
+        corner = corner * (scene.colors[kept] / 255.0)
     clamped = np.array([[m.wrap_s == "clamp", m.wrap_t == "clamp"] for m in materials])
     images = []
     for image in scene.images:
@@ -70,8 +72,8 @@ def paint_of(scene: Scene) -> Paint:
         images.append(np.ascontiguousarray(rgb) if rgb.size else _WHITE)
     return Paint(
         np.rint(corner.clip(0, 1) * 255).astype(np.uint8),
-        scene.uv.astype(np.float32),
-        np.array([m.image for m in materials], np.int32)[scene.triangle_material],
-        clamped[scene.triangle_material],
+        scene.uv[kept].astype(np.float32),
+        np.array([m.image for m in materials], np.int32)[material],
+        clamped[material],
         tuple(images),
     )

@@ -33,7 +33,7 @@ class RenderOptions:
     field_of_view: vertical, degrees.
     width, height: pixels.
     what: the mesh as lit from the upper left, or the normals as they are stored.
-    backend: gl draws with OpenGL, embree by rays, auto with what is there.
+    backend: what draws: gl is OpenGL, embree rays, auto what is there.
     """
 
     levels: int | None = None
@@ -45,6 +45,9 @@ class RenderOptions:
     height: int = 1024
     what: Literal["shaded", "normals"] = "shaded"
     backend: Literal["auto", "gl", "embree"] = "auto"
+
+    def __post_init__(self) -> None:
+        _check(self)
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,6 @@ def render(
     MissingComponentError PTM-M500 where OpenGL is asked for and absent.
     """
     options = options or RenderOptions()
-    _check(options)
     if not len(points) or not np.ptp(points, axis=0).any():
         raise InputError("PTM-I861", "a mesh without extent, of which there is no picture")
     view = view_of(

@@ -6,10 +6,12 @@ and sizes are held against what addresses allow before memory is taken for them.
 
 from __future__ import annotations
 
+import errno
 import os
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +30,8 @@ from ptmtools.files import open_regular
 _AGAIN = "write it again with `ptm apo`"
 #: An index of 21 levels has 3 kB; more fields may be added.
 _INDEX_MOST = 1 << 20
+#: Deflate makes nothing larger than by this factor and so many bytes besides.
+_GROWTH, _BESIDES = 1.01, 64
 #: Bytes of a GLB of 4 million vertices.
 _MESH_MOST = 1 << 28
 
@@ -138,8 +142,10 @@ def _check(index: Index) -> None:
             wrong = f"a stream is called {stream.file[:40]!r} instead of {name!r}"
         elif {len(stream.ends), len(stream.crc32)} != {index.levels}:
             wrong = f"{name} has not as many levels as there are"
-        elif min(np.diff(stream.ends, prepend=0)) <= 0:
+        elif ((size := np.diff(stream.ends, prepend=0)) <= 0).any():
             wrong = f"the levels of {name} do not follow each other"
+        elif (size > 4 * np.diff(index.start) * _GROWTH + _BESIDES).any():
+            wrong = f"a level of {name} takes more than its texels"
     if index.mesh["file"] != MESH:
         wrong = f"the mesh is called {str(index.mesh['file'])[:40]!r} instead of {MESH!r}"
     if wrong:
@@ -202,15 +208,26 @@ def read_mesh(folder: str | os.PathLike[str]) -> Simple:
 
     Raises InputError: PTM-I844 it cannot be read; PTM-I846 it is damaged. LimitError PTM-L841.
     """
-    file = Path(folder) / MESH
-    with naming(file):
-        return mesh_of(_bytes_of(file, _MESH_MOST))
+    with naming(Path(folder) / MESH):
+        return mesh_of(mesh_bytes(folder))
+
+
+def mesh_bytes(folder: str | os.PathLike[str]) -> bytes:
+    """The mesh's file. Raises InputError PTM-I844, LimitError PTM-L841."""
+    return _bytes_of(Path(folder) / MESH, _MESH_MOST)
+
+
+def open_own(file: Path) -> BufferedReader:
+    """A file of a folder, opened for reading, if it is one and no link. Raises OSError."""
+    if file.is_symlink():
+        raise OSError(errno.ELOOP, "is a symbolic link")
+    return open_regular(file)
 
 
 def _bytes_of(file: Path, most: int, *, whole: bool = True) -> bytes:
     """A file, or with ``whole`` False its first ``most`` bytes."""
     try:
-        with open_regular(file) as stream:
+        with open_own(file) as stream:
             data = stream.read(most + whole)
     except OSError as fault:
         raise InputError(

@@ -10,6 +10,9 @@ from ptmtools.arrays import Floats, Ints
 
 #: Vertical, degrees.
 FIELD_OF_VIEW = 35.0
+#: Who looks up or down with less than this of his view level, looks straight up or down: what is
+#: level then is rounding.
+_STRAIGHT = 2.0**-40
 
 
 @dataclass(frozen=True)
@@ -36,8 +39,8 @@ class View:
         ahead = self.target - self.eye
         ahead = ahead / np.linalg.norm(ahead)
         right = np.array([-ahead[2], 0.0, ahead[0]])
-        if not right.any():
-            right[0] = 1.0
+        if np.linalg.norm(right) < _STRAIGHT:
+            right = np.array([1.0, 0.0, 0.0])
         right /= np.linalg.norm(right)
         return np.stack([right, np.cross(right, ahead), ahead])
 

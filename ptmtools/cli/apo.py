@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from ptmtools.apo.model import ApoOptions
 from ptmtools.apo.picture import RenderOptions
@@ -59,23 +60,32 @@ def apo(
     """
     from ptmtools.apo.files import INDEX
     from ptmtools.apo.reading import read_index
-    from ptmtools.files import refuse_existing
+    from ptmtools.scene.ingestion import check_file
 
     if not mesh or "" in (folder, view):
         raise no_name()
     drawn = take(RenderOptions, values)
-    if view is not None and not force:
-        refuse_existing(view)
+    if view is not None:
+        _check_picture(view, force)
     made = folder is None and view is not None and (Path(mesh) / INDEX).is_file()
+    if made:
+        _refuse_making(values)
+    else:
+        check_file(Path(mesh))
     target = mesh if made else folder or os.fspath(Path(mesh).with_suffix(".apo"))
     if not made:
         _make(voice, mesh, target, values, workers, force)
     index = read_index(target)
+    said: dict[str, Any] = {}
     if view is not None:
-        _draw(voice, target, view, drawn, force)
+        said = _draw(target, view, drawn, force)
     if as_json:
-        voice.emit_json(index.document)
-    elif not made:
+        voice.emit_json({**index.document, **({"picture": said} if said else {})})
+        return
+    if said:
+        by = f"{said['levels']} of {count(index.levels, 'level')}"
+        voice.say(f"{view}: {target} by {by}, {said['renderer']}")
+    if not made:
         source, mesh_file = index.document["source"], index.mesh
         whole = sum(stream.ends[-1] for stream in (index.normals, index.colors) if stream)
         voice.say(
@@ -109,7 +119,30 @@ def _make(
         voice.warn(warning)
 
 
-def _draw(voice: Voice, folder: str, view: str, options: RenderOptions, force: bool) -> None:
+def _check_picture(view: str, force: bool) -> None:
+    """Raises OutputError PTM-O102 for a picture that is no PNG, PTM-O001 if it is there."""
+    from ptmtools.errors import OutputError
+    from ptmtools.files import refuse_existing
+
+    if Path(view).suffix.lower() != ".png":
+        raise OutputError("PTM-O102", "only PNG is drawn", file=view, remedy="name it .png")
+    if not force:
+        refuse_existing(view)
+
+
+def _refuse_making(values: dict[str, Any]) -> None:
+    """Raises UsageError for an option of what is made already."""
+    context = click.get_current_context()
+    of_picture = {each.name for each in fields(RenderOptions)}
+    for name in values:
+        given = context.get_parameter_source(name) == ParameterSource.COMMANDLINE
+        if given and name not in of_picture:
+            raise click.UsageError(
+                f"--{name.replace('_', '-')} is for making an octree texture; this one is made"
+            )
+
+
+def _draw(folder: str, view: str, options: RenderOptions, force: bool) -> dict[str, Any]:
     import numpy as np
 
     from ptmtools.apo.picture import render
@@ -122,4 +155,4 @@ def _draw(voice: Voice, folder: str, view: str, options: RenderOptions, force: b
     found = render(octree, mesh.points, mesh.triangles, options, normals)
     write_bytes(view, png_bytes(found.picture), force=force)
     levels = octree.levels if options.levels is None else min(options.levels, octree.levels)
-    voice.say(f"{view}: {folder} by {levels} of {count(octree.levels, 'level')}, {found.renderer}")
+    return {"file": view, "levels": levels, "renderer": found.renderer}

@@ -108,8 +108,8 @@ def deinterlace(
     if not folder or output == "":
         raise no_name()
     interlaced = read_manifest(folder)
-    path = Path(folder).absolute()
-    target = output or os.fspath(path.with_name(f"{path.resolve().name}.png"))
+    path = Path(folder).resolve()
+    target = output or os.fspath(path.with_name(f"{path.name}.png"))
     with naming(target):
         writer(Path(target).suffix)
     writable(target, force)

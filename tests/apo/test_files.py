@@ -8,6 +8,7 @@ import re
 import shutil
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from ptmtools import schemas
-from ptmtools.apo.checking import CODES, check_folder
+from ptmtools.apo.checking import CODES, check_folder, describe
 from ptmtools.apo.files import COLORS, FORM, INDEX, MESH, NORMALS, OBJ, files_of
 from ptmtools.apo.making import make_apo
 from ptmtools.apo.model import ApoOptions
@@ -179,12 +180,15 @@ PLANTED: dict[str, list[Callable[[Path], object]]] = {
         lambda f: (f / NORMALS).unlink(),
         lambda f: (f / OBJ).unlink(),
         lambda f: ((f / MESH).unlink(), (f / MESH).mkdir()),
+        lambda f: ((f / OBJ).unlink(), (f / OBJ).symlink_to("/etc/hostname")),
     ],
     "PTM-D851": [
         lambda f: (f / INDEX).write_text("{"),
         lambda f: edit(f, lambda d: d["levels"].append(3)),
         lambda f: edit(f, lambda d: d.update(schema=2)),
         lambda f: edit(f, lambda d: d["cube"].update(side=0)),
+        lambda f: edit(f, lambda d: d["normals"]["ends"].__setitem__(-1, 10**30)),
+        lambda f: edit(f, lambda d: d["normals"]["ends"].__setitem__(-1, 4 * 10**9)),
     ],
     "PTM-D852": [
         lambda f: flip(f / NORMALS, -20),
@@ -268,6 +272,24 @@ def test_from_a_mesh_to_a_picture(
     assert before == {file.name: file.read_bytes() for file in target.iterdir()}
 
 
+def test_a_mesh_whose_error_is_not_known(written: Path, tmp_path: Path) -> None:
+    made = make_apo(scene_of(*sphere(3)), ApoOptions(faces=100, depth=4), Serial())
+    FORM.write(tmp_path / "a.apo", files_of(replace(made, deviation=float("nan"))))
+    assert check(tmp_path / "a.apo").ok
+    assert "unknown" in describe(tmp_path / "a.apo")[0][0]
+    space = read_index(tmp_path / "a.apo").document["space"]
+    assert space == {"origin": [0, 0, 0], "unit": 1, "up": "y"}
+
+
+def test_a_picture_and_the_record(
+    written: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    view = tmp_path / "view.png"
+    small = ["--width", 8, "--height", 8, "--backend", "embree"]
+    assert run("apo", written, "--render", view, "--json", *small) == 0
+    assert json.loads(capsys.readouterr().out)["picture"]["file"] == str(view)
+
+
 def test_the_folder_lies_beside_the_mesh_unless_it_is_named(model: Path, tmp_path: Path) -> None:
     mesh = Path(shutil.copy(model, tmp_path))
     assert run("apo", mesh, "--faces", 100, "--depth", 3, "-q") == 0
@@ -327,6 +349,9 @@ def bad_inputs(model: Path, folder: Path, tmp_path: Path) -> list[tuple[list[Any
         (["apo", damaged("d", PLANTED["PTM-D850"][0]), "--render", view], "PTM-I844"),
         (["apo", damaged("e", lambda f: flip(f / MESH, 30)), "--render", view], "PTM-I846"),
         (["apo", ""], "PTM-"),
+        (["apo", "."], "PTM-"),
+        (["apo", folder, "--render", tmp_path / "view.jpg"], "PTM-O"),
+        (["apo", folder, "--render", view, "--faces", "9"], ""),
     ]
 
 
@@ -338,7 +363,7 @@ def test_bad_inputs_have_one_line_each(
         said = capsys.readouterr().err
         assert status in (2, 3, 4, 7), arguments
         assert said.count("\n") == 1, (arguments, said)
-        assert f"[{code}" in said, (arguments, said)
+        assert not code or f"[{code}" in said, (arguments, said)
         assert "Traceback" not in said
     assert not (tmp_path / "new").exists()
     assert (tmp_path / "own" / "thesis.doc").read_text() == "mine"

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from ptmtools.apo import blocks
+from ptmtools.apo.blocks import Surface
 from ptmtools.apo.casting import REACH, Source, nearest
 from ptmtools.apo.making import Made, make_apo, welded
 from ptmtools.apo.model import ApoOptions
 from ptmtools.apo.normals import corner_normals
+from ptmtools.apo.sampling import areas
 from ptmtools.apo.texels import fault_of
 from ptmtools.apo.traversal import look_up
 from ptmtools.errors import InputError, LimitError
@@ -115,7 +117,7 @@ def test_the_number_of_workers_changes_nothing(ball: Made, monkeypatch: pytest.M
         other = make_apo(scene, OPTIONS, executor)
     assert np.array_equal(ball.octree.texels, other.octree.texels)
     assert np.array_equal(ball.mesh.points, other.mesh.points)
-    monkeypatch.setattr(blocks, "MOST", 3000)  # some forty blocks instead of one
+    monkeypatch.setattr(blocks, "MOST", 3000)  # some fifteen blocks instead of one, of small cells
     cut = make_apo(scene, OPTIONS, Serial())
     assert np.array_equal(ball.octree.start, cut.octree.start)
     assert np.abs(ball.octree.texels.astype(int) - cut.octree.texels).max() <= 1
@@ -179,6 +181,64 @@ def test_a_sample_stands_for_the_nearest_surface_that_faces_its_way() -> None:
     # Too far away.
     assert cast(sheet(0.5 + 1.01 * REACH, True))[0] == -1
     assert cast(sheet(0.5 - 0.99 * REACH, True))[0] == 0
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_face_with_two_sides_counts_once(turned: bool) -> None:
+    points, triangles = square(12, 0.05)
+    both = [triangles, triangles[:, ::-1]]
+    found = made(points, np.concatenate(both[::-1] if turned else both))
+    assert found.missed == 0
+    assert found.source == len(triangles)
+    assert any("count once" in note for note in found.notes)
+    assert (found.octree.texels[0, 1] > 128) != turned
+
+
+@pytest.mark.parametrize("thickness", [0.05, 0.02])
+def test_either_side_of_a_thin_wall_shows_its_own_normal(thickness: float) -> None:
+    top, faces = square(40)
+    n = len(top)
+    points = np.concatenate([top, top - [0, thickness, 0]])
+    turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+    found = made(
+        points @ turn.T,
+        np.concatenate([faces, faces[:, ::-1] + n]),
+        ApoOptions(faces=10**6, density=8),
+    )
+    rng = np.random.default_rng(4)
+    at = np.stack([rng.random(2000), np.zeros(2000), rng.random(2000)], axis=1) @ turn.T
+    up = np.broadcast_to(np.array([0.0, 1, 0]) @ turn.T, at.shape)
+    up = up * np.sign(np.linalg.det(turn))
+    assert (angles(found, at, up) > 90).mean() < 0.03
+
+
+def test_memory_does_not_grow_with_a_far_speck(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(blocks, "MOST", 5000)
+    points, triangles = sphere(5, 0.03)
+    far = np.array([[1000.0, 0, 0], [1000, 1, 0], [1000, 0, 1]])
+    sizes = []
+    divided = blocks.divided
+
+    def watched(work: Any) -> Any:
+        found = divided(work)
+        for block in found[1]:
+            corner = work.surface.corner[block.triangles]
+            sizes.append(len(blocks.spread(corner, work.spacing).triangle))
+        return found
+
+    monkeypatch.setattr(blocks, "divided", watched)
+    made(
+        np.concatenate([points, far]),
+        np.concatenate([triangles, [[len(points) + k for k in range(3)]]]),
+    )
+    assert max(sizes) < 20_000  # of 160,000
+
+
+def test_needles_have_no_more_samples_than_others() -> None:
+    corner = np.array([[[0, 0, 0], [1, 0, 0], [0.5, 1e-9, 0]]])
+    pieces = Surface(corner, np.zeros((1, 3, 3))).cut_up(0.125)
+    assert len(pieces.corner) <= 20
+    np.testing.assert_allclose(areas(pieces.corner).sum(), areas(corner).sum())
 
 
 def test_too_many_texels_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

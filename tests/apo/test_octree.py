@@ -91,7 +91,8 @@ def plain(samples: Samples, depth: int, prefix: int, bounds: Bounds, bottom: int
     if len(mean) > 3:
         spread = samples.square[here].sum() / n - float(mean[3:] @ mean[3:])
         off = off or spread > bounds.color_error**2
-    if not off or depth == bottom or n < ENOUGH:
+    opposed = np.linalg.norm(mean[:3]) < 0.5 and n > 1
+    if not off or depth == bottom or (n < ENOUGH and not opposed):
         return unit, {}
     below = {c: plain(samples, depth + 1, 8 * prefix + c, bounds, bottom) for c in range(8)}
     below = {c: node for c, node in below.items() if node}
@@ -149,8 +150,10 @@ def test_normals_that_cancel_out_have_a_direction_all_the_same() -> None:
 
 def test_few_samples_are_not_divided_and_alike_ones_neither() -> None:
     rng = np.random.default_rng(2)
-    few = made(np.arange(ENOUGH - 1), rng.normal(size=(ENOUGH - 1, 3)))
+    few = made(np.arange(ENOUGH - 1), rng.normal(size=(ENOUGH - 1, 3)) + [0, 4, 0])
     assert len(divide(few, 0, 1, Bounds(0.01, 1, 1))) == 1
+    sides = made(np.array([0, 7]), np.array([[0, 1.0, 0], [0, -1, 0]]))
+    assert len(divide(sides, 0, 1, Bounds(0.01, 1, 1))) == 2
     alike = made(np.arange(8), np.tile([0.0, 0, 1], (8, 1)))
     assert len(divide(alike, 0, 1, Bounds(0.01, 1, 1))) == 1
 
