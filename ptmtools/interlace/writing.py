@@ -12,6 +12,7 @@ import os
 import re
 import stat
 import zlib
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -56,6 +57,12 @@ class Written:
     interlaced: Interlaced
     files: tuple[bytes, ...]
     notes: tuple[str, ...]
+
+    def named(self) -> Iterator[tuple[str, bytes]]:
+        """Name and bytes of each file of the folder, the manifest last."""
+        for part, data in zip(self.interlaced.parts, self.files, strict=True):
+            yield part.name, data
+        yield INDEX, (json.dumps(self.interlaced.document(), indent=1) + "\n").encode()
 
 
 def interlace(
@@ -146,13 +153,11 @@ def write_folder(folder: str | os.PathLike[str], written: Written, *, force: boo
     check_folder(folder, force=force)
     marked = f".{target.name[:200]}.{os.urandom(6).hex()}"
     beside, old = target.with_name(f"{marked}.part"), target.with_name(f"{marked}.old")
-    text = json.dumps(written.interlaced.document(), indent=1) + "\n"
     with writing(folder):
         try:
             beside.mkdir()
-            for part, data in zip(written.interlaced.parts, written.files, strict=True):
-                _put(beside / part.name, data)
-            _put(beside / INDEX, text.encode())
+            for name, data in written.named():
+                _put(beside / name, data)
             replaced = os.path.lexists(target)
             if replaced:
                 os.rename(target, old)
