@@ -24,7 +24,7 @@ from ptmtools.texture.rows import Rows
 #: Half the width of the filter, texels.
 _REACH = 2.0
 #: So many samples of the result are made at a time.
-_STRIP_SAMPLES = 1 << 20
+_STRIP_SAMPLES = 1 << 18
 
 
 def nearest_power(side: int) -> int:
@@ -49,8 +49,8 @@ def scaled(image: Rows, width: int, height: int) -> NDArray[Any]:
         rows = down[y : y + step]
         low, high = int(rows.min()), int(rows.max()) + 1
         strip = _weighted(np.asarray(image[low:high]).astype(np.float64), top)
-        strip = _filtered(strip.swapaxes(0, 1), across, across_weight).swapaxes(0, 1)
-        strip = _filtered(strip, rows - low, down_weight[y : y + step])
+        strip = _filtered(strip, rows - low, down_weight[y : y + step], 0)
+        strip = _filtered(strip, across, across_weight, 1)
         found[y : y + step] = np.floor(np.clip(_plain(strip, top), 0, top) + 0.5)
     return found
 
@@ -63,7 +63,10 @@ def _taps(old: int, new: int) -> tuple[Ints, Floats]:
     first = np.floor(centre - _REACH * factor + 0.5)
     line = first[:, None] + np.arange(count)
     weight = _cubic((line + 0.5 - centre[:, None]) / factor)
-    weight /= _sum(weight.T)[:, None]
+    total = np.zeros(new)
+    for column in weight.T:
+        total += column
+    weight /= total[:, None]
     return np.clip(line, 0, old - 1).astype(np.int64), weight
 
 
@@ -74,17 +77,17 @@ def _cubic(x: Floats) -> Floats:
     return np.where(x < 1, near, np.where(x < _REACH, far, 0.0))
 
 
-def _filtered(image: Floats, line: Ints, weight: Floats) -> Floats:
-    """(n, w, c) lines, each the sum of (n, k) weighted ones of an (h, w, c) image."""
-    return _sum(image[line[:, k]] * weight[:, k, None, None] for k in range(line.shape[1]))
-
-
-def _sum(terms: Any) -> Floats:
-    """One after the other: numpy's own sum goes by pairs, of as many as suit the machine."""
-    total: Floats | float = 0.0
-    for term in terms:
-        total = total + term
-    return np.asarray(total)
+def _filtered(image: Floats, line: Ints, weight: Floats, axis: int) -> Floats:
+    """An (h, w, c) image whose rows (axis 0) or columns (1) are sums of (n, k) weighted lines."""
+    shape = [1, 1, 1]
+    shape[axis] = -1
+    # One after the other: numpy's own sum goes by pairs, of as many as suit the machine.
+    total = np.zeros(())
+    for k in range(line.shape[1]):
+        taken = np.take(image, line[:, k], axis)
+        taken *= weight[:, k].reshape(shape)
+        total = taken if k == 0 else np.add(total, taken, out=total)
+    return total
 
 
 def _weighted(image: Floats, top: int) -> Floats:

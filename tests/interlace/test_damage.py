@@ -17,7 +17,7 @@ import pytest
 from PIL import Image
 
 from ptmtools.cli.main import main
-from ptmtools.interlace import validate_interlaced
+from ptmtools.interlace import deinterlace, validate_interlaced
 from ptmtools.interlace.checking import CODES
 from ptmtools.texture import Limits
 from ptmtools.texture.images import png_bytes
@@ -277,9 +277,36 @@ def test_warnings(tmp_path: Path) -> None:
     assert report.ok
 
 
+def test_other_axes_are_joined_as_they_say(tmp_path: Path) -> None:
+    """Such as a set of two files, or one that begins with rows; the check points it out."""
+    texels = image(16, 32)
+    folder = folder_of(tmp_path / "folder", texels, smallest=16)
+    data = [png_bytes(np.ascontiguousarray(part)) for part in (texels[::2], texels[1::2])]
+
+    def edit(document: dict[str, Any]) -> None:
+        joined = [{"width": 32, "height": height} for height in (8, 16)]
+        document["files"] = [
+            {"name": f"{n + 1}.png", "width": 32, "height": 8, "bytes": len(data[n])}
+            | {"crc32": zlib.crc32(data[n]), "axis": (None, "rows")[n], "joined": joined[n]}
+            for n in range(2)
+        ]
+
+    for number, part in enumerate(data, 1):
+        (folder / f"{number}.png").write_bytes(part)
+    edited(edit)(folder)
+    np.testing.assert_array_equal(deinterlace(folder), texels)
+    assert [issue.code for issue in validate_interlaced(folder).issues] == ["PTM-D808"]
+
+
 def test_every_code_is_found_somewhere() -> None:
     found = {finding for _, _, finding in DAMAGES.values()}
     assert found | {"PTM-D806", "PTM-D807", "PTM-D808"} == set(CODES)
+
+
+def test_the_page_lists_the_codes() -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs/format-interlace.md").read_text("utf-8")
+    rows = re.findall(r"^\| (PTM-D\d+) \| (\w+) \| (.*) \|$", page, re.MULTILINE)
+    assert {code: (severity, meaning) for code, severity, meaning in rows} == dict(CODES)
 
 
 def test_no_manifest_however_damaged_ends_in_a_traceback(

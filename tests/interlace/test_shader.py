@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from ptmtools.errors import MissingComponentError
 from ptmtools.interlace.model import Axis, axes_of
-from ptmtools.interlace.shader import StepShader
+from ptmtools.interlace.shader import FRAGMENT, StepShader
 from ptmtools.interlace.steps import join, split
 
 
@@ -54,3 +55,8 @@ def test_all_steps_of_an_image(shader: StepShader, size: tuple[int, int]) -> Non
     for part, axis in zip(rest, axes, strict=True):
         found = shader.join(found, part, axis)
     np.testing.assert_array_equal(found, image)
+
+
+def test_the_page_has_this_shader() -> None:
+    page = Path(__file__).resolve().parents[2] / "docs/format-interlace.md"
+    assert f"```glsl{FRAGMENT}```" in page.read_text("utf-8")
