@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from make_museum import File, generator, png, write
 from museum_parts.mesh import Face, Point, Thing, Uv, tiled
 from museum_parts.obj import obj_text
