@@ -12,6 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.vectors import normals
+from ptmtools.scene.mapping import gradients
 from ptmtools.walkthrough.memory import Columns, columns_of
 from ptmtools.walkthrough.recording import Browser
 from ptmtools.walkthrough.served import Document, Served
@@ -29,8 +31,8 @@ class Shapes:
     ----------
     cell, texture: (n,) int64, ascending by cell; the texture is -1 without.
     low, high: (n, 3) corners of their boxes, metres.
-    side: (n,) metres that a side of the texture's image takes on the shape, as if it were square:
-        the root of the area for once the image; 0 where it takes none.
+    side: (n, 2) metres that the width and the height of the texture's image take on the shape, on
+        average over its area; 0 where it shows one point of it.
     """
 
     cell: Ints
@@ -49,7 +51,8 @@ class Catalogue:
     ----------
     levels: (T,) columns of each texture beside the first.
     ends: (T, K) bytes of its file that hold each column; of several files, of all up to it.
-    memory: (T, K) of texture memory. texels: (T, K) of the finest image that a column shows.
+    memory: (T, K) of texture memory. size: (T, K, 2) width and height of the finest
+        image that a column shows.
     differences: (T, K) of each column to the one before it, on average over its texels, 0 to 255,
         at least `LEAST`; of what lies behind the last 0.
     colors: (T, 3) mean colour, 0 to 255.
@@ -63,7 +66,7 @@ class Catalogue:
     levels: Ints
     ends: Ints
     memory: Ints
-    texels: Ints
+    size: Ints
     differences: Floats
     colors: Floats
     index_bytes: int
@@ -136,7 +139,7 @@ class Catalogue:
             levels=columns.last,
             ends=columns.ends,
             memory=columns.memory,
-            texels=columns.texels,
+            size=columns.size,
             differences=np.where(stored, LEAST, 0.0),
         )
 
@@ -145,7 +148,7 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
     """The catalogue of a served folder; ``differences`` (T, L) and ``colors`` (T, 3) as `Pyramids`
     has them, for hints that do not say them of every texture."""
     textures = served.index["textures"]
-    levels, ends, memory, texels = columns_of(textures)
+    levels, ends, memory, size = columns_of(textures)
     beside = np.zeros(ends.shape)
     beside[:, 1:] = differences[:, : ends.shape[1] - 1]
     if all(len(row.get("differences", ())) == len(row["ends"]) for row in textures):
@@ -161,7 +164,7 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
         levels=levels,
         ends=ends,
         memory=memory,
-        texels=texels,
+        size=size,
         differences=beside,
         colors=colors,
         index_bytes=served.index_bytes,
@@ -192,9 +195,9 @@ def _shapes(served: Served) -> Shapes:
     cell, texture = (np.zeros(count, np.int64) for _ in range(2))
     cell[surfaces.shape], texture[surfaces.shape] = surfaces.cell, surfaces.texture
     drawn = np.isfinite(low[:, 0])
-    edges = np.diff(surfaces.corner, axis=1), np.diff(surfaces.uv, axis=1)
-    across = np.linalg.norm(np.cross(edges[0][:, 0], edges[0][:, 1]), axis=1)
-    images = abs(edges[1][:, 0, 0] * edges[1][:, 1, 1] - edges[1][:, 0, 1] * edges[1][:, 1, 0])
-    area, often = (np.bincount(surfaces.shape, each, count) for each in (across, images))
-    side = np.sqrt(np.divide(area, often, out=np.zeros(count), where=often > 0))
+    area = np.linalg.norm(normals(surfaces.corner), axis=1)
+    slope = np.linalg.norm(gradients(surfaces.corner, surfaces.uv), axis=2)
+    often = np.stack([np.bincount(surfaces.shape, area * s, count) for s in slope.T], axis=1)
+    whole = np.bincount(surfaces.shape, area, count)[:, None]
+    side = np.divide(whole, often, out=np.zeros((count, 2)), where=often > 0)
     return Shapes(*(field[drawn] for field in (cell, texture, low, high, side)))

@@ -22,13 +22,13 @@ class Columns(NamedTuple):
     ----------
     last: (T,) of each texture; column 0 is nothing.
     ends: (T, K) bytes that hold each column and those before it. memory: (T, K) of texture memory.
-    texels: (T, K) of the finest image that each column shows.
+    size: (T, K, 2) width and height of the finest image that each column shows.
     """
 
     last: Ints
     ends: Ints
     memory: Ints
-    texels: Ints
+    size: Ints
 
 
 def texel_bytes(texture: Any, *, paper: bool = False) -> int:
@@ -46,21 +46,20 @@ def columns_of(textures: Sequence[Any], *, paper: bool = False) -> Columns:
     for texture in textures:
         shift = len(texture["ends"]) - 1 - np.arange(len(texture["ends"]))
         sides = [np.maximum(1, texture[side] >> shift) for side in ("width", "height")]
-        texels = sides[0] * sides[1]
-        each = np.cumsum(texels) * texel_bytes(texture, paper=paper)
-        rows.append((texture["ends"], each, texels))
+        each = np.cumsum(sides[0] * sides[1]) * texel_bytes(texture, paper=paper)
+        rows.append((texture["ends"], each, np.stack(sides, axis=1)))
     return aligned(rows)
 
 
-def aligned(rows: Sequence[tuple[Sequence[int] | Ints, ...]]) -> Columns:
-    """Columns of textures that have any number of them: of each its (k,) ``ends``, ``memory`` and
-    ``texels``, without the first column."""
+def aligned(rows: Sequence[tuple[Any, Any, Any]]) -> Columns:
+    """Columns of textures that have any number of them: of each its (k,) ``ends`` and ``memory``,
+    and (k, 2) ``size``, without the first column."""
     last = np.array([len(row[0]) for row in rows], dtype=np.int64)
-    wide = int(last.max(initial=0)) + 1
-    tables = [np.zeros((len(rows), wide), np.int64) for _ in range(3)]
+    shape = len(rows), int(last.max(initial=0)) + 1
+    ends, memory, size = (np.zeros(s, np.int64) for s in (shape, shape, (*shape, 2)))
     for t, row in enumerate(rows):
         n = int(last[t])
-        for table, values in zip(tables, row, strict=True):
+        for table, values in zip((ends, memory, size), row, strict=True):
             table[t, 1 : n + 1] = values
             table[t, n + 1 :] = table[t, n]
-    return Columns(last, *tables)
+    return Columns(last, ends, memory, size)

@@ -154,7 +154,7 @@ def test_what_can_be_fetched_of_interlaced_images(interlaced_world: World) -> No
         last = stock.levels[t]
         assert np.diff(stock.ends[t, : last + 1]).tolist() == files
         texels = [part.joined[0] * part.joined[1] for part in parts]
-        assert stock.texels[t, 1 : last + 1].tolist() == texels
+        assert stock.size[t, 1 : last + 1].tolist() == [list(part.joined) for part in parts]
         # Four bytes a texel, and a third more for mip levels.
         assert stock.memory[t, 1 : last + 1] == pytest.approx(np.array(texels) * 16 / 3, rel=1e-3)
     own = interlaced_world.catalogue

@@ -27,19 +27,19 @@ from tests.walkthrough.worlds import (
 )
 
 EYE = np.array([1.0, 1.6, 2.0])
-#: Three files, whose images have 64, 128 and 256 texels.
+#: Three files, whose images have 8 × 8, 16 × 8 and 16 × 16 texels.
 STEPS = Texture((100, 100, 200), (64, 64, 128))
 
 
-def scene(*shapes: tuple[float, float]) -> Catalogue:
-    """One room; each texture on a shape so many metres ahead of the eye, behind it below 0, whose
-    image has a side of so many metres."""
+def scene(*shapes: tuple[float, ...]) -> Catalogue:
+    """One room; each texture on a shape so many metres ahead of the eye, behind it below 0, on
+    which its image is so many metres wide and high."""
     stock = catalogue([STEPS] * len(shapes), [(0, t) for t in range(len(shapes))])
-    far, side = np.array(shapes).T
+    far, side = np.array(shapes)[:, 0], np.array(shapes)[:, [1, -1]]
     low = EYE + np.outer(far, [1, 0, 0]) - [0, 0.1, 0.1]
     return replace(
         stock,
-        texels=np.tile([0, 64, 128, 256], (len(shapes), 1)),
+        size=np.tile([[0, 0], [8, 8], [16, 8], [16, 16]], (len(shapes), 1, 1)),
         shapes=Shapes(stock.shapes.cell, stock.shapes.texture, low, low + [0.0, 0.2, 0.2], side),
     )
 
@@ -72,9 +72,9 @@ def steps_of(stock: Catalogue, asked: list[Range]) -> list[tuple[int, int]]:
     ]
 
 
-#: Metres of a side of an image on which so many texels are as large as pixels at one metre.
 def side(texels: float) -> float:
-    return float(np.sqrt(texels)) * CAMERA.pixel
+    """Metres on which so many texels are as large as pixels, at one metre."""
+    return texels * CAMERA.pixel
 
 
 def test_rings_then_steps_then_distance() -> None:
@@ -91,12 +91,14 @@ def test_rings_then_steps_then_distance() -> None:
 
 
 @pytest.mark.parametrize(
-    ("texels", "steps"), [(1, 1), (63, 1), (65, 2), (127, 2), (129, 3), (257, 3), (0, 1)]
-)
-def test_where_the_screen_needs_no_more(texels: float, steps: int) -> None:
-    """Until texels are no larger than pixels; twice as far away a quarter of them does."""
+    ("wide", "high", "steps"),
+    [(1, 1, 1), (7.9, 7.9, 1), (8.1, 7, 2), (16, 8, 2), (7, 8.1, 3), (16.1, 7, 3), (99, 99, 3),
+     (0, 0, 1)],
+)  # fmt: skip
+def test_where_the_screen_needs_no_more(wide: float, high: float, steps: int) -> None:
+    """Until texels are neither wider nor higher than pixels; of twice the size, twice as far."""
     for far in (1.0, 2.0):
-        stock = scene((far, side(texels) * far))
+        stock = scene((far, side(wide) * far, side(high) * far))
         run, asked = walked(stock)
         assert steps_of(stock, asked) == [(0, step + 1) for step in range(steps)]
         assert run.column[-1].tolist() == [steps]
@@ -124,7 +126,7 @@ def test_never_above_the_budget(seed: int, budget: int, bandwidth: float) -> Non
     world = any_world(seed, frames=40)
     stock = world.catalogue
     random = np.random.default_rng(seed)
-    sides = side(1) * 10 ** random.uniform(-1, 2, len(stock.shapes.cell))
+    sides = side(1) * 10 ** random.uniform(-1, 2, (len(stock.shapes.cell), 2))
     stock = replace(stock, shapes=replace(stock.shapes, side=sides))
     world = for_policy(replace(world, catalogue=stock), "gpuii")
     run = simulate(world, POLICIES["gpuii"], Conditions(bandwidth), budget)

@@ -76,14 +76,14 @@ def catalogue(
     if random is not None:
         ends_of = np.sort(random.uniform(0, 1, (2, len(shapes), 3)), axis=0)
         low, high = low + ends_of[0] * ROOM, low + ends_of[1] * ROOM
-    own = Shapes(cell, texture_of, low, high, np.full(len(cell), np.inf))
+    own = Shapes(cell, texture_of, low, high, np.full((len(cell), 2), np.inf))
     rooms = np.arange(cells)[:, None] * [ROOM[0], 0, 0]
     records = tuple(_record(c, cells, textures, shapes, random) for c in range(cells))
     return Catalogue(
         levels=count,
         ends=ends,
         memory=memory,
-        texels=memory,
+        size=np.repeat(memory[:, :, None], 2, axis=2),
         differences=differences,
         colors=np.full((len(textures), 3), 100.0),
         index_bytes=500,

@@ -49,8 +49,8 @@ def columns(served: Served, paper: bool) -> Columns:
         parts = _manifest(served, t)[1].parts
         each = texel_bytes(texture, paper=paper)
         held = [each * sum(w * h for w, h in mip_sizes(*part.joined)) for part in parts]
-        texels = [part.joined[0] * part.joined[1] for part in parts]
-        rows.append(([*accumulate(part.bytes for part in parts)], held, texels))
+        ends = [*accumulate(part.bytes for part in parts)]
+        rows.append((ends, held, [part.joined for part in parts]))
     return aligned(rows)
 
 

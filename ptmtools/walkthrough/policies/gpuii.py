@@ -5,8 +5,8 @@ What is loaded next is the file that is most important, by four criteria:
 
 1. Its image is visible: a shape that shows it reaches into the frustum, by its box. Nothing is said
    of what hides what, and nothing else is loaded ahead.
-2. It needs another step: the texels of the image that its files make so far are larger than pixels
-   on a shape that shows it, as far away as the nearest point of that shape's box.
+2. It needs another step: the texels of the image that its files make so far are wider or higher
+   than pixels on a shape that shows it, as far away as the nearest point of that shape's box.
 3. It is near: rings around the camera, the nearest first.
 4. Within a ring the lowest step first, "to get a consistent look".
 
@@ -31,8 +31,9 @@ from ptmtools.walkthrough.policies.whole import WholeClient
 from ptmtools.walkthrough.view.frustum import NEAR
 from ptmtools.walkthrough.world import World
 
-#: Width of a ring around the camera, metres.
-RING = 2.0
+#: Width of a ring around the camera, metres. Narrower ones make worse pictures, wider ones none
+#: that are better everywhere (docs/neighbours.md).
+RING = 8.0
 
 
 class GpuiiClient(WholeClient):
@@ -97,9 +98,10 @@ class GpuiiClient(WholeClient):
         far = np.maximum(frustum.distance(shapes.low[met], shapes.high[met]), NEAR)
         self.distance = np.full(stock.texture_count, np.inf)
         np.minimum.at(self.distance, texture, far)
-        pixels = np.zeros(stock.texture_count)
-        np.maximum.at(pixels, texture, (shapes.side[met] / (far * self.world.camera.pixel)) ** 2)
-        coarse = (stock.texels[:, 1:] < pixels[:, None]).sum(axis=1)
+        pixels = np.zeros((stock.texture_count, 2))
+        pixel = far[:, None] * self.world.camera.pixel
+        np.maximum.at(pixels, texture, shapes.side[met] / pixel)
+        coarse = (stock.size[:, 1:] < pixels[:, None]).any(axis=2).sum(axis=1)
         visible = np.isfinite(self.distance)
         self.wanted = np.where(visible, np.minimum(coarse + 1, stock.levels), 0)
         self._seen[visible] = self.frame
