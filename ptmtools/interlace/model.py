@@ -27,7 +27,7 @@ class InterlaceOptions:
 
     Attributes
     ----------
-    min: no side of the first file is halved below this, texels (pixels of a texture).
+    min: no side is halved below this, texels (pixels of a texture).
     format: of the files
     quality: of JPEG files, 1 to 100.
     """

@@ -3,6 +3,7 @@ finds it."""
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
@@ -119,7 +120,9 @@ def swapped(document: dict[str, Any]) -> None:
     files[1], files[2] = files[2], files[1]
 
 
-OTHER = png_bytes(image(8, 8))
+OTHER, SMALLER = png_bytes(image(8, 8)), png_bytes(image(4, 4))
+WEBP = io.BytesIO()
+Image.fromarray(image(4, 8)).save(WEBP, "WEBP", lossless=True)
 GREY = png_bytes(image(4, 8, 1))
 DEEP = png_bytes(image(4, 8, 3, "uint16"))
 
@@ -139,7 +142,8 @@ DAMAGES: dict[str, tuple[Damage, str, str]] = {
     "grey for colours": (put("1.png", GREY, recorded=True), "PTM-I826", "PTM-D805"),
     "deep for 8 bits": (put("1.png", DEEP, recorded=True), "PTM-I826", "PTM-D805"),
     "no image": (put("3.png", b"nonsense", recorded=True), "PTM-I826", "PTM-D805"),
-    "another container": (put("1.png", b"GIF89a" + bytes(99), True), "PTM-I826", "PTM-D805"),
+    "a smaller size": (put("2.png", SMALLER, recorded=True), "PTM-I826", "PTM-D805"),
+    "another container": (put("1.png", WEBP.getvalue(), recorded=True), "PTM-I826", "PTM-D805"),
     "a huge size declared": (bomb, "PTM-I826", "PTM-D805"),
     "checksum": (at("files", 0, "crc32", value=7), "PTM-I825", "PTM-D804"),
     "index cut": (cut("interlace.json", 100), "PTM-I821", "PTM-D800"),
@@ -216,6 +220,23 @@ def test_one_line(tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str])
     _, err = said(capsys)
     assert (status == 0) == (finding in ("PTM-D803", "PTM-D804", "PTM-D805"))
     assert err.count("\n") == (status != 0)
+
+
+def test_what_is_larger_than_described_is_not_decoded(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = folder_of(tmp_path / "folder", image())
+    put("2.png", png_bytes(np.zeros((2000, 2000, 3), np.uint8)), recorded=True)(folder)
+    assert main(["deinterlace", str(folder), "-o", str(tmp_path / "x.png")]) == 3
+    assert "more than the limit of 128 bytes" in said(capsys)[1]
+
+
+def test_a_single_file_of_any_size_is_refused(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "folder", image(4, 4))
+    put("1.png", png_bytes(image(4, 5)), recorded=True)(folder)
+    for path in (("width",), ("files", 0, "width"), ("files", 0, "joined", "width")):
+        at(*path, value=5)(folder)
+    assert [issue.code for issue in validate_interlaced(folder).issues] == ["PTM-D802"]
 
 
 def test_the_undamaged_folder_is_good(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
+from PIL import Image
 
 from ptmtools.interlace.scaling import nearest_power, scaled
 
@@ -48,6 +49,16 @@ def test_transposed_is_the_same() -> None:
     other = scaled(image.swapaxes(0, 1), 32, 64).swapaxes(0, 1)
     apart = scaled(image, 64, 32).astype(int) - other
     assert abs(apart).max() <= 1  # sums in another order
+
+
+@pytest.mark.parametrize("size", [(64, 128), (128, 64), (128, 128), (64, 64)])
+def test_inside_it_is_the_cubic_of_pillow(size: tuple[int, int]) -> None:
+    """Which has the same filter; at the edges it leaves out what is outside."""
+    image = np.random.default_rng(6).integers(0, 65536, (90, 91, 1), np.uint16)
+    real = Image.fromarray(image[:, :, 0].astype(np.float32))
+    want = np.asarray(real.resize(size, Image.Resampling.BICUBIC))[4:-4, 4:-4]
+    found = scaled(image, *size)[4:-4, 4:-4, 0]
+    assert abs(found - want.clip(0, 65535)).max() < 0.6
 
 
 def test_strips_do_not_show() -> None:
