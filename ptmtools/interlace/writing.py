@@ -52,6 +52,12 @@ class Written:
     files: tuple[bytes, ...]
     notes: tuple[str, ...]
 
+    def named(self) -> Iterator[tuple[str, bytes]]:
+        """Name and bytes of each file of the folder, the manifest last."""
+        for part, data in zip(self.interlaced.parts, self.files, strict=True):
+            yield part.name, data
+        yield INDEX, (json.dumps(self.interlaced.document(), indent=1) + "\n").encode()
+
 
 def interlace(
     picture: Picture, options: InterlaceOptions = _OPTIONS, limits: Limits = _LIMITS
@@ -131,14 +137,7 @@ def _check_options(options: InterlaceOptions) -> None:
         )
 
 
-def files_of(written: Written) -> Iterator[tuple[str, bytes]]:
-    """Name and contents of each file of a folder, the index last."""
-    for part, data in zip(written.interlaced.parts, written.files, strict=True):
-        yield part.name, data
-    yield INDEX, (json.dumps(written.interlaced.document(), indent=1) + "\n").encode()
-
-
 def write_folder(folder: str | os.PathLike[str], written: Written, *, force: bool = False) -> None:
     """Write an interlaced image to a folder, whole or not at all; raises what `FolderForm.write`
     raises."""
-    FORM.write(folder, files_of(written), force=force)
+    FORM.write(folder, written.named(), force=force)

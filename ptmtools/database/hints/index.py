@@ -50,6 +50,8 @@ def index_text(content: Content) -> str:
         "geometry": {e.name: e.cell_files for e in emitters if e.cell_files},
         "statistics": STATISTICS,
     }
+    if sets := {e.name: e.texture_files for e in emitters if e.texture_files}:
+        head["textureSets"] = sets
     if content.options.first_look:
         head["firstLook"] = FIRST_LOOK_FILES
     return document_text(

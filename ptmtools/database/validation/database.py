@@ -116,7 +116,7 @@ class _Check:
         self._read_manifest()
         there = served_files(self._folder / SERVED, self.found)
         check_names(there, self.found)
-        database = ServedDatabase(self._folder / SERVED, there, self.found)
+        database = ServedDatabase(self._folder / SERVED, there, self.found, self._limits)
         ours = {path for path in there if self._is_ours(path)}
         self._note_others([path for path in there if path not in ours])
         self._strays = any(f"{SERVED}/{path}" not in self._outputs for path in ours)

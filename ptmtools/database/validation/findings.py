@@ -88,6 +88,7 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D741": ("error", "the index, the records and the statistics contradict each other"),
     "PTM-D742": ("error", "a first-look bundle is not what its cell's record and the textures say"),
     "PTM-D743": ("error", "what a record says of how fine textures are needed cannot be"),
+    "PTM-D744": ("error", "the interlaced images are not those of the textures"),
 }
 
 #: Of files that are not as their stage wrote them: a build sees that by itself.
