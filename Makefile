@@ -137,6 +137,8 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/ach.py sample_data/two_rooms/two_rooms.obj --only presets speed
 	$(BIN)/python benchmarks/emission.py
 	$(BIN)/python benchmarks/formats.py
+	$(BIN)/python benchmarks/simplification.py --faces 100000
+	$(BIN)/python benchmarks/apo.py --triangles 50000
 	$(BIN)/python benchmarks/interlace.py --quick
 	@[ ! -f build/museum/museum.obj ] || { set -x; $(BIN)/python benchmarks/rounded.py; { set +x; } 2>/dev/null; }
 	$(BIN)/python -m benchmarks.fuzz --count 5000 --jobs $(JOBS)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from ptmtools.errors import OutputError
-from ptmtools.files import leads_inside, open_regular, refuse_existing, writing
+from ptmtools.files import exchanged, leads_inside, open_regular, refuse_existing, writing
 
 #: How an index begins, in so many first bytes.
 _HEAD = 256
@@ -146,8 +146,10 @@ def _paths(folder: Path) -> Iterator[tuple[str, bool]]:
 
 
 def _replace(target: Path, new: Path, old: Path) -> None:
-    """Gives a new folder its name, and what has it now another."""
+    """Gives a new folder its name, and what has it now another: at once where that can be done."""
     there = os.path.lexists(target)
+    if there and exchanged(new, target):
+        return
     if there:
         os.rename(target, old)
     try:

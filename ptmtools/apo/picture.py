@@ -18,7 +18,7 @@ from ptmtools.arrays import Floats
 from ptmtools.errors import InputError, MissingComponentError
 
 #: Pixels of a side, at most.
-WIDEST = 8192
+WIDEST = 4096
 
 
 @dataclass(frozen=True)
