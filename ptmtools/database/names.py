@@ -17,6 +17,7 @@ STATISTICS = f"{HINTS_FOLDER}/statistics.json"
 CELL_FOLDER = "cells"
 TEXTURE_FOLDER = "textures"
 GLTF_FOLDER = "gltf"
+OCTREE_FOLDER = "apo"
 #: From one of these folders back to the served one.
 UP = "../"
 #: The files of a cell, as the index names them: URI templates (RFC 6570, level 1).
