@@ -19,8 +19,8 @@ RANGES: dict[str, tuple[float, float]] = {
 
 
 def check_range(name: str, value: float, prefix: str = "") -> None:
-    """Raises InputError PTM-I840 for a value that an option, which the command line calls ``prefix``
-    and the name, cannot have."""
+    """Raises InputError PTM-I840 for a value that is out of range; the command line calls the
+    option ``prefix`` and its name."""
     least, most = RANGES[name]
     if not least <= value <= most:
         raise InputError(

@@ -52,7 +52,7 @@ def index_text(content: Content) -> str:
     }
     if content.options.first_look:
         head["firstLook"] = FIRST_LOOK_FILES
-    lists = {
+    lists: dict[str, list[Any]] = {
         "viewpoints": [_viewpoint(v) for v in content.viewpoints],
         "textures": [_texture(r, content.options.fallback) for r in content.textures],
         "octrees": [_octree(r) for r in content.octrees],
