@@ -49,11 +49,10 @@ class Artifacts:
         """Raises PTM-D004 to PTM-D006, also where artifacts do not fit together; PTM-D008 if
         another release of ptmtools made the artifact."""
         if stage not in self._stages:
-            if stage.changes and arrays_of(stage.name) not in self.outputs(stage):
-                made, name = self[stage.changes], arrays_of(stage.changes.name)
-            else:
-                made, name = self._read(stage), arrays_of(stage.name)
-            with self.reading(name):
+            stored = stage if self.is_stored(stage) else stage.changes
+            assert stored
+            made = self._read(stage) if stored is stage else self[stored]
+            with self.reading(arrays_of(stored.name)):
                 self._fit(stage, made)
             self._stages[stage] = made
         return cast(A, self._stages[stage])
@@ -105,6 +104,11 @@ class Artifacts:
         if stage.changes and self._known(stage) is None:
             return {}
         return self.record(stage).outputs
+
+    def is_stored(self, stage: Stage[Any]) -> bool:
+        """Whether a stage's artifact is its own; False if it is the very one that it could have
+        changed. Raises as `outputs`."""
+        return not stage.changes or arrays_of(stage.name) in self.outputs(stage)
 
     def _known(self, stage: Stage[Any]) -> StageRecord | None:
         """The record of a stage's last run, if there was one."""
