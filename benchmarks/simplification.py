@@ -9,6 +9,9 @@ peak beyond what the process held.
 Errors are against the given mesh, both ways, at points strewn evenly over the one (seeded): the
 way along the normal to the other, by Embree, and the angle between the normals there. Distances are
 in millionths of the box's diagonal. Behind each figure stands its ratio to that of ``quadric``.
+
+``--painted`` gives the statues six charts of texture, one for each side of the cube, and prints
+what that costs ``quadric``, and how far the texture is from where it was.
 """
 
 from __future__ import annotations
@@ -43,7 +46,7 @@ def grid(n: int) -> Any:
     return np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
 
 
-def statue(faces: int, shape: str, seed: int = 1) -> Mesh:
+def statue(faces: int, shape: str, painted: bool = False, seed: int = 1) -> Mesh:
     """About so many faces: waves from a third of the size to a hundredth, and folds."""
     n = ceil(sqrt(faces / 12))
     axis = np.tan(np.linspace(-np.pi / 4, np.pi / 4, n + 1))
@@ -71,7 +74,10 @@ def statue(faces: int, shape: str, seed: int = 1) -> Mesh:
     made = unit * (1 + 0.12 * height)[:, None]
     if shape == "squashed":
         made *= [1.0, 0.3, 2.0]
-    return Mesh(made, faces_of.astype(np.int32))
+    # Six charts side by side, each as its side of the cube.
+    chart = np.stack([u, v], axis=1) / 2 + 0.5
+    uv = np.concatenate([chart[grid(n)] + [2.0 * side, 0.0] for side in range(6)])
+    return Mesh(made, faces_of.astype(np.int32), uv=uv if painted else None)
 
 
 def by_quadric(mesh: Mesh, faces: int) -> tuple[Floats, Any]:
@@ -172,6 +178,61 @@ def figures(given: Mesh, found: Mesh) -> list[float]:
     ]  # fmt: skip
 
 
+def texture_shift(given: Mesh, found: Mesh) -> list[float]:
+    """Mean, 95th and 99.9th percentile of how far the texture is from where it was, over points of
+    the given mesh."""
+    from embreex.mesh_construction import TriangleMesh
+    from embreex.rtcore_scene import EmbreeScene
+
+    assert given.uv is not None
+    assert found.uv is not None
+    scene = EmbreeScene(robust=True)
+    TriangleMesh(scene, found.points.astype(np.float32), found.triangles)
+    rng = np.random.default_rng(5)
+    face = rng.integers(0, len(given.triangles), SAMPLES)
+    corner = given.points[given.triangles[face]]
+    point, uv = corner.mean(axis=1), given.uv[face].mean(axis=1)
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    area = np.linalg.norm(normal, axis=1)
+    normal /= area[:, None]
+    edges = given.uv[face][:, 1:] - given.uv[face][:, :1]
+    scale = np.sqrt(area / np.abs(np.linalg.det(edges)))
+    way, shift = np.full(len(point), np.inf), np.zeros(len(point))
+    back = 1e-4 * np.ptp(given.points, axis=0).max()
+    for side in (1.0, -1.0):
+        origin = (point - side * back * normal).astype(np.float32)
+        hit = scene.run(origin, (side * normal).astype(np.float32), output=True)
+        # Embree's u and v belong to the second and the third corner.
+        at = found.uv[hit["primID"]]
+        a, b = hit["u"][:, None], hit["v"][:, None]
+        there = at[:, 0] * (1 - a - b) + at[:, 1] * a + at[:, 2] * b
+        far = np.abs(hit["tfar"] - back)
+        nearer = (hit["primID"] >= 0) & (far < way)
+        # Beside a seam the nearest point may be in the next chart.
+        same = np.abs(there[:, 0] // 2 - uv[:, 0] // 2) == 0
+        way[nearer] = far[nearer]
+        shift[nearer] = np.where(same, np.linalg.norm(there - uv, axis=1) * scale, np.nan)[nearer]
+    away = shift[np.isfinite(way) & np.isfinite(shift)]
+    away = away / np.linalg.norm(np.ptp(given.points, axis=0)) * 1e6
+    return [away.mean(), np.percentile(away, 95), np.percentile(away, 99.9)]
+
+
+def print_painted(asked: argparse.Namespace) -> None:
+    """The table of what textures cost."""
+    print("| faces | charts | left | s | mean | 95 % | 99.9 % | shift | 95 % | 99.9 % |")
+    print("|---" * 10 + "|")
+    for count in asked.faces:
+        for painted in (False, True):
+            given = statue(count, asked.shape, painted)
+            begin = time.process_time()
+            found = simplify(given, SimplifyOptions(asked.to)).mesh
+            row = [time.process_time() - begin, *figures(given, found)[:3]]
+            row += texture_shift(given, found) if painted else []
+            head = f"| {len(given.triangles):,} | {6 * painted} | {len(found.triangles):,} "
+            cells = [f"{x:,.3g}" for x in row] + [""] * (7 - len(row))
+            print(head + "".join(f"| {cell} " for cell in cells) + "|", flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--faces", type=int, nargs="+", default=[100_000, 1_000_000])
@@ -179,7 +240,13 @@ def main() -> None:
     parser.add_argument("--shape", choices=["round", "squashed"], default="round")
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS))
     parser.add_argument("--runs", type=int, default=2)
+    parser.add_argument("--painted", action="store_true", help="what textures cost")
     asked = parser.parse_args()
+    if asked.painted:
+        for painted in (False, True):
+            simplify(statue(3000, asked.shape, painted), SimplifyOptions(1000))
+        print_painted(asked)
+        return
     print("| faces | method | left | s | MB | mean | 95 % | 99.9 % | angle | 95 % |")
     print("|---" * 10 + "|")
     for count in asked.faces:

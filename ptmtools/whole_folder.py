@@ -124,12 +124,14 @@ class FolderForm:
 
 
 def _paths(folder: Path) -> Iterator[tuple[str, bool]]:
-    """Of all that is in a folder but folders: the path, with slashes, and whether it is a file."""
+    """Of all that is in a folder, but for folders that hold something: the path, with slashes, and
+    whether it is a file."""
     for place, folders, files in os.walk(folder):
-        for name in [*files, *(f for f in folders if os.path.islink(os.path.join(place, f)))]:
+        for name in [*folders, *files]:
             path = Path(place, name)
-            plain = stat.S_ISREG(os.lstat(path).st_mode)
-            yield PurePosixPath(path.relative_to(folder)).as_posix(), plain
+            mode = os.lstat(path).st_mode
+            if not stat.S_ISDIR(mode) or not os.listdir(path):
+                yield PurePosixPath(path.relative_to(folder)).as_posix(), stat.S_ISREG(mode)
 
 
 def _put(folder: Path, path: str, data: bytes) -> None:

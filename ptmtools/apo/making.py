@@ -82,7 +82,9 @@ def make_apo(
     """
     points, triangles = welded(scene.points, scene.triangles)
     progress(0, 1, "simplifying")
-    simplified = simplify(Mesh(points, triangles), SimplifyOptions(options.faces, options.method))
+    simplified = simplify(
+        Mesh(points, triangles), SimplifyOptions(options.faces, method=options.method)
+    )
     progress(1, 1, "simplifying")
     mesh = smooth(simplified.mesh.points, simplified.mesh.triangles)
     paint = paint_of(scene) if options.color else None

@@ -25,6 +25,7 @@ class ApoOptions:
         root mean square of the length of the difference, 0 to 2.
     depth: greatest depth of leaves; a leaf of depth 13 is 1/8192 of the cube wide.
     density: samples for each triangle of the source, on average.
+    method: what simplifies; meshlab is pymeshlab, as the paper's tool.
     color: also keep the colours of vertices or of the texture, which the paper leaves for later.
     color_error: the same for colours, as a share of the full range.
 

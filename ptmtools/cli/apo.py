@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -98,12 +99,14 @@ def _make(
     FORM.check(folder, force=force)
     with voice.progress() as progress, open_executor(workers) as executor:
         scene = ingest(model, read, progress, workers=workers or processors())
+        if scene.space.up_guessed or scene.space.unit_guessed:
+            # Guessed by what buildings are like; a statue stays as it is.
+            read = replace(read, up=read.up or "y", unit=read.unit or "m")
+            scene = ingest(model, read, progress, workers=workers or processors())
         made = make_apo(scene, options, executor, progress)
     FORM.write(folder, files_of(made), force=force)
     for warning in [*warnings(scene.notes), *made.notes]:
         voice.warn(warning)
-    if scene.space.up_guessed:
-        voice.warn(f"note: the {scene.space.up} axis seems to be up; if it is not, give --up")
 
 
 def _draw(voice: Voice, folder: str, view: str, options: RenderOptions, force: bool) -> None:

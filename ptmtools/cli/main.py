@@ -39,6 +39,8 @@ COMMANDS = {
     "encode": ("images", "encode", "Encode images as .ptm files."),
     "decode": ("images", "decode", "Decode .ptm files to images."),
     "apo": ("apo", "apo", "Make a light mesh and an octree texture of a heavy mesh."),
+    "interlace": ("interlacing", "interlace", "Split an image into files that sharpen it."),
+    "deinterlace": ("interlacing", "deinterlace", "Join the files of an interlaced image."),
     "warm-up": ("warm_up", "warm_up", "Compile for this machine, before the first run."),
     "compare": ("comparing", "compare", "Compare .ptm with other image formats: size and speed."),
 }

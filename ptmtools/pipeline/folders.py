@@ -39,20 +39,26 @@ class FolderKind:
     describe: Lazy[Callable[[Path], tuple[tuple[str, ...], Mapping[str, Any]]]]
 
 
+_LIST = (
+    FolderKind(
+        index="interlace.json",
+        about="interlaced image",
+        again="ptm interlace IMAGE",
+        codes=Lazy("ptmtools.interlace.checking:CODES"),
+        check=Lazy("ptmtools.interlace.checking:validate_interlaced"),
+        describe=Lazy("ptmtools.interlace.reading:describe"),
+    ),
+    FolderKind(
+        index="apo.json",
+        about="octree texture",
+        again="ptm apo MESH",
+        codes=Lazy("ptmtools.apo.checking:CODES"),
+        check=Lazy("ptmtools.apo.checking:check_folder"),
+        describe=Lazy("ptmtools.apo.checking:describe"),
+    ),
+)
 #: By the name of the index.
-FOLDERS: dict[str, FolderKind] = {
-    kind.index: kind
-    for kind in (
-        FolderKind(
-            index="apo.json",
-            about="octree texture",
-            again="ptm apo MESH",
-            codes=Lazy("ptmtools.apo.checking:CODES"),
-            check=Lazy("ptmtools.apo.checking:check_folder"),
-            describe=Lazy("ptmtools.apo.checking:describe"),
-        ),
-    )
-}
+FOLDERS = {kind.index: kind for kind in _LIST}
 
 
 def kind_of(folder: Path) -> FolderKind | None:

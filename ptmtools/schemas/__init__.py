@@ -29,7 +29,8 @@ from typing import Any
 HINTS, CELL, STATISTICS = "hints", "cell", "statistics"
 MANIFEST, VALIDATION, GLB, SCENE = "manifest", "validation", "glb", "scene"
 WALK, TRACE, SIMULATION, SITE = "walk", "trace", "simulation", "site"
-HANDED, APO = "handed", "apo"
+HANDED = "handed"
+INTERLACE, APO = "interlace", "apo"
 #: So many lists and objects lie in each other at most, where anything may stand.
 DEEPEST = 16
 #: How the message of a number ends that is beyond float64.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Literal
 
 import numpy as np
@@ -46,15 +47,20 @@ class SimplifyOptions:
     Attributes
     ----------
     faces: keep at most so many, where seams and borders allow it.
+    error: make no collapse with a greater error (`Simplified.error`), in the unit of the points,
+        even if more faces are left; for `quadric` alone.
     method: what makes them fewer.
     """
 
     faces: int = 10_000
+    error: float = inf
     method: Method = "quadric"
 
     def __post_init__(self) -> None:
         if self.faces < 1:
             raise ValueError(f"{self.faces} faces are too few")
+        if not self.error >= 0:
+            raise ValueError(f"{self.error} is no error")
 
 
 @dataclass(frozen=True)
@@ -82,6 +88,6 @@ def too_many(left: int, faces: int) -> tuple[str, ...]:
     if left <= faces:
         return ()
     return (
-        f"{left:,} faces are left, not {faces:,}: borders, seams and parts that cannot have fewer "
-        "do not allow it",
+        f"{left:,} faces are left, not {faces:,}: borders, seams, small parts or the greatest "
+        "error do not allow it",
     )

@@ -18,6 +18,7 @@ from ptmtools.cli.main import main
 from ptmtools.database.fault import FileError
 from ptmtools.database.validation.findings import CODES
 from ptmtools.database.validation.hints import read_file
+from ptmtools.pipeline.folders import FOLDERS
 from ptmtools.pipeline.stages import STAGES
 from ptmtools.store.manifest import FORMAT, SCHEMA, Manifest, StageRecord
 
@@ -326,4 +327,5 @@ def test_ok_is_what_the_exit_status_says(database: Path, run: Run) -> None:
 def test_the_codes_of_the_command(run: Run) -> None:
     status, stdout = run("validate", "--codes")
     assert status == 0
-    assert [line.split()[0] for line in stdout.splitlines()] == sorted(CODES)
+    every = {*CODES}.union(*(kind.codes.load() for kind in FOLDERS.values()))
+    assert [line.split()[0] for line in stdout.splitlines()] == sorted(every)

@@ -13,7 +13,7 @@ from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.simplification import SimplifyOptions, meshlab, simplify
 from tests.simplification.shapes import sphere
 
-TO_500 = SimplifyOptions(500, "meshlab")
+TO_500 = SimplifyOptions(500, method="meshlab")
 
 
 def test_a_sphere_stays_one(require: Callable[[str, str], None]) -> None:

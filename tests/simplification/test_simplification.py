@@ -72,8 +72,8 @@ def test_faces_do_not_turn() -> None:
 
 def test_windows_keep_their_outline_and_bricks_their_texture() -> None:
     given = facade(4, 3, 5)
-    # The outline of the wall and of 12 windows have 4 corners each; a window has two faces.
-    least = 2 * 12 + (2 * 4 * 12 + 4 - 2)
+    # Of the corners of the wall and of 12 windows, 4 are on the border.
+    least = 2 * (4 + 4 * 12) - 2 - 4
     found = to(least, given)
     assert len(found.mesh.triangles) == least
     # The root of rounding errors of texture coordinates.
@@ -92,6 +92,24 @@ def test_windows_keep_their_outline_and_bricks_their_texture() -> None:
     assert np.abs(found.mesh.uv[window] - (corner[window] - low)).max() < 1e-9
     assert (low == np.floor(low)).all()
     assert (low % 2 == 1).all()
+
+
+@pytest.mark.parametrize("painted", [False, True])
+def test_materials_or_colours_alone_make_seams(painted: bool) -> None:
+    given = replace(facade(2, 2, 4), uv=None)
+    assert given.material is not None
+    if painted:
+        colors = np.repeat(given.material, 9).reshape(-1, 3, 3).astype(np.uint8) * 200
+        given = replace(given, material=None, colors=colors)
+    found = to(2 * (4 + 4 * 4) - 2 - 4, given)
+    assert not found.notes
+    mesh = found.mesh
+    kind = mesh.material if mesh.colors is None else mesh.colors[:, 0, 0] // 200
+    assert (np.abs(normals(mesh)[:, 2]) / 2)[kind == 1].sum() == pytest.approx(4)
+    # The corners of the wall and of four windows.
+    assert len(mesh.points) == 4 + 4 * 4
+    assert (mesh.points == np.round(mesh.points)).all()
+    assert mesh.colors is None or (mesh.colors == mesh.colors[:, :1, :1]).all()
 
 
 def test_a_texture_that_bends_is_dear() -> None:
@@ -186,6 +204,42 @@ def test_many_parts() -> None:
     least = to(1, Mesh(points, triangles.astype(np.int32)))
     assert len(least.mesh.triangles) == 4 * 500
     assert least.notes
+
+
+def test_no_collapse_has_a_greater_error_than_allowed() -> None:
+    given = sphere(20)
+    for error in (1e-3, 1e-2):
+        found = simplify(given, SimplifyOptions(1, error=error))
+        assert error / 2 < found.error <= error
+        assert found.notes
+    box_again = simplify(box(5), SimplifyOptions(1, error=0.0))
+    assert len(box_again.mesh.triangles) == 12
+    free = simplify(given, SimplifyOptions(1000, error=1e300))
+    assert bytes_of(free.mesh) == bytes_of(to(1000, given).mesh)
+    with pytest.raises(ValueError, match="no error"):
+        SimplifyOptions(error=float("nan"))
+
+
+def test_lone_triangles_stay() -> None:
+    corners = np.random.default_rng(3).uniform(size=(20, 3, 3))
+    found = to(1, Mesh(corners.reshape(-1, 3), np.arange(60, dtype=np.int32).reshape(-1, 3)))
+    assert sorted(map(bytes, found.mesh.points)) == sorted(map(bytes, corners.reshape(-1, 3)))
+    assert len(found.mesh.triangles) == 20
+
+
+def test_parts_that_touch_in_a_point_still_do() -> None:
+    """A sheet, the middle of whose border is a corner of an octahedron."""
+    x, y = (each.reshape(-1) for each in np.meshgrid(np.arange(11.0), np.arange(-5.0, 6.0)))
+    ends = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1.0]])
+    octahedron = [[a, b, c] for a in (0, 1) for b in (2, 3) for c in (4, 5)]
+    points = np.concatenate([np.stack([x, y, 0 * x], axis=1), ends * 3 - [3, 0, 0]])
+    faces = [[a, b, c] if (a + b + c) % 2 == 0 else [a, c, b] for a, b, c in octahedron]
+    triangles = np.concatenate([grid(10, 10), np.array(faces, np.int32) + len(x)])
+    found = to(1, Mesh(points, triangles)).mesh
+    at_origin = (found.points[found.triangles] == 0).all(axis=2).any(axis=1)
+    sheet = (found.points[found.triangles][:, :, 0] >= 0).all(axis=1)
+    assert (at_origin & sheet).any()
+    assert (at_origin & ~sheet).any()
 
 
 def test_the_source_of_each_face_is_where_it_is() -> None:
