@@ -8,6 +8,7 @@ them.
 from __future__ import annotations
 
 import json
+import math
 import re
 import unicodedata
 from collections.abc import Iterable, Iterator, Mapping
@@ -135,13 +136,15 @@ def _record(row: Mapping[str, Any]) -> OctreeRecord:
     """Raises ValueError, KeyError or TypeError for what is no row of the list."""
     from ptmtools.database.model import OctreeRecord
 
-    low = tuple(map(float, row["low"]))
+    low, side = tuple(map(float, row["low"])), float(row["side"])
     levels, ends, checks = (tuple(map(int, row[name])) for name in ("levels", "ends", "crc32"))
     if not isinstance(row["object"], str) or not _FILE.fullmatch(row["file"]):
         raise ValueError("an octree with an impossible name")
-    if len(low) != 3 or not len(levels) == len(ends) == len(checks) > 0:
+    if len(low) != 3 or not all(map(math.isfinite, low)) or not 0 < side < math.inf:
+        raise ValueError("an octree without a place")
+    if not len(levels) == len(ends) == len(checks) > 0:
         raise ValueError("an octree whose lists are not aligned")
-    return OctreeRecord(row["object"], row["file"], low, float(row["side"]), levels, ends, checks)
+    return OctreeRecord(row["object"], row["file"], low, side, levels, ends, checks)
 
 
 def load_scene(artifacts: Artifacts, arrays: Mapping[str, NDArray[np.generic]]) -> Scene:
