@@ -24,6 +24,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "sample_data")]
 from ptmtools.apo.files import streamed  # noqa: E402
 from ptmtools.apo.making import Made, make_apo  # noqa: E402
 from ptmtools.apo.model import ApoOptions  # noqa: E402
+from ptmtools.apo.warm_up import warm_up  # noqa: E402
 from ptmtools.executors import open_executor  # noqa: E402
 from ptmtools.scene import IngestOptions, ingest  # noqa: E402
 
@@ -74,31 +75,6 @@ def levels(name: str, made: Made) -> str:
     first = each[:8].sum()
     rest = ", ".join(f"{k} {mb:.2f}" for k, mb in enumerate(each[8:], start=8))
     return f"{name}: levels 0 to 7 {first:.2f} MB" + (f", {rest}" if rest else "")
-
-
-def warm_up() -> None:
-    """Compiles what is compiled, lest the first row pay for it."""
-    import trimesh
-
-    from ptmtools.executors import Serial
-    from ptmtools.scene.model import Material, Scene
-    from ptmtools.scene.orientation import tolerance_of
-
-    ball = trimesh.creation.icosphere(subdivisions=3)
-    points, faces = np.asarray(ball.vertices), np.asarray(ball.faces, np.int32)
-    n = len(faces)
-    scene = Scene(
-        points,
-        faces,
-        np.zeros((n, 3, 2)),
-        np.zeros(n, np.int32),
-        np.zeros(n, np.int32),
-        np.ones(n, bool),
-        ("ball",),
-        (Material("stone"),),
-        tolerance_of(points, faces),
-    )
-    make_apo(scene, ApoOptions(faces=100, depth=4), Serial())
 
 
 def main() -> None:

@@ -24,6 +24,7 @@ from ptmtools.apo.octree import (
     pruned,
 )
 from ptmtools.apo.sampling import Points, areas, at, spread
+from ptmtools.apo.texels import check_count
 from ptmtools.arrays import Floats, Ints, Singles
 from ptmtools.executors import Executor
 from ptmtools.progress import Progress, silent
@@ -104,12 +105,17 @@ class Found:
 
 def build(work: Work, executor: Executor, progress: Progress = silent) -> tuple[list[Level], float]:
     """The levels of the octree, from the root on, and the share of the samples that no ray found
-    the source from, whose normals are the simplified mesh's own."""
+    the source from, whose normals are the simplified mesh's own.
+
+    Raises LimitError PTM-L840: too many texels.
+    """
     blocks = list(_blocks(work))
-    found = []
+    found, held = [], 0
     for done, each in enumerate(executor.each(_block, work, blocks)):
         progress(done, len(blocks), "casting rays")
         found.append(each)
+        held += texel_count(each.levels)
+        check_count(held)
     progress(len(blocks), len(blocks), "casting rays")
     parts = [each.cells for each in found]
     cells = Samples(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -200,3 +201,24 @@ def test_too_many_texels_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_options_out_of_range(wrong: dict[str, float]) -> None:
     with pytest.raises(InputError, match="PTM-I840"):
         ApoOptions(**wrong)  # type: ignore[arg-type]
+
+
+def test_the_warm_up_calls_every_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
+    from ptmtools import compiled
+    from ptmtools.apo.warm_up import warm_up
+
+    names: set[str] = set()
+    call = compiled._Kernel.__call__
+
+    def record(self: Any, *arguments: Any) -> Any:
+        names.add(f"{self.__module__}.{self.__name__}")
+        return call(self, *arguments)
+
+    monkeypatch.setattr(compiled._Kernel, "__call__", record)
+    found = make_apo(scene_of(*sphere(5, 0.03)), OPTIONS, Serial())
+    look_up(found.octree, np.full((1, 3), 0.5))
+    needed = set(names)
+    names.clear()
+    warm_up()
+    assert needed
+    assert needed <= names
