@@ -97,6 +97,7 @@ def replaced(
         simplified, part = _simplified(scene, i, triangles[i], options.apo_faces, progress)
         notes += [f"{scene.objects[i]}: {note}" for note in simplified.notes]
         if not 0 < len(part.source) < len(triangles[i]):
+            notes.append(f"{scene.objects[i]} stays as modelled: it cannot have fewer triangles")
             continue
         parts.append(part)
         octrees.append(_octree(scene, triangles[i], simplified, part, options, executor, progress))

@@ -69,6 +69,7 @@ class ReplacingJob(Job):
             "texels": sum(sum(row["levels"]) for row in rows),
             "bytes": sum(row["ends"][-1] for row in rows),
             "triangles": len(made.scene.triangles),
+            "deviation": max((row["deviation"] for row in rows), default=0.0),
         }
         notes = tuple(map(str, made.notes))
         return replace(work, counts=counts, notes=notes, warnings=warnings_in(made.notes))

@@ -158,6 +158,18 @@ def test_light_objects_and_unknown_names(rooms: Scene) -> None:
     assert len(some.octrees) == 2
 
 
+def test_what_cannot_be_lighter_stays(rooms: Scene) -> None:
+    """Each triangle has a material of its own: every edge is a border."""
+    own = of_object(rooms, "statue_01")
+    material = rooms.triangle_material.copy()
+    material[own] = len(rooms.materials) + np.arange(len(own))
+    materials = (*rooms.materials, *[rooms.materials[0]] * len(own))
+    patched = replace(rooms, triangle_material=material, materials=materials)
+    found = replaced(patched, replace(OPTIONS, apo=("statue_01",)), Serial())
+    assert found.scene is patched
+    assert "statue_01 stays as modelled: it cannot have fewer triangles" in found.notes
+
+
 def test_objects_of_one_name_are_two(rooms: Scene) -> None:
     names = tuple("statue" if name in STATUES else name for name in rooms.objects)
     found = replaced(replace(rooms, objects=names), replace(OPTIONS, apo=("statue",)), Serial())
