@@ -23,6 +23,8 @@ from tests.apo.test_making import source_normals
 
 OPTIONS = ReplaceOptions(apo=("statue_*",), apo_faces=600, apo_error=0.1, apo_depth=8)
 SUBDIVISIONS = 4
+#: Half of an edge of a statue as modelled, metres; that of a simplified one is three times as long.
+NARROW = 0.025
 
 
 @pytest.fixture(scope="module")
@@ -137,11 +139,11 @@ def test_borders_of_sides_and_of_colours_stay(rooms: Scene) -> None:
     assert scene.colors is not None
     own = of_object(scene, "statue_02")
     assert len(own) < 1200
-    middle = scene.corners[own].mean(axis=1)
+    corner = scene.corners[own]
     red = (scene.colors[own] == [255, 0, 0]).all(axis=(1, 2))
-    for along, said in ((middle[:, 0] - x, red), (middle[:, 1] - y, scene.two_sided[own])):
-        apart = np.abs(along) > 0.06
-        assert np.array_equal(said[apart], along[apart] > 0)
+    for along, said in ((corner[..., 0] - x, red), (corner[..., 1] - y, scene.two_sided[own])):
+        assert along[said].min() > -NARROW
+        assert along[~said].max() < NARROW
     rest = scene.triangle_object != scene.objects.index("statue_02")
     assert (scene.colors[rest] == 255).all()
 
