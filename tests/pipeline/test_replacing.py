@@ -18,7 +18,7 @@ from ptmtools.database.names import HINTS
 from ptmtools.errors import DatabaseError
 from ptmtools.pipeline import Artifacts, build_scene, database_status, plan_build, validate
 from ptmtools.pipeline.replacing import octree_files
-from ptmtools.pipeline.stages import ACH, APO, CELLS, SCENE, STAGES
+from ptmtools.pipeline.stages import ACH, APO, CELLS, EMIT, SCENE, STAGES
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import OCTREE_LIST, arrays_of, sha256
@@ -86,6 +86,9 @@ def test_later_stages_see_the_simplified_meshes(made: Path) -> None:
     cells, ach = artifacts[CELLS], artifacts[ACH]
     assert cells.triangle_source.max() < len(shown.triangles)
     assert np.allclose(np.add.reduceat(ach.value, ach.start[:-1]), 1)
+    for stage in (CELLS, ACH, EMIT):
+        inputs = DatabaseFolder.open(db).record(stage.name).inputs
+        assert {arrays_of(SCENE.name), arrays_of(APO.name)} <= inputs.keys(), stage.name
     rows = index_of(db)["octrees"]
     assert [row["object"] for row in rows] == ["statue_01", "statue_02"]
     for row in rows:
