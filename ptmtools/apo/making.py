@@ -18,7 +18,7 @@ from ptmtools.apo.cube import cube_around
 from ptmtools.apo.model import ApoOptions, Octree
 from ptmtools.apo.normals import corner_normals
 from ptmtools.apo.octree import Bounds
-from ptmtools.apo.painting import paint_of
+from ptmtools.apo.painting import Paint, paint_of
 from ptmtools.apo.sampling import areas
 from ptmtools.apo.texels import octree_of
 from ptmtools.arrays import Floats, Ints, Singles
@@ -88,13 +88,41 @@ def make_apo(
     simplified = simplify(
         Mesh(points, triangles), SimplifyOptions(options.faces, method=options.method), progress
     )
-    mesh = smooth(simplified.mesh)
+    mesh = smooth(simplified.mesh.points, simplified.mesh.triangles)
+    paint = paint_of(scene, kept) if options.color else None
+    octree, missed = octree_around(mesh, points, triangles, options, paint, executor, progress)
+    return Made(
+        mesh,
+        octree,
+        len(triangles),
+        simplified.error,
+        missed,
+        options,
+        scene.space,
+        (*simplified.notes, *([_TWICE] if len(kept) < len(scene.triangles) else [])),
+    )
+
+
+def octree_around(
+    mesh: Simple,
+    points: Floats,
+    triangles: NDArray[np.int32],
+    options: ApoOptions,
+    paint: Paint | None,
+    executor: Executor,
+    progress: Progress = silent,
+) -> tuple[Octree, float]:
+    """The octree of the normals of (T, 3) triangles between (P, 3) points, each of which is there
+    once, around what was made of them; and the share of its samples that no ray found them from.
+
+    Raises LimitError PTM-L840: it has too many texels.
+    """
     cube = cube_around(np.concatenate([points, mesh.points]))
     source = Source(
         cube.inside(points).astype(np.float32),
         triangles,
         corner_normals(points, triangles).astype(np.float32),
-        paint_of(scene, kept) if options.color else None,
+        paint,
     )
     corner = cube.inside(mesh.points)[mesh.triangles]
     surface = Surface(corner, mesh.normals[mesh.triangles].astype(np.float64)).cut_up(_LONGEST)
@@ -107,16 +135,7 @@ def make_apo(
         Bounds(options.error, options.color_error, options.depth),
     )
     levels, missed = build(work, executor, progress)
-    return Made(
-        mesh,
-        octree_of(levels, cube),
-        len(triangles),
-        simplified.error,
-        missed,
-        options,
-        scene.space,
-        (*simplified.notes, *([_TWICE] if len(kept) < len(scene.triangles) else [])),
-    )
+    return octree_of(levels, cube), missed
 
 
 def once(triangles: NDArray[np.int32]) -> tuple[NDArray[np.int32], Ints]:
@@ -127,13 +146,13 @@ def once(triangles: NDArray[np.int32]) -> tuple[NDArray[np.int32], Ints]:
     return triangles[kept], kept
 
 
-def smooth(mesh: Mesh) -> Simple:
+def smooth(points: Floats, triangles: NDArray[np.int32]) -> Simple:
     """A mesh with normals that are smooth at creases too: between rays that spread apart there a
     part of the source would be left out."""
-    corner = corner_normals(mesh.points, mesh.triangles, 180.0)
-    normals = np.zeros((len(mesh.points), 3), np.float32)
-    normals[mesh.triangles.ravel()] = corner.reshape(-1, 3)  # equal at all corners of a point
-    return Simple(mesh.points, mesh.triangles, normals)
+    corner = corner_normals(points, triangles, 180.0)
+    normals = np.zeros((len(points), 3), np.float32)
+    normals[triangles.ravel()] = corner.reshape(-1, 3)  # equal at all corners of a point
+    return Simple(points, triangles, normals)
 
 
 def welded(points: Floats, triangles: NDArray[np.int32]) -> tuple[Floats, NDArray[np.int32]]:

@@ -8,21 +8,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.apo.options import RANGES, check_range
 from ptmtools.arrays import Floats, Ints
-from ptmtools.errors import InputError
 
 #: Bits of the address of a child, and so the most texels.
 ADDRESS_BITS = 24
-#: The greatest depth: Morton codes of three times as many bits stay within 63.
-DEEPEST = 20
-#: Option, least, most.
-_RANGES = (
-    ("faces", 4, 10_000_000),
-    ("error", 0.0, 2.0),
-    ("depth", 1, DEEPEST),
-    ("density", 0.01, 1000.0),
-    ("color_error", 0.0, 2.0),
-)
 
 
 @dataclass(frozen=True)
@@ -51,14 +41,8 @@ class ApoOptions:
     color_error: float = 0.05
 
     def __post_init__(self) -> None:
-        for name, least, most in _RANGES:
-            value = getattr(self, name)
-            if not least <= value <= most:
-                raise InputError(
-                    "PTM-I840",
-                    f"--{name.replace('_', '-')} {value:g} is not possible",
-                    remedy=f"give {least:g} to {most:g}",
-                )
+        for name in RANGES:
+            check_range(name, getattr(self, name))
 
 
 @dataclass(frozen=True)
