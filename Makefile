@@ -157,6 +157,7 @@ docs-pictures: build/museum/.made
 	$(BIN)/ptm build-scene build/museum/museum.obj -o build/museum.db
 	$(BIN)/python benchmarks/docs_pictures.py build/museum.db
 	$(BIN)/python benchmarks/interlace_picture.py
+	$(BIN)/python benchmarks/apo_picture.py
 
 clean:
 	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
