@@ -1,4 +1,4 @@
-"""Draws docs/pictures/apo.jpg: a bust as modelled, simplified, and with the first levels of its octree.
+"""Draws docs/pictures/apo.jpg: a bust as modelled, simplified, and by levels of its octree.
 
 python benchmarks/apo_picture.py [-o docs/pictures/apo.jpg]
 """
