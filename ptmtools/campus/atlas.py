@@ -27,6 +27,8 @@ GAP = 2
 _TRIES, _FIRST = 8, 0.6
 #: An atlas with fewer texels to the metre than this share of those aimed at is mostly gaps.
 _WORTH = 0.4
+#: But where a chart is as long as this share of the side, as a street's is, its length decides.
+_LONG = 0.7
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ def unwrap(points: Floats, triangles: NDArray[np.integer[Any]]) -> Atlas:
     for side in LIGHT_SIZES:
         wanted = side * math.sqrt(_FIRST / area)
         atlas, density = _packed(xatlas, moved, triangles, side, wanted)
-        if density >= _WORTH * wanted:
+        if density >= _WORTH * wanted or _longest(atlas) >= _LONG * side:
             break
     got = max(atlas.width, atlas.height)
     _, index, uv = atlas.get_mesh(0)
@@ -86,6 +88,17 @@ def _packed(
             break
         density *= 0.97 * side / got
     return atlas, density
+
+
+def _longest(atlas: Any) -> float:
+    """The longest side of the box of a chart, texels."""
+    _, index, uv = atlas.get_mesh(0)
+    chart = components(index.astype(np.int64), len(uv))
+    low, high = np.full((len(uv), 2), np.inf), np.full((len(uv), 2), -np.inf)
+    np.minimum.at(low, chart, uv)
+    np.maximum.at(high, chart, uv)
+    size = np.array([atlas.width, atlas.height])
+    return float(((high - low)[np.unique(chart)] * size).max())
 
 
 @kernel

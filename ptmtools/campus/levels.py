@@ -1,7 +1,9 @@
 """The levels of detail of an object's geometry.
 
 The finest mesh is the model's own; each coarser one has a share of the faces of the next finer, but
-never fewer than a floor. All are simplified from the model's own, so that errors do not add up.
+never fewer than a floor, and no error beyond a bound: of a building few vertices can go for
+nothing, and the share alone takes corners off it. All are simplified from the model's own, so that
+errors do not add up.
 """
 
 from __future__ import annotations
@@ -43,15 +45,17 @@ def level_faces(faces: int, lods: int, ratio: float, least: int) -> list[int]:
     return [min(faces, max(least, round(some))) for some in wanted]
 
 
-def levels(mesh: Mesh, lods: int, ratio: float, least: int) -> list[Level]:
-    """The meshes of an object, from the coarsest to the finest."""
+def levels(mesh: Mesh, lods: int, ratio: float, least: int, error: float) -> list[Level]:
+    """The meshes of an object, from the coarsest to the finest; ``error`` is a share of the
+    diagonal of its box."""
+    bound = error * float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
     whole = len(mesh.triangles)
     found = []
     for faces in level_faces(whole, lods, ratio, least):
         if faces == whole:
             found.append(_level(mesh, np.arange(whole, dtype=np.int32), 0.0))
             continue
-        less = simplify(mesh, SimplifyOptions(faces=faces))
+        less = simplify(mesh, SimplifyOptions(faces=faces, error=bound))
         found.append(_level(less.mesh, less.source, less.error))
     return found
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles
-from ptmtools.campus.occlusion import Surroundings, light, lighter_side, normals
+from ptmtools.campus.occlusion import Surroundings, light, lighter_side, normals, outermost
 
 #: (n,) faces, (n, 3) points on them, (n,) shares of a circle by which points differ → (n,) linear
 #: light from 0 to 1.
@@ -19,21 +19,34 @@ Look = Callable[[Ints, Floats, Floats], Singles]
 
 @dataclass(frozen=True)
 class Rays:
-    """The light of (T, 3, 3) faces by rays along (T, 3) unit normals; see `light`."""
+    """The light of (T, 3, 3) faces by rays along (T, 3) unit normals; see `light`.
+
+    Faces that are up to ``error`` metres off the surface that they stand for have its light.
+    """
 
     around: Surroundings
     normal: Floats
     samples: int
     reach: float
+    error: float = 0.0
 
     @staticmethod
-    def of(around: Surroundings, corner: Floats, both: Bools, samples: int, reach: float) -> Rays:
+    def of(
+        around: Surroundings,
+        corner: Floats,
+        both: Bools,
+        samples: int,
+        reach: float,
+        error: float = 0.0,
+    ) -> Rays:
         """Of faces of which some have ``both`` sides: on these the lighter one counts."""
-        normal = lighter_side(around, corner, normals(corner), both, reach)
-        return Rays(around, normal, samples, reach)
+        normal = lighter_side(around, corner, normals(corner), both, reach, error)
+        return Rays(around, normal, samples, reach, error)
 
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
-        return light(self.around, point, self.normal[face], turn, self.samples, self.reach)
+        normal = self.normal[face]
+        place = outermost(self.around, point, normal, self.error)
+        return light(self.around, place, normal, turn, self.samples, self.reach)
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,9 @@ from ptmtools.campus.viewpoints import viewpoint
 from ptmtools.scene.colors import encoded, to_linear
 from ptmtools.simplification import Mesh
 
+#: A coarse face may lie so many times the error of its mesh, which is a mean, beneath the surface.
+_BENEATH = 2.0
+
 
 @dataclass(frozen=True)
 class Work:
@@ -87,7 +90,7 @@ def make_object(work: Work, task: tuple[str, Part]) -> ObjectMade:
         work.uv[faces],
         None if work.colors is None else work.colors[faces],
     )
-    lods = levels(mesh, options.lods, options.ratio, options.faces)
+    lods = levels(mesh, options.lods, options.ratio, options.faces, options.error)
     finest = lods[-1]
     lit = options.lightmaps != "none"
     place, lightmaps, notes = None, [], []
@@ -150,7 +153,8 @@ def _look(work: Work, faces: Ints, finest: Level, level: Level) -> Look:
             finest.corner, painted.uv[faces], painted.image[faces], painted.images, level.source
         )
     both, options = work.two_sided[faces][level.source], work.options
-    return Rays.of(work.around, level.corner, both, options.samples, options.reach)
+    rays = options.samples, options.reach
+    return Rays.of(work.around, level.corner, both, *rays, _BENEATH * level.error)
 
 
 def _light_source(work: Work, faces: Ints) -> tuple[int, int]:

@@ -104,6 +104,22 @@ class Surroundings:
         return float(point[1] - hit[0]) if hit[0] < limit[0] else None
 
 
+def outermost(around: Surroundings, point: Floats, normal: Floats, within: float) -> Floats:
+    """(n, 3) points moved to the outermost surface that is nearer than ``within`` metres along
+    their normals, before or behind; those where there is none stay.
+
+    The faces of a coarse mesh lie beneath the model's own, which would shade them.
+    """
+    if around.tree is None or within <= around.lift:
+        return point
+    start = (point + within * normal - around.middle).astype(np.float32)
+    limit = np.full(len(point), 2 * within, np.float32)
+    back = (-normal).astype(np.float32)
+    far = around.tree.run(start, back, dists=limit.copy(), query="DISTANCE")
+    moved = np.where(far < limit, within - far.astype(np.float64), 0.0)
+    return np.asarray(point + moved[:, None] * normal)
+
+
 def light(
     around: Surroundings,
     point: Floats,
@@ -133,19 +149,26 @@ def light(
 
 
 def lighter_side(
-    around: Surroundings, corner: Floats, normal: Floats, both: Bools, reach: float
+    around: Surroundings,
+    corner: Floats,
+    normal: Floats,
+    both: Bools,
+    reach: float,
+    error: float = 0.0,
 ) -> Floats:
     """(T, 3) the normals, turned round where a face that has ``both`` sides is lighter behind; the
     front counts where they are alike.
 
-    ``corner`` is (T, 3, 3), ``both`` (T,).
+    ``corner`` is (T, 3, 3), ``both`` (T,); ``error`` is that of `outermost`.
     """
     which = np.flatnonzero(both)
     if not len(which):
         return normal
     middle, turn = corner[which].mean(axis=1), np.zeros(len(which))
-    front = light(around, middle, normal[which], turn, _SIDE_RAYS, reach)
-    back = light(around, middle, -normal[which], turn, _SIDE_RAYS, reach)
+    front, back = (
+        light(around, outermost(around, middle, way, error), way, turn, _SIDE_RAYS, reach)
+        for way in (normal[which], -normal[which])
+    )
     turned = normal.copy()
     turned[which[back > front]] *= -1
     return turned

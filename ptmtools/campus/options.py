@@ -20,6 +20,8 @@ class CampusOptions:
     lods: meshes of each object, from the coarsest to the finest. The finest is the model's own.
     ratio: faces of a mesh, as a share of those of the next finer one.
     faces: no mesh is simplified to fewer faces than this.
+    error: the greatest error of a step of a simplification, as a share of the diagonal of the
+        object's box; more faces are left where it would be exceeded.
     small: objects smaller than this, the diagonal of their box in metres, are joined with their
         small neighbours; 0 joins none.
     lightmaps: where they come from: bake computes how much of the sky each point sees, model takes
@@ -33,6 +35,7 @@ class CampusOptions:
     lods: int = 2
     ratio: float = 0.1
     faces: int = 100
+    error: float = 0.01
     small: float = 10.0
     lightmaps: Literal["bake", "model", "none"] = "bake"
     samples: int = 64
@@ -44,6 +47,7 @@ class CampusOptions:
             ("lods", 1 <= self.lods <= MAX_LODS, f"1 to {MAX_LODS}"),
             ("ratio", 0 < self.ratio <= 1, "more than 0 and at most 1"),
             ("faces", self.faces >= 1, "1 or more"),
+            ("error", self.error >= 0, "0 or more"),
             ("small", 0 <= self.small < float("inf"), "0 or more"),
             ("lightmaps", self.lightmaps in ("bake", "model", "none"), "bake, model or none"),
             ("samples", 1 <= self.samples <= MAX_SAMPLES, f"1 to {MAX_SAMPLES}"),

@@ -66,6 +66,7 @@ BAD: list[tuple[str, Callable[[Path], list[str]]]] = [
     ("PTM-I830", text("t.obj", TRIANGLE, "--ratio", "0")),
     ("PTM-I830", text("t.obj", TRIANGLE, "--ratio", "nan")),
     ("PTM-I830", text("t.obj", TRIANGLE, "--faces", "0")),
+    ("PTM-I830", text("t.obj", TRIANGLE, "--error", "-1")),
     ("PTM-I830", text("t.obj", TRIANGLE, "--small", "-1")),
     ("PTM-I830", text("t.obj", TRIANGLE, "--samples", "0")),
     ("PTM-I830", text("t.obj", TRIANGLE, "--samples", "999999")),

@@ -85,6 +85,18 @@ def test_the_lighter_side_counts() -> None:
     assert one(face, point, np.zeros(1))[0] < 0.2
 
 
+def test_a_coarse_face_beneath_the_surface_has_its_light() -> None:
+    """The faces of a coarse dome lie within the dome."""
+    sheet = quad((-1, -0.2, -1), (-1, -0.2, 1), (1, -0.2, 1), (1, -0.2, -1))
+    assert (normals(sheet)[:, 1] > 0).all()
+    where = around(FLOOR)
+    face, point = np.array([0]), sheet[0].mean(axis=0)[None]
+    none = np.zeros(2, bool)
+    assert Rays.of(where, sheet, none, 64, 20.0)(face, point, np.zeros(1))[0] < 0.2
+    assert Rays.of(where, sheet, none, 64, 20.0, 0.3)(face, point, np.zeros(1))[0] == 1.0
+    assert Rays.of(where, sheet, ~none, 64, 20.0, 0.3).normal[0, 1] == 1.0
+
+
 def test_directions_are_in_proportion_to_the_cosine() -> None:
     fan = hemisphere(1024).astype(float)
     assert np.allclose(np.linalg.norm(fan, axis=1), 1, atol=1e-6)

@@ -154,7 +154,7 @@ def facade(steps: int) -> Mesh:
 
 def test_a_facade_keeps_its_texture_through_the_levels() -> None:
     whole = facade(16)
-    found = levels(whole, 3, 0.25, 4)
+    found = levels(whole, 3, 0.25, 4, 0.01)
     assert [len(level.corner) for level in found] == sorted(len(v.corner) for v in found)
     assert len(found[0].corner) < 0.2 * len(whole.triangles)
     for level in found:

@@ -28,7 +28,7 @@ def test_it_says_what_it_said() -> None:
     (gate,) = campus.objects
     assert (gate.name, gate.label, gate.lightmap) == ("Garden_gate", "Garden gate", "Garden_gate")
     assert gate.box == (-4, 0, -3, 4, 3, 3)
-    assert [mesh.faces for mesh in gate.meshes] == [4, 10]
+    assert [mesh.faces for mesh in gate.meshes] == [5, 10]
     assert [m.name for m in campus.materials] == ["fence", "floor"]
     assert [shader((*m.channels, "l")) for m in campus.materials] == [
         "diffuse+lightmap+alpha",
