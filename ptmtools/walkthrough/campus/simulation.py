@@ -37,7 +37,7 @@ class CampusRun:
     quality, conditions, budget: what was run; the budget is bytes of graphics memory, or None.
     time: (F,) s.
     error: (F,) e, the mean over the pixels of the root mean square over R, G and B, 0 to 255; NaN
-        without tables.
+        in frames without tables.
     memory: (F,) bytes of graphics memory in use. fetched: (F,) bytes of bodies received so far.
     lacking: (F,) how many of the objects that are wanted in high detail are not shown so; all of
         them before the client has the index.
@@ -70,6 +70,12 @@ class CampusRun:
     overhead: float
     requests: int
     sorts: int
+
+    @property
+    def e(self) -> float:
+        """Mean of the errors; NaN without tables."""
+        known = self.error[np.isfinite(self.error)]
+        return float(known.mean()) if len(known) else float("nan")
 
     @property
     def late(self) -> float:
@@ -134,9 +140,9 @@ def simulate_campus(
         memory[f] = client.memory
         fetched[f] = link.bytes + sum(r.received for r in client.waiting)
         lacking[f] = waits.lacking if client.order.size else max(options.nearest, 1)
-        if world.tables is not None:
-            mesh, column = columns.of(client)
-            error[f] = world.tables.wrong(int(world.view[f]), mesh, column)
+        view = int(world.view[f])
+        if world.tables is not None and view >= 0:
+            error[f] = world.tables.wrong(view, *columns.of(client))
     idle = [[*span, float(world.time[-1])][:2] for span in client.idle]
     low = np.unique([f for files in client.low for f in files]).astype(np.int64)
     return CampusRun(

@@ -29,7 +29,8 @@ class CampusWorld:
     Attributes
     ----------
     stock: what can be fetched.
-    tables: of the errors, None if nobody asks for them. view: (F,) which of them each frame has.
+    tables: of the errors, None if nobody asks for them. view: (F,) which of them each frame has, -1
+        for none.
     time: (F,) s. eye: (F, 3) metres.
     rate: frames a second.
     """
@@ -54,7 +55,7 @@ def prepare_campus(
     *,
     rate: float = RATE,
     pixels: tuple[int, int] = PIXELS,
-    pictures: bool = True,
+    every: int = 1,
     progress: Progress = silent,
 ) -> CampusWorld:
     """The world of a walk through a campus.
@@ -65,7 +66,7 @@ def prepare_campus(
         it is None, that is the campus with all finest meshes and largest textures: what
         compression and a lesser size did to the images is then no error.
     rate: frames a second. pixels: of the pictures, across and down.
-    pictures: whether errors are tabulated at all, which takes most of the time.
+    every: errors are tabulated of every so-manieth frame, which takes most of the time; 0: of none.
 
     Raises
     ------
@@ -83,17 +84,17 @@ def prepare_campus(
     stock = read_stock(folder)
     time = np.arange(int(np.floor(walk.duration * rate + 1e-9)) + 1) / rate
     eye, direction = walk.at(time)
-    pose = np.concatenate([eye, direction], axis=1)
-    seen, view = np.unique(pose, axis=0, return_inverse=True)
-    tables = None
-    if pictures:
+    view, tables = np.full(len(time), -1, np.int64), None
+    if every:
+        pose = np.concatenate([eye, direction], axis=1)[::every]
+        seen, found = np.unique(pose, axis=0, return_inverse=True)
+        view[::every] = found.reshape(-1)
         finest, coarsest = (read_surfaces(folder, stock, level) for level in (-1, 0))
         small, middle, large = (read_textures(folder, stock, size) for size in SIZES)
-        if served is None:
-            full = Full(finest, large)
-        else:
+        full = Full(finest, large)
+        if served is not None:
             full = Full(served.surfaces, read_pyramids(served, progress))
         camera = Camera(*pixels, walk.field_of_view, walk.aspect)
         sizes = small, middle, large
         tables = look(full, finest, coarsest, sizes, camera, seen[:, :3], seen[:, 3:], progress)
-    return CampusWorld(stock, tables, view.reshape(-1).astype(np.int64), time, eye, rate)
+    return CampusWorld(stock, tables, view, time, eye, rate)
