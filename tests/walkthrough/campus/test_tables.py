@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -23,8 +24,8 @@ from ptmtools.walkthrough.campus import (
     read_stock,
     walk_campus,
 )
-from ptmtools.walkthrough.campus.surfaces import mip_levels
-from ptmtools.walkthrough.campus.tables import COARSE, FINE, NOTHING, Tables
+from ptmtools.walkthrough.campus.surfaces import mip_levels, read_surfaces, read_textures
+from ptmtools.walkthrough.campus.tables import COARSE, FINE, NOTHING, Full, Tables, look
 from ptmtools.walkthrough.view.rays import Camera
 from ptmtools.walkthrough.walk import Walk
 
@@ -190,6 +191,52 @@ def test_nothing_is_wrong_with_all_of_it_and_something_with_less(world: CampusWo
     assert 0.1 < e(FINE, 2) < e(FINE, 1) < e(FINE, 0)
     assert e(COARSE, 3) > 0.1
     assert e(NOTHING, 3) == e(NOTHING, 0) >= e(FINE, 0) > 10
+
+
+def test_another_full_picture(folder: Path, world: CampusWorld) -> None:
+    stock = read_stock(folder)
+    finest, coarsest = (read_surfaces(folder, stock, level) for level in (-1, 0))
+    small, middle, large = (read_textures(folder, stock, size) for size in SIZES)
+    sizes = small, middle, large
+    poses, own = (CAMERA, EYES, LOOKS), tables(world)
+    same = look(Full(replace(finest), large), finest, coarsest, sizes, *poses)
+    mesh, column = np.full(stock.objects, COARSE), np.full(len(stock.bases), 2)
+    for frame in range(4):
+        found = same.wrong(frame, mesh, column)
+        assert found == own.wrong(int(world.view[frame]), mesh, column)
+    # What the campus does not have at all is wrong in every run.
+    nothing = read_surfaces(folder, replace(stock, campus=replace(stock.campus, objects=())), 0)
+    empty = look(Full(finest, large), nothing, nothing, sizes, *poses)
+    none = np.zeros(0, np.int64)
+    picture = Picture(folder, -1)
+    for frame in range(4):
+        axes = CAMERA.rays(LOOKS[frame][None])[1][0]
+        shown = np.array([
+            picture.color(face, 512, EYES[frame], ray, axes)
+            for face, ray in zip(picture.hits(frame), rays_of(frame), strict=True)
+        ])  # fmt: skip
+        expected = np.sqrt((shown**2).mean(axis=1)).mean()
+        assert empty.wrong(frame, none, column) == pytest.approx(expected, rel=1e-4)
+
+
+def test_what_files_weigh(folder: Path) -> None:
+    stock = read_stock(folder)
+    for number, each in enumerate(stock.campus.objects):
+        for file, mesh in zip(stock.meshes(number), each.meshes, strict=True):
+            parts = read_mesh((folder / mesh.file).read_bytes())
+            bytes_ = sum(
+                12 * len(p.point)
+                + (0 if p.uv is None else 8 * len(p.uv))
+                + (0 if p.color is None else 8 * len(p.color))
+                + 2 * p.triangle.size
+                for p in parts
+            )
+            assert stock.memory[file] == bytes_ < stock.most[file] == mesh.bytes
+            assert stock.sent[file] < stock.stored[file] == mesh.bytes
+    texture = stock.names.index("textures/wall_256_d.jpg")
+    assert stock.memory[texture] == 4 * (4**9 - 1) // 3
+    assert stock.sent[texture] == stock.stored[texture]
+    assert stock.memory[0] == 0
 
 
 def test_a_walk_with_every_preset(folder: Path) -> None:
