@@ -39,6 +39,7 @@ COMMANDS = {
     "encode": ("images", "encode", "Encode images as .ptm files."),
     "decode": ("images", "decode", "Decode .ptm files to images."),
     "campus": ("campus", "campus", "Write a model as objects with levels of detail."),
+    "walk-campus": ("walk_campus", "walk_campus", "Walk through a campus as clients would see it."),
     "warm-up": ("warm_up", "warm_up", "Compile for this machine, before the first run."),
     "compare": ("comparing", "compare", "Compare .ptm with other image formats: size and speed."),
 }

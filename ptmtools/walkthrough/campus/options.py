@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from ptmtools.campus.model import PRESETS, Quality
 from ptmtools.errors import InputError
@@ -16,8 +17,23 @@ NEAREST = 8
 THREADS = 4
 #: Metres of the viewpoint after which objects are sorted again; the paper does not say (notes).
 MOVE = 2.0
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A preset, and what is said of it where it is chosen."""
+
+    quality: Quality
+
+    @property
+    def about(self) -> str:
+        """Sides of textures and lightmaps."""
+        cached = ", all of it in the browser's cache" if self.quality.cached else ""
+        return f"{self.quality.diffuse} and {self.quality.light}{cached}"
+
+
 #: Presets by how an option names them.
-QUALITIES = {quality.name.lower().replace(" ", "-"): quality for quality in PRESETS}
+QUALITIES = {quality.name.lower().replace(" ", "-"): Choice(quality) for quality in PRESETS}
 
 
 @dataclass(frozen=True)
@@ -26,7 +42,7 @@ class CampusWalkOptions:
 
     Attributes
     ----------
-    preset: qualities of the paper's table 2, with commas in between.
+    preset: sides of textures and of lightmaps, texels, with commas in between
     bandwidth: of the link, bit/s, such as 512k, 4M (powers of ten) or inf.
     latency: from a request to the first byte of its response, such as 100ms or 0.1.
     overhead: bytes of headers a request.
@@ -49,7 +65,7 @@ class CampusWalkOptions:
     bandwidth: str = "4M"
     latency: str = "100ms"
     overhead: int = 300
-    protocol: str = "h1"
+    protocol: Literal["h1", "h2"] = "h1"
     memory: str = "inf"
     nearest: int = NEAREST
     threads: int = THREADS
@@ -77,7 +93,7 @@ class CampusWalkOptions:
     @property
     def qualities(self) -> list[Quality]:
         """In the order given, each once."""
-        return [QUALITIES[name] for name in self._presets()]
+        return [QUALITIES[name].quality for name in self._presets()]
 
     @property
     def budget(self) -> int | None:

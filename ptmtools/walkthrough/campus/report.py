@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +45,38 @@ def received(runs: Sequence[CampusRun], every: float = EVERY) -> list[str]:
         lines.append(_row(f"{instant:.0f}", cells))
         before = now
     return lines
+
+
+def document(campus: str, runs: Sequence[CampusRun]) -> dict[str, Any]:
+    """All runs as JSON has them; seconds and bytes."""
+    return {
+        "campus": campus,
+        "seconds": float(runs[0].time[-1]),
+        "runs": [
+            {
+                "preset": run.quality.name,
+                "bandwidth": run.conditions.bandwidth,
+                "begun": run.begun,
+                "memory": {"start": run.floor, "most": int(run.memory.max())},
+                "bytes": round(run.body),
+                "overheadBytes": round(run.overhead),
+                "requests": run.requests,
+                "idle": run.idle_share,
+                "pauses": run.pauses,
+                "late": run.late,
+                "delay": _known(run.delay),
+                "shown": len(run.delays),
+                "never": run.never,
+                "reused": run.reused,
+                "e": _known(run.e),
+            }
+            for run in runs
+        ],
+    }
+
+
+def _known(value: float) -> float | None:
+    return None if np.isnan(value) else value
 
 
 def _head(first: str, runs: Sequence[CampusRun]) -> list[str]:

@@ -66,7 +66,8 @@ def prepare_campus(
         it is None, that is the campus with all finest meshes and largest textures: what
         compression and a lesser size did to the images is then no error.
     rate: frames a second. pixels: of the pictures, across and down.
-    every: errors are tabulated of every so-manieth frame, which takes most of the time; 0: of none.
+    every: errors are tabulated of each frame whose number it divides, which takes most of the time;
+        0: of none.
 
     Raises
     ------
