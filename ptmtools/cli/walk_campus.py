@@ -37,6 +37,12 @@ from ptmtools.walkthrough.campus.options import CampusWalkOptions
     help="Measure the picture of every Nth frame, of five a second; 0: of none.",
 )
 @click.option(
+    "--only",
+    default="*",
+    metavar="NAMES",
+    help="Objects, with * and ?, as if there were no others.",
+)
+@click.option(
     "--trace",
     "trace_file",
     type=click.Path(),
@@ -51,6 +57,7 @@ def walk_campus(
     walk_file: str,
     db: str | None,
     every: int,
+    only: str,
     trace_file: str | None,
     as_json: bool,
     **values: Any,
@@ -72,7 +79,7 @@ def walk_campus(
     trace = read_trace(trace_file) if trace_file else None
     served = read_served(db) if db else None
     with voice.progress() as progress:
-        world = prepare_campus(campus, walk, served, every=every, progress=progress)
+        world = prepare_campus(campus, walk, served, every=every, only=only, progress=progress)
     runs = [simulate_campus(world, quality, options, trace) for quality in options.qualities]
     if as_json:
         voice.emit_json(document(campus, runs))

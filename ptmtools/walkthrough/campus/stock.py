@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import os
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
 
@@ -98,16 +99,22 @@ class Stock:
         return {name: number for number, name in enumerate(self.names)}
 
 
-def read_stock(folder: str | os.PathLike[str]) -> Stock:
-    """What can be fetched of a campus.
+def read_stock(folder: str | os.PathLike[str], only: str = "*") -> Stock:
+    """What can be fetched of a campus, of which no other objects exist than those whose names are
+    as ``only`` says, with * and ?.
 
     Raises
     ------
-    InputError: PTM-I714 a file is missing, or not that of the index; PTM-I832, I833 the index is.
+    InputError: PTM-I714 a file is missing, or not that of the index, or no object has such a name;
+        PTM-I832, I833 the index cannot be read, or is damaged.
     LimitError: PTM-L831 the index is too long.
     """
     folder = Path(folder)
     campus = read_campus(folder)
+    kept = tuple(each for each in campus.objects if fnmatchcase(each.name, only))
+    if not kept:
+        raise refused(folder / INDEX, f"has no object {only}", "give names that it has")
+    campus = replace(campus, objects=kept)
     index = _bytes(folder, INDEX)
     rows = [(on_link(index), len(index), 0, 0)]
     sizes = {texture.file: texture.size for texture in campus.textures}
@@ -193,5 +200,6 @@ def _require_textures(folder: Path, stock: Stock) -> None:
             raise refused(folder / INDEX, f"does not list {fault.args[0]}") from None
 
 
-def refused(file: Path, what: str) -> InputError:
-    return InputError("PTM-I714", what, file=file, remedy=_AGAIN)
+def refused(file: Path, what: str, remedy: str = _AGAIN) -> InputError:
+    """PTM-I714."""
+    return InputError("PTM-I714", what, file=file, remedy=remedy)

@@ -56,6 +56,7 @@ def prepare_campus(
     rate: float = RATE,
     pixels: tuple[int, int] = PIXELS,
     every: int = 1,
+    only: str = "*",
     progress: Progress = silent,
 ) -> CampusWorld:
     """The world of a walk through a campus.
@@ -68,10 +69,11 @@ def prepare_campus(
     rate: frames a second. pixels: of the pictures, across and down.
     every: errors are tabulated of each frame whose number it divides, which takes most of the time;
         0: of none.
+    only: names of the objects that there are, with * and ?.
 
     Raises
     ------
-    InputError: PTM-I714, I832, I833 the campus is incomplete or damaged.
+    InputError: PTM-I714, I832, I833 the campus is incomplete or damaged, or has no such object.
     LimitError: PTM-L700 the walk is too long; PTM-L831 the index is.
     DatabaseError, LimitError: those of `read_pyramids`.
     """
@@ -82,7 +84,7 @@ def prepare_campus(
             remedy="give a shorter one",
         )
     folder = Path(folder)
-    stock = read_stock(folder)
+    stock = read_stock(folder, only)
     time = np.arange(int(np.floor(walk.duration * rate + 1e-9)) + 1) / rate
     eye, direction = walk.at(time)
     view, tables = np.full(len(time), -1, np.int64), None

@@ -29,6 +29,11 @@ def test_all_presets(folder: Path, walk: str, capsys: pytest.CaptureFixture[str]
     assert [line.split(" | ")[0] for line in said[-2:]] == ["| 30", "| 40"]
 
 
+def test_some_objects(folder: Path, walk: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["walk-campus", str(folder), "--walk", walk, "--only", "H*", "--every", "0"]) == 0
+    assert capsys.readouterr().out.startswith("40 m in 40 s, 2 objects, ")
+
+
 def test_options_and_json(folder: Path, walk: str, capsys: pytest.CaptureFixture[str]) -> None:
     asked = ["--preset", "low,ultra-cached", "--bandwidth", "512k", "--nearest", "1", "--memory",
              "1MiB", "--threads", "2", "--no-lightmaps", "--every", "0", "--json"]  # fmt: skip
@@ -46,6 +51,7 @@ def test_options_and_json(folder: Path, walk: str, capsys: pytest.CaptureFixture
     [
         (["--memory", "10%"], "PTM-I713"),
         (["--bandwidth", "fast"], "PTM-I712"),
+        (["--only", "Castle"], "PTM-I714"),
         (["--protocol", "h3"], ""),
         (["--preset", "best"], ""),
     ],
