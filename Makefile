@@ -137,6 +137,9 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/ach.py sample_data/two_rooms/two_rooms.obj --only presets speed
 	$(BIN)/python benchmarks/emission.py
 	$(BIN)/python benchmarks/formats.py
+	$(BIN)/python benchmarks/simplification.py --faces 100000
+	$(BIN)/python benchmarks/apo.py --triangles 50000
+	$(BIN)/python benchmarks/interlace.py --quick
 	@[ ! -f build/museum/museum.obj ] || { set -x; $(BIN)/python benchmarks/rounded.py; { set +x; } 2>/dev/null; }
 	$(BIN)/python -m benchmarks.fuzz --count 5000 --jobs $(JOBS)
 
@@ -153,6 +156,7 @@ docs-timings: build/museum/.made $(VENV)/.installed-dev
 docs-pictures: build/museum/.made
 	$(BIN)/ptm build-scene build/museum/museum.obj -o build/museum.db
 	$(BIN)/python benchmarks/docs_pictures.py build/museum.db
+	$(BIN)/python benchmarks/interlace_picture.py
 
 clean:
 	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -108,8 +108,7 @@ def main() -> None:
     given = parser.parse_args()
     artifacts = Artifacts(open_database(given.database))
     made = path_through(artifacts, PathOptions())
-    world = prepare(read_served(given.database), made.walk, pixels=PIXELS)
-    world = replace(world, catalogue=world.catalogue.counted_by_paper(world.served))
+    world = prepare(read_served(given.database), made.walk, pixels=PIXELS).counted_by_paper()
     stock = world.catalogue
     shown = sum(len(stock.in_sight[cell]) for cell in world.cell.tolist()) / world.frames
     print(

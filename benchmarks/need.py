@@ -20,7 +20,7 @@ from ptmtools.coverage.need import Need, TextureSize, compute_need
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.emission import texture_records
 from ptmtools.pipeline.run import Artifacts
-from ptmtools.pipeline.stages import CELLS, PVS, SCENE
+from ptmtools.pipeline.stages import APO, CELLS, PVS
 
 POINTS = (16, 64, 256, 1024)
 
@@ -35,7 +35,7 @@ def main() -> None:
 
 def _row(database: Path) -> list[str]:
     artifacts = Artifacts(open_database(database))
-    given = artifacts[SCENE], artifacts[CELLS], artifacts[PVS]
+    given = artifacts[APO], artifacts[CELLS], artifacts[PVS]
     records = texture_records(artifacts)
     sizes = {r.image: TextureSize(r.width, r.height, len(r.levels)) for r in records}
     seconds, found = [], []

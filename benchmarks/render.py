@@ -181,10 +181,10 @@ def load(path: Path) -> Scene:
     """The scene of a model file, or of a database."""
     if path.is_dir():
         from ptmtools.pipeline.run import Artifacts
-        from ptmtools.pipeline.stages import SCENE
+        from ptmtools.pipeline.stages import APO
         from ptmtools.store.folder import DatabaseFolder
 
-        return Artifacts(DatabaseFolder.open(path))[SCENE]
+        return Artifacts(DatabaseFolder.open(path))[APO]
     from ptmtools.scene import ingest
 
     return ingest(path)

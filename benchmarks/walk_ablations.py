@@ -27,7 +27,7 @@ from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.options import AchOptions
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
-from ptmtools.pipeline.stages import CELLS, PVS, SCENE
+from ptmtools.pipeline.stages import APO, CELLS, PVS
 from ptmtools.walkthrough.client import Client
 from ptmtools.walkthrough.network import Conditions, Link
 from ptmtools.walkthrough.path.options import PathOptions
@@ -217,7 +217,7 @@ def walked(worlds: Sequence[World], client: Callable[[World, Link, int], Client]
 
 def with_points(world: World, made: Artifacts, points: int) -> tuple[World, float]:
     """The world with coverage hints from so many sample points, and the seconds these took."""
-    scene, cells, pvs = made[SCENE], made[CELLS], made[PVS]
+    scene, cells, pvs = made[APO], made[CELLS], made[PVS]
     start = time.process_time()
     ach = compute_ach(scene, cells, pvs, AchOptions(samples=points, backend="embree"))
     seconds = time.process_time() - start

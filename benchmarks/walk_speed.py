@@ -23,6 +23,7 @@ from walk_scenes import database_of, make_scene, walk_file
 
 from ptmtools.quantities import parse_memory
 from ptmtools.walkthrough.comparing import budget_of
+from ptmtools.walkthrough.forms import PTM
 from ptmtools.walkthrough.network import Conditions
 from ptmtools.walkthrough.policies import POLICIES
 from ptmtools.walkthrough.served import read_served
@@ -30,6 +31,8 @@ from ptmtools.walkthrough.simulation import simulate
 from ptmtools.walkthrough.walk import Walk, read_walk
 from ptmtools.walkthrough.world import RATE, World, prepare
 
+#: The policies that take `.ptm`s.
+OURS = [name for name, policy in POLICIES.items() if policy.form == PTM]
 SECONDS, BANDWIDTH, MEMORY = 300, 512e3, "10%"
 #: The parts of a preparation, and the functions that do them.
 PARTS = {
@@ -44,12 +47,12 @@ def main() -> None:
     scenes = sys.argv[1:] or ["museum", "rooms"]
     print("| scene | frames | " + " | ".join([*PARTS, "rest", "preparation", "all told"]) + " |")
     print("|---" + "|--:" * (len(PARTS) + 4) + "|")
-    runs: dict[str, list[float]] = {name: [] for name in POLICIES}
+    runs: dict[str, list[float]] = {name: [] for name in OURS}
     for scene in scenes:
         make_scene(scene)
         walk = read_walk(walk_file(scene, 1, SECONDS))
         world = prepared(scene, walk, 1 / SECONDS)
-        for policy in POLICIES:
+        for policy in OURS:
             run(world, policy)
         profile, begin = Profile(time.process_time), time.process_time()
         world = profile.runcall(prepared, scene, walk, RATE)

@@ -30,11 +30,14 @@ from statistics import fmean, pstdev
 from walk_runs import Case, Row, made
 from walk_scenes import FOLDER, SCENES, WALKS, make_scenes
 
+from ptmtools.walkthrough.forms import PTM
 from ptmtools.walkthrough.measures import STANDS
 from ptmtools.walkthrough.policies import POLICIES
 
 BANDWIDTHS = ("56k", "512k", "4M", "16M")
 MEMORIES = ("4MiB", "10%", "30%")
+#: The policies that take `.ptm`s; those of other systems are in `neighbours`.
+OURS = [name for name, policy in POLICIES.items() if policy.form == PTM]
 #: e of the prototype in three scenes, at .5, 4 and 16 Mbit/s: where clients are alike.
 PROTOTYPE_SCENES, PROTOTYPE_LINKS = ("museum", "rooms", "hospital"), BANDWIDTHS[1:]
 PROTOTYPE = {
@@ -61,7 +64,7 @@ def main() -> None:
     )
     parser.add_argument("--scenes", default=",".join(SCENES))
     parser.add_argument("--walks", default=",".join(map(str, WALKS)))
-    parser.add_argument("--policy", default=",".join(POLICIES))
+    parser.add_argument("--policy", default=",".join(OURS))
     parser.add_argument("--bandwidth", default=",".join(BANDWIDTHS))
     parser.add_argument("--memory", default=",".join(MEMORIES))
     parser.add_argument("--jobs", type=int, default=2)

@@ -15,9 +15,11 @@ against somebody who may write in the folder and exchanges it at the same moment
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import errno
 import os
 import stat
+import sys
 from collections.abc import Callable, Iterator
 from io import BufferedReader
 from pathlib import Path
@@ -27,6 +29,8 @@ from ptmtools.errors import OutputError
 
 #: So many folders may lie in each other below a root.
 _DEEPEST = 64
+#: Of renameat2: relative to the working folder; exchange.
+_HERE, _EXCHANGE = -100, 2
 
 
 def write_bytes(path: str | os.PathLike[str], data: bytes, *, force: bool = False) -> None:
@@ -233,6 +237,15 @@ def _link(path: Path) -> OutputError:
         file=path,
         remedy="put a real folder or file in its place, or name another output",
     )
+
+
+def exchanged(one: Path, other: Path) -> bool:
+    """Whether two folders of one disk have changed names, at once: Linux can do that."""
+    call = getattr(ctypes.CDLL(None), "renameat2", None) if sys.platform == "linux" else None
+    if call is None:
+        return False
+    done: int = call(_HERE, os.fsencode(one), _HERE, os.fsencode(other), _EXCHANGE)
+    return done == 0
 
 
 def output_error(target: str | os.PathLike[str], error: OSError) -> OutputError:

@@ -93,6 +93,8 @@ class Findings:
         self._codes = codes
         self._issues: dict[tuple[str, str], list[Issue]] = {}
         self._more: Counter[tuple[str, str]] = Counter()
+        #: Of the codes found, which others may have.
+        self._severity: dict[str, Severity] = {}
 
     def add(self, code: str, file: str, place: str, message: str) -> None:
         """One issue; its severity is the code's."""
@@ -107,6 +109,7 @@ class Findings:
         """Issues that others found."""
         for issue in issues:
             key = (issue.file, issue.code)
+            self._severity[issue.code] = issue.severity
             kept = self._issues.setdefault(key, [])
             if len(kept) < self.MOST and issue.count == 1:
                 kept.append(issue)
@@ -118,7 +121,7 @@ class Findings:
         found = [issue for kept in self._issues.values() for issue in kept]
         for (file, code), more in self._more.items():
             message = f"{more} more of these"
-            found.append(Issue(code, self._codes[code][0], file, "", message, more))
+            found.append(Issue(code, self._severity[code], file, "", message, more))
         return worst_first(found)
 
 

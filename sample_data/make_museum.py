@@ -14,17 +14,15 @@ closed); pictures, statues and benches. The same seed gives the same bytes, what
 from __future__ import annotations
 
 import argparse
-import io
 import os
-import re
 import sys
-import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from museum_parts.files import HEAD, File, between, constant, png, write
 from museum_parts.furnishing import furnish, hang
 from museum_parts.mesh import Thing
 from museum_parts.noise import bytes_of
@@ -36,10 +34,7 @@ from museum_parts.surfaces import SURFACES
 from museum_parts.two_rooms import two_rooms
 from PIL import Image, ImageOps
 
-HEAD = "# ptmtools sample"
 Color = tuple[float, float, float]
-#: A path in the folder that is written, and a function that returns the bytes.
-File = tuple[str, Callable[[], bytes]]
 
 #: Material: its texture, the tint of the texture, the colour without it.
 MATERIALS: dict[str, tuple[str, Color, Color]] = {
@@ -90,21 +85,11 @@ def generator(seed: int, *stream: int) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64([seed, *stream]))
 
 
-def _constant(data: bytes) -> Callable[[], bytes]:
-    return lambda: data
-
-
 def surface_names(things: list[Thing], textures: int) -> list[str]:
     """At most a third of the textures covers walls and floors, the rest are paintings."""
     used = {MATERIALS[f.material][0] for t in things for f in t.faces if f.material in MATERIALS}
     used.add("gilt")  # frames, which are hung later
     return [name for name in SURFACES if name in used][: textures // 3]
-
-
-def png(image: Image.Image) -> bytes:
-    out = io.BytesIO()
-    image.save(out, "PNG", compress_level=3)  # 3 % more than 6, three times as fast
-    return out.getvalue()
 
 
 def surface_pictures(names: list[str], options: MuseumOptions) -> list[Picture]:
@@ -157,7 +142,7 @@ def users_pictures(folder: Path) -> list[Picture]:
             Picture(
                 f"painting_{len(found) + 1:02d}{suffix}",
                 upright.width / upright.height,
-                _constant(data),
+                constant(data),
             )
         )
     return found
@@ -212,57 +197,6 @@ def make_museum(options: MuseumOptions) -> Iterator[File]:
     yield "museum.obj", lambda: model
 
 
-def ours(folder: Path, stem: str) -> set[str]:
-    """The files that an earlier run wrote into ``folder``, or nothing if it holds no such model."""
-    try:
-        with (folder / f"{stem}.obj").open(encoding="utf-8") as file:
-            if not file.readline().startswith(HEAD):
-                return set()
-        lines = (folder / f"{stem}.mtl").read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError):
-        return set()
-    images = {line.split()[-1] for line in lines if line.startswith("map_Kd ")}
-    safe = re.compile(r"(textures/)?[a-z0-9_]+\.(png|jpg)")
-    return {f"{stem}.obj", f"{stem}.mtl", *(name for name in images if safe.fullmatch(name))}
-
-
-def write(folder: Path, files: list[File], *, force: bool) -> None:
-    """Writes the files, all or (short of a power cut during the renames) none.
-
-    A folder that holds something and no museum is refused without ``force``; what is not ours is
-    left alone. Textures of an earlier museum that this one does not have are removed.
-    """
-    before = ours(folder, Path(files[-1][0]).stem) if folder.is_dir() else set()
-    if folder.exists() and not folder.is_dir():
-        raise NotADirectoryError(f"{folder} is not a folder")
-    if folder.exists() and not before and not force and any(folder.iterdir()):
-        raise FileExistsError(f"{folder} holds files that this script did not write; use --force")
-    folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".museum-", dir=folder) as staging:
-        for k, (name, load) in enumerate(files):
-            if sys.stderr.isatty():
-                print(f"\r{k + 1}/{len(files)} {name:40}", end="", file=sys.stderr)
-            (Path(staging) / str(k)).write_bytes(load())
-        if sys.stderr.isatty():
-            print(file=sys.stderr)
-        for k, (name, _) in enumerate(files):
-            target = folder / name
-            target.parent.mkdir(exist_ok=True)
-            os.replace(Path(staging) / str(k), target)
-    for name in sorted(before - {name for name, _ in files}):
-        (folder / name).unlink(missing_ok=True)
-
-
-def _at_least(least: int, most: int) -> Callable[[str], int]:
-    def number(text: str) -> int:
-        value = int(text)
-        if not least <= value <= most:
-            raise argparse.ArgumentTypeError(f"{value} is not between {least} and {most}")
-        return value
-
-    return number
-
-
 def main(arguments: list[str] | None = None) -> int:
     default = MuseumOptions()
     parser = argparse.ArgumentParser(
@@ -271,10 +205,10 @@ def main(arguments: list[str] | None = None) -> int:
     )
     add = parser.add_argument
     add("-o", "--output", type=Path, required=True, metavar="DIR", help="folder to write")
-    add("--rooms", type=_at_least(1, 2000), default=default.rooms, help="rooms besides corridors")
-    add("--textures", type=_at_least(1, 5000), default=default.textures, help="images made")
-    add("--size", type=_at_least(4, 8192), default=default.size, help="texels of an image's side")
-    add("--seed", type=_at_least(0, 2**63), default=default.seed, help="another museum")
+    add("--rooms", type=between(1, 2000), default=default.rooms, help="rooms besides corridors")
+    add("--textures", type=between(1, 5000), default=default.textures, help="images made")
+    add("--size", type=between(4, 8192), default=default.size, help="texels of an image's side")
+    add("--seed", type=between(0, 2**63), default=default.seed, help="another museum")
     add("--images", type=Path, metavar="DIR", help="hang the images of this folder instead")
     add("--no-windows", action="store_true", help="a closed building")
     add("--two-rooms", action="store_true", help="write the hand-checkable two rooms instead")
@@ -288,7 +222,7 @@ def main(arguments: list[str] | None = None) -> int:
     _compile_ahead()
     try:
         if given.two_rooms:
-            files = [(name, _constant(data)) for name, data in two_rooms().items()]
+            files = [(name, constant(data)) for name, data in two_rooms().items()]
         else:
             files = list(make_museum(options))
         write(given.output, files, force=given.force)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from benchmarks.fuzz.databases import Interrupted, ManifestText, Npz, Served, Vrml
+from benchmarks.fuzz.interlaced import Interlaced
 from benchmarks.fuzz.models import Gltf, Handed, Mesh, Meshopt, Mtl, Obj
 from benchmarks.fuzz.textures import Images, Ptm
 
@@ -30,6 +31,7 @@ KINDS: dict[str, Kind] = {
     "handed": Kind(Handed, 4),
     "mesh": Kind(Mesh, 3),
     "image": Kind(Images, 10),
+    "interlaced": Kind(Interlaced, 4),
     "vrml": Kind(Vrml, 3),
     "staged": Kind(Interrupted, 2),
     "served": Kind(Served, 1),

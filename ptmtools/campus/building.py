@@ -17,13 +17,12 @@ from numpy.typing import NDArray
 
 from ptmtools.campus.making import ObjectMade, Work, make_object
 from ptmtools.campus.model import INDEX, Campus, CampusMaterial
-from ptmtools.campus.names import Names
+from ptmtools.campus.names import FORM, Names
 from ptmtools.campus.objects import notes_on, parts_of
 from ptmtools.campus.occlusion import Surroundings
 from ptmtools.campus.options import CampusOptions
 from ptmtools.campus.second_set import model_light, model_masks
 from ptmtools.campus.textures import BaseImage, Mask, texture_files
-from ptmtools.campus.writing import check, staged
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
 from ptmtools.lazy import component
@@ -76,11 +75,11 @@ def make_campus(
     ------
     InputError: what ingest raises; PTM-I831 no lightmaps in the model.
     LimitError: PTM-L830 too many objects.
-    OutputError: PTM-O001, O002, O003, O830 of the folder.
+    OutputError: PTM-O001, O002, O003, O820, O821 of the folder.
     MissingComponentError: PTM-M830 lightmaps are to be baked, and xatlas is not installed.
     """
     executor, path = executor or Serial(), Path(model)
-    check(Path(os.path.realpath(folder)), force)
+    FORM.check(folder, force=force)
     if options.lightmaps != "none":
         component("xatlas", "PTM-M830", "lightmaps need xatlas", "campus")
     clock = _Clock()
@@ -104,13 +103,13 @@ def make_campus(
         painted,
     )
     clock.end("reading")
-    with staged(folder, force=force) as files:
+    with FORM.staged(folder, force=force) as put:
         textures = []
         limits = reading.limit << 20, options.quality
         for done, written in enumerate(executor.each(texture_files, limits, bases)):
             progress(done, len(bases), "textures")
             for record, data in written:
-                files.write(record.file, data)
+                put(record.file, data)
                 textures.append(record)
         clock.end("textures")
         made: list[ObjectMade] = []
@@ -118,9 +117,9 @@ def make_campus(
         for done, each in enumerate(executor.each(make_object, work, tasks)):
             progress(done, len(tasks), "objects")
             for file, data in each.meshes:
-                files.write(file, data)
+                put(file, data)
             for record, data in each.lightmaps:
-                files.write(record.file, data)
+                put(record.file, data)
                 textures.append(record)
             made.append(ObjectMade(each.record, (), (), each.notes, each.covered, each.computed))
         progress(len(tasks), len(tasks), "objects")
@@ -135,7 +134,7 @@ def make_campus(
             materials,
             tuple(textures),
         )
-        files.write(INDEX, index_bytes(campus))
+        put(INDEX, index_bytes(campus))
     clock.end("writing")
     return Made(
         campus,

@@ -5,16 +5,29 @@ from __future__ import annotations
 import re
 import unicodedata
 
-from ptmtools.campus.model import ALPHA, DIFFUSE, LIGHT, MASK, MESHES, TEXTURES
+from ptmtools.campus.model import (
+    ALPHA,
+    DIFFUSE,
+    FORMAT,
+    INDEX,
+    LIGHT,
+    MASK,
+    MESHES,
+    TEXTURES,
+)
+from ptmtools.whole_folder import FolderForm
 
 #: Names that Windows keeps for devices, with or without a suffix.
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)$", re.IGNORECASE)
 #: Longest name that is given out, in characters; a number may follow.
 _LONGEST = 60
 #: What a folder of ours consists of, besides its index.
-OURS = re.compile(
+_OURS = re.compile(
     rf"({MESHES}/[A-Za-z0-9_-]+_\d+\.glb|"
     rf"{TEXTURES}/[A-Za-z0-9_-]+_\d+_[{DIFFUSE}{ALPHA}{MASK}{LIGHT}]\.jpg)"
+)
+FORM = FolderForm(
+    INDEX, FORMAT, "ptm campus", lambda name: name == INDEX or bool(_OURS.fullmatch(name))
 )
 
 

@@ -21,7 +21,7 @@ from ptmtools.findings import ValidationReport
 from ptmtools.pipeline import Artifacts, shoot_segments, validate as check
 from ptmtools.pipeline.command import build_command, open_database
 from ptmtools.pipeline.folders import FOLDERS, kind_of
-from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE
+from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Limits
 from ptmtools.visibility import SegmentReport
@@ -122,7 +122,7 @@ def plot(voice: Voice, db: str, output: str, walk: str | None, force: bool, **va
     options = take(PlotOptions, values)
     artifacts = Artifacts(open_database(db))
     report = plot_plan(
-        artifacts[SCENE],
+        artifacts[APO],
         artifacts[CELLS],
         artifacts[PVS] if artifacts.before(PVS) else None,
         artifacts[ACH] if artifacts.before(ACH) else None,

@@ -25,7 +25,7 @@ from ptmtools.walkthrough.served import read_served
 from ptmtools.walkthrough.trace import read_trace
 from ptmtools.walkthrough.view.pyramids import read_pyramids
 from ptmtools.walkthrough.walk import Walk, read_walk
-from ptmtools.walkthrough.world import prepare
+from ptmtools.walkthrough.world import prepare, read_forms
 
 #: How long the walk is that is made where none is given, s.
 DURATION = 150.0
@@ -141,8 +141,9 @@ def simulate(
     require_hints(served, options.policies)
     with voice.progress() as progress:
         pyramids = read_pyramids(served, progress)
+        forms = read_forms(served, pyramids, (p.form for p in options.policies), progress)
         worlds = {
-            name: counted(prepare(served, walk, pyramids, progress=progress), options)
+            name: counted(prepare(served, walk, pyramids, progress=progress, forms=forms), options)
             for name, walk in walks.items()
         }
         played = play(worlds, options, trace, progress, flip=flip)

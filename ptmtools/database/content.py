@@ -15,7 +15,7 @@ from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
 from ptmtools.database.geometry import Geometry
 from ptmtools.database.hints.numbers import shares_of
-from ptmtools.database.model import EmitOptions, TextureRecord, Viewpoint
+from ptmtools.database.model import EmitOptions, OctreeRecord, TextureRecord, Viewpoint
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
@@ -33,6 +33,7 @@ class Content:
     viewpoints: the places to start from.
     progress: is called for every cell.
     need: how fine textures are needed, where that was measured.
+    octrees: the octree textures of objects.
     """
 
     scene: Scene
@@ -44,6 +45,7 @@ class Content:
     options: EmitOptions = EmitOptions()  # noqa: RUF009 - a frozen value
     progress: Progress = silent
     need: Need | None = None
+    octrees: tuple[OctreeRecord, ...] = ()
 
     @cached_property
     def geometry(self) -> Geometry:

@@ -14,7 +14,7 @@ from ptmtools.cells.model import Cells
 from ptmtools.coverage.model import Ach
 from ptmtools.database.content import Content
 from ptmtools.database.emitters import chosen_emitters
-from ptmtools.database.model import EmitOptions, EmitReport, TextureRecord
+from ptmtools.database.model import EmitOptions, EmitReport, OctreeRecord, TextureRecord
 from ptmtools.database.names import BUNDLE
 from ptmtools.database.served import write_files
 from ptmtools.database.viewpoints.placement import place_viewpoints
@@ -41,6 +41,7 @@ def emit(
     *,
     force: bool = False,
     need: Need | None = None,
+    octrees: tuple[OctreeRecord, ...] = (),
 ) -> EmitReport:
     """Writes the files of every emitter that ``options.format`` names into the folder ``out``. The
     textures themselves are written by the stage before.
@@ -50,6 +51,7 @@ def emit(
     textures: one record for every image that a material in use names.
     force: overwrite files of these names, gzip copies included.
     need: how fine the textures are needed, if that is to be written.
+    octrees: the octree textures of objects, which are there already.
 
     Raises
     ------
@@ -69,7 +71,9 @@ def emit(
             remedy = "name another folder, or give --force to overwrite it"
             refuse_existing(folder / name, remedy)
     viewpoints, notes = place_viewpoints(scene, cells, options, textures)
-    content = Content(scene, cells, pvs, ach, textures, viewpoints, options, progress, need)
+    content = Content(
+        scene, cells, pvs, ach, textures, viewpoints, options, progress, need, octrees
+    )
     written = [emitter.files(content) for emitter in emitters]
     for name in owned:
         if name.endswith("/"):

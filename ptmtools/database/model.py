@@ -60,6 +60,29 @@ class TextureRecord:
 
 
 @dataclass(frozen=True)
+class OctreeRecord:
+    """What the emitted files say of the octree texture of an object (docs/format-apo.md).
+
+    Attributes
+    ----------
+    object: its name; objects may share one.
+    file: the stream of texels, relative to the served folder, "apo/NAME.bin".
+    low, side: corner and side of the cube, world metres.
+    levels: texels of each level, from the root on.
+    ends: for each level, so many first bytes of the file hold it and all before it.
+    crc32: of the texels of each level.
+    """
+
+    object: str
+    file: str
+    low: tuple[float, ...]
+    side: float
+    levels: tuple[int, ...]
+    ends: tuple[int, ...]
+    crc32: tuple[int, ...]
+
+
+@dataclass(frozen=True)
 class GivenViewpoint:
     """A viewpoint that the user asks for.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from pathlib import PurePosixPath
 
 #: In the served folder.
 ROOT = "root.wrl"
@@ -17,6 +18,8 @@ STATISTICS = f"{HINTS_FOLDER}/statistics.json"
 CELL_FOLDER = "cells"
 TEXTURE_FOLDER = "textures"
 GLTF_FOLDER = "gltf"
+INTERLACE_FOLDER = "interlace"
+OCTREE_FOLDER = "apo"
 #: From one of these folders back to the served one.
 UP = "../"
 #: The files of a cell, as the index names them: URI templates (RFC 6570, level 1).
@@ -25,6 +28,8 @@ BUNDLE = ".bin"
 FIRST_LOOK_FILES = f"{HINTS_FOLDER}/{{name}}{BUNDLE}"
 VRML_FILES = f"{CELL_FOLDER}/{{name}}.wrl"
 GLTF_FILES = f"{GLTF_FOLDER}/{{name}}.glb"
+#: The folder of a texture's interlaced set likewise.
+INTERLACE_FILES = f"{INTERLACE_FOLDER}/{{name}}/"
 
 _ILLEGAL = re.compile(r"[^A-Za-z0-9_]+")
 #: Longer object names are cut: they come from generators and say nothing more.
@@ -44,6 +49,11 @@ def cell_file(cell: int) -> str:
 def path_of(cell: int, files: str) -> str:
     """A cell's file relative to the served folder, by the template of such files."""
     return files.replace("{name}", cell_name(cell))
+
+
+def texture_name(file: str) -> str:
+    """The name of a texture, by the path or the URL of its `.ptm`."""
+    return PurePosixPath(file).stem
 
 
 class DefNames:

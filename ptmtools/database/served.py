@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from ptmtools.database.emitters import GZIP
-from ptmtools.files import write_bytes, writing
+from ptmtools.files import real_folder, write_bytes, writing
 from ptmtools.texture.parallel import ordered
 
 #: Files that wait for the disk at a time.
@@ -43,17 +43,18 @@ def write_files(
     Parameters
     ----------
     folder: an existing one.
-    files: name relative to the folder, and contents.
+    files: name relative to the folder, and contents; folders on the way are made.
     force: overwrite files; a gzip copy that is not written again goes.
     gzip: write copies of VRML and JSON files.
 
-    Raises OutputError: PTM-O001 to PTM-O003, of the first file that cannot be written.
+    Raises OutputError: PTM-O001 to PTM-O003, PTM-O005, of the first file that cannot be written.
     """
 
     def write(file: tuple[str, str | bytes]) -> dict[str, int]:
         name, content = file
         data = content.encode() if isinstance(content, str) else content
         copy = folder / f"{name}{GZIP}"
+        real_folder(folder, name.rpartition("/")[0])
         write_bytes(folder / name, data, force=force)
         if gzip and name.endswith(_TEXT):
             packed = compressed(data)

@@ -146,7 +146,7 @@ def _run(
                 compile_ahead(WARM_UP)
             if job.stage.one_thread and job.planned()[1]:
                 for later in jobs[i + 1 :]:
-                    if finished.issuperset(later.stage.read_with(later.options)):
+                    if finished.issuperset(later.stage.sources(later.options)):
                         later.begin()
             job.do()
             tell(run.reports[-1])

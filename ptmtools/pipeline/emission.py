@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 from ptmtools.notes import warnings_in
 from ptmtools.pipeline.encoding import fallback_level, read_detail
 from ptmtools.pipeline.images import image_digests
+from ptmtools.pipeline.replacing import octree_records
 from ptmtools.pipeline.run import Artifacts, Job
-from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE, TEXTURES
+from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS, TEXTURES
 from ptmtools.pipeline.textures import detail_file, header_of, texture_files
 from ptmtools.store.layout import SERVED
 from ptmtools.store.manifest import StageRecord
@@ -31,7 +32,7 @@ class EmissionJob(Job):
 
         run, textures = self.run, texture_records(self.run)
         report = emit(
-            run[SCENE],
+            run[APO],
             run[CELLS],
             run[PVS],
             run[ACH],
@@ -41,6 +42,7 @@ class EmissionJob(Job):
             run.progress,
             force=True,
             need=self._need(textures),
+            octrees=octree_records(run),
         )
         for name in report.files:
             transaction.take(f"{SERVED}/{name}", transaction.folder / SERVED / name)
@@ -66,9 +68,7 @@ class EmissionJob(Job):
 
         run = self.run
         sizes = {t.image: TextureSize(t.width, t.height, len(t.levels)) for t in textures}
-        return compute_need(
-            run[SCENE], run[CELLS], run[PVS], sizes, self.options.need, run.progress
-        )
+        return compute_need(run[APO], run[CELLS], run[PVS], sizes, self.options.need, run.progress)
 
 
 def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:

@@ -39,20 +39,34 @@ class FolderKind:
     describe: Lazy[Callable[[Path], tuple[tuple[str, ...], Mapping[str, Any]]]]
 
 
+_LIST = (
+    FolderKind(
+        index="interlace.json",
+        about="interlaced image",
+        again="ptm interlace IMAGE",
+        codes=Lazy("ptmtools.interlace.checking:CODES"),
+        check=Lazy("ptmtools.interlace.checking:validate_interlaced"),
+        describe=Lazy("ptmtools.interlace.reading:describe"),
+    ),
+    FolderKind(
+        index="apo.json",
+        about="octree texture",
+        again="ptm apo MESH",
+        codes=Lazy("ptmtools.apo.checking:CODES"),
+        check=Lazy("ptmtools.apo.checking:check_folder"),
+        describe=Lazy("ptmtools.apo.checking:describe"),
+    ),
+    FolderKind(
+        index="campus.json",
+        about="campus",
+        again="ptm campus MODEL",
+        codes=Lazy("ptmtools.campus.validation:CODES"),
+        check=Lazy("ptmtools.campus.validation:check_campus"),
+        describe=Lazy("ptmtools.campus.description:describe_campus"),
+    ),
+)
 #: By the name of the index.
-FOLDERS: dict[str, FolderKind] = {
-    kind.index: kind
-    for kind in (
-        FolderKind(
-            "campus.json",
-            "a campus",
-            "ptm campus MODEL",
-            Lazy("ptmtools.campus.validation:CODES"),
-            Lazy("ptmtools.campus.validation:check_campus"),
-            Lazy("ptmtools.campus.description:describe_campus"),
-        ),
-    )
-}
+FOLDERS = {kind.index: kind for kind in _LIST}
 
 
 def kind_of(folder: Path) -> FolderKind | None:

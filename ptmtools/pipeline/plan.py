@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -13,7 +14,6 @@ from ptmtools.pipeline.run import Artifacts, work_of
 from ptmtools.pipeline.stage import Options, Stage
 from ptmtools.pipeline.stages import STAGES
 from ptmtools.store.folder import DatabaseFolder
-from ptmtools.store.layout import arrays_of
 from ptmtools.store.writer import admitted
 
 Plan = Literal["current", "run", "maybe"]
@@ -64,19 +64,21 @@ def plan_build(
     return plans
 
 
+def _outputs(artifacts: Artifacts, stage: Stage[Any]) -> Mapping[str, str]:
+    record = artifacts.before(stage)
+    return record.outputs if record else {}
+
+
 def _plan(
     artifacts: Artifacts, stage: Stage[Any], options: Options, changing: set[Stage[Any]]
 ) -> StagePlan:
     """Of a stage, after those that it reads; it is added to those ``changing`` where it is one."""
-    reads, before = stage.read_with(options), artifacts.before(stage)
-    anew = [read.name for read in reads if read in changing]
+    before = artifacts.before(stage)
+    anew = [read.name for read in stage.sources(options) if read in changing]
     # What it would do, of the files as they are.
     inputs: dict[str, str] = {}
     if not stage.inputs:
-        for read in reads:
-            record, name = artifacts.before(read), arrays_of(read.name)
-            outputs = record.outputs if record else {}
-            inputs |= {name: outputs.get(name, "")} if read.artifact else outputs
+        inputs |= stage.files_read(options, lambda read: _outputs(artifacts, read))
     elif not anew:
         inputs |= stage.inputs.load()(artifacts, options)
     elif before:

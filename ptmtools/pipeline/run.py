@@ -49,22 +49,29 @@ class Artifacts:
         """Raises PTM-D004 to PTM-D006, also where artifacts do not fit together; PTM-D008 if
         another release of ptmtools made the artifact."""
         if stage not in self._stages:
-            assert stage.artifact is not None
-            if self.record(stage).recipe != stage.recipe:
-                raise DatabaseError(
-                    "PTM-D008",
-                    f"the {stage.name} stage was run by another release of ptmtools",
-                    file=self.db.path,
-                    remedy=f"run `{build_command(self.db.path)}` to bring the database up to date",
-                )
-            with naming_command(self.db.path):
-                arrays = self.db.read_arrays(stage.name)
-            kind = stage.artifact.load()
-            with self.reading(arrays_of(stage.name)):
-                made = stage.load.load()(self, arrays) if stage.load else kind.from_arrays(arrays)
+            stored = stage if self.is_stored(stage) else stage.changes
+            assert stored
+            made = self._read(stage) if stored is stage else self[stored]
+            with self.reading(arrays_of(stored.name)):
                 self._fit(stage, made)
             self._stages[stage] = made
         return cast(A, self._stages[stage])
+
+    def _read(self, stage: Stage[A]) -> A:
+        assert stage.artifact is not None
+        if self.record(stage).recipe != stage.recipe:
+            raise DatabaseError(
+                "PTM-D008",
+                f"the {stage.name} stage was run by another release of ptmtools",
+                file=self.db.path,
+                remedy=f"run `{build_command(self.db.path)}` to bring the database up to date",
+            )
+        with naming_command(self.db.path):
+            arrays = self.db.read_arrays(stage.name)
+        kind = stage.artifact.load()
+        with self.reading(arrays_of(stage.name)):
+            made = stage.load.load()(self, arrays) if stage.load else kind.from_arrays(arrays)
+        return cast(A, made)
 
     def keep(self, stage: Stage[A], artifact: A) -> None:
         """Keeps an artifact that was just computed."""
@@ -90,6 +97,23 @@ class Artifacts:
         """The record of a stage as the database has it, or None."""
         return self.db.manifest.stages.get(stage.name)
 
+    def outputs(self, stage: Stage[Any]) -> Mapping[str, str]:
+        """What a stage has written: name → SHA-256; raises PTM-D004 if it has not run. One that
+        changes another's artifact has then changed nothing: databases of earlier releases lack
+        it."""
+        if stage.changes and self._known(stage) is None:
+            return {}
+        return self.record(stage).outputs
+
+    def is_stored(self, stage: Stage[Any]) -> bool:
+        """Whether a stage's artifact is its own; False if it is the very one that it could have
+        changed. Raises as `outputs`."""
+        return not stage.changes or arrays_of(stage.name) in self.outputs(stage)
+
+    def _known(self, stage: Stage[Any]) -> StageRecord | None:
+        """The record of a stage's last run, if there was one."""
+        return self.db.manifest.stages.get(stage.name)
+
     def recorded(self, stage: Stage[Any]) -> Options:
         """The options of a stage's last run; raises PTM-D002 if the record has others."""
         record = self.record(stage)
@@ -102,17 +126,16 @@ class Artifacts:
         """Name → SHA-256 of what the stage would read now; raises PTM-D004 and PTM-D002."""
         if stage.inputs:
             return dict(stage.inputs.load()(self, options))
-        found: dict[str, str] = {}
-        for read in stage.read_with(options):
-            outputs, name = self.record(read).outputs, arrays_of(read.name)
-            if read.artifact:
-                found[name] = outputs.get(name) or self.db.output(read.name, name)  # which raises
-            else:
-                found |= outputs
+        found = stage.files_read(options, self.outputs)
+        for read in stage.sources(options):
+            if found.get(arrays_of(read.name)) == "":
+                self.db.output(read.name, arrays_of(read.name))  # which raises
         return found
 
     def outdated(self, stage: Stage[Any]) -> str:
         """What a stage that has run was made from and is another by now; "" if there is none."""
+        if stage.changes and self._known(stage) is None:
+            return ""
         record = self.record(stage)
         if record.recipe != stage.recipe:
             return "release of ptmtools"
@@ -169,6 +192,9 @@ class Run(Artifacts):
         """As `Artifacts.record`, of this run if it is not committed yet."""
         return self._uncommitted.get(stage.name) or super().record(stage)
 
+    def _known(self, stage: Stage[Any]) -> StageRecord | None:
+        return self._uncommitted.get(stage.name) or super()._known(stage)
+
     def before(self, stage: Stage[Any]) -> StageRecord | None:
         """As `Artifacts.before`; None for a run that does everything again."""
         return None if self.rebuild else super().before(stage)
@@ -182,7 +208,7 @@ class Run(Artifacts):
             what has been replaced since.
         """
         inputs = self.inputs(stage, options)
-        for read in stage.read_with(options):
+        for read in stage.sources(options):
             if earlier := self.outdated(read):
                 raise DatabaseError(
                     "PTM-D008",

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Generic, Literal, TypeVar, Union, get_arg
 
 from ptmtools.errors import PtmError
 from ptmtools.lazy import Lazy
+from ptmtools.store.layout import arrays_of
 
 if TYPE_CHECKING:
     from ptmtools.pipeline.run import Artifacts, Job
@@ -47,6 +48,9 @@ class Stage(Generic[A]):
         recipe, and what the default was before that.
     reads: the stages that it reads, in the order in which `compute` takes their artifacts; a
         function of the options if it depends on them.
+    changes: the stage whose artifact it makes another of, of the same class; where it has stored no
+        arrays it is that one. Who reads it reads the arrays of both.
+    files: of the stages that it reads, those of which it reads all files, not the arrays alone.
     artifact: the class of what it makes, with ``to_arrays`` and ``from_arrays``; None if it makes
         files only.
     compute: ``compute(*artifacts, options, progress, executor)``, which makes the artifact.
@@ -78,6 +82,8 @@ class Stage(Generic[A]):
     options: type
     changed: str = ""
     reads: tuple[Stage[Any], ...] | Callable[[Options], tuple[Stage[Any], ...]] = ()
+    changes: Stage[A] | None = None
+    files: tuple[Stage[Any], ...] = ()
     artifact: Lazy[Any] | None = None
     compute: Lazy[Callable[..., A]] | None = None
     counts: Callable[[A], Counts] | None = None
@@ -98,6 +104,26 @@ class Stage(Generic[A]):
     def read_with(self, options: Options) -> tuple[Stage[Any], ...]:
         """The stages that it reads when it is run with these options."""
         return self.reads(options) if callable(self.reads) else self.reads
+
+    def sources(self, options: Options) -> tuple[Stage[Any], ...]:
+        """The stages whose files it reads: also those that one of `read_with` changes."""
+        reads = self.read_with(options)
+        changed = (read.changes for read in reads if read.changes)
+        return tuple(dict.fromkeys((*changed, *reads)))
+
+    def files_read(
+        self, options: Options, outputs: Callable[[Stage[Any]], Mapping[str, str]]
+    ) -> dict[str, str]:
+        """Name → SHA-256 of what it reads of other stages, whose ``outputs`` are given; "" for
+        arrays that are not among these."""
+        found: dict[str, str] = {}
+        for read in self.sources(options):
+            there, name = outputs(read), arrays_of(read.name)
+            if read.artifact is None or read in self.files:
+                found |= there
+            elif name in there or not read.changes:
+                found[name] = there.get(name, "")
+        return found
 
     def summarize(self, counts: Counts) -> str:
         """`summary`; a manifest may say anything."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection
+from contextlib import suppress
 from typing import Any
 
 from ptmtools.database.validation.findings import CODES
@@ -32,6 +33,9 @@ def check_stages(db: DatabaseFolder, astray: Collection[str] = ()) -> tuple[Issu
     for stage in STAGES.values():
         if stage.name in db.manifest.stages:
             _check_stage(stage, db, together, astray, found)
+        if not together.is_stored(stage):
+            with suppress(DatabaseError):  # which is that of the stage that it could have changed
+                together[stage]
     return found.issues()
 
 
@@ -52,7 +56,7 @@ def _check_stage(
         alone.recorded(stage)
     except DatabaseError as fault:
         found.add("PTM-D650", MANIFEST, f"stages.{stage.name}.parameters", fault.message)
-    if stage.artifact is None:
+    if stage.artifact is None or not alone.is_stored(stage):
         return
     try:
         made = alone[stage]

@@ -10,7 +10,7 @@ from ptmtools.errors import naming
 from ptmtools.pipeline.images import image_rows_of, images_of
 from ptmtools.pipeline.options import TextureOptions
 from ptmtools.pipeline.run import Artifacts
-from ptmtools.pipeline.stages import CELLS, PVS, SCENE
+from ptmtools.pipeline.stages import APO, CELLS, PVS, SCENE
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import IMAGES
 
@@ -31,7 +31,7 @@ def unresolved(artifacts: Artifacts, options: TextureOptions) -> list[int]:
     screen = Screen(options.trim_height, options.trim_fov, options.trim_distance)
 
     def levels() -> list[int]:
-        stages = artifacts[SCENE], artifacts[CELLS], artifacts[PVS]
+        stages = artifacts[APO], artifacts[CELLS], artifacts[PVS]
         return [int(n) for n in unresolved_levels(*stages, _sizes(artifacts, options), screen)]
 
     return artifacts.held(f"levels unresolved by {screen}", levels)

@@ -17,7 +17,7 @@ from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.folders import kind_of
 from ptmtools.pipeline.run import Artifacts
 from ptmtools.pipeline.stagecheck import check_stages
-from ptmtools.pipeline.stages import CELLS, PVS, SCENE
+from ptmtools.pipeline.stages import APO, CELLS, PVS
 from ptmtools.progress import Progress, silent
 from ptmtools.texture.model import Limits
 from ptmtools.visibility import Pvs, SegmentReport, check_conservative
@@ -78,6 +78,6 @@ def structure_of(db: str | os.PathLike[str]) -> tuple[NDArray[np.float64], Cells
     Raises as `shoot_segments`.
     """
     artifacts = Artifacts(open_database(db))
-    options, scene, cells = artifacts.recorded(CELLS), artifacts[SCENE], artifacts[CELLS]
+    options, scene, cells = artifacts.recorded(CELLS), artifacts[APO], artifacts[CELLS]
     corners = scene.corners[structural_triangles(scene, options, cells.opened)]
     return corners, cells, artifacts[PVS]

@@ -26,10 +26,22 @@ from ptmtools.simplification.quadric_kernels import (
     value_at,
     wedge_value_at,
 )
-from ptmtools.simplification.state_kernels import ENTRIES, FACES, MADE, MARKS, State, meet, prune
+from ptmtools.simplification.state_kernels import (
+    ENTRIES,
+    FACES,
+    MADE,
+    MARKS,
+    REFUSED,
+    State,
+    meet,
+    prune,
+)
 from ptmtools.simplification.surface import FREE, LINE
 from ptmtools.tolerance import ROUNDING_SHARE
 
+#: When costs have grown so many times, what was refused before is tried again first: others have
+#: gone since, and on flat walls it costs nothing.
+AGAIN = 4.0
 #: The ways of a collapse: into the second end, into the first, to the best place; none.
 SECOND, FIRST, PLACED, NONE = 0, 1, 2, 3
 #: Share of the weight that pulls the best place to the middle of the edge.
@@ -132,7 +144,7 @@ def put(state: State, heap: Heap, a: int, b: int, tried: int, cost: float) -> No
 def fill(state: State, heap: Heap) -> None:
     """Puts all edges into an empty heap."""
     triangle = state.triangle
-    state.number[ENTRIES] = 0
+    state.number[ENTRIES] = state.number[REFUSED] = 0
     for t in range(len(triangle)):
         if triangle[t, 0] < 0:
             continue
@@ -232,6 +244,10 @@ def collapse_edges(state: State, heap: Heap, faces: int) -> None:
     while number[FACES] > faces and number[ENTRIES] > 0:
         a, b = heap.ends[0, 0], heap.ends[0, 1]
         tried, stamp = heap.tried[0], heap.version[0]
+        if number[REFUSED] > 0 and heap.cost[0] > state.worst[2]:
+            state.worst[2] = AGAIN * heap.cost[0]
+            fill(state, heap)
+            continue
         number[ENTRIES] -= 1
         move(heap, 0, number[ENTRIES])
         sink(heap, number[ENTRIES], 0)
@@ -250,9 +266,11 @@ def collapse_edges(state: State, heap: Heap, faces: int) -> None:
         prune(state, v)
         count = meet(state, u, v)
         if count < 1 or not is_linked(state, u, v, count):
+            number[REFUSED] += 1
             continue
         fits = has_counterparts(state, u, v, count) and keeps_faces(state, u, v, px, py, pz)
         if not fits or (way == PLACED and not keeps_faces(state, v, u, px, py, pz)):
+            number[REFUSED] += 1
             push(state, heap, a, b, tried | (1 << way))
             continue
         if cost > state.worst[0] * weight:

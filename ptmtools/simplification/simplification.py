@@ -95,12 +95,12 @@ def _state(mesh: Mesh, surface: Surface) -> State:
         version=np.zeros(vertices, np.int32),
         mark=np.zeros(vertices, np.int64),
         moved=np.zeros(vertices, bool),
-        number=np.array([len(surface.triangle), 0, 0, 0]),
+        number=np.array([len(surface.triangle), 0, 0, 0, 0]),
         place=np.empty(3),
         shared=np.empty((MOST_AT_EDGE, 6), np.int32),
         shown=np.empty(2),
         limits=np.array(CAREFUL),
-        worst=np.zeros(2),
+        worst=np.zeros(3),
     )
 
 

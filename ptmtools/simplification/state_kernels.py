@@ -17,8 +17,9 @@ from ptmtools.compiled import plain_kernel as kernel
 #: So many faces at an edge at most; an edge with more does not collapse.
 MOST_AT_EDGE = 64
 
-#: Where `State.number` counts faces, entries of the heap, marks given out and collapses made.
-FACES, ENTRIES, MARKS, MADE = 0, 1, 2, 3
+#: Where `State.number` counts faces, entries of the heap, marks given out, collapses made, and
+#: edges refused since all were tried.
+FACES, ENTRIES, MARKS, MADE, REFUSED = 0, 1, 2, 3, 4
 
 
 class State(NamedTuple):
@@ -31,9 +32,10 @@ class State(NamedTuple):
     head, tail: (V,) the first and the last corner at each vertex; beyond: (3 T,) the next one.
     version: (V,) how often each vertex has changed.
     moved: (V,) whether it has left its place.
-    number: (4,) counts, by `FACES` and so on.
+    number: (5,) counts, by `FACES` and so on.
     limits: (3,) say when faces turn, such as `CAREFUL`.
-    worst: (2,) the largest error of a collapse, squared, and the largest that is allowed.
+    worst: (3,) the largest error of a collapse, squared, the largest that is allowed, and the cost
+        up to which what was refused has been tried again.
     mark, place, shared, shown: (V,), (3,), (`MOST_AT_EDGE`, 6) and (2,), storage.
     """
 

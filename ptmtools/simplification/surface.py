@@ -192,9 +192,10 @@ def _continued(mesh: Mesh, source: Indices, one: Ints, two: Ints) -> Bools:
     if mesh.material is not None:
         same &= mesh.material[here] == mesh.material[there]
     if mesh.uv is not None:
-        slack = UV_SHARE * np.abs(mesh.uv).max(initial=0.0)
         for a, b in ends:
-            same &= (np.abs(mesh.uv[here, a] - mesh.uv[there, b]) <= slack).all(axis=1)
+            mine, other = mesh.uv[here, a], mesh.uv[there, b]
+            slack = UV_SHARE * np.maximum(np.abs(mine), np.abs(other))
+            same &= (np.abs(mine - other) <= slack).all(axis=1)
     if mesh.colors is not None:
         for a, b in ends:
             same &= (mesh.colors[here, a] == mesh.colors[there, b]).all(axis=1)

@@ -6,6 +6,7 @@
     stages/NAME.npz     the arrays of a stage
     stages/images.json  the list of the model's images
     stages/images/      a copy of each, under its SHA-256
+    stages/octrees.json the list of the octree textures
     stages/textures/    what the levels of each texture show
     www/                what is served, and nothing else
     .ptm-new/           outputs on their way in, see `transaction`
@@ -22,6 +23,7 @@ STAGES_FOLDER = "stages"
 #: The folders that stages write in.
 WRITTEN = (STAGES_FOLDER, SERVED)
 IMAGES, IMAGE_LIST = f"{STAGES_FOLDER}/images", f"{STAGES_FOLDER}/images.json"
+OCTREE_LIST = f"{STAGES_FOLDER}/octrees.json"
 STAGING = ".ptm-new"
 LOCK = ".ptm-lock"
 

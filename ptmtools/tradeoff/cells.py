@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ptmtools.cells import SubdivideOptions, subdivide
-from ptmtools.pipeline.stages import CELLS, SCENE
+from ptmtools.pipeline.stages import APO, CELLS
 from ptmtools.scene.model import Scene
 from ptmtools.tradeoff.experiment import Measured, Setting, timed
 from ptmtools.tradeoff.experiments import Subject
@@ -24,7 +24,7 @@ WARM = 4
 
 def prepare(subject: Subject) -> CellsTrade:
     """See `EXPERIMENTS`."""
-    return CellsTrade(subject.artifacts[SCENE], subject.options(CELLS))
+    return CellsTrade(subject.artifacts[APO], subject.options(CELLS))
 
 
 class CellsTrade:

@@ -17,7 +17,7 @@ from ptmtools.coverage.backends.choice import choose
 from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.options import MAX_SAMPLES, PRESETS, AchOptions
 from ptmtools.coverage.sampling import CellHints, Sampler
-from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE
+from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS
 from ptmtools.scene.model import Scene
 from ptmtools.tradeoff.experiment import Measured, Setting, timed
 from ptmtools.tradeoff.experiments import Subject
@@ -44,7 +44,7 @@ def prepare(subject: Subject) -> CoverageTrade:
     options = replace(subject.options(ACH), samples=None, face=None, placement=None, tolerance=None)
     made = subject.artifacts
     tried, points = subject.cells_tried, subject.reference_points
-    return CoverageTrade(made[SCENE], made[CELLS], made[PVS], options, tried, points)
+    return CoverageTrade(made[APO], made[CELLS], made[PVS], options, tried, points)
 
 
 class CoverageTrade:

@@ -17,7 +17,7 @@ from typing import Any
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.build import run_stage
 from ptmtools.pipeline.stage import Options, Stage
-from ptmtools.pipeline.stages import SCENE, STAGES
+from ptmtools.pipeline.stages import STAGES
 from ptmtools.progress import Progress, silent
 from ptmtools.tradeoff.experiment import timed
 
@@ -27,11 +27,12 @@ Own = Mapping[Stage[Any], Options]
 
 
 def own_options(artifacts: Artifacts) -> Own:
-    """Those that the stages after the scene, which needs the model, last ran with.
+    """Those that the stages last ran with, but for those that make the scene, of which the first
+    needs the model.
 
     Raises DatabaseError PTM-D004 if one has not run, PTM-D002 for options that no stage has.
     """
-    return {stage: artifacts.recorded(stage) for stage in STAGES.values() if stage is not SCENE}
+    return {stage: artifacts.recorded(stage) for stage in STAGES.values() if not stage.hidden}
 
 
 @contextmanager

@@ -39,7 +39,7 @@ DATA = "data"
 JSON, JPEG = "application/json", "image/jpeg"
 GLB, PTM = "model/gltf-binary", "application/octet-stream"
 #: What the index of a database has and that of a site has not.
-_LEFT_OUT = ("record", "geometry", "statistics", "firstLook")
+_LEFT_OUT = ("record", "geometry", "textureSets", "statistics", "firstLook", "octrees")
 _VRML_MEDIA = {".wrl": "model/vrml", ".png": "image/png"}
 #: How pictures begin.
 _MAGIC = (

@@ -11,8 +11,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ptmtools.arrays import Floats, Ints
-from ptmtools.walkthrough.memory import columns_of
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.cells.vectors import normals
+from ptmtools.scene.mapping import gradients
+from ptmtools.walkthrough.memory import Columns, columns_of
 from ptmtools.walkthrough.recording import Browser
 from ptmtools.walkthrough.served import Document, Served
 
@@ -29,22 +31,28 @@ class Shapes:
     ----------
     cell, texture: (n,) int64, ascending by cell; the texture is -1 without.
     low, high: (n, 3) corners of their boxes, metres.
+    side: (n, 2) metres that the width and the height of the texture's image take on the shape, on
+        average over its area; 0 where it shows one point of it.
     """
 
     cell: Ints
     texture: Ints
     low: Floats
     high: Floats
+    side: Floats
 
 
 @dataclass(frozen=True)
 class Catalogue:
-    """What can be fetched, and what is said of it. K columns: nothing, then the levels.
+    """What can be fetched, and what is said of it. K columns: nothing, then the levels, or what a
+    form has in place of them (`ptmtools.walkthrough.forms`).
 
     Attributes
     ----------
-    levels: (T,) of each texture.
-    ends: (T, K) bytes of the `.ptm` that hold each column. memory: (T, K) of texture memory.
+    levels: (T,) columns of each texture beside the first.
+    ends: (T, K) bytes of its file that hold each column; of several files, of all up to it.
+    memory: (T, K) of texture memory. size: (T, K, 2) width and height of the finest
+        image that a column shows.
     differences: (T, K) of each column to the one before it, on average over its texels, 0 to 255,
         at least `LEAST`; of what lies behind the last 0.
     colors: (T, 3) mean colour, 0 to 255.
@@ -58,6 +66,7 @@ class Catalogue:
     levels: Ints
     ends: Ints
     memory: Ints
+    size: Ints
     differences: Floats
     colors: Floats
     index_bytes: int
@@ -122,17 +131,24 @@ class Catalogue:
             self, record_bytes=browser.record_bytes, geometry_bytes=browser.geometry_bytes
         )
 
-    def counted_by_paper(self, served: Served) -> Catalogue:
-        """The same with RGB of three bytes in texture memory."""
-        _, _, memory = columns_of(served.index["textures"], paper=True)
-        return replace(self, memory=memory)
+    def in_columns(self, columns: Columns) -> Catalogue:
+        """The same textures with other columns, each of which says as little of what it adds."""
+        stored = _stored(columns.last, columns.ends.shape[1])
+        return replace(
+            self,
+            levels=columns.last,
+            ends=columns.ends,
+            memory=columns.memory,
+            size=columns.size,
+            differences=np.where(stored, LEAST, 0.0),
+        )
 
 
 def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalogue:
     """The catalogue of a served folder; ``differences`` (T, L) and ``colors`` (T, 3) as `Pyramids`
     has them, for hints that do not say them of every texture."""
     textures = served.index["textures"]
-    levels, ends, memory = columns_of(textures)
+    levels, ends, memory, size = columns_of(textures)
     beside = np.zeros(ends.shape)
     beside[:, 1:] = differences[:, : ends.shape[1] - 1]
     if all(len(row.get("differences", ())) == len(row["ends"]) for row in textures):
@@ -142,13 +158,13 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
         colors = np.array([row["color"] for row in textures], dtype=np.float64)
     boxes = np.array([cell["box"] for cell in served.index["cells"]], dtype=np.float64)
     low, high = boxes.reshape(-1, 2, 3).transpose(1, 0, 2).copy()
-    column = np.arange(ends.shape[1])
-    stored = (column > 0) & (column <= levels[:, None])
+    stored = _stored(levels, ends.shape[1])
     beside[stored] = np.maximum(beside[stored], LEAST)
     return Catalogue(
         levels=levels,
         ends=ends,
         memory=memory,
+        size=size,
         differences=beside,
         colors=colors,
         index_bytes=served.index_bytes,
@@ -163,6 +179,13 @@ def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalog
     )
 
 
+def _stored(last: Ints, wide: int) -> Bools:
+    """(T, K) which columns there are, the first aside."""
+    column = np.arange(wide)
+    found: Bools = (column > 0) & (column <= last[:, None])
+    return found
+
+
 def _shapes(served: Served) -> Shapes:
     surfaces = served.surfaces
     count = int(surfaces.shape.max(initial=-1)) + 1
@@ -172,4 +195,9 @@ def _shapes(served: Served) -> Shapes:
     cell, texture = (np.zeros(count, np.int64) for _ in range(2))
     cell[surfaces.shape], texture[surfaces.shape] = surfaces.cell, surfaces.texture
     drawn = np.isfinite(low[:, 0])
-    return Shapes(*(field[drawn] for field in (cell, texture, low, high)))
+    area = np.linalg.norm(normals(surfaces.corner), axis=1)
+    slope = np.linalg.norm(gradients(surfaces.corner, surfaces.uv), axis=2)
+    often = np.stack([np.bincount(surfaces.shape, area * s, count) for s in slope.T], axis=1)
+    whole = np.bincount(surfaces.shape, area, count)[:, None]
+    side = np.divide(whole, often, out=np.zeros((count, 2)), where=often > 0)
+    return Shapes(*(field[drawn] for field in (cell, texture, low, high, side)))

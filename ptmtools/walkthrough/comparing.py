@@ -10,6 +10,7 @@ from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
 from ptmtools.quantities import MemorySize, parse_bandwidth, parse_duration, parse_memory
 from ptmtools.walkthrough.flip import Flip
+from ptmtools.walkthrough.forms import FORMS, PTM
 from ptmtools.walkthrough.measures import STANDS, Measures, measure
 from ptmtools.walkthrough.network import Conditions
 from ptmtools.walkthrough.policies import POLICIES, Declared
@@ -92,8 +93,17 @@ class Played:
 
 
 def require_hints(served: Served, policies: Sequence[Declared]) -> None:
-    """Raises InputError PTM-I701 if the records lack what a policy needs."""
+    """Raises InputError PTM-I701 if the records lack what a policy needs, or the textures are not
+    there in its form."""
     for policy in policies:
+        form = FORMS[policy.form]
+        if form.needs and form.needs[0] not in served.index.get("textureSets", {}):
+            raise InputError(
+                "PTM-I701",
+                f"policy {policy.name} needs {form.about}, which the database does not have",
+                file=served.folder,
+                remedy=form.needs[1],
+            )
         if policy.needs and any(policy.needs[0] not in record for record in served.records):
             raise InputError(
                 "PTM-I701",
@@ -105,16 +115,15 @@ def require_hints(served: Served, policies: Sequence[Declared]) -> None:
 
 def counted(world: World, options: SimulateOptions) -> World:
     """The world with texture memory counted, and ranges asked for, as the options say."""
-    world = replace(world, one_range=world.one_range or options.one_range)
-    if not options.paper_bytes:
-        return world
-    return replace(world, catalogue=world.catalogue.counted_by_paper(world.served))
+    world = world.changed(lambda w: replace(w, one_range=w.one_range or options.one_range))
+    return world.changed(World.counted_by_paper) if options.paper_bytes else world
 
 
-def budget_of(world: World, memory: MemorySize) -> int:
-    """Bytes of texture memory; no limit is what all textures take."""
+def budget_of(world: World, memory: MemorySize, form: str = PTM) -> int:
+    """Bytes of texture memory: a share is of what all `.ptm`s take, in whatever form clients take
+    textures; no limit is what all take in that form."""
     held = memory.of(world.catalogue.whole)
-    return world.catalogue.whole if held is None else held
+    return world.in_form(form).catalogue.whole if held is None else held
 
 
 def play(
@@ -129,7 +138,8 @@ def play(
 
     Raises
     ------
-    InputError: PTM-I701 a policy's hints are not there; PTM-I711, PTM-I712.
+    InputError: PTM-I701 a policy's hints, or the textures in its form, are not there; PTM-I711,
+        PTM-I712.
     MissingComponentError: PTM-M702 with ``flip``, without flip-evaluator.
     """
     cases = [
@@ -141,16 +151,19 @@ def play(
     ]
     for world in worlds.values():
         require_hints(world.served, options.policies)
-    standing = {name: world.standing(STANDS) for name, world in worlds.items()}
-    looks = {name: Flip(world) for name, world in worlds.items()} if flip else {}
+    taken = {
+        (name, p.form): w.in_form(p.form) for name, w in worlds.items() for p in options.policies
+    }
+    standing = {of: world.standing(STANDS) for of, world in taken.items()}
+    looks = {of: Flip(world) for of, world in taken.items()} if flip else {}
     found = []
     for done, (link, memory, policy, name) in enumerate(cases):
         progress(done, len(cases), "simulating")
-        world = worlds[name]
-        budget = budget_of(world, memory)
+        of = name, policy.form
+        world, budget = taken[of], budget_of(worlds[name], memory, policy.form)
         run = simulate(world, policy, link, budget)
-        stood = simulate(standing[name], policy, link, budget)
-        seen = float(looks[name].each(run).mean()) if flip else None
+        stood = simulate(standing[of], policy, link, budget)
+        seen = float(looks[of].each(run).mean()) if flip else None
         found.append(Played(name, memory.text, run, measure(run, world, stood), seen))
     return found
 

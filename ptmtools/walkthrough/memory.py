@@ -7,12 +7,28 @@ texels of three bytes, so RGB counts four; the paper counts three.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ptmtools.arrays import Ints
 from ptmtools.texture.model import gpu_texel_bytes
+
+
+class Columns(NamedTuple):
+    """What can be fetched of textures; beyond the last column of one all repeat it.
+
+    Attributes
+    ----------
+    last: (T,) of each texture; column 0 is nothing.
+    ends: (T, K) bytes that hold each column and those before it. memory: (T, K) of texture memory.
+    size: (T, K, 2) width and height of the finest image that each column shows.
+    """
+
+    last: Ints
+    ends: Ints
+    memory: Ints
+    size: Ints
 
 
 def texel_bytes(texture: Any, *, paper: bool = False) -> int:
@@ -23,18 +39,27 @@ def texel_bytes(texture: Any, *, paper: bool = False) -> int:
     return int(texture.get("gpuTexelBytes", gpu_texel_bytes(stored, texture["components"])))
 
 
-def columns_of(textures: Sequence[Any], *, paper: bool = False) -> tuple[Ints, Ints, Ints]:
-    """(T,) columns beside the first, (T, K) bytes of the file that hold each column, and (T, K)
-    bytes of texture memory, for entries of the index; beyond the last both repeat it."""
-    count = np.array([len(t["ends"]) for t in textures], dtype=np.int64)
-    wide = int(count.max(initial=0)) + 1
-    ends, memory = (np.zeros((len(textures), wide), np.int64) for _ in range(2))
-    for row, texture in enumerate(textures):
-        n = int(count[row])
-        shift = n - 1 - np.arange(n)
+def columns_of(textures: Sequence[Any], *, paper: bool = False) -> Columns:
+    """Levels of `.ptm`s, for entries of the index: bytes are those of the file, and memory that of
+    all levels of a column."""
+    rows = []
+    for texture in textures:
+        shift = len(texture["ends"]) - 1 - np.arange(len(texture["ends"]))
         sides = [np.maximum(1, texture[side] >> shift) for side in ("width", "height")]
-        each = sides[0] * sides[1] * texel_bytes(texture, paper=paper)
-        for table, values in ((ends, texture["ends"]), (memory, np.cumsum(each))):
-            table[row, 1 : n + 1] = values
-            table[row, n + 1 :] = table[row, n]
-    return count, ends, memory
+        each = np.cumsum(sides[0] * sides[1]) * texel_bytes(texture, paper=paper)
+        rows.append((texture["ends"], each, np.stack(sides, axis=1)))
+    return aligned(rows)
+
+
+def aligned(rows: Sequence[tuple[Any, Any, Any]]) -> Columns:
+    """Columns of textures that have any number of them: of each its (k,) ``ends`` and ``memory``,
+    and (k, 2) ``size``, without the first column."""
+    last = np.array([len(row[0]) for row in rows], dtype=np.int64)
+    shape = len(rows), int(last.max(initial=0)) + 1
+    ends, memory, size = (np.zeros(s, np.int64) for s in (shape, shape, (*shape, 2)))
+    for t, row in enumerate(rows):
+        n = int(last[t])
+        for table, values in zip((ends, memory, size), row, strict=True):
+            table[t, 1 : n + 1] = values
+            table[t, n + 1 :] = table[t, n]
+    return Columns(last, ends, memory, size)

@@ -25,6 +25,7 @@ _STRIP_LINES, _LABEL, _GAP = 360, 26, 6
 
 def frames(world: World, run: Run, every: float) -> Iterator[tuple[str, bytes]]:
     """PNGs of the frames of a run, one each ``every`` seconds, by names that say when."""
+    world = world.in_form(POLICIES[run.policy].form)
     renderer = Renderer(world, LINES)
     step = max(1, round(every * world.rate))
     for f in range(0, world.frames, step):
@@ -36,8 +37,9 @@ def frames(world: World, run: Run, every: float) -> Iterator[tuple[str, bytes]]:
 def strip(world: World, played: Played) -> bytes:
     """A PNG: what the client of a run shows after `INSTANTS` to who stands where the walk begins,
     and the full picture."""
-    stays = world.standing(INSTANTS[-1])
     of = played.run
+    world = world.in_form(POLICIES[of.policy].form)
+    stays = world.standing(INSTANTS[-1])
     run = simulate(stays, POLICIES[of.policy], of.conditions, of.budget)
     renderer = Renderer(world, _STRIP_LINES, samples=3)
     sight = renderer.look(stays.eye[0], stays.direction[0])

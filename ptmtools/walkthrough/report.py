@@ -52,9 +52,9 @@ def table(played: Sequence[Played], worlds: Mapping[str, World]) -> list[str]:
         f"{'rmse':>6} {'  FLIP ' if flip else ''}{'missing':>7} {'quality':>7} {'received':>9} "
         f"{'waste':>5} {'requests':>8} {'stalled':>7}  {_final_head()}"
     )
-    for (link, memory, budget), block in groupby(
-        played, lambda p: (p.run.conditions, p.memory, p.run.budget)
-    ):
+    for (link, memory), runs in groupby(played, lambda p: (p.run.conditions, p.memory)):
+        block = list(runs)
+        budget = block[0].run.budget
         lines += ["", f"{link_text(link)}; texture memory {memory} ({size(budget)})", head]
         for policy, some in groupby(block, lambda p: p.run.policy):
             lines.append(_row(f"{policy:<{wide}}", list(some)))

@@ -22,7 +22,7 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.database.fault import FileError
 from ptmtools.database.gltf.material import WRAPS
 from ptmtools.database.gltf.reader import ReadGlb, ReadPrimitive, read_glb
-from ptmtools.database.names import HINTS
+from ptmtools.database.names import HINTS, texture_name
 from ptmtools.errors import DatabaseError
 from ptmtools.files import open_regular
 from ptmtools.scene.colors import to_srgb
@@ -100,6 +100,11 @@ class Served:
     def texture_file(self, texture: int) -> Path:
         """The `.ptm` of a texture."""
         return _inside(self.folder, self.index["textures"][texture]["file"])
+
+    def texture_set(self, form: str, texture: int) -> Path:
+        """The folder of a texture in another form, one of the index's."""
+        name = texture_name(self.index["textures"][texture]["file"])
+        return _inside(self.folder, self.index["textureSets"][form].replace("{name}", name))
 
 
 def read_index(folder: Path) -> Document:

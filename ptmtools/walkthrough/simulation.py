@@ -73,7 +73,11 @@ class Run:
 
 
 def simulate(world: World, policy: Declared, conditions: Conditions, budget: int) -> Run:
-    """Walks. The same arguments give the same run, bit for bit."""
+    """Walks, with textures in the policy's form. The same arguments give the same run, bit for bit.
+
+    Raises InputError PTM-I701 if the world was not made ready for that form.
+    """
+    world = world.in_form(policy.form)
     link = Link(conditions)
     client = policy.client(world, link, budget)
     frames, stock, views = world.frames, world.catalogue, world.views

@@ -5,7 +5,8 @@ Made once, which takes most of the time; a run then takes a second.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,13 +15,14 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.errors import InputError, LimitError
 from ptmtools.progress import Progress, silent
 from ptmtools.walkthrough.catalogue import Catalogue, catalogue_of
+from ptmtools.walkthrough.forms import FORMS, PTM
 from ptmtools.walkthrough.recording import Browser
 from ptmtools.walkthrough.served import Served
 from ptmtools.walkthrough.view.frustum import Frustum
 from ptmtools.walkthrough.view.pyramids import read_pyramids
 from ptmtools.walkthrough.view.rays import Camera
-from ptmtools.walkthrough.view.records import Pyramids
-from ptmtools.walkthrough.view.tables import Views, look
+from ptmtools.walkthrough.view.records import Pyramids, Shows
+from ptmtools.walkthrough.view.tables import Views, look_at_forms
 
 if TYPE_CHECKING:
     from ptmtools.walkthrough.walk import Walk
@@ -45,7 +47,7 @@ class World:
 
     Attributes
     ----------
-    served, pyramids: what is shown.
+    served, pyramids: what is shown: of the `.ptm`s all levels.
     catalogue: what clients know.
     views, view: what is on the screen, and (F,) which of the views each frame has.
     camera: of the item buffer.
@@ -59,6 +61,9 @@ class World:
     drawn: (F,) the frame in which that was drawn, -1 if there is none; None unless in a browser.
     colored: whether clients know the mean colour of each texture; else it is grey until its first
         level comes.
+    form: in which clients take textures, a name in `ptmtools.walkthrough.forms.FORMS`.
+    shows: what the columns show, None for the levels of the pyramids.
+    beside: the same in other forms, by name.
     """
 
     served: Served
@@ -77,11 +82,39 @@ class World:
     one_range: bool = False
     browser: Browser | None = None
     drawn: Ints | None = None
+    form: str = PTM
+    shows: Shows | None = None
+    beside: Mapping[str, World] = field(default_factory=dict)
 
     @property
     def frames(self) -> int:
         """How many there are."""
         return len(self.time)
+
+    def in_form(self, form: str) -> World:
+        """The same for clients that take textures in a form.
+
+        Raises InputError PTM-I701 if it was not made ready for that.
+        """
+        if form == self.form:
+            return self
+        if form not in self.beside:
+            raise InputError(
+                "PTM-I701",
+                f"textures are not at hand as {FORMS[form].about} here",
+                remedy="walk with another policy, or by `ptm simulate`",
+            )
+        return self.beside[form]
+
+    def changed(self, change: Callable[[World], World]) -> World:
+        """A change of this and of what is beside it."""
+        beside = {name: change(world) for name, world in self.beside.items()}
+        return replace(change(self), beside=beside)
+
+    def counted_by_paper(self) -> World:
+        """The same with RGB of three bytes in texture memory."""
+        columns = FORMS[self.form].columns.load()(self.served, True)
+        return replace(self, catalogue=replace(self.catalogue, memory=columns.memory))
 
     def frustum(self, frame: int) -> Frustum:
         """What the camera of a frame takes in."""
@@ -105,6 +138,7 @@ class World:
             rate=rate,
             browser=None,
             drawn=None,
+            beside={name: world.standing(seconds) for name, world in self.beside.items()},
         )
 
 
@@ -118,6 +152,7 @@ def prepare(
     progress: Progress = silent,
     full: Pyramids | None = None,
     views: Views | None = None,
+    forms: Mapping[str, Shows] | None = None,
 ) -> World:
     """The world of a walk.
 
@@ -127,6 +162,7 @@ def prepare(
     rate: frames a second. pixels: of the item buffer, across and down.
     full: that pictures are compared with instead; see `look`.
     views: of this walk, if they have been made already.
+    forms: other forms that clients may take textures in, as `read_forms` reads them.
 
     Raises
     ------
@@ -167,11 +203,15 @@ def prepare(
         camera, drawn = _camera(walk, browser), _drawn(time, browser.age)
         pose = pose[np.where(drawn < 0, np.arange(len(time)), drawn)]
     seen, view = np.unique(pose, axis=0, return_inverse=True)
+    others: list[Views] = []
     if views is None:
         eyes, looks = seen[:, :3], seen[:, 3:]
-        views = look(served.surfaces, textures, camera, eyes, looks, progress, full=full)
+        shows = [*(forms or {}).values()]
+        views, *others = look_at_forms(
+            served.surfaces, textures, shows, camera, eyes, looks, progress, full=full
+        )
     catalogue = catalogue_of(served, textures.differences, textures.mean)
-    return World(
+    world = World(
         served=served,
         pyramids=textures,
         catalogue=catalogue.as_found(browser) if browser else catalogue,
@@ -188,6 +228,28 @@ def prepare(
         browser=browser,
         drawn=drawn,
     )
+    beside = {
+        name: replace(
+            world,
+            form=name,
+            catalogue=world.catalogue.in_columns(FORMS[name].columns.load()(served, False)),
+            views=found,
+            shows=shown,
+        )
+        for (name, shown), found in zip((forms or {}).items(), others, strict=True)
+    }
+    return replace(world, beside=beside)
+
+
+def read_forms(
+    served: Served, pyramids: Pyramids, names: Iterable[str], progress: Progress = silent
+) -> dict[str, Shows]:
+    """What textures show in the forms of those names, but for the `.ptm`s themselves.
+
+    Raises DatabaseError, LimitError: see `Form.shows`.
+    """
+    known = (FORMS[name] for name in dict.fromkeys(names))
+    return {f.name: f.shows.load()(served, pyramids, progress) for f in known if f.shows}
 
 
 def _require_fitting(browser: Browser, served: Served) -> None:

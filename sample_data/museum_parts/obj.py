@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from museum_parts.mesh import Thing
+from museum_parts.mesh import Point, Thing, Uv
 
 
 def number(value: float, digits: int) -> str:
@@ -15,6 +15,8 @@ def obj_text(things: list[Thing], head: list[str], library: str) -> str:
     """The objects with shared vertices (0.1 mm) and texture coordinates (1e-5)."""
     points: dict[str, int] = {}
     coordinates: dict[str, int] = {}
+    numbers: dict[Point, int] = {}  # most corners are there before: writing them out is slow
+    pairs: dict[Uv, int] = {}
     body: list[str] = []
     for thing in things:
         if thing.comment:
@@ -27,10 +29,13 @@ def obj_text(things: list[Thing], head: list[str], library: str) -> str:
                 body.append(f"usemtl {material}")
             corners = []
             for p, t in zip(face.points, face.uv, strict=True):
-                v = "v " + " ".join(number(c, 4) for c in p)
-                vt = "vt " + " ".join(number(c, 5) for c in t)
-                a = points.setdefault(v, len(points) + 1)
-                b = coordinates.setdefault(vt, len(coordinates) + 1)
+                a, b = numbers.get(p), pairs.get(t)
+                if a is None:
+                    v = "v " + " ".join(number(c, 4) for c in p)
+                    a = numbers[p] = points.setdefault(v, len(points) + 1)
+                if b is None:
+                    vt = "vt " + " ".join(number(c, 5) for c in t)
+                    b = pairs[t] = coordinates.setdefault(vt, len(coordinates) + 1)
                 corners.append(f"{a}/{b}")
             body.append("f " + " ".join(corners))
     lines = [*head, f"mtllib {library}", *points, *coordinates, *body]

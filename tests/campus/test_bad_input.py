@@ -80,8 +80,8 @@ BAD: list[tuple[str, Callable[[Path], list[str]]]] = [
     ("PTM-I248", text("d.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")),
     ("PTM-L203", text("t.obj", TRIANGLE * 2, "--max-triangles", "1")),
     ("PTM-L104", too_large_an_image),
-    ("PTM-O001", a_file_is_there),
-    ("PTM-O830", another_folder_is_there),
+    ("PTM-O820", a_file_is_there),
+    ("PTM-O820", another_folder_is_there),
 ]  # fmt: skip
 
 

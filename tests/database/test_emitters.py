@@ -78,7 +78,7 @@ def test_a_toy_emitter(
 def test_the_command_knows_it(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert main(["emit", str(tmp_path), "--format", "vrml,toy"]) == 5, "no database there"
     assert main(["emit", str(tmp_path), "--format", "vrml,toys"]) == 2
-    assert "'toys' is not one of vrml, gltf, toy" in capsys.readouterr().err
+    assert "'toys' is not one of vrml, gltf, interlace, toy" in capsys.readouterr().err
 
 
 def test_names_in_any_order() -> None:

@@ -18,6 +18,7 @@ from ptmtools.cli.main import main
 from ptmtools.database.fault import FileError
 from ptmtools.database.validation.findings import CODES
 from ptmtools.database.validation.hints import read_file
+from ptmtools.pipeline.folders import FOLDERS
 from ptmtools.pipeline.stages import STAGES
 from ptmtools.store.manifest import FORMAT, SCHEMA, Manifest, StageRecord
 
@@ -39,8 +40,11 @@ def validator(name: str) -> jsonschema.Draft202012Validator:
 
 @pytest.fixture(scope="module")
 def served(finished: Path) -> dict[str, dict[str, Any]]:
-    """By schema; the record with optional fields that no other database here has."""
+    """By schema; the index and the record with optional fields that no other database here has."""
     found = {n: json.loads((finished / "www" / file).read_text()) for n, file in SERVED.items()}
+    cube = {"low": [0.5, 0, -1], "side": 2}
+    octree = {"object": "a", "file": "apo/a.bin", "cube": cube, "levels": [2, 8]}
+    found[schemas.HINTS]["octrees"] = [octree | {"ends": [16, 90], "crc32": [0, 1]}]
     record = found[schemas.CELL]
     record["need"] = [[0, 1, 0.25, 0.125]]
     record["textureShares"] = [[[0, record["ach"][0]]], [[None, record["ach"][1]]], []]
@@ -323,4 +327,5 @@ def test_ok_is_what_the_exit_status_says(database: Path, run: Run) -> None:
 def test_the_codes_of_the_command(run: Run) -> None:
     status, stdout = run("validate", "--codes")
     assert status == 0
-    assert [line.split()[0] for line in stdout.splitlines()] == sorted(CODES)
+    every = {*CODES}.union(*(kind.codes.load() for kind in FOLDERS.values()))
+    assert [line.split()[0] for line in stdout.splitlines()] == sorted(every)

@@ -147,6 +147,7 @@ def test_status(model: Path, tmp_path: Path, ptm: Ptm) -> None:
     assert ptm("cells", model, "-o", db).status == 0
     assert states(ptm, db) == {
         "scene": "done",
+        "apo": "done",
         "cells": "done",
         **dict.fromkeys(["pvs", "ach", "textures", "emit"], "not run"),
     }

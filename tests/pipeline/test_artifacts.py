@@ -19,7 +19,7 @@ from ptmtools.cli.main import main
 from ptmtools.errors import DatabaseError
 from ptmtools.pipeline.images import images_of
 from ptmtools.pipeline.run import Artifacts
-from ptmtools.pipeline.stages import ACH, CELLS, PVS, SCENE
+from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import IMAGE_LIST, arrays_of, sha256
@@ -54,7 +54,7 @@ def replaced(db: Path, name: str, data: bytes) -> None:
 
 def opened(db: Path) -> list[object]:
     artifacts = Artifacts(DatabaseFolder.open(db))
-    return [artifacts[stage] for stage in (SCENE, CELLS, PVS, ACH)]
+    return [artifacts[stage] for stage in (APO, CELLS, PVS, ACH)]
 
 
 def first(name: str, value: object, at: int = 0) -> Change:
@@ -332,6 +332,11 @@ SAID: list[tuple[str, dict[str, Any]]] = [
     ("cells", {"parameters": {"structural": [5], "detail": []}}),
     ("textures", {"parameters": {"fallback_size": "x", "fallback": None}}),
     ("cells", {"recipe": 10**400}),
+    ("apo", {"inputs": {"stages/scene.npz": "0" * 64}}),
+    ("apo", {"parameters": {"apo": 5, "apo_faces": "many"}}),
+    ("apo", {"counts": {"octrees": "x", "source": None}}),
+    ("apo", {"recipe": 10**400}),
+    ("apo", {"outputs": {"stages/apo.npz": "0" * 64, "stages/octrees.json": "0" * 64}}),
 ]
 
 

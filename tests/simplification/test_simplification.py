@@ -72,8 +72,8 @@ def test_faces_do_not_turn() -> None:
 
 def test_windows_keep_their_outline_and_bricks_their_texture() -> None:
     given = facade(4, 3, 5)
-    # The outline of the wall and of 12 windows have 4 corners each; a window has two faces.
-    least = 2 * 12 + (2 * 4 * 12 + 4 - 2)
+    # Of the corners of the wall and of 12 windows, 4 are on the border.
+    least = 2 * (4 + 4 * 12) - 2 - 4
     found = to(least, given)
     assert len(found.mesh.triangles) == least
     # The root of rounding errors of texture coordinates.
@@ -92,6 +92,24 @@ def test_windows_keep_their_outline_and_bricks_their_texture() -> None:
     assert np.abs(found.mesh.uv[window] - (corner[window] - low)).max() < 1e-9
     assert (low == np.floor(low)).all()
     assert (low % 2 == 1).all()
+
+
+@pytest.mark.parametrize("painted", [False, True])
+def test_materials_or_colours_alone_make_seams(painted: bool) -> None:
+    given = replace(facade(2, 2, 4), uv=None)
+    assert given.material is not None
+    if painted:
+        colors = np.repeat(given.material, 9).reshape(-1, 3, 3).astype(np.uint8) * 200
+        given = replace(given, material=None, colors=colors)
+    found = to(2 * (4 + 4 * 4) - 2 - 4, given)
+    assert not found.notes
+    mesh = found.mesh
+    kind = mesh.material if mesh.colors is None else mesh.colors[:, 0, 0] // 200
+    assert (np.abs(normals(mesh)[:, 2]) / 2)[kind == 1].sum() == pytest.approx(4)
+    # The corners of the wall and of four windows.
+    assert len(mesh.points) == 4 + 4 * 4
+    assert (mesh.points == np.round(mesh.points)).all()
+    assert mesh.colors is None or (mesh.colors == mesh.colors[:, :1, :1]).all()
 
 
 def test_a_texture_that_bends_is_dear() -> None:

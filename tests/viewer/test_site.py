@@ -141,6 +141,7 @@ def test_the_poster_shows_the_first_viewpoint(two_rooms: Path, site: Site) -> No
     from ptmtools.walkthrough.served import read_served
     from ptmtools.walkthrough.view.pyramids import read_pyramids
     from ptmtools.walkthrough.view.rays import Camera, Caster
+    from ptmtools.walkthrough.view.records import own_levels
     from ptmtools.walkthrough.view.shading import shade
     from ptmtools.walkthrough.view.triangles import triangles_of
 
@@ -153,7 +154,7 @@ def test_the_poster_shows_the_first_viewpoint(two_rooms: Path, site: Site) -> No
     pyramids, shown = read_pyramids(served), np.empty((160 * 90, 3))
     triangles = triangles_of(served.surfaces)
     there = np.ones(served.cell_count, dtype=np.bool_)
-    shade(sight, triangles, pyramids, there, pyramids.levels, shown)
+    shade(sight, triangles, own_levels(pyramids), there, pyramids.levels, shown)
     poster = Image.open(io.BytesIO(site.entries[told(site)["poster"]].read())).resize((160, 90))
     textured = (sight.triangle >= 0) & (triangles.texture[sight.triangle] >= 0)
     assert textured.mean() > 0.2

@@ -7,11 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from ptmtools.cli.main import main
+from ptmtools.walkthrough.forms import FORMS
 from ptmtools.walkthrough.served import read_served
+from ptmtools.walkthrough.view.pyramids import read_pyramids
 from ptmtools.walkthrough.walk import Walk, read_walk
-from ptmtools.walkthrough.world import World, prepare
+from ptmtools.walkthrough.world import World, prepare, read_forms
 from tests.e2e.conftest import Ptm, ptm
 
 __all__ = ["Ptm", "ptm"]
@@ -41,6 +44,33 @@ def walk_file(two_rooms: Path) -> Path:
 def world(two_rooms: Path, walk_file: Path) -> World:
     """That walk's."""
     return prepare(read_served(two_rooms), read_walk(walk_file))
+
+
+@pytest.fixture(scope="session")
+def interlaced_rooms(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The database of the two rooms, with interlaced images, of which two have several files: one
+    of 256 × 256 texels, and one of 300 × 200 that is scaled."""
+    folder = tmp_path_factory.mktemp("interlaced_rooms")
+    shutil.copytree(SAMPLES / "two_rooms", folder / "model")
+    random = np.random.default_rng(7)
+    for name, shape in {"room_a": (256, 256), "room_b": (200, 300)}.items():
+        image = Image.open(folder / f"model/{name}.png").convert("RGB").resize(shape[::-1])
+        noise = random.integers(-20, 21, (*shape, 3))
+        texels = np.clip(np.asarray(image).astype(np.int64) + noise, 0, 255)
+        Image.fromarray(texels.astype(np.uint8)).save(folder / f"model/{name}.png")
+    model, formats = folder / "model" / "two_rooms.obj", "vrml,gltf,interlace"
+    words = ["-q", "build-scene", str(model), "-o", str(folder / "db"), "-j", "1"]
+    assert main([*words, "--format", formats]) == 0
+    return folder / "db"
+
+
+@pytest.fixture(scope="session")
+def interlaced_world(interlaced_rooms: Path, walk_file: Path) -> World:
+    """The same walk through them, in all forms."""
+    served = read_served(interlaced_rooms)
+    pyramids = read_pyramids(served)
+    forms = read_forms(served, pyramids, FORMS)
+    return prepare(served, read_walk(walk_file), pyramids, forms=forms)
 
 
 @pytest.fixture(scope="session")

@@ -64,3 +64,16 @@ def test_the_only_level_of_a_texture_is_worth_something(database: Path) -> None:
     served, pyramids = (read_served(database), read_pyramids(read_served(database)))
     stock = catalogue_of(served, pyramids.differences * 0, pyramids.mean)
     assert (stock.differences[np.arange(stock.texture_count), 1] >= LEAST).all()
+
+
+def test_how_large_an_image_is_on_a_shape(database: Path) -> None:
+    """Of the walls of the two rooms: 4 m wide and 3 m high, floors once a metre; in the doorway
+    once a metre both ways, across its sides and floor alike."""
+    served = read_served(database)
+    pyramids = read_pyramids(served)
+    stock = catalogue_of(served, pyramids.differences, pyramids.mean)
+    painted = stock.shapes.texture >= 0
+    found = {tuple(np.round(side, 3).tolist()) for side in stock.shapes.side[painted]}
+    assert found == {(4, 3), (1, 1)}
+    assert (stock.size[:, -1] == 64).all()
+    assert (stock.size[:, 1] == 1).all()

@@ -18,7 +18,7 @@ from ptmtools.walkthrough.request import Request
 from ptmtools.walkthrough.simulation import Run, simulate
 from ptmtools.walkthrough.view.tables import Views
 from ptmtools.walkthrough.world import World
-from tests.walkthrough.worlds import SEEDS, any_world, leaf
+from tests.walkthrough.worlds import SEEDS, any_world, for_policy, leaf
 
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)
 HONEST = [name for name, policy in POLICIES.items() if policy.knows is not Knows.FUTURE]
@@ -45,7 +45,8 @@ def played(
         clients.append(POLICIES[policy].client(world, link, budget))
         return clients[0]
 
-    run = simulate(world, replace(POLICIES[policy], client=make), conditions, budget)
+    declared = replace(POLICIES[policy], client=make)
+    run = simulate(for_policy(world, policy), declared, conditions, budget)
     return run, clients[0], asked
 
 

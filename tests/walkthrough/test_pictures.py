@@ -59,6 +59,7 @@ def card() -> Any:
         pyramids=textures,
         camera=Camera(2, 1, np.pi / 2, 2.0),
         catalogue=SimpleNamespace(cell_count=1, levels=np.array([2])),
+        shows=None,
     )
 
 

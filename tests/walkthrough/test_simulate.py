@@ -12,6 +12,7 @@ import pytest
 
 from ptmtools import schemas
 from ptmtools.walkthrough.comparing import SimulateOptions, play
+from ptmtools.walkthrough.forms import PTM
 from ptmtools.walkthrough.network import Conditions
 from ptmtools.walkthrough.policies import POLICIES, Declared
 from ptmtools.walkthrough.report import COLUMNS, table
@@ -20,7 +21,7 @@ from ptmtools.walkthrough.walk import Walk, walk_text
 from ptmtools.walkthrough.world import World
 from tests.walkthrough.conftest import Ptm
 
-ALL = [policy for policy in POLICIES.values() if policy.needs is None]
+ALL = [p for p in POLICIES.values() if p.needs is None and p.form == PTM]
 
 
 def test_json_and_csv(ptm: Ptm, two_rooms: Path, walk_file: Path, tmp_path: Path) -> None:
@@ -116,6 +117,7 @@ def test_the_same_twice_is_run_once(world: World) -> None:
         (["--latency", "soon"], "PTM-I712"),
         (["--overhead", "-1"], "PTM-I711"),
         (["--policy", "ach-texture"], "PTM-I701"),
+        (["--policy", "gpuii"], "PTM-I701"),
         (["--walk", "nowhere.json"], "PTM-I800"),
         (["--trace", "nowhere.json"], "PTM-I099"),
         (["--csv", "nowhere/frames.csv"], "PTM-O002"),

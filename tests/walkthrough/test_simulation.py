@@ -20,7 +20,7 @@ from ptmtools.walkthrough.request import Request
 from ptmtools.walkthrough.simulation import Run, simulate
 from ptmtools.walkthrough.world import World
 from tests.walkthrough.links import CONDITIONS
-from tests.walkthrough.worlds import SEEDS, any_world, catalogue, raw, standing
+from tests.walkthrough.worlds import SEEDS, any_world, catalogue, for_policy, raw, standing
 
 #: A world of a smaller seed is no smaller.
 PHASES = (Phase.explicit, Phase.reuse, Phase.generate)
@@ -36,6 +36,7 @@ class Witness:
     """Plays a client, and checks in each frame what it has against what it was sent."""
 
     def __init__(self, world: World, policy: str, conditions: Conditions, budget: int) -> None:
+        world = for_policy(world, policy)
         self.world, self.asked, self.frames = world, list[Request](), 0
         self.run = simulate(
             world, replace(POLICIES[policy], client=self._watched(policy)), conditions, budget
@@ -157,7 +158,7 @@ def same(a: Run, b: Run) -> bool:
 @settings(max_examples=5, phases=PHASES)
 @given(SEEDS, LINKS, BUDGETS)
 def test_the_same_run_twice(policy: str, seed: int, conditions: Conditions, budget: int) -> None:
-    world = any_world(seed)
+    world = for_policy(any_world(seed), policy)
     declared = POLICIES[policy]
     first = simulate(world, declared, conditions, budget)
     assert same(first, simulate(world, declared, conditions, budget))
@@ -176,7 +177,8 @@ def test_all_come_to_the_same_without_limits(seed: int, protocol: str) -> None:
     # The coarsest level is one texel, of the mean colour: some see no use in it alone.
     wanted[wanted == 1] = 0
     for name, policy in POLICIES.items():
-        run = simulate(world.standing(10), policy, Conditions(None, protocol=protocol), 1 << 50)
+        stays = for_policy(world, name).standing(10)
+        run = simulate(stays, policy, Conditions(None, protocol=protocol), 1 << 50)
         assert run.error[-1] == 0, name
         assert (np.minimum(run.column[-1], wanted) == wanted).all(), name
 
@@ -186,7 +188,7 @@ def test_all_come_to_the_same_without_limits(seed: int, protocol: str) -> None:
 @given(SEEDS)
 def test_nothing_comes_before_it_can(policy: str, seed: int) -> None:
     """The index takes a latency, the record and the geometry one more, textures a third."""
-    world = any_world(seed)
+    world = for_policy(any_world(seed), policy)
     run = simulate(world, POLICIES[policy], Conditions(None, latency=0.5), 1 << 40)
     early = run.time < 1.0
     assert run.error[early] == pytest.approx(of_nothing(world)[early])
@@ -199,7 +201,8 @@ def test_a_run_counted_by_hand(policy: str) -> None:
     """Who stands before two textures gets all there is, once, and all of it is on the screen."""
     textures = [raw(8), raw(16)]
     stock = catalogue(textures, [(0, 0), (0, 1)])
-    run = simulate(standing(stock, 5), POLICIES[policy], Conditions(None, 0.1), 1 << 40)
+    stays = for_policy(standing(stock, 5), policy)
+    run = simulate(stays, POLICIES[policy], Conditions(None, 0.1), 1 << 40)
     files = sum(sum(t.groups) for t in textures) + 4000
     # The index and the record; ach-views goes by the statistics, too.
     documents = 500 + 300 + 700 * (policy == "ach-views")
@@ -208,7 +211,7 @@ def test_a_run_counted_by_hand(policy: str) -> None:
     assert run.memory[-1] == run.uploads == sum(sum(t.memory) for t in textures)
     assert run.quality[-1] == 1
     # Geometry comes after the index, and for who waits for it also after the record.
-    assert run.stalls == run.there[:, 0].argmax() == (2 if policy == "lru" else 1)
+    assert run.stalls == run.there[:, 0].argmax() == (2 if policy in ("lru", "gpuii") else 1)
 
 
 def test_a_client_that_takes_more_memory_than_there_is() -> None:

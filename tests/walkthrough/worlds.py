@@ -7,7 +7,7 @@ an error that falls with each level, none with the finest that is wanted.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.walkthrough.catalogue import Catalogue, Shapes
+from ptmtools.walkthrough.policies import POLICIES
 from ptmtools.walkthrough.view.frustum import Frustum
 from ptmtools.walkthrough.view.rays import Camera
 from ptmtools.walkthrough.view.tables import Views
@@ -75,13 +76,14 @@ def catalogue(
     if random is not None:
         ends_of = np.sort(random.uniform(0, 1, (2, len(shapes), 3)), axis=0)
         low, high = low + ends_of[0] * ROOM, low + ends_of[1] * ROOM
-    own = Shapes(cell, texture_of, low, high)
+    own = Shapes(cell, texture_of, low, high, np.full((len(cell), 2), np.inf))
     rooms = np.arange(cells)[:, None] * [ROOM[0], 0, 0]
     records = tuple(_record(c, cells, textures, shapes, random) for c in range(cells))
     return Catalogue(
         levels=count,
         ends=ends,
         memory=memory,
+        size=np.repeat(memory[:, :, None], 2, axis=2),
         differences=differences,
         colors=np.full((len(textures), 3), 100.0),
         index_bytes=500,
@@ -217,6 +219,11 @@ def _row(
         ]
         need[:wanted] = share * np.linspace(1, 0.5, wanted)
     return wrong * share, wrong**2 * share, need, need.copy()
+
+
+def for_policy(world: World, policy: str) -> World:
+    """The same for a policy, in whose form everything is here."""
+    return replace(world, form=POLICIES[policy].form)
 
 
 def standing(stock: Catalogue, seconds: float) -> World:

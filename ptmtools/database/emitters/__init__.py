@@ -10,12 +10,13 @@ from __future__ import annotations
 from ptmtools.database.emitters.emitter import GZIP, Emitter
 from ptmtools.database.emitters.gltf import GLTF
 from ptmtools.database.emitters.hints import HINTS_EMITTER
+from ptmtools.database.emitters.interlace import INTERLACE
 from ptmtools.database.emitters.vrml import VRML
 
 __all__ = ["EMITTERS", "GZIP", "Emitter", "all_emitters", "chosen_emitters", "owner_of"]
 
 #: What `--format` names, in the order of writing.
-EMITTERS: dict[str, Emitter] = {emitter.name: emitter for emitter in (VRML, GLTF)}
+EMITTERS: dict[str, Emitter] = {emitter.name: emitter for emitter in (VRML, GLTF, INTERLACE)}
 #: What is written behind whichever of them are chosen.
 _ALWAYS = (HINTS_EMITTER,)
 

@@ -18,7 +18,7 @@ GZIP = ".gz"
 
 @dataclass(frozen=True)
 class Emitter:
-    """A form in which cells are served.
+    """A form in which cells, or their textures, are served.
 
     Attributes
     ----------
@@ -29,6 +29,8 @@ class Emitter:
     entry: the one of its files that leads to the others, if any, and that a browser opens; written
         when those are on the disk. A form without one is for clients of the hints.
     cell_files: template of the paths of the cells' geometry (`names.path_of`), if it writes that.
+    texture_files: template of the folders of the textures' files, if it writes textures in a form
+        of its own (`names.texture_name`).
     writer: function from a `Content` to the files, as (path in the served folder, str or bytes);
         what it can refuse, it refuses before it gives the first.
     reader: function from (path in the served folder, bytes) of one of its files to what the check
@@ -46,6 +48,7 @@ class Emitter:
     check: Lazy[Callable[[ServedDatabase], Mapping[str, int]]] | None = None
     entry: str = ""
     cell_files: str = ""
+    texture_files: str = ""
 
     def is_owner(self, path: str) -> bool:
         """Whether a path in the served folder is that of one of its files, or of a gzip copy."""

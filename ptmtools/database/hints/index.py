@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ptmtools.database.emitters import chosen_emitters
 from ptmtools.database.hints.numbers import coordinates, document_text, whole
-from ptmtools.database.model import TextureRecord, Viewpoint
+from ptmtools.database.model import OctreeRecord, TextureRecord, Viewpoint
 from ptmtools.database.names import FIRST_LOOK_FILES, RECORD_FILES, STATISTICS, cell_name
 from ptmtools.texture.model import gpu_texel_bytes
 
@@ -50,21 +50,24 @@ def index_text(content: Content) -> str:
         "geometry": {e.name: e.cell_files for e in emitters if e.cell_files},
         "statistics": STATISTICS,
     }
+    if sets := {e.name: e.texture_files for e in emitters if e.texture_files}:
+        head["textureSets"] = sets
     if content.options.first_look:
         head["firstLook"] = FIRST_LOOK_FILES
-    return document_text(
-        head,
-        {
-            "viewpoints": [_viewpoint(v) for v in content.viewpoints],
-            "textures": [_texture(r, content.options.fallback) for r in content.textures],
-            "cells": [
-                {"name": cell_name(c), "box": box} | ({} if standing else {"standing": False})
-                for c, (box, standing) in enumerate(
-                    zip(_boxes(content), cells.standing.tolist(), strict=True)
-                )
-            ],
-        },
-    )
+    lists: dict[str, list[Any]] = {
+        "viewpoints": [_viewpoint(v) for v in content.viewpoints],
+        "textures": [_texture(r, content.options.fallback) for r in content.textures],
+        "octrees": [_octree(r) for r in content.octrees],
+        "cells": [
+            {"name": cell_name(c), "box": box} | ({} if standing else {"standing": False})
+            for c, (box, standing) in enumerate(
+                zip(_boxes(content), cells.standing.tolist(), strict=True)
+            )
+        ],
+    }
+    if not content.octrees:
+        del lists["octrees"]
+    return document_text(head, lists)
 
 
 def texel_bytes(level: Level) -> int:
@@ -102,6 +105,17 @@ def _texture(record: TextureRecord, fallback: bool) -> Mapping[str, Any]:
         row["differences"] = [whole(value) for value in record.detail.differences]
         row["color"] = list(record.detail.color)
     return row
+
+
+def _octree(record: OctreeRecord) -> Mapping[str, Any]:
+    return {
+        "object": record.object,
+        "file": quote(record.file),
+        "cube": {"low": list(record.low), "side": record.side},
+        "levels": list(record.levels),
+        "ends": list(record.ends),
+        "crc32": list(record.crc32),
+    }
 
 
 def _boxes(content: Content) -> list[Any]:

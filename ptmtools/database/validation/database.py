@@ -20,7 +20,7 @@ import numpy as np
 from ptmtools import schemas
 from ptmtools.database.emitters import Emitter, all_emitters, chosen_emitters, owner_of
 from ptmtools.database.model import EmitOptions
-from ptmtools.database.names import HINTS, TEXTURE_FOLDER
+from ptmtools.database.names import HINTS, OCTREE_FOLDER, TEXTURE_FOLDER
 from ptmtools.database.validation.files import check_names, served_files
 from ptmtools.database.validation.findings import CODES
 from ptmtools.database.validation.reading import FileReader
@@ -116,7 +116,7 @@ class _Check:
         self._read_manifest()
         there = served_files(self._folder / SERVED, self.found)
         check_names(there, self.found)
-        database = ServedDatabase(self._folder / SERVED, there, self.found)
+        database = ServedDatabase(self._folder / SERVED, there, self.found, self._limits)
         ours = {path for path in there if self._is_ours(path)}
         self._note_others([path for path in there if path not in ours])
         self._strays = any(f"{SERVED}/{path}" not in self._outputs for path in ours)
@@ -138,6 +138,8 @@ class _Check:
         for path in sorted(ours - database.named):
             if path.startswith(f"{TEXTURE_FOLDER}/"):
                 database.at(path).add("PTM-D677", "no other file names it")
+            elif path.startswith(f"{OCTREE_FOLDER}/"):
+                database.at(path).add("PTM-D864", "no other file names it")
 
     def _read_manifest(self) -> None:
         """Fills in what the stages wrote."""
@@ -164,7 +166,9 @@ class _Check:
     def _is_ours(self, path: str) -> bool:
         """Whether a served file is one that was written, or lies where such files do."""
         written = f"{SERVED}/{path}" in self._outputs
-        return written or path.startswith(f"{TEXTURE_FOLDER}/") or owner_of(path) is not None
+        folder = path.partition("/")[0]
+        ours = folder in (TEXTURE_FOLDER, OCTREE_FOLDER) or owner_of(path) is not None
+        return written or ours
 
     def _note_others(self, paths: Sequence[str]) -> None:
         """Other files that users add are theirs."""

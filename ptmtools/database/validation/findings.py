@@ -88,6 +88,12 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D741": ("error", "the index, the records and the statistics contradict each other"),
     "PTM-D742": ("error", "a first-look bundle is not what its cell's record and the textures say"),
     "PTM-D743": ("error", "what a record says of how fine textures are needed cannot be"),
+    "PTM-D744": ("error", "the interlaced images are not those of the textures"),
+    "PTM-D860": ("error", "what hints.json says of an octree texture contradicts itself"),
+    "PTM-D861": ("error", "an octree texture is shorter or longer than its levels"),
+    "PTM-D862": ("error", "a level of an octree texture is damaged"),
+    "PTM-D863": ("error", "the texels of an octree texture are no octree, breadth first"),
+    "PTM-D864": ("warning", "hints.json does not name an octree texture"),
 }
 
 #: Of files that are not as their stage wrote them: a build sees that by itself.

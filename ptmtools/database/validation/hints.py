@@ -19,6 +19,7 @@ from ptmtools.database.names import BUNDLE, HINTS, HINTS_FOLDER, STATISTICS, pat
 from ptmtools.database.validation.first_look import check_first_looks
 from ptmtools.database.validation.lists import check_graph, check_list, check_shares
 from ptmtools.database.validation.need import impossible_need
+from ptmtools.database.validation.octrees import check_octrees
 from ptmtools.database.validation.served import ServedDatabase
 from ptmtools.database.validation.space import check_space
 from ptmtools.database.validation.textures import check_record
@@ -163,6 +164,7 @@ def check_files(database: ServedDatabase) -> Mapping[str, int]:
     _check_textures(hints, {t for textures in own.values() for t in textures}, database)
     _check_statistics(hints, database)
     check_first_looks(hints, database)
+    check_octrees(hints, database)
     _check_forms(hints, database)
     check_space(hints.records, hints.index["viewpoints"], places, at)
     for i, view in enumerate(hints.index["viewpoints"]):

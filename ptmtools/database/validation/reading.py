@@ -111,7 +111,7 @@ class FileReader:
         path = name.removeprefix(f"{SERVED}/")
         if suffix == GZIP:
             check_gzip(data, self._neighbour(stem), at)
-        elif suffix == ".png" and not self._is_served(f"{stem}.ptm"):
+        elif suffix == ".png" and owner_of(path) is None and not self._is_served(f"{stem}.ptm"):
             read_png(data, self.limits, at)
         elif suffix == ".ptm":
             fallback = self._neighbour(f"{stem}.png")

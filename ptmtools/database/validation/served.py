@@ -7,6 +7,7 @@ import posixpath
 import re
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,14 +16,16 @@ from urllib.parse import unquote_to_bytes
 from ptmtools.database.names import CELL_FOLDER
 from ptmtools.database.validation.textures import ReadTexture
 from ptmtools.files import open_regular
-from ptmtools.findings import Findings, Place
+from ptmtools.findings import Findings, Issue, Place
 from ptmtools.store.layout import SERVED
+from ptmtools.texture.model import Limits
 
 if TYPE_CHECKING:
     from ptmtools.database.validation.hints import ReadHints
 
 #: A path as a relative reference may have it (RFC 3986); all else is percent-encoded there.
 _PATH = re.compile(r"(?:[A-Za-z0-9._~!$&'()*+,;=:@/-]|%[0-9A-Fa-f]{2})+")
+_LIMITS = Limits()
 _ELSEWHERE = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:|//")
 
 
@@ -31,15 +34,19 @@ class ServedDatabase:
 
     Attributes
     ----------
+    folder: of the files.
     files: all that is served.
+    limits: of the check.
     held: what the emitters' readers gave of each of their files; none that gave None.
     textures: of each `.ptm` that could be read.
     named: the files that some URL names.
     """
 
-    def __init__(self, folder: Path, files: Iterable[str], found: Findings) -> None:
+    def __init__(
+        self, folder: Path, files: Iterable[str], found: Findings, limits: Limits = _LIMITS
+    ) -> None:
+        self.folder, self.limits = folder, limits
         self.files = set(files)
-        self._folder = folder
         self.held: dict[str, Any] = {}
         self.textures: dict[str, ReadTexture] = {}
         self.named: set[str] = set()
@@ -55,6 +62,10 @@ class ServedDatabase:
 
         return gather(self)
 
+    def take(self, path: str, issues: Iterable[Issue]) -> None:
+        """What the check of a folder in the served one found, by files of that."""
+        self._found.take(replace(i, file=f"{SERVED}/{path}{i.file}") for i in issues)
+
     def at(self, path: str, place: str = "") -> Place:
         """Who adds what is found in a served file."""
         return self._found.at(f"{SERVED}/{path}", place)
@@ -62,7 +73,7 @@ class ServedDatabase:
     def head(self, path: str, length: int) -> bytes:
         """So many first bytes of a served file, or all that can be read."""
         try:
-            with open_regular(self._folder / path) as file:
+            with open_regular(self.folder / path) as file:
                 return file.read(length)
         except OSError:
             return b""

@@ -6,18 +6,20 @@ from typing import Any
 
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages.ach import ACH
+from ptmtools.pipeline.stages.apo import APO
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.emit import EMIT
 from ptmtools.pipeline.stages.pvs import PVS
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.pipeline.stages.textures import TEXTURES
 
-__all__ = ["ACH", "CELLS", "EMIT", "PVS", "SCENE", "STAGES", "TEXTURES"]
+__all__ = ["ACH", "APO", "CELLS", "EMIT", "PVS", "SCENE", "STAGES", "TEXTURES"]
 
 STAGES: dict[str, Stage[Any]] = {
     stage.name: stage
     for stage in (
         SCENE,
+        APO,
         CELLS,
         PVS,
         ACH,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.stage import Stage
-from ptmtools.pipeline.stages.scene import SCENE
+from ptmtools.pipeline.stages.apo import APO
 from ptmtools.quantities import count
 
 if TYPE_CHECKING:
@@ -46,14 +46,14 @@ CELLS: Stage[Cells] = Stage(
     about="Read a model and cut it into cells and portals.",
     recipe=6,
     options=SubdivideOptions,
-    reads=(SCENE,),
+    reads=(APO,),
     changed="a cell is a place where one can stand, or what is seen from there",
     artifact=Lazy("ptmtools.cells.model:Cells"),
     compute=Lazy("ptmtools.cells:subdivide"),
     counts=_counts,
     notes=lambda cells, _: cells.notes,
     summary=_summary,
-    fits={SCENE: _fits_scene},
+    fits={APO: _fits_scene},
     from_model=True,
     one_thread=True,
 )

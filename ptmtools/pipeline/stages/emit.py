@@ -9,9 +9,9 @@ from ptmtools.database.model import EmitOptions
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages.ach import ACH
+from ptmtools.pipeline.stages.apo import APO
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.pvs import PVS
-from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.pipeline.stages.textures import TEXTURES
 from ptmtools.quantities import count, size
 
@@ -37,7 +37,8 @@ EMIT: Stage[None] = Stage(
     "coarse levels for each cell; "
     "viewpoints look where pictures are",
     options=EmitOptions,
-    reads=(SCENE, CELLS, PVS, ACH, TEXTURES),
+    reads=(APO, CELLS, PVS, ACH, TEXTURES),
+    files=(APO,),
     job=Lazy("ptmtools.pipeline.emission:EmissionJob"),
     summary=_summary,
 )

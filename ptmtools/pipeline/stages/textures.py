@@ -8,6 +8,7 @@ from typing import Any
 from ptmtools.lazy import Lazy
 from ptmtools.pipeline.options import TextureOptions
 from ptmtools.pipeline.stage import Stage
+from ptmtools.pipeline.stages.apo import APO
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.pipeline.stages.pvs import PVS
 from ptmtools.pipeline.stages.scene import SCENE
@@ -29,7 +30,7 @@ TEXTURES: Stage[None] = Stage(
     recipe=4,
     changed="what each level adds, and the mean colour of each texture, are kept for the hints",
     options=TextureOptions,
-    reads=lambda options: (SCENE, CELLS, PVS) if options.trim else (SCENE,),
+    reads=lambda options: (SCENE, APO, CELLS, PVS) if options.trim else (SCENE,),
     inputs=Lazy("ptmtools.pipeline.textures:inputs_of"),
     job=Lazy("ptmtools.pipeline.textures:TexturesJob"),
     tasks=Lazy("ptmtools.pipeline.textures:waiting_textures"),

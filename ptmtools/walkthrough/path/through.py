@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ptmtools.database.names import HINTS
 from ptmtools.pipeline import Artifacts
-from ptmtools.pipeline.stages import CELLS, SCENE
+from ptmtools.pipeline.stages import APO, CELLS
 from ptmtools.store.layout import SERVED
 from ptmtools.walkthrough.path.beginning import Viewpoints
 from ptmtools.walkthrough.path.making import Path, make_path
@@ -17,7 +17,7 @@ def path_through(artifacts: Artifacts, options: PathOptions) -> Path:
 
     Raises what `make_path` and `read_index` do.
     """
-    return make_path(artifacts[SCENE], artifacts[CELLS], options, _viewpoints(artifacts))
+    return make_path(artifacts[APO], artifacts[CELLS], options, _viewpoints(artifacts))
 
 
 def _viewpoints(artifacts: Artifacts) -> Viewpoints:

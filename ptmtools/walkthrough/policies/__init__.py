@@ -11,10 +11,12 @@ from enum import Enum
 from functools import partial
 
 from ptmtools.walkthrough.client import Client
+from ptmtools.walkthrough.forms import PTM
 from ptmtools.walkthrough.network import Link
 from ptmtools.walkthrough.policies import around, coverage
 from ptmtools.walkthrough.policies.best import BEST
 from ptmtools.walkthrough.policies.engine import EngineClient, Policy
+from ptmtools.walkthrough.policies.gpuii import GpuiiClient
 from ptmtools.walkthrough.policies.lru import LruClient
 from ptmtools.walkthrough.policies.oracle import Oracle
 from ptmtools.walkthrough.policies.paper import PaperClient
@@ -41,6 +43,7 @@ class Declared:
     knows: what it needs.
     client: makes a client of it, in a world, on a link, with a budget.
     needs: a field that the records of cells must have, and how to get it; None: as they always are.
+    form: in which it takes textures, a name in `ptmtools.walkthrough.forms.FORMS`.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Declared:
     knows: Knows
     client: Callable[[World, Link, int], Client]
     needs: tuple[str, str] | None = None
+    form: str = PTM
 
 
 def _engine(
@@ -66,6 +70,13 @@ def _same(policy: Policy, *, statistics: bool = False) -> Callable[[World, Link,
 _LIST = (
     Declared("paper", "Marvie & Bouatouch, §6.1 and §6.2, as written", Knows.CAMERA, PaperClient),
     Declared("lru", "files in the order met, and a cache", Knows.CAMERA, LruClient),
+    Declared(
+        "gpuii",
+        "interlaced images by rings around the camera, Englert et al., §3.3",
+        Knows.CAMERA,
+        GpuiiClient,
+        form="interlaced",
+    ),
     Declared(
         "ach",
         "the paper's weights, average coverage, in the common engine",

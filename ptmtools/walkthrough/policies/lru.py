@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ptmtools.walkthrough.client import Client, Kind
+from ptmtools.walkthrough.client import Kind
 from ptmtools.walkthrough.network import Link
 from ptmtools.walkthrough.policies.engine import CONNECTIONS
+from ptmtools.walkthrough.policies.whole import WholeClient
 from ptmtools.walkthrough.world import World
 
 
-class LruClient(Client):
+class LruClient(WholeClient):
     """See the module."""
 
     def __init__(self, world: World, link: Link, budget: int) -> None:
@@ -50,17 +51,7 @@ class LruClient(Client):
 
     def fetch(self) -> None:
         """See `Client.fetch`: one after the other, whole."""
-        self._whole(Kind.INDEX, 0)
-        if not self.index:
+        if not self.documents():
             return
-        self._whole(Kind.RECORD, int(self.world.cell[self.frame]))
-        if self.cell >= 0:
-            for cell in self.world.catalogue.visible[self.cell].tolist():
-                self._whole(Kind.GEOMETRY, cell)
         while self._queue and len(self.waiting) < CONNECTIONS:
-            self._whole(Kind.TEXTURE, self._queue.pop(0))
-
-    def _whole(self, kind: Kind, number: int) -> None:
-        files = self.files[kind]
-        if not files.asked[number]:
-            self.ask(kind, number, int(files.size[number]), -self.link.requests)
+            self.whole(Kind.TEXTURE, self._queue.pop(0))

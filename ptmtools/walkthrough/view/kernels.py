@@ -12,7 +12,7 @@ import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.compiled import inlined_kernel, plain_kernel
-from ptmtools.walkthrough.view.records import Pyramids, Sight, Triangles
+from ptmtools.walkthrough.view.records import Pyramids, Shows, Sight, Triangles
 
 #: What is shown where nothing is known: 0 to 255.
 GREY = 128.0
@@ -25,7 +25,8 @@ class Sums(NamedTuple):
     ----------
     pair: (m,) of each triangle.
     error, square: (P, L + 2) root mean squares over R, G and B, and their squares, with nothing,
-        the mean colour, level 0, level 1, … as the finest that is there.
+        the mean colour, level 0, level 1, … as the finest that is there; or the columns of `Shows`
+        in place of levels.
     need, sight: (P, L) how much each level is wanted, 0 to 1 a pixel, of all pixels and of those of
         a client's item buffer; the first stands for surfaces without texture.
     """
@@ -130,15 +131,14 @@ def level_of_detail(
 
 @inlined_kernel
 def texel_under(
-    sight: Sight, i: int, triangles: Triangles, textures: Pyramids, room: Floats
+    sight: Sight, i: int, triangles: Triangles, textures: Pyramids, t: int, room: Floats
 ) -> tuple[float, float, float]:
-    """Texture coordinates of what a pixel shows, and its level of detail (see `level_of_detail`),
-    which is 0 at least and at most that of the coarsest level.
+    """Texture coordinates of what a pixel shows, and its level of detail (see `level_of_detail`) in
+    a pyramid, which is 0 at least and at most that of the coarsest level.
 
-    ``i`` is the pixel, of a triangle with a texture; ``room`` (3, 3) to work in.
+    ``i`` is the pixel, ``t`` the pyramid; ``room`` (3, 3) to work in.
     """
     f = sight.triangle[i]
-    t = triangles.texture[f]
     finest = textures.levels[t] - 1
     ray, normal, gradient = sight.ray[i], triangles.normal[f], triangles.gradient[f]
     offset, scaled = room[0], room[1:]
@@ -206,9 +206,9 @@ def add_frame(
             continue
         clamped, finest = triangles.clamped[f], textures.levels[t] - 1
         if not same:
-            u, v, detail = texel_under(sight, i, triangles, full, work)
+            u, v, detail = texel_under(sight, i, triangles, full, t, work)
             blend(full, t, detail, u, v, clamped, exact, coarse)
-        u, v, detail = texel_under(sight, i, triangles, textures, work)
+        u, v, detail = texel_under(sight, i, triangles, textures, t, work)
         sharp = finest - int(detail)  # the finest level that is sampled
         for n in range(sharp + 1):
             sample(textures, t, n, u, v, clamped, shown[n + 2])
@@ -233,3 +233,62 @@ def add_frame(
             sums.need[p, n] += wanted
             if seen[i]:
                 sums.sight[p, n] += wanted
+
+
+@plain_kernel
+def add_columns(
+    sight: Sight,
+    seen: Bools,
+    triangles: Triangles,
+    shows: Shows,
+    full: Pyramids,
+    sums: Sums,
+    room: Floats,
+) -> None:
+    """As `add_frame`, of textures each column of which has levels of its own.
+
+    A column is wanted as far as the finest level of the one before it is too coarse: where texels
+    of its own finest level are no smaller than pixels, or, between that and half of it, in part;
+    the first always is.
+    """
+    exact, coarse, work, color = room[0], room[1], room[2:5], room[5]
+    for i in range(len(sight.triangle)):
+        f = sight.triangle[i]
+        if f < 0:
+            continue
+        p, t, tint = sums.pair[f], triangles.texture[f], triangles.color[f]
+        if t < 0:
+            for k in range(3):
+                exact[k] = 255.0 * tint[k]
+                color[k] = GREY
+            square = distance(color, exact)
+            sums.error[p, 0] += np.sqrt(square)
+            sums.square[p, 0] += square
+            sums.need[p, 0] += 1.0
+            if seen[i]:
+                sums.sight[p, 0] += 1.0
+            continue
+        clamped = triangles.clamped[f]
+        u, v, detail = texel_under(sight, i, triangles, full, t, work)
+        blend(full, t, detail, u, v, clamped, exact, coarse)
+        for k in range(3):
+            exact[k] *= tint[k]
+        for n in range(shows.last[t] + 2):
+            if n < 2:
+                for k in range(3):
+                    color[k] = shows.mean[t, k] * tint[k] if n else GREY
+            else:
+                row = shows.row[t, n - 1]
+                below = float(shows.pyramids.levels[row] - shows.held[t, n - 1])
+                u, v, detail = texel_under(sight, i, triangles, shows.pyramids, row, work)
+                wanted = min(max(below + 1.0 - detail, 0.0), 1.0) if n > 2 else 1.0
+                sums.need[p, n - 2] += wanted
+                if seen[i]:
+                    sums.sight[p, n - 2] += wanted
+                at = max(detail, below)
+                blend(shows.pyramids, row, at, u, v, clamped, color, coarse)
+                for k in range(3):
+                    color[k] *= tint[k]
+            square = distance(color, exact)
+            sums.error[p, n] += np.sqrt(square)
+            sums.square[p, n] += square

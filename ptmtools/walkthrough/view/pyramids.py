@@ -61,7 +61,7 @@ def _pyramids(served: Served, progress: Progress) -> Pyramids:
                     "PTM-D006", "is not the texture that the index has", file=file, remedy=BUILD
                 )
             for n, samples in enumerate(ptm.levels()):
-                level = _rgb(samples)
+                level = rgb(samples)
                 if below is None:
                     mean[t] = level.reshape(-1, 3).mean(axis=0)
                 else:
@@ -76,7 +76,7 @@ def _pyramids(served: Served, progress: Progress) -> Pyramids:
     return Pyramids(texel, start, size, levels, mean, differences)
 
 
-def _rgb(samples: NDArray[Any]) -> NDArray[np.uint8]:
+def rgb(samples: NDArray[Any]) -> NDArray[np.uint8]:
     """(h, w, 3) of (h, w, c) samples of any kind."""
     shown = in_eight_bits(samples)
     color = shown[:, :, :3] if shown.shape[2] >= 3 else np.repeat(shown[:, :, :1], 3, axis=2)

@@ -32,6 +32,32 @@ class Pyramids(NamedTuple):
     differences: Floats
 
 
+class Shows(NamedTuple):
+    """What the columns of textures show (`Catalogue`): each the coarsest levels of a pyramid.
+
+    Attributes
+    ----------
+    pyramids: any number of them.
+    row: (T, K) which of them each column shows. held: (T, K) how many of its levels.
+    last: (T,) column of each texture; the first is nothing.
+    mean: (T, 3) what is shown where nothing is there, 0 to 255.
+    """
+
+    pyramids: Pyramids
+    row: Ints
+    held: Ints
+    last: Ints
+    mean: Floats
+
+
+def own_levels(pyramids: Pyramids) -> Shows:
+    """Of textures with a pyramid each, whose columns are its levels."""
+    shape = pyramids.start.shape[0], pyramids.start.shape[1] + 1
+    held = np.minimum(np.arange(shape[1]), pyramids.levels[:, None])
+    row = np.repeat(np.arange(shape[0])[:, None], shape[1], axis=1)
+    return Shows(pyramids, row, held, pyramids.levels, pyramids.mean)
+
+
 class Triangles(NamedTuple):
     """All that are drawn.
 

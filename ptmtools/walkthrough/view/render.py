@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.walkthrough.view.rays import Camera, Caster
-from ptmtools.walkthrough.view.records import Sight
+from ptmtools.walkthrough.view.records import Shows, Sight, own_levels
 from ptmtools.walkthrough.view.triangles import triangles_of
 
 if TYPE_CHECKING:
@@ -28,7 +28,8 @@ class Renderer:
     def __init__(self, world: World, height: int, samples: int = 2) -> None:
         self.height, self.samples = height, samples
         self.width = max(1, round(height * world.camera.aspect))
-        self._world = world
+        self._world, self._full = world, own_levels(world.pyramids)
+        self._shows = self._full if world.shows is None else world.shows
         camera = world.camera
         self._camera = Camera(
             self.width * samples,
@@ -45,20 +46,24 @@ class Renderer:
         return self._caster.look(self._camera, eye, direction)
 
     def colors(self, sight: Sight, there: Bools, column: Ints) -> Floats:
-        """(height, width, 3) 0 to 255, with the geometry of cells (C,) that is there and so many
-        levels (T,) of each texture."""
+        """(height, width, 3) 0 to 255, with the geometry of cells (C,) that is there and a column
+        (T,) of each texture."""
+        return self._drawn(sight, self._shows, there, column)
+
+    def full(self, sight: Sight) -> Floats:
+        """The same with everything there, in whatever form clients take it: all levels of the
+        pyramids."""
+        there = np.ones(self._world.catalogue.cell_count, dtype=np.bool_)
+        return self._drawn(sight, self._full, there, self._full.last)
+
+    def _drawn(self, sight: Sight, shows: Shows, there: Bools, column: Ints) -> Floats:
         from ptmtools.walkthrough.view.shading import shade
 
         shown = np.empty((len(sight.ray), 3))
-        shade(sight, self._triangles, self._world.pyramids, there, column, shown)
+        shade(sight, self._triangles, shows, there, column, shown)
         each = (self.height, self.samples, self.width, self.samples, 3)
         found: Floats = shown.reshape(each).mean(axis=(1, 3))
         return found
-
-    def full(self, sight: Sight) -> Floats:
-        """The same with everything there."""
-        stock = self._world.catalogue
-        return self.colors(sight, np.ones(stock.cell_count, dtype=np.bool_), stock.levels)
 
 
 def as_bytes(colors: Floats) -> NDArray[np.uint8]:

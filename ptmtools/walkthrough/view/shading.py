@@ -8,14 +8,14 @@ import numpy as np
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.compiled import kernel
 from ptmtools.walkthrough.view.kernels import GREY, blend, texel_under
-from ptmtools.walkthrough.view.records import Pyramids, Sight, Triangles
+from ptmtools.walkthrough.view.records import Shows, Sight, Triangles
 
 
 @kernel
 def shade(
     sight: Sight,
     triangles: Triangles,
-    textures: Pyramids,
+    shows: Shows,
     there: Bools,
     column: Ints,
     shown: Floats,
@@ -23,7 +23,7 @@ def shade(
     """Writes to ``shown`` (n, 3) what the pixels of one frame show, 0 to 255: grey where the
     geometry is not there, the mean colour of textures of which nothing is, black where nothing is.
 
-    ``there`` (C,) geometry, and ``column`` (T,) how many levels of each texture.
+    ``there`` (C,) geometry, and ``column`` (T,) of each texture.
     """
     work, coarse = np.zeros((3, 3)), np.zeros(3)
     for i in range(len(sight.triangle)):
@@ -37,12 +37,13 @@ def shade(
         t = triangles.texture[f]
         held = column[t] if t >= 0 else 0
         if held > 0:
-            u, v, detail = texel_under(sight, i, triangles, textures, work)
+            textures, row = shows.pyramids, shows.row[t, held]
+            u, v, detail = texel_under(sight, i, triangles, textures, row, work)
             # The finest level that is there bounds the level of detail from below.
-            detail = max(detail, float(textures.levels[t] - held))
-            blend(textures, t, detail, u, v, triangles.clamped[f], pixel, coarse)
+            detail = max(detail, float(textures.levels[row] - shows.held[t, held]))
+            blend(textures, row, detail, u, v, triangles.clamped[f], pixel, coarse)
         else:
             for k in range(3):
-                pixel[k] = textures.mean[t, k] if t >= 0 else 255.0
+                pixel[k] = shows.mean[t, k] if t >= 0 else 255.0
         for k in range(3):
             pixel[k] *= triangles.color[f, k]

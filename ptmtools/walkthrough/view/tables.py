@@ -6,13 +6,19 @@ G and B (0 to 255), is summed up by the pair. A run then only looks up: the erro
 sum over its pairs, each at the level that the client holds. Nothing that is no texture is wrong
 once its cell is there; what is not there is grey.
 
+The same casting of the rays serves textures in several forms (`ptmtools.walkthrough.forms`). Of the
+levels of one pyramid each pixel samples every one once; a form whose steps are pyramids of their
+own (`Shows`) costs a sample of each.
+
 The level of detail is that of a screen of 1080 lines, whatever the item buffer has: a coarser
 buffer samples fewer pixels of the same picture.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +27,7 @@ from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.progress import Progress, silent
 from ptmtools.walkthrough.served import Surfaces
 from ptmtools.walkthrough.view.rays import Camera, Caster
-from ptmtools.walkthrough.view.records import Pyramids, Sight, Triangles
+from ptmtools.walkthrough.view.records import Pyramids, Shows, Sight, Triangles
 from ptmtools.walkthrough.view.triangles import triangles_of
 
 
@@ -34,7 +40,8 @@ class Views:
     start: (F + 1,) where the rows of each frame begin.
     cell, texture: (R,) int32 of each row; the texture is -1 for surfaces without.
     error, square: (R, L + 2) its part of the frame's mean of errors, and of squared errors, with as
-        the finest that is there: nothing, the mean colour, level 0, level 1, …
+        the finest that is there: nothing, the mean colour, level 0, level 1, …; in other forms
+        their columns in place of levels.
     need: (R, L) the share of the pixels for which a level is wanted, beside the coarser ones; for
         surfaces without texture the first is the share that they cover.
     sight: (R, L) the same in the item buffer that a client draws, with half as many pixels each
@@ -75,33 +82,56 @@ def look(
 ) -> Views:
     """The tables of (F, 3) eyes and unit directions of view; errors are against what ``full`` would
     show, which holds the same textures in other quality."""
+    return look_at_forms(surfaces, pyramids, (), camera, eye, direction, progress, full=full)[0]
+
+
+def look_at_forms(
+    surfaces: Surfaces,
+    pyramids: Pyramids,
+    forms: Sequence[Shows],
+    camera: Camera,
+    eye: Floats,
+    direction: Floats,
+    progress: Progress = silent,
+    *,
+    full: Pyramids | None = None,
+) -> list[Views]:
+    """The tables of `look`, and those of the same textures in other forms, against the same."""
     triangles, caster, seen = triangles_of(surfaces), Caster(surfaces), camera.sparse
-    tally = _Tally(triangles, pyramids, full, seen)
+    full = pyramids if full is None else full
+    shown: list[Pyramids | Shows] = [pyramids, *forms]
+    tallies = [_Tally(triangles, textures, full, seen) for textures in shown]
     owner = np.empty((len(eye), int(seen.sum())), np.int32)
     depth = np.empty(owner.shape, np.float32)
     for k in range(len(eye)):
         progress(k, len(eye), "looking along the walk")
         sight = caster.look(camera, eye[k], direction[k])
-        tally.add(sight)
+        for tally in tallies:
+            tally.add(sight)
         owner[k], depth[k] = _item_buffer(sight, triangles, seen)
     progress(len(eye), len(eye), "looking along the walk")
-    return tally.views(owner, depth)
+    return [tally.views(owner, depth) for tally in tallies]
 
 
 class _Tally:
     """Adds up frames."""
 
     def __init__(
-        self, triangles: Triangles, pyramids: Pyramids, full: Pyramids | None, seen: Bools
+        self, triangles: Triangles, textures: Pyramids | Shows, full: Pyramids, seen: Bools
     ) -> None:
-        from ptmtools.walkthrough.view.kernels import Sums
+        from ptmtools.walkthrough.view.kernels import Sums, add_columns, add_frame
 
         keys = np.stack([triangles.cell, triangles.texture], axis=1)
         self._pairs, pair = np.unique(keys, axis=0, return_inverse=True)
-        deepest = pyramids.start.shape[1]
+        self._add: Callable[..., None]
+        if isinstance(textures, Shows):
+            self._add, deepest = add_columns, textures.row.shape[1] - 1
+            self._what: tuple[Any, ...] = seen, triangles, textures, full
+        else:
+            self._add, deepest = add_frame, textures.start.shape[1]
+            self._what = seen, triangles, textures, full, textures is full
         columns = (deepest + 2, deepest + 2, deepest, deepest)
         self._sums = Sums(pair.reshape(-1), *(np.zeros((len(self._pairs), n)) for n in columns))
-        self._what = seen, triangles, pyramids, pyramids if full is None else full, full is None
         self._room = np.zeros((deepest + 7, 3))
         pixels = len(seen)
         self._pixels = (pixels, pixels, pixels, max(int(seen.sum()), 1))
@@ -111,9 +141,7 @@ class _Tally:
 
     def add(self, sight: Sight) -> None:
         """Makes the rows of the next frame."""
-        from ptmtools.walkthrough.view.kernels import add_frame
-
-        add_frame(sight, *self._what, self._sums, self._room)
+        self._add(sight, *self._what, self._sums, self._room)
         found = np.flatnonzero(self._sums.need[:, 0])
         self._found.append(found)
         for rows, table, pixels in zip(self._rows, self._sums[1:], self._pixels, strict=True):

@@ -1,0 +1,215 @@
+"""Which system shows the better picture for the same bytes: ``python benchmarks/neighbours.py``
+
+The viewer's client and others that take `.ptm`s, and the clients of the neighbouring systems, on
+the same walks: the sample museum (`make sample`), and a hall of large photographs, all different
+(`sample_data/make_photo_gallery.py`), which interlaced images are made for. `h1`, 100 ms to the
+first byte, 300 bytes of headers a request; geometry, records and hints are on the link, too. What
+is missing is made in ``build/bench/neighbours`` first, which takes minutes.
+
+e             mean over pixels and frames of the root mean square error over R, G and B, 0 to 255,
+              against the picture of all `.ptm`s with all of their levels
+/ best        e over that of `best`
+p95           what e does not exceed in 95 % of the frames
+50 %, …, s    until who stands where the walk begins has so much of the picture, at most a minute
+e at 100 kB   of who stands before a picture, at `PLACES` places of the walk, once so many bytes
+              have been received, over a link of 512 kbit/s with all memory, and over that of
+              `best`; in the end, and the bytes by then, after a minute
+all there     e over the walk with all files there: what scaling to powers of two and other mip
+              levels make of the same texels
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+from at_hand import ROOT
+from walk_scenes import ptm
+
+from ptmtools.arrays import Floats
+from ptmtools.quantities import size
+from ptmtools.walkthrough.comparing import Played, SimulateOptions, play
+from ptmtools.walkthrough.forms import FORMS, PTM
+from ptmtools.walkthrough.measures import STANDS
+from ptmtools.walkthrough.network import Conditions
+from ptmtools.walkthrough.policies import POLICIES, Declared
+from ptmtools.walkthrough.policies.gpuii import GpuiiClient
+from ptmtools.walkthrough.report import link_text
+from ptmtools.walkthrough.served import read_served
+from ptmtools.walkthrough.simulation import simulate
+from ptmtools.walkthrough.view.pyramids import read_pyramids
+from ptmtools.walkthrough.walk import read_walk
+from ptmtools.walkthrough.world import World, prepare, read_forms
+
+FOLDER = ROOT / "build/bench/neighbours"
+#: Those that take `.ptm`s, and the neighbouring systems; a row each.
+OURS, NEIGHBOURS = ("best", "paper", "lru", "distance"), ("gpuii",)
+RIVAL = "best"
+#: Of the walk, s; of links; and of texture memory.
+SECONDS, BANDWIDTHS, MEMORIES = 120, "56k,512k,4M", "10%,inf"
+#: Bytes received at which pictures are compared, at how many places, over what link.
+MARKS, PLACES, LINK = (100_000, 200_000, 500_000, 1_000_000, 2_000_000), 8, Conditions(512e3)
+#: Widths of the rings of `gpuii` that ``--rings`` tries, metres.
+RINGS = (0.5, 1.0, 2.0, 4.0, 8.0, 1000.0)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A scene: what makes its model, and where that is."""
+
+    name: str
+    script: str
+    model: Path
+
+
+SCENES = {
+    scene.name: scene
+    for scene in (
+        Scene("museum", "make_museum.py", ROOT / "build/museum/museum.obj"),
+        Scene("photos", "make_photo_gallery.py", ROOT / "build/photo_gallery/photo_gallery.obj"),
+    )
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--scenes", default=",".join(SCENES))
+    parser.add_argument("--policy", default=",".join((*OURS, *NEIGHBOURS)))
+    parser.add_argument("--bandwidth", default=BANDWIDTHS)
+    parser.add_argument("--memory", default=MEMORIES)
+    parser.add_argument("--rings", action="store_true", help="try rings of several widths instead")
+    given = parser.parse_args()
+    options = SimulateOptions(policy=given.policy, bandwidth=given.bandwidth, memory=given.memory)
+    for name in given.scenes.split(","):
+        world = world_of(SCENES[name], options.policies)
+        print(f"## {name}\n")
+        for line in rings(world) if given.rings else tables(world, options):
+            print(line, flush=True)
+
+
+def world_of(scene: Scene, policies: Sequence[Declared]) -> World:
+    """The world of a walk through a scene, in all forms that the policies take."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    if not scene.model.is_file():
+        script = ROOT / "sample_data" / scene.script
+        call = [sys.executable, str(script), "-o", str(scene.model.parent)]
+        subprocess.run(call, check=True, cwd=ROOT)
+    database, walk = FOLDER / f"{scene.name}.db", FOLDER / f"{scene.name}-{SECONDS}.json"
+    ptm("build-scene", scene.model, "-o", database, "--format", "vrml,gltf,interlace")
+    ptm("path", database, "-o", walk, "--duration", SECONDS, "--force")
+    served = read_served(database)
+    pyramids = read_pyramids(served)
+    forms = read_forms(served, pyramids, (policy.form for policy in policies))
+    return prepare(served, read_walk(walk), pyramids, forms=forms)
+
+
+def tables(world: World, options: SimulateOptions) -> Iterator[str]:
+    """All of a scene, as Markdown."""
+    yield from stock_table(world)
+    played = play({"": world}, options)
+    for (link, memory), runs in groupby(played, lambda p: (p.run.conditions, p.memory)):
+        block = list(runs)
+        held = size(block[0].run.budget)
+        yield f"\n{link_text(link)}; texture memory {memory} ({held})\n"
+        yield from runs_table(block)
+    yield f"\nStanding before pictures, {link_text(LINK)}, all memory\n"
+    yield from bytes_table(world, options.policies)
+    yield ""
+
+
+def stock_table(world: World) -> Iterator[str]:
+    """What the textures take in each form, and the error with all of it there."""
+    yield "| form | textures | their texture memory | all there |"
+    yield "|---|--:|--:|--:|"
+    for form in (PTM, *world.beside):
+        own = world.in_form(form)
+        stock = own.catalogue
+        fetched, held = size(int(stock.ends[:, -1].sum())), size(stock.whole)
+        yield f"| {FORMS[form].about} | {fetched} | {held} | {all_there(own):.2f} |"
+
+
+def all_there(world: World) -> float:
+    """e over the walk with everything there."""
+    views, last = world.views, np.append(world.catalogue.levels, 0)
+    rows = views.error[np.arange(len(views.texture)), last[views.texture] + 1]
+    of = np.repeat(np.arange(views.frames), np.diff(views.start))
+    left = np.where(views.texture >= 0, rows, 0.0)
+    frames: Floats = np.bincount(of, left, views.frames)
+    return float(frames[world.view].mean())
+
+
+def runs_table(block: list[Played]) -> Iterator[str]:
+    """A row for each system, of one link and memory."""
+    rival = next((p.measures.e.mean for p in block if p.run.policy == RIVAL), float("nan"))
+    yield "| system | e | / best | p95 | received | requests | 50 %, s | 90 %, s | 99 %, s |"
+    yield "|---" + "|--:" * 8 + "|"
+    for each in block:
+        m = each.measures
+        until = " | ".join("–" if t is None else f"{t:.1f}" for t in m.final)
+        yield (
+            f"| {each.run.policy} | {m.e.mean:.2f} | {m.e.mean / rival:.2f} | {m.e.p95:.2f} | "
+            f"{size(m.bytes)} | {m.requests:,} | {until} |"
+        )
+
+
+def bytes_table(world: World, policies: Sequence[Declared]) -> Iterator[str]:
+    """e by bytes received, means over places."""
+    places = standing_places(world)
+    heads = " | ".join(f"e at {size(mark)}" for mark in MARKS)
+    yield f"| system | {heads} | at the end | received |"
+    yield "|---" + "|--:" * (len(MARKS) + 2) + "|"
+    rival: list[float] = []
+    rows = {policy.name: by_bytes(world, policy, places) for policy in policies}
+    rival = rows.get(RIVAL, ([float("nan")] * (len(MARKS) + 1), 0.0))[0]
+    for name, (errors, received) in rows.items():
+        cells = " | ".join(f"{e:.2f} ({e / r:.2f})" for e, r in zip(errors, rival, strict=True))
+        yield f"| {name} | {cells} | {size(round(received))} |"
+
+
+def standing_places(world: World) -> list[int]:
+    """Frames in which the walker has just come to stand, spread over the walk."""
+    begins = np.flatnonzero(world.still[1:] & ~world.still[:-1]) + 1
+    chosen = begins[np.linspace(0, len(begins) - 1, min(PLACES, len(begins))).astype(int)]
+    found: list[int] = chosen.tolist()
+    return found
+
+
+def by_bytes(world: World, policy: Declared, places: Sequence[int]) -> tuple[list[float], float]:
+    """e at each of the `MARKS` and at the end, and the bytes by then."""
+    own, found = world.in_form(policy.form), []
+    for frame in places:
+        stands = replace(
+            own,
+            **{name: getattr(own, name)[frame:] for name in ("view", "eye", "direction", "cell")},
+        ).standing(STANDS)
+        run = simulate(stands, policy, LINK, own.catalogue.whole)
+        at = np.searchsorted(run.fetched, MARKS, "right") - 1
+        found.append([*run.error[np.maximum(at, 0)], run.error[-1], run.fetched[-1]])
+    *errors, received = np.mean(found, axis=0).tolist()
+    return errors, received
+
+
+def rings(world: World) -> Iterator[str]:
+    """e of `gpuii` with rings of several widths."""
+    own = world.in_form(POLICIES["gpuii"].form)
+    bandwidths = (512e3, 4e6)
+    yield "| ring, m | " + " | ".join(link_text(Conditions(b)) for b in bandwidths) + " |"
+    yield "|--:" * (1 + len(bandwidths)) + "|"
+    for ring in RINGS:
+        make: Callable[..., GpuiiClient] = partial(GpuiiClient, ring=ring)
+        policy = replace(POLICIES["gpuii"], client=make)
+        runs = (simulate(own, policy, Conditions(b), own.catalogue.whole // 10) for b in bandwidths)
+        yield f"| {ring:g} | " + " | ".join(f"{run.error.mean():.2f}" for run in runs) + " |"
+
+
+if __name__ == "__main__":
+    main()

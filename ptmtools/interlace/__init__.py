@@ -1,0 +1,30 @@
+"""GPU image interlacing: an image as a row of files that sharpen it step by step (Englert et al.,
+"Efficient Image Distribution on the Web", 2014). One of the systems beside `.ptm`; docs/
+format-interlace.md has the format.
+
+The names below are loaded when first used, so that importing this package costs nothing.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ptmtools.lazy import names
+
+if TYPE_CHECKING:
+    from ptmtools.interlace.checking import validate_interlaced as validate_interlaced
+    from ptmtools.interlace.model import (
+        Axis as Axis,
+        Interlaced as Interlaced,
+        InterlaceOptions as InterlaceOptions,
+        Part as Part,
+    )
+    from ptmtools.interlace.reading import (
+        deinterlace as deinterlace,
+        read_manifest as read_manifest,
+    )
+    from ptmtools.interlace.shader import StepShader as StepShader
+    from ptmtools.interlace.steps import join as join, split as split
+    from ptmtools.interlace.writing import interlace as interlace, write_folder as write_folder
+
+__getattr__ = names(__name__)

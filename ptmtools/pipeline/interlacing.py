@@ -1,0 +1,135 @@
+"""The interlaced images of a database's textures: what the emitter `interlace` writes and checks.
+
+Of each `.ptm` the finest level is interlaced, as it is served: with what `--max-error` and `--trim`
+have left of it. Sides that are no powers of two are scaled, and one that is short is one file
+(docs/format-interlace.md). Floats, which images do not hold, are taken in eight bits, as clients
+show them.
+
+A database and an interlaced image know nothing of each other; this is above both.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ptmtools.database.content import Content
+from ptmtools.database.emitters.interlace import INTERLACE
+from ptmtools.database.model import TextureRecord
+from ptmtools.database.names import HINTS, INTERLACE_FILES, INTERLACE_FOLDER, texture_name
+from ptmtools.database.validation.served import ServedDatabase
+from ptmtools.database.validation.textures import ReadTexture
+from ptmtools.errors import DatabaseError, InputError, naming
+from ptmtools.interlace.checking import validate_interlaced
+from ptmtools.interlace.model import INDEX, Interlaced
+from ptmtools.interlace.reading import read_manifest
+from ptmtools.interlace.writing import Written, interlace
+from ptmtools.texture import reader
+from ptmtools.texture.images import Picture
+from ptmtools.texture.model import Limits
+from ptmtools.texture.parallel import ordered
+from ptmtools.texture.samples import KINDS, in_eight_bits
+
+#: Files that no manifest of a set names are found by the check of the database.
+_STRAY = "PTM-D806"
+#: Samples of what floats are shown as.
+EIGHT_BITS = "uint8"
+
+
+def interlaced_files(content: Content) -> Iterator[tuple[str, str | bytes]]:
+    """The files of each texture's set, in the order of the hints, the manifest of each set last.
+
+    Raises
+    ------
+    DatabaseError: PTM-D602 a texture is not at hand.
+    InputError, LimitError: what reading a `.ptm` and `interlace` raise.
+    """
+    for record in content.textures:
+        if record.stored is None:
+            raise DatabaseError(
+                "PTM-D602",
+                f"the texture {record.file!r} was not encoded",
+                remedy="run the stage `textures` again",
+            )
+    sets = ordered(_interlaced, content.textures, os.cpu_count() or 1)
+    for record, written in zip(content.textures, sets, strict=True):
+        folder = INTERLACE_FILES.replace("{name}", texture_name(record.file))
+        for name, data in written.named():
+            yield f"{folder}{name}", data
+
+
+def _interlaced(record: TextureRecord) -> Written:
+    assert record.stored
+    finest = record.levels[-1]
+    # What was encoded once can be decoded: its levels, and room to work in.
+    limits = Limits(64 * finest.width * finest.height * record.components + (1 << 20))
+    with naming(record.stored), reader.open(record.stored, limits=limits) as ptm:
+        texels = ptm.level(len(ptm.header.levels) - 1)
+        if texels.dtype.kind == "f":
+            texels = in_eight_bits(texels)
+        return interlace(Picture(np.ascontiguousarray(texels)), limits=limits)
+
+
+def read_file(path: str, data: bytes) -> int:
+    """Nothing of a file is kept but its length: the sets are checked one by one."""
+    return len(data)
+
+
+def check_sets(database: ServedDatabase) -> Mapping[str, int]:
+    """Checks each texture's set, and that it is that of its texture; counts nothing."""
+    hints = database.hints
+    if hints is None:
+        return {}
+    template = hints.index.get("textureSets", {}).get(INTERLACE.name)
+    if template is None:
+        database.at(HINTS, "textureSets").add("PTM-D741", f"{INTERLACE.name} is there, not named")
+        return {}
+    rows = hints.index["textures"]
+    wanted = [template.replace("{name}", texture_name(row["file"])) + INDEX for row in rows]
+    found = database.resolve_each(HINTS, "textureSets", wanted)
+    for row, images, path in zip(rows, hints.images, found, strict=True):
+        if path is not None:
+            _check_set(database, path.removesuffix(INDEX), row, images)
+    sets = {p for p in database.files if p.startswith(f"{INTERLACE_FOLDER}/") and _is_index(p)}
+    for path in sorted(sets - set(found)):
+        database.at(path).add("PTM-D744", "is of no texture")
+    return {}
+
+
+def _is_index(path: str) -> bool:
+    return path.endswith(f"/{INDEX}")
+
+
+def _check_set(
+    database: ServedDatabase, folder: str, row: Mapping[str, Any], images: Sequence[str | None]
+) -> None:
+    """One set, by the check of interlaced images, and beside its texture."""
+    report = validate_interlaced(database.folder / folder, database.limits)
+    database.take(folder, (issue for issue in report.issues if issue.code != _STRAY))
+    try:
+        interlaced = read_manifest(database.folder / folder)
+    except InputError:
+        return  # has been found
+    texture = database.textures.get(images[-1] or "")
+    if wrong := _misfit(interlaced, row, texture):
+        database.at(f"{folder}{INDEX}").add("PTM-D744", wrong)
+
+
+def _misfit(interlaced: Interlaced, row: Mapping[str, Any], texture: ReadTexture | None) -> str:
+    """In what a set is not that of a texture; empty if it is."""
+    if not interlaced.lossless:
+        return f"{interlaced.container} is not exact"
+    size = row["width"], row["height"]
+    if interlaced.original != size:
+        old = " x ".join(map(str, interlaced.original))
+        return f"was made of {old} texels, the texture has {size[0]} x {size[1]}"
+    if interlaced.components != row["components"]:
+        return f"has {interlaced.components} components, the texture {row['components']}"
+    if texture:
+        kind = KINDS[texture.header.kind]
+        if interlaced.kind != (EIGHT_BITS if kind.is_float else kind.name):
+            return f"has samples of {interlaced.kind}, the texture of {kind.name}"
+    return ""

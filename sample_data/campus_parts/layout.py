@@ -1,0 +1,120 @@
+"""Where things are: the street's line, the plots beside it, and frames to put things into.
+
+The street bends a little every 250 m. Along it runs s, and t across it, to the right as seen by
+who walks on. Cosines and sines of its headings are rational, so that nothing depends on a
+library's last bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+from museum_parts.mesh import Face, Point
+
+from campus_parts.solids import Flat
+
+HEADINGS: list[Flat] = [(60 / 61, -11 / 61), (1.0, 0.0), (40 / 41, 9 / 41), (1.0, 0.0)]
+#: Metres: how far the street goes on at either end; half of the street; to the end of the
+#: pavement; of the front gardens; of the campus; from the middle to the buildings' fronts.
+BEYOND, KERB, PAVEMENT, GARDEN, EDGE, FRONT = 30.0, 5.0, 8.5, 24.0, 66.0, 15.0
+CURB_HEIGHT = 0.12
+#: The least frontage of a plot, m: the widest building, and room at the bends.
+LEAST_PLOT = 46.0
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A place to build on: x runs along ``right``, z along ``out``, y up from ``origin``."""
+
+    origin: Point
+    right: Flat
+    out: Flat
+
+    def at(self, p: Point) -> Point:
+        (x, y, z), (rx, rz), (ox, oz) = self.origin, self.right, self.out
+        return x + rx * p[0] + ox * p[2], y + p[1], z + rz * p[0] + oz * p[2]
+
+    def placed(self, faces: list[Face]) -> list[Face]:
+        return [Face(f.material, tuple(self.at(p) for p in f.points), f.uv) for f in faces]
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A building's ground: its part of the street's segment, on the right (1) or left (-1)."""
+
+    number: int
+    segment: int
+    slot: int
+    side: int
+    low: float
+    high: float
+
+
+class Street:
+    """The line of the street, its segments and plots."""
+
+    def __init__(self, buildings: int, length: float) -> None:
+        count = max(1, round(length / 250))
+        slots = -(-buildings // 2)
+        count = min(count, slots)
+        self.segment_length = length / count
+        shares = [slots * (k + 1) // count - slots * k // count for k in range(count)]
+        if self.segment_length / max(shares) < LEAST_PLOT:
+            least = round(LEAST_PLOT * max(shares) * count)
+            raise ValueError(
+                f"{buildings} buildings do not fit on {length:g} m: it takes {least} m"
+            )
+        self.headings = [HEADINGS[k % len(HEADINGS)] for k in range(count)]
+        self.nodes: list[Flat] = [(0.0, 0.0)]
+        for hx, hz in self.headings:
+            x, z = self.nodes[-1]
+            self.nodes.append((x + hx * self.segment_length, z + hz * self.segment_length))
+        self.shares = shares
+        self.plots: list[Plot] = []
+        slot = 0
+        for segment, share in enumerate(shares):
+            for k in range(share):
+                for side in (1, -1):
+                    if len(self.plots) < buildings:
+                        low, high = k / share, (k + 1) / share
+                        self.plots.append(Plot(len(self.plots), segment, slot, side, low, high))
+                slot += 1
+
+    def across(self, node: int) -> Flat:
+        """How far a node's cross-section moves for a metre of t: the mitre of two segments."""
+        a = self.headings[max(node - 1, 0)]
+        b = self.headings[min(node, len(self.headings) - 1)]
+        (ax, az), (bx, bz) = (-a[1], a[0]), (-b[1], b[0])
+        share = 1 + ax * bx + az * bz
+        return (ax + bx) / share, (az + bz) / share
+
+    def mitred(self, segment: int, f: float, t: float) -> Flat:
+        """The point at a share f of a segment, between its mitred ends."""
+        (x, z), (X, Z) = self.nodes[segment : segment + 2]
+        (p, q), (P, Q) = self.across(segment), self.across(segment + 1)
+        a, b = (x + p * t, z + q * t), (X + P * t, Z + Q * t)
+        return a[0] + (b[0] - a[0]) * f, a[1] + (b[1] - a[1]) * f
+
+    def frame(self, segment: int, s: float, t: float, y: float, side: int) -> Frame:
+        """At s metres along a segment, t across it; facing the street from the side given."""
+        (x, z), (hx, hz) = self.nodes[segment], self.headings[segment]
+        out = (hz * side, -hx * side)
+        return Frame((x + hx * s - hz * t, y, z + hz * s + hx * t), (out[1], -out[0]), out)
+
+    def line(self) -> list[Flat]:
+        """The middle of the street from one end to the other, beyond the plots too."""
+        (hx, hz), (kx, kz) = self.headings[0], self.headings[-1]
+        (x, z), (X, Z) = self.nodes[0], self.nodes[-1]
+        first, last = (x - hx * BEYOND, z - hz * BEYOND), (X + kx * BEYOND, Z + kz * BEYOND)
+        return [first, *self.nodes, last]
+
+
+def along(line: list[Flat], s: float) -> Flat:
+    """The point of a polyline at s metres from its beginning."""
+    for (x, z), (X, Z) in pairwise(line):
+        length = ((X - x) * (X - x) + (Z - z) * (Z - z)) ** 0.5
+        if s <= length:
+            return x + (X - x) * s / length, z + (Z - z) * s / length
+        s -= length
+    return line[-1]

@@ -1,0 +1,63 @@
+"""How a building is described, and the styles of windows that several have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from campus_parts.facade import Look
+from campus_parts.openings import Style
+from campus_parts.solids import Ring
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A building: its footprint, facades, roof, and what is added.
+
+    ``roof``: kind, surface, and rise over run of sloped ones. ``door_wall``: number of the wall
+    that has the entrance. ``extras``: names that `campus_parts.buildings` knows.
+    """
+
+    name: str
+    label: str
+    footprint: Callable[[], list[Ring]]
+    look: Look
+    roof: tuple[str, str] = ("flat", "roof_gravel")
+    pitch: float = 0.8
+    door_wall: int = 0
+    extras: frozenset[str] = field(default_factory=frozenset)
+
+
+SASH = Style(panes=(2, 3), depth=0.14, bar=0.05)
+CASEMENT = Style(panes=(2, 2), transom=True)
+CROSS = Style(panes=(2, 2), transom=True, depth=0.24, surround="frame", frame="paint_green")
+NOBLE = Style(panes=(2, 3), depth=0.2, surround="pediment")
+ROUND = Style(arched=True, depth=0.3, surround="keystone", frame="metal_dark", bar=0.08)
+MODERN = Style(panes=(3, 1), frame="metal_dark", depth=0.12, sill=False)
+RIBBON = Style(panes=(2, 2), frame="metal", depth=0.1, transom=True)
+CURTAIN = Style(panes=(2, 2), frame="metal_dark", glass=("glass_sky",), depth=0.08, sill=False)
+PLAIN = Style(panes=(2, 1), frame="paint_white", depth=0.18)
+LINTEL = Style(panes=(3, 3), frame="metal_dark", depth=0.2, surround="lintel", transom=True)
+SHOP = Style(
+    panes=(2, 2), frame="metal_dark", depth=0.3, glass=("glass_dark", "glass_sky"), transom=True
+)
+
+
+def look(wall: str, style: Style, **more: object) -> Look:
+    known = {"ground": wall, "ground_style": style, **more}
+    return Look(wall=wall, style=style, **known)  # type: ignore[arg-type]
+
+
+def recipe(
+    name: str,
+    label: str,
+    footprint: Callable[[], list[Ring]],
+    facade: Look,
+    roof: str = "flat roof_gravel",
+    extras: str = "",
+    **more: object,
+) -> Recipe:
+    kind, surface = roof.split()
+    return Recipe(
+        name, label, footprint, facade, (kind, surface), extras=frozenset(extras.split()), **more
+    )  # type: ignore[arg-type]

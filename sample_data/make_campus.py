@@ -1,0 +1,203 @@
+"""Makes the sample campus: forty buildings along a street of 1 km, as OBJ, MTL and PNG files.
+
+    python sample_data/make_campus.py -o build/campus
+    python sample_data/make_campus.py -o build/few --buildings 3 --length 100
+
+Metres, Y up. It stands in for the campus of the paper on levels of detail (section IV): the first
+third has buildings of which no two share a wall's texture, the last third is homogeneous. Beside
+colours some materials have an image of where they reflect (``map_Ks``), the trees one of where
+they are (``map_d``). ``campus_way.json`` is a walk along the street at 11 km/h, for ``ptm
+simulate``. The same seed gives the same bytes, whatever the machine (for the same numpy and
+Pillow). Needs numpy and Pillow, not ptmtools.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from campus_parts.buildings import build
+from campus_parts.furniture import furnish
+from campus_parts.ground import make_ground
+from campus_parts.layout import CURB_HEIGHT, FRONT, Street
+from campus_parts.materials import MATERIALS, Material
+from campus_parts.monuments import HETEROGENEOUS
+from campus_parts.quarters import MIXED, residence
+from campus_parts.recipes import Recipe
+from campus_parts.textures import ALPHAS, IMAGES, mask, signs
+from campus_parts.way import way_text
+from museum_parts.files import HEAD, File, between, png, write
+from museum_parts.mesh import Face, Thing
+from museum_parts.noise import bytes_of
+from museum_parts.obj import number, obj_text
+from PIL import Image
+
+#: What stands along the way, in its order: no two walls alike, then what recurs, then one kind.
+RECIPES = [*HETEROGENEOUS, *MIXED, *(residence(k) for k in range(14))]
+
+
+@dataclass(frozen=True)
+class CampusOptions:
+    """What `make_campus` builds; ``length`` in metres, textures are square, ``texture`` wide."""
+
+    buildings: int = 40
+    length: float = 1000
+    seed: int = 1
+    texture: int = 512
+
+
+def generator(seed: int, *stream: int) -> np.random.Generator:
+    """An independent stream of random numbers for each part of the campus."""
+    return np.random.Generator(np.random.PCG64([seed, *stream]))
+
+
+def chosen(buildings: int) -> list[Recipe]:
+    """A recipe for each building: few of them come from the whole length of the way."""
+    return [RECIPES[k * len(RECIPES) // buildings] for k in range(buildings)]
+
+
+def make_things(options: CampusOptions) -> tuple[list[Thing], Street, tuple[float, float]]:
+    """All objects in the world, the street, and the (x, z) that the model was centred by."""
+    street = Street(options.buildings, options.length)
+    recipes = chosen(options.buildings)
+    things: list[Thing] = make_ground(street)
+    depths = []
+    for plot, recipe in zip(street.plots, recipes, strict=True):
+        built = build(recipe, generator(options.seed, 1, plot.number))
+        depths.append(max(-z for _, z in built.rings[0]))
+        middle = (plot.low + plot.high) / 2 * street.segment_length
+        back = FRONT + (plot.number * 7 % 5) * 0.8
+        frame = street.frame(plot.segment, middle, plot.side * back, CURB_HEIGHT - 0.02, plot.side)
+        faces = sorted(frame.placed(built.faces), key=lambda f: f.material)
+        things.append(Thing(f"building_{plot.number + 1:02d}_{recipe.name}", faces))
+    things += furnish(street, recipes, depths, generator(options.seed, 2))
+    xs, zs = ([p[i] for t in things for f in t.faces for p in f.points] for i in (0, 2))
+    # Whole tenths of millimetres, so that rounding is that of the uncentred places.
+    x, z = (round((min(c) + max(c)) / 2, 4) for c in (xs, zs))
+    for thing in things:
+        thing.faces = [
+            Face(f.material, tuple((p[0] - x, p[1], p[2] - z) for p in f.points), f.uv)
+            for f in thing.faces
+        ]
+    return things, street, (x, z)
+
+
+def used(things: list[Thing]) -> dict[str, Material]:
+    names = {face.material for thing in things for face in thing.faces}
+    return {name: material for name, material in MATERIALS.items() if name in names}
+
+
+def mtl_text(materials: dict[str, Material]) -> str:
+    blocks = [f"{HEAD} campus: materials\n"]
+    for name, m in materials.items():
+        kd = " ".join(number(c, 3) for c in m.tint)
+        lines = [f"newmtl {name}", f"Kd {kd}"]
+        lines += [f"d {number(m.opacity, 2)}"] if m.opacity < 1 else []
+        lines += ["Ks 0.5 0.5 0.5", "Ns 60", "illum 2"] if m.mask else ["illum 1"]
+        clamp = "" if m.tile else "-clamp on "
+        lines.append(f"map_Kd {clamp}textures/{m.image}.png")
+        lines += [f"map_Ks {clamp}textures/{m.image}_mask.png"] if m.mask else []
+        lines += [f"map_d {clamp}textures/{m.image}_alpha.png"] if m.alpha else []
+        blocks.append("\n".join(lines) + "\n")
+    return "\n".join(blocks)
+
+
+def pictures(materials: dict[str, Material], options: CampusOptions) -> Iterator[File]:
+    """The images of the materials, each with its further channels."""
+    size, seed = options.texture, options.seed
+    streams = {name: k for k, name in enumerate(IMAGES)}
+    masked = {m.image for m in materials.values() if m.mask}
+    clear = {m.image for m in materials.values() if m.alpha}
+
+    def lettered() -> bytes:
+        labels = [recipe.label for recipe in chosen(options.buildings)]
+        return png(signs(labels)(generator(seed, 6), size))
+
+    def drawn(name: str) -> Callable[[], bytes]:
+        def load() -> bytes:
+            field = IMAGES[name](generator(seed, 3, streams[name]), size)
+            return png(Image.fromarray(bytes_of(field)))
+
+        return load
+
+    def reflecting(name: str) -> Callable[[], bytes]:
+        def load() -> bytes:
+            field = IMAGES[name](generator(seed, 3, streams[name]), size)
+            grey = mask(name, field, generator(seed, 4, streams[name]), size)
+            return png(Image.fromarray(bytes_of(grey)))
+
+        return load
+
+    def cut(name: str) -> Callable[[], bytes]:
+        def load() -> bytes:
+            return png(
+                Image.fromarray(bytes_of(ALPHAS[name](generator(seed, 5, streams[name]), size)))
+            )
+
+        return load
+
+    for name in dict.fromkeys(m.image for m in materials.values()):
+        if name == "signs":
+            yield f"textures/{name}.png", lettered
+            continue
+        yield f"textures/{name}.png", drawn(name)
+        if name in masked:
+            yield f"textures/{name}_mask.png", reflecting(name)
+        if name in clear:
+            yield f"textures/{name}_alpha.png", cut(name)
+
+
+def make_campus(options: CampusOptions) -> Iterator[File]:
+    """The campus's files: relative path and a function that returns the bytes; the OBJ last.
+
+    Raises ValueError if the buildings do not fit along the street.
+    """
+    things, street, centre = make_things(options)
+    materials = used(things)
+    images = list(pictures(materials, options))
+    triangles = sum(len(f.points) - 2 for t in things for f in t.faces)
+    head = [
+        f"{HEAD} campus: {options.buildings} buildings on {number(options.length, 1)} m, "
+        f"{triangles} triangles, {len(images)} images, seed {options.seed}",
+        "# metres, Y up",
+    ]
+    model = obj_text(things, head, "campus.mtl").encode()
+    library = mtl_text(materials).encode()
+    way = way_text(street, options.length, centre).encode()
+    yield from images
+    yield "campus_way.json", lambda: way
+    yield "campus.mtl", lambda: library
+    yield "campus.obj", lambda: model
+
+
+def main(arguments: list[str] | None = None) -> int:
+    default = CampusOptions()
+    parser = argparse.ArgumentParser(
+        description="Make the sample campus: OBJ, MTL and PNG files, and a walk through it.",
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    add = parser.add_argument
+    add("-o", "--output", type=Path, required=True, metavar="DIR", help="folder to write")
+    add("--buildings", type=between(1, 400), default=default.buildings, help="on both sides")
+    add("--length", type=between(50, 20000), default=default.length, help="m of street")
+    add("--seed", type=between(0, 2**63), default=default.seed, help="another campus")
+    add("--texture", type=between(8, 8192), default=default.texture, help="texels of a side")
+    add("--force", action="store_true", help="write into a folder that holds other files")
+    given = parser.parse_args(arguments)
+    options = CampusOptions(given.buildings, given.length, given.seed, given.texture)
+    try:
+        files = list(make_campus(options))
+        write(given.output, files, force=given.force)
+    except (OSError, ValueError) as error:
+        parser.exit(1, f"make_campus: {error}\n")
+    total = sum((given.output / name).stat().st_size for name, _ in files)
+    print(f"{given.output}: {len(files)} files, {total / 1e6:.1f} MB")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

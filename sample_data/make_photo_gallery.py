@@ -1,0 +1,166 @@
+"""Makes a gallery of photographs: one hall, its walls full of large images, all different.
+
+    python sample_data/make_photo_gallery.py -o build/photo_gallery
+
+The scene that systems for large image collections are made for: nearly all bytes are images, of
+1024 to 4096 texels a side, powers of two; there is one room, and most images are in view at once.
+The images are landscapes, portraits and still lifes by the museum's painters, which stand in for
+photographs. Metres, Y up; closed. The same options give the same bytes, whatever the machine (for
+the same numpy and Pillow). Needs numpy and Pillow, not ptmtools.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from make_museum import File, generator, png, write
+from museum_parts.mesh import Face, Point, Thing, Uv, tiled
+from museum_parts.obj import obj_text
+from museum_parts.paintings import PAINTINGS, Painting
+
+HEAD = "# ptmtools sample gallery of photographs"
+#: The painters whose pictures come nearest to photographs.
+STYLES = ("landscape", "portrait", "seascape", "still_life", "night")
+#: Texels of a side → metres of the longer side on the wall.
+METRES = {4096: 3.6, 2048: 2.4, 1024: 1.4}
+#: Of every twelve images so many have this side, each after the other where there is one left.
+SIDES = (4096, 1024, 1024, 2048, 1024, 1024, 2048, 1024, 1024, 2048, 1024, 1024)
+#: Metres: between images and at corners, the middle of an image above the floor, off the wall.
+GAP, CORNER, MIDDLE, OFF = 0.6, 0.8, 1.9, 0.02
+#: Width of the hall by its length, and its height, metres.
+DEEP, HIGH = 0.45, 5.0
+COLORS = {"wall": (0.92, 0.91, 0.88), "floor": (0.5, 0.4, 0.3), "ceiling": (0.97, 0.97, 0.96)}
+
+
+@dataclass(frozen=True)
+class Photo:
+    """An image: name, texels of a side, metres on the wall, and who makes it."""
+
+    name: str
+    side: int
+    width: float
+    height: float
+    paint: Painting
+
+
+def photos(count: int) -> list[Photo]:
+    """So many images, of the styles in turn."""
+    by_name = {name: (paint, aspect) for name, paint, aspect in PAINTINGS}
+    found = []
+    for k in range(count):
+        paint, aspect = by_name[STYLES[k % len(STYLES)]]
+        side = SIDES[k % len(SIDES)]
+        longer = METRES[side]
+        width, height = (longer, longer / aspect) if aspect > 1 else (longer * aspect, longer)
+        found.append(Photo(f"photo_{k + 1:02d}", side, width, height, paint))
+    return found
+
+
+def hung(images: list[Photo]) -> tuple[float, list[Thing]]:
+    """The length of the hall in which they fill all walls, and the images on them."""
+    length = 2.0
+    while (walls := _filled(images, length)) is None:
+        length += 0.5
+    return length, walls
+
+
+def _filled(images: list[Photo], length: float) -> list[Thing] | None:
+    """The images on the walls of a hall of that length, or None if they do not fit."""
+    deep = round(length * DEEP, 3)
+    waiting, things = list(images), []
+    # North, east, south, west: where each begins at its left, and which way it goes.
+    walls: list[tuple[float, Callable[[float], tuple[float, float]]]] = [
+        (length, lambda s: (s, OFF)),
+        (deep, lambda s: (length - OFF, s)),
+        (length, lambda s: (length - s, deep - OFF)),
+        (deep, lambda s: (OFF, deep - s)),
+    ]
+    for room, place in walls:
+        at = CORNER
+        while waiting and at + waiting[0].width + CORNER <= room:
+            image = waiting.pop(0)
+            things.append(_image(image, place(at), place(at + image.width)))
+            at += image.width + GAP
+    return None if waiting else things
+
+
+def _image(image: Photo, left: tuple[float, float], right: tuple[float, float]) -> Thing:
+    low, high = MIDDLE - image.height / 2, MIDDLE + image.height / 2
+    points: tuple[Point, ...] = (
+        (left[0], low, left[1]),
+        (right[0], low, right[1]),
+        (right[0], high, right[1]),
+        (left[0], high, left[1]),
+    )
+    uv: tuple[Uv, ...] = ((0, 0), (1, 0), (1, 1), (0, 1))
+    return Thing(image.name, [Face(image.name, points, uv)])
+
+
+def hall(length: float) -> list[Thing]:
+    """Its walls, floor and ceiling, seen from inside."""
+    x, z = length, round(length * DEEP, 3)
+    ground = ((0.0, 0.0), (x, 0.0), (x, z), (0.0, z))
+    flat: list[Point] = [(a, 0.0, b) for a, b in reversed(ground)]
+    things = [
+        Thing("floor", [tiled("floor", tuple(flat), 1.0)]),
+        Thing("ceiling", [tiled("ceiling", tuple((a, HIGH, b) for a, b in ground), 1.0)]),
+    ]
+    for k, name in enumerate(("north", "east", "south", "west")):
+        (a, b), (c, d) = ground[k], ground[(k + 1) % 4]
+        points: tuple[Point, ...] = ((a, 0.0, b), (c, 0.0, d), (c, HIGH, d), (a, HIGH, b))
+        things.append(Thing(f"wall_{name}", [tiled("wall", points, 1.0)]))
+    return things
+
+
+def make_gallery(count: int, seed: int) -> Iterator[File]:
+    """The files of the gallery: relative path and a function that returns the bytes; the OBJ
+    last."""
+    images = photos(count)
+    length, pictures = hung(images)
+    plain = [
+        f"newmtl {name}\nKd {' '.join(map(str, color))}\nillum 1\n"
+        for name, color in COLORS.items()
+    ]
+    painted = [
+        f"newmtl {i.name}\nKd 1 1 1\nillum 1\nmap_Kd -clamp on textures/{i.name}.png\n"
+        for i in images
+    ]
+    materials = "\n".join([f"{HEAD}: materials\n", *plain, *painted]).encode()
+    head = [f"{HEAD}: {count} images, seed {seed}", "# metres, Y up"]
+    model = obj_text([*hall(length), *pictures], head, "photo_gallery.mtl").encode()
+
+    def loader(k: int) -> Callable[[], bytes]:
+        return lambda: png(images[k].paint(generator(seed, 5, k), images[k].side))
+
+    for k, image in enumerate(images):
+        yield f"textures/{image.name}.png", loader(k)
+    yield "photo_gallery.mtl", lambda: materials
+    yield "photo_gallery.obj", lambda: model
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        description="Make a gallery of photographs: OBJ, MTL and PNG files.",
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    add = parser.add_argument
+    add("-o", "--output", type=Path, required=True, metavar="DIR", help="folder to write")
+    add("--images", type=int, default=24, help="how many, 1 to 200")
+    add("--seed", type=int, default=1, help="other images")
+    add("--force", action="store_true", help="write into a folder that holds other files")
+    given = parser.parse_args(arguments)
+    if not (1 <= given.images <= 200 and given.seed >= 0):
+        parser.error("--images is 1 to 200, --seed 0 or more")
+    try:
+        write(given.output, list(make_gallery(given.images, given.seed)), force=given.force)
+    except OSError as error:
+        parser.exit(1, f"make_photo_gallery: {error}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,229 @@
+"""The surface of a solid as triangles of even size: closed, and everywhere a surface.
+
+Space is filled with the tetrahedra of a body-centred cubic lattice, which are all alike; each that
+has corners inside and outside gives one triangle or two (marching tetrahedra). Neighbours share
+what crosses their common edges, so the surface is closed and each edge has two triangles, whatever
+the function is. Then points slide along the surface towards the middle of their neighbours, and are
+put back on it by Newton's method, which makes slivers into triangles.
+
+The function is only asked near the surface: where a block's middle is farther from it than `STEEP`
+times the way to the block's corners, the whole block is on one side.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from statue_parts.fields import Points, Values
+
+Field = Callable[[Points], Values]
+Ints = NDArray[np.int64]
+
+#: Points that the function is asked for at a time.
+PART = 1 << 13
+#: Cubes along a block's side, and how much less than the distance the function may be.
+BLOCK, STEEP = 4, 2.2
+#: The number of triangles may differ from what was asked for by this share.
+WITHIN, TRIES = 0.07, 5
+#: How often points slide, how far of the way, and at most by which share of a cube.
+SLIDES, SHARE, FARTHEST = 3, 0.6, 0.25
+#: The function is smoothed over this share of a cube, lest points jump across sharp edges.
+AROUND = 0.3
+
+
+def ask(field: Field, p: Points) -> Values:
+    """The function at (3, n) points, a part at a time, on all processors."""
+    parts = [p[:, first : first + PART] for first in range(0, p.shape[1], PART)]
+    if not parts:
+        return np.zeros(0)
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        return np.concatenate(list(threads.map(field, parts)))
+
+
+def mesh(
+    field: Field, low: tuple[float, ...], high: tuple[float, ...], triangles: int
+) -> tuple[Values, Ints]:
+    """(P, 3) points and (T, 3) triangles, about so many, of the solid within a box."""
+    extent = np.array(high) - np.array(low)
+    cube = float(extent.max()) / 40
+    best: tuple[Values, Ints, float] | None = None
+    for _ in range(TRIES):
+        points, found = _march(field, np.array(low), extent, cube)
+        if best is None or abs(len(found) - triangles) < abs(len(best[1]) - triangles):
+            best = points, found, cube
+        if abs(len(found) - triangles) <= WITHIN * triangles:
+            break
+        cube *= (len(found) / triangles) ** 0.5
+    assert best is not None
+    points, found = _main_part(*best[:2])
+    return _slid(field, points, found, best[2]), found
+
+
+def _main_part(points: Values, triangles: Ints) -> tuple[Values, Ints]:
+    """The largest of the surfaces that hang together; crumbs are left out."""
+    label = np.arange(len(points))
+    while True:
+        parent = np.arange(len(points))
+        least = label[triangles].min(axis=1)
+        for k in range(3):
+            np.minimum.at(parent, label[triangles[:, k]], least)
+        if np.array_equal(parent[label], label):
+            break
+        while not np.array_equal(parent, above := parent[parent]):
+            parent = above
+        label = parent[label]
+    kept = label == np.argmax(np.bincount(label))
+    number = np.cumsum(kept) - 1
+    return points[kept], number[triangles[kept[triangles[:, 0]]]]
+
+
+def _march(field: Field, low: Values, extent: Values, cube: float) -> tuple[Values, Ints]:
+    blocks = np.ceil((extent + 2 * cube) / (cube * BLOCK)).astype(np.int64)
+    count = blocks * BLOCK
+    low = low - (count * cube - extent) / 2
+    corner, middle = _values(field, low, cube, blocks)
+    inside = (corner < 0, middle < 0)
+    first = int(np.prod(count + 1))
+
+    def number(at: Ints) -> Ints:
+        """Of corners (n, 3), in the lattice of all corners and then all middles."""
+        return (at[:, 0] * (count[1] + 1) + at[:, 1]) * (count[2] + 1) + at[:, 2]
+
+    def middle_number(at: Ints) -> Ints:
+        return first + (at[:, 0] * count[1] + at[:, 1]) * count[2] + at[:, 2]
+
+    value = np.concatenate([corner.ravel(), middle.ravel()])
+    ends = []
+    for tetrahedra in _tetrahedra(inside, number, middle_number):
+        mask = (value[tetrahedra] < 0) @ np.array([1, 2, 4, 8])
+        for case, rows in CASES.items():
+            chosen = tetrahedra[mask == case]
+            ends += [chosen[:, np.array(row)] for row in rows]
+    edge = np.concatenate(ends).reshape(-1, 2)
+    edge.sort(axis=1)
+    key, triangles = np.unique(edge[:, 0] * len(value) + edge[:, 1], return_inverse=True)
+    a, b = np.divmod(key, len(value))
+    share = value[a] / (value[a] - value[b])
+    share = np.clip(share, 0.1, 0.9)[:, None]
+    pa, pb = (_places(ids, first, count, low, cube) for ids in (a, b))
+    return pa + share * (pb - pa), triangles.reshape(-1, 3)
+
+
+def _places(ids: Ints, first: int, count: Ints, low: Values, cube: float) -> Values:
+    of_corner = np.stack(np.unravel_index(np.minimum(ids, first - 1), count + 1), axis=1)
+    of_middle = np.stack(np.unravel_index(np.maximum(ids - first, 0), count), axis=1) + 0.5
+    at = np.where((ids < first)[:, None], of_corner, of_middle)
+    return np.asarray(low + at * cube)
+
+
+def _values(field: Field, low: Values, cube: float, blocks: Ints) -> tuple[Values, Values]:
+    """At the corners and in the middles of all cubes; outside along the border."""
+    side = BLOCK * cube
+    at = np.stack(np.indices(blocks), axis=-1).reshape(-1, 3)
+    centre = ask(field, (low + (at + 0.5) * side).T)
+    near = at[np.abs(centre) < STEEP * side * 3**0.5 / 2] * BLOCK
+    whole = centre.reshape(blocks)
+    for axis in range(3):
+        whole = np.repeat(whole, BLOCK, axis=axis)
+    middle = whole.copy()
+    corner = np.pad(whole, ((0, 1),) * 3, mode="edge")
+    for array, offset, size in ((middle, 0.5, BLOCK), (corner, 0.0, BLOCK + 1)):
+        steps = np.stack(np.indices((size,) * 3), axis=-1).reshape(-1, 3)
+        asked = np.zeros(array.shape, dtype=bool)
+        here = (near[:, None] + steps).reshape(-1, 3)
+        asked[tuple(here.T)] = True
+        here = np.argwhere(asked)
+        array[asked] = ask(field, (low + (here + offset) * cube).T)
+    for axis in range(3):
+        for end in (0, -1):
+            edge: list[int | slice] = [slice(None)] * 3
+            edge[axis] = end
+            corner[tuple(edge)] = np.maximum(np.abs(corner[tuple(edge)]), 1e-9)
+            middle[tuple(edge)] = np.maximum(np.abs(middle[tuple(edge)]), 1e-9)
+    return corner, middle
+
+
+def _tetrahedra(
+    inside: tuple[NDArray[np.bool_], NDArray[np.bool_]],
+    number: Callable[[Ints], Ints],
+    middle_number: Callable[[Ints], Ints],
+) -> Iterator[Ints]:
+    """(n, 4) lattice points of those that the surface crosses, and some more: the middles of two
+    cubes beside each other, and two corners beside each other of the face between them."""
+    corner, middle = inside
+    for axis in range(3):
+        one, two = (axis + 1) % 3, (axis + 2) % 3
+        shape = np.array(middle.shape)
+        shape[axis] -= 1
+
+        def part(array: NDArray[np.bool_], offset: Ints, shape: Ints = shape) -> Ints:
+            return array[tuple(slice(o, o + n) for o, n in zip(offset, shape, strict=True))] * 1
+
+        along, across, up = (np.eye(3, dtype=np.int64)[k] for k in (axis, one, two))
+        zero = np.zeros(3, dtype=np.int64)
+        around = [along, along + across, along + across + up, along + up]
+        total = part(middle, zero) + part(middle, along)
+        for offset in around:
+            total = total + part(corner, offset)
+        at = np.argwhere((total > 0) & (total < 6))
+        a, b = middle_number(at), middle_number(at + along)
+        for k in range(4):
+            p, q = number(at + around[k]), number(at + around[(k + 1) % 4])
+            yield np.stack([a, b, p, q], axis=1)
+
+
+def _cases() -> dict[int, list[list[list[int]]]]:
+    """For each set of corners inside, triangles of edges that face outwards."""
+    # Middles along x, corners around it: as `_tetrahedra` has them, for every axis alike.
+    place = np.array([[-0.5, 0, 0], [0.5, 0, 0], [0, -0.5, -0.5], [0, 0.5, -0.5]])
+    cases = {}
+    for mask in range(1, 15):
+        within = [k for k in range(4) if mask >> k & 1]
+        without = [k for k in range(4) if not mask >> k & 1]
+        edges = [[a, b] for a in within for b in without]
+        if len(edges) == 4:  # a0, a1, b0, b1 around in order
+            edges = [edges[0], edges[1], edges[3], edges[2]]
+        middles = np.array([(place[a] + place[b]) / 2 for a, b in edges])
+        normal = np.cross(middles[1] - middles[0], middles[2] - middles[0])
+        if normal @ (place[without].mean(axis=0) - place[within].mean(axis=0)) < 0:
+            edges.reverse()
+        cases[mask] = [[edges[0], edges[k], edges[k + 1]] for k in range(1, len(edges) - 1)]
+    return cases
+
+
+CASES = _cases()
+
+
+def _gradient(field: Field, p: Values, step: float) -> tuple[Values, Values]:
+    """The function and its gradient at (n, 3) points, from four beside them."""
+    ways = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=np.float64)
+    asked = np.concatenate([p + step * way for way in ways]).T
+    values = ask(field, np.ascontiguousarray(asked)).reshape(4, -1)
+    gradient = np.stack(
+        [(values[0] + ways[1, k] * values[1] + ways[2, k] * values[2] + ways[3, k] * values[3])
+         for k in range(3)], axis=1) / (4 * step)  # fmt: skip
+    return (values[0] + values[1] + values[2] + values[3]) / 4, gradient
+
+
+def _slid(field: Field, points: Values, triangles: Ints, cube: float) -> Values:
+    a, b = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).T
+    count = np.bincount(a, minlength=len(points))[:, None]
+    for share in (*[SHARE] * SLIDES, 0.0):
+        value, gradient = _gradient(field, points, AROUND * cube)
+        square = (gradient[:, 0] ** 2 + gradient[:, 1] ** 2 + gradient[:, 2] ** 2)[:, None]
+        square = np.maximum(square, 1e-6)
+        means = np.stack(
+            [np.bincount(a, points[b, k], len(points)) for k in range(3)], axis=1
+        ) / np.maximum(count, 1)
+        way = share * (means - points)
+        dot = way[:, 0] * gradient[:, 0] + way[:, 1] * gradient[:, 1] + way[:, 2] * gradient[:, 2]
+        way -= gradient * dot[:, None] / square
+        way -= gradient * value[:, None] / square
+        length = np.sqrt(way[:, 0] ** 2 + way[:, 1] ** 2 + way[:, 2] ** 2)[:, None]
+        points = points + way * np.minimum(1.0, FARTHEST * cube / np.maximum(length, 1e-12))
+    return points
