@@ -39,7 +39,7 @@ def color_of(
     if t < 0:
         color[:] = 255.0
     else:
-        u, v, detail = texel_under(sight, i, triangles, textures, work[:3])
+        u, v, detail = texel_under(sight, i, triangles, textures, t, work[:3])
         blend(textures, t, detail, u, v, triangles.clamped[f], color, work[3])
     for k in range(3):
         color[k] *= triangles.color[f, k]
