@@ -42,6 +42,7 @@ COMMANDS = {
     "interlace": ("interlacing", "interlace", "Split an image into files that sharpen it."),
     "deinterlace": ("interlacing", "deinterlace", "Join the files of an interlaced image."),
     "campus": ("campus", "campus", "Write a model as objects with levels of detail."),
+    "walk-campus": ("walk_campus", "walk_campus", "Walk through a campus as clients would see it."),
     "warm-up": ("warm_up", "warm_up", "Compile for this machine, before the first run."),
     "compare": ("comparing", "compare", "Compare .ptm with other image formats: size and speed."),
 }

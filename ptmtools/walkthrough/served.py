@@ -152,7 +152,7 @@ def read_served(database: str | os.PathLike[str]) -> Served:
         file = _of(folder, index["geometry"][FORM], name)
         data = _bytes(file)
         geometry.append(_glb(file, data, cell, len(index["textures"])))
-        sizes.append(_on_link(data))
+        sizes.append(on_link(data))
     locator = Locator(records)
     return Served(
         folder,
@@ -200,10 +200,10 @@ def _document(file: Path, schema: str) -> tuple[Document, int]:
         raise DatabaseError(
             "PTM-D006", fault.message, file=file, place=fault.place or None, remedy=BUILD
         ) from None
-    return document, _on_link(data)
+    return document, on_link(data)
 
 
-def _on_link(data: bytes) -> int:
+def on_link(data: bytes) -> int:
     """Bytes of a file that a server sends compressed (gzip), as it can all but textures."""
     return min(len(data), len(zlib.compress(data, 6)) + _GZIP_MORE)
 

@@ -1,0 +1,204 @@
+"""What of a campus can be fetched: its files, what each weighs on the link and in graphics memory,
+and which of them each object needs.
+
+On the link every file is a request. The index and the meshes count as gzip makes them, as other
+clients' do (docs/walkthrough.md); images as they lie. In graphics memory a mesh takes the bytes of
+its vertices and indices, a texture or lightmap four bytes a texel and a third for its mip levels,
+whatever its channel.
+"""
+
+from __future__ import annotations
+
+import os
+import zlib
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from ptmtools import schemas
+from ptmtools.arrays import Floats, Ints
+from ptmtools.campus.model import CHANNELS, INDEX, LIGHT, PRESETS, SIZES, Campus, Quality
+from ptmtools.campus.names import texture_file
+from ptmtools.campus.reading import read_campus
+from ptmtools.errors import InputError
+from ptmtools.files import open_regular
+from ptmtools.glb import glb_chunks
+from ptmtools.walkthrough.served import on_link
+
+#: Bytes of a texel in graphics memory.
+_TEXEL = 4
+_AGAIN = "write it again with `ptm campus`"
+
+
+@dataclass(frozen=True)
+class Stock:
+    """All files; number 0 is the index.
+
+    Attributes
+    ----------
+    campus: what the index says.
+    names: (n,) of the files. sent: (n,) bytes on the link. stored: (n,) as they lie.
+    memory: (n,) of graphics memory; 0 of the index. most: (n,) what a client that knows only the
+        index takes for that, never less: of a mesh the bytes of its file.
+    boxes, barycentres: (m, 6), (m, 3) of the objects, metres.
+    bases: of textures, by their number; those that have a diffuse channel.
+    """
+
+    campus: Campus
+    names: tuple[str, ...]
+    sent: Ints
+    stored: Ints
+    memory: Ints
+    most: Ints
+    boxes: Floats
+    barycentres: Floats
+    bases: tuple[str, ...]
+
+    @property
+    def objects(self) -> int:
+        """How many there are."""
+        return len(self.campus.objects)
+
+    def meshes(self, number: int) -> tuple[int, ...]:
+        """Files of an object's meshes, from the coarsest to the finest."""
+        return tuple(self._number[mesh.file] for mesh in self.campus.objects[number].meshes)
+
+    def low(self, number: int) -> tuple[int, ...]:
+        """Files that an object needs at first: its coarsest mesh, textures of the least size."""
+        return (self.meshes(number)[0], *self.textures(number, SIZES[0]))
+
+    def high(self, number: int, quality: Quality, lightmaps: bool) -> tuple[int, ...]:
+        """Files of its high detail: its finest mesh, textures and lightmap of a preset."""
+        each = self.campus.objects[number]
+        files = [self.meshes(number)[-1], *self.textures(number, quality.diffuse)]
+        if lightmaps and each.lightmap is not None:
+            files.append(self._number[texture_file(each.lightmap, quality.light, LIGHT)])
+        return tuple(files)
+
+    def textures(self, number: int, size: int) -> tuple[int, ...]:
+        """Files of all channels of an object's materials, each once, in their order."""
+        materials = [self.campus.materials[m] for m in self.campus.objects[number].materials]
+        names = [
+            texture_file(m.base, size, channel)
+            for m in materials
+            if m.base is not None
+            for channel in CHANNELS
+            if channel in m.channels
+        ]
+        return tuple(dict.fromkeys(self._number[name] for name in names))
+
+    def diffuse(self, base: int, size: int) -> int:
+        """The file of the colours of a base."""
+        return self._number[texture_file(self.bases[base], size, CHANNELS[0])]
+
+    @cached_property
+    def _number(self) -> dict[str, int]:
+        return {name: number for number, name in enumerate(self.names)}
+
+
+def read_stock(folder: str | os.PathLike[str], only: str = "*") -> Stock:
+    """What can be fetched of a campus, of which no other objects exist than those whose names are
+    as ``only`` says, with * and ?.
+
+    Raises
+    ------
+    InputError: PTM-I714 a file is missing, or not that of the index, or no object has such a name;
+        PTM-I832, I833 the index cannot be read, or is damaged.
+    LimitError: PTM-L831 the index is too long.
+    """
+    folder = Path(folder)
+    campus = read_campus(folder)
+    kept = tuple(each for each in campus.objects if fnmatchcase(each.name, only))
+    if not kept:
+        raise refused(folder / INDEX, f"has no object {only}", "give names that it has")
+    campus = replace(campus, objects=kept)
+    index = _bytes(folder, INDEX)
+    rows = [(on_link(index), len(index), 0, 0)]
+    sizes = {texture.file: texture.size for texture in campus.textures}
+    files = campus.files()
+    for name in files:
+        data = file_bytes(folder, name, files[name])
+        if name in sizes:
+            taken = _TEXEL * _mipped(sizes[name])
+            rows.append((len(data), len(data), taken, taken))
+        else:
+            rows.append((on_link(data), len(data), _held(folder, name, data), len(data)))
+    sent, stored, memory, most = np.array(rows, dtype=np.int64).T.copy()
+    stock = Stock(
+        campus=campus,
+        names=(INDEX, *files),
+        sent=sent,
+        stored=stored,
+        memory=memory,
+        most=most,
+        boxes=np.array([o.box for o in campus.objects], dtype=np.float64).reshape(-1, 6),
+        barycentres=np.array([o.barycentre for o in campus.objects]).reshape(-1, 3),
+        bases=_bases(campus),
+    )
+    _require_textures(folder, stock)
+    return stock
+
+
+def file_bytes(folder: Path, name: str, listed: tuple[int, int] | None = None) -> bytes:
+    """The bytes of a file of a campus, of which the index lists size and CRC-32. Its schema has no
+    names that lead out of the folder.
+
+    Raises InputError PTM-I714.
+    """
+    data = _bytes(folder, name)
+    if listed is not None and (len(data), zlib.crc32(data)) != listed:
+        raise refused(folder / name, "is not the file that the index of the campus lists")
+    return data
+
+
+def _bytes(folder: Path, name: str) -> bytes:
+    try:
+        with open_regular(folder / name) as stream:
+            return stream.read()
+    except OSError as fault:
+        raise refused(folder / name, f"cannot be read ({fault.strerror or fault})") from None
+
+
+def _held(folder: Path, name: str, data: bytes) -> int:
+    """Bytes of the vertices and indices of a mesh."""
+    try:
+        views = schemas.parse(glb_chunks(data)[0][2])["bufferViews"]
+        return sum(int(view["byteLength"]) for view in views)
+    except (ValueError, LookupError, TypeError, schemas.ShapeError) as fault:
+        raise refused(folder / name, f"is no mesh of a campus ({fault})") from None
+
+
+def _mipped(side: int) -> int:
+    """Texels of a square and of its mip levels."""
+    total = 0
+    while side:
+        total += side * side
+        side >>= 1
+    return total
+
+
+def _bases(campus: Campus) -> tuple[str, ...]:
+    named = (m.base for m in campus.materials if m.base is not None and CHANNELS[0] in m.channels)
+    return tuple(dict.fromkeys(named))
+
+
+def _require_textures(folder: Path, stock: Stock) -> None:
+    """That the index lists each file which an object may want."""
+    campus = stock.campus
+    for number, each in enumerate(campus.objects):
+        if max(each.materials, default=-1) >= len(campus.materials):
+            raise refused(folder / INDEX, f"{each.name} has a material that there is not")
+        try:
+            stock.low(number)
+            for quality in PRESETS:
+                stock.high(number, quality, True)
+        except KeyError as fault:
+            raise refused(folder / INDEX, f"does not list {fault.args[0]}") from None
+
+
+def refused(file: Path, what: str, remedy: str = _AGAIN) -> InputError:
+    """PTM-I714."""
+    return InputError("PTM-I714", what, file=file, remedy=remedy)
