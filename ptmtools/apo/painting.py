@@ -67,7 +67,7 @@ def paint_of(scene: Scene, kept: Ints) -> Paint:
     images = []
     for image in scene.images:
         with naming(image.name):
-            shown = in_eight_bits(load_image(image.load()).upright().array())
+            shown = in_eight_bits(load_image(image.load()).array())
         rgb = shown[..., :3] if shown.shape[2] >= 3 else np.repeat(shown[..., :1], 3, axis=2)
         images.append(np.ascontiguousarray(rgb) if rgb.size else _WHITE)
     return Paint(

@@ -23,6 +23,8 @@ from ptmtools.lazy import component
 
 #: Texels between charts, of the least lightmap: those of both sides that a bilinear lookup reads.
 GAP = 2
+#: Half the size of what is unwrapped, in the unit of its own.
+_LARGE = 64.0
 #: How often xatlas is asked, and the share of the square that the first packing aims at.
 _TRIES, _FIRST = 8, 0.6
 #: An atlas with fewer texels to the metre than this share of those aimed at is mostly gaps.
@@ -54,8 +56,12 @@ def unwrap(points: Floats, triangles: NDArray[np.integer[Any]]) -> Atlas:
     Raises MissingComponentError: PTM-M830 xatlas is not installed.
     """
     xatlas = component("xatlas", "PTM-M830", "baking lightmaps needs xatlas", "campus")
-    # Far from the origin single precision has no texels.
-    moved = (points - points.mean(axis=0)).astype(np.float32)
+    # Far from the origin single precision has no texels, and xatlas drops faces that it takes for
+    # empty, whatever the unit.
+    near = points - points.mean(axis=0)
+    largest = float(np.abs(near).max(initial=0.0))
+    unit = _LARGE / largest if largest else 1.0
+    moved = (near * unit).astype(np.float32)
     corner = moved[triangles].astype(np.float64)
     across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     area = max(np.linalg.norm(across, axis=1).sum() / 2, np.finfo(np.float32).tiny)

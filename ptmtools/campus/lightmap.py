@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles
-from ptmtools.campus.atlas import Atlas, cover
+from ptmtools.campus.atlas import GAP, Atlas, cover
 from ptmtools.campus.lights import Look
 from ptmtools.campus.model import LIGHT_SIZES
 
@@ -68,8 +68,27 @@ def bake(
         value[row, column] = _smoothed(value, chart, row, column)
         below = value, chart
         if size > sizes[0]:
-            found.append(Lit(fill(value, owner >= 0), len(row), int((owner >= 0).sum())))
+            grown = spread(value, owner >= 0)
+            found.append(Lit(fill(*grown), len(row), int((owner >= 0).sum())))
     return found
+
+
+def spread(value: Singles, known: Bools) -> tuple[Singles, Bools]:
+    """The same with the gap beside what is known: each texel there the mean of the known ones
+    around it, so that either side of a gap has its own."""
+    for _ in range(GAP):
+        height, width = value.shape
+        weight = np.pad(known, 1).astype(np.float32)
+        held = np.pad(np.where(known, value, 0), 1).astype(np.float32)
+        count, total = np.zeros_like(value), np.zeros_like(value)
+        for down in range(3):
+            for right in range(3):
+                around = slice(down, down + height), slice(right, right + width)
+                count, total = count + weight[around], total + held[around]
+        new = ~known & (count > 0)
+        value = np.where(new, total / np.maximum(count, 1), value).astype(np.float32)
+        known = known | new
+    return value, known
 
 
 def fill(value: Singles, known: Bools) -> Singles:

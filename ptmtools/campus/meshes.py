@@ -130,11 +130,20 @@ def read_mesh(data: bytes) -> tuple[Primitive, ...]:
         raise ValueError("not one chunk of JSON and one of bytes")
     document, binary = schemas.parse(chunks[0][2]), chunks[1][2]
     try:
-        return tuple(
-            _read(document, binary, primitive) for primitive in document["meshes"][0]["primitives"]
-        )
+        wanted = document["meshes"][0]["primitives"]
+        held = len(binary)
+        found = []
+        for primitive in wanted:
+            found.append(_read(document, binary, primitive))
+            # Each has arrays of its own, so all together are no larger than the bytes.
+            held -= found[-1].point.size * 4
+            if held < 0:
+                raise ValueError("primitives that share their arrays")
     except (LookupError, TypeError, AttributeError) as fault:
         raise ValueError(f"not as a mesh of a campus is ({fault})") from None
+    if not found:
+        raise ValueError("no primitives")
+    return tuple(found)
 
 
 def _read(document: Any, binary: bytes, primitive: Mapping[str, Any]) -> Primitive:
@@ -147,13 +156,13 @@ def _read(document: Any, binary: bytes, primitive: Mapping[str, Any]) -> Primiti
 
     named = primitive["attributes"]
     point, indices = values(named["POSITION"]), values(primitive["indices"])
-    assert point is not None
-    assert indices is not None
+    if point is None or indices is None:
+        raise ValueError("a primitive without positions or indices")
     uv, light, color = (values(named.get(n)) for n in ("TEXCOORD_0", "TEXCOORD_1", "COLOR_0"))
     for part in (point, uv, light, color):
         if part is not None and (len(part) != len(point) or not np.isfinite(part).all()):
             raise ValueError("attributes of other lengths, or not finite")
-    if len(indices) % 3 or indices.max() >= len(point):
+    if not len(indices) or len(indices) % 3 or indices.min() < 0 or indices.max() >= len(point):
         raise ValueError("indices that are no triangles of the vertices")
     material = document["materials"][primitive["material"]]["extras"]["material"]
     if type(material) is not int or point.shape[1] != 3:

@@ -36,6 +36,8 @@ class Names:
 
     def __init__(self) -> None:
         self._taken: set[str] = set()
+        #: Of each name the number that was last added to it.
+        self._last: dict[str, int] = {}
 
     def take(self, text: str, otherwise: str) -> str:
         """A name after ``text``, or ``otherwise`` if nothing of that can stand in one."""
@@ -43,11 +45,12 @@ class Names:
         stem = re.sub(r"[^A-Za-z0-9-]+", "_", plain).strip("_")[:_LONGEST].strip("_") or otherwise
         if _DEVICES.match(stem):
             stem = f"{otherwise}_{stem}"
-        unique, count = stem, 1
+        unique, count = stem, self._last.get(stem.lower(), 1)
         while unique.lower() in self._taken:
             count += 1
             unique = f"{stem}-{count}"
         self._taken.add(unique.lower())
+        self._last[stem.lower()] = count
         return unique
 
 

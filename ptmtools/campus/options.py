@@ -43,15 +43,16 @@ class CampusOptions:
     quality: int = 85
 
     def __post_init__(self) -> None:
+        no_end = self.reach == float("inf")
         for name, sound, wanted in (
             ("lods", 1 <= self.lods <= MAX_LODS, f"1 to {MAX_LODS}"),
             ("ratio", 0 < self.ratio <= 1, "more than 0 and at most 1"),
             ("faces", self.faces >= 1, "1 or more"),
             ("error", self.error >= 0, "0 or more"),
-            ("small", 0 <= self.small < float("inf"), "0 or more"),
+            ("small", 0 <= self.small < float("inf"), "0 or more, finite"),
             ("lightmaps", self.lightmaps in ("bake", "model", "none"), "bake, model or none"),
             ("samples", 1 <= self.samples <= MAX_SAMPLES, f"1 to {MAX_SAMPLES}"),
-            ("reach", self.reach > 0, "more than 0"),
+            ("reach", 1e-3 <= self.reach <= 1e6 or no_end, "0.001 to 1000000, or inf"),
             ("quality", 1 <= self.quality <= 95, "1 to 95"),
         ):
             if not sound:

@@ -14,7 +14,7 @@ import io
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, BinaryIO, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from ptmtools.campus.model import ALPHA, DIFFUSE, MASK, SIZES, TextureFile
 from ptmtools.campus.names import texture_file
 from ptmtools.errors import naming
-from ptmtools.texture.images.opening import load, opened, pillow_faults
-from ptmtools.texture.images.picture import check_size
+from ptmtools.texture.images import load_image
 from ptmtools.texture.model import Limits
+from ptmtools.texture.samples import in_eight_bits
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -138,17 +138,15 @@ def _written(base: str, size: int, channel: str, data: bytes, source: tuple[int,
 
 
 def _decoded(data: bytes, most: int, label: str) -> Image.Image:
-    """An image of 8 bits: L, RGB or RGBA."""
-    limits = Limits(most)
-    with naming(label), pillow_faults():
-        image = opened(cast("BinaryIO", io.BytesIO(data)), limits)
-        check_size(*image.size, 4, limits)
-        load(image)
-        if image.mode.startswith("I"):  # 16 bits, which convert() would clip
-            return _grey((np.asarray(image).astype(np.int64) >> 8).astype(np.uint8))
-        if image.has_transparency_data:
-            return image.convert("RGBA")
-        return image.convert("L" if image.mode in ("1", "L") else "RGB")
+    """An image of 8 bits: L, RGB or RGBA. Its orientation says nothing, as for all textures."""
+    from PIL import Image
+
+    with naming(label):
+        texels = in_eight_bits(load_image(data, Limits(most)).array())
+    kinds = {1: "L", 2: "LA", 3: "RGB", 4: "RGBA"}
+    shown = texels[:, :, 0] if texels.shape[2] == 1 else texels
+    image = Image.fromarray(np.ascontiguousarray(shown), kinds[texels.shape[2]])
+    return image.convert("RGBA") if image.mode == "LA" else image
 
 
 def _grey(texels: NDArray[np.uint8]) -> Image.Image:

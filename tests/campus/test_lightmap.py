@@ -8,7 +8,7 @@ from hypothesis import given, strategies as st
 
 from ptmtools.arrays import Floats
 from ptmtools.campus.atlas import GAP, components, cover, unwrap
-from ptmtools.campus.lightmap import AGREE, bake, fill
+from ptmtools.campus.lightmap import AGREE, bake, fill, spread
 from ptmtools.campus.lights import Painted, Rays
 from ptmtools.campus.occlusion import Surroundings, normals
 from ptmtools.campus.vertex_light import vertex_light
@@ -213,3 +213,14 @@ def test_the_models_own_light_is_looked_up() -> None:
     assert np.allclose(found, [0.2, 0.8], atol=0.02)
     white = Painted(corner, uv, np.full(2, -1, np.int32), (image,), np.arange(2))
     assert (white(face, point, np.zeros(2)) == 1).all()
+
+
+@pytest.mark.parametrize("offset", range(8))
+def test_either_side_of_the_least_gap_has_its_own_value(offset: int) -> None:
+    value, known = np.zeros((4, 32), np.float32), np.zeros((4, 32), bool)
+    first = 4 + offset
+    known[:, :first] = True
+    known[:, first + GAP :], value[:, first + GAP :] = True, 1
+    found = fill(*spread(value, known))
+    assert (found[:, : first + GAP // 2] == 0).all()
+    assert (found[:, first + GAP // 2 :] == 1).all()

@@ -14,6 +14,7 @@ from PIL import Image
 
 from ptmtools.campus.validation import CODES
 from ptmtools.cli.main import main
+from ptmtools.glb import BINARY, JSON, glb, glb_chunks
 from ptmtools.pipeline.validation import validate
 
 Document = dict[str, Any]
@@ -190,3 +191,38 @@ def test_an_index_that_cannot_be_read(copy: Path, tmp_path: Path) -> None:
 
     report = check_campus(tmp_path, Limits())
     assert [i.code for i in report.issues] == ["PTM-D820"]
+
+
+def mesh_with(folder: Path, alter: Callable[[Document], object]) -> None:
+    """A mesh gets another document, and is recorded so."""
+    name = sorted((folder / "meshes").iterdir())[0].name
+    (_, _, text), (_, _, binary) = glb_chunks((folder / "meshes" / name).read_bytes())
+    document = json.loads(text)
+    alter(document)
+    data = glb([(JSON, json.dumps(document).encode()), (BINARY, binary)])
+    rewrite(folder, f"meshes/{name}", data)
+
+
+def primitives(document: Document) -> list[Document]:
+    found: list[Document] = document["meshes"][0]["primitives"]
+    return found
+
+
+@pytest.mark.parametrize(
+    "alter",
+    [
+        lambda d: primitives(d)[0]["attributes"].update(POSITION=None),
+        lambda d: primitives(d)[0].update(indices=None),
+        lambda d: primitives(d).clear(),
+        lambda d: primitives(d).extend(primitives(d) * 300),
+    ],
+    ids=["no positions", "no indices", "no primitives", "the same arrays many times"],
+)
+def test_meshes_of_strangers(copy: Path, alter: Callable[[Document], object]) -> None:
+    mesh_with(copy, alter)
+    assert "PTM-D826" in codes(copy)
+
+
+def test_sizes_that_no_file_has(copy: Path) -> None:
+    change(copy, put("textures", 0, "bytes", value=10**30))
+    assert codes(copy) == {"PTM-D821"}
