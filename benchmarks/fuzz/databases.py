@@ -108,7 +108,7 @@ class _Held(DatabaseFolder):
     """A database in memory, one of whose archives is still to be read."""
 
     def __init__(self, stages: Mapping[str, Any], images: bytes) -> None:
-        self.path = Path("db")
+        self.path, self.manifest = Path("db"), Manifest("model.obj")
         self._stages = stages
         self._images = images
 

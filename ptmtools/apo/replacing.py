@@ -33,6 +33,8 @@ from ptmtools.simplification import Mesh, Simplified, SimplifyOptions, simplify
 _NAMED = 3
 #: A greater share of samples that found nothing of the original is told.
 _MISSED = 0.01
+#: So is an object that is simplified by more than this share of its size.
+_FAR_OFF = 0.02
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,14 @@ def replaced(
         if not 0 < len(part.source) < len(triangles[i]):
             notes.append(f"{scene.objects[i]} stays as modelled: it cannot have fewer triangles")
             continue
+        size = float(np.linalg.norm(np.ptp(scene.corners[triangles[i]], axis=(0, 1))))
+        if simplified.error > _FAR_OFF * size:
+            notes.append(
+                Warned(
+                    f"{scene.objects[i]} is off by about {simplified.error:.2g} m once simplified, "
+                    f"of {size:.2g} m; give more --apo-faces, or leave it out of --apo"
+                )
+            )
         parts.append(part)
         octrees.append(_octree(scene, triangles[i], simplified, part, options, executor, progress))
     if light:

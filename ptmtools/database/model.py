@@ -181,7 +181,10 @@ class EmitOptions:
     def __post_init__(self) -> None:
         wrong = None
         try:
-            chosen = {emitter.name for emitter in chosen_emitters(self.format)}
+            emitters = chosen_emitters(self.format)
+            if not any(emitter.cell_files for emitter in emitters):
+                raise ValueError("none of them is of cells; add vrml or gltf")
+            chosen = {emitter.name for emitter in emitters}
             names = ",".join(name for name in EMITTERS if name in chosen)
             object.__setattr__(self, "format", names)
         except ValueError as fault:

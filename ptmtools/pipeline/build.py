@@ -148,8 +148,10 @@ def _run(
                 for later in jobs[i + 1 :]:
                     if finished.issuperset(later.stage.sources(later.options)):
                         later.begin()
+            told = len(run.reports)
             job.do()
-            tell(run.reports[-1])
+            for report in run.reports[told:]:
+                tell(report)
             finished.add(job.stage)
     except BaseException:
         with ExitStack() as abandoned:

@@ -242,8 +242,12 @@ class Run(Artifacts):
         seconds: float,
         tasks: tuple[int, int, int] | None = None,
     ) -> None:
-        """Notes that a stage has been dealt with."""
-        made = self.record(stage)
+        """Notes that a stage has been dealt with; not of one that could have changed another's
+        artifact, and neither did nor had."""
+        made, before = self.record(stage), super().before(stage)
+        idle = not made.outputs and not made.notes and not (before and before.outputs)
+        if stage.changes and idle:
+            return
         self.reports.append(
             StageReport(
                 stage.name,

@@ -102,7 +102,10 @@ def _stage(artifacts: Artifacts, stage: Stage[Any]) -> StageStatus:
     db = artifacts.db
     record = db.manifest.stages.get(stage.name)
     if record is None:
-        return StageStatus(stage.name, "not run", "", {}, 0, 0)
+        # Databases of earlier releases lack a stage that changes another's artifact: it changed
+        # nothing.
+        done = stage.changes is not None and stage.changes.name in db.manifest.stages
+        return StageStatus(stage.name, "done" if done else "not run", "", {}, 0, 0)
     sizes = []
     for name in record.outputs:
         file = db.path / name

@@ -22,6 +22,7 @@ from ptmtools.tradeoff.knobs import Setting, concerned, settings
 from ptmtools.tradeoff.rebuilding import Own, Seconds, build_again, copied, own_options
 from ptmtools.walkthrough.catalogue import Catalogue, catalogue_of
 from ptmtools.walkthrough.comparing import SimulateOptions, budget_of, counted, play, require_hints
+from ptmtools.walkthrough.forms import PTM
 from ptmtools.walkthrough.measures import SHARES
 from ptmtools.walkthrough.policies import POLICIES
 from ptmtools.walkthrough.served import Served, Surfaces, read_served
@@ -35,11 +36,15 @@ from ptmtools.walkthrough.world import World, prepare
 FIRST = 0.9
 
 
+#: Those that walk through whatever a build makes.
+_OF_DATABASES = {name: policy for name, policy in POLICIES.items() if policy.form == PTM}
+
+
 @dataclass(frozen=True)
 class WalkOptions(SimulateOptions):
     """Who walks, over what; everything else as in `SimulateOptions`."""
 
-    policy: str = field(default="best", metadata={"choices": POLICIES, "several": True})
+    policy: str = field(default="best", metadata={"choices": _OF_DATABASES, "several": True})
     memory: str = "10%"
 
 

@@ -243,3 +243,11 @@ def test_options_out_of_range(wrong: dict[str, float]) -> None:
 def test_the_model_is_that_of_the_sample_and_statues(rooms: Scene, tmp_path: Path) -> None:
     assert len(rooms.triangles) == 40 + 2 * 5120
     assert len(rooms.objects) == 15
+
+
+def test_an_object_that_is_far_off_once_simplified_is_told(rooms: Scene) -> None:
+    name = rooms.objects[-1]
+    told = replaced(rooms, ReplaceOptions(apo=(name,), apo_faces=12), Serial()).notes
+    assert any(isinstance(note, Warned) and "is off by about" in note for note in told)
+    fine = replaced(rooms, ReplaceOptions(apo=(name,), apo_faces=1000), Serial()).notes
+    assert not any("is off by about" in note for note in fine)

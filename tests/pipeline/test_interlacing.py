@@ -12,7 +12,8 @@ import pytest
 from PIL import Image
 
 from ptmtools.cli.main import main
-from ptmtools.database import validate_database
+from ptmtools.database import EmitOptions, validate_database
+from ptmtools.errors import InputError
 from ptmtools.interlace import deinterlace, read_manifest
 from ptmtools.interlace.scaling import scaled
 from ptmtools.texture import decode
@@ -150,3 +151,8 @@ def test_sets_that_the_index_does_not_name(db: Path) -> None:
     del index["textureSets"]
     file.write_text(json.dumps(index))
     assert codes(db) == {"PTM-D652", "PTM-D741"}
+
+
+def test_images_alone_are_no_database() -> None:
+    with pytest.raises(InputError, match=r"none of them is of cells.*PTM-I603"):
+        EmitOptions(format="interlace")

@@ -32,7 +32,7 @@ def _summary(n: Mapping[str, Any]) -> str:
         return "no object is replaced"
     return (
         f"{count(n['octrees'], 'object')} of {count(n['source'], 'triangle')} → {n['faces']:,}, "
-        f"off by {1000 * n['deviation']:.2g} mm at most; "
+        f"off by about {n['deviation']:.2g} m; "
         f"{count(n['texels'], 'texel')} of octrees, {size(n['bytes'])}"
     )
 

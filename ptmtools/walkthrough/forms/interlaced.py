@@ -6,9 +6,9 @@ What is shown with so many files is the image that they make, and mip levels of 
 texels, and each step has mip levels of its own, of an image that was decimated unfiltered. The
 next step replaces the one before it.
 
-Files are requests of their own; names and sizes follow from the index and the paper's rules, so
-that no manifest is on the link. That the old image, the file and the new one are in texture memory
-together while they are joined is not counted.
+Files are requests of their own. Manifests are not on the link: axes follow from the paper's rules,
+and sizes could stand in the index. That the old image, the file and the new one are in texture
+memory together while they are joined is not counted.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from ptmtools.interlace.model import Interlaced
 from ptmtools.interlace.reading import check_joined, read_manifest, read_part
 from ptmtools.interlace.steps import join
 from ptmtools.progress import Progress
-from ptmtools.texture.model import Limits
-from ptmtools.walkthrough.memory import Columns, aligned, texel_bytes
+from ptmtools.texture.model import Limits, gpu_texel_bytes
+from ptmtools.walkthrough.memory import Columns, aligned
 from ptmtools.walkthrough.served import Served
 from ptmtools.walkthrough.view.pyramids import rgb
 from ptmtools.walkthrough.view.records import Pyramids, Shows
@@ -45,9 +45,10 @@ def columns(served: Served, paper: bool) -> Columns:
     says.
     """
     rows = []
-    for t, texture in enumerate(served.index["textures"]):
-        parts = _manifest(served, t)[1].parts
-        each = texel_bytes(texture, paper=paper)
+    for t in range(len(served.index["textures"])):
+        manifest = _manifest(served, t)[1]
+        parts, stored = manifest.parts, manifest.texel_bytes
+        each = stored if paper else gpu_texel_bytes(stored, manifest.components)
         held = [each * sum(w * h for w, h in mip_sizes(*part.joined)) for part in parts]
         ends = [*accumulate(part.bytes for part in parts)]
         rows.append((ends, held, [part.joined for part in parts]))
