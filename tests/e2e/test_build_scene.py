@@ -122,7 +122,8 @@ def test_textures_within_an_error_have_twins_of_the_same_texels(
 def test_only_what_changed_is_done_again(tmp_path: Path, ptm: Ptm, build: Build) -> None:
     folder = Path(shutil.copytree(TWO_ROOMS, tmp_path / "model"))
     model, db = folder / "two_rooms.obj", tmp_path / "a.db"
-    assert len(ran(build(model, db))) == len(STAGES)
+    # A stage that changes nothing of another's is not told of.
+    assert len(ran(build(model, db))) == sum(not stage.changes for stage in STAGES.values())
     before = listing(db)
     stamps = {p: p.stat().st_mtime_ns for p in db.rglob("*")}
 

@@ -168,7 +168,8 @@ def test_the_first_build_says_what_is_rebuilt_and_why(
     (db / "manifest.json").write_text(json.dumps(manifest | {"schema": 1}))
     assert main(build) == 0
     said = capsys.readouterr().out
-    assert said.count("because the database has schema 1, this ptmtools writes 2") == len(STAGES)
+    told = sum(not stage.changes for stage in STAGES.values())
+    assert said.count("because the database has schema 1, this ptmtools writes 2") == told
     assert (db / "manifest.json").read_bytes() == (built / "manifest.json").read_bytes()
 
 
