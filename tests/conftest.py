@@ -14,6 +14,8 @@ from hypothesis import settings
 from numpy.typing import ArrayLike
 
 from ptmtools.cells.model import Cells
+from ptmtools.coverage.backends.opengl import APT, create_context
+from ptmtools.errors import MissingComponentError
 from ptmtools.scene.model import Material, Scene
 from ptmtools.scene.orientation import tolerance_of
 
@@ -36,6 +38,22 @@ def absent(what: str, remedy: str) -> None:
 def require() -> Callable[[str, str], None]:
     """``require(what, remedy)``: report a missing component (skip, or fail with CI=true)."""
     return absent
+
+
+@pytest.fixture(scope="session")
+def has_gl() -> bool:
+    try:
+        create_context().release()
+    except MissingComponentError:
+        return False
+    return True
+
+
+@pytest.fixture
+def gl(has_gl, require) -> None:
+    """For tests that need OpenGL; a missing one is reported."""
+    if not has_gl:
+        require("OpenGL", APT)
 
 
 @pytest.fixture(scope="session")

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.errors import MissingComponentError
+from ptmtools.coverage.backends.opengl import create_context
 from ptmtools.interlace.model import Axis
 
 Texels = NDArray[Any]
@@ -55,9 +55,9 @@ class StepShader:
     """Joins by OpenGL; to be used and closed by the thread that made it."""
 
     def __init__(self) -> None:
-        """Opens a context without a window; raises MissingComponentError PTM-M820 where there is
+        """Opens a context without a window; raises MissingComponentError PTM-M500 where there is
         no OpenGL 3.3."""
-        self._context = context = _create_context()
+        self._context = context = create_context()
         self.name = str(context.info["GL_RENDERER"])
         #: The longest side that it can join.
         self.most = int(context.info["GL_MAX_TEXTURE_SIZE"])
@@ -114,17 +114,3 @@ def _held(components: int) -> int:
 def _type(texels: Texels) -> str:
     """moderngl's name of the samples."""
     return f"u{texels.dtype.itemsize}"
-
-
-def _create_context() -> Any:
-    try:
-        import moderngl
-
-        settings: dict[str, Any] = {"backend": "egl"}
-        return moderngl.create_context(require=330, standalone=True, **settings)
-    except Exception as error:  # moderngl raises bare Exception, ctypes OSError
-        raise MissingComponentError(
-            "PTM-M820",
-            f"no OpenGL to join by ({error})",
-            remedy="apt install libegl1 libgl1 libgl1-mesa-dri; numpy joins without it",
-        ) from error

@@ -12,28 +12,10 @@ import pytest
 
 from ptmtools.cells.model import Cells
 from ptmtools.coverage.backends import BACKENDS
-from ptmtools.coverage.backends.opengl import APT, create_context
 from ptmtools.coverage.item_buffer import Renderer, Surfaces
 from ptmtools.coverage.sample_points import SamplePoints
 from ptmtools.coverage.tally import PixelCounter
-from ptmtools.errors import MissingComponentError
 from ptmtools.scene.model import Material, Scene
-
-
-@pytest.fixture(scope="session")
-def has_gl() -> bool:
-    try:
-        create_context().release()
-    except MissingComponentError:
-        return False
-    return True
-
-
-@pytest.fixture
-def gl(has_gl, require) -> None:
-    """For tests that need OpenGL; a missing one is reported."""
-    if not has_gl:
-        require("OpenGL", APT)
 
 
 @pytest.fixture(params=["gl", "embree"])
