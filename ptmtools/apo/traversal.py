@@ -128,15 +128,28 @@ def _ones(mask: int) -> int:
 
 
 @plain_kernel
-def _walk(texel: NDArray[np.uint8], q: Floats, limit: Ints, at: Ints, deep: Ints) -> None:
+def child_of(texel: NDArray[np.uint8], address: int, child: int) -> int:
+    """The address of a child, 0 to 7, of the node at an address of (n, 4) texels; -1 if there is
+    none."""
     count = np.int64(len(texel))
+    present = int(np.int64(texel[address, 3]))
+    if present >> child & 1 == 0 or address + 1 >= count:
+        return -1
+    below = (1 << child) - 1
+    inner = int(np.int64(texel[address + 1, 3]))
+    first = int(np.int64(texel[address + 1, 0]))
+    first += int(np.int64(texel[address + 1, 1])) << 8
+    first += int(np.int64(texel[address + 1, 2])) << 16
+    there = first + _ones(present & below) + _ones(inner & below)
+    return there if there < count else -1
+
+
+@plain_kernel
+def _walk(texel: NDArray[np.uint8], q: Floats, limit: Ints, at: Ints, deep: Ints) -> None:
     for i in range(len(q)):
         x, y, z = q[i, 0], q[i, 1], q[i, 2]
         address, depth = 0, 0
-        while depth < limit[i] and address + 1 < count:
-            present = int(np.int64(texel[address, 3]))
-            if present == 0:
-                break
+        while depth < limit[i]:
             x, y, z = 2 * x, 2 * y, 2 * z
             child = 0
             if x >= 1:
@@ -145,15 +158,8 @@ def _walk(texel: NDArray[np.uint8], q: Floats, limit: Ints, at: Ints, deep: Ints
                 child, y = child + 2, y - 1
             if z >= 1:
                 child, z = child + 4, z - 1
-            if present >> child & 1 == 0:
-                break
-            below = (1 << child) - 1
-            inner = int(np.int64(texel[address + 1, 3]))
-            first = int(np.int64(texel[address + 1, 0]))
-            first += int(np.int64(texel[address + 1, 1])) << 8
-            first += int(np.int64(texel[address + 1, 2])) << 16
-            there = first + _ones(present & below) + _ones(inner & below)
-            if there >= count:
+            there = child_of(texel, address, child)
+            if there < 0:
                 break
             address = there
             depth += 1

@@ -20,12 +20,13 @@ from ptmtools.walkthrough.comparing import SimulateOptions, counted, play, requi
 from ptmtools.walkthrough.flip import require as require_flip
 from ptmtools.walkthrough.path.options import PathOptions
 from ptmtools.walkthrough.path.through import path_through
+from ptmtools.walkthrough.relief.light import lit
 from ptmtools.walkthrough.report import as_csv, document, table
 from ptmtools.walkthrough.served import read_served
 from ptmtools.walkthrough.trace import read_trace
 from ptmtools.walkthrough.view.pyramids import read_pyramids
 from ptmtools.walkthrough.walk import Walk, read_walk
-from ptmtools.walkthrough.world import prepare, read_forms
+from ptmtools.walkthrough.world import prepare, read_forms, relief_of
 
 #: How long the walk is that is made where none is given, s.
 DURATION = 150.0
@@ -50,6 +51,13 @@ DURATION = 150.0
     help="Seed of the walk that is made without --walk; 1 by default. May be given several times.",
 )
 @options_of(SimulateOptions)
+@click.option(
+    "--against",
+    type=click.Path(),
+    metavar="DB",
+    help="Another database of the same model: pictures are compared with its full one instead of "
+    "that of DB. Such as one without --apo, or without --max-error.",
+)
 @click.option(
     "--trace",
     "trace_file",
@@ -103,6 +111,7 @@ def simulate(
     db: str,
     walk_files: tuple[str, ...],
     seeds: tuple[int, ...],
+    against: str | None,
     trace_file: str | None,
     flip: bool,
     csv_file: str | None,
@@ -137,13 +146,19 @@ def simulate(
         require_flip()
     trace = read_trace(trace_file) if trace_file else None
     walks = {file: read_walk(file) for file in walk_files} or _made(db, seeds)
-    served = read_served(db)
+    served, other = read_served(db), read_served(against) if against else None
+    if options.lit:
+        served, other = lit(served), lit(other) if other else None
     require_hints(served, options.policies)
     with voice.progress() as progress:
         pyramids = read_pyramids(served, progress)
+        relief = relief_of(served, pyramids, other, lit=options.lit, progress=progress)
         forms = read_forms(served, pyramids, (p.form for p in options.policies), progress)
         worlds = {
-            name: counted(prepare(served, walk, pyramids, progress=progress, forms=forms), options)
+            name: counted(
+                prepare(served, walk, pyramids, progress=progress, forms=forms, relief=relief),
+                options,
+            )
             for name, walk in walks.items()
         }
         played = play(worlds, options, trace, progress, flip=flip)

@@ -8,13 +8,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.vectors import normals
 from ptmtools.scene.mapping import gradients
-from ptmtools.walkthrough.memory import Columns, columns_of
+from ptmtools.walkthrough.memory import Columns, columns_of, joined
 from ptmtools.walkthrough.recording import Browser
 from ptmtools.walkthrough.served import Document, Served
 
@@ -40,6 +41,14 @@ class Shapes:
     low: Floats
     high: Floats
     side: Floats
+
+    def beside(self, more: Shapes) -> Shapes:
+        """These and more."""
+        order = np.argsort(np.concatenate([self.cell, more.cell]), kind="stable")
+        both: dict[str, Any] = {
+            name: np.concatenate([own, vars(more)[name]])[order] for name, own in vars(self).items()
+        }
+        return Shapes(**both)
 
 
 @dataclass(frozen=True)
@@ -143,6 +152,33 @@ class Catalogue:
             differences=np.where(stored, LEAST, 0.0),
         )
 
+    def with_memory(self, memory: Ints) -> Catalogue:
+        """The same with other texture memory (t, k) of the first textures."""
+        rows, wide = memory.shape
+        found = self.memory.copy()
+        found[:rows, :wide] = memory
+        found[:rows, wide:] = memory[:, -1:]
+        return replace(self, memory=found)
+
+    def beside(self, more: Columns, differences: Floats, shapes: Shapes | None = None) -> Catalogue:
+        """The same with more textures behind these, and shapes that show them; ``differences``
+        (T', K')."""
+        own = joined(Columns(self.levels, self.ends, self.memory, self.size), more)
+        wide = own.ends.shape[1]
+        each = [
+            np.pad(d, ((0, 0), (0, wide - d.shape[1]))) for d in (self.differences, differences)
+        ]
+        return replace(
+            self,
+            levels=own.last,
+            ends=own.ends,
+            memory=own.memory,
+            size=own.size,
+            differences=np.concatenate(each),
+            colors=np.concatenate([self.colors, np.zeros((len(more.last), 3))]),
+            shapes=self.shapes if shapes is None else self.shapes.beside(shapes),
+        )
+
 
 def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalogue:
     """The catalogue of a served folder; ``differences`` (T, L) and ``colors`` (T, 3) as `Pyramids`
@@ -188,10 +224,8 @@ def _stored(last: Ints, wide: int) -> Bools:
 
 def _shapes(served: Served) -> Shapes:
     surfaces = served.surfaces
-    count = int(surfaces.shape.max(initial=-1)) + 1
-    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    np.minimum.at(low, surfaces.shape, surfaces.corner.min(axis=1))
-    np.maximum.at(high, surfaces.shape, surfaces.corner.max(axis=1))
+    low, high = surfaces.boxes()
+    count = len(low)
     cell, texture = (np.zeros(count, np.int64) for _ in range(2))
     cell[surfaces.shape], texture[surfaces.shape] = surfaces.cell, surfaces.texture
     drawn = np.isfinite(low[:, 0])

@@ -34,8 +34,10 @@ class SimulateOptions:
         between.
     paper_bytes: count three bytes a texel of RGB, as the paper does; graphics processors take four.
     one_range: ask for one range of a file at a time, as browsers must.
+    lit: light what is shown, so that relief is seen: clients of octree textures need it.
 
-    Raises InputError: PTM-I711 a link that cannot be; PTM-I712 a word that is no such quantity.
+    Raises InputError: PTM-I701 a policy shows relief, and nothing is lit; PTM-I711 a link that
+    cannot be; PTM-I712 a word that is no such quantity.
     """
 
     policy: str = field(
@@ -49,10 +51,18 @@ class SimulateOptions:
     memory: str = "4MiB,10%"
     paper_bytes: bool = False
     one_range: bool = False
+    lit: bool = False
 
     def __post_init__(self) -> None:
         self.links()
         self.memories  # noqa: B018 - both raise for what cannot be read
+        unseen = [p.name for p in self.policies if FORMS[p.form].octrees]
+        if unseen and not self.lit:
+            raise InputError(
+                "PTM-I701",
+                f"policy {unseen[0]} fetches relief, which only lit pictures show",
+                remedy="give --lit, too",
+            )
 
     @property
     def policies(self) -> list[Declared]:
@@ -97,7 +107,8 @@ def require_hints(served: Served, policies: Sequence[Declared]) -> None:
     there in its form."""
     for policy in policies:
         form = FORMS[policy.form]
-        if form.needs and form.needs[0] not in served.index.get("textureSets", {}):
+        there = {*served.index, *served.index.get("textureSets", ())}
+        if form.needs and form.needs[0] not in there:
             raise InputError(
                 "PTM-I701",
                 f"policy {policy.name} needs {form.about}, which the database does not have",

@@ -51,6 +51,19 @@ def columns_of(textures: Sequence[Any], *, paper: bool = False) -> Columns:
     return aligned(rows)
 
 
+def joined(first: Columns, second: Columns) -> Columns:
+    """Those of two lists of textures, one behind the other."""
+    wide = max(first.ends.shape[1], second.ends.shape[1])
+
+    def both(one: Ints, other: Ints) -> Ints:
+        rest = [(0, 0)] * (one.ndim - 2)
+        parts = (np.pad(a, [(0, 0), (0, wide - a.shape[1]), *rest], "edge") for a in (one, other))
+        return np.concatenate(list(parts))
+
+    tables = zip(first[1:], second[1:], strict=True)
+    return Columns(np.concatenate([first.last, second.last]), *(both(*pair) for pair in tables))
+
+
 def aligned(rows: Sequence[tuple[Any, Any, Any]]) -> Columns:
     """Columns of textures that have any number of them: of each its (k,) ``ends`` and ``memory``,
     and (k, 2) ``size``, without the first column."""

@@ -53,6 +53,7 @@ class Surfaces:
     clamped: (n, 2) whether u and v stop at the edge of the texture instead of repeating it.
     seen: (n, 2) of each the one that is seen in its place from where its normal points to, and from
         behind it, see `sides`.
+    objects: of each shape the name of its object.
     """
 
     corner: Floats
@@ -65,6 +66,15 @@ class Surfaces:
     glass: Bools
     clamped: Bools
     seen: Ints
+    objects: tuple[str, ...] = ()
+
+    def boxes(self) -> tuple[Floats, Floats]:
+        """(s, 3) corners of the boxes of the shapes, metres; infinite of one without triangles."""
+        count = int(self.shape.max(initial=-1)) + 1
+        low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+        np.minimum.at(low, self.shape, self.corner.min(axis=1))
+        np.maximum.at(high, self.shape, self.corner.max(axis=1))
+        return low, high
 
 
 @dataclass(frozen=True)
@@ -97,14 +107,22 @@ class Served:
         """How many cells there are."""
         return len(self.records)
 
+    def file(self, url: str) -> Path:
+        """A file that the index names. Raises DatabaseError PTM-D006 for one outside the folder."""
+        return _inside(self.folder, url)
+
+    def read(self, url: str) -> bytes:
+        """What is in it. Raises DatabaseError PTM-D005, D006."""
+        return _bytes(self.file(url))
+
     def texture_file(self, texture: int) -> Path:
         """The `.ptm` of a texture."""
-        return _inside(self.folder, self.index["textures"][texture]["file"])
+        return self.file(self.index["textures"][texture]["file"])
 
     def texture_set(self, form: str, texture: int) -> Path:
         """The folder of a texture in another form, one of the index's."""
         name = texture_name(self.index["textures"][texture]["file"])
-        return _inside(self.folder, self.index["textureSets"][form].replace("{name}", name))
+        return self.file(self.index["textureSets"][form].replace("{name}", name))
 
 
 def read_index(folder: Path) -> Document:
@@ -273,6 +291,7 @@ def _surfaces(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         glass=spread([m.blends and t < 0 for m, t in zip(looks, texture, strict=True)], np.bool_),
         clamped=spread([[w == clamp for w in m.wrap] for m in looks], np.bool_, 2),
         seen=sides(corner, cell, two_sided, locator),
+        objects=tuple(p.object for _, p in shapes),
     )
 
 

@@ -17,6 +17,7 @@ from ptmtools.progress import Progress, silent
 from ptmtools.walkthrough.catalogue import Catalogue, catalogue_of
 from ptmtools.walkthrough.forms import FORMS, PTM
 from ptmtools.walkthrough.recording import Browser
+from ptmtools.walkthrough.relief.tables import Relief
 from ptmtools.walkthrough.served import Served
 from ptmtools.walkthrough.view.frustum import Frustum
 from ptmtools.walkthrough.view.pyramids import read_pyramids
@@ -63,6 +64,8 @@ class World:
         level comes.
     form: in which clients take textures, a name in `ptmtools.walkthrough.forms.FORMS`.
     shows: what the columns show, None for the levels of the pyramids.
+    relief: octrees, which come behind the textures, and what pictures are compared with; None:
+        there are none, and nothing else.
     beside: the same in other forms, by name.
     """
 
@@ -84,6 +87,7 @@ class World:
     drawn: Ints | None = None
     form: str = PTM
     shows: Shows | None = None
+    relief: Relief | None = None
     beside: Mapping[str, World] = field(default_factory=dict)
 
     @property
@@ -114,7 +118,7 @@ class World:
     def counted_by_paper(self) -> World:
         """The same with RGB of three bytes in texture memory."""
         columns = FORMS[self.form].columns.load()(self.served, True)
-        return replace(self, catalogue=replace(self.catalogue, memory=columns.memory))
+        return replace(self, catalogue=self.catalogue.with_memory(columns.memory))
 
     def frustum(self, frame: int) -> Frustum:
         """What the camera of a frame takes in."""
@@ -153,6 +157,7 @@ def prepare(
     full: Pyramids | None = None,
     views: Views | None = None,
     forms: Mapping[str, Shows] | None = None,
+    relief: Relief | None = None,
 ) -> World:
     """The world of a walk.
 
@@ -163,6 +168,7 @@ def prepare(
     full: that pictures are compared with instead; see `look`.
     views: of this walk, if they have been made already.
     forms: other forms that clients may take textures in, as `read_forms` reads them.
+    relief: octrees, and another database to compare with, if it is lit (`relief_of`).
 
     Raises
     ------
@@ -197,6 +203,8 @@ def prepare(
     known = np.maximum.accumulate(np.where(astray, -1, np.arange(len(cell))))
     cell = cell[np.where(known < 0, int(np.argmax(~astray)), known)]
     textures = read_pyramids(served, progress) if pyramids is None else pyramids
+    if full is None and relief and relief.reference:
+        full = relief.reference.pyramids
     camera = Camera(*pixels, walk.field_of_view, walk.aspect)
     pose, drawn = np.concatenate([eye, direction], axis=1), None
     if browser:
@@ -208,13 +216,15 @@ def prepare(
         eyes, looks = seen[:, :3], seen[:, 3:]
         shows = [*(forms or {}).values()]
         views, *others = look_at_forms(
-            served.surfaces, textures, shows, camera, eyes, looks, progress, full=full
-        )
+            served.surfaces, textures, shows, camera, eyes, looks, progress, full=full,
+            relief=relief,
+        )  # fmt: skip
     catalogue = catalogue_of(served, textures.differences, textures.mean)
+    catalogue = catalogue.as_found(browser) if browser else catalogue
     world = World(
         served=served,
         pyramids=textures,
-        catalogue=catalogue.as_found(browser) if browser else catalogue,
+        catalogue=catalogue,
         views=views,
         view=view.reshape(-1).astype(np.int64),
         camera=camera,
@@ -227,6 +237,7 @@ def prepare(
         one_range=browser is not None,
         browser=browser,
         drawn=drawn,
+        relief=relief,
     )
     beside = {
         name: replace(
@@ -238,7 +249,57 @@ def prepare(
         )
         for (name, shown), found in zip((forms or {}).items(), others, strict=True)
     }
-    return replace(world, beside=beside)
+    world = replace(world, beside=beside)
+    if relief is None:
+        return world
+    from ptmtools.walkthrough.relief.stock import with_octrees, without_octrees
+
+    octrees = relief.octrees
+    world = world.changed(lambda w: replace(w, catalogue=without_octrees(w.catalogue, octrees)))
+    if not octrees.number:
+        return world
+    drawing = [form.name for form in FORMS.values() if form.octrees]
+    fetched = with_octrees(catalogue, served, octrees)
+    more = {name: replace(world, form=name, catalogue=fetched, beside={}) for name in drawing}
+    return replace(world, beside={**world.beside, **more})
+
+
+def relief_of(
+    served: Served,
+    pyramids: Pyramids,
+    against: Served | None = None,
+    *,
+    lit: bool = True,
+    progress: Progress = silent,
+) -> Relief | None:
+    """The octrees of a database, and another of the same model with whose full picture pictures are
+    compared; both are ``lit`` (`relief.light.lit`) or neither, and then there are no octrees.
+
+    Raises
+    ------
+    InputError: PTM-I703 the other database has other textures.
+    DatabaseError: those of `read_octrees` and `read_pyramids`.
+    """
+    from ptmtools.walkthrough.relief.octrees import no_octrees, read_octrees
+    from ptmtools.walkthrough.relief.tables import Reference
+
+    if against is None and not lit:
+        return None
+    reference = None
+    if against is not None:
+        names = [[row["file"] for row in of.index["textures"]] for of in (served, against)]
+        if names[0] != names[1]:
+            raise InputError(
+                "PTM-I703",
+                "has other textures than what is walked through",
+                file=against.folder,
+                remedy="give a database of the same model, with --against",
+            )
+        full = read_pyramids(against, progress)
+        same = all(np.array_equal(full[k], pyramids[k]) for k in range(len(full)))
+        reference = Reference(against.surfaces, pyramids if same else full)
+    octrees = read_octrees(served) if lit else no_octrees(served.surfaces)
+    return Relief(octrees, reference)
 
 
 def read_forms(

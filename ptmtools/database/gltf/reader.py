@@ -52,7 +52,7 @@ class ReadPrimitive:
 
     Attributes
     ----------
-    place: of the primitive in the document.
+    place: of the primitive in the document. object: the name of its node, that of an object.
     point: (n, 3) float32.
     uv: (n, 2) float32, origin at the upper left, or None.
     color: (n, 3) linear light, or None.
@@ -60,6 +60,7 @@ class ReadPrimitive:
     """
 
     place: str
+    object: str
     point: NDArray[np.float32]
     uv: NDArray[np.float32] | None
     color: NDArray[np.float64] | None
@@ -111,10 +112,12 @@ class _Reader:
             _foreign("scene", "has not all nodes, or not a mesh for each")
         primitives: list[ReadPrimitive] = []
         for index in nodes:
-            if self._row("nodes", index)["mesh"] != index:
+            node = self._row("nodes", index)
+            if node["mesh"] != index:
                 _foreign(f"nodes[{index}]", "has the mesh of another")
             for n, primitive in enumerate(self._row("meshes", index)["primitives"]):
-                primitives.append(self._primitive(primitive, f"meshes[{index}].primitives[{n}]"))
+                place = f"meshes[{index}].primitives[{n}]"
+                primitives.append(self._primitive(primitive, place, node["name"]))
         return ReadGlb(scene["name"], scene["extras"]["cell"], tuple(primitives))
 
     def _row(self, name: str, index: int) -> dict[str, Any]:
@@ -125,7 +128,7 @@ class _Reader:
         row: dict[str, Any] = rows[index]
         return row
 
-    def _primitive(self, primitive: dict[str, Any], place: str) -> ReadPrimitive:
+    def _primitive(self, primitive: dict[str, Any], place: str, name: str) -> ReadPrimitive:
         attributes = primitive["attributes"]
         point = self._vertices(attributes["POSITION"], "VEC3")
         self._check_bounds(attributes["POSITION"], point)
@@ -141,7 +144,7 @@ class _Reader:
             raise FileError("PTM-D734", place, message)
         triangle = index.astype(np.int64).reshape(-1, 3)
         material = self._material(primitive["material"])
-        return ReadPrimitive(place, point, uv, color, triangle, material)
+        return ReadPrimitive(place, name, point, uv, color, triangle, material)
 
     def _colors(
         self, attributes: dict[str, int], count: int, place: str

@@ -28,7 +28,8 @@ class Form:
         texture memory if the second argument says so. Raises DatabaseError.
     shows: what the columns show, given the `.ptm`s; None: the levels of those. Raises
         DatabaseError, LimitError.
-    needs: the one of the index's texture sets that it reads, and how to get it.
+    needs: the one of the index's texture sets or lists that it reads, and how to get it.
+    octrees: whether octree textures are fetched, too, which only lit pictures show.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Form:
     columns: Lazy[Callable[[Served, bool], Columns]]
     shows: Lazy[Callable[[Served, Pyramids, Progress], Shows]] | None = None
     needs: tuple[str, str] | None = None
+    octrees: bool = False
 
 
 _LIST = (
@@ -46,6 +48,13 @@ _LIST = (
         Lazy("ptmtools.walkthrough.forms.interlaced:columns"),
         Lazy("ptmtools.walkthrough.forms.interlaced:shows"),
         ("interlace", "write them with `ptm emit DB --format vrml,gltf,interlace`"),
+    ),
+    Form(
+        "octree",
+        "levels of `.ptm`s and of octree textures",
+        Lazy("ptmtools.walkthrough.forms.levels:columns"),
+        needs=("octrees", "build it with `ptm build-scene --apo`"),
+        octrees=True,
     ),
 )
 #: By name, and the one that others are compared with.

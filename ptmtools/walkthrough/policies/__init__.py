@@ -14,6 +14,7 @@ from ptmtools.walkthrough.client import Client
 from ptmtools.walkthrough.forms import PTM
 from ptmtools.walkthrough.network import Link
 from ptmtools.walkthrough.policies import around, coverage
+from ptmtools.walkthrough.policies.apo import ApoClient
 from ptmtools.walkthrough.policies.best import BEST
 from ptmtools.walkthrough.policies.engine import EngineClient, Policy
 from ptmtools.walkthrough.policies.gpuii import GpuiiClient
@@ -129,6 +130,20 @@ _LIST = (
         needs=("need", "measure it with `ptm emit DB --need 16`"),
     ),
     Declared("best", "the viewer's: screen, need and distance", Knows.SCREEN, _same(BEST)),
+    Declared(
+        "apo",
+        "octree textures level by level, Lacoste et al., §4.2; all else as best",
+        Knows.SCREEN,
+        ApoClient,
+        form="octree",
+    ),
+    Declared(
+        "best+apo",
+        "best, with octree textures by the same measure",
+        Knows.SCREEN,
+        _same(BEST),
+        form="octree",
+    ),
     Declared("oracle", "knows the walk, and is greedy", Knows.FUTURE, _engine(Oracle)),
     Declared(
         "oracle-exchange",

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.walkthrough.relief.light import lamps
 from ptmtools.walkthrough.view.rays import Camera, Caster
 from ptmtools.walkthrough.view.records import Shows, Sight, own_levels
 from ptmtools.walkthrough.view.triangles import triangles_of
@@ -40,6 +41,7 @@ class Renderer:
         )
         self._triangles = triangles_of(world.served.surfaces)
         self._caster = Caster(world.served.surfaces)
+        self._lamps = lamps(world.served.surfaces.corner) if world.relief else np.zeros(0)
 
     def look(self, eye: Floats, direction: Floats) -> Sight:
         """What is seen from an eye (3,) in a direction (3,)."""
@@ -52,15 +54,31 @@ class Renderer:
 
     def full(self, sight: Sight) -> Floats:
         """The same with everything there, in whatever form clients take it: all levels of the
-        pyramids."""
+        pyramids and of octrees, or what the walk is compared with."""
+        relief = self._world.relief
+        if relief and relief.reference:
+            return self._picture(relief.reference.shown(relief.reference.look(sight)))
         there = np.ones(self._world.catalogue.cell_count, dtype=np.bool_)
-        return self._drawn(sight, self._full, there, self._full.last)
+        last = self._full.last
+        if relief:
+            last = np.concatenate([last, relief.octrees.levels])
+        return self._drawn(sight, self._full, there, last)
 
     def _drawn(self, sight: Sight, shows: Shows, there: Bools, column: Ints) -> Floats:
         from ptmtools.walkthrough.view.shading import shade
 
         shown = np.empty((len(sight.ray), 3))
         shade(sight, self._triangles, shows, there, column, shown)
+        if self._world.relief:
+            from ptmtools.walkthrough.relief.kernels import relieve
+
+            octrees, first = self._world.relief.octrees, len(self._world.pyramids.levels)
+            held = column[first : first + octrees.number]
+            relieve(sight, self._triangles, self._lamps, octrees, there, held, shown)
+        return self._picture(shown)
+
+    def _picture(self, shown: Floats) -> Floats:
+        """(height, width, 3) of (n, 3) samples."""
         each = (self.height, self.samples, self.width, self.samples, 3)
         found: Floats = shown.reshape(each).mean(axis=(1, 3))
         return found

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.progress import Progress, silent
+from ptmtools.walkthrough.relief.tables import Relief, Rows, Tally as ReliefTally
 from ptmtools.walkthrough.served import Surfaces
 from ptmtools.walkthrough.view.rays import Camera, Caster
 from ptmtools.walkthrough.view.records import Pyramids, Shows, Sight, Triangles
@@ -38,7 +39,8 @@ class Views:
     Attributes
     ----------
     start: (F + 1,) where the rows of each frame begin.
-    cell, texture: (R,) int32 of each row; the texture is -1 for surfaces without.
+    cell, texture: (R,) int32 of each row; the texture is -1 for surfaces without. Behind the
+        textures come octrees, see `ptmtools.walkthrough.relief`.
     error, square: (R, L + 2) its part of the frame's mean of errors, and of squared errors, with as
         the finest that is there: nothing, the mean colour, level 0, level 1, …; in other forms
         their columns in place of levels.
@@ -95,22 +97,27 @@ def look_at_forms(
     progress: Progress = silent,
     *,
     full: Pyramids | None = None,
+    relief: Relief | None = None,
 ) -> list[Views]:
-    """The tables of `look`, and those of the same textures in other forms, against the same."""
+    """The tables of `look`, and those of the same textures in other forms, against the same; with
+    octrees, and what else is lit, if there are any."""
     triangles, caster, seen = triangles_of(surfaces), Caster(surfaces), camera.sparse
     full = pyramids if full is None else full
     shown: list[Pyramids | Shows] = [pyramids, *forms]
     tallies = [_Tally(triangles, textures, full, seen) for textures in shown]
+    beside = ReliefTally(relief, surfaces, triangles, pyramids, seen) if relief else None
     owner = np.empty((len(eye), int(seen.sum())), np.int32)
     depth = np.empty(owner.shape, np.float32)
     for k in range(len(eye)):
         progress(k, len(eye), "looking along the walk")
         sight = caster.look(camera, eye[k], direction[k])
+        plain = beside.add(sight) if beside else sight
         for tally in tallies:
-            tally.add(sight)
+            tally.add(plain)
         owner[k], depth[k] = _item_buffer(sight, triangles, seen)
     progress(len(eye), len(eye), "looking along the walk")
-    return [tally.views(owner, depth) for tally in tallies]
+    found = [tally.views(owner, depth) for tally in tallies]
+    return [with_rows(views, beside.rows) for views in found] if beside else found
 
 
 class _Tally:
@@ -169,6 +176,24 @@ def _item_buffer(
     facing = np.einsum("ij,ij->i", normal, rays[hit])
     depth[hit] = np.einsum("ij,ij->i", normal, offset) / facing
     return owner, depth
+
+
+def with_rows(views: Views, more: Rows) -> Views:
+    """The same with more rows, each behind those of its frame."""
+    of = np.repeat(np.arange(views.frames), np.diff(views.start))
+    order = np.argsort(np.concatenate([of, more.frame]), kind="stable")
+
+    def both(name: str) -> Any:
+        tables = [getattr(views, name), getattr(more, name)]
+        wide = max(table.shape[-1] for table in tables)
+        if tables[0].ndim > 1:
+            # Columns that a row does not have are never looked at.
+            tables = [np.pad(t, ((0, 0), (0, wide - t.shape[1]))) for t in tables]
+        return np.concatenate(tables)[order]
+
+    names = ("cell", "texture", "error", "square", "need", "sight")
+    start = np.searchsorted(np.sort(np.concatenate([of, more.frame])), np.arange(views.frames + 1))
+    return replace(views, start=start, **{name: both(name) for name in names})
 
 
 def limited(views: Views, count: Ints) -> Views:

@@ -1,0 +1,35 @@
+"""The light of lit pictures: one lamp far away, and some light from everywhere.
+
+The lamp wraps around (half Lambert, squared), so that relief shows on all sides of a statue. It
+multiplies colours as sRGB encodes them, as the rest of the simulator does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ptmtools.arrays import Floats
+from ptmtools.cells.vectors import normals
+from ptmtools.walkthrough.served import Served
+
+#: Share of the light that comes from everywhere, and a unit vector towards the lamp.
+AMBIENT = 0.3
+LAMP = tuple(float(v) for v in np.array([0.5, 0.7, 0.6]) / np.linalg.norm([0.5, 0.7, 0.6]))
+
+
+def lamps(corner: Floats) -> Floats:
+    """(n,) how much light falls on triangles (n, 3, 3), which are flat: `AMBIENT` to 1."""
+    normal = normals(corner)
+    length = np.linalg.norm(normal, axis=1)
+    along = np.divide(normal @ LAMP, length, out=np.zeros(len(corner)), where=length > 0)
+    found: Floats = AMBIENT + (1 - AMBIENT) * ((1 + along) / 2) ** 2
+    return found
+
+
+def lit(served: Served) -> Served:
+    """The same under the lamp."""
+    surfaces = served.surfaces
+    color = surfaces.color * lamps(surfaces.corner)[:, None]
+    return replace(served, surfaces=replace(surfaces, color=color))

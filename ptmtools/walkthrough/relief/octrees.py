@@ -1,0 +1,128 @@
+"""The octree textures of a served folder, as kernels take them, and as what clients fetch."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Floats, Ints
+from ptmtools.errors import DatabaseError, InputError
+from ptmtools.walkthrough.memory import Columns, aligned
+from ptmtools.walkthrough.served import BUILD, Served, Surfaces
+
+#: Bytes of a texel in texture memory.
+_TEXEL = 4
+#: A shape may leave the cube of its octree by so large a share of the cube, for rounding.
+_SLACK = 1e-4
+
+
+class Octrees(NamedTuple):
+    """Octree textures one after the other.
+
+    Attributes
+    ----------
+    texel: (N, 4) uint8. begin: (O + 1,) where each octree begins in it.
+    levels: (O,) how many each has.
+    low, side: (O, 3), (O,) of the cubes, metres.
+    of: (m,) int32 the octree of each triangle of the surfaces, -1 without.
+    """
+
+    texel: NDArray[np.uint8]
+    begin: Ints
+    levels: Ints
+    low: Floats
+    side: Floats
+    of: NDArray[np.int32]
+
+    @property
+    def number(self) -> int:
+        """How many there are."""
+        return len(self.levels)
+
+
+def read_octrees(served: Served) -> Octrees:
+    """All of a served folder, which may have none.
+
+    Raises DatabaseError: PTM-D005 a file is missing; PTM-D006 it is damaged, or not as the index
+    says.
+    """
+    rows = _rows(served)
+    texel = [_texels(served, row) for row in rows]
+    count = len(rows)
+    return Octrees(
+        texel=np.concatenate([np.zeros((0, 4), np.uint8), *texel]),
+        begin=np.cumsum([0, *map(len, texel)]).astype(np.int64),
+        levels=np.array([len(row["levels"]) for row in rows], dtype=np.int64),
+        low=np.array([row["cube"]["low"] for row in rows], dtype=np.float64).reshape(count, 3),
+        side=np.array([row["cube"]["side"] for row in rows], dtype=np.float64),
+        of=_of(served.surfaces, rows),
+    )
+
+
+def no_octrees(surfaces: Surfaces) -> Octrees:
+    """None at all."""
+    of = np.full(len(surfaces.corner), -1, np.int32)
+    no = np.zeros(0, np.int64)
+    return Octrees(
+        np.zeros((0, 4), np.uint8), np.zeros(1, np.int64), no, np.zeros((0, 3)), np.zeros(0), of
+    )
+
+
+def octree_columns(served: Served) -> Columns:
+    """What can be fetched of each octree: a column is a level, its size the nodes along a side."""
+    rows = []
+    for row in _rows(served):
+        across = 1 << np.arange(len(row["levels"]))
+        memory = np.cumsum(row["levels"]) * _TEXEL
+        rows.append((row["ends"], memory, np.stack([across, across], axis=1)))
+    return aligned(rows)
+
+
+def _rows(served: Served) -> Sequence[Mapping[str, Any]]:
+    found: Sequence[Mapping[str, Any]] = served.index.get("octrees", ())
+    return found
+
+
+def _texels(served: Served, row: Mapping[str, Any]) -> NDArray[np.uint8]:
+    from ptmtools.apo.reading import Stream, inflated
+
+    file = served.file(row["file"])
+    start = np.concatenate([[0], np.cumsum(row["levels"], dtype=np.int64)])
+    wrong = ""
+    if not len(row["levels"]) == len(row["ends"]) == len(row["crc32"]):
+        wrong = "has levels, ends and checksums that do not fit together in hints.json"
+    elif start[-1] > 1 << 24 or (np.diff(row["ends"], prepend=0) <= 0).any():
+        wrong = "has more texels in hints.json than there can be, or ends that do not ascend"
+    if not wrong:
+        data = served.read(row["file"])
+        try:
+            return inflated(data, start, Stream(row["file"], row["ends"], row["crc32"]))
+        except (InputError, zlib.error) as fault:
+            wrong = getattr(fault, "message", str(fault))
+    raise DatabaseError("PTM-D006", wrong, file=file, remedy=BUILD)
+
+
+def _of(surfaces: Surfaces, rows: Sequence[Mapping[str, Any]]) -> NDArray[np.int32]:
+    """(m,) the octree of each triangle: of an object's name, and if several have it, around which
+    the shape lies, the nearest to the middle (docs/hints.md)."""
+    shape_of = np.full(len(surfaces.objects), -1, np.int32)
+    low, high = surfaces.boxes()
+    for number, name in enumerate(surfaces.objects):
+        nearest = np.inf
+        for o, row in enumerate(rows):
+            cube, side = np.array(row["cube"]["low"]), row["cube"]["side"]
+            spare = _SLACK * side
+            inside = (low[number] >= cube - spare).all() and (
+                high[number] <= cube + side + spare
+            ).all()
+            if row["object"] != name or not inside:
+                continue
+            away = float(np.linalg.norm((low[number] + high[number]) / 2 - (cube + side / 2)))
+            if away < nearest:
+                nearest, shape_of[number] = away, o
+    found: NDArray[np.int32] = shape_of[surfaces.shape]
+    return found
