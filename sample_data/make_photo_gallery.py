@@ -60,9 +60,9 @@ def photos(count: int) -> list[Photo]:
     return found
 
 
-def hung(images: list[Photo]) -> tuple[float, list[Thing]]:
-    """The length of the hall in which they fill all walls, and the images on them."""
-    length = 2.0
+def hung(images: list[Photo], least: float = 2.0) -> tuple[float, list[Thing]]:
+    """The length of the hall in which they fill all walls, or ``least``, and the images on them."""
+    length = least
     while (walls := _filled(images, length)) is None:
         length += 0.5
     return length, walls

@@ -234,4 +234,4 @@ def _shapes(served: Served) -> Shapes:
     often = np.stack([np.bincount(surfaces.shape, area * s, count) for s in slope.T], axis=1)
     whole = np.bincount(surfaces.shape, area, count)[:, None]
     side = np.divide(whole, often, out=np.zeros((count, 2)), where=often > 0)
-    return Shapes(*(field[drawn] for field in (cell, texture, low, high, side)))
+    return Shapes(cell[drawn], texture[drawn], low[drawn], high[drawn], side[drawn])

@@ -56,6 +56,7 @@ def card() -> Any:
     )
     return SimpleNamespace(
         served=SimpleNamespace(surfaces=surfaces),
+        relief=None,
         pyramids=textures,
         camera=Camera(2, 1, np.pi / 2, 2.0),
         catalogue=SimpleNamespace(cell_count=1, levels=np.array([2])),
