@@ -99,10 +99,7 @@ def main() -> None:
 def world_of(scene: Scene, policies: Sequence[Declared]) -> World:
     """The world of a walk through a scene, in all forms that the policies take."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    if not scene.model.is_file():
-        script = ROOT / "sample_data" / scene.script
-        call = [sys.executable, str(script), "-o", str(scene.model.parent)]
-        subprocess.run(call, check=True, cwd=ROOT)
+    made(scene.script, scene.model)
     database, walk = FOLDER / f"{scene.name}.db", FOLDER / f"{scene.name}-{SECONDS}.json"
     ptm("build-scene", scene.model, "-o", database, "--format", "vrml,gltf,interlace")
     ptm("path", database, "-o", walk, "--duration", SECONDS, "--force")
@@ -110,6 +107,13 @@ def world_of(scene: Scene, policies: Sequence[Declared]) -> World:
     pyramids = read_pyramids(served)
     forms = read_forms(served, pyramids, (policy.form for policy in policies))
     return prepare(served, read_walk(walk), pyramids, forms=forms)
+
+
+def made(script: str, model: Path) -> None:
+    """Makes a model by a script of the sample data, unless it is there."""
+    if not model.is_file():
+        call = [sys.executable, str(ROOT / "sample_data" / script), "-o", str(model.parent)]
+        subprocess.run(call, check=True, cwd=ROOT)
 
 
 def tables(world: World, options: SimulateOptions) -> Iterator[str]:
