@@ -17,7 +17,12 @@ from ptmtools.simplification.heap_kernels import (
     sink,
     without_stale,
 )
-from ptmtools.simplification.legality_kernels import has_counterparts, is_linked, keeps_faces
+from ptmtools.simplification.legality_kernels import (
+    has_counterparts,
+    is_linked,
+    keeps_faces,
+    may_close,
+)
 from ptmtools.simplification.quadric_kernels import (
     add,
     best_place,
@@ -27,6 +32,7 @@ from ptmtools.simplification.quadric_kernels import (
     wedge_value_at,
 )
 from ptmtools.simplification.state_kernels import (
+    CLOSING,
     ENTRIES,
     FACES,
     MADE,
@@ -178,6 +184,28 @@ def keep_edges(state: State, v: int, count: int) -> None:
 
 
 @kernel
+def cancel(state: State, v: int) -> None:
+    """Takes away the faces of v that lie back to back."""
+    triangle = state.triangle
+    corner = state.head[v]
+    while corner >= 0:
+        t, k = corner // 3, corner % 3
+        corner = state.beyond[corner]
+        if triangle[t, 0] < 0:
+            continue
+        x, y = triangle[t, (k + 1) % 3], triangle[t, (k + 2) % 3]
+        other = corner
+        while other >= 0:
+            s, j = other // 3, other % 3
+            other = state.beyond[other]
+            alive = triangle[s, 0] >= 0
+            if alive and triangle[s, (j + 1) % 3] == y and triangle[s, (j + 2) % 3] == x:
+                triangle[t, 0] = triangle[s, 0] = -1
+                state.number[FACES] -= 2
+                break
+
+
+@kernel
 def collapse(state: State, u: int, v: int, count: int, px: float, py: float, pz: float) -> None:
     """Moves u into v, and v to that place; ``shared`` holds the faces between them."""
     triangle, wedge, shared, point = state.triangle, state.wedge, state.shared, state.point
@@ -212,6 +240,9 @@ def collapse(state: State, u: int, v: int, count: int, px: float, py: float, pz:
     state.beyond[state.tail[v]] = state.head[u]
     state.tail[v] = state.tail[u]
     prune(state, v)
+    if state.number[CLOSING]:
+        cancel(state, v)
+        prune(state, v)
     state.head[u] = state.tail[u] = -1
     keep_edges(state, v, count)
     state.version[u] += 1
@@ -265,7 +296,9 @@ def collapse_edges(state: State, heap: Heap, faces: int) -> None:
         prune(state, u)
         prune(state, v)
         count = meet(state, u, v)
-        if count < 1 or not is_linked(state, u, v, count):
+        closing = number[CLOSING] == 1
+        fits = may_close(state, u, v, count) if closing else is_linked(state, u, v, count)
+        if count < 1 or not fits:
             number[REFUSED] += 1
             continue
         fits = has_counterparts(state, u, v, count) and keeps_faces(state, u, v, px, py, pz)

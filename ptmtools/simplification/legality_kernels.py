@@ -69,6 +69,63 @@ def is_linked(state: State, u: int, v: int, count: int) -> bool:
 
 
 @kernel
+def may_close(state: State, u: int, v: int, count: int) -> bool:
+    """The same where handles may be closed: what joins the ends besides their faces becomes edges
+    of four faces, and faces that fall onto each other back to back are gone (`cancel`).
+
+    No line of kept edges may fall onto anything, and no face onto one that looks the same way.
+    """
+    triangle, kept, mark, shared = state.triangle, state.kept, state.mark, state.shared
+    for i in range(count):
+        if shared[i, 4] and shared[i, 5]:
+            return False
+    near = state.number[MARKS] + 1
+    third = near + 1
+    state.number[MARKS] = third
+    corner = state.head[v]
+    while corner >= 0:
+        for k in range(3):
+            mark[triangle[corner // 3, k]] = near
+        corner = state.beyond[corner]
+    mark[u] = mark[v] = 0
+    for i in range(count):
+        mark[shared[i, 2]] = third
+    both = state.number[MARKS] + 1
+    state.number[MARKS] = both
+    corner = state.head[u]
+    while corner >= 0:
+        t, k = corner // 3, corner % 3
+        corner = state.beyond[corner]
+        x, y = triangle[t, (k + 1) % 3], triangle[t, (k + 2) % 3]
+        if mark[x] == near or mark[x] == both:
+            if (kept[t] >> k) & 1:
+                return False
+            mark[x] = both
+        if mark[y] == near or mark[y] == both:
+            if (kept[t] >> ((k + 2) % 3)) & 1:
+                return False
+            mark[y] = both
+        if mark[x] < near or mark[y] < near:
+            continue
+        other = state.head[v]
+        while other >= 0:
+            s, j = other // 3, other % 3
+            if triangle[s, (j + 1) % 3] == x and triangle[s, (j + 2) % 3] == y:
+                return False
+            other = state.beyond[other]
+    corner = state.head[v]
+    while corner >= 0:
+        t, k = corner // 3, corner % 3
+        corner = state.beyond[corner]
+        x, y = triangle[t, (k + 1) % 3], triangle[t, (k + 2) % 3]
+        if mark[x] == both and (kept[t] >> k) & 1:
+            return False
+        if mark[y] == both and (kept[t] >> ((k + 2) % 3)) & 1:
+            return False
+    return True
+
+
+@kernel
 def has_counterparts(state: State, u: int, v: int, count: int) -> bool:
     """Whether each wedge of u goes on as one of v, by the faces in ``count`` rows of ``shared``."""
     shared, wedge = state.shared, state.wedge

@@ -27,12 +27,14 @@ import numpy as np
 
 from ptmtools.progress import Progress, silent
 from ptmtools.simplification.collapse_kernels import collapse_edges, fill
+from ptmtools.simplification.handles import PER_HANDLE, handles
 from ptmtools.simplification.heap_kernels import Heap
 from ptmtools.simplification.legality_kernels import CAREFUL, CARELESS
 from ptmtools.simplification.meshlab import by_meshlab
 from ptmtools.simplification.model import Mesh, Simplified, SimplifyOptions, too_many
 from ptmtools.simplification.quadrics import attributes, vertex_quadrics, wedge_quadrics
 from ptmtools.simplification.state_kernels import (
+    CLOSING,
     ENTRIES,
     FACES,
     MADE,
@@ -45,6 +47,8 @@ from ptmtools.tolerance import FILE_SHARE
 
 #: Progress is told after so many parts of the work.
 PARTS = 50
+#: Handles that hold a greater share of the faces that are to be left are closed.
+HELD = 0.1
 
 DEFAULTS = SimplifyOptions()
 
@@ -66,6 +70,7 @@ def simplify(
         return by_meshlab(mesh, surface, options.faces)
     state = _state(mesh, surface)
     state.worst[1] = _square(options.error / surface.scale)
+    state.number[CLOSING] = PER_HANDLE * handles(surface) > HELD * options.faces
     _collapse(state, options.faces, progress)
     return _result(mesh, surface, state, options)
 
@@ -95,7 +100,7 @@ def _state(mesh: Mesh, surface: Surface) -> State:
         version=np.zeros(vertices, np.int32),
         mark=np.zeros(vertices, np.int64),
         moved=np.zeros(vertices, bool),
-        number=np.array([len(surface.triangle), 0, 0, 0, 0]),
+        number=np.array([len(surface.triangle), 0, 0, 0, 0, 0]),
         place=np.empty(3),
         shared=np.empty((MOST_AT_EDGE, 6), np.int32),
         shown=np.empty(2),

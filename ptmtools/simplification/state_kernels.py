@@ -18,8 +18,8 @@ from ptmtools.compiled import plain_kernel as kernel
 MOST_AT_EDGE = 64
 
 #: Where `State.number` counts faces, entries of the heap, marks given out, collapses made, and
-#: edges refused since all were tried.
-FACES, ENTRIES, MARKS, MADE, REFUSED = 0, 1, 2, 3, 4
+#: edges refused since all were tried; and whether collapses may close handles, 1 or 0.
+FACES, ENTRIES, MARKS, MADE, REFUSED, CLOSING = 0, 1, 2, 3, 4, 5
 
 
 class State(NamedTuple):
@@ -32,7 +32,7 @@ class State(NamedTuple):
     head, tail: (V,) the first and the last corner at each vertex; beyond: (3 T,) the next one.
     version: (V,) how often each vertex has changed.
     moved: (V,) whether it has left its place.
-    number: (5,) counts, by `FACES` and so on.
+    number: (6,) counts, by `FACES` and so on.
     limits: (3,) say when faces turn, such as `CAREFUL`.
     worst: (3,) the largest error of a collapse, squared, the largest that is allowed, and the cost
         up to which what was refused has been tried again.

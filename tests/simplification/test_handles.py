@@ -1,0 +1,129 @@
+"""Meshes of many handles: how many there are, and that they do not stand in the way."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+from numpy.typing import NDArray
+
+from ptmtools.simplification import Mesh, SimplifyOptions, simplify
+from ptmtools.simplification.handles import handles
+from ptmtools.simplification.surface import surface_of
+from tests.simplification.shapes import box, cylinder, edge_faces, euler, normals, sphere, torus
+
+
+def voxels(filled: NDArray[np.bool_]) -> Mesh:
+    """The surface of unit cubes."""
+    inside = np.pad(filled, 1)
+    corner = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    quads = []
+    for axis in range(3):
+        across = [(axis + 1) % 3, (axis + 2) % 3]
+        for side in (0, 1):
+            out = inside & ~np.roll(inside, 1 - 2 * side, axis)
+            at = np.argwhere(out)
+            quad = np.repeat(at[:, None], 4, axis=1)
+            quad[:, :, across] += corner if side else corner[::-1]
+            quad[:, :, axis] += side
+            quads.append(quad)
+    points, index = np.unique(np.concatenate(quads).reshape(-1, 3), axis=0, return_inverse=True)
+    index = index.reshape(-1, 4)
+    triangles = np.concatenate([index[:, [0, 1, 2]], index[:, [0, 2, 3]]])
+    return Mesh(points.astype(np.float64), triangles.astype(np.int32))
+
+
+def plate(holes: int, wide: int = 3, thick: int = 2) -> Mesh:
+    """A plate with ``holes`` by ``holes`` holes of one cube."""
+    filled = np.ones((wide * holes + 2, wide * holes + 2, thick), bool)
+    filled[2::wide, 2::wide][:holes, :holes] = False
+    return voxels(filled)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "expected"),
+    [
+        (sphere(12), 0),
+        (torus(20, 12), 1),
+        (plate(1), 1),
+        (plate(5), 25),
+        (cylinder(12, 4), 0),
+        (box(3), 0),
+    ],
+    ids=["sphere", "torus", "plate", "plate of 25", "cylinder without ends", "box"],
+)
+def test_how_many_there_are(mesh: Mesh, expected: int) -> None:
+    assert handles(surface_of(mesh)) == expected
+    two = Mesh(
+        np.concatenate([mesh.points, mesh.points + 100]),
+        np.concatenate([mesh.triangles, mesh.triangles + len(mesh.points)]),
+    )
+    assert handles(surface_of(two)) == 2 * expected
+
+
+def test_nobody_can_say_where_three_faces_meet() -> None:
+    fan = np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]], dtype=np.int32)
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0]], dtype=np.float64)
+    assert handles(surface_of(Mesh(points, fan))) == 0
+    assert handles(surface_of(Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)))) == 0
+
+
+def test_many_handles_are_closed_and_the_plate_stays() -> None:
+    """400 holes hold 1,600 faces; of the plate's outline 200 are enough."""
+    given = plate(20)
+    found = simplify(given, SimplifyOptions(faces=200))
+    assert len(found.mesh.triangles) <= 200
+    assert found.notes == ()
+    # Nothing opens: every edge has an even number of faces.
+    assert (edge_faces(found.mesh) % 2 == 0).all()
+    low, high = given.points.min(axis=0), given.points.max(axis=0)
+    assert np.allclose(found.mesh.points.min(axis=0), low, atol=0.5)
+    assert np.allclose(found.mesh.points.max(axis=0), high, atol=0.5)
+    volume = (normals(found.mesh) * found.mesh.points[found.mesh.triangles[:, 0]]).sum() / 6
+    # Of whole cubes: each hole closes by some, or stays.
+    assert 0.85 * np.prod(high - low) < volume < 1.1 * np.prod(high - low)
+
+
+def test_few_handles_stay() -> None:
+    """What holds a tenth of the faces at most is kept, as anything else that one sees."""
+    given = plate(3)
+    found = simplify(given, SimplifyOptions(faces=360))
+    assert euler(found.mesh) == 2 - 2 * 9
+    assert (edge_faces(found.mesh) == 2).all()
+
+
+def test_no_step_goes_beyond_the_error() -> None:
+    given = plate(20)
+    free = simplify(given, SimplifyOptions(faces=100))
+    held = simplify(given, SimplifyOptions(faces=100, error=0.1))
+    assert held.error <= 0.1 < free.error
+    assert len(held.mesh.triangles) > len(free.mesh.triangles)
+    assert (edge_faces(held.mesh) % 2 == 0).all()
+
+
+def test_materials_stay_where_they_are() -> None:
+    """The outlines of a material are as exact with handles closed as without: half of the plate."""
+    given = plate(12)
+    middle = (given.points[:, 0].max() + given.points[:, 0].min()) // 2
+    material = (given.points[given.triangles].mean(axis=1)[:, 0] > middle).astype(np.int32)
+    found = simplify(replace(given, material=material), SimplifyOptions(faces=150)).mesh
+    assert found.material is not None
+    assert (edge_faces(found) % 2 == 0).all()
+    corners = found.points[found.triangles][..., 0]
+    assert corners[found.material == 0].max() <= middle + 1e-9
+    assert corners[found.material == 1].min() >= middle - 1e-9
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(8, 200))
+def test_noise_stays_closed_and_is_the_same_again(seed: int, faces: int) -> None:
+    """Cubes at random: handles, islands, edges of four faces."""
+    random = np.random.default_rng(seed)
+    given = voxels(random.random((6, 6, 6)) < 0.6)
+    found, again = (simplify(given, SimplifyOptions(faces=faces)) for _ in range(2))
+    assert (edge_faces(found.mesh) % 2 == 0).all()
+    assert found.mesh.points.tobytes() == again.mesh.points.tobytes()
+    assert found.mesh.triangles.tobytes() == again.mesh.triangles.tobytes()
+    assert (np.diff(np.sort(found.mesh.triangles, axis=1), axis=1) > 0).all()
+    assert np.isfinite(found.mesh.points).all()
