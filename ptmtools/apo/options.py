@@ -45,7 +45,7 @@ class ReplaceOptions:
     apo_depth: greatest depth of the leaves; one of depth 11 is 1/2048 of the object wide.
     apo_density: samples for each triangle of an object, on average.
 
-    Raises InputError PTM-I840 for what is out of range.
+    Raises InputError PTM-I840 for what is out of range, or of no object.
     """
 
     apo: tuple[str, ...] = ()
@@ -57,3 +57,9 @@ class ReplaceOptions:
     def __post_init__(self) -> None:
         for name in ("faces", "error", "depth", "density"):
             check_range(name, getattr(self, f"apo_{name}"), "apo-")
+            if not self.apo and getattr(self, f"apo_{name}") != getattr(type(self), f"apo_{name}"):
+                raise InputError(
+                    "PTM-I840",
+                    f"--apo-{name} does nothing without --apo",
+                    remedy="name the objects that it is for with --apo",
+                )

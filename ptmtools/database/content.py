@@ -65,6 +65,11 @@ class Content:
         return {record.image: (place, record) for place, record in enumerate(self.textures)}
 
     @cached_property
+    def octree_of(self) -> Mapping[int, int]:
+        """Object of the scene → the place of its octree in `octrees`."""
+        return {record.number: place for place, record in enumerate(self.octrees)}
+
+    @cached_property
     def paint(self) -> NDArray[np.int64]:
         """(S,) of each shape its texture's place in `textures`; -1 for none."""
         place = [self.records[m.image][0] if m.image >= 0 else -1 for m in self.scene.materials]

@@ -65,7 +65,7 @@ class OctreeRecord:
 
     Attributes
     ----------
-    object: its name; objects may share one.
+    object, number: its name, which objects may share, and its index in the scene.
     file: the stream of texels, relative to the served folder, "apo/NAME.bin".
     low, side: corner and side of the cube, world metres.
     levels: texels of each level, from the root on.
@@ -74,6 +74,7 @@ class OctreeRecord:
     """
 
     object: str
+    number: int
     file: str
     low: tuple[float, ...]
     side: float

@@ -107,6 +107,7 @@ def _written(file: str, made: ReplacedObject) -> tuple[dict[str, Any], bytes]:
     data, levels = streamed(made.octree.texels, made.octree)
     row = {
         "object": made.name,
+        "number": made.object,
         "file": file,
         "low": made.octree.low.tolist(),
         "side": made.octree.side,
@@ -139,13 +140,14 @@ def _record(row: Mapping[str, Any]) -> OctreeRecord:
 
     low, side = tuple(map(float, row["low"])), float(row["side"])
     levels, ends, checks = (tuple(map(int, row[name])) for name in ("levels", "ends", "crc32"))
-    if not isinstance(row["object"], str) or not _FILE.fullmatch(row["file"]):
+    number = int(row["number"])
+    if not isinstance(row["object"], str) or number < 0 or not _FILE.fullmatch(row["file"]):
         raise ValueError("an octree with an impossible name")
     if len(low) != 3 or not all(map(math.isfinite, low)) or not 0 < side < math.inf:
         raise ValueError("an octree without a place")
     if not len(levels) == len(ends) == len(checks) > 0:
         raise ValueError("an octree whose lists are not aligned")
-    return OctreeRecord(row["object"], row["file"], low, side, levels, ends, checks)
+    return OctreeRecord(row["object"], number, row["file"], low, side, levels, ends, checks)
 
 
 def load_scene(artifacts: Artifacts, arrays: Mapping[str, NDArray[np.generic]]) -> Scene:
@@ -153,7 +155,8 @@ def load_scene(artifacts: Artifacts, arrays: Mapping[str, NDArray[np.generic]]) 
     from ptmtools.apo.replacement import Replacement
 
     replacement = Replacement.from_arrays(arrays)
-    if len(octree_records(artifacts)) != len(replacement.objects):
+    numbers = [record.number for record in octree_records(artifacts)]
+    if numbers != replacement.objects.tolist():
         raise ValueError(f"{arrays_of(APO.name)} and {OCTREE_LIST} are of other objects")
     return replacement.of(artifacts[SCENE])
 

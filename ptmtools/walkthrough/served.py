@@ -53,7 +53,7 @@ class Surfaces:
     clamped: (n, 2) whether u and v stop at the edge of the texture instead of repeating it.
     seen: (n, 2) of each the one that is seen in its place from where its normal points to, and from
         behind it, see `sides`.
-    objects: of each shape the name of its object.
+    octree: (n,) int32, the octree texture of its object in the hints, -1 without.
     """
 
     corner: Floats
@@ -66,7 +66,7 @@ class Surfaces:
     glass: Bools
     clamped: Bools
     seen: Ints
-    objects: tuple[str, ...] = ()
+    octree: NDArray[np.int32]
 
     def boxes(self) -> tuple[Floats, Floats]:
         """(s, 3) corners of the boxes of the shapes, metres; infinite of one without triangles."""
@@ -169,7 +169,8 @@ def read_served(database: str | os.PathLike[str]) -> Served:
     for cell, name in enumerate(names):
         file = _of(folder, index["geometry"][FORM], name)
         data = _bytes(file)
-        geometry.append(_glb(file, data, cell, len(index["textures"])))
+        lists = len(index["textures"]), len(index.get("octrees", ()))
+        geometry.append(_glb(file, data, cell, *lists))
         sizes.append(on_link(data))
     locator = Locator(records)
     return Served(
@@ -247,7 +248,7 @@ def _check_record(
         raise DatabaseError("PTM-D006", wrong, file=file, remedy=BUILD)
 
 
-def _glb(file: Path, data: bytes, cell: int, textures: int) -> ReadGlb:
+def _glb(file: Path, data: bytes, cell: int, textures: int, octrees: int) -> ReadGlb:
     try:
         read = read_glb(data)
     except FileError as fault:
@@ -255,7 +256,9 @@ def _glb(file: Path, data: bytes, cell: int, textures: int) -> ReadGlb:
             "PTM-D006", fault.message, file=file, place=fault.place, remedy=BUILD
         ) from None
     used = [p.material.texture for p in read.primitives if p.material.texture is not None]
-    if read.cell != cell or max(used, default=-1) >= textures:
+    around = [p.octree for p in read.primitives if p.octree is not None]
+    wrong = max(used, default=-1) >= textures or max(around, default=-1) >= octrees
+    if read.cell != cell or wrong:
         raise DatabaseError("PTM-D006", "is not that of its cell", file=file, remedy=BUILD)
     return read
 
@@ -291,7 +294,7 @@ def _surfaces(geometry: list[ReadGlb], locator: Locator) -> Surfaces:
         glass=spread([m.blends and t < 0 for m, t in zip(looks, texture, strict=True)], np.bool_),
         clamped=spread([[w == clamp for w in m.wrap] for m in looks], np.bool_, 2),
         seen=sides(corner, cell, two_sided, locator),
-        objects=tuple(p.object for _, p in shapes),
+        octree=spread([-1 if p.octree is None else p.octree for _, p in shapes], np.int32),
     )
 
 

@@ -38,13 +38,14 @@ FIRST = "apo/Statue_u.bin"
 def put_octrees(www: Path) -> tuple[OctreeRecord, ...]:
     (www / "apo").mkdir()
     records = []
-    for name, stem, depth in OBJECTS:
+    for number, (name, stem, depth) in enumerate(OBJECTS):
         octree = ball(depth, LOW, SIDE)
         data, levels = streamed(octree.texels, octree)
         (www / f"apo/{stem}.bin").write_bytes(data)
         counts = tuple(np.diff(octree.start).tolist())
         ends, checks = tuple(levels["ends"]), tuple(levels["crc32"])
-        records.append(OctreeRecord(name, f"apo/{stem}.bin", LOW, SIDE, counts, ends, checks))
+        file = f"apo/{stem}.bin"
+        records.append(OctreeRecord(name, number, file, LOW, SIDE, counts, ends, checks))
     return tuple(records)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from PIL import Image
 from ptmtools.apo.options import ReplaceOptions
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
+from ptmtools.database.gltf.container import pack, unpack
 from ptmtools.database.names import HINTS
 from ptmtools.errors import DatabaseError
 from ptmtools.pipeline import Artifacts, build_scene, database_status, plan_build, validate
@@ -227,6 +229,68 @@ def test_a_list_that_names_another_file(folder: Path) -> None:
     assert (issue.code, issue.file, issue.place) == ("PTM-D721", OCTREE_LIST, "statue_02")
 
 
+def glb_nodes(db: Path) -> dict[str, int]:
+    """The octree that each object has, by all GLBs."""
+    found = {}
+    for file in sorted((db / "www/gltf").glob("*.glb")):
+        for node in unpack(file.read_bytes())[0].get("nodes", []):
+            if "extras" in node:
+                found[node["name"]] = node["extras"]["octree"]
+    return found
+
+
+def renumbered(db: Path, change: Callable[[int], int]) -> None:
+    """Other octrees for the nodes of all GLBs."""
+    for file in (db / "www/gltf").glob("*.glb"):
+        document, binary = unpack(file.read_bytes())
+        for node in document.get("nodes", []):
+            if "extras" in node:
+                node["extras"]["octree"] = change(node["extras"]["octree"])
+        sealed(db, f"www/gltf/{file.name}", pack(document, binary))
+
+
+def moved(db: Path, by: float, larger: float = 1.0) -> None:
+    """The cube of the first octree elsewhere, by a share of its side."""
+    index = index_of(db)
+    cube = index["octrees"][0]["cube"]
+    cube["low"] = [value + by * cube["side"] for value in cube["low"]]
+    cube["side"] *= larger
+    sealed(db, f"www/{HINTS}", json.dumps(index).encode())
+
+
+def test_nodes_say_which_octree_is_theirs(made: Path) -> None:
+    names = [row["object"] for row in index_of(made / "light.db")["octrees"]]
+    assert glb_nodes(made / "light.db") == {name: k for k, name in enumerate(names)}
+    assert glb_nodes(made / "plain.db") == {}
+
+
+@pytest.mark.parametrize(
+    ("damage", "expected"),
+    [
+        (lambda db: renumbered(db, lambda k: 1 - k), "its octree texture of 'statue_0"),
+        (lambda db: renumbered(db, lambda k: k + 2), "the hints have no octree texture"),
+        (lambda db: moved(db, 0.2), "leaves the cube"),
+        (lambda db: moved(db, -0.5, 2.0), "of its points have no texel"),
+    ],
+    ids=["swapped", "out of range", "cube elsewhere", "cube larger"],
+)
+def test_octrees_of_other_objects(
+    folder: Path, damage: Callable[[Path], None], expected: str
+) -> None:
+    db = folder / "light.db"
+    damage(db)
+    # The compressed copy of the hints is left as it was.
+    issues = [i for i in validate(db).issues if i.code not in ("PTM-D866", "PTM-D659")]
+    assert {i.code for i in issues} == {"PTM-D865"}
+    assert expected in issues[0].message
+
+
+def test_an_octree_of_nobody(folder: Path) -> None:
+    db = folder / "light.db"
+    renumbered(db, lambda k: 0)
+    assert {i.code for i in validate(db).issues} == {"PTM-D865", "PTM-D866"}
+
+
 def test_names_of_files() -> None:
     names = ["Büste 1", "buste_1", "BUSTE_1", "../../x", "", "像", "a" * 99, "."]
     assert octree_files(names) == [
@@ -250,6 +314,8 @@ def test_nothing_fits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert "warning: 1 object of --apo has no more triangles than --apo-faces 2,000" in said
     assert main(["build-scene", str(model), *options, "--apo-faces", "2"]) == 3
     assert "--apo-faces 2 is not possible" in capsys.readouterr().err
+    assert main(["build-scene", str(model), *options, "--apo-error", "0.1"]) == 3
+    assert "--apo-error does nothing without --apo" in capsys.readouterr().err
     assert main(["build-scene", str(model), *options, "--apo", "[bB]*", "--apo-faces", "99"]) == 0
     assert sorted(p.name for p in (tmp_path / "db/www/apo").iterdir()) == [
         "Buste_1.bin",

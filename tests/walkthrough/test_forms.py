@@ -17,7 +17,7 @@ from ptmtools.interlace import deinterlace, read_manifest
 from ptmtools.texture import decode
 from ptmtools.walkthrough.comparing import SimulateOptions, budget_of, counted, play
 from ptmtools.walkthrough.flip import Flip
-from ptmtools.walkthrough.forms import FORMS, PTM
+from ptmtools.walkthrough.forms import PTM
 from ptmtools.walkthrough.forms.interlaced import mip_levels, mip_sizes
 from ptmtools.walkthrough.network import Conditions
 from ptmtools.walkthrough.policies import POLICIES

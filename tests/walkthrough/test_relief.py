@@ -223,11 +223,15 @@ def test_each_statue_has_its_octree(world: World) -> None:
     relief = world.relief
     assert relief
     surfaces = world.served.surfaces
-    names = np.array(surfaces.objects)[surfaces.shape]
     rows = [row["object"] for row in world.served.index["octrees"]]
     assert sorted(rows) == sorted(STATUES)
     for o, name in enumerate(rows):
-        assert np.array_equal(relief.octrees.of == o, names == name)
+        foot, radius = STATUES[name]
+        corner = surfaces.corner[relief.octrees.of == o] + world.served.index["origin"]
+        assert 0 < len(corner) <= 600
+        low, high = corner.min(axis=(0, 1)), corner.max(axis=(0, 1))
+        assert ((low + high) / 2)[[0, 2]] == pytest.approx([foot[0], foot[2]], abs=0.1)
+        assert high - low == pytest.approx(np.full(3, 2 * radius), rel=0.15)
     assert no_octrees(surfaces).number == 0
 
 

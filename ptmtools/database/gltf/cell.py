@@ -49,12 +49,16 @@ def _glb(content: Content, cell: int) -> bytes:
     scene, geometry, buffer = content.scene, content.geometry, BufferWriter()
     materials = MaterialWriter(scene.materials, content.records, content.options.fallback)
     nodes: list[dict[str, Any]] = []
+    node: dict[str, Any]
     meshes: list[dict[str, Any]] = []
     last = -1
     for shape in geometry.shapes(cell):
         if shape.object != last:
             last = shape.object
-            nodes.append({"name": scene.objects[shape.object], "mesh": len(meshes)})
+            node = {"name": scene.objects[shape.object], "mesh": len(meshes)}
+            if (octree := content.octree_of.get(shape.object)) is not None:
+                node["extras"] = {"octree": octree}
+            nodes.append(node)
             meshes.append({"primitives": []})
         meshes[-1]["primitives"].append(_primitive(scene, geometry, shape, buffer, materials))
     top: dict[str, Any] = {"name": cell_name(cell), "extras": {"cell": cell}}

@@ -52,7 +52,9 @@ class ReadPrimitive:
 
     Attributes
     ----------
-    place: of the primitive in the document. object: the name of its node, that of an object.
+    place: of the primitive in the document.
+    object, octree: what its node says: the name of an object, and the place of its octree texture
+        in the hints, or None.
     point: (n, 3) float32.
     uv: (n, 2) float32, origin at the upper left, or None.
     color: (n, 3) linear light, or None.
@@ -61,6 +63,7 @@ class ReadPrimitive:
 
     place: str
     object: str
+    octree: int | None
     point: NDArray[np.float32]
     uv: NDArray[np.float32] | None
     color: NDArray[np.float64] | None
@@ -117,7 +120,7 @@ class _Reader:
                 _foreign(f"nodes[{index}]", "has the mesh of another")
             for n, primitive in enumerate(self._row("meshes", index)["primitives"]):
                 place = f"meshes[{index}].primitives[{n}]"
-                primitives.append(self._primitive(primitive, place, node["name"]))
+                primitives.append(self._primitive(primitive, place, node))
         return ReadGlb(scene["name"], scene["extras"]["cell"], tuple(primitives))
 
     def _row(self, name: str, index: int) -> dict[str, Any]:
@@ -128,7 +131,9 @@ class _Reader:
         row: dict[str, Any] = rows[index]
         return row
 
-    def _primitive(self, primitive: dict[str, Any], place: str, name: str) -> ReadPrimitive:
+    def _primitive(
+        self, primitive: dict[str, Any], place: str, node: dict[str, Any]
+    ) -> ReadPrimitive:
         attributes = primitive["attributes"]
         point = self._vertices(attributes["POSITION"], "VEC3")
         self._check_bounds(attributes["POSITION"], point)
@@ -144,7 +149,8 @@ class _Reader:
             raise FileError("PTM-D734", place, message)
         triangle = index.astype(np.int64).reshape(-1, 3)
         material = self._material(primitive["material"])
-        return ReadPrimitive(place, name, point, uv, color, triangle, material)
+        octree = node.get("extras", {}).get("octree")
+        return ReadPrimitive(place, node["name"], octree, point, uv, color, triangle, material)
 
     def _colors(
         self, attributes: dict[str, int], count: int, place: str

@@ -94,6 +94,8 @@ CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D862": ("error", "a level of an octree texture is damaged"),
     "PTM-D863": ("error", "the texels of an octree texture are no octree, breadth first"),
     "PTM-D864": ("warning", "hints.json does not name an octree texture"),
+    "PTM-D865": ("error", "a GLB and hints.json disagree about an octree texture"),
+    "PTM-D866": ("warning", "an octree texture is listed in hints.json that no GLB uses"),
 }
 
 #: Of files that are not as their stage wrote them: a build sees that by itself.

@@ -1,4 +1,5 @@
-"""What octree textures must satisfy beside what `hints.json` says of them (docs/format-apo.md)."""
+"""What octree textures must satisfy beside what `hints.json` says of them (docs/format-apo.md), and
+beside the objects of the GLBs that they are of."""
 
 from __future__ import annotations
 
@@ -7,28 +8,64 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ptmtools.arrays import Floats
+from ptmtools.database.gltf.reader import ReadGlb, ReadPrimitive
 from ptmtools.database.names import HINTS
 from ptmtools.errors import InputError
 from ptmtools.findings import Place
 
 if TYPE_CHECKING:
+    from ptmtools.apo.model import Octree
     from ptmtools.database.validation.hints import ReadHints
     from ptmtools.database.validation.served import ServedDatabase
 
 #: More than as many texels as there are addresses take, deflated in any way.
 _MOST = 1 << 27
+#: Points of an object may leave the cube by such a share of its side, for single precision.
+_OUTSIDE = 1e-5
+#: Of so many points of an object some fall between the samples that the octree was made of: some
+#: percent; of another object's octree most do.
+_BARE = 0.5
+
+#: The shapes of an octree's object, and the file that each is in.
+Shown = list[tuple[str, ReadPrimitive]]
 
 
 def check_octrees(hints: ReadHints, database: ServedDatabase) -> None:
     """Holds each octree texture against its row: it ends with its last level, each level inflates
-    by itself to the texels that it should have, and these are an octree."""
+    by itself to the texels that it should have, and these are an octree; and against the objects
+    of the GLBs that say that it is theirs."""
     rows = hints.index.get("octrees", ())
     files = database.resolve_each(HINTS, "octrees", [row["file"] for row in rows])
+    shown = _shown(database, len(rows))
     for i, (row, file) in enumerate(zip(rows, files, strict=True)):
         if wrong := _contradiction(row):
             database.at(HINTS, f"octrees[{i}]").add("PTM-D860", wrong)
-        elif file:
-            _check(row, database.head(file, row["ends"][-1] + 1), database.at(file))
+            continue
+        if shown is not None and not shown[i]:
+            database.at(HINTS, f"octrees[{i}]").add("PTM-D866", f"{row['object']!r} in no GLB")
+        if file:
+            head = database.head(file, row["ends"][-1] + 1)
+            octree = _read(row, head, database.at(file))
+            for path, shape in shown[i] if shown else ():
+                if wrong := _misfit(row, octree, shape):
+                    database.at(path, shape.place).add("PTM-D865", wrong)
+
+
+def _shown(database: ServedDatabase, count: int) -> list[Shown] | None:
+    """Of each octree the shapes that it is of; None without GLBs."""
+    glbs = [(path, held) for path, held in database.held.items() if isinstance(held, ReadGlb)]
+    found: list[Shown] = [[] for _ in range(count)]
+    for path, glb in glbs:
+        for shape in glb.primitives:
+            if shape.octree is None:
+                continue
+            if shape.octree >= count:
+                message = f"the hints have no octree texture {shape.octree}"
+                database.at(path, shape.place).add("PTM-D865", message)
+            else:
+                found[shape.octree].append((path, shape))
+    return found if glbs else None
 
 
 def _contradiction(row: Mapping[str, Any]) -> str:
@@ -45,7 +82,8 @@ def _contradiction(row: Mapping[str, Any]) -> str:
     return ""
 
 
-def _check(row: Mapping[str, Any], data: bytes, at: Place) -> None:
+def _read(row: Mapping[str, Any], data: bytes, at: Place) -> Octree | None:
+    """The octree of a row; None, and a finding, if it is none."""
     from ptmtools.apo.model import Octree
     from ptmtools.apo.reading import Stream, inflated
     from ptmtools.apo.texels import fault_of
@@ -58,8 +96,29 @@ def _check(row: Mapping[str, Any], data: bytes, at: Place) -> None:
         texels = inflated(data, start, Stream(row["file"], row["ends"], row["crc32"]))
     except InputError as fault:
         at.add("PTM-D862", fault.message, fault.place or "")
-        return
+        return None
     octree = Octree(texels, start, np.array(row["cube"]["low"]), row["cube"]["side"])
     if wrong_place := fault_of(octree):
         place, wrong = wrong_place
         at.add("PTM-D863", wrong, place)
+        return None
+    return octree
+
+
+def _misfit(row: Mapping[str, Any], octree: Octree | None, shape: ReadPrimitive) -> str:
+    """In what a shape is not of a row's object; empty if it is."""
+    from ptmtools.apo.traversal import plain_look_up
+
+    if shape.object != row["object"]:
+        return f"is of {shape.object!r}, its octree texture of {row['object']!r}"
+    corner = shape.point.astype(np.float64)[shape.triangle]
+    points: Floats = np.concatenate([corner.reshape(-1, 3), corner.mean(axis=1)])
+    q = (points - row["cube"]["low"]) / row["cube"]["side"]
+    if (abs(q - 0.5) > 0.5 + _OUTSIDE).any():
+        return "leaves the cube of its octree texture"
+    if octree is not None:
+        # Where the walk ends in a node with children, there is none at the point.
+        bare = (octree.texels[plain_look_up(octree, q).address, 3] > 0).mean()
+        if bare > _BARE:
+            return f"is not what its octree texture is of: {bare:.0%} of its points have no texel"
+    return ""

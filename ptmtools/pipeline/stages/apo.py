@@ -40,8 +40,9 @@ def _summary(n: Mapping[str, Any]) -> str:
 APO: Stage[Scene] = Stage(
     name="apo",
     about="Replace objects by simplified meshes with octree textures.",
-    recipe=1,
+    recipe=2,
     options=ReplaceOptions,
+    changed="meshes of many handles become as simple as others",
     reads=_reads,
     changes=SCENE,
     artifact=Lazy("ptmtools.scene.model:Scene"),

@@ -16,8 +16,6 @@ from ptmtools.walkthrough.served import BUILD, Served, Surfaces
 
 #: Bytes of a texel in texture memory.
 _TEXEL = 4
-#: A shape may leave the cube of its octree by so large a share of the cube, for rounding.
-_SLACK = 1e-4
 
 
 class Octrees(NamedTuple):
@@ -59,7 +57,7 @@ def read_octrees(served: Served) -> Octrees:
         levels=np.array([len(row["levels"]) for row in rows], dtype=np.int64),
         low=np.array([row["cube"]["low"] for row in rows], dtype=np.float64).reshape(count, 3),
         side=np.array([row["cube"]["side"] for row in rows], dtype=np.float64),
-        of=_of(served.surfaces, rows),
+        of=served.surfaces.octree,
     )
 
 
@@ -104,25 +102,3 @@ def _texels(served: Served, row: Mapping[str, Any]) -> NDArray[np.uint8]:
         except (InputError, zlib.error) as fault:
             wrong = getattr(fault, "message", str(fault))
     raise DatabaseError("PTM-D006", wrong, file=file, remedy=BUILD)
-
-
-def _of(surfaces: Surfaces, rows: Sequence[Mapping[str, Any]]) -> NDArray[np.int32]:
-    """(m,) the octree of each triangle: of an object's name, and if several have it, around which
-    the shape lies, the nearest to the middle (docs/hints.md)."""
-    shape_of = np.full(len(surfaces.objects), -1, np.int32)
-    low, high = surfaces.boxes()
-    for number, name in enumerate(surfaces.objects):
-        nearest = np.inf
-        for o, row in enumerate(rows):
-            cube, side = np.array(row["cube"]["low"]), row["cube"]["side"]
-            spare = _SLACK * side
-            inside = (low[number] >= cube - spare).all() and (
-                high[number] <= cube + side + spare
-            ).all()
-            if row["object"] != name or not inside:
-                continue
-            away = float(np.linalg.norm((low[number] + high[number]) / 2 - (cube + side / 2)))
-            if away < nearest:
-                nearest, shape_of[number] = away, o
-    found: NDArray[np.int32] = shape_of[surfaces.shape]
-    return found
