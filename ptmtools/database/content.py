@@ -34,6 +34,7 @@ class Content:
     progress: is called for every cell.
     need: how fine textures are needed, where that was measured.
     octrees: the octree textures of objects.
+    workers: threads that may be used.
     """
 
     scene: Scene
@@ -46,6 +47,7 @@ class Content:
     progress: Progress = silent
     need: Need | None = None
     octrees: tuple[OctreeRecord, ...] = ()
+    workers: int = 1
 
     @cached_property
     def geometry(self) -> Geometry:

@@ -42,6 +42,7 @@ def emit(
     force: bool = False,
     need: Need | None = None,
     octrees: tuple[OctreeRecord, ...] = (),
+    workers: int = 1,
 ) -> EmitReport:
     """Writes the files of every emitter that ``options.format`` names into the folder ``out``. The
     textures themselves are written by the stage before.
@@ -52,6 +53,7 @@ def emit(
     force: overwrite files of these names, gzip copies included.
     need: how fine the textures are needed, if that is to be written.
     octrees: the octree textures of objects, which are there already.
+    workers: threads that may be used.
 
     Raises
     ------
@@ -72,7 +74,7 @@ def emit(
             refuse_existing(folder / name, remedy)
     viewpoints, notes = place_viewpoints(scene, cells, options, textures)
     content = Content(
-        scene, cells, pvs, ach, textures, viewpoints, options, progress, need, octrees
+        scene, cells, pvs, ach, textures, viewpoints, options, progress, need, octrees, workers
     )
     written = [emitter.files(content) for emitter in emitters]
     for name in owned:

@@ -43,6 +43,7 @@ class EmissionJob(Job):
             force=True,
             need=self._need(textures),
             octrees=octree_records(run),
+            workers=run.workers.executor.workers,
         )
         for name in report.files:
             transaction.take(f"{SERVED}/{name}", transaction.folder / SERVED / name)

@@ -10,11 +10,12 @@ A database and an interlaced image know nothing of each other; this is above bot
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ptmtools.database.content import Content
 from ptmtools.database.emitters.interlace import INTERLACE
@@ -22,10 +23,11 @@ from ptmtools.database.model import TextureRecord
 from ptmtools.database.names import HINTS, INTERLACE_FILES, INTERLACE_FOLDER, texture_name
 from ptmtools.database.validation.served import ServedDatabase
 from ptmtools.database.validation.textures import ReadTexture
-from ptmtools.errors import DatabaseError, InputError, naming
+from ptmtools.errors import DatabaseError, InputError, PtmError, naming
 from ptmtools.interlace.checking import validate_interlaced
 from ptmtools.interlace.model import INDEX, Interlaced
-from ptmtools.interlace.reading import read_manifest
+from ptmtools.interlace.reading import deinterlace, read_manifest
+from ptmtools.interlace.scaling import scaled
 from ptmtools.interlace.writing import Written, interlace
 from ptmtools.texture import reader
 from ptmtools.texture.images import Picture
@@ -54,7 +56,7 @@ def interlaced_files(content: Content) -> Iterator[tuple[str, str | bytes]]:
                 f"the texture {record.file!r} was not encoded",
                 remedy="run the stage `textures` again",
             )
-    sets = ordered(_interlaced, content.textures, os.cpu_count() or 1)
+    sets = ordered(_interlaced, content.textures, content.workers)
     for record, written in zip(content.textures, sets, strict=True):
         folder = INTERLACE_FILES.replace("{name}", texture_name(record.file))
         for name, data in written.named():
@@ -66,11 +68,15 @@ def _interlaced(record: TextureRecord) -> Written:
     finest = record.levels[-1]
     # What was encoded once can be decoded: its levels, and room to work in.
     limits = Limits(64 * finest.width * finest.height * record.components + (1 << 20))
-    with naming(record.stored), reader.open(record.stored, limits=limits) as ptm:
+    with naming(record.stored):
+        return interlace(Picture(_finest(record.stored, limits)), limits=limits)
+
+
+def _finest(file: Path, limits: Limits) -> NDArray[Any]:
+    """The finest level of a `.ptm`, as it is shown."""
+    with reader.open(file, limits=limits) as ptm:
         texels = ptm.level(len(ptm.header.levels) - 1)
-        if texels.dtype.kind == "f":
-            texels = in_eight_bits(texels)
-        return interlace(Picture(np.ascontiguousarray(texels)), limits=limits)
+    return np.ascontiguousarray(in_eight_bits(texels) if texels.dtype.kind == "f" else texels)
 
 
 def read_file(path: str, data: bytes) -> int:
@@ -114,8 +120,28 @@ def _check_set(
     except InputError:
         return  # has been found
     texture = database.textures.get(images[-1] or "")
-    if wrong := _misfit(interlaced, row, texture):
+    wrong = _misfit(interlaced, row, texture)
+    if not wrong and texture and not report.issues:
+        wrong = _other_texels(database, folder, interlaced, images[-1] or "")
+    if wrong:
         database.at(f"{folder}{INDEX}").add("PTM-D744", wrong)
+
+
+def _other_texels(
+    database: ServedDatabase, folder: str, interlaced: Interlaced, texture: str
+) -> str:
+    """How many texels of a set are not those of its texture; empty if all are, or if there is more
+    than can be read."""
+    try:
+        texels = _finest(database.folder / texture, database.limits)
+        shown = deinterlace(database.folder / folder, limits=database.limits)
+    except PtmError:
+        return ""  # has been found, or is too large
+    width, height = interlaced.width, interlaced.height
+    if texels.shape[:2] != (height, width):
+        texels = scaled(texels, width, height)
+    differ = (texels.reshape(shown.shape) != shown).any(axis=-1)
+    return f"{differ.sum():,} texels differ from those of the texture" if differ.any() else ""
 
 
 def _misfit(interlaced: Interlaced, row: Mapping[str, Any], texture: ReadTexture | None) -> str:

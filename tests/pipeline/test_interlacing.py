@@ -14,9 +14,10 @@ from PIL import Image
 from ptmtools.cli.main import main
 from ptmtools.database import EmitOptions, validate_database
 from ptmtools.errors import InputError
-from ptmtools.interlace import deinterlace, read_manifest
+from ptmtools.interlace import deinterlace, interlace, read_manifest
 from ptmtools.interlace.scaling import scaled
 from ptmtools.texture import decode
+from ptmtools.texture.images import Picture
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_data"
 FORMATS = "vrml,gltf,interlace"
@@ -143,6 +144,23 @@ def test_the_set_of_another_texture(db: Path) -> None:
     shutil.copytree(other, one)
     found = [i for i in validate_database(db, workers=1).issues if i.code == "PTM-D744"]
     assert [i.file for i in found] == [f"www/interlace/{one.name}/interlace.json"]
+
+
+def test_a_set_of_other_texels(db: Path) -> None:
+    """Of the right size and kind, with all checksums as its manifest has them; of two textures,
+    one of which is scaled."""
+    for folder in sorted((db / "www/interlace").iterdir()):
+        manifest = read_manifest(folder)
+        texels = deinterlace(folder).copy()
+        texels[3, 5] ^= 1
+        written = interlace(Picture(texels))
+        old = json.loads((folder / "interlace.json").read_text())["original"]
+        for name, data in written.named():
+            (folder / name).write_bytes(data if isinstance(data, bytes) else data.encode())
+        edited(lambda d, old=old: d.update(original=old))(folder)
+        assert read_manifest(folder).original == manifest.original
+    found = [i for i in validate_database(db, workers=1).issues if i.code == "PTM-D744"]
+    assert [i.message for i in found] == ["1 texels differ from those of the texture"] * 4
 
 
 def test_sets_that_the_index_does_not_name(db: Path) -> None:
