@@ -2,56 +2,24 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 
 from ptmtools import schemas
 from ptmtools.apo.making import Simple
 from ptmtools.errors import InputError
-from ptmtools.glb import BINARY, JSON, glb, glb_chunks
-
-_FLOAT, _SHORT, _INT, _VERTICES, _INDICES = 5126, 5123, 5125, 34962, 34963
-#: An index of 16 bits that restarts a primitive.
-_RESTART = 65535
+from ptmtools.glb import BINARY, JSON, glb_chunks
+from ptmtools.glb_writing import INT, SHORT, BufferWriter, one_mesh
 
 
 def glb_of(mesh: Simple) -> bytes:
     """A GLB: positions, normals, indices."""
-    point, triangle = mesh.points.astype(np.float32), mesh.triangles
-    narrow = len(point) < _RESTART
-    arrays = [
-        point.astype("<f4"),
-        mesh.normals.astype("<f4"),
-        triangle.astype("<u2" if narrow else "<u4"),
-    ]
-    views, at = [], 0
-    for array, target in zip(arrays, (_VERTICES, _VERTICES, _INDICES), strict=True):
-        views.append({"buffer": 0, "byteOffset": at, "byteLength": array.nbytes, "target": target})
-        at += array.nbytes
-    bounds = {"min": point.min(axis=0).tolist(), "max": point.max(axis=0).tolist()}
-    vector = {"componentType": _FLOAT, "count": len(point), "type": "VEC3"}
-    document = {
-        "asset": {"version": "2.0", "generator": "ptmtools"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "NORMAL": 1}, "indices": 2}]}],
-        "accessors": [
-            {"bufferView": 0, **vector, **bounds},
-            {"bufferView": 1, **vector},
-            {
-                "bufferView": 2,
-                "componentType": _SHORT if narrow else _INT,
-                "count": triangle.size,
-                "type": "SCALAR",
-            },
-        ],
-        "bufferViews": views,
-        "buffers": [{"byteLength": at}],
+    buffer = BufferWriter()
+    attributes = {
+        "POSITION": buffer.positions(mesh.points),
+        "NORMAL": buffer.vectors(mesh.normals),
     }
-    text = json.dumps(document, separators=(",", ":")).encode()
-    return glb([(JSON, text), (BINARY, b"".join(array.tobytes() for array in arrays))])
+    indices = buffer.indices(mesh.triangles, len(mesh.points))
+    return one_mesh([{"attributes": attributes, "indices": indices}], buffer)
 
 
 def obj_of(mesh: Simple) -> bytes:
@@ -75,7 +43,7 @@ def mesh_of(data: bytes) -> Simple:
         document = schemas.parse(chunks[JSON])
         views, accessors = document["bufferViews"], document["accessors"]
         vertices, corners = (int(accessors[k]["count"]) for k in (0, 2))
-        indices = {_SHORT: "<u2", _INT: "<u4"}[accessors[2]["componentType"]]
+        indices = {SHORT: "<u2", INT: "<u4"}[accessors[2]["componentType"]]
         wanted = (3 * vertices, "<f4"), (3 * vertices, "<f4"), (corners, indices)
         arrays = []
         for k, (count, kind) in enumerate(wanted):

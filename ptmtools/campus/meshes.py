@@ -15,8 +15,7 @@ material       name: the material's base, or its own name; extras.material: its 
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,12 +25,15 @@ from numpy.typing import NDArray
 from ptmtools import schemas
 from ptmtools.arrays import Floats, Singles
 from ptmtools.campus.model import CampusMaterial
-from ptmtools.glb import BINARY, JSON, elements, glb, glb_chunks, meaning
+from ptmtools.glb import BINARY, JSON, elements, glb_chunks, meaning
+from ptmtools.glb_writing import BufferWriter, one_mesh
 
-_FLOAT, _SHORT, _INT = 5126, 5123, 5125
-_VERTICES, _INDICES = 34962, 34963
-#: Narrow indices end before 65535, which restarts a primitive.
-_NARROW = 65535
+_ADD: dict[str, Callable[[BufferWriter, NDArray[Any]], int]] = {
+    "POSITION": BufferWriter.positions,
+    "TEXCOORD_0": BufferWriter.vectors,
+    "TEXCOORD_1": BufferWriter.vectors,
+    "COLOR_0": BufferWriter.shares,
+}
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class Corners:
 
 def mesh_bytes(mesh: Corners, materials: tuple[CampusMaterial, ...]) -> bytes:
     """The GLB of a mesh, of at least one face."""
-    buffer = _Buffer()
+    buffer = BufferWriter()
     primitives: list[dict[str, Any]] = []
     named: list[dict[str, Any]] = []
     for index in np.unique(mesh.material).tolist():
@@ -76,7 +78,7 @@ def mesh_bytes(mesh: Corners, materials: tuple[CampusMaterial, ...]) -> bytes:
         vertices = {name: part.reshape(-1, part.shape[-1])[first] for name, part in data.items()}
         primitives.append(
             {
-                "attributes": {name: buffer.add(part) for name, part in vertices.items()},
+                "attributes": {name: _ADD[name](buffer, part) for name, part in vertices.items()},
                 "indices": buffer.indices(triangle, len(first)),
                 "material": len(named),
             }
@@ -86,17 +88,7 @@ def mesh_bytes(mesh: Corners, materials: tuple[CampusMaterial, ...]) -> bytes:
             "extras": {"material": index},
         }
         named.append(entry | ({"doubleSided": True} if material.two_sided else {}))
-    document = {
-        "asset": {"version": "2.0", "generator": "ptmtools"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": primitives}],
-        "materials": named,
-        **buffer.members(),
-    }
-    text = json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return glb([(JSON, text.encode("utf-8", "replace")), (BINARY, buffer.bytes())])
+    return one_mesh(primitives, buffer, {"materials": named})
 
 
 @dataclass(frozen=True)
@@ -175,58 +167,6 @@ def _read(document: Any, binary: bytes, primitive: Mapping[str, Any]) -> Primiti
         light,
         None if color is None else color[:, :3],
     )
-
-
-class _Buffer:
-    """Gathers the arrays of one GLB, a view for each."""
-
-    def __init__(self) -> None:
-        self._parts: list[bytes] = []
-        self._accessors: list[dict[str, Any]] = []
-        self._views: list[dict[str, Any]] = []
-        self._size = 0
-
-    def add(self, part: NDArray[Any]) -> int:
-        """(n, items) of an attribute; the number of its accessor."""
-        short = part.dtype.kind == "u"
-        accessor: dict[str, Any] = {
-            "componentType": _SHORT if short else _FLOAT,
-            "count": len(part),
-            "type": f"VEC{part.shape[1]}",
-        }
-        if short:
-            accessor["normalized"] = True
-        if part.shape[1] == 3:
-            accessor |= {"min": _numbers(part.min(axis=0)), "max": _numbers(part.max(axis=0))}
-        return self._append(accessor, part.tobytes(), _VERTICES)
-
-    def indices(self, triangle: NDArray[np.int64], vertices: int) -> int:
-        kind, form = (_SHORT, "<u2") if vertices <= _NARROW else (_INT, "<u4")
-        accessor = {"componentType": kind, "count": triangle.size, "type": "SCALAR"}
-        return self._append(accessor, triangle.astype(form).tobytes(), _INDICES)
-
-    def _append(self, accessor: dict[str, Any], data: bytes, target: int) -> int:
-        view = {"buffer": 0, "byteOffset": self._size, "byteLength": len(data), "target": target}
-        self._accessors.append({"bufferView": len(self._views)} | accessor)
-        self._views.append(view)
-        self._parts.append(data + bytes(-len(data) % 4))
-        self._size += len(self._parts[-1])
-        return len(self._accessors) - 1
-
-    def members(self) -> dict[str, Any]:
-        return {
-            "accessors": self._accessors,
-            "bufferViews": self._views,
-            "buffers": [{"byteLength": self._size}],
-        }
-
-    def bytes(self) -> bytes:
-        return b"".join(self._parts)
-
-
-def _numbers(values: Singles) -> list[float]:
-    """The shortest decimals that read back to the same float32."""
-    return [float(str(value)) for value in values]
 
 
 def _flipped(uv: Floats) -> Singles:

@@ -175,9 +175,9 @@ def simulate(
     if strip_file:
         write_bytes(strip_file, pictures.strip(first, played[0]), force=force)
     if as_json:
-        voice.emit_json(document(db, played, worlds))
+        voice.emit_json(document(db, played, worlds, lit=options.lit, against=against))
         return
-    for line in table(played, worlds):
+    for line in table(played, worlds, lit=options.lit, against=against):
         voice.say(line)
 
 

@@ -30,7 +30,7 @@ HINTS, CELL, STATISTICS = "hints", "cell", "statistics"
 MANIFEST, VALIDATION, GLB, SCENE = "manifest", "validation", "glb", "scene"
 WALK, TRACE, SIMULATION, SITE = "walk", "trace", "simulation", "site"
 HANDED = "handed"
-INTERLACE, APO, CAMPUS = "interlace", "apo", "campus"
+INTERLACE, APO, CAMPUS, CAMPUS_WALK = "interlace", "apo", "campus", "campus_walk"
 #: So many lists and objects lie in each other at most, where anything may stand.
 DEEPEST = 16
 #: How the message of a number ends that is beyond float64.

@@ -34,9 +34,19 @@ COLUMNS = (
 _DIGITS = 6
 
 
-def table(played: Sequence[Played], worlds: Mapping[str, World]) -> list[str]:
+def table(
+    played: Sequence[Played],
+    worlds: Mapping[str, World],
+    *,
+    lit: bool = False,
+    against: str | None = None,
+) -> list[str]:
     """Lines of text: a block for each link and memory, a row for each policy, means over walks."""
     lines = [*INTRODUCTION]
+    if lit:
+        lines.append("All is lit.")
+    if against is not None:
+        lines.append(f"The full picture is that of {against}.")
     several, flip = len(worlds) > 1, any(p.flip is not None for p in played)
     if flip:
         lines.append(
@@ -122,13 +132,22 @@ def _mean(values: list[float]) -> str:
     return f"{np.mean(known):.2f}" if known else "–"
 
 
-def document(database: str, played: Sequence[Played], worlds: Mapping[str, World]) -> Any:
+def document(
+    database: str,
+    played: Sequence[Played],
+    worlds: Mapping[str, World],
+    *,
+    lit: bool = False,
+    against: str | None = None,
+) -> Any:
     """All runs as JSON has them; the schema is published. Numbers have `_DIGITS` digits."""
     some = next(iter(worlds.values()))
     return {
         "format": FORMAT,
         "schema": SCHEMA,
         "database": database,
+        "lit": lit,
+        "against": against,
         "textureMemory": some.catalogue.whole,
         "framesPerSecond": some.rate,
         "pixels": [some.camera.width, some.camera.height],

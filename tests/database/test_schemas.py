@@ -31,7 +31,7 @@ SERVED = {
     schemas.CELL: "hints/c0001.json",
     schemas.STATISTICS: "hints/statistics.json",
 }
-NAMES = (*SERVED, schemas.MANIFEST, schemas.VALIDATION, schemas.TRACE)
+NAMES = (*SERVED, schemas.MANIFEST, schemas.VALIDATION, schemas.TRACE, schemas.CAMPUS_WALK)
 
 
 def validator(name: str) -> jsonschema.Draft202012Validator:

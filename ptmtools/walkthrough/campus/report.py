@@ -9,6 +9,7 @@ import numpy as np
 
 from ptmtools.walkthrough.campus.simulation import PAUSE, CampusRun
 
+FORMAT, SCHEMA = "ptmtools campus walk", 1
 #: Seconds from one row of the table of bytes to the next.
 EVERY = 30.0
 
@@ -48,8 +49,10 @@ def received(runs: Sequence[CampusRun], every: float = EVERY) -> list[str]:
 
 
 def document(campus: str, runs: Sequence[CampusRun]) -> dict[str, Any]:
-    """All runs as JSON has them; seconds and bytes."""
+    """All runs as JSON has them, by its schema."""
     return {
+        "format": FORMAT,
+        "schema": SCHEMA,
         "campus": campus,
         "seconds": float(runs[0].time[-1]),
         "runs": [

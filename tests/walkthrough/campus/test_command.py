@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from ptmtools import schemas
 from ptmtools.cli.main import main
 from ptmtools.walkthrough.walk import Walk, walk_text
 
@@ -38,7 +38,7 @@ def test_options_and_json(folder: Path, walk: str, capsys: pytest.CaptureFixture
     asked = ["--preset", "low,ultra-cached", "--bandwidth", "512k", "--nearest", "1", "--memory",
              "1MiB", "--threads", "2", "--no-lightmaps", "--every", "0", "--json"]  # fmt: skip
     assert main(["walk-campus", str(folder), "--walk", walk, *asked]) == 0
-    told = json.loads(capsys.readouterr().out)
+    told = schemas.read(capsys.readouterr().out.encode(), schemas.CAMPUS_WALK)
     low, cached = told["runs"]
     assert (low["preset"], cached["preset"]) == ("Low", "Ultra cached")
     assert (low["bandwidth"], low["e"], cached["bytes"]) == (512_000, None, 0)
