@@ -9,9 +9,10 @@ from hypothesis import given, strategies as st
 from ptmtools.arrays import Floats
 from ptmtools.campus.atlas import GAP, components, cover, unwrap
 from ptmtools.campus.lightmap import AGREE, bake, fill, spread
-from ptmtools.campus.lights import Painted, Rays
+from ptmtools.campus.lights import LightImage, Painted, Rays
 from ptmtools.campus.occlusion import Surroundings, normals
 from ptmtools.campus.vertex_light import vertex_light
+from ptmtools.scene.source import SourceWrap
 from tests.campus.made import house, level
 
 pytest.importorskip("xatlas", reason="pip install 'ptmtools[campus]'")
@@ -205,7 +206,7 @@ def test_a_corner_does_not_blacken_its_faces() -> None:
 def test_the_models_own_light_is_looked_up() -> None:
     corner = triangles_of(level((0, 0), (10, 10), 0))
     uv = np.stack([corner[..., 0] / 10, corner[..., 2] / 10], axis=2)
-    image = np.tile(np.linspace(0, 1, 64, dtype=np.float32), (64, 1))
+    image = LightImage(np.tile(np.linspace(0, 255, 64).astype(np.uint8), (64, 1)), CLAMPED)
     look = Painted(corner, uv, np.zeros(2, np.int32), (image,), np.arange(2))
     point = np.array([[2.0, 0, 3], [8, 0, 7]])
     face = np.array([1 if z > x else 0 for x, _, z in point])
@@ -213,6 +214,44 @@ def test_the_models_own_light_is_looked_up() -> None:
     assert np.allclose(found, [0.2, 0.8], atol=0.02)
     white = Painted(corner, uv, np.full(2, -1, np.int32), (image,), np.arange(2))
     assert (white(face, point, np.zeros(2)) == 1).all()
+
+
+CLAMPED: tuple[SourceWrap, SourceWrap] = ("clamp", "clamp")
+
+
+@pytest.mark.parametrize(
+    ("wrap", "wanted"),
+    [("repeat", [0, 1, 0, 1]), ("clamp", [0, 1, 1, 1]), ("mirror", [0, 1, 1, 0])],
+)
+def test_the_models_own_light_goes_on_as_its_sampler_says(
+    wrap: SourceWrap, wanted: list[float]
+) -> None:
+    """A half dark image, looked up in four halves, along either axis."""
+    texels = np.zeros((8, 8), np.uint8)
+    texels[:, 4:] = 255
+    corner = triangles_of(level((0, 0), (10, 10), 0))
+    point = np.array([[1.25, 0, 1.25], [3.75, 0, 1.25], [6.25, 0, 1.25], [8.75, 0, 1.25]])
+    for axis, image in ((0, texels), (2, texels.T[::-1])):
+        uv = corner[..., [0, 2]] / 5
+        look = Painted(
+            corner, uv, np.zeros(2, np.int32), (LightImage(image, (wrap, wrap)),), np.arange(2)
+        )
+        at = point if axis == 0 else point[:, ::-1]
+        assert look(_face_of(corner, at), at, np.zeros(4)).tolist() == wanted
+
+
+def _face_of(corner: Floats, point: Floats) -> np.ndarray:
+    """Which of two triangles of a square a point is nearer to the middle of."""
+    far = np.linalg.norm(point[:, None] - corner.mean(axis=1), axis=2)
+    return np.asarray(far.argmin(axis=1))
+
+
+def test_a_weaker_light_is_nearer_to_white() -> None:
+    corner = triangles_of(level((0, 0), (10, 10), 0))
+    image = LightImage(np.zeros((2, 2), np.uint8), strength=0.25)
+    look = Painted(corner, np.zeros((2, 3, 2)), np.zeros(2, np.int32), (image,), np.arange(2))
+    found = look(np.array([0]), corner[0].mean(axis=0)[None], np.zeros(1))
+    assert found[0] == pytest.approx(0.75)
 
 
 @pytest.mark.parametrize("offset", range(8))
