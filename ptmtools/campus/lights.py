@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, Singles
-from ptmtools.campus.occlusion import Surroundings, light, lighter_side, normals, outermost
+from ptmtools.arrays import Floats, Ints, Singles
+from ptmtools.campus.occlusion import Surroundings, light, normals, outermost
 from ptmtools.scene.source import SourceWrap
 
 #: (n,) faces, (n, 3) points on them, (n,) shares of a circle by which points differ → (n,) linear
@@ -35,13 +35,13 @@ class Rays:
     def of(
         around: Surroundings,
         corner: Floats,
-        both: Bools,
         samples: int,
         reach: float,
         error: float = 0.0,
+        side: Floats | float = 1.0,
     ) -> Rays:
-        """Of faces of which some have ``both`` sides: on these the lighter one counts."""
-        normal = lighter_side(around, corner, normals(corner), both, reach, error)
+        """Of faces that are lit on (T,) sides, 1 the front and -1 the back."""
+        normal = normals(corner) * np.broadcast_to(side, len(corner))[:, None]
         return Rays(around, normal, samples, reach, error)
 
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:

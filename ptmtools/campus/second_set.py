@@ -90,7 +90,7 @@ def model_light(model: Path, options: IngestOptions) -> ModelLight:
         wrap = texture.wrap_s, texture.wrap_t
         images.append(LightImage(decoded[texture.read], wrap, texture.strength))
     uv = read.source.uv[read.faces]
-    finite = np.isfinite(uv).all(axis=(1, 2))
+    finite = np.asarray(np.isfinite(uv).all(axis=(1, 2)))
     return ModelLight(
         np.where(finite[:, None, None], uv, 0.0),
         index[read.source.triangle_material[read.faces]],

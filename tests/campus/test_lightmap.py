@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ptmtools.arrays import Floats
-from ptmtools.campus.atlas import GAP, components, cover, unwrap
-from ptmtools.campus.lightmap import AGREE, bake, fill, spread
+from ptmtools.campus.atlas import claim, components, cover, nearest, unwrap
+from ptmtools.campus.lightmap import AGREE, bake, fill
 from ptmtools.campus.lights import LightImage, Painted, Rays
 from ptmtools.campus.occlusion import Surroundings, normals
 from ptmtools.campus.vertex_light import vertex_light
@@ -78,12 +78,6 @@ def test_an_atlas_gives_each_face_a_place_of_its_own() -> None:
     held = np.bincount(owner[owner >= 0], minlength=len(triangles))
     assert np.allclose(held, area, rtol=0.1, atol=40), "faces lie over each other"
     assert (owner >= 0).mean() > 0.3
-    chart = np.where(owner >= 0, atlas.chart[owner], -1)
-    for down, across in ((0, 1), (1, 0), (1, 1)):
-        for step in range(1, GAP + 1):
-            one = chart[step * down :, step * across :]
-            other = chart[: 512 - step * down, : 512 - step * across]
-            assert not ((one != other) & (one >= 0) & (other >= 0)).any(), "no gap"
 
 
 def test_texels_are_as_large_as_the_surface_everywhere() -> None:
@@ -95,12 +89,118 @@ def test_texels_are_as_large_as_the_surface_everywhere() -> None:
     assert ratio.max() / ratio.min() < 1.1
 
 
-def test_too_many_charts_for_the_least_lightmap() -> None:
-    """Thousands of loose faces."""
+def loose(count: int) -> Floats:
+    """(count, 3, 3) faces without neighbours, of all sizes."""
     random = np.random.default_rng(1)
-    corner = random.random((5000, 1, 3)) * 1000 + random.random((5000, 3, 3))
-    points, triangles = indexed(corner)
-    assert unwrap(points, triangles).side != 512
+    size = 10 ** random.uniform(-1, 1.5, (count, 1, 1))
+    return random.random((count, 1, 3)) * 1000 + size * random.random((count, 3, 3))
+
+
+def ledges(count: int) -> Floats:
+    """A wall with shelves of 3 cm by 6 m, of which all faces are loose."""
+    parts = [[[0, 0, 0], [6, 0, 0], [6, 8, 0], [0, 8, 0]]]
+    for k in range(count):
+        y = 0.5 + 0.1 * k
+        for low, high, back in ((y, y, 0.0), (y + 0.03, y + 0.03, 0.0), (y, y + 0.03, 0.03)):
+            quad = [[0, low, 0.03], [6, low, 0.03], [6, high, back], [0, high, back]]
+            parts.append(quad if low != y or high != y else quad[::-1])
+    quads = np.array(parts, float)
+    return quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
+
+
+def bilinear(texels: Floats, at: Floats) -> tuple[Floats, np.ndarray, Floats]:
+    """(n,) as a client finds it; (n, 4) what is read, by row and column, and its weights."""
+    size = len(texels)
+    place = at * size - 0.5
+    first = np.floor(place).astype(int)
+    read, weights = [], []
+    for right in (0, 1):
+        for below in (0, 1):
+            column, row = (first + [right, below]).T.clip(0, size - 1)
+            weight = np.abs(1 - right - (place - first)[:, 0])
+            weight = weight * np.abs(1 - below - (place - first)[:, 1])
+            weights.append(weight)
+            read.append(row * size + column)
+    index, share = np.stack(read, axis=1), np.stack(weights, axis=1)
+    return (share * texels.ravel()[index]).sum(axis=1), index, share
+
+
+def samples(corner: Floats, uv: Floats, count: int) -> tuple[np.ndarray, Floats, Floats]:
+    """Faces, points on them, and their coordinates from the upper left."""
+    random = np.random.default_rng(5)
+    face = random.integers(0, len(corner), count)
+    share = random.dirichlet([1, 1, 1], count)
+    point, at = (np.einsum("nk,nkx->nx", share, held[face]) for held in (corner, uv))
+    return face, point, at * [1, -1] + [0, 1]
+
+
+@pytest.mark.parametrize("size", [512, 1024, 2048])
+@pytest.mark.parametrize(
+    "corner", [loose(3000), HOUSE, ledges(40)], ids=["loose", "house", "ledges"]
+)
+def test_every_face_reads_its_own_chart_alone(corner: Floats, size: int) -> None:
+    """However thin it is."""
+    atlas = unwrap(*indexed(corner))
+    assert atlas.side == 512
+    owner = claim(atlas.uv, cover(atlas.uv, size)).ravel()
+    face, _, at = samples(corner, atlas.uv, 20_000)
+    _, read, weight = bilinear(np.zeros((size, size)), at)
+    stranger = (owner[read] < 0) | (atlas.chart[owner[read]] != atlas.chart[face][:, None])
+    assert ((weight * stranger).sum(axis=1) > 0.01).mean() < 0.005
+
+
+def test_thin_faces_show_their_own_light() -> None:
+    """The undersides of shelves are dark, their tops are light."""
+    corner = ledges(40)
+    atlas = unwrap(*indexed(corner))
+    where = surroundings(corner, GROUND)
+    face, point, at = samples(corner, atlas.uv, 4000)
+    light = Rays.of(where, corner, 256, 0.2)
+    wanted = light(face, point, np.zeros(len(face)))
+    assert np.ptp(wanted) > 0.5
+    for found, most in zip(bake(light, corner, atlas), (0.08, 0.04, 0.03), strict=True):
+        assert (np.abs(bilinear(found.value, at)[0] - wanted) > 0.1)[face >= 2].mean() < most
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 8))
+def test_what_a_face_reads_is_claimed_by_the_nearest(seed: int, faces: int) -> None:
+    random = np.random.default_rng(seed)
+    uv = random.random((faces, 1, 2)) + 10 ** random.uniform(-4, 0, (faces, 1, 1)) * (
+        random.random((faces, 3, 2)) - 0.5
+    )
+    uv, size = uv.clip(0, 1), 16
+    centre = cover(uv, size)
+    owner = claim(uv, centre)
+    assert np.array_equal(owner[centre >= 0], centre[centre >= 0])
+    face, _, at = samples(np.zeros((faces, 3, 3)), uv, 400)
+    _, read, _ = bilinear(np.zeros((size, size)), at)
+    assert (owner.ravel()[read] >= 0).all()
+    # Of the faces that read a texel its own is the nearest.
+    texel = np.stack([read % size, size - 1 - read // size], axis=2) + 0.5
+    flat, reader = texel.reshape(-1, 2) / size, np.repeat(face, 4)
+    ours, theirs = (
+        np.linalg.norm(np.einsum("nk,nkx->nx", nearest(uv[f], flat), uv[f]) - flat, axis=1)
+        for f in (owner.ravel()[read].ravel(), reader)
+    )
+    assert (ours <= theirs + 1e-9).all()
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_the_nearest_point_of_a_triangle(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    uv, at = random.random((1, 3, 2)), 3 * random.random((1, 2)) - 1
+    share = nearest(uv, at)
+    assert share.min() >= 0
+    assert share.sum() == pytest.approx(1)
+    others = random.dirichlet([0.5, 0.5, 0.5], 500)
+    far = np.linalg.norm(share @ uv[0] - at)
+    assert far <= np.linalg.norm(others @ uv[0] - at, axis=1).min() + 1e-9
+
+
+def test_too_many_charts_for_the_least_lightmap(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Thousands of loose faces, in small lightmaps."""
+    monkeypatch.setattr("ptmtools.campus.atlas.LIGHT_SIZES", (64, 128))
+    assert unwrap(*indexed(loose(3000))).side != 64
 
 
 def test_a_long_object_has_its_gaps_in_every_lightmap() -> None:
@@ -113,7 +213,7 @@ def test_a_lightmap_of_a_house_on_the_ground() -> None:
     points, triangles = indexed(HOUSE)
     atlas = unwrap(points, triangles)
     where = surroundings(HOUSE, GROUND)
-    look = Rays.of(where, HOUSE, np.zeros(len(HOUSE), bool), 64, 20.0)
+    look = Rays.of(where, HOUSE, 64, 20.0)
     maps = bake(look, HOUSE, atlas)
     assert [len(m.value) for m in maps] == [512, 1024, 2048]
     normal = normals(HOUSE)
@@ -134,10 +234,10 @@ def test_larger_lightmaps_are_nearly_what_rays_say_everywhere(
     points, triangles = indexed(HOUSE)
     atlas = unwrap(points, triangles)
     where = surroundings(HOUSE, GROUND)
-    look = Rays.of(where, HOUSE, np.zeros(len(HOUSE), bool), 64, 20.0)
+    look = Rays.of(where, HOUSE, 64, 20.0)
     (taken,) = bake(look, HOUSE, atlas, (512,))
 
-    def nothing(value: object, chart: object, larger: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def nothing(value: object, chart: object, centred: object, larger: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(larger.shape, np.float32), np.zeros(larger.shape, np.bool_)
 
     monkeypatch.setattr("ptmtools.campus.lightmap._enlarged", nothing)
@@ -154,7 +254,7 @@ def test_no_row_of_texels_lies_in_the_ground() -> None:
     points, triangles = indexed(HOUSE)
     atlas = unwrap(points, triangles)
     where = surroundings(HOUSE, GROUND)
-    look = Rays.of(where, HOUSE, np.zeros(len(HOUSE), bool), 64, 20.0)
+    look = Rays.of(where, HOUSE, 64, 20.0)
     (found,) = bake(look, HOUSE, atlas, (512,))
     assert found.value.min() > 0.4
 
@@ -196,7 +296,7 @@ def test_vertices_carry_the_light_of_their_faces() -> None:
 
 def test_a_corner_does_not_blacken_its_faces() -> None:
     where = surroundings(HOUSE, GROUND)
-    look = Rays.of(where, HOUSE, np.zeros(len(HOUSE), bool), 64, 20.0)
+    look = Rays.of(where, HOUSE, 64, 20.0)
     found = vertex_light(look, HOUSE, normals(HOUSE))
     roof = normals(HOUSE)[:, 1] > 0.9
     assert found[roof].min() > 0.95
@@ -252,14 +352,3 @@ def test_a_weaker_light_is_nearer_to_white() -> None:
     look = Painted(corner, np.zeros((2, 3, 2)), np.zeros(2, np.int32), (image,), np.arange(2))
     found = look(np.array([0]), corner[0].mean(axis=0)[None], np.zeros(1))
     assert found[0] == pytest.approx(0.75)
-
-
-@pytest.mark.parametrize("offset", range(8))
-def test_either_side_of_the_least_gap_has_its_own_value(offset: int) -> None:
-    value, known = np.zeros((4, 32), np.float32), np.zeros((4, 32), bool)
-    first = 4 + offset
-    known[:, :first] = True
-    known[:, first + GAP :], value[:, first + GAP :] = True, 1
-    found = fill(*spread(value, known))
-    assert (found[:, : first + GAP // 2] == 0).all()
-    assert (found[:, first + GAP // 2 :] == 1).all()
