@@ -110,12 +110,9 @@ def visitors(around: Surroundings) -> Floats:
     """(m, 3) eyes over what lies highest, so none is within a solid."""
     low, high = around.points.min(axis=0), around.points.max(axis=0)
     place = np.arange(1, PLACES + 1)[:, None] * [0.7548776662466927, 0.5698402909980532] % 1.0
-    eyes = []
-    for x, z in (low[[0, 2]] + place * (high - low)[[0, 2]]).tolist():
-        top = around.below(np.array([x, high[1] + 1, z]), high[1] - low[1] + 2)
-        for height in HEIGHTS:
-            eyes.append([x, (around.ground if top is None else top) + height, z])
-    return np.array(eyes)
+    column = np.insert(low[[0, 2]] + place * (high - low)[[0, 2]], 1, high[1] + 1, axis=1)
+    column[:, 1] = around.below(column, high[1] - low[1] + 2)
+    return np.concatenate([column + [0, height, 0] for height in HEIGHTS])
 
 
 def seen(

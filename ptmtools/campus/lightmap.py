@@ -23,12 +23,10 @@ from ptmtools.campus.atlas import Atlas, claim, cover, nearest
 from ptmtools.campus.lights import Look
 from ptmtools.campus.model import LIGHT_SIZES
 from ptmtools.campus.surface import SPREAD
+from ptmtools.tolerance import INWARD_SHARE
 
 #: Four texels agree if none differs from another by more.
 AGREE = 8 / 255
-#: Points are moved so far towards the middle of their face: a row of texels whose centres are the
-#: lower edge of a wall would lie in the ground, and be black.
-_INWARD = 1e-3
 #: The share of the bilinear weight that texels of the same chart must have.
 _ENOUGH = 0.5
 _KERNEL = ((-1, 0.25), (0, 0.5), (1, 0.25))
@@ -97,7 +95,8 @@ def _positions(
     """(n, 3) the points of faces that are nearest to the centres of texels."""
     at = np.stack([(column + 0.5) / size, 1 - (row + 0.5) / size], axis=1)
     share = nearest(uv[face], at)
-    share += _INWARD * (1 / 3 - share)
+    # A row of texels whose centres are the lower edge of a wall would lie in the ground.
+    share += INWARD_SHARE * (1 / 3 - share)
     return np.asarray(np.einsum("nk,nkx->nx", share, corner[face]))
 
 

@@ -92,15 +92,27 @@ class Surroundings:
         hit = self.tree.run(start, along, dists=short.copy(), query="DISTANCE")
         return np.asarray(hit >= short)
 
-    def below(self, point: Floats, far: float) -> float | None:
-        """The height of what lies first under a point, at most so ``far``; None for nothing."""
+    def below(self, point: Floats, far: float) -> Floats:
+        """(n,) the heights of what lies first under (n, 3) points, at most so ``far``; where that
+        is nothing, of the ground."""
+        return self._upright(point, far, -1.0)
+
+    def above(self, point: Floats, far: float) -> Floats:
+        """The same of what lies first over points."""
+        return self._upright(point, far, 1.0)
+
+    def _upright(self, point: Floats, far: float, way: float) -> Floats:
+        found = np.full(len(point), self.ground)
         if self.tree is None:
-            return None
-        start = (point - self.middle).astype(np.float32)[None]
-        limit = np.array([far + self.lift], np.float32)
-        down = np.array([[0, -1, 0]], np.float32)
-        hit = self.tree.run(start, down, dists=limit.copy(), query="DISTANCE")
-        return float(point[1] - hit[0]) if hit[0] < limit[0] else None
+            return found
+        along = np.zeros((len(point), 3), np.float32)
+        along[:, 1] = way
+        limit = np.full(len(point), far + self.lift, np.float32)
+        start = (point - self.middle).astype(np.float32)
+        hit = self.tree.run(start, along, dists=limit.copy(), query="DISTANCE")
+        there = hit < limit
+        found[there] = (point[:, 1] + way * hit)[there]
+        return found
 
 
 def outermost(around: Surroundings, point: Floats, normal: Floats, within: float) -> Floats:

@@ -3,9 +3,9 @@
 Outside of a building its walls see the sky, or what sees it; within a closed one nothing does,
 however large it is and however narrow the court before it. So walks by random rays begin on both
 sides, turned back by what they meet, and that side counts from which more of them come to the sky;
-where as many do from either, as of a fence, or as good as none, as within, the lighter one. Faces of one plane that share an edge are
-decided together, by points spread over all of them. Where the two sides are close, more points are
-asked.
+where as many do from either, as of a fence, or as good as none, as within, the lighter one. Faces
+of one plane that share an edge are decided together, by points spread over all of them. Where the
+two sides are close, more points are asked.
 
 (Tried: the lighter side of each face by itself, by 16 rays from its middle. Rays that end on
 something far away count nearly as if they escaped, so a hall of 20 m is lighter within than a court

@@ -237,7 +237,9 @@ def test_larger_lightmaps_are_nearly_what_rays_say_everywhere(
     look = Rays.of(where, HOUSE, 64, 20.0)
     (taken,) = bake(look, HOUSE, atlas, (512,))
 
-    def nothing(value: object, chart: object, centred: object, larger: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def nothing(
+        value: object, chart: object, centred: object, larger: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(larger.shape, np.float32), np.zeros(larger.shape, np.bool_)
 
     monkeypatch.setattr("ptmtools.campus.lightmap._enlarged", nothing)
