@@ -8,7 +8,8 @@ compared with that of rays from the point itself. A point is off where they diff
 
 A face with two sides has one light for both. Which side is right is found by sight, not by light:
 visitors stand on the ground and on roofs all over the campus, and some fly. Where they see one side
-of a point, its light counts; where both, that which is nearer; where none, the point is left out.
+of a point, its light counts; where both, that which is nearer; where none, the point is left out. "Of the other side" are points
+that are off because they have the light of the side that no visitor sees.
 """
 
 from __future__ import annotations
@@ -70,12 +71,14 @@ def say_light(folder: Path, made: Made, reach: float) -> None:
                 one_side = (true[0] ^ true[1])[counted] & points.both[counted]
                 off[size][kind].append(bad)
                 other[size][kind].append(bad & one_side & (hidden <= OFF))
-    print("\n| lightmap | points off | with the light of the other side | faces off |")
-    print("|---|---|---|---|")
+    print("\n| lightmap | points off | of the worst object | of the other side | faces off |")
+    print("|---|---|---|---|---|")
     for size in LIGHT_SIZES:
         area, face = (np.concatenate(these) for these in off[size])
         turned = np.concatenate(other[size][0])
-        print(f"| {size}² | {area.mean():.1%} | {turned.mean():.1%} | {face.mean():.1%} |")
+        worst = max(float(these.mean()) for these in off[size][0] if len(these))
+        shares = f"{area.mean():.1%} | {worst:.1%} | {turned.mean():.1%} | {face.mean():.1%}"
+        print(f"| {size}² | {shares} |")
     count = sum(map(len, off[LIGHT_SIZES[0]][0]))
     print(f"\nof {count:,} points and as many faces that visitors see; off: by more than {OFF}")
 

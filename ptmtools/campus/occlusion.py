@@ -186,10 +186,10 @@ def escaping(
             if bounce == bounces or out.all():
                 break
             kept = ~out
-            origin, walk, back = origin[kept], walk[kept], against[kept].astype(np.float64)
+            origin, walk, back = origin[kept], walk[kept], against[kept]
             origin = origin + far[kept, None] * along[kept] + around.lift * back
             ways = fan[(walk * 5 + 3 * bounce + 1) % samples]
-            frames = _frames(back, (walk + bounce + 1) * _GOLDEN % 1.0)
+            frames = _frames(back, np.asarray((walk + bounce + 1) * _GOLDEN % 1.0, np.float64))
             along = np.einsum("nk,nkx->nx", ways, frames)
     return count
 
