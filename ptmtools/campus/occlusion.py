@@ -189,7 +189,8 @@ def escaping(
             origin, walk, back = origin[kept], walk[kept], against[kept]
             origin = origin + far[kept, None] * along[kept] + around.lift * back
             ways = fan[(walk * 5 + 3 * bounce + 1) % samples]
-            frames = _frames(back, np.asarray((walk + bounce + 1) * _GOLDEN % 1.0, np.float64))
+            turned = np.asarray((walk + bounce + 1) * _GOLDEN % 1.0, np.float64)
+            frames = _frames(back, turned)
             along = np.einsum("nk,nkx->nx", ways, frames)
     return count
 
