@@ -8,8 +8,8 @@ compared with that of rays from the point itself. A point is off where they diff
 
 A face with two sides has one light for both. Which side is right is found by sight, not by light:
 visitors stand on the ground and on roofs all over the campus, and some fly. Where they see one side
-of a point, its light counts; where both, that which is nearer; where none, the point is left out. "Of the other side" are points
-that are off because they have the light of the side that no visitor sees.
+of a point, its light counts; where both, that which is nearer; where none, the point is left out.
+"Of the other side" are points that are off and have the light of the side that no visitor sees.
 """
 
 from __future__ import annotations
