@@ -42,7 +42,7 @@ class Made:
     scene: that of the model, for its notes.
     notes: what else there is to say.
     seconds: by phase.
-    covered, computed: texels of lightmaps that lie on faces, and those that were computed.
+    covered, computed: texels of lightmaps that are read on faces, and those that were computed.
     """
 
     campus: Campus

@@ -65,7 +65,7 @@ class Work:
 
 @dataclass(frozen=True)
 class ObjectMade:
-    """An object's record and its files; `notes` on it; how many texels of its lightmaps lie on
+    """An object's record and its files; `notes` on it; how many texels of its lightmaps are read on
     faces, and how many were computed."""
 
     record: CampusObject

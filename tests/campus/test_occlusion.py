@@ -11,14 +11,11 @@ from ptmtools.arrays import Floats
 from ptmtools.campus.lights import Rays
 from ptmtools.campus.occlusion import Surroundings, hemisphere, light, normals, turns
 from ptmtools.campus.sides import open_sides, planes
+from tests.campus.shapes import prism, quad
 
 UP = np.array([[0.0, 1, 0]])
 #: So far away that it counts as infinite, metres.
 FAR = 1e4
-
-
-def quad(*corner: tuple[float, float, float]) -> Floats:
-    return np.array([[corner[0], corner[1], corner[2]], [corner[0], corner[2], corner[3]]], float)
 
 
 def around(*parts: Floats, ground: float = -1.0) -> Surroundings:
@@ -87,16 +84,6 @@ def test_the_lighter_side_counts() -> None:
     for side, least, most in ((-1.0, 0.9, 1.0), (1.0, 0.0, 0.2)):
         found = Rays.of(where, sheet, 64, 20.0, side=side)(face, point, np.zeros(1))[0]
         assert least <= found <= most
-
-
-def prism(x: float, z: float, wide: float, deep: float, high: float) -> Floats:
-    """The walls of a box, wound outwards."""
-    at = [(x, z), (x, z + deep), (x + wide, z + deep), (x + wide, z)]
-    quads = []
-    for k in range(4):
-        (a, b), (c, d) = at[k], at[(k + 1) % 4]
-        quads.append(quad((a, 0, b), (c, 0, d), (c, high, d), (a, high, b)))
-    return np.concatenate(quads)
 
 
 def test_a_court_is_outside_however_light_the_halls_around_it_are() -> None:

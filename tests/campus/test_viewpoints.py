@@ -15,8 +15,7 @@ from ptmtools.campus.occlusion import Surroundings
 from ptmtools.campus.viewpoints import EYE, STEP, viewpoint
 from ptmtools.scene import IngestOptions, Scene, ingest
 from tests.campus.made import level
-from tests.campus.test_lightmap import surroundings, triangles_of
-from tests.campus.test_occlusion import prism
+from tests.campus.shapes import prism, surroundings, triangles_of
 
 SCRIPT = Path(__file__).resolve().parents[2] / "sample_data" / "make_campus.py"
 METRES = IngestOptions(unit="m", up="y")
