@@ -19,6 +19,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from campus_light import say_light
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
@@ -143,6 +144,8 @@ def main() -> None:
         objects = len(made.campus.objects)
         print(f"{Path(given.model).name}: {objects:,} objects, {executor.workers} workers\n")
         say_levels(folder, made)
+        if given.lightmaps == "bake":
+            say_light(folder, made, options.reach)
     say_textures(made)
     say_presets(made)
     print("\n| phase | s |")

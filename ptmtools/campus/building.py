@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.campus.making import ObjectMade, Work, make_object
-from ptmtools.campus.model import INDEX, Campus, CampusMaterial
+from ptmtools.campus.model import ALPHA, INDEX, Campus, CampusMaterial
 from ptmtools.campus.names import FORM, Names
 from ptmtools.campus.objects import notes_on, parts_of
 from ptmtools.campus.occlusion import Surroundings
@@ -42,7 +42,7 @@ class Made:
     scene: that of the model, for its notes.
     notes: what else there is to say.
     seconds: by phase.
-    covered, computed: texels of lightmaps that lie on faces, and those that were computed.
+    covered, computed: texels of lightmaps that are read on faces, and those that were computed.
     """
 
     campus: Campus
@@ -85,7 +85,7 @@ def make_campus(
     clock = _Clock()
     scene = ingest(path, reading, progress, workers=executor.workers)
     masks, notes = model_masks(path, scene, reading)
-    painted = model_light(path, scene, reading) if options.lightmaps == "model" else None
+    painted = model_light(path, reading) if options.lightmaps == "model" else None
     parts = parts_of(scene, options.small)
     names = Names()
     bases, of_image = _bases(scene, masks, names)
@@ -182,10 +182,15 @@ def _bases(
             name = names.take(Path(image.name).stem, "texture")
             bases.append(BaseImage(name, image, alpha=False, mask=mask))
         of[number] = found[key]
-        if material.transparent and not image.plain:
+        if _cut_out(scene, material):
             known = bases[found[key]]
             bases[found[key]] = BaseImage(known.base, known.image, True, known.mask)
     return bases, of
+
+
+def _cut_out(scene: Scene, material: Material) -> bool:
+    """Whether the alpha of its image counts."""
+    return material.transparent and not scene.images[material.image].plain
 
 
 def _digest(mask: Mask) -> str:
@@ -204,16 +209,22 @@ def _materials(
     found = []
     for number, both in (divmod(one, 2) for one in used.tolist()):
         base = bases[of[number]] if number in of else None
-        found.append(_material(scene.materials[number], base, bool(both)))
+        given = scene.materials[number]
+        channels = () if base is None else base.channels
+        if base is not None and not _cut_out(scene, given):
+            channels = tuple(channel for channel in channels if channel != ALPHA)
+        found.append(_material(given, base, channels, bool(both)))
     return tuple(found), place.ravel().astype(np.int32)
 
 
-def _material(given: Material, base: BaseImage | None, both: bool) -> CampusMaterial:
+def _material(
+    given: Material, base: BaseImage | None, channels: tuple[str, ...], both: bool
+) -> CampusMaterial:
     tested = given.cutoff is not None
     return CampusMaterial(
         name=given.name,
         base=None if base is None else base.base,
-        channels=() if base is None else base.channels,
+        channels=channels,
         wrap=(given.wrap_s, given.wrap_t),
         color=given.color,
         opacity=given.opacity,

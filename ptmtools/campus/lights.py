@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, Singles
-from ptmtools.campus.occlusion import Surroundings, light, lighter_side, normals, outermost
+from ptmtools.arrays import Floats, Ints, Singles
+from ptmtools.campus.occlusion import Surroundings, light, normals, outermost
+from ptmtools.scene.source import SourceWrap
 
 #: (n,) faces, (n, 3) points on them, (n,) shares of a circle by which points differ → (n,) linear
 #: light from 0 to 1.
@@ -34,19 +35,35 @@ class Rays:
     def of(
         around: Surroundings,
         corner: Floats,
-        both: Bools,
         samples: int,
         reach: float,
         error: float = 0.0,
+        side: Floats | float = 1.0,
     ) -> Rays:
-        """Of faces of which some have ``both`` sides: on these the lighter one counts."""
-        normal = lighter_side(around, corner, normals(corner), both, reach, error)
+        """Of faces that are lit on (T,) sides, 1 the front and -1 the back."""
+        normal = normals(corner) * np.broadcast_to(side, len(corner))[:, None]
         return Rays(around, normal, samples, reach, error)
 
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
         normal = self.normal[face]
         place = outermost(self.around, point, normal, self.error)
         return light(self.around, place, normal, turn, self.samples, self.reach)
+
+
+@dataclass(frozen=True)
+class LightImage:
+    """A lightmap of the model as a material has it.
+
+    Attributes
+    ----------
+    texels: (h, w) linear light in 255ths, rows from the top; materials share those of one image.
+    wrap: beyond [0, 1], across and up.
+    strength: how much of the light it decides, in [0, 1]; the rest is white.
+    """
+
+    texels: NDArray[np.uint8]
+    wrap: tuple[SourceWrap, SourceWrap] = ("repeat", "repeat")
+    strength: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -57,14 +74,14 @@ class Painted:
     ----------
     corner, uv: (T, 3, 3) and (T, 3, 2), of the model's faces; uv from the lower left.
     image: (T,) index into `images`, -1 for faces without, which are white.
-    images: (h, w) linear light, rows from the top.
+    images: see `LightImage`.
     source: (F,) for each face that is asked about the one of the model's that it came from.
     """
 
     corner: Floats
     uv: Floats
     image: NDArray[np.int32]
-    images: tuple[Singles, ...]
+    images: tuple[LightImage, ...]
     source: NDArray[np.integer[Any]]
 
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
@@ -82,20 +99,29 @@ class Painted:
         at = corners[:, 0] + share[:, :1] * (corners[:, 1] - corners[:, 0])
         at += share[:, 1:] * (corners[:, 2] - corners[:, 0])
         found = np.ones(len(point), np.float32)
-        for index, texels in enumerate(self.images):
+        for index, image in enumerate(self.images):
             these = self.image[of] == index
-            found[these] = _bilinear(texels, at[these])
+            found[these] = 1 - image.strength * (1 - _bilinear(image, at[these]))
         return found
 
 
-def _bilinear(texels: Singles, at: Floats) -> Singles:
-    """(n,) of an image at (n, 2) coordinates from its lower left; its edges go on."""
-    height, width = texels.shape
-    x = np.clip(at[:, 0] * width - 0.5, 0, width - 1)
-    y = np.clip((1 - at[:, 1]) * height - 0.5, 0, height - 1)
-    column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    right, below = np.minimum(column + 1, width - 1), np.minimum(row + 1, height - 1)
-    s, t = x - column, y - row
-    upper = texels[row, column] * (1 - s) + texels[row, right] * s
-    lower = texels[below, column] * (1 - s) + texels[below, right] * s
-    return np.asarray(upper * (1 - t) + lower * t, np.float32)
+def _bilinear(image: LightImage, at: Floats) -> Singles:
+    """(n,) of an image at (n, 2) coordinates from its lower left."""
+    texels, (across, up) = image.texels, image.wrap
+    left, right, s = _between(at[:, 0], texels.shape[1], across)
+    above, below, t = _between(1 - at[:, 1], texels.shape[0], up)
+    upper = texels[above, left] * (1 - s) + texels[above, right] * s
+    lower = texels[below, left] * (1 - s) + texels[below, right] * s
+    return np.asarray((upper * (1 - t) + lower * t) / 255, np.float32)
+
+
+def _between(at: Floats, count: int, wrap: SourceWrap) -> tuple[Ints, Ints, Floats]:
+    """The two of ``count`` texels in a row between whose centres coordinates lie, and the share of
+    the second."""
+    if wrap == "mirror":
+        at = 1 - np.abs(1 - at % 2)
+    place = (at % 1 if wrap == "repeat" else np.clip(at, 0, 1)) * count - 0.5
+    first = np.floor(place).astype(np.int64)
+    if wrap == "repeat":
+        return first % count, (first + 1) % count, place - first
+    return np.maximum(first, 0), np.minimum(first + 1, count - 1), place - first

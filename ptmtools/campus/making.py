@@ -28,6 +28,7 @@ from ptmtools.campus.objects import Part
 from ptmtools.campus.occlusion import Surroundings, normals
 from ptmtools.campus.options import CampusOptions
 from ptmtools.campus.second_set import ModelLight
+from ptmtools.campus.sides import open_sides
 from ptmtools.campus.textures import Written, light_files
 from ptmtools.campus.vertex_light import vertex_light
 from ptmtools.campus.viewpoints import viewpoint
@@ -64,7 +65,7 @@ class Work:
 
 @dataclass(frozen=True)
 class ObjectMade:
-    """An object's record and its files; `notes` on it; how many texels of its lightmaps lie on
+    """An object's record and its files; `notes` on it; how many texels of its lightmaps are read on
     faces, and how many were computed."""
 
     record: CampusObject
@@ -92,13 +93,14 @@ def make_object(work: Work, task: tuple[str, Part]) -> ObjectMade:
     )
     lods = levels(mesh, options.lods, options.ratio, options.faces, options.error)
     finest = lods[-1]
-    lit = options.lightmaps != "none"
+    lit, side = options.lightmaps != "none", np.ones(len(faces))
     place, lightmaps, notes = None, [], []
     covered = computed = 0
     if lit:
         atlas = unwrap(mesh.points, mesh.triangles)
         place = atlas.uv
-        maps = bake(_look(work, faces, finest, finest), finest.corner, atlas)
+        side = _sides(work, faces, finest)
+        maps = bake(_look(work, faces, finest, finest, side), finest.corner, atlas)
         source = _light_source(work, faces)
         texels = [(len(m.value), encoded(m.value.astype(np.float64)), source) for m in maps]
         lightmaps = light_files(name, texels, options.quality)
@@ -115,9 +117,8 @@ def make_object(work: Work, task: tuple[str, Part]) -> ObjectMade:
         fine = level is finest
         color = None if level.color is None else to_linear(level.color / 255)
         if lit and not fine:
-            held = vertex_light(
-                _look(work, faces, finest, level), level.corner, normals(level.corner)
-            )[..., None]
+            look = _look(work, faces, finest, level, side)
+            held = vertex_light(look, level.corner, normals(level.corner))[..., None]
             color = held * (np.ones(3) if color is None else color)
         corners = Corners(level.corner, level.material, level.uv, place if fine else None, color)
         data, file = mesh_bytes(corners, work.materials), mesh_file(name, lod)
@@ -145,16 +146,28 @@ def make_object(work: Work, task: tuple[str, Part]) -> ObjectMade:
     )
 
 
-def _look(work: Work, faces: Ints, finest: Level, level: Level) -> Look:
-    """The light on the faces of a level."""
+def _sides(work: Work, faces: Ints, finest: Level) -> Floats:
+    """(T,) as of `open_sides`; a painted face has its light on both."""
+    if work.painted is not None:
+        return np.ones(len(faces))
+    return open_sides(work.around, finest.corner, work.two_sided[faces], work.options.reach)
+
+
+def _look(work: Work, faces: Ints, finest: Level, level: Level, side: Floats) -> Look:
+    """The light on the faces of a level, of which (T,) of the finest say the sides."""
     if work.painted is not None:
         painted = work.painted
         return Painted(
             finest.corner, painted.uv[faces], painted.image[faces], painted.images, level.source
         )
-    both, options = work.two_sided[faces][level.source], work.options
-    rays = options.samples, options.reach
-    return Rays.of(work.around, level.corner, both, *rays, _BENEATH * level.error)
+    return Rays.of(
+        work.around,
+        level.corner,
+        work.options.samples,
+        work.options.reach,
+        _BENEATH * level.error,
+        side[level.source],
+    )
 
 
 def _light_source(work: Work, faces: Ints) -> tuple[int, int]:
@@ -162,7 +175,7 @@ def _light_source(work: Work, faces: Ints) -> tuple[int, int]:
     if work.painted is None:
         return LIGHT_SIZES[-1], LIGHT_SIZES[-1]
     used = {i for i in np.unique(work.painted.image[faces]).tolist() if i >= 0}
-    sizes = [work.painted.images[i].shape for i in used] or [(1, 1)]
+    sizes = [work.painted.images[i].texels.shape for i in used] or [(1, 1)]
     height, width = max(sizes)
     return width, height
 

@@ -89,7 +89,7 @@ class CampusMaterial:
     Attributes
     ----------
     base: base name of its textures, None without.
-    channels: those that its textures have.
+    channels: those of its textures that count for it.
     color: sRGB, multiplied with the diffuse texture.
     alpha: "opaque", "mask" (tested against `cutoff`) or "blend".
     two_sided: whether its faces have a back.

@@ -24,16 +24,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Singles
+from ptmtools.arrays import Bools, Floats, Ints, Singles
 from ptmtools.scene.model import Scene
+from ptmtools.tolerance import DEPTH_SHARE
 
 #: Rays that are cast together: their arrays stay within the processor's cache.
 RAYS = 2**17
-#: Rays by which the lighter side of a face with two is found.
-_SIDE_RAYS = 16
 _GOLDEN = 0.6180339887498949
-#: A line of sight ends so much before what it leads to, as a share of its length.
-_NEAR = 1e-3
 
 
 @dataclass(frozen=True)
@@ -90,18 +87,32 @@ class Surroundings:
         along = (way / np.maximum(far, np.finfo(float).tiny)[:, None]).astype(np.float32)
         start = (origin - self.middle).astype(np.float32)
         # Not quite as far as the target, which lies on a surface.
-        short = (far * (1 - _NEAR) - self.lift).astype(np.float32)
-        return np.asarray(self.tree.run(start, along, dists=short, query="DISTANCE") >= short)
+        short = (far * (1 - DEPTH_SHARE) - self.lift).astype(np.float32)
+        # A copy: Embree writes into what it is given.
+        hit = self.tree.run(start, along, dists=short.copy(), query="DISTANCE")
+        return np.asarray(hit >= short)
 
-    def below(self, point: Floats, far: float) -> float | None:
-        """The height of what lies first under a point, at most so ``far``; None for nothing."""
+    def below(self, point: Floats, far: float) -> Floats:
+        """(n,) the heights of what lies first under (n, 3) points, at most so ``far``; where that
+        is nothing, of the ground."""
+        return self._upright(point, far, -1.0)
+
+    def above(self, point: Floats, far: float) -> Floats:
+        """The same of what lies first over points."""
+        return self._upright(point, far, 1.0)
+
+    def _upright(self, point: Floats, far: float, way: float) -> Floats:
+        found = np.full(len(point), self.ground)
         if self.tree is None:
-            return None
-        start = (point - self.middle).astype(np.float32)[None]
-        limit = np.array([far + self.lift], np.float32)
-        down = np.array([[0, -1, 0]], np.float32)
-        hit = self.tree.run(start, down, dists=limit.copy(), query="DISTANCE")
-        return float(point[1] - hit[0]) if hit[0] < limit[0] else None
+            return found
+        along = np.zeros((len(point), 3), np.float32)
+        along[:, 1] = way
+        limit = np.full(len(point), far + self.lift, np.float32)
+        start = (point - self.middle).astype(np.float32)
+        hit = self.tree.run(start, along, dists=limit.copy(), query="DISTANCE")
+        there = hit < limit
+        found[there] = (point[:, 1] + way * hit)[there]
+        return found
 
 
 def outermost(around: Surroundings, point: Floats, normal: Floats, within: float) -> Floats:
@@ -148,30 +159,59 @@ def light(
     return found
 
 
-def lighter_side(
+def escaping(
     around: Surroundings,
-    corner: Floats,
+    point: Floats,
     normal: Floats,
-    both: Bools,
-    reach: float,
-    error: float = 0.0,
-) -> Floats:
-    """(T, 3) the normals, turned round where a face that has ``both`` sides is lighter behind; the
-    front counts where they are alike.
+    turn: Floats,
+    samples: int,
+    bounces: int,
+) -> Ints:
+    """(n,) how many of ``samples`` walks from (n, 3) points into the hemispheres over (n, 3)
+    normals come to the sky, each turned back into a new direction by what it meets, at most
+    ``bounces`` times. ``turn`` as of `light`."""
+    fan = hemisphere(samples)
+    count = np.zeros(len(point), np.int64)
+    step = max(1, RAYS // samples)
+    for at in range(0, len(point), step):
+        part = slice(at, at + step)
+        along = (fan @ _frames(normal[part], turn[part])).reshape(-1, 3)
+        lifted = point[part] + around.lift * normal[part] - around.middle
+        origin = np.repeat(lifted, samples, axis=0)
+        walk = np.arange(len(origin))
+        for bounce in range(bounces + 1):
+            far, against = _met(around, origin, along)
+            out = np.isinf(far)
+            count[part] += np.bincount(walk[out] // samples, minlength=len(lifted))
+            if bounce == bounces or out.all():
+                break
+            kept = ~out
+            origin, walk, back = origin[kept], walk[kept], against[kept]
+            origin = origin + far[kept, None] * along[kept] + around.lift * back
+            ways = fan[(walk * 5 + 3 * bounce + 1) % samples]
+            turned = np.asarray((walk + bounce + 1) * _GOLDEN % 1.0, np.float64)
+            frames = _frames(back, turned)
+            along = np.einsum("nk,nkx->nx", ways, frames)
+    return count
 
-    ``corner`` is (T, 3, 3), ``both`` (T,); ``error`` is that of `outermost`.
-    """
-    which = np.flatnonzero(both)
-    if not len(which):
-        return normal
-    middle, turn = corner[which].mean(axis=1), np.zeros(len(which))
-    front, back = (
-        light(around, outermost(around, middle, way, error), way, turn, _SIDE_RAYS, reach)
-        for way in (normal[which], -normal[which])
-    )
-    turned = normal.copy()
-    turned[which[back > front]] *= -1
-    return turned
+
+def _met(around: Surroundings, origin: Floats, along: Singles) -> tuple[Floats, Floats]:
+    """(n,) how far rays from the middle of the scene go, inf to the sky; (n, 3) the normals of what
+    they meet, against them."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        down = (around.ground - around.middle[1] - origin[:, 1]) / along[:, 1]
+    far = np.where(along[:, 1] < 0, np.maximum(down, 0), np.inf)
+    against = np.zeros((len(far), 3))
+    against[:, 1] = 1.0
+    if around.tree is not None:
+        hit = around.tree.run(origin.astype(np.float32), along.astype(np.float32), output=True)
+        nearer = (hit["primID"] >= 0) & (hit["tfar"] < far)
+        far[nearer] = hit["tfar"][nearer]
+        face = around.points[around.triangles[hit["primID"][nearer]]]
+        way = normals(face)
+        facing = np.einsum("nx,nx->n", way, along[nearer]) < 0
+        against[nearer] = np.where(facing[:, None], way, -way)
+    return far, against
 
 
 def hemisphere(samples: int) -> Singles:

@@ -5,7 +5,8 @@ of the image. The set is complete: an image of 200 texels has a file of 512, too
 than that of 256, and the index records what it was made of, so that a client may leave it out.
 Made smaller, a texel is the mean of what it covers, in the encoded values, as the levels of a
 `.ptm` are; made larger, it is interpolated. Alpha is a file of its own, and colours are not
-multiplied by it.
+multiplied by it; but where an image has alpha that counts, a colour has the weight of its alpha, so
+that what is not seen does not fringe what is.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ptmtools.arrays import Singles
 from ptmtools.campus.model import ALPHA, DIFFUSE, MASK, SIZES, TextureFile
 from ptmtools.campus.names import texture_file
 from ptmtools.errors import naming
@@ -72,10 +74,17 @@ def texture_files(limits: tuple[int, int], base: BaseImage) -> list[Written]:
     found: list[Written] = []
     if base.image is not None:
         image = _decoded(base.image.load(), most, base.image.name)
-        channels = {DIFFUSE: image.convert("RGB")}
+        alpha = None
         if base.alpha:
-            channels[ALPHA] = image.getchannel("A") if "A" in image.getbands() else _white(image)
-        found += _files(base.base, channels, quality)
+            alpha = image.getchannel("A") if "A" in image.getbands() else _white(image)
+        colors = image.convert("RGB")
+        for size in SIZES:
+            fitted = squared(colors, size) if alpha is None else weighted(colors, alpha, size)
+            data = jpeg(fitted, quality)
+            found.append(_written(base.base, size, DIFFUSE, data, image.size))
+            if alpha is not None:
+                data = jpeg(squared(alpha, size), quality)
+                found.append(_written(base.base, size, ALPHA, data, image.size))
     if base.mask is not None:
         image = _decoded(base.mask.load(), most, base.mask.label)
         held = np.asarray(
@@ -83,9 +92,10 @@ def texture_files(limits: tuple[int, int], base: BaseImage) -> list[Written]:
             if base.mask.band < 0
             else image.convert("RGB").getchannel(base.mask.band)
         )
-        found += _files(
-            base.base, {MASK: _grey(255 - held if base.mask.inverted else held)}, quality
-        )
+        shine = _grey(255 - held if base.mask.inverted else held)
+        for size in SIZES:
+            data = jpeg(squared(shine, size), quality)
+            found.append(_written(base.base, size, MASK, data, shine.size))
     return found
 
 
@@ -119,17 +129,32 @@ def squared(image: Image.Image, size: int) -> Image.Image:
     return image
 
 
+def weighted(colors: Image.Image, alpha: Image.Image, size: int) -> Image.Image:
+    """The colours of an image as a square, each with the weight of its ``alpha``; where all of that
+    is 0, what `squared` makes of them."""
+    from PIL import Image
+
+    share = np.asarray(alpha, np.float32)
+    total = _resized(share, size)
+    plain = squared(colors, size)
+    held = np.asarray(plain, np.float32).copy()
+    # Interpolation overshoots beside what is clear.
+    there = total >= 1
+    for band in range(3):
+        of = _resized(np.asarray(colors.getchannel(band), np.float32) * share, size)
+        held[there, band] = of[there] / total[there]
+    return Image.fromarray(np.rint(np.clip(held, 0, 255)).astype(np.uint8))
+
+
 def decoded_lightmap(data: bytes, most: int, label: str) -> Image.Image:
     """An image as RGB. Raises what decoding raises."""
     return _decoded(data, most, label).convert("RGB")
 
 
-def _files(base: str, channels: dict[str, Image.Image], quality: int) -> list[Written]:
-    return [
-        _written(base, size, channel, jpeg(squared(image, size), quality), image.size)
-        for size in SIZES
-        for channel, image in channels.items()
-    ]
+def _resized(texels: Singles, size: int) -> Singles:
+    from PIL import Image
+
+    return np.asarray(squared(Image.fromarray(texels), size), np.float32)
 
 
 def _written(base: str, size: int, channel: str, data: bytes, source: tuple[int, int]) -> Written:

@@ -31,6 +31,7 @@ from ptmtools.errors import LimitError, PtmError
 from ptmtools.files import open_regular
 from ptmtools.findings import Findings, Severity, ValidationReport
 from ptmtools.texture.model import Limits
+from ptmtools.tolerance import UNIT_SHARE
 
 #: Code → severity, meaning.
 CODES: dict[str, tuple[Severity, str]] = {
@@ -53,8 +54,6 @@ CODES: dict[str, tuple[Severity, str]] = {
                  "one has fewer faces"),
     "PTM-D836": ("warning", "a texture that no material uses"),
 }  # fmt: skip
-#: A direction is a unit vector up to this, which six decimals leave.
-_UNIT = 1e-5
 
 
 def check_campus(folder: Path, limits: Limits) -> ValidationReport:
@@ -184,7 +183,7 @@ class _Check:
         eye, along = map(np.array, each.viewpoint)
         if ((low <= eye) & (eye <= high)).all():
             at.add("PTM-D832", "lies in the box", f"{where}.viewpoint.position")
-        if abs(math.hypot(*along) - 1) > _UNIT:
+        if abs(math.hypot(*along) - 1) > UNIT_SHARE:
             at.add("PTM-D832", "is no unit vector", f"{where}.viewpoint.direction")
         if beyond := [m for m in each.materials if m >= len(campus.materials)]:
             at.add("PTM-D830", f"there is no material {beyond[0]}", f"{where}.materials")

@@ -15,6 +15,8 @@ import numpy as np
 from ptmtools.arrays import Floats, Ints, Singles
 from ptmtools.campus.lights import Look
 from ptmtools.campus.occlusion import hemisphere, turns
+from ptmtools.campus.surface import areas
+from ptmtools.tolerance import TIE_SHARE
 
 #: Points of a face at which its light is computed.
 POINTS = 8
@@ -34,10 +36,7 @@ def vertex_light(look: Look, corner: Floats, normal: Floats) -> Floats:
     face = np.repeat(np.arange(count), POINTS)
     seen = look(face, point, turns(len(point))).reshape(count, POINTS)
     vertex = _shared(corner, normal)
-    area = np.linalg.norm(
-        np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1
-    )
-    fitted = _fitted(vertex, share, seen, area)
+    fitted = _fitted(vertex, share, seen, areas(corner))
     return np.clip(fitted[vertex], 0.0, 1.0)
 
 
@@ -70,7 +69,10 @@ def _shared(corner: Floats, normal: Floats) -> Ints:
 def _fitted(vertex: Ints, share: Floats, seen: Singles, area: Floats) -> Floats:
     """(V,) values at vertices whose interpolation is nearest to the light ``seen`` at the points of
     each face, by conjugate gradients on the normal equations."""
-    count, weight = int(vertex.max()) + 1, np.maximum(area, area.max() * 1e-6 + 1e-300)
+    count, weight = (
+        int(vertex.max()) + 1,
+        np.maximum(area, max(area.max() * TIE_SHARE, np.finfo(float).tiny)),
+    )
     within = share.T @ share / POINTS
 
     def gathered(at_corners: Floats) -> Floats:

@@ -1,9 +1,11 @@
-"""Where a visitor is put who wants to see an object: before it, at the height of eyes.
+"""Where a visitor is put who wants to see an object: on the ground, at the height of eyes.
 
-Candidates stand before the four sides of its box and its four corners, as far away as lets the
-whole box into the view, nearer where little is seen from there, and on whatever lies below. Of them
-that one is taken from which most of the object is seen, past all others; the widest side where
-several are alike.
+Candidates stand all around its box, as far away as lets the whole box into the view, nearer and
+farther. Those count that stand on the ground under the open sky: what lies highest there is what
+lies lowest, within a step. So none is within a solid, on a roof, in a tree or under a bridge. Of
+them that one is taken from which most of the object is seen, past all others; where several are
+alike the first, before the widest side. An object of which nothing is seen from any such place,
+because it stands in a building, is looked at from beside it, on whatever floor there is.
 """
 
 from __future__ import annotations
@@ -15,20 +17,18 @@ import numpy as np
 from ptmtools.arrays import Floats
 from ptmtools.campus.model import Vector
 from ptmtools.campus.occlusion import Surroundings
+from ptmtools.campus.surface import areas, points_on, spread_over
 
 #: Height of eyes, and how near and how far from a box one stands, metres.
 EYE, NEAREST, FARTHEST = 1.6, 3.0, 150.0
 #: Half of the angle that the box fits into.
 _HALF_VIEW = math.radians(25)
-#: Shares of the distance that are tried.
-_SHARES = (1.0, 0.5, 0.25)
+#: Shares of the distance that are tried, and directions around the box.
+_SHARES, _WAYS = (1.0, 0.7, 0.5, 0.25, 1.5), 24
 #: How many points of the object are looked at; gains below this share count as none.
 _POINTS, _ALIKE = 64, 0.05
-#: Who stands higher than this over an object's lowest point, metres, stands on a roof, which costs
-#: such a share of what is seen.
-_STEP, _ON_TOP = 3.0, 0.5
-#: From so far above an object the ground is looked for, in its own heights.
-_ABOVE = 2.0
+#: Who stands no more than this over what lies lowest, metres, stands on the ground.
+STEP = 0.6
 
 
 def viewpoint(around: Surroundings, corner: Floats, box: Floats) -> tuple[Vector, Vector]:
@@ -41,64 +41,72 @@ def viewpoint(around: Surroundings, corner: Floats, box: Floats) -> tuple[Vector
     box: (6,) its bounding box.
     """
     low, high = box[:3], box[3:]
-    middle, half = (low + high) / 2, (high - low) / 2
+    middle = (low + high) / 2
     target = _points_of(corner)
-    best: tuple[float, Floats] | None = None
-    for share in _SHARES:
-        for x, z in ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)):
-            eye = _candidate(around, low, high, middle, half, np.array([x, z]), share)
-            seen = _seen(around, eye, target)
-            # Sides before corners, the widest first.
-            width = half[2] if x else half[0]
-            seen -= _ON_TOP if eye[1] - EYE > low[1] + _STEP else 0.0
-            worth = seen + _ALIKE * (width / max(half[0], half[2], 1e-300) if not x * z else 0.5)
-            if best is None or worth > best[0] + _ALIKE:
-                best = worth, eye
-        if best is not None and best[0] > 2 * _ALIKE:
-            break
-    assert best is not None
-    eye = best[1]
+    place = _candidates(low, high)
+    top, ground = _heights(around, place)
+    outside = np.column_stack([place[:, 0], top + EYE, place[:, 1]])
+    seen = np.where(top <= ground + STEP, _seen(around, outside, target), 0.0)
+    eyes = outside
+    if not seen.max() > _ALIKE:
+        # From the height of eyes down to a floor; first those beside the foot of the object.
+        head = np.column_stack([place[:, 0], np.full(len(place), low[1] + EYE), place[:, 1]])
+        floor = around.below(head, EYE + STEP)
+        floor = np.where(floor > head[:, 1] - EYE - STEP, floor, low[1])
+        within = np.column_stack([place[:, 0], floor + EYE, place[:, 1]])
+        eyes = np.concatenate([outside, within])
+        seen = np.concatenate([seen, _seen(around, within, target)])
+        if not seen.any():
+            # Wholly hidden: wherever one can stand.
+            seen = np.concatenate([(top <= ground + STEP) * 1.0, np.zeros(len(within))])
+    eye = eyes[int(np.flatnonzero(seen > seen.max() - _ALIKE)[0])]
     way = middle - eye
     x, y, z = (way / np.linalg.norm(way)).tolist()
     a, b, c = eye.tolist()
     return (a, b, c), (x, y, z)
 
 
-def _candidate(
-    around: Surroundings,
-    low: Floats,
-    high: Floats,
-    middle: Floats,
-    half: Floats,
-    way: Floats,
-    share: float,
-) -> Floats:
-    """Where one stands before the side or corner of a box that ``way`` leads to."""
-    across = half[0] if way[0] == 0 else half[2] if way[1] == 0 else math.hypot(half[0], half[2])
-    far = max(across, half[1]) / math.tan(_HALF_VIEW) * share
-    far = min(max(far, NEAREST), FARTHEST)
-    ground = way * (half[[0, 2]] + far / np.linalg.norm(way))
-    x, z = middle[0] + ground[0], middle[2] + ground[1]
-    top = high[1] + _ABOVE * max(2 * half[1], EYE)
-    floor = min(low[1], around.ground)
-    hit = around.below(np.array([x, top, z]), top - floor)
-    return np.array([x, (around.ground if hit is None else hit) + EYE, z])
+def _candidates(low: Floats, high: Floats) -> Floats:
+    """(n, 2) x and z around a box, first those as far away as shows all of it, before the middle of
+    its widest side."""
+    half, middle = (high - low)[[0, 2]] / 2, (low + high)[[0, 2]] / 2
+    turn = 2 * math.pi * np.arange(_WAYS) / _WAYS
+    # Alternately to both sides of the first one.
+    turn = turn[np.argsort(np.minimum(np.arange(_WAYS), _WAYS - np.arange(_WAYS)), kind="stable")]
+    way = np.stack([np.sin(turn), np.cos(turn)], axis=1)
+    if half[1] > half[0]:
+        way = way[:, ::-1]
+    # To the edge of the box, and half of what is seen of it from there.
+    with np.errstate(divide="ignore"):
+        edge = (half / np.abs(way)).min(axis=1)
+    across = np.abs(way[:, ::-1]) @ half
+    far = np.maximum(across, (high[1] - low[1]) / 2) / math.tan(_HALF_VIEW)
+    away = np.clip(np.outer(_SHARES, far), NEAREST, FARTHEST)
+    return np.asarray((middle + (edge + away)[..., None] * way).reshape(-1, 2))
+
+
+def _heights(around: Surroundings, place: Floats) -> tuple[Floats, Floats]:
+    """(n,) of what lies highest and of what lies lowest at (n, 2) places; the ground of the scene
+    is what lies lowest where there is nothing else."""
+    least, most = around.points[:, 1].min(), around.points[:, 1].max()
+    height = most - least + EYE
+    at = np.column_stack([place[:, 0], np.full(len(place), most + EYE), place[:, 1]])
+    top = around.below(at, 2 * height)
+    under = at.copy()
+    under[:, 1] = least - EYE
+    return top, around.above(under, 2 * height)
 
 
 def _points_of(corner: Floats) -> Floats:
-    """(n, 3) points spread over a surface by area, a little inside of its faces."""
-    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    area = np.linalg.norm(across, axis=1).cumsum()
-    if not area[-1] > 0:
+    """(n, 3) points spread over a surface by area."""
+    area = areas(corner)
+    if not area.sum() > 0:
         return np.asarray(corner.mean(axis=1)[:_POINTS])
-    place = (np.arange(_POINTS) + 0.5) / _POINTS
-    face = np.searchsorted(area, place * area[-1]).clip(0, len(corner) - 1)
-    along = np.sqrt((place * 0.7548776662466927 * _POINTS) % 1.0)
-    aside = (place * 0.5698402909980532 * _POINTS) % 1.0
-    share = np.stack([1 - along, along * (1 - aside), along * aside], axis=1)
-    return np.asarray(np.einsum("nk,nkx->nx", share, corner[face]))
+    face = spread_over(area, np.zeros(len(area), np.int64), np.zeros(1, np.int64), _POINTS)[0]
+    return points_on(corner[face], np.arange(1, _POINTS + 1))
 
 
-def _seen(around: Surroundings, eye: Floats, target: Floats) -> float:
-    """The share of points that are seen from an eye."""
-    return float(np.mean(around.free(np.broadcast_to(eye, target.shape), target)))
+def _seen(around: Surroundings, eyes: Floats, target: Floats) -> Floats:
+    """(n,) the share of points that is seen from each of (n, 3) eyes."""
+    origin, end = np.repeat(eyes, len(target), axis=0), np.tile(target, (len(eyes), 1))
+    return np.asarray(around.free(origin, end).reshape(len(eyes), -1).mean(axis=1))

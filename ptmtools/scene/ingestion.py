@@ -183,6 +183,7 @@ def ingest(
         space=space,
         notes=findings.notes,
         files=tuple(findings.folder.sought),
+        shines=tuple(source.materials[i].shine for i in used_material.tolist()),
     )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -94,6 +95,22 @@ class SourceImage:
 
 
 @dataclass(frozen=True)
+class Shine:
+    """Where a material reflects, as the model says it (``map_Ks`` of OBJ); nothing was looked for.
+
+    Attributes
+    ----------
+    file: the name of the image as it stands.
+    base: folder that it is relative to.
+    fault: why it cannot be had beside the colours, or "".
+    """
+
+    file: str
+    base: Path
+    fault: str = ""
+
+
+@dataclass(frozen=True)
 class Camera:
     """A viewpoint: eye and a unit viewing direction in world coordinates, vertical field of view
     in radians."""
@@ -146,6 +163,7 @@ class Scene:
     notes: what was dropped, missed or guessed, in the order of the model file.
     files: what was read or looked for beside the model file, relative to its folder, "/" between
         names: a change to any of these may change the scene. Not part of the artifact.
+    shines: (of `materials`) where each reflects, or None. Not part of the artifact.
     """
 
     points: NDArray[np.float64]
@@ -165,6 +183,7 @@ class Scene:
     space: Space = Space((0.0, 0.0, 0.0), 1.0, "y")
     notes: tuple[Note, ...] = ()
     files: tuple[str, ...] = field(default=(), compare=False)
+    shines: tuple[Shine | None, ...] = field(default=(), compare=False)
 
     @property
     def corners(self) -> NDArray[np.float64]:

@@ -108,7 +108,7 @@ def parse_map(text: str, line: int = 0) -> MapStatement:
 @dataclass
 class MtlMaterial:
     """A ``newmtl`` block of a library; ``dissolve`` is ``d``, or 1 - ``Tr`` where only that is
-    given."""
+    given. That ``map_Ks`` is not understood is no miss, since few ask for it: ``map_ks_fault``."""
 
     library: Path
     color: tuple[float, float, float] | None = None
@@ -117,6 +117,7 @@ class MtlMaterial:
     map_kd: MapStatement | None = None
     map_d: MapStatement | None = None
     map_ks: MapStatement | None = None
+    map_ks_fault: str = ""
 
 
 def read_mtl(path: Path, findings: Findings) -> dict[str, MtlMaterial]:
@@ -183,5 +184,7 @@ def _statement(material: MtlMaterial, key: str, rest: str, line: int) -> None:
     elif key == "map_d":
         material.map_d = parse_map(rest, line)
     elif key == "map_ks":
-        with suppress(ValueError):  # few ask for it, and it is no miss
-            material.map_ks = parse_map(rest, line)
+        try:
+            material.map_ks, material.map_ks_fault = parse_map(rest, line), ""
+        except ValueError as error:
+            material.map_ks_fault = str(error)

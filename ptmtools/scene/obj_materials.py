@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Set
 from pathlib import Path
 
-from ptmtools.scene.model import Wrap
+from ptmtools.scene.model import Shine, Wrap
 from ptmtools.scene.mtl import MapStatement, MtlMaterial, read_mtl
 from ptmtools.scene.source import FileRange, Findings, SourceMaterial, Texture
 
@@ -74,9 +74,20 @@ def resolved(
                 see_through=known.dissolve < 1 or (known.map_d is not None and mask is None),
                 texture=texture,
                 mask=mask,
+                shine=_shine(known),
             )
         )
     return tuple(materials), maps
+
+
+def _shine(material: MtlMaterial) -> Shine | None:
+    colors, said, base = material.map_kd, material.map_ks, material.library.parent
+    if material.map_ks_fault:
+        return Shine("", base, f"map_Ks: {material.map_ks_fault}")
+    if said is None:
+        return None
+    alike = colors is None or (colors.scale, colors.offset) == (said.scale, said.offset)
+    return Shine(said.file, base, "" if alike else "other texture coordinates")
 
 
 def _suggestion(path: Path, name: str) -> str:

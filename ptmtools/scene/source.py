@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ptmtools.errors import InputError, LimitError
 from ptmtools.files import open_regular
-from ptmtools.scene.model import Camera, Kind, Note, Storey, Wrap
+from ptmtools.scene.model import Camera, Kind, Note, Shine, Storey, Wrap
 from ptmtools.scene.reference import Folder
 
 SourceWrap = Literal[Wrap, "mirror"]
@@ -86,6 +86,7 @@ class Texture:
     wrap_s, wrap_t: beyond [0, 1]; "mirror" is a repetition of which every other is mirrored.
     channel: the channel that a mask takes its values from: "m" (matte), "l" (luminance), "r",
         "g", "b", or "" for matte where there is one and luminance elsewhere.
+    strength: how much of it applies, in [0, 1] (glTF's occlusionTexture).
     """
 
     read: Callable[[], bytes]
@@ -95,6 +96,7 @@ class Texture:
     wrap_s: SourceWrap = "repeat"
     wrap_t: SourceWrap = "repeat"
     channel: str = ""
+    strength: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -110,6 +112,7 @@ class SourceMaterial:
         they are blended.
     two_sided: whether its faces have a back.
     texture, mask: colours, and a separate image of opacities (``map_d``).
+    shine: where it reflects.
     """
 
     name: str
@@ -120,6 +123,7 @@ class SourceMaterial:
     two_sided: bool = True
     texture: Texture | None = None
     mask: Texture | None = None
+    shine: Shine | None = None
 
 
 @dataclass(frozen=True)

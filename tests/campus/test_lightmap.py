@@ -1,4 +1,4 @@
-"""Atlases and lightmaps: kernels against plain loops, known scenes, what larger ones take over."""
+"""Lightmaps: known scenes, what larger ones take over, the light of vertices and of the model."""
 
 from __future__ import annotations
 
@@ -7,112 +7,45 @@ import pytest
 from hypothesis import given, strategies as st
 
 from ptmtools.arrays import Floats
-from ptmtools.campus.atlas import GAP, components, cover, unwrap
-from ptmtools.campus.lightmap import AGREE, bake, fill, spread
-from ptmtools.campus.lights import Painted, Rays
-from ptmtools.campus.occlusion import Surroundings, normals
+from ptmtools.campus.atlas import cover, unwrap
+from ptmtools.campus.lightmap import AGREE, bake, fill
+from ptmtools.campus.lights import LightImage, Painted, Rays
+from ptmtools.campus.occlusion import normals
 from ptmtools.campus.vertex_light import vertex_light
-from tests.campus.made import house, level
+from ptmtools.scene.source import SourceWrap
+from tests.campus.made import level
+from tests.campus.shapes import (
+    GROUND,
+    HOUSE,
+    bilinear,
+    indexed,
+    ledges,
+    samples,
+    surroundings,
+    triangles_of,
+)
 
 pytest.importorskip("xatlas", reason="pip install 'ptmtools[campus]'")
 
 
-def triangles_of(rows: Floats) -> Floats:
-    """(2 n, 3, 3) of the (4 n, 5) corners of quads."""
-    quads = rows[:, :3].reshape(-1, 4, 3)
-    return quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
-
-
-HOUSE = triangles_of(np.concatenate(list(house(0, 0, 12, 8, 9, 2).values())))
-GROUND = triangles_of(level((-30, -30), (40, 40), 0))
-
-
-def indexed(corner: Floats) -> tuple[Floats, np.ndarray]:
-    points, place = np.unique(corner.reshape(-1, 3), axis=0, return_inverse=True)
-    return points, place.reshape(-1, 3).astype(np.int32)
-
-
-def surroundings(*parts: Floats) -> Surroundings:
-    points, triangles = indexed(np.concatenate(parts))
-    return Surroundings(points, triangles, points.mean(axis=0), 0.0, 1e-4)
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(1, 12))
-def test_cover_is_a_test_of_every_texel(seed: int, faces: int) -> None:
-    uv = np.random.default_rng(seed).random((faces, 3, 2))
-    size = 16
-    wanted = np.full((size, size), -1)
-    for row, column in np.ndindex(size, size):
-        at = np.array([column + 0.5, size - row - 0.5]) / size
-        for t in range(faces):
-            sides = [
-                np.linalg.det([b - a, at - a])
-                for a, b in zip(uv[t], np.roll(uv[t], -1, 0), strict=True)
-            ]
-            if min(sides) > 1e-12 or max(sides) < -1e-12:
-                wanted[row, column] = t
-                break
-    assert (cover(uv, size) == wanted).mean() > 0.99
-
-
-@given(st.integers(0, 2**32 - 1), st.integers(1, 30))
-def test_components_are_those_of_a_flood(seed: int, faces: int) -> None:
-    triangle = np.random.default_rng(seed).integers(0, 25, (faces, 3))
-    label = np.arange(25)
-    for _ in range(25):
-        for t in triangle:
-            label[t] = label[t].min()
-    assert np.array_equal(components(triangle, 25), label)
-
-
-def test_an_atlas_gives_each_face_a_place_of_its_own() -> None:
-    points, triangles = indexed(HOUSE)
-    atlas = unwrap(points, triangles)
-    assert atlas.side == 512
-    assert atlas.uv.shape == (len(triangles), 3, 2)
-    assert ((atlas.uv >= 0) & (atlas.uv <= 1)).all()
-    owner = cover(atlas.uv, 512)
-    a, b, c = np.moveaxis(atlas.uv * 512, 1, 0)
-    area = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
-    held = np.bincount(owner[owner >= 0], minlength=len(triangles))
-    assert np.allclose(held, area, rtol=0.1, atol=40), "faces lie over each other"
-    assert (owner >= 0).mean() > 0.3
-    chart = np.where(owner >= 0, atlas.chart[owner], -1)
-    for down, across in ((0, 1), (1, 0), (1, 1)):
-        for step in range(1, GAP + 1):
-            one = chart[step * down :, step * across :]
-            other = chart[: 512 - step * down, : 512 - step * across]
-            assert not ((one != other) & (one >= 0) & (other >= 0)).any(), "no gap"
-
-
-def test_texels_are_as_large_as_the_surface_everywhere() -> None:
-    points, triangles = indexed(HOUSE)
-    uv = unwrap(points, triangles).uv
-    lengths = np.linalg.norm(HOUSE - np.roll(HOUSE, 1, axis=1), axis=2)
-    drawn = np.linalg.norm(uv - np.roll(uv, 1, axis=1), axis=2)
-    ratio = drawn / lengths
-    assert ratio.max() / ratio.min() < 1.1
-
-
-def test_too_many_charts_for_the_least_lightmap() -> None:
-    """Thousands of loose faces."""
-    random = np.random.default_rng(1)
-    corner = random.random((5000, 1, 3)) * 1000 + random.random((5000, 3, 3))
-    points, triangles = indexed(corner)
-    assert unwrap(points, triangles).side != 512
-
-
-def test_a_long_object_has_its_gaps_in_every_lightmap() -> None:
-    quads = [level((5 * i, 0), (5 * i + 5, 3), 0) for i in range(40)]
-    points, triangles = indexed(triangles_of(np.concatenate(quads)))
-    assert unwrap(points, triangles).side == 512
+def test_thin_faces_show_their_own_light() -> None:
+    """The undersides of shelves are dark, their tops are light."""
+    corner = ledges(40)
+    atlas = unwrap(*indexed(corner))
+    where = surroundings(corner, GROUND)
+    face, point, at = samples(corner, atlas.uv, 4000)
+    light = Rays.of(where, corner, 256, 0.2)
+    wanted = light(face, point, np.zeros(len(face)))
+    assert np.ptp(wanted) > 0.5
+    for found, most in zip(bake(light, corner, atlas), (0.08, 0.04, 0.03), strict=True):
+        assert (np.abs(bilinear(found.value, at)[0] - wanted) > 0.1)[face >= 2].mean() < most
 
 
 def test_a_lightmap_of_a_house_on_the_ground() -> None:
     points, triangles = indexed(HOUSE)
     atlas = unwrap(points, triangles)
     where = surroundings(HOUSE, GROUND)
-    look = Rays.of(where, HOUSE, np.zeros(len(HOUSE), bool), 64, 20.0)
+    look = Rays.of(where, HOUSE, 64, 20.0)
     maps = bake(look, HOUSE, atlas)
     assert [len(m.value) for m in maps] == [512, 1024, 2048]
     normal = normals(HOUSE)
@@ -133,10 +66,12 @@ def test_larger_lightmaps_are_nearly_what_rays_say_everywhere(
     points, triangles = indexed(HOUSE)
     atlas = unwrap(points, triangles)
     where = surroundings(HOUSE, GROUND)
-    look = Rays.of(where, HOUSE, np.zeros(len(HOUSE), bool), 64, 20.0)
+    look = Rays.of(where, HOUSE, 64, 20.0)
     (taken,) = bake(look, HOUSE, atlas, (512,))
 
-    def nothing(value: object, chart: object, larger: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def nothing(
+        value: object, chart: object, centred: object, larger: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(larger.shape, np.float32), np.zeros(larger.shape, np.bool_)
 
     monkeypatch.setattr("ptmtools.campus.lightmap._enlarged", nothing)
@@ -153,7 +88,7 @@ def test_no_row_of_texels_lies_in_the_ground() -> None:
     points, triangles = indexed(HOUSE)
     atlas = unwrap(points, triangles)
     where = surroundings(HOUSE, GROUND)
-    look = Rays.of(where, HOUSE, np.zeros(len(HOUSE), bool), 64, 20.0)
+    look = Rays.of(where, HOUSE, 64, 20.0)
     (found,) = bake(look, HOUSE, atlas, (512,))
     assert found.value.min() > 0.4
 
@@ -195,7 +130,7 @@ def test_vertices_carry_the_light_of_their_faces() -> None:
 
 def test_a_corner_does_not_blacken_its_faces() -> None:
     where = surroundings(HOUSE, GROUND)
-    look = Rays.of(where, HOUSE, np.zeros(len(HOUSE), bool), 64, 20.0)
+    look = Rays.of(where, HOUSE, 64, 20.0)
     found = vertex_light(look, HOUSE, normals(HOUSE))
     roof = normals(HOUSE)[:, 1] > 0.9
     assert found[roof].min() > 0.95
@@ -205,7 +140,7 @@ def test_a_corner_does_not_blacken_its_faces() -> None:
 def test_the_models_own_light_is_looked_up() -> None:
     corner = triangles_of(level((0, 0), (10, 10), 0))
     uv = np.stack([corner[..., 0] / 10, corner[..., 2] / 10], axis=2)
-    image = np.tile(np.linspace(0, 1, 64, dtype=np.float32), (64, 1))
+    image = LightImage(np.tile(np.linspace(0, 255, 64).astype(np.uint8), (64, 1)), CLAMPED)
     look = Painted(corner, uv, np.zeros(2, np.int32), (image,), np.arange(2))
     point = np.array([[2.0, 0, 3], [8, 0, 7]])
     face = np.array([1 if z > x else 0 for x, _, z in point])
@@ -215,12 +150,39 @@ def test_the_models_own_light_is_looked_up() -> None:
     assert (white(face, point, np.zeros(2)) == 1).all()
 
 
-@pytest.mark.parametrize("offset", range(8))
-def test_either_side_of_the_least_gap_has_its_own_value(offset: int) -> None:
-    value, known = np.zeros((4, 32), np.float32), np.zeros((4, 32), bool)
-    first = 4 + offset
-    known[:, :first] = True
-    known[:, first + GAP :], value[:, first + GAP :] = True, 1
-    found = fill(*spread(value, known))
-    assert (found[:, : first + GAP // 2] == 0).all()
-    assert (found[:, first + GAP // 2 :] == 1).all()
+CLAMPED: tuple[SourceWrap, SourceWrap] = ("clamp", "clamp")
+
+
+@pytest.mark.parametrize(
+    ("wrap", "wanted"),
+    [("repeat", [0, 1, 0, 1]), ("clamp", [0, 1, 1, 1]), ("mirror", [0, 1, 1, 0])],
+)
+def test_the_models_own_light_goes_on_as_its_sampler_says(
+    wrap: SourceWrap, wanted: list[float]
+) -> None:
+    """A half dark image, looked up in four halves, along either axis."""
+    texels = np.zeros((8, 8), np.uint8)
+    texels[:, 4:] = 255
+    corner = triangles_of(level((0, 0), (10, 10), 0))
+    point = np.array([[1.25, 0, 1.25], [3.75, 0, 1.25], [6.25, 0, 1.25], [8.75, 0, 1.25]])
+    for axis, image in ((0, texels), (2, texels.T[::-1])):
+        uv = corner[..., [0, 2]] / 5
+        look = Painted(
+            corner, uv, np.zeros(2, np.int32), (LightImage(image, (wrap, wrap)),), np.arange(2)
+        )
+        at = point if axis == 0 else point[:, ::-1]
+        assert look(_face_of(corner, at), at, np.zeros(4)).tolist() == wanted
+
+
+def _face_of(corner: Floats, point: Floats) -> np.ndarray:
+    """Which of two triangles of a square a point is nearer to the middle of."""
+    far = np.linalg.norm(point[:, None] - corner.mean(axis=1), axis=2)
+    return np.asarray(far.argmin(axis=1))
+
+
+def test_a_weaker_light_is_nearer_to_white() -> None:
+    corner = triangles_of(level((0, 0), (10, 10), 0))
+    image = LightImage(np.zeros((2, 2), np.uint8), strength=0.25)
+    look = Painted(corner, np.zeros((2, 3, 2)), np.zeros(2, np.int32), (image,), np.arange(2))
+    found = look(np.array([0]), corner[0].mean(axis=0)[None], np.zeros(1))
+    assert found[0] == pytest.approx(0.75)

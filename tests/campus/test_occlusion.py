@@ -10,14 +10,12 @@ import pytest
 from ptmtools.arrays import Floats
 from ptmtools.campus.lights import Rays
 from ptmtools.campus.occlusion import Surroundings, hemisphere, light, normals, turns
+from ptmtools.campus.sides import open_sides, planes
+from tests.campus.shapes import prism, quad
 
 UP = np.array([[0.0, 1, 0]])
 #: So far away that it counts as infinite, metres.
 FAR = 1e4
-
-
-def quad(*corner: tuple[float, float, float]) -> Floats:
-    return np.array([[corner[0], corner[1], corner[2]], [corner[0], corner[2], corner[3]]], float)
 
 
 def around(*parts: Floats, ground: float = -1.0) -> Surroundings:
@@ -74,15 +72,65 @@ def test_a_point_under_a_roof_is_darker() -> None:
 
 
 def test_the_lighter_side_counts() -> None:
-    """A sheet just above a floor, wound so that its front looks down."""
+    """A sheet just above a floor, wound so that its front looks down, and one of mixed winding."""
     sheet = quad((-1, 0.1, -1), (1, 0.1, -1), (1, 0.1, 1), (-1, 0.1, 1))
     assert (normals(sheet)[:, 1] < 0).all()
     where = around(FLOOR, sheet)
-    both = Rays.of(where, sheet, np.ones(2, bool), 64, 20.0)
-    one = Rays.of(where, sheet, np.zeros(2, bool), 64, 20.0)
+    assert open_sides(where, sheet, np.ones(2, bool), 20.0).tolist() == [-1, -1]
+    assert open_sides(where, sheet, np.zeros(2, bool), 20.0).tolist() == [1, 1]
+    mixed = np.stack([sheet[0, ::-1], sheet[1]])
+    assert open_sides(where, mixed, np.ones(2, bool), 20.0).tolist() == [1, -1]
     face, point = np.array([0]), sheet[0].mean(axis=0)[None]
-    assert both(face, point, np.zeros(1))[0] > 0.9
-    assert one(face, point, np.zeros(1))[0] < 0.2
+    for side, least, most in ((-1.0, 0.9, 1.0), (1.0, 0.0, 0.2)):
+        found = Rays.of(where, sheet, 64, 20.0, side=side)(face, point, np.zeros(1))[0]
+        assert least <= found <= most
+
+
+def test_a_court_is_outside_however_light_the_halls_around_it_are() -> None:
+    """Wings of 30 m around a shaft of 2 m, 20 m high, under a roof with a hole."""
+    outer, inner = prism(-31, -31, 62, 62, 20), prism(-1, -1, 2, 2, 20)
+    ring = [
+        quad((x, 20, z), (x, 20, z + d), (x + w, 20, z + d), (x + w, 20, z))
+        for x, z, w, d in ((-31, -31, 62, 30), (-31, 1, 62, 30), (-31, -1, 30, 2), (1, -1, 30, 2))
+    ]
+    walls = np.concatenate([outer, inner])
+    floor = np.concatenate([FLOOR, *ring])
+    where = around(floor, walls, ground=0.0)
+    middle = inner.mean(axis=1)
+    lights = [
+        light(where, middle, way, np.zeros(8), 256, 20.0).mean()
+        for way in (normals(inner), -normals(inner))
+    ]
+    assert lights[0] > lights[1], "the hall is lighter"
+    found = open_sides(where, walls, np.ones(16, bool), 20.0)
+    assert found.tolist() == [1] * 8 + [-1] * 8
+
+
+def test_within_a_closed_house_the_lighter_side_counts() -> None:
+    """A partition near a wall."""
+    house = np.concatenate(
+        [prism(0, 0, 20, 10, 3), quad((0, 3, 0), (0, 3, 10), (20, 3, 10), (20, 3, 0))]
+    )
+    partition = quad((0.2, 0, 0), (0.2, 0, 10), (0.2, 3, 10), (0.2, 3, 0))
+    assert (normals(partition)[:, 0] < 0).all()
+    where = around(FLOOR, house, partition, ground=0.0)
+    assert open_sides(where, partition, np.ones(2, bool), 20.0).tolist() == [-1, -1]
+
+
+def test_planes_are_connected_by_edges() -> None:
+    """Two quads in a row, one turned away from them, and one apart; a face of one side is alone."""
+    corner = np.concatenate(
+        [
+            quad((0, 0, 0), (1, 0, 0), (1, 0, 1), (0, 0, 1)),
+            quad((1, 0, 0), (2, 0, 0), (2, 0, 1), (1, 0, 1)),
+            quad((2, 0, 0), (2, 0, 1), (2, 1, 1), (2, 1, 0)),
+            quad((5, 0, 0), (6, 0, 0), (6, 0, 1), (5, 0, 1)),
+        ]
+    )
+    every = planes(corner, normals(corner), np.ones(8, bool))
+    assert every.tolist() == [0, 0, 0, 0, 4, 4, 6, 6]
+    some = planes(corner, normals(corner), np.arange(8) != 2)
+    assert some[2] == 2
 
 
 def test_a_coarse_face_beneath_the_surface_has_its_light() -> None:
@@ -91,10 +139,16 @@ def test_a_coarse_face_beneath_the_surface_has_its_light() -> None:
     assert (normals(sheet)[:, 1] > 0).all()
     where = around(FLOOR)
     face, point = np.array([0]), sheet[0].mean(axis=0)[None]
-    none = np.zeros(2, bool)
-    assert Rays.of(where, sheet, none, 64, 20.0)(face, point, np.zeros(1))[0] < 0.2
-    assert Rays.of(where, sheet, none, 64, 20.0, 0.3)(face, point, np.zeros(1))[0] == 1.0
-    assert Rays.of(where, sheet, ~none, 64, 20.0, 0.3).normal[0, 1] == 1.0
+    assert Rays.of(where, sheet, 64, 20.0)(face, point, np.zeros(1))[0] < 0.2
+    assert Rays.of(where, sheet, 64, 20.0, 0.3)(face, point, np.zeros(1))[0] == 1.0
+
+
+def test_sight_ends_at_what_is_before_it() -> None:
+    wall = quad((0, 0, -1), (0, 2, -1), (0, 2, 1), (0, 0, 1))
+    where = around(FLOOR, wall)
+    eye = np.array([[5.0, 1, 0], [5, 1, 0], [5, 1, 0], [-5, 1, 0]])
+    target = np.array([[0.0, 1, 0], [-0.05, 1, 0], [-3, 1, 5], [-3, 1, 0]])
+    assert where.free(eye, target).tolist() == [True, False, True, True]
 
 
 def test_directions_are_in_proportion_to_the_cosine() -> None:

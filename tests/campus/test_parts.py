@@ -10,16 +10,17 @@ import pytest
 from hypothesis import given, strategies as st
 from PIL import Image
 
-from ptmtools.campus import Campus, read_campus
+from ptmtools.campus import Campus, CampusOptions, make_campus, read_campus
 from ptmtools.campus.levels import level_faces, levels
 from ptmtools.campus.meshes import Corners, mesh_bytes, read_mesh
 from ptmtools.campus.model import CampusMaterial
 from ptmtools.campus.names import FORM, Names, mesh_file, texture_file
 from ptmtools.campus.objects import notes_on, parts_of
-from ptmtools.campus.textures import jpeg, squared
+from ptmtools.campus.textures import jpeg, squared, weighted
 from ptmtools.errors import LimitError
+from ptmtools.pipeline.validation import validate
 from ptmtools.simplification import Mesh
-from tests.campus.made import TILE, texture, wall
+from tests.campus.made import TILE, texture, wall, write_obj
 from tests.conftest import scene_of
 
 
@@ -133,6 +134,40 @@ def test_an_alpha_channel_is_a_file_of_its_own(made: Path) -> None:
         through = np.asarray(image, float)
     assert through[16, 16] < 40
     assert through[16, 96] > 215
+
+
+@pytest.mark.parametrize("size", [16, 128])
+def test_what_is_not_seen_does_not_fringe_what_is(size: int) -> None:
+    """Red leaves on black that is clear, made smaller and larger."""
+    texels = np.zeros((64, 64, 3), np.uint8)
+    clear = np.arange(64) // 7 % 2 == 0
+    texels[:, ~clear] = [200, 40, 0]
+    alpha = np.where(clear, 0, 255).astype(np.uint8)[None].repeat(64, axis=0)
+    found = np.asarray(weighted(Image.fromarray(texels), Image.fromarray(alpha), size), int)
+    share = np.asarray(squared(Image.fromarray(alpha), size), int)
+    assert (share > 8).any()
+    assert np.abs(found - [200, 40, 0])[share > 8].max() <= 1
+    plain = np.asarray(squared(Image.fromarray(texels), size), int)
+    assert np.array_equal(found[share == 0], plain[share == 0])
+
+
+def test_an_opaque_material_has_no_alpha_channel(tmp_path: Path) -> None:
+    """It shares its image with one that is cut out."""
+    held = np.zeros((8, 8, 4), np.uint8)
+    held[:, :4] = 255
+    Image.fromarray(held).save(tmp_path / "leaf.png")
+    (tmp_path / "campus.mtl").write_text(
+        "newmtl whole\nmap_Kd leaf.png\nnewmtl cut\nmap_Kd leaf.png\n"
+    )
+    whole, cut = wall((0, 0), (20, 0), 12), wall((0, 5), (20, 5), 12)
+    whole[:, 3:] = 0.1 + 0.2 * (whole[:, 3:] > 0)
+    write_obj(tmp_path / "campus.obj", [("a", {"whole": whole}), ("b", {"cut": cut})])
+    made = make_campus(tmp_path / "campus.obj", tmp_path / "c", CampusOptions(lightmaps="none"))
+    found = {m.name: m for m in made.campus.materials}
+    assert found["whole"].base == found["cut"].base == "leaf"
+    assert (found["whole"].alpha, found["whole"].channels) == ("opaque", ("d",))
+    assert (found["cut"].alpha, found["cut"].channels) == ("blend", ("d", "a"))
+    assert validate(tmp_path / "c").issues == ()
 
 
 def test_a_jpeg_is_the_same_every_time() -> None:

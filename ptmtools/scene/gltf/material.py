@@ -112,7 +112,7 @@ class MaterialReader:
 
         texture, coords, matrix = None, "TEXCOORD_0", np.eye(2, 3)
         if use is not None:
-            texture = self._texture(use["index"], place)
+            texture = self._texture(use["index"], place, _share(use.get("strength", 1.0)))
             moved = use.get("extensions", {}).get("KHR_texture_transform", {})
             matrix = _transform(moved)
             coords = f"TEXCOORD_{moved.get('texCoord', use.get('texCoord', 0))}"
@@ -134,7 +134,7 @@ class MaterialReader:
         )
         return Painted(len(self._materials) - 1, coords, matrix, see_through, light)
 
-    def _texture(self, index: int, place: str) -> Texture | None:
+    def _texture(self, index: int, place: str, strength: float) -> Texture | None:
         tree = self._document.tree
         texture = tree["textures"][index]
         sampler = tree["samplers"][texture["sampler"]] if "sampler" in texture else {}
@@ -167,6 +167,7 @@ class MaterialReader:
             place=place,
             wrap_s=_WRAPS.get(sampler.get("wrapS"), "repeat"),
             wrap_t=_WRAPS.get(sampler.get("wrapT"), "repeat"),
+            strength=strength,
         )
 
 
