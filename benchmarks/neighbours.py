@@ -168,10 +168,12 @@ def runs_table(block: list[Played]) -> Iterator[str]:
 def bytes_table(world: World, policies: Sequence[Declared]) -> Iterator[str]:
     """e by bytes received, means over places."""
     places = standing_places(world)
+    if not places:
+        yield "Nobody comes to stand in this walk."
+        return
     heads = " | ".join(f"e at {size(mark)}" for mark in MARKS)
     yield f"| system | {heads} | at the end | received |"
     yield "|---" + "|--:" * (len(MARKS) + 2) + "|"
-    rival: list[float] = []
     rows = {policy.name: by_bytes(world, policy, places) for policy in policies}
     rival = rows.get(RIVAL, ([float("nan")] * (len(MARKS) + 1), 0.0))[0]
     for name, (errors, received) in rows.items():
