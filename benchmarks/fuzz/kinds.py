@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from benchmarks.fuzz.databases import Interrupted, ManifestText, Npz, Served, Vrml
+from benchmarks.fuzz.folders import ApoFolder, CampusFolder
 from benchmarks.fuzz.interlaced import Interlaced
 from benchmarks.fuzz.models import Gltf, Handed, Mesh, Meshopt, Mtl, Obj
 from benchmarks.fuzz.textures import Images, Ptm
@@ -32,6 +33,8 @@ KINDS: dict[str, Kind] = {
     "mesh": Kind(Mesh, 3),
     "image": Kind(Images, 10),
     "interlaced": Kind(Interlaced, 4),
+    "apo": Kind(ApoFolder, 3),
+    "campus": Kind(CampusFolder, 2),
     "vrml": Kind(Vrml, 3),
     "staged": Kind(Interrupted, 2),
     "served": Kind(Served, 1),

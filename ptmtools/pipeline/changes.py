@@ -34,8 +34,10 @@ def reasons(
         both = name in before.parameters and name in work.parameters
         if old != new and (both or before.recipe == work.recipe):
             found.append(f"{name.replace('_', ' ')}: {_text(old)} → {_text(new)}")
+    options = bool(found)
     for what, files in _changed(before.inputs, work.inputs).items():
-        if files:
+        # What it does not read any more because of its options says nothing beside them.
+        if files and not (options and what == "removed"):
             found.append(f"{_listed(files)} {what}")
     if not found and (lost := db.damaged(before.outputs)):
         found.append(f"{lost} is missing or damaged")

@@ -137,8 +137,11 @@ def test_with_and_without_by_turns(folder: Path) -> None:
     model, db = folder / "model/two_rooms.obj", folder / "plain.db"
     assert {"apo", "cells", "emit"} <= set(built(model, db, STATUES))
     assert contents(db) == contents(folder / "light.db")
-    plan = {p.stage: p.plan for p in plan_build(model, db, QUICK)}
-    assert (plan["apo"], plan["cells"]) == ("run", "maybe")
+    plans = {p.stage: p for p in plan_build(model, db, QUICK)}
+    assert (plans["apo"].plan, plans["cells"].plan) == ("run", "maybe")
+    # That it does not read the scene any more follows from the option.
+    assert plans["apo"].reasons[0] == "apo: ['statue_*'] → none"
+    assert not any("removed" in reason for reason in plans["apo"].reasons)
     assert {"apo", "cells", "emit"} <= set(built(model, db))
     assert not (db / "www/apo").exists()
     model.write_text(model.read_text().replace("v 4 2 1.5", "v 4 2.1 1.5"))

@@ -1,0 +1,173 @@
+"""Hostile folders of octree textures and of campuses: the index, and files, many with the checksum
+corrected in the index.
+
+What the check of a folder finds nothing in can be read.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import zlib
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+
+from benchmarks.fuzz.databases import MODEL, commanded
+from benchmarks.fuzz.mutation import NAMES, damaged, dumped, twisted
+from benchmarks.fuzz.target import Case
+from ptmtools.apo import read_mesh, read_octree
+from ptmtools.apo.checking import check_folder
+from ptmtools.apo.files import INDEX as APO_INDEX
+from ptmtools.apo.traversal import look_up
+from ptmtools.campus.model import INDEX as CAMPUS_INDEX, SIZES
+from ptmtools.campus.validation import check_campus
+from ptmtools.errors import PtmError
+from ptmtools.texture.model import Limits
+from ptmtools.walkthrough.campus.stock import read_stock
+from ptmtools.walkthrough.campus.surfaces import read_surfaces, read_textures
+
+LIMITS = Limits(1 << 26)
+
+
+class Folder:
+    """What both have in common; ``index`` is the name of theirs."""
+
+    index = ""
+    limit = 4 * LIMITS.decoded_bytes
+
+    def __init__(self, folder: Path, outside: Path) -> None:
+        (outside / "secret.glb").write_bytes(b"secret")
+        self._folder = folder / "hostile"
+        made = self.built(folder)
+        self._files = {
+            file.relative_to(made).as_posix(): file.read_bytes()
+            for file in sorted(made.rglob("*"))
+            if file.is_file()
+        }
+        os.symlink(outside, folder / "away")
+
+    def built(self, folder: Path) -> Path:
+        """A sound one."""
+        raise NotImplementedError
+
+    def sealed(self, document: Any, name: str, data: bytes) -> None:
+        """Writes bytes and checksum of a file to the index."""
+        raise NotImplementedError
+
+    def check(self) -> bool:
+        """Whether the check of the folder finds nothing."""
+        raise NotImplementedError
+
+    def use(self) -> str:
+        """Reads all of it as clients do."""
+        raise NotImplementedError
+
+    def make(self, rng: Random) -> Case:
+        """The index with other values or bytes; or a file damaged, and sealed or not."""
+        name = rng.choice((self.index, self.index, *self._files))
+        way, sealed = rng.randrange(8), rng.random() < 0.6
+        if name != self.index:
+            other = rng.choice(list(self._files.values()))
+            return Case(damaged(rng, self._files[name], other), (name, sealed, way))
+        if rng.random() < 0.3:
+            changed = damaged(rng, self._files[name])
+        else:
+            tree = twisted(rng, json.loads(self._files[name]), (*NAMES, *self._files))
+            changed = dumped(rng, tree)
+        return Case(changed, (name, False, way))
+
+    def read(self, case: Case) -> str:
+        """Checks and reads, or asks a command."""
+        name, sealed, way = case.told
+        files = self._files | {name: case.data}
+        if sealed:
+            document = json.loads(files[self.index])
+            self.sealed(document, name, case.data)
+            files[self.index] = json.dumps(document).encode()
+        shutil.rmtree(self._folder, ignore_errors=True)
+        for file, data in files.items():
+            path = self._folder / file
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+        if way == 0:
+            return f"info {commanded('info', str(self._folder))[0]}"
+        sound = self.check()
+        try:
+            return self.use()
+        except PtmError:
+            assert not sound, "the check found nothing in what cannot be read"
+            raise
+
+
+class ApoFolder(Folder):
+    """The readers of octree textures."""
+
+    index = APO_INDEX
+
+    def built(self, folder: Path) -> Path:
+        """See `Folder.built`."""
+        side = 24
+        x, z = (k.ravel() for k in np.mgrid[:side, :side] / side)
+        y = 0.1 * np.sin(9 * x) * np.cos(7 * z)
+        at = np.arange(side * side).reshape(side, side) + 1
+        a, b, c, d = at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]
+        faces = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
+        rows = [f"v {p:.6f} {q:.6f} {r:.6f}" for p, q, r in zip(x, y, z, strict=True)]
+        rows += [f"f {i} {j} {k}" for i, j, k in faces.tolist()]
+        (folder / "mesh.obj").write_text("\n".join(rows))
+        words = ["--faces", "100", "--depth", "6", "--unit", "m", "--up", "y", "-q", "-j", "1"]
+        call = ["apo", str(folder / "mesh.obj"), "-o", str(folder / "apo"), *words]
+        assert commanded(*call)[0] == 0
+        return folder / "apo"
+
+    def sealed(self, document: Any, name: str, data: bytes) -> None:
+        """See `Folder.sealed`: of the mesh; levels have checksums of what is in them."""
+        if name == document["mesh"]["file"]:
+            document["mesh"] |= {"bytes": len(data), "crc32": zlib.crc32(data)}
+
+    def check(self) -> bool:
+        """See `Folder.check`."""
+        return not check_folder(self._folder, LIMITS).issues
+
+    def use(self) -> str:
+        """See `Folder.use`."""
+        octree, mesh = read_octree(self._folder), read_mesh(self._folder)
+        found = look_up(octree, (mesh.points - octree.low) / octree.side)
+        assert np.isfinite(found.normals).all()
+        return f"{octree.levels} levels"
+
+
+class CampusFolder(Folder):
+    """The readers of campuses."""
+
+    index = CAMPUS_INDEX
+
+    def built(self, folder: Path) -> Path:
+        """See `Folder.built`."""
+        model = Path(shutil.copytree(MODEL, folder / "model"))
+        words = ["--lightmaps", "none", "--unit", "m", "--up", "y", "-q", "-j", "1"]
+        call = ["campus", str(model / "two_rooms.obj"), "-o", str(folder / "campus"), *words]
+        assert commanded(*call)[0] == 0
+        return folder / "campus"
+
+    def sealed(self, document: Any, name: str, data: bytes) -> None:
+        """See `Folder.sealed`."""
+        meshes = [mesh for each in document["objects"] for mesh in each["meshes"]]
+        for row in (*meshes, *document["textures"]):
+            if row["file"] == name:
+                row |= {"bytes": len(data), "crc32": zlib.crc32(data)}
+
+    def check(self) -> bool:
+        """See `Folder.check`."""
+        return not check_campus(self._folder, LIMITS).issues
+
+    def use(self) -> str:
+        """See `Folder.use`."""
+        stock = read_stock(self._folder)
+        faces = [len(read_surfaces(self._folder, stock, level).corner) for level in (0, -1)]
+        read_textures(self._folder, stock, SIZES[0])
+        return f"{len(faces)} levels"
