@@ -93,6 +93,31 @@ def report() -> dict[str, Any]:
     }
 
 
+CAMPUS_WALK = {
+    "format": "ptmtools campus walk",
+    "schema": 1,
+    "campus": "campus",
+    "seconds": 40.0,
+    "runs": [
+        {
+            "preset": "Low",
+            "bandwidth": None,
+            "begun": 1.5,
+            "memory": {"start": 10, "most": 20},
+            "bytes": 30,
+            "overheadBytes": 4,
+            "requests": 5,
+            "idle": 0.5,
+            "pauses": 1,
+            "late": 0.25,
+            "delay": None,
+            "shown": 0,
+            "never": 2,
+            "reused": 1.0,
+            "e": None,
+        }
+    ],
+}
 TRACE = {
     "format": "ptmtools trace",
     "schema": 1,
@@ -129,7 +154,9 @@ def shape_fault(document: object, name: str) -> str:
 
 
 def test_what_we_write_satisfies_them(served, manifest, report) -> None:
-    for name, document in zip(NAMES, (*served.values(), manifest, report, TRACE), strict=True):
+    for name, document in zip(
+        NAMES, (*served.values(), manifest, report, TRACE, CAMPUS_WALK), strict=True
+    ):
         validator(name).validate(document)
         assert shape_fault(document, name) == ""
 
@@ -209,7 +236,7 @@ def shortened(value: Any) -> Any:
 @pytest.mark.parametrize("name", NAMES)
 def test_our_reader_and_jsonschema_agree(name: str, served, manifest, report) -> None:
     hints = map(shortened, served.values())
-    document = dict(zip(NAMES, (*hints, manifest, report, TRACE), strict=True))[name]
+    document = dict(zip(NAMES, (*hints, manifest, report, TRACE, CAMPUS_WALK), strict=True))[name]
     theirs = validator(name)
     refused = tried = 0
     for changed, what in mutations(document):
