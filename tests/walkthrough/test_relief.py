@@ -21,11 +21,12 @@ from ptmtools.errors import DatabaseError, InputError
 from ptmtools.walkthrough.client import Client, Kind, Range
 from ptmtools.walkthrough.comparing import SimulateOptions, budget_of, play, require_hints
 from ptmtools.walkthrough.network import Conditions, Link
-from ptmtools.walkthrough.policies import POLICIES
+from ptmtools.walkthrough.policies import POLICIES, Declared
 from ptmtools.walkthrough.policies.apo import ApoClient
 from ptmtools.walkthrough.relief.kernels import descend, lamp, stop_of
 from ptmtools.walkthrough.relief.light import AMBIENT, lamps, lit
 from ptmtools.walkthrough.relief.octrees import Octrees, no_octrees, read_octrees
+from ptmtools.walkthrough.relief.stock import without_octrees
 from ptmtools.walkthrough.request import Request
 from ptmtools.walkthrough.served import Served, read_served
 from ptmtools.walkthrough.simulation import Run, simulate
@@ -37,7 +38,7 @@ from ptmtools.walkthrough.world import World, prepare, relief_of
 from tests.apo.building import Node, nodes, octree_of
 from tests.apo.statues import STATUES, write_rooms
 from tests.walkthrough.conftest import Ptm
-from tests.walkthrough.worlds import SEEDS
+from tests.walkthrough.worlds import SEEDS, catalogue, raw
 
 APO, OURS, BEST = (POLICIES[name] for name in ("apo", "best+apo", "best"))
 
@@ -357,6 +358,50 @@ def prepare_views(world: World) -> World:
     )  # fmt: skip
     view = np.zeros(len(world.view), np.int64)
     return replace(world, views=views, view=view, beside={}).standing(20)
+
+
+@pytest.mark.parametrize("levels", [1, 3, 12])
+def test_as_many_columns_as_the_tables_have(levels: int) -> None:
+    """Whatever is deeper, a texture or an octree; policies go through all of them."""
+    stock = catalogue([raw(16)], [(0, 0)])
+    octrees = no_octrees_of(levels)
+    found = without_octrees(stock, octrees)
+    assert found.ends.shape == (3, 1 + max(5, levels))
+    assert (found.ends[1:] == 0).all()
+    assert (found.levels == [5, 0, 0]).all()
+    assert found.whole == stock.whole
+
+
+def no_octrees_of(levels: int) -> Octrees:
+    """One that nothing has."""
+    return Octrees(
+        np.zeros((1, 4), np.uint8), np.array([0, 1]), np.array([levels]), np.zeros((1, 3)),
+        np.ones(1), np.zeros(0, np.int32),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("form", ["ptm", "octree"])
+def test_columns_are_those_of_the_tables(world: World, form: str) -> None:
+    own = world.in_form(form)
+    shape = len(world.pyramids.levels) + 3, own.views.need.shape[1] + 1
+    assert own.catalogue.ends.shape == own.catalogue.differences.shape == shape
+
+
+@pytest.mark.parametrize("policy", [p for p in POLICIES.values() if p.needs is None])
+def test_all_policies_walk_through_lit_rooms(world: World, policy: Declared) -> None:
+    if policy.form not in ("ptm", "octree"):
+        return
+    run = simulate(world, policy, Conditions(1e6), 1 << 16)
+    assert np.isfinite(run.error).all()
+    assert run.overruns == 0
+
+
+def test_a_database_whose_objects_have_none(made: Path) -> None:
+    """As one of before nodes said which octree is theirs."""
+    served = read_served(made / "light.db")
+    none = replace(served.surfaces, octree=np.full(len(served.surfaces.cell), -1, np.int32))
+    with pytest.raises(DatabaseError, match=r"no object in the GLBs.*PTM-D006"):
+        read_octrees(replace(served, surfaces=none))
 
 
 def test_memory_as_the_paper_counts(world: World) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
+from ptmtools.database.names import HINTS
 from ptmtools.errors import DatabaseError, InputError
 from ptmtools.walkthrough.memory import Columns, aligned
 from ptmtools.walkthrough.served import BUILD, Served, Surfaces
@@ -49,6 +50,13 @@ def read_octrees(served: Served) -> Octrees:
     says.
     """
     rows = _rows(served)
+    if rows and (served.surfaces.octree < 0).all():
+        raise DatabaseError(
+            "PTM-D006",
+            "lists octree textures, and no object in the GLBs has one",
+            file=served.folder / HINTS,
+            remedy=BUILD,
+        )
     texel = [_texels(served, row) for row in rows]
     count = len(rows)
     return Octrees(

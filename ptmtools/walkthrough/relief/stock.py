@@ -6,7 +6,7 @@ import numpy as np
 
 from ptmtools.arrays import Floats
 from ptmtools.walkthrough.catalogue import LEAST, Catalogue, Shapes
-from ptmtools.walkthrough.memory import Columns, aligned
+from ptmtools.walkthrough.memory import Columns
 from ptmtools.walkthrough.relief.octrees import Octrees, octree_columns
 from ptmtools.walkthrough.served import Served
 
@@ -17,20 +17,27 @@ _BRIGHT = 255 * 0.7
 
 
 def without_octrees(stock: Catalogue, octrees: Octrees) -> Catalogue:
-    """What a client knows that draws none: nothing can be fetched of them."""
-    count = octrees.number + 1
-    nothing = aligned([((), (), np.zeros((0, 2)))] * count)
-    return stock.beside(nothing, np.zeros((count, 1)))
+    """What a client knows that draws none: nothing can be fetched of them.
+
+    There are as many columns as the tables of the walk have.
+    """
+    return _none(stock, octrees.number + 1, octrees)
 
 
 def with_octrees(stock: Catalogue, served: Served, octrees: Octrees) -> Catalogue:
     """What a client knows that draws octrees; ``stock`` is of the textures alone."""
     columns = octree_columns(served)
+    found = stock.beside(columns, differences(served, octrees, columns), _shapes(served, octrees))
     # Behind them what nothing mends, see the package.
-    last = aligned([((), (), np.zeros((0, 2)))])
-    return stock.beside(
-        columns, differences(served, octrees, columns), _shapes(served, octrees)
-    ).beside(last, np.zeros((1, 1)))
+    return _none(found, 1, octrees)
+
+
+def _none(stock: Catalogue, count: int, octrees: Octrees) -> Catalogue:
+    """With so many textures more of which nothing can be fetched."""
+    wide = 1 + int(octrees.levels.max(initial=1))
+    last, table = np.zeros(count, np.int64), np.zeros((count, wide), np.int64)
+    nothing = Columns(last, table, table, np.zeros((count, wide, 2), np.int64))
+    return stock.beside(nothing, np.zeros((count, wide)))
 
 
 def differences(served: Served, octrees: Octrees, columns: Columns) -> Floats:
