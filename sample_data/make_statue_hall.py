@@ -24,8 +24,9 @@ from museum_parts.obj import obj_text
 HEAD = "# ptmtools sample hall of statues"
 #: Texels of a side of all images.
 SIDE = 1024
-#: Metres: a statue's height, from the middle of one to that of the next, and to the walls.
-HEIGHT, APART, ENDS = 2.0, 2.6, 3.0
+#: Metres: a statue's height and width at most, from the middle of one to that of the next, and to
+#: the walls.
+HEIGHT, WIDTH, APART, ENDS = 2.0, 2.0, 2.6, 3.0
 STONE = (0.85, 0.83, 0.78)
 
 
@@ -54,7 +55,8 @@ def statue_rows(options: HallOptions, length: float, first: int) -> list[str]:
         low, high = made.points.min(axis=0), made.points.max(axis=0)
         foot = (low + high) / 2 * [1, 0, 1] + low * [0, 1, 0]
         at = [ENDS + k * gap if options.statues > 1 else length / 2, 0.0, length * DEEP / 2]
-        points = (made.points - foot) * (HEIGHT / (high[1] - low[1])) + at
+        wide, tall, deep = (high - low).tolist()
+        points = (made.points - foot) * min(HEIGHT / tall, WIDTH / max(wide, deep)) + at
         rows += [f"o statue_{k + 1:02d}_{name}", "usemtl stone"]
         rows += [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points.tolist()]
         rows += [f"f {a} {b} {c}" for a, b, c in (made.triangles + first + 1).tolist()]

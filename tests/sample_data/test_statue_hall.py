@@ -1,0 +1,68 @@
+"""The hall of statues: they stand apart on its floor, between pictures on its walls."""
+
+from __future__ import annotations
+
+import sys
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from tests.sample_data.conftest import SAMPLE_DATA
+
+sys.path.append(str(SAMPLE_DATA))
+from make_photo_gallery import DEEP, HIGH
+from make_statue_hall import APART, HEIGHT, HallOptions, main, make_hall, statue_rows
+
+SMALL = HallOptions(statues=5, triangles=1500, images=2)
+
+
+def statues(rows: list[str], first: int = 0) -> dict[str, np.ndarray]:
+    """Points of each statue; every face has three points of its own statue."""
+    found: dict[str, list[list[float]]] = {}
+    faces: list[int] = []
+    name = ""
+    for row in rows:
+        word, *rest = row.split()
+        if word == "o":
+            name = rest[0]
+            found[name] = []
+        elif word == "v":
+            found[name].append([float(v) for v in rest])
+        elif word == "f":
+            faces += [int(v) for v in rest]
+    count = first + sum(map(len, found.values()))
+    assert first < min(faces)
+    assert max(faces) == count
+    return {name: np.array(points) for name, points in found.items()}
+
+
+def test_they_stand_apart_on_the_floor() -> None:
+    length = 20.0
+    found = statues(statue_rows(SMALL, length, 7), 7)
+    assert len(found) == 5
+    boxes = [(p.min(axis=0), p.max(axis=0)) for p in found.values()]
+    for low, high in boxes:
+        assert low[1] == pytest.approx(0, abs=1e-6)
+        assert 0.5 < high[1] <= HEIGHT + 1e-3
+        assert (low >= 0).all()
+        assert (high <= [length, HIGH, length * DEEP]).all()
+    for (_, before), (after, _) in pairwise(boxes):
+        assert before[0] < after[0]
+
+
+def test_the_same_again_and_another_seed() -> None:
+    files, again = dict(make_hall(SMALL)), dict(make_hall(SMALL))
+    other = dict(make_hall(HallOptions(statues=5, triangles=1500, images=2, seed=2)))
+    assert list(files)[-2:] == ["statue_hall.mtl", "statue_hall.obj"]
+    model = files["statue_hall.obj"]()
+    assert model == again["statue_hall.obj"]() != other["statue_hall.obj"]()
+    # A hall for so many, though two pictures need less.
+    xs = [float(line.split()[1]) for line in model.decode().splitlines() if line.startswith("v ")]
+    assert max(xs) >= 4 * APART
+
+
+def test_numbers_out_of_range(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["-o", str(tmp_path), "--statues", "0"])
+    assert "1 to 100" in capsys.readouterr().err
