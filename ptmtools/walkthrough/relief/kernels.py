@@ -55,6 +55,8 @@ def stop_of(sight: Sight, i: int, triangles: Triangles, depth: float, side: floa
     f = sight.triangle[i]
     ray, normal = sight.ray[i], triangles.normal[f]
     facing = normal[0] * ray[0] + normal[1] * ray[1] + normal[2] * ray[2]
+    if facing == 0.0:
+        return 0
     least = np.inf
     for k in range(2):
         axis = sight.axes[k]
