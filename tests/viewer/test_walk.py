@@ -17,6 +17,7 @@ from tests.web import node
 
 HERE = Path(__file__).resolve().parent
 RADIUS, EYE, STEP = 0.25, 1.6, 0.5
+BERTH = 0.31
 Quad = list[list[float]]
 AHEAD = {"forward": 1}
 RUN = {"forward": 1, "run": True}
@@ -88,8 +89,18 @@ def test_a_long_pause_is_no_leap(tmp_path: Path) -> None:
     assert -path[-1][2] < 1
 
 
-PLAN = st.tuples(*[st.floats(-3, 3)] * 4).filter(
-    lambda line: math.dist(line[:2], line[2:]) > 0.05 and off(np.zeros((1, 3)), line)[0] > 0.3
+def plan(distance: float, angle: float, start: float, length: float) -> tuple[float, ...]:
+    """A wall on a line so far from the visitor's place; on a near one, not where that place is."""
+    if distance < BERTH:
+        start = abs(start) + math.sqrt(BERTH**2 - distance**2)
+    outward = np.array([math.cos(angle), math.sin(angle)])
+    along = np.array([-outward[1], outward[0]])
+    ends = [distance * outward + way * along for way in (start, start + length)]
+    return tuple(float(value) for value in np.concatenate(ends))
+
+
+PLAN = st.builds(
+    plan, st.floats(0, 3), st.floats(-math.pi, math.pi), st.floats(-3, 3), st.floats(0.06, 5)
 )
 MOVES = st.tuples(
     st.sampled_from([0.002, 1 / 144, 1 / 60, 1 / 20, 0.25, 5]),
