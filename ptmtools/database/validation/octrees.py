@@ -47,9 +47,16 @@ def check_octrees(hints: ReadHints, database: ServedDatabase) -> None:
         if file:
             head = database.head(file, row["ends"][-1] + 1)
             octree = _read(row, head, database.at(file))
+            inside = [np.zeros((0, 3))]
             for path, shape in shown[i] if shown else ():
-                if wrong := _misfit(row, octree, shape):
+                q = _place(row, shape)
+                if wrong := _misfit(row, q, shape):
                     database.at(path, shape.place).add("PTM-D865", wrong)
+                else:
+                    inside.append(q)
+            if octree is not None and (bare := _bare(octree, np.concatenate(inside))) > _BARE:
+                wrong = f"{bare:.0%} of the points of {row['object']!r} have no texel in it"
+                database.at(HINTS, f"octrees[{i}]").add("PTM-D865", wrong)
 
 
 def _shown(database: ServedDatabase, count: int) -> list[Shown] | None:
@@ -105,20 +112,28 @@ def _read(row: Mapping[str, Any], data: bytes, at: Place) -> Octree | None:
     return octree
 
 
-def _misfit(row: Mapping[str, Any], octree: Octree | None, shape: ReadPrimitive) -> str:
-    """In what a shape is not of a row's object; empty if it is."""
-    from ptmtools.apo.traversal import plain_look_up
-
-    if shape.object != row["object"]:
-        return f"is of {shape.object!r}, its octree texture of {row['object']!r}"
+def _place(row: Mapping[str, Any], shape: ReadPrimitive) -> Floats:
+    """(n, 3) the corners and middles of a shape's triangles in a row's cube, 0 to 1."""
     corner = shape.point.astype(np.float64)[shape.triangle]
     points: Floats = np.concatenate([corner.reshape(-1, 3), corner.mean(axis=1)])
-    q = (points - row["cube"]["low"]) / row["cube"]["side"]
+    q: Floats = (points - row["cube"]["low"]) / row["cube"]["side"]
+    return q
+
+
+def _misfit(row: Mapping[str, Any], q: Floats, shape: ReadPrimitive) -> str:
+    """In what a shape, at ``q`` in the cube, is not of a row's object; empty if it is."""
+    if shape.object != row["object"]:
+        return f"is of {shape.object!r}, its octree texture of {row['object']!r}"
     if (abs(q - 0.5) > 0.5 + _OUTSIDE).any():
         return "leaves the cube of its octree texture"
-    if octree is not None:
-        # Where the walk ends in a node with children, there is none at the point.
-        bare = (octree.texels[plain_look_up(octree, q).address, 3] > 0).mean()
-        if bare > _BARE:
-            return f"is not what its octree texture is of: {bare:.0%} of its points have no texel"
     return ""
+
+
+def _bare(octree: Octree, q: Floats) -> float:
+    """The share of points of an object, all its shapes together, where the octree has none."""
+    from ptmtools.apo.traversal import plain_look_up
+
+    if not len(q):
+        return 0.0
+    # There the walk ends in a node with children.
+    return float((octree.texels[plain_look_up(octree, q).address, 3] > 0).mean())
