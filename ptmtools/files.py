@@ -151,6 +151,22 @@ def open_regular(path: str | os.PathLike[str]) -> BufferedReader:
     return os.fdopen(descriptor, "rb")  # which closes it, whatever happens
 
 
+def open_below(root: str | os.PathLike[str], name: str) -> BufferedReader:
+    """The file ``name`` (with slashes) of a folder that may come from a stranger, opened as by
+    `open_regular`, and reached through no link, which might lead anywhere.
+
+    ``root`` may be a link: whoever named it chose it. Raises OSError, ELOOP, for a link below it;
+    ValueError.
+    """
+    here = Path(root)
+    for step in name.split("/"):
+        here /= step
+        if here.is_symlink():
+            what = "a symbolic link, which is not followed"
+            raise OSError(errno.ELOOP, what, os.fspath(here))
+    return open_regular(here)
+
+
 def real_folder(root: Path, relative: str = "", *, make: bool = True) -> Path:
     """The folder ``relative`` (with slashes) below ``root``, reached through no link.
 

@@ -12,7 +12,7 @@ from typing import IO
 import pytest
 
 from ptmtools.errors import OutputError
-from ptmtools.files import open_regular, real_file, real_folder, write_bytes, write_with
+from ptmtools.files import open_below, open_regular, real_file, real_folder, write_bytes, write_with
 
 KILLED = """
 import os, signal, sys
@@ -209,3 +209,21 @@ def test_only_files_are_opened(tmp_path: Path) -> None:
         open_regular(tmp_path)
     with pytest.raises(FileNotFoundError):
         open_regular(tmp_path / "b")
+
+
+def test_links_below_a_folder_are_not_followed(tmp_path: Path) -> None:
+    """However they are reached; but the folder itself may be one."""
+    folder, other = tmp_path / "db", tmp_path / "other"
+    (folder / "meshes").mkdir(parents=True)
+    (other / "meshes").mkdir(parents=True)
+    for root in (folder, other):
+        (root / "meshes" / "a").write_bytes(root.name.encode())
+    (folder / "b").symlink_to(other / "meshes" / "a")
+    (folder / "there").symlink_to(other / "meshes")
+    (tmp_path / "link").symlink_to(folder)
+    for root in (folder, tmp_path / "link"):
+        with open_below(root, "meshes/a") as file:
+            assert file.read() == b"db"
+        for name in ("b", "there/a"):
+            with pytest.raises(OSError, match="not followed"):
+                open_below(root, name)

@@ -12,9 +12,10 @@ import numpy as np
 
 from ptmtools.apo.files import COLORS, INDEX, MESH, NORMALS, OBJ
 from ptmtools.apo.mesh_files import mesh_of
-from ptmtools.apo.reading import Index, mesh_bytes, open_own, read_index, read_octree
+from ptmtools.apo.reading import Index, mesh_bytes, read_index, read_octree
 from ptmtools.apo.texels import fault_of
 from ptmtools.errors import InputError, PtmError
+from ptmtools.files import open_below
 from ptmtools.findings import Findings, Severity, ValidationReport
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Limits
@@ -64,7 +65,7 @@ def check_folder(folder: Path, limits: Limits) -> ValidationReport:
 def _size(folder: Path, name: str, found: Findings) -> int | None:
     """Bytes of a file, if it is one."""
     try:
-        with open_own(folder / name) as file:
+        with open_below(folder, name) as file:
             return os.fstat(file.fileno()).st_size
     except OSError as fault:
         found.add("PTM-D850", name, "", f"cannot be read ({fault.strerror or fault})")

@@ -6,12 +6,10 @@ and sizes are held against what addresses allow before memory is taken for them.
 
 from __future__ import annotations
 
-import errno
 import os
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +23,7 @@ from ptmtools.apo.mesh_files import mesh_of
 from ptmtools.apo.model import ADDRESS_BITS, Octree
 from ptmtools.arrays import Floats, Ints
 from ptmtools.errors import InputError, LimitError, naming
-from ptmtools.files import open_regular
+from ptmtools.files import open_below
 
 _AGAIN = "write it again with `ptm apo`"
 #: An index of 21 levels has 3 kB; more fields may be added.
@@ -90,7 +88,7 @@ def read_index(folder: str | os.PathLike[str]) -> Index:
             file=folder,
             remedy="name a folder that `ptm apo` wrote",
         )
-    data = _bytes_of(file, _INDEX_MOST)
+    data = _bytes_of(folder, INDEX, _INDEX_MOST)
     with naming(file):
         return _index(data)
 
@@ -177,9 +175,8 @@ def read_octree(folder: str | os.PathLike[str], levels: int | None = None) -> Oc
 def _texels(
     folder: str | os.PathLike[str], index: Index, stream: Stream, levels: int
 ) -> NDArray[np.uint8]:
-    file = Path(folder) / stream.file
-    data = _bytes_of(file, stream.ends[levels - 1], whole=False)
-    with naming(file):
+    data = _bytes_of(folder, stream.file, stream.ends[levels - 1], whole=False)
+    with naming(Path(folder) / stream.file):
         return inflated(data, index.start[: levels + 1], stream)
 
 
@@ -214,20 +211,14 @@ def read_mesh(folder: str | os.PathLike[str]) -> Simple:
 
 def mesh_bytes(folder: str | os.PathLike[str]) -> bytes:
     """The mesh's file. Raises InputError PTM-I844, LimitError PTM-L841."""
-    return _bytes_of(Path(folder) / MESH, _MESH_MOST)
+    return _bytes_of(folder, MESH, _MESH_MOST)
 
 
-def open_own(file: Path) -> BufferedReader:
-    """A file of a folder, opened for reading, if it is one and no link. Raises OSError."""
-    if file.is_symlink():
-        raise OSError(errno.ELOOP, "is a symbolic link")
-    return open_regular(file)
-
-
-def _bytes_of(file: Path, most: int, *, whole: bool = True) -> bytes:
+def _bytes_of(folder: str | os.PathLike[str], name: str, most: int, *, whole: bool = True) -> bytes:
     """A file, or with ``whole`` False its first ``most`` bytes."""
+    file = Path(folder) / name
     try:
-        with open_own(file) as stream:
+        with open_below(folder, name) as stream:
             data = stream.read(most + whole)
     except OSError as fault:
         raise InputError(

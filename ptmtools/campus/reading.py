@@ -8,7 +8,7 @@ from pathlib import Path
 from ptmtools import schemas
 from ptmtools.campus.model import INDEX, Campus
 from ptmtools.errors import InputError, LimitError
-from ptmtools.files import open_regular
+from ptmtools.files import open_below
 
 #: An index longer than this is none, bytes.
 LONGEST = 1 << 28
@@ -24,7 +24,7 @@ def read_campus(folder: str | os.PathLike[str]) -> Campus:
     """
     file = Path(folder) / INDEX
     try:
-        with open_regular(file) as stream:
+        with open_below(folder, INDEX) as stream:
             data = stream.read(LONGEST + 1)
     except (OSError, ValueError) as fault:
         why = getattr(fault, "strerror", None) or str(fault)

@@ -8,7 +8,6 @@ size recorded; sizes are held against the limit before memory is taken for them.
 from __future__ import annotations
 
 import os
-import stat
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,7 +17,7 @@ import numpy as np
 
 from ptmtools import schemas
 from ptmtools.errors import InputError, LimitError, PtmError, naming
-from ptmtools.files import open_regular
+from ptmtools.files import open_below
 from ptmtools.interlace.containers import CONTAINERS, Texels
 from ptmtools.interlace.model import INDEX, Interlaced, Part, sizes_of
 from ptmtools.interlace.steps import join
@@ -51,7 +50,7 @@ def read_manifest(folder: str | os.PathLike[str]) -> Interlaced:
             file=folder,
             remedy="name a folder that `ptm interlace` wrote",
         )
-    data = _bytes_of(file, _MANIFEST_MOST, "PTM-L822", "a manifest")
+    data = _bytes_of(Path(folder), INDEX, _MANIFEST_MOST, "PTM-L822", "a manifest")
     with naming(file):
         interlaced = Interlaced.of(_document(data))
         _check_chain(interlaced)
@@ -169,16 +168,18 @@ def read_part(folder: Path, interlaced: Interlaced, part: Part) -> Texels:
 def part_bytes(folder: Path, interlaced: Interlaced, part: Part) -> bytes:
     """The bytes of a file, which are those recorded; raises as `read_part`."""
     texels = part.width * part.height * interlaced.texel_bytes
-    file = folder / part.name
     most = _BYTES * texels + _BYTES_BESIDES
-    data = _bytes_of(file, most, "PTM-L823", f"{part.width} x {part.height} texels")
+    what = f"{part.width} x {part.height} texels"
+    data = _bytes_of(folder, part.name, most, "PTM-L823", what)
     wrong = None
     if len(data) != part.bytes:
         wrong = f"has {len(data)} bytes instead of {part.bytes}"
     elif zlib.crc32(data) != part.crc32:
         wrong = "has another checksum than recorded"
     if wrong:
-        raise InputError("PTM-I825", wrong, file=file, remedy=f"download it again, or {_AGAIN}")
+        raise InputError(
+            "PTM-I825", wrong, file=folder / part.name, remedy=f"download it again, or {_AGAIN}"
+        )
     return data
 
 
@@ -210,12 +211,11 @@ def part_texels(file: Path, data: bytes, interlaced: Interlaced, part: Part) -> 
         ) from None
 
 
-def _bytes_of(file: Path, most: int, code: str, what: str) -> bytes:
+def _bytes_of(folder: Path, name: str, most: int, code: str, what: str) -> bytes:
     """The bytes of a regular file; raises InputError PTM-I824, LimitError with that code."""
+    file = folder / name
     try:
-        if stat.S_ISLNK(os.lstat(file).st_mode):
-            raise OSError(0, "a symbolic link, which is not followed")
-        with open_regular(file) as stream:
+        with open_below(folder, name) as stream:
             length = os.fstat(stream.fileno()).st_size
             if length > most:
                 raise LimitError(

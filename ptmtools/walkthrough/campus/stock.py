@@ -22,9 +22,9 @@ from ptmtools import schemas
 from ptmtools.arrays import Floats, Ints
 from ptmtools.campus.model import CHANNELS, INDEX, LIGHT, PRESETS, SIZES, Campus, Quality
 from ptmtools.campus.names import texture_file
-from ptmtools.campus.reading import read_campus
+from ptmtools.campus.reading import LONGEST, read_campus
 from ptmtools.errors import InputError
-from ptmtools.files import open_regular
+from ptmtools.files import open_below
 from ptmtools.glb import glb_chunks
 from ptmtools.walkthrough.served import on_link
 
@@ -115,7 +115,7 @@ def read_stock(folder: str | os.PathLike[str], only: str = "*") -> Stock:
     if not kept:
         raise refused(folder / INDEX, f"has no object {only}", "give names that it has")
     campus = replace(campus, objects=kept)
-    index = _bytes(folder, INDEX)
+    index = _bytes(folder, INDEX, LONGEST)
     rows = [(on_link(index), len(index), 0, 0)]
     sizes = {texture.file: texture.size for texture in campus.textures}
     files = campus.files()
@@ -148,16 +148,17 @@ def file_bytes(folder: Path, name: str, listed: tuple[int, int] | None = None) -
 
     Raises InputError PTM-I714.
     """
-    data = _bytes(folder, name)
+    data = _bytes(folder, name, LONGEST if listed is None else listed[0])
     if listed is not None and (len(data), zlib.crc32(data)) != listed:
         raise refused(folder / name, "is not the file that the index of the campus lists")
     return data
 
 
-def _bytes(folder: Path, name: str) -> bytes:
+def _bytes(folder: Path, name: str, most: int) -> bytes:
+    """The bytes of a file, of which not many more than ``most`` are read."""
     try:
-        with open_regular(folder / name) as stream:
-            return stream.read()
+        with open_below(folder, name) as stream:
+            return stream.read(most + 1)
     except OSError as fault:
         raise refused(folder / name, f"cannot be read ({fault.strerror or fault})") from None
 
