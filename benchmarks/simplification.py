@@ -1,7 +1,8 @@
 """What simplification costs, and how near it comes: `python benchmarks/simplification.py`
 
 Made statues (a sphere blown up from a cube, with seeded waves and folds; ``--shape squashed`` to
-make it flat and long, ``--shape column`` for the sample column, which has thousands of handles)
+make it flat and long, ``column`` for the sample column, which has thousands of handles, ``holed``
+for a twentieth of the faces missing, ``littered`` for thousands of small parts around it)
 become 10,000 faces, by our collapses (``quadric``), by fast-simplification (``fast``) and by
 pymeshlab (``meshlab``), each in a process of its own; one that is not installed is left out. Times
 are the processor's, the least of some runs, without compiling; memory is the peak beyond what the
@@ -39,6 +40,8 @@ from ptmtools.arrays import Floats  # noqa: E402
 from ptmtools.simplification import Mesh, SimplifyOptions, simplify  # noqa: E402
 
 SAMPLES = 200_000
+#: Parts beside the littered statue.
+CHIPS = 10_000
 
 
 def grid(n: int) -> Any:
@@ -54,6 +57,18 @@ def column(faces: int) -> Mesh:
 
     made = make_statue("column", StatueOptions(faces))
     return Mesh(made.points.astype(np.float64), made.triangles.astype(np.int32))
+
+
+def littered(points: Floats, faces: Any, rng: np.random.Generator) -> tuple[Floats, Any]:
+    """With cubes of a 500th of the size strewn about, of 12 faces each."""
+    cube = np.array(list(np.ndindex(2, 2, 2))) * 0.004
+    square = [[0, 1, 3], [0, 3, 2], [4, 7, 5], [4, 6, 7], [0, 5, 1], [0, 4, 5]]
+    square += [[2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+    away = rng.normal(size=(CHIPS, 3))
+    away *= 1.6 / np.linalg.norm(away, axis=1, keepdims=True)
+    chips = (away[:, None] + cube).reshape(-1, 3)
+    more = np.array(square) + 8 * np.arange(CHIPS)[:, None, None] + len(points)
+    return np.concatenate([points, chips]), np.concatenate([faces, more.reshape(-1, 3)])
 
 
 def statue(faces: int, shape: str, painted: bool = False, seed: int = 1) -> Mesh:
@@ -86,6 +101,10 @@ def statue(faces: int, shape: str, painted: bool = False, seed: int = 1) -> Mesh
     made = unit * (1 + 0.12 * height)[:, None]
     if shape == "squashed":
         made *= [1.0, 0.3, 2.0]
+    if shape == "holed":
+        faces_of = faces_of[rng.random(len(faces_of)) >= 0.05]
+    if shape == "littered":
+        made, faces_of = littered(made, faces_of, rng)
     # Six charts side by side, each as its side of the cube.
     chart = np.stack([u, v], axis=1) / 2 + 0.5
     uv = np.concatenate([chart[grid(n)] + [2.0 * side, 0.0] for side in range(6)])
@@ -113,6 +132,7 @@ def by_meshlab(mesh: Mesh, faces: int) -> tuple[Floats, Any]:
     return found.vertex_matrix(), found.face_matrix()
 
 
+SHAPES = ("round", "squashed", "column", "holed", "littered")
 METHODS: dict[str, tuple[Callable[[Mesh, int], tuple[Floats, Any]], str]] = {
     "quadric": (by_quadric, "numba"),
     "fast": (by_fast, "fast_simplification"),
@@ -249,7 +269,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--faces", type=int, nargs="+", default=[100_000, 1_000_000])
     parser.add_argument("--to", type=int, default=10_000)
-    parser.add_argument("--shape", choices=["round", "squashed", "column"], default="round")
+    parser.add_argument("--shape", choices=SHAPES, default="round")
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS))
     parser.add_argument("--runs", type=int, default=2)
     parser.add_argument("--painted", action="store_true", help="what textures cost")

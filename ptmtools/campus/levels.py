@@ -55,7 +55,7 @@ def levels(mesh: Mesh, lods: int, ratio: float, least: int, error: float) -> lis
         if faces == whole:
             found.append(_level(mesh, np.arange(whole, dtype=np.int32), 0.0))
             continue
-        less = simplify(mesh, SimplifyOptions(faces=faces, error=bound))
+        less = simplify(mesh, SimplifyOptions(faces=faces, error=bound, keep_parts=True))
         found.append(_level(less.mesh, less.source, less.error))
     return found
 

@@ -32,12 +32,13 @@ from ptmtools.simplification.quadric_kernels import (
     wedge_value_at,
 )
 from ptmtools.simplification.state_kernels import (
-    CLOSING,
     ENTRIES,
     FACES,
+    KEEP,
     MADE,
     MARKS,
     REFUSED,
+    TOPOLOGY,
     State,
     meet,
     prune,
@@ -240,7 +241,7 @@ def collapse(state: State, u: int, v: int, count: int, px: float, py: float, pz:
     state.beyond[state.tail[v]] = state.head[u]
     state.tail[v] = state.tail[u]
     prune(state, v)
-    if state.number[CLOSING]:
+    if state.number[TOPOLOGY] != KEEP:
         cancel(state, v)
         prune(state, v)
     state.head[u] = state.tail[u] = -1
@@ -296,8 +297,8 @@ def collapse_edges(state: State, heap: Heap, faces: int) -> None:
         prune(state, u)
         prune(state, v)
         count = meet(state, u, v)
-        closing = number[CLOSING] == 1
-        fits = may_close(state, u, v, count) if closing else is_linked(state, u, v, count)
+        keep = number[TOPOLOGY] == KEEP
+        fits = is_linked(state, u, v, count) if keep else may_close(state, u, v, count)
         if count < 1 or not fits:
             number[REFUSED] += 1
             continue

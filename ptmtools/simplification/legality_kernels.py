@@ -9,7 +9,7 @@ goes has no counterpart at the one that stays.
 from __future__ import annotations
 
 from ptmtools.compiled import plain_kernel as kernel
-from ptmtools.simplification.state_kernels import MARKS, State
+from ptmtools.simplification.state_kernels import DROP, FACES, MARKS, TOPOLOGY, State
 from ptmtools.tolerance import FILE_SHARE
 
 #: A face is a line if its height is less than this share of its longest side.
@@ -69,13 +69,37 @@ def is_linked(state: State, u: int, v: int, count: int) -> bool:
 
 
 @kernel
+def faces_at(state: State, v: int) -> int:
+    """How many faces a vertex has."""
+    found, corner = 0, state.head[v]
+    while corner >= 0:
+        found += state.triangle[corner // 3, 0] >= 0
+        corner = state.beyond[corner]
+    return found
+
+
+@kernel
+def is_alone(state: State, u: int, v: int, count: int) -> bool:
+    """Whether the face at an edge is the only one of all its vertices."""
+    if count != 1 or faces_at(state, u) > 1 or faces_at(state, v) > 1:
+        return False
+    return faces_at(state, state.shared[0, 2]) == 1
+
+
+@kernel
 def may_close(state: State, u: int, v: int, count: int) -> bool:
     """The same where handles may be closed: what joins the ends besides their faces becomes edges
     of four faces, and faces that fall onto each other back to back are gone (`cancel`).
 
-    No line of kept edges may fall onto anything, and no face onto one that looks the same way.
+    No line of kept edges may fall onto anything, and no face onto one that looks the same way. A
+    face by itself may vanish where parts with a border may.
     """
     triangle, kept, mark, shared = state.triangle, state.kept, state.mark, state.shared
+    if faces_at(state, u) + faces_at(state, v) - count >= state.number[FACES]:
+        # Nothing might be left.
+        return is_linked(state, u, v, count)
+    if state.number[TOPOLOGY] == DROP and is_alone(state, u, v, count):
+        return True
     for i in range(count):
         if shared[i, 4] and shared[i, 5]:
             return False

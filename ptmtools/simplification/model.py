@@ -50,11 +50,14 @@ class SimplifyOptions:
     error: make no collapse with a greater error (`Simplified.error`), in the unit of the points,
         even if more faces are left; for `quadric` alone.
     method: what makes them fewer.
+    keep_parts: fill no hole, and let no part with a border vanish, however many there are: of a
+        building, through whose windows one sees. For `quadric` alone; pymeshlab keeps nothing.
     """
 
     faces: int = 10_000
     error: float = inf
     method: Method = "quadric"
+    keep_parts: bool = False
 
     def __post_init__(self) -> None:
         if self.faces < 1:
@@ -83,11 +86,12 @@ class Simplified:
     notes: tuple[str, ...] = ()
 
 
-def too_many(left: int, faces: int) -> tuple[str, ...]:
-    """The note for a mesh that has more faces than it should."""
+def too_many(left: int, faces: int, turned: int = 0) -> tuple[str, ...]:
+    """The note for a mesh that has more faces than it should, of which so many edges join two faces
+    that disagree on their front."""
     if left <= faces:
         return ()
-    return (
-        f"{left:,} faces are left, not {faces:,}: borders, seams, small parts or the greatest "
-        "error do not allow it",
-    )
+    why = "borders, seams, small parts or the greatest error do not allow it"
+    if turned:
+        why += f"; {turned:,} edges join faces that do not look the same way"
+    return (f"{left:,} faces are left, not {faces:,}: {why}",)

@@ -21,34 +21,37 @@ beside ours:
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import inf
 
 import numpy as np
 
 from ptmtools.progress import Progress, silent
 from ptmtools.simplification.collapse_kernels import collapse_edges, fill
-from ptmtools.simplification.handles import PER_HANDLE, handles
 from ptmtools.simplification.heap_kernels import Heap
+from ptmtools.simplification.holes import filled
 from ptmtools.simplification.legality_kernels import CAREFUL, CARELESS
 from ptmtools.simplification.meshlab import by_meshlab
 from ptmtools.simplification.model import Mesh, Simplified, SimplifyOptions, too_many
 from ptmtools.simplification.quadrics import attributes, vertex_quadrics, wedge_quadrics
 from ptmtools.simplification.state_kernels import (
-    CLOSING,
+    CLOSE,
+    DROP,
     ENTRIES,
     FACES,
+    KEEP,
     MADE,
     MOST_AT_EDGE,
+    TOPOLOGY,
     State,
     link_corners,
 )
-from ptmtools.simplification.surface import Surface, check, surface_of
+from ptmtools.simplification.surface import Surface, check, edges_of, surface_of
+from ptmtools.simplification.topology import HELD, PER_HANDLE, topology
 from ptmtools.tolerance import FILE_SHARE
 
 #: Progress is told after so many parts of the work.
 PARTS = 50
-#: Handles that hold a greater share of the faces that are to be left are closed.
-HELD = 0.1
 
 DEFAULTS = SimplifyOptions()
 
@@ -68,11 +71,33 @@ def simplify(
     surface = surface_of(mesh)
     if options.method == "meshlab":
         return by_meshlab(mesh, surface, options.faces)
+    mended = None if options.keep_parts else filled(mesh, surface, options.faces)
+    if mended is None:
+        return _simplified(mesh, surface, options, progress)
+    found = _simplified(mended.mesh, surface_of(mended.mesh), options, progress)
+    note = f"{mended.holes:,} small holes are filled: they would hold many of the faces"
+    source = mended.like[found.source].astype(np.int32)
+    return replace(found, source=source, notes=(note, *found.notes))
+
+
+def _simplified(
+    mesh: Mesh, surface: Surface, options: SimplifyOptions, progress: Progress
+) -> Simplified:
     state = _state(mesh, surface)
     state.worst[1] = _square(options.error / surface.scale)
-    state.number[CLOSING] = PER_HANDLE * handles(surface) > HELD * options.faces
+    there = topology(surface)
+    held = PER_HANDLE * there.handles if options.keep_parts else there.held
+    if held > HELD * options.faces:
+        state.number[TOPOLOGY] = CLOSE if options.keep_parts else DROP
     _collapse(state, options.faces, progress)
-    return _result(mesh, surface, state, options)
+    found = _result(mesh, surface, state, options)
+    if state.number[TOPOLOGY] == KEEP:
+        return found
+    left = topology(surface_of(found.mesh)).parts
+    if left >= there.parts:
+        return found
+    gone = f"{there.parts - left:,} of {there.parts:,} parts are gone"
+    return replace(found, notes=(f"{gone}: they would hold many of the faces", *found.notes))
 
 
 def _square(error: float) -> float:
@@ -147,5 +172,9 @@ def _result(mesh: Mesh, surface: Surface, state: State, options: SimplifyOptions
         None if mesh.uv is None else mesh.uv[face, side],
         None if mesh.colors is None else mesh.colors[face, side],
     )
-    notes = too_many(len(source), options.faces)
+    turned = 0
+    if len(source) > options.faces:
+        edges = edges_of(triangles.reshape(-1, 3), len(used))
+        turned = int((edges.faces == 2).sum()) - len(edges.pairs[0])
+    notes = too_many(len(source), options.faces, turned)
     return Simplified(left, source, float(np.sqrt(state.worst[0])) * surface.scale, notes)

@@ -18,8 +18,10 @@ from ptmtools.compiled import plain_kernel as kernel
 MOST_AT_EDGE = 64
 
 #: Where `State.number` counts faces, entries of the heap, marks given out, collapses made, and
-#: edges refused since all were tried; and whether collapses may close handles, 1 or 0.
-FACES, ENTRIES, MARKS, MADE, REFUSED, CLOSING = 0, 1, 2, 3, 4, 5
+#: edges refused since all were tried; and says what collapses may do to the topology.
+FACES, ENTRIES, MARKS, MADE, REFUSED, TOPOLOGY = 0, 1, 2, 3, 4, 5
+#: Nothing; close handles, and let closed parts vanish; let parts with a border vanish, too.
+KEEP, CLOSE, DROP = 0, 1, 2
 
 
 class State(NamedTuple):

@@ -146,11 +146,44 @@ def _layered(triangle: Ints, given: Ints) -> tuple[Ints, Ints]:
     return found.reshape(-1, 3), given[place % len(given)]
 
 
-def _seams(
-    mesh: Mesh, source: Indices, triangle: Indices, count: int
-) -> tuple[NDArray[np.uint8], Ints, Ints]:
-    """Which edges are kept, bit by bit; the first corner of each corner's wedge, (3 T,); and how
-    many kept edges end in each vertex."""
+@dataclass(frozen=True)
+class Edges:
+    """The edges of faces, which meet in some.
+
+    An edge of a face is 3 t + k, from the corner k of the face t to the next.
+
+    Attributes
+    ----------
+    order: (3 T,) the edges of faces, those that are the same edge of the mesh side by side.
+    start: (E,) where each edge of the mesh begins in it. faces: (E,) how many faces it has.
+    key: (E,) a number for each, ascending: of its vertices the lesser times V, and the other.
+    count: V. begin: (3 T,) the vertex at which an edge of a face begins.
+    """
+
+    order: Ints
+    start: Ints
+    faces: Ints
+    key: Ints
+    count: int
+    begin: Ints
+
+    @property
+    def ends(self) -> tuple[Ints, Ints]:
+        """The vertices of each edge of the mesh."""
+        one, two = np.divmod(self.key, max(self.count, 1))
+        return one, two
+
+    @property
+    def pairs(self) -> tuple[Ints, Ints]:
+        """The edges of faces of which each is that of two, which agree on their front."""
+        first = self.start[self.faces == 2]
+        one, two = self.order[first], self.order[first + 1]
+        agree = self.begin[one] != self.begin[two]
+        return one[agree], two[agree]
+
+
+def edges_of(triangle: NDArray[np.integer[Any]], count: int) -> Edges:
+    """Those of (T, 3) triangles of so many vertices."""
     begin = triangle.reshape(-1).astype(np.int64)
     end = np.roll(triangle, -1, axis=1).reshape(-1).astype(np.int64)
     edge = np.minimum(begin, end) * count + np.maximum(begin, end)
@@ -159,20 +192,25 @@ def _seams(
     first[1:] = np.diff(edge[order]) != 0
     start = np.flatnonzero(first)
     faces = np.diff(start, append=len(order))
-    one = order[start[faces == 2]]
-    two = order[start[faces == 2] + 1]
-    smooth = begin[one] != begin[two]
-    one, two = one[smooth], two[smooth]
+    return Edges(order, start, faces, edge[order[start]], count, begin)
+
+
+def _seams(
+    mesh: Mesh, source: Indices, triangle: Indices, count: int
+) -> tuple[NDArray[np.uint8], Ints, Ints]:
+    """Which edges are kept, bit by bit; the first corner of each corner's wedge, (3 T,); and how
+    many kept edges end in each vertex."""
+    edges = edges_of(triangle, count)
+    one, two = edges.pairs
     across = _continued(mesh, source, one, two)
     one, two = one[across], two[across]
 
-    open_ = np.ones(len(order), bool)
+    open_ = np.ones(triangle.size, bool)
     open_[one] = open_[two] = False
     kept = np.packbits(open_.reshape(-1, 3), axis=1, bitorder="little").reshape(-1)
-    lone = open_[order[start]]
-    ends = np.bincount(begin[order[start][lone]], minlength=count)
-    ends += np.bincount(end[order[start][lone]], minlength=count)
-    parent = np.arange(len(order))
+    lone = open_[edges.order[edges.start]]
+    ends = np.bincount(np.concatenate([end[lone] for end in edges.ends]), minlength=count)
+    parent = np.arange(triangle.size)
     unite(parent, one, following(two))
     unite(parent, following(one), two)
     return kept, flattened(parent), ends

@@ -55,7 +55,7 @@ def test_a_sphere_stays_a_sphere() -> None:
 
 @pytest.mark.parametrize(("mesh", "characteristic"), [(sphere(20), 2), (torus(60, 40), 0)])
 def test_closed_meshes_stay_closed(mesh: Mesh, characteristic: int) -> None:
-    for faces in (1000, 200, 1):
+    for faces in (1000, 200):
         found = to(faces, mesh)
         assert (edge_faces(found.mesh) == 2).all()
         assert euler(found.mesh) == characteristic
@@ -201,7 +201,8 @@ def test_many_parts() -> None:
     found = to(10_000, Mesh(points, triangles.astype(np.int32)))
     assert len(found.mesh.triangles) == 10_000
     assert (edge_faces(found.mesh) == 2).all()
-    least = to(1, Mesh(points, triangles.astype(np.int32)))
+    options = SimplifyOptions(1, keep_parts=True)
+    least = simplify(Mesh(points, triangles.astype(np.int32)), options)
     assert len(least.mesh.triangles) == 4 * 500
     assert least.notes
 
@@ -222,7 +223,8 @@ def test_no_collapse_has_a_greater_error_than_allowed() -> None:
 
 def test_lone_triangles_stay() -> None:
     corners = np.random.default_rng(3).uniform(size=(20, 3, 3))
-    found = to(1, Mesh(corners.reshape(-1, 3), np.arange(60, dtype=np.int32).reshape(-1, 3)))
+    given = Mesh(corners.reshape(-1, 3), np.arange(60, dtype=np.int32).reshape(-1, 3))
+    found = simplify(given, SimplifyOptions(1, keep_parts=True))
     assert sorted(map(bytes, found.mesh.points)) == sorted(map(bytes, corners.reshape(-1, 3)))
     assert len(found.mesh.triangles) == 20
 
@@ -349,4 +351,5 @@ def test_any_soup(seed: int, points: int, faces: int, target: int, painted: bool
     if found.mesh is not mesh:
         assert (left.triangles != np.roll(left.triangles, 1, axis=1)).all()
         assert len(np.unique(left.triangles)) == len(left.points)
-        assert bool(found.notes) == (len(left.triangles) > target)
+        many = any("faces are left" in note for note in found.notes)
+        assert many == (len(left.triangles) > target)

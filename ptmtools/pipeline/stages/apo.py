@@ -40,9 +40,9 @@ def _summary(n: Mapping[str, Any]) -> str:
 APO: Stage[Scene] = Stage(
     name="apo",
     about="Replace objects by simplified meshes with octree textures.",
-    recipe=2,
+    recipe=3,
     options=ReplaceOptions,
-    changed="meshes of many handles become as simple as others",
+    changed="meshes of many small holes, handles or parts become as simple as others",
     reads=_reads,
     changes=SCENE,
     artifact=Lazy("ptmtools.scene.model:Scene"),

@@ -10,9 +10,18 @@ from hypothesis import given, strategies as st
 from numpy.typing import NDArray
 
 from ptmtools.simplification import Mesh, SimplifyOptions, simplify
-from ptmtools.simplification.handles import handles
 from ptmtools.simplification.surface import surface_of
-from tests.simplification.shapes import box, cylinder, edge_faces, euler, normals, sphere, torus
+from ptmtools.simplification.topology import topology
+from tests.simplification.shapes import (
+    box,
+    cylinder,
+    edge_faces,
+    euler,
+    grid,
+    normals,
+    sphere,
+    torus,
+)
 
 
 def voxels(filled: NDArray[np.bool_]) -> Mesh:
@@ -55,19 +64,20 @@ def plate(holes: int, wide: int = 3, thick: int = 2) -> Mesh:
     ids=["sphere", "torus", "plate", "plate of 25", "cylinder without ends", "box"],
 )
 def test_how_many_there_are(mesh: Mesh, expected: int) -> None:
-    assert handles(surface_of(mesh)) == expected
+    assert topology(surface_of(mesh)).handles == expected
     two = Mesh(
         np.concatenate([mesh.points, mesh.points + 100]),
         np.concatenate([mesh.triangles, mesh.triangles + len(mesh.points)]),
     )
-    assert handles(surface_of(two)) == 2 * expected
+    assert topology(surface_of(two)).handles == 2 * expected
 
 
 def test_nobody_can_say_where_three_faces_meet() -> None:
     fan = np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]], dtype=np.int32)
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0]], dtype=np.float64)
-    assert handles(surface_of(Mesh(points, fan))) == 0
-    assert handles(surface_of(Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32)))) == 0
+    assert topology(surface_of(Mesh(points, fan))).handles == 0
+    nothing = Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32))
+    assert topology(surface_of(nothing)).held == 0
 
 
 def test_many_handles_are_closed_and_the_plate_stays() -> None:
@@ -127,3 +137,62 @@ def test_noise_stays_closed_and_is_the_same_again(seed: int, faces: int) -> None
     assert found.mesh.triangles.tobytes() == again.mesh.triangles.tobytes()
     assert (np.diff(np.sort(found.mesh.triangles, axis=1), axis=1) > 0).all()
     assert np.isfinite(found.mesh.points).all()
+
+
+def beside(body: Mesh, chip: Mesh, count: int) -> Mesh:
+    """A body with many chips around it, a hundredth as large."""
+    k = np.arange(count) + 0.5
+    z, angle = 1 - 2 * k / count, np.pi * (1 + 5**0.5) * k
+    across = np.sqrt(1 - z**2)
+    places = 1.5 * np.stack([across * np.cos(angle), across * np.sin(angle), z], axis=1)
+    points = (places[:, None] + 0.01 * chip.points).reshape(-1, 3)
+    step = len(chip.points) * np.arange(count)[:, None, None]
+    triangles = (chip.triangles + step).reshape(-1, 3) + len(body.points)
+    return Mesh(
+        np.concatenate([body.points, points]),
+        np.concatenate([body.triangles, triangles]).astype(np.int32),
+    )
+
+
+def sheet(steps: int) -> Mesh:
+    """A square of 2 steps² faces."""
+    x, y = (each.reshape(-1) for each in np.meshgrid(*[np.arange(steps + 1.0)] * 2))
+    return Mesh(np.stack([x, y, 0 * x], axis=1), grid(steps, steps))
+
+
+@pytest.mark.parametrize(
+    ("chip", "closed"),
+    [(sphere(2), True), (sheet(3), False)],
+    ids=["closed", "open"],
+)
+def test_many_parts_give_way_to_the_body(chip: Mesh, closed: bool) -> None:
+    """Two thousand chips hold more faces than there are to be: without them the body, whose faces
+    are dearest, would be a tetrahedron."""
+    given = beside(sphere(40), chip, 2000)
+    there = topology(surface_of(given))
+    assert (there.parts, there.closed) == (2001, 2001 if closed else 1)
+    found = simplify(given, SimplifyOptions(1000))
+    assert len(found.mesh.triangles) <= 1000
+    assert any("parts are gone" in note for note in found.notes)
+    far = np.linalg.norm(found.mesh.points[found.mesh.triangles].mean(axis=1), axis=1)
+    body = far < 1.2
+    assert body.sum() > 400
+    assert np.abs(far[body] - 1).max() < 0.05
+
+    kept = simplify(given, SimplifyOptions(1000, keep_parts=True))
+    assert topology(surface_of(kept.mesh)).parts == 2001
+
+
+def test_few_parts_stay() -> None:
+    given = beside(sphere(20), sphere(2), 5)
+    found = simplify(given, SimplifyOptions(1000))
+    assert topology(surface_of(found.mesh)).parts == 6
+    assert found.notes == ()
+
+
+@pytest.mark.parametrize("mesh", [sphere(10), torus(20, 12), plate(5)])
+def test_something_is_left(mesh: Mesh) -> None:
+    for faces in (1, 2, 4):
+        assert len(simplify(mesh, SimplifyOptions(faces)).mesh.triangles) > 0
+    two = beside(mesh, mesh, 3)
+    assert len(simplify(two, SimplifyOptions(1)).mesh.triangles) > 0
