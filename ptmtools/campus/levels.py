@@ -4,6 +4,11 @@ The finest mesh is the model's own; each coarser one has a share of the faces of
 never fewer than a floor, and no error beyond a bound: of a building few vertices can go for
 nothing, and the share alone takes corners off it. All are simplified from the model's own, so that
 errors do not add up.
+
+(Tried: leaving out plane parts narrower than 1.5 times the error that have something larger behind
+them within it, and strips half as wide. The sample campus of 40 buildings then has 203,405 coarse
+faces instead of 471,454, but along its walk the picture is off by 3.57 instead of 2.75, with the
+preset Medium and no lightmaps: bars and sills are what one sees of a facade from afar.)
 """
 
 from __future__ import annotations
