@@ -21,6 +21,19 @@ CAREFUL, CARELESS = (0.5, 0.95, 0.05), (0.2, 0.2, 0.0)
 
 
 @kernel
+def marked_around(state: State, u: int, v: int) -> int:
+    """A new mark, which the vertices of v's faces have now, but for u and v."""
+    near, corner = state.number[MARKS] + 1, state.head[v]
+    state.number[MARKS] = near
+    while corner >= 0:
+        for k in range(3):
+            state.mark[state.triangle[corner // 3, k]] = near
+        corner = state.beyond[corner]
+    state.mark[u] = state.mark[v] = 0
+    return int(near)
+
+
+@kernel
 def is_linked(state: State, u: int, v: int, count: int) -> bool:
     """Whether the faces at an edge, ``count`` rows of ``shared``, are all that joins its ends, and
     no line of kept edges would end or meet itself."""
@@ -28,16 +41,9 @@ def is_linked(state: State, u: int, v: int, count: int) -> bool:
     for i in range(count):
         if shared[i, 4] and shared[i, 5]:
             return False
-    near = state.number[MARKS] + 1
+    near = marked_around(state, u, v)
     common = near + 1
     state.number[MARKS] = common
-    corner = state.head[v]
-    while corner >= 0:
-        t = corner // 3
-        for k in range(3):
-            mark[triangle[t, k]] = near
-        corner = state.beyond[corner]
-    mark[u] = mark[v] = 0
     both, corner = 0, state.head[u]
     while corner >= 0:
         t = corner // 3
@@ -103,19 +109,11 @@ def may_close(state: State, u: int, v: int, count: int) -> bool:
     for i in range(count):
         if shared[i, 4] and shared[i, 5]:
             return False
-    near = state.number[MARKS] + 1
-    third = near + 1
-    state.number[MARKS] = third
-    corner = state.head[v]
-    while corner >= 0:
-        for k in range(3):
-            mark[triangle[corner // 3, k]] = near
-        corner = state.beyond[corner]
-    mark[u] = mark[v] = 0
+    near = marked_around(state, u, v)
+    third, both = near + 1, near + 2
+    state.number[MARKS] = both
     for i in range(count):
         mark[shared[i, 2]] = third
-    both = state.number[MARKS] + 1
-    state.number[MARKS] = both
     corner = state.head[u]
     while corner >= 0:
         t, k = corner // 3, corner % 3

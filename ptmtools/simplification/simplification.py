@@ -83,9 +83,9 @@ def simplify(
 def _simplified(
     mesh: Mesh, surface: Surface, options: SimplifyOptions, progress: Progress
 ) -> Simplified:
+    there = topology(surface)
     state = _state(mesh, surface)
     state.worst[1] = _square(options.error / surface.scale)
-    there = topology(surface)
     held = PER_HANDLE * there.handles if options.keep_parts else there.held
     if held > HELD * options.faces:
         state.number[TOPOLOGY] = CLOSE if options.keep_parts else DROP
