@@ -81,10 +81,7 @@ def of_campus(world: CampusWorld, preset: str, memory: str) -> System:
         return simulate_campus(walked, options.qualities[0], options)
 
     def stand(bandwidth: str, frame: int) -> CampusRun:
-        count = round(STANDS * world.rate) + 1
-        held = np.full(count, frame)
-        time = np.arange(count) / world.rate
-        return run(replace(world, view=world.view[held], time=time, eye=world.eye[held]), bandwidth)
+        return run(world.standing(STANDS, frame), bandwidth)
 
     return System(f"`campus`, {preset}", partial(run, world), stand)
 
@@ -148,10 +145,9 @@ def main() -> None:
         systems += [of_database(lossy, f"`{p.name}`, lossy", p, given.memory) for p in policies]
     place = prepare_campus(given.campus, walk, served, rate=given.rate)
     systems += [of_campus(place, preset, given.memory) for preset in given.preset.split(",")]
-    least = 0.0 if place.tables is None else float(place.tables.least[place.view].mean())
     print(
         f"{walk.length:.0f} m in {walk.duration:.0f} s; {served.cell_count} cells; "
-        f"{place.stock.objects} objects, whose meshes leave out e of {least:.3f}\n"
+        f"{place.stock.objects} objects, whose meshes leave out e of {place.lacking:.3f}\n"
     )
     print("\n".join(along(systems, bandwidths)), "\n")
     print("\n".join(standing(systems, bandwidths[-1], world.frames)))

@@ -16,6 +16,7 @@ from ptmtools.files import refuse_existing, write_bytes, writing
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
 from ptmtools.walkthrough import figure, pictures
+from ptmtools.walkthrough.campus.world import prepare_campus
 from ptmtools.walkthrough.comparing import SimulateOptions, counted, play, require_hints
 from ptmtools.walkthrough.flip import require as require_flip
 from ptmtools.walkthrough.path.options import PathOptions
@@ -57,6 +58,12 @@ DURATION = 150.0
     metavar="DB",
     help="Another database of the same model: pictures are compared with its full one instead of "
     "that of DB. Such as one without --apo, or without --max-error.",
+)
+@click.option(
+    "--campus",
+    type=click.Path(),
+    metavar="DIR",
+    help="A campus of the same model, as `ptm campus` wrote it, for the policies campus-….",
 )
 @click.option(
     "--trace",
@@ -112,6 +119,7 @@ def simulate(
     walk_files: tuple[str, ...],
     seeds: tuple[int, ...],
     against: str | None,
+    campus: str | None,
     trace_file: str | None,
     flip: bool,
     csv_file: str | None,
@@ -144,6 +152,7 @@ def simulate(
         figure.require()
     if flip:
         require_flip()
+    _check_campus(options, campus, drawn=bool(frames_to or strip_file))
     trace = read_trace(trace_file) if trace_file else None
     walks = {file: read_walk(file) for file in walk_files} or _made(db, seeds)
     served, other = read_served(db), read_served(against) if against else None
@@ -153,6 +162,12 @@ def simulate(
     with voice.progress() as progress:
         pyramids = read_pyramids(served, progress)
         relief = relief_of(served, pyramids, other, lit=options.lit, progress=progress)
+        shown = relief.reference.pyramids if relief and relief.reference else pyramids
+        campuses = {
+            name: prepare_campus(campus, walk, other or served, shown, progress=progress)
+            for name, walk in walks.items()
+            if campus
+        }
         forms = read_forms(served, pyramids, (p.form for p in options.policies), progress)
         worlds = {
             name: counted(
@@ -161,7 +176,7 @@ def simulate(
             )
             for name, walk in walks.items()
         }
-        played = play(worlds, options, trace, progress, flip=flip)
+        played = play(worlds, options, trace, progress, flip=flip, campuses=campuses)
     if csv_file:
         write_bytes(csv_file, as_csv(played).encode(), force=force)
     if plot_file:
@@ -177,8 +192,26 @@ def simulate(
     if as_json:
         voice.emit_json(document(db, played, worlds, lit=options.lit, against=against))
         return
-    for line in table(played, worlds, lit=options.lit, against=against):
+    for line in table(played, worlds, lit=options.lit, against=against, campuses=campuses):
         voice.say(line)
+
+
+def _check_campus(options: SimulateOptions, campus: str | None, *, drawn: bool) -> None:
+    """Raises UsageError if a campus is named and not walked through, or the other way round, or if
+    frames of it are to be drawn."""
+    asked = [policy.name for policy in options.campus_policies]
+    if asked and not campus:
+        raise click.UsageError(
+            f"policy {asked[0]} needs --campus, a folder that `ptm campus` wrote"
+        )
+    if campus and not asked:
+        raise click.UsageError(
+            "--campus is for policies such as campus-medium; add one to --policy"
+        )
+    if drawn and not options.policies:
+        raise click.UsageError(
+            "--frames and --strip draw what clients of DB show; add such a policy"
+        )
 
 
 def _fillable(folder: Path, force: bool) -> None:

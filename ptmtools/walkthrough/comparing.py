@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Literal
 
 from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
 from ptmtools.quantities import MemorySize, parse_bandwidth, parse_duration, parse_memory
+from ptmtools.walkthrough.campus.beside import CAMPUS_POLICIES, CampusPolicy, walk_beside
+from ptmtools.walkthrough.campus.world import CampusWorld
 from ptmtools.walkthrough.flip import Flip
 from ptmtools.walkthrough.forms import FORMS, PTM
 from ptmtools.walkthrough.measures import STANDS, Measures, measure
@@ -36,13 +39,13 @@ class SimulateOptions:
     one_range: ask for one range of a file at a time, as browsers must.
     lit: light what is shown, so that relief is seen: clients of octree textures need it.
 
-    Raises InputError: PTM-I701 a policy shows relief, and nothing is lit; PTM-I711 a link that
-    cannot be; PTM-I712 a word that is no such quantity.
+    Raises InputError: PTM-I701 a policy shows relief, and nothing is lit, or is of a campus, and
+    all is; PTM-I711 a link that cannot be; PTM-I712 a word that is no such quantity.
     """
 
     policy: str = field(
         default="paper,ach,best,oracle",
-        metadata={"choices": POLICIES, "several": True},
+        metadata={"choices": {**POLICIES, **CAMPUS_POLICIES}, "several": True},
     )
     bandwidth: str = "512k,4M"
     latency: str = "100ms"
@@ -63,11 +66,22 @@ class SimulateOptions:
                 f"policy {unseen[0]} fetches relief, which only lit pictures show",
                 remedy="give --lit, too",
             )
+        if self.campus_policies and self.lit:
+            raise InputError(
+                "PTM-I701",
+                f"policy {self.campus_policies[0].name} shows nothing lit",
+                remedy="leave out --lit, or that policy",
+            )
 
     @property
     def policies(self) -> list[Declared]:
-        """In the order given."""
-        return [POLICIES[name] for name in _parts(self.policy)]
+        """Those of clients of the database, in the order given."""
+        return [POLICIES[name] for name in _parts(self.policy) if name in POLICIES]
+
+    @property
+    def campus_policies(self) -> list[CampusPolicy]:
+        """Those of clients of a campus, in the order given."""
+        return [CAMPUS_POLICIES[name] for name in _parts(self.policy) if name in CAMPUS_POLICIES]
 
     @property
     def memories(self) -> list[MemorySize]:
@@ -144,20 +158,28 @@ def play(
     progress: Progress = silent,
     *,
     flip: bool = False,
+    campuses: Mapping[str, CampusWorld] = MappingProxyType({}),
 ) -> list[Played]:
-    """All runs: by link, memory, policy, walk.
+    """All runs: by link, memory, policy, walk; those of a campus after the others.
+
+    Parameters
+    ----------
+    flip: also measure that, of clients of the database.
+    campuses: each walk through a campus, where a policy is of one.
 
     Raises
     ------
+    KeyError: a policy is of a campus, and a walk has none.
     InputError: PTM-I701 a policy's hints, or the textures in its form, are not there; PTM-I711,
         PTM-I712.
     MissingComponentError: PTM-M702 with ``flip``, without flip-evaluator.
     """
+    policies: list[Declared | CampusPolicy] = [*options.policies, *options.campus_policies]
     cases = [
         (link, memory, policy, name)
         for link in options.links(trace)
         for memory in options.memories
-        for policy in options.policies
+        for policy in policies
         for name in worlds
     ]
     for world in worlds.values():
@@ -170,6 +192,11 @@ def play(
     found = []
     for done, (link, memory, policy, name) in enumerate(cases):
         progress(done, len(cases), "simulating")
+        if isinstance(policy, CampusPolicy):
+            held = memory.of(worlds[name].catalogue.whole)
+            both = walk_beside(campuses[name], worlds[name], policy, link, held)
+            found.append(Played(name, memory.text, *both))
+            continue
         of = name, policy.form
         world, budget = taken[of], budget_of(worlds[name], memory, policy.form)
         run = simulate(world, policy, link, budget)

@@ -64,7 +64,8 @@ def _draw(axes: Any, block: list[Played], values: Callable[[Run], Floats]) -> No
         style = {"color": COLORS[k % len(COLORS)], "label": one.run.policy}
         axes.plot(one.run.time, values(one.run), linewidth=1, **style)
     # What comes before anything is there would dwarf the rest.
-    most = max(float(np.percentile(values(one.run), 98)) for one in block)
+    drawn = [values(one.run) for one in block]
+    most = max((float(np.percentile(v, 98)) for v in drawn if np.isfinite(v).all()), default=0.0)
     axes.set_ylim(0, 1.1 * most if most > 0 else 1)
     axes.set_xlim(0, run.time[-1] or 1)
     axes.grid(True, color="#e5e5e5", linewidth=0.5)

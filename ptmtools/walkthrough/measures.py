@@ -56,7 +56,7 @@ class Measures:
     waste: float
     requests: int
     stalls: float
-    uploads: int
+    uploads: float
     switches: float
     overruns: int
     final: tuple[float | None, ...]
@@ -80,7 +80,7 @@ def measure(run: Run, world: World, standing: Run) -> Measures:
         uploads=run.uploads,
         switches=run.switches * 60 * world.rate / world.frames,
         overruns=run.overruns,
-        final=_final(standing, nothing_there(world, 0)),
+        final=seconds_to(standing, nothing_there(world, 0)),
     )
 
 
@@ -110,7 +110,8 @@ def _summary(
     )
 
 
-def _final(standing: Run, nothing: float) -> tuple[float | None, ...]:
+def seconds_to(standing: Run, nothing: float) -> tuple[float | None, ...]:
+    """`Measures.final` of who stands, where e of nothing is as given."""
     # A table of float32 may leave a little of an error that is none.
     rounding = nothing * float(np.finfo(np.float32).eps)
     reached = [standing.error <= (1 - share) * nothing + rounding for share in SHARES]

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from itertools import groupby
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from ptmtools.quantities import count, size
+from ptmtools.walkthrough.campus.world import CampusWorld
 from ptmtools.walkthrough.comparing import Played
 from ptmtools.walkthrough.flip import FRAMES, PER_DEGREE, PIXELS
 from ptmtools.walkthrough.measures import SHARES
@@ -40,6 +43,7 @@ def table(
     *,
     lit: bool = False,
     against: str | None = None,
+    campuses: Mapping[str, CampusWorld] = MappingProxyType({}),
 ) -> list[str]:
     """Lines of text: a block for each link and memory, a row for each policy, means over walks."""
     lines = [*INTRODUCTION]
@@ -47,6 +51,11 @@ def table(
         lines.append("All is lit.")
     if against is not None:
         lines.append(f"The full picture is that of {against}.")
+    if campuses:
+        lacking = np.mean([place.lacking for place in campuses.values()])
+        lines.append(
+            f"The meshes of the campus leave out e of {lacking:.2f}; they count as memory, too."
+        )
     several, flip = len(worlds) > 1, any(p.flip is not None for p in played)
     if flip:
         lines.append(
@@ -67,7 +76,7 @@ def table(
         budget = block[0].run.budget
         lines += ["", f"{link_text(link)}; texture memory {memory} ({size(budget)})", head]
         for policy, some in groupby(block, lambda p: p.run.policy):
-            lines.append(_row(f"{policy:<{wide}}", list(some)))
+            lines.append(_row(f"{policy:<{wide}}", list(some), flip=flip))
     over = sum(p.measures.overruns for p in played)
     if over:
         lines += ["", f"{count(over, 'frame')} above the budget"]
@@ -102,12 +111,13 @@ def _final_head() -> str:
     return " ".join(f"{f'{share:.0%}':>6}" for share in SHARES)
 
 
-def _row(name: str, some: list[Played]) -> str:
+def _row(name: str, some: list[Played], *, flip: bool) -> str:
     measures = [p.measures for p in some]
     e = [m.e.mean for m in measures]
     spread = f"{f'{min(e):.2f}–{max(e):.2f}':>13} " if len(some) > 1 else ""
     flips = [p.flip for p in some if p.flip is not None]
-    flip = f"{np.mean(flips):6.4f} " if flips else ""
+    alike = f"{_mean(flips, '.4f'):>6} " if flip else ""
+    stalled = _mean([m.stalls for m in measures], ".1f")
     final = []
     for k in range(len(SHARES)):
         times = [m.final[k] for m in measures]
@@ -116,20 +126,20 @@ def _row(name: str, some: list[Played]) -> str:
     return (
         f"  {name} {np.mean(e):6.2f} {spread}{_mean([m.e.p95 for m in measures]):>6} "
         f"{_mean([m.e.still for m in measures]):>6} {_mean([m.e.moving for m in measures]):>6} "
-        f"{_mean([m.rmse.mean for m in measures]):>6} {flip}"
-        f"{np.mean([m.missing.mean for m in measures]):7.1%} "
-        f"{np.mean([m.quality.mean for m in measures]):7.1%} "
+        f"{_mean([m.rmse.mean for m in measures]):>6} {alike}"
+        f"{_mean([m.missing.mean for m in measures], '.1%'):>7} "
+        f"{_mean([m.quality.mean for m in measures], '.1%'):>7} "
         f"{size(round(np.mean([m.bytes for m in measures]))):>9} "
-        f"{np.mean([m.waste for m in measures]):5.0%} "
+        f"{_mean([m.waste for m in measures], '.0%'):>5} "
         f"{np.mean([m.requests for m in measures]):8,.0f} "
-        f"{np.mean([m.stalls for m in measures]):5.1f} s  {' '.join(final)}"
+        f"{f'{stalled} s' if stalled != '–' else stalled:>7}  {' '.join(final)}"
     )
 
 
-def _mean(values: list[float]) -> str:
+def _mean(values: list[float], form: str = ".2f") -> str:
     """Of those that are numbers."""
     known = [v for v in values if not np.isnan(v)]
-    return f"{np.mean(known):.2f}" if known else "–"
+    return format(np.mean(known), form) if known else "–"
 
 
 def document(
@@ -203,7 +213,8 @@ def _rounded(value: Any) -> Any:
 
 
 def as_csv(played: Sequence[Played]) -> str:
-    """A row for each frame of each run; an empty bandwidth is none."""
+    """A row for each frame of each run; an empty bandwidth is none, and what is not counted of a
+    client is empty."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(COLUMNS)
@@ -217,5 +228,6 @@ def as_csv(played: Sequence[Played]) -> str:
         for time, (still, held, received), row in zip(
             run.time.tolist(), whole.tolist(), numbers.tolist(), strict=True
         ):
-            rows.writerow([*head, f"{time:g}", still, *(f"{v:.6g}" for v in row), held, received])
+            known = ["" if math.isnan(v) else f"{v:.6g}" for v in row]
+            rows.writerow([*head, f"{time:g}", still, *known, held, received])
     return text.getvalue()

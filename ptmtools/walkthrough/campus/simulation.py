@@ -118,9 +118,11 @@ def simulate_campus(
     quality: Quality,
     options: CampusWalkOptions = CampusWalkOptions(),  # noqa: B008 - a frozen value
     trace: Trace | None = None,
+    conditions: Conditions | None = None,
 ) -> CampusRun:
-    """Walks. The same arguments give the same run, bit for bit."""
-    link = Link(options.link(trace))
+    """Walks. The same arguments give the same run, bit for bit. Other ``conditions`` take the place
+    of the link of the options and the trace."""
+    link = Link(conditions or options.link(trace))
     client = CampusClient(world.stock, link, quality, options)
     frames, columns = world.frames, _Columns(world.stock)
     error = np.full(frames, np.nan)
