@@ -7,8 +7,12 @@ reveals that are thinner than a texel, which would else show what lies beside th
 One of half the least size is computed texel by texel. Each larger one takes over what the four
 texels below agree on, as their bilinear mean, and computes the rest anew: light is smooth but for
 where surfaces meet. At the edge of a chart those of the four count that lie on it, if they have
-half of the weight. What was computed is smoothed with its eight neighbours on the same chart. What
-no face reads takes the value of what is nearest, so that JPEG has few edges to code.
+half of the weight. What was computed is smoothed with those of its eight neighbours on the same
+chart that differ by no more than the grain of the light: where light has an edge, it stays. What no
+face reads takes the value of what is nearest, so that JPEG has few edges to code.
+
+(Tried: smoothing over edges, too. Files were a tenth smaller, and twice as many points of the
+sample campus had light that was off by a tenth.)
 """
 
 from __future__ import annotations
@@ -43,11 +47,16 @@ class Lit:
 
 
 def bake(
-    look: Look, corner: Floats, atlas: Atlas, sizes: tuple[int, ...] = LIGHT_SIZES
+    look: Look,
+    corner: Floats,
+    atlas: Atlas,
+    grain: float,
+    sizes: tuple[int, ...] = LIGHT_SIZES,
 ) -> list[Lit]:
     """The lightmaps of (T, 3, 3) faces, whose light ``look`` says.
 
-    ``sizes`` ascend, each twice the one before.
+    Neighbours that differ by more than ``grain`` stay apart; ``sizes`` ascend, each twice the one
+    before.
     """
     sizes = (sizes[0] // 2, *sizes)
     found: list[Lit] = []
@@ -65,7 +74,7 @@ def bake(
         point = _positions(atlas.uv, corner, face, row, column, size)
         turn = (column * SPREAD[0] + row * SPREAD[1]) % 1.0
         value[row, column] = look(face, point, turn)
-        value[row, column] = _smoothed(value, chart, row, column)
+        value[row, column] = _smoothed(value, chart, row, column, grain)
         below = value, chart, centre >= 0
         if size > sizes[0]:
             found.append(Lit(fill(value, owner >= 0), len(row), int((owner >= 0).sum())))
@@ -131,15 +140,19 @@ def _enlarged(
     return mean, believed
 
 
-def _smoothed(value: Singles, chart: NDArray[np.int32], row: Ints, column: Ints) -> Singles:
-    """(n,) the binomial mean of some texels and their neighbours on the same chart."""
+def _smoothed(
+    value: Singles, chart: NDArray[np.int32], row: Ints, column: Ints, grain: float
+) -> Singles:
+    """(n,) the binomial mean of some texels and of those neighbours on the same chart that differ
+    from them by no more than ``grain``."""
     held, charts = np.pad(value, 1), np.pad(chart, 1, constant_values=-2)
     total, weight = np.zeros(len(row), np.float32), np.zeros(len(row), np.float32)
-    here = chart[row, column]
+    here, own = chart[row, column], value[row, column]
     for i, down in _KERNEL:
         for j, across in _KERNEL:
             place = row + 1 + i, column + 1 + j
-            share = np.where(charts[place] == here, np.float32(down * across), np.float32(0))
+            alike = (charts[place] == here) & (np.abs(held[place] - own) <= grain)
+            share = np.where(alike, np.float32(down * across), np.float32(0))
             total += share * held[place]
             weight += share
     return np.asarray(total / weight)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +17,8 @@ from ptmtools.scene.source import SourceWrap
 #: (n,) faces, (n, 3) points on them, (n,) shares of a circle by which points differ → (n,) linear
 #: light from 0 to 1.
 Look = Callable[[Ints, Floats, Floats], Singles]
+#: What n rays leave of grain is within this, divided by the root of n.
+_GRAIN = 0.8
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,12 @@ class Rays:
         """Of faces that are lit on (T,) sides, 1 the front and -1 the back."""
         normal = normals(corner) * np.broadcast_to(side, len(corner))[:, None]
         return Rays(around, normal, samples, reach, error)
+
+    @property
+    def grain(self) -> float:
+        """By how much the light found at a point may differ from that found beside it, where it is
+        the same."""
+        return _GRAIN / math.sqrt(self.samples)
 
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
         normal = self.normal[face]
@@ -83,6 +92,11 @@ class Painted:
     image: NDArray[np.int32]
     images: tuple[LightImage, ...]
     source: NDArray[np.integer[Any]]
+
+    @property
+    def grain(self) -> float:
+        """None: what is painted is exact."""
+        return 0.0
 
     def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
         of = self.source[face]

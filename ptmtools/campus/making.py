@@ -15,7 +15,7 @@ from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.campus.atlas import unwrap
 from ptmtools.campus.levels import Level, levels
 from ptmtools.campus.lightmap import bake
-from ptmtools.campus.lights import Look, Painted, Rays
+from ptmtools.campus.lights import Painted, Rays
 from ptmtools.campus.meshes import Corners, mesh_bytes
 from ptmtools.campus.model import (
     LIGHT_SIZES,
@@ -100,7 +100,8 @@ def make_object(work: Work, task: tuple[str, Part]) -> ObjectMade:
         atlas = unwrap(mesh.points, mesh.triangles)
         place = atlas.uv
         side = _sides(work, faces, finest)
-        maps = bake(_look(work, faces, finest, finest, side), finest.corner, atlas)
+        look = _look(work, faces, finest, finest, side)
+        maps = bake(look, finest.corner, atlas, look.grain)
         source = _light_source(work, faces)
         texels = [(len(m.value), encoded(m.value.astype(np.float64)), source) for m in maps]
         lightmaps = light_files(name, texels, options.quality)
@@ -153,7 +154,7 @@ def _sides(work: Work, faces: Ints, finest: Level) -> Floats:
     return open_sides(work.around, finest.corner, work.two_sided[faces], work.options.reach)
 
 
-def _look(work: Work, faces: Ints, finest: Level, level: Level, side: Floats) -> Look:
+def _look(work: Work, faces: Ints, finest: Level, level: Level, side: Floats) -> Rays | Painted:
     """The light on the faces of a level, of which (T,) of the finest say the sides."""
     if work.painted is not None:
         painted = work.painted

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ptmtools.arrays import Floats
+from ptmtools.arrays import Floats, Ints, Singles
 from ptmtools.campus.atlas import cover, unwrap
 from ptmtools.campus.lightmap import AGREE, bake, fill
 from ptmtools.campus.lights import LightImage, Painted, Rays
@@ -37,7 +37,8 @@ def test_thin_faces_show_their_own_light() -> None:
     light = Rays.of(where, corner, 256, 0.2)
     wanted = light(face, point, np.zeros(len(face)))
     assert np.ptp(wanted) > 0.5
-    for found, most in zip(bake(light, corner, atlas), (0.08, 0.04, 0.03), strict=True):
+    maps = bake(light, corner, atlas, light.grain)
+    for found, most in zip(maps, (0.08, 0.04, 0.03), strict=True):
         assert (np.abs(bilinear(found.value, at)[0] - wanted) > 0.1)[face >= 2].mean() < most
 
 
@@ -46,7 +47,7 @@ def test_a_lightmap_of_a_house_on_the_ground() -> None:
     atlas = unwrap(points, triangles)
     where = surroundings(HOUSE, GROUND)
     look = Rays.of(where, HOUSE, 64, 20.0)
-    maps = bake(look, HOUSE, atlas)
+    maps = bake(look, HOUSE, atlas, look.grain)
     assert [len(m.value) for m in maps] == [512, 1024, 2048]
     normal = normals(HOUSE)
     owner = cover(atlas.uv, 512)
@@ -67,7 +68,7 @@ def test_larger_lightmaps_are_nearly_what_rays_say_everywhere(
     atlas = unwrap(points, triangles)
     where = surroundings(HOUSE, GROUND)
     look = Rays.of(where, HOUSE, 64, 20.0)
-    (taken,) = bake(look, HOUSE, atlas, (512,))
+    (taken,) = bake(look, HOUSE, atlas, look.grain, (512,))
 
     def nothing(
         value: object, chart: object, centred: object, larger: np.ndarray
@@ -75,7 +76,7 @@ def test_larger_lightmaps_are_nearly_what_rays_say_everywhere(
         return np.zeros(larger.shape, np.float32), np.zeros(larger.shape, np.bool_)
 
     monkeypatch.setattr("ptmtools.campus.lightmap._enlarged", nothing)
-    (whole,) = bake(look, HOUSE, atlas, (512,))
+    (whole,) = bake(look, HOUSE, atlas, look.grain, (512,))
     assert whole.computed == whole.covered
     assert taken.computed < 0.05 * whole.computed
     error = np.abs(taken.value - whole.value)[cover(atlas.uv, 512) >= 0]
@@ -89,8 +90,29 @@ def test_no_row_of_texels_lies_in_the_ground() -> None:
     atlas = unwrap(points, triangles)
     where = surroundings(HOUSE, GROUND)
     look = Rays.of(where, HOUSE, 64, 20.0)
-    (found,) = bake(look, HOUSE, atlas, (512,))
+    (found,) = bake(look, HOUSE, atlas, look.grain, (512,))
     assert found.value.min() > 0.4
+
+
+def test_grain_is_smoothed_and_edges_of_light_stay() -> None:
+    atlas = unwrap(*indexed(GROUND))
+    middle = GROUND[..., 0].mean()
+
+    def look(face: Ints, point: Floats, turn: Floats) -> Singles:
+        step = np.where(point[:, 0] < middle, 0.2, 0.8)
+        return np.asarray(step + 0.1 * (turn - 0.5), np.float32)
+
+    (grained,), (smooth,) = (bake(look, GROUND, atlas, grain, (512,)) for grain in (0.0, 0.1))
+    face, point, at = samples(GROUND, atlas.uv, 4000)
+    texel = np.ptp(GROUND[..., 0]) / (512 * np.ptp(atlas.uv[..., 0]))
+    # Not those between two texels on both sides of the edge.
+    apart = np.abs(point[:, 0] - middle) > 1.05 * texel
+    wanted = look(face, point, np.full(len(face), 0.5))[apart]
+    before, after = (
+        np.abs(bilinear(found.value, at)[0][apart] - wanted) for found in (grained, smooth)
+    )
+    assert after.max() < 0.05
+    assert after.mean() < 0.6 * before.mean()
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 40), st.integers(1, 40))
