@@ -28,7 +28,8 @@ class Replacement:
     ----------
     objects: (K,) int32, those that are replaced, ascending.
     points: (P, 3) float64, metres. triangles: (F, 3) int32 indices into them.
-    source: (F,) int32, the triangle of the scene that each stands for, ascending.
+    source: (F,) int32, the triangle of the scene that each stands for, never descending: those that
+        fill a hole stand for one beside it, which may stand for itself, too.
     uv: (F, 3, 2) float64. colors: (F, 3, 3) uint8 if the scene has colours, else None.
     """
 
@@ -96,7 +97,7 @@ class Replacement:
             stored.array("uv", np.float64, n, 3, 2, finite=True),
             stored.array("colors", np.uint8, n, 3, 3) if "colors" in arrays else None,
         )
-        if (np.diff(found.source) <= 0).any() or (np.diff(found.objects) <= 0).any():
+        if (np.diff(found.source) < 0).any() or (np.diff(found.objects) <= 0).any():
             raise ValueError("triangles or objects are not in order")
         return found
 
@@ -105,7 +106,7 @@ def joined(parts: list[Replacement]) -> Replacement:
     """Replacements of different objects of one scene as one."""
     first = np.cumsum([0, *(len(part.points) for part in parts)])
     source = np.concatenate([part.source for part in parts])
-    order = np.argsort(source)
+    order = np.argsort(source, kind="stable")
     triangles = [part.triangles + begin for part, begin in zip(parts, first, strict=False)]
     colors = [part.colors for part in parts if part.colors is not None]
     return Replacement(

@@ -202,6 +202,22 @@ def test_workers_and_the_way_through_a_file_change_nothing(rooms: Scene, made: R
         assert np.array_equal(one.octree.texels, two.octree.texels)
 
 
+def test_holes_that_are_filled_go_the_way_through_a_file(rooms: Scene) -> None:
+    """What fills a hole stands for a face beside it, as that may itself."""
+    statue = np.flatnonzero(np.isin(rooms.triangle_object, list(map(rooms.objects.index, STATUES))))
+    lost = np.random.default_rng(1).choice(statue, len(statue) // 20, replace=False)
+    kept = np.setdiff1d(np.arange(len(rooms.triangles)), lost)
+    names = ("triangles", "uv", "triangle_object", "triangle_material", "two_sided")
+    holed = replace(rooms, **{name: getattr(rooms, name)[kept] for name in names})
+    made = replaced(holed, OPTIONS, Serial())
+    assert made.replacement
+    assert any("holes are filled" in note for note in made.notes)
+    assert (np.diff(made.replacement.source) == 0).any()
+    again = Replacement.from_arrays(made.replacement.to_arrays()).of(holed)
+    for name, array in made.scene.to_arrays().items():
+        assert np.array_equal(array, again.to_arrays()[name]), name
+
+
 @pytest.mark.parametrize(
     ("name", "change"),
     [
