@@ -47,7 +47,7 @@ from ptmtools.simplification.state_kernels import (
     link_corners,
 )
 from ptmtools.simplification.surface import Surface, check, edges_of, surface_of
-from ptmtools.simplification.topology import HELD, PER_HANDLE, topology
+from ptmtools.simplification.topology import HELD, PER_HANDLE, parts_of, topology
 from ptmtools.tolerance import FILE_SHARE
 
 #: Progress is told after so many parts of the work.
@@ -93,8 +93,13 @@ def _simplified(
     found = _result(mesh, surface, state, options)
     if state.number[TOPOLOGY] == KEEP:
         return found
-    left = topology(surface_of(found.mesh)).parts
-    if left >= there.parts:
+    # That of which no face stands for any is gone.
+    part = np.empty(len(mesh.triangles), np.int64)
+    part[surface.source] = parts_of(
+        edges_of(surface.triangle, len(surface.point)), len(surface.source)
+    )
+    left = len(np.unique(part[found.source]))
+    if left == there.parts:
         return found
     gone = f"{there.parts - left:,} of {there.parts:,} parts are gone"
     return replace(found, notes=(f"{gone}: they would hold many of the faces", *found.notes))

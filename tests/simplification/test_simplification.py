@@ -237,7 +237,7 @@ def test_parts_that_touch_in_a_point_still_do() -> None:
     points = np.concatenate([np.stack([x, y, 0 * x], axis=1), ends * 3 - [3, 0, 0]])
     faces = [[a, b, c] if (a + b + c) % 2 == 0 else [a, c, b] for a, b, c in octahedron]
     triangles = np.concatenate([grid(10, 10), np.array(faces, np.int32) + len(x)])
-    found = to(1, Mesh(points, triangles)).mesh
+    found = simplify(Mesh(points, triangles), SimplifyOptions(1, keep_parts=True)).mesh
     at_origin = (found.points[found.triangles] == 0).all(axis=2).any(axis=1)
     sheet = (found.points[found.triangles][:, :, 0] >= 0).all(axis=1)
     assert (at_origin & sheet).any()

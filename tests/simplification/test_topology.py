@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ptmtools.simplification import Mesh, SimplifyOptions, simplify
 from ptmtools.simplification.surface import surface_of
-from ptmtools.simplification.topology import topology
+from ptmtools.simplification.topology import Topology, topology
 from tests.simplification.shapes import (
     box,
     cylinder,
@@ -70,6 +70,69 @@ def test_how_many_there_are(mesh: Mesh, expected: int) -> None:
         np.concatenate([mesh.triangles, mesh.triangles + len(mesh.points)]),
     )
     assert topology(surface_of(two)).handles == 2 * expected
+
+
+def touching_holes(count: int, every: int) -> Mesh:
+    """A sheet of squares of which one diagonal in ``every`` is missing, ``count`` squares long at
+    most: the holes touch."""
+    sheet = grid(count + 2, count + 2)
+    x, y = np.meshgrid(np.arange(count + 3.0), np.arange(count + 3.0))
+    points = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
+    middle = points[sheet].mean(axis=1).astype(int)
+    inside = ((middle > 0) & (middle <= count))[:, :2].all(axis=1)
+    hole = (middle[:, 0] - middle[:, 1]) % every == 0
+    return Mesh(points, sheet[~(hole & inside)])
+
+
+def chained(count: int) -> Mesh:
+    """Tori, each of which touches the next in a vertex."""
+    one = torus(12, 8)
+    first, last = one.points[:, 0].argmin(), one.points[:, 0].argmax()
+    step = one.points[last] - one.points[first]
+    return Mesh(
+        np.concatenate([one.points + i * step for i in range(count)]),
+        np.concatenate([one.triangles + i * len(one.points) for i in range(count)]),
+    )
+
+
+def test_what_touches_in_a_vertex_is_no_handle() -> None:
+    assert topology(surface_of(touching_holes(4, 9))) == Topology(0, 0, 1)
+    assert topology(surface_of(touching_holes(30, 3))).handles == 0
+    # In a line, so that the sums for the last end where those for the next begin.
+    chain = chained(8)
+    corners = np.unique(np.round(chain.points, 9), axis=0, return_inverse=True)[1]
+    welded = Mesh(np.unique(np.round(chain.points, 9), axis=0), corners[chain.triangles])
+    assert len(welded.points) == len(chain.points) - 7
+    assert topology(surface_of(welded)) == Topology(8, 8, 0)
+
+
+def test_holes_that_touch_take_no_part_away() -> None:
+    """They are no handles, so nothing closes, and small closed parts stay with a sheet."""
+    sheet, chips = touching_holes(40, 3), box(1)
+    points = [sheet.points, *(0.05 * chips.points + [i, 0, 5] for i in range(5))]
+    triangles = [sheet.triangles]
+    for i in range(5):
+        triangles.append(chips.triangles + len(sheet.points) + i * len(chips.points))
+    given = Mesh(np.concatenate(points), np.concatenate(triangles).astype(np.int32))
+    found = simplify(given, SimplifyOptions(300, keep_parts=True))
+    whose = np.searchsorted(np.cumsum([len(part) for part in triangles]), found.source, "right")
+    assert np.unique(whose).tolist() == [0, 1, 2, 3, 4, 5]
+
+
+def test_the_note_counts_parts_of_which_nothing_is_left() -> None:
+    rng = np.random.default_rng(5)
+    many = [0.01 * box(1).points + rng.random(3) for _ in range(200)]
+    step = len(box(1).points)
+    chips = np.concatenate([box(1).triangles + i * step for i in range(200)])
+    big = sphere(20)
+    given = Mesh(
+        np.concatenate([*many, big.points]), np.concatenate([chips, big.triangles + 200 * step])
+    )
+    found = simplify(given, SimplifyOptions(100))
+    part = np.minimum(found.source // len(box(1).triangles), 200)
+    gone = 201 - len(np.unique(part))
+    assert gone > 100
+    assert found.notes[0].startswith(f"{gone} of 201 parts are gone")
 
 
 def test_nobody_can_say_where_three_faces_meet() -> None:
