@@ -30,6 +30,7 @@ from ptmtools.scene.signs import Named
 from ptmtools.scene.source import MAX_VERTICES, Findings, Source, SourceMaterial
 from ptmtools.scene.space import Said, parse_unit, settle, to_world, turned
 from ptmtools.scene.texels import uses_holes
+from ptmtools.scene.tiles import MOST, near_origin
 from ptmtools.scene.wrapping import told, unmirrored
 from ptmtools.tolerance import PLANE_SHARE
 
@@ -107,17 +108,7 @@ def ingest(
         Said(source.metres, source.up),
         findings,
     )
-    uv = source.uv[kept.source]
-    finite_uv = np.asarray(np.isfinite(uv).all(axis=(1, 2)))
-    if not finite_uv.all():
-        findings.say(
-            "PTM-N228",
-            "texture coordinates that are not finite count as 0",
-            "",
-            int((~finite_uv).sum()),
-        )
-        uv = np.where(finite_uv[:, None, None], uv, 0.0)
-
+    uv = _coordinates(source, kept, findings)
     used_material, triangle_material = np.unique(
         source.triangle_material[kept.source], return_inverse=True
     )
@@ -239,6 +230,25 @@ def _note_faces(kept: KeptFaces, source: Source, findings: Findings) -> None:
     ):
         if count:
             tell(code, message, "", count)
+
+
+def _coordinates(source: Source, kept: KeptFaces, findings: Findings) -> NDArray[np.float64]:
+    """(T, 3, 2) of kept faces, all of them finite, and near the origin where textures repeat."""
+    uv = source.uv[kept.source]
+    unusable: NDArray[np.bool_] = np.logical_not(np.isfinite(uv).all(axis=(1, 2)))
+    uv[unusable] = 0.0
+    textures = [material.texture for material in source.materials]
+    repeats = np.array(
+        [(t is None or t.wrap_s != "clamp", t is None or t.wrap_t != "clamp") for t in textures]
+    )
+    material, each = source.triangle_material[kept.source], source.triangle_object[kept.source]
+    uv = near_origin(uv, material * np.int64(len(source.objects)) + each, repeats[material])
+    unusable |= (np.abs(uv) > MOST).any(axis=(1, 2))
+    if unusable.any():
+        what = f"texture coordinates that are not finite, or beyond {MOST:,.0f}, count as 0"
+        findings.say("PTM-N228", what, "", int(unusable.sum()))
+        uv[unusable] = 0.0
+    return uv
 
 
 def _two_sided(kept: KeptFaces, source: Source) -> NDArray[np.bool_]:

@@ -277,6 +277,21 @@ def test_coordinates_that_are_not_finite(put: Put) -> None:
     assert ("PTM-N228", "") in said(scene)
 
 
+def test_coordinates_far_away_come_near_where_the_texture_repeats(textured: Textured) -> None:
+    """As of map projections: single precision has no texels there."""
+    image = {"a.png": png(noise(1))}
+    scene = ingest(textured("map_Kd -o 5400000.25 -7654321.5 0 a.png", image))
+    assert scene.uv[0].tolist() == [[0.25, 0.5], [1.25, 0.5], [1.25, 1.5]]
+    held = ingest(textured("map_Kd -clamp on -o 5400000.25 3 0 a.png", image))
+    assert held.uv[0].tolist() == [[5400000.25, 3], [5400001.25, 3], [5400001.25, 4]]
+
+
+def test_coordinates_beyond_all_precision(put: Put) -> None:
+    scene = ingest(put("a.obj", QUAD + "vt 0 1e300\nf 1/1 2/5 3/3\nf 1/1 3/3 4/4\n"))
+    assert scene.uv.tolist() == [[[0, 0]] * 3, [[0, 0], [1, 1], [0, 1]]]
+    assert ("PTM-N228", "") in said(scene)
+
+
 def test_one_triangle(put: Put) -> None:
     assert len(ingest(put("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")).triangles) == 1
 
