@@ -177,7 +177,7 @@ def _light_source(work: Work, faces: Ints) -> tuple[int, int]:
         return LIGHT_SIZES[-1], LIGHT_SIZES[-1]
     used = {i for i in np.unique(work.painted.image[faces]).tolist() if i >= 0}
     sizes = [work.painted.images[i].texels.shape for i in used] or [(1, 1)]
-    height, width = max(sizes)
+    height, width = max(sizes, key=max)
     return width, height
 
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from ptmtools import schemas
 from ptmtools.arrays import Floats, Singles
 from ptmtools.campus.model import CampusMaterial
-from ptmtools.glb import BINARY, JSON, elements, glb_chunks, meaning
+from ptmtools.glb import BINARY, JSON, elements, glb_chunks, meaning, natural
 from ptmtools.glb_writing import BufferWriter, one_mesh
 
 _ADD: dict[str, Callable[[BufferWriter, NDArray[Any]], int]] = {
@@ -122,6 +122,7 @@ def read_mesh(data: bytes) -> tuple[Primitive, ...]:
         raise ValueError("not one chunk of JSON and one of bytes")
     document, binary = schemas.parse(chunks[0][2]), chunks[1][2]
     try:
+        view_bytes(document, binary)
         wanted = document["meshes"][0]["primitives"]
         held = len(binary)
         found = []
@@ -138,6 +139,18 @@ def read_mesh(data: bytes) -> tuple[Primitive, ...]:
     return tuple(found)
 
 
+def view_bytes(document: Any, binary: bytes) -> int:
+    """Bytes of all vertices and indices of a GLB: what it takes in graphics memory.
+
+    Raises ValueError if it says that these are more than it has, LookupError or TypeError if it
+    does not say it as glTF does.
+    """
+    held = sum(natural(view["byteLength"]) for view in document["bufferViews"])
+    if held > len(binary):
+        raise ValueError(f"views of {held} bytes in {len(binary)}")
+    return held
+
+
 def _read(document: Any, binary: bytes, primitive: Mapping[str, Any]) -> Primitive:
     def values(index: object) -> Floats | None:
         if index is None:
@@ -151,14 +164,18 @@ def _read(document: Any, binary: bytes, primitive: Mapping[str, Any]) -> Primiti
     if point is None or indices is None:
         raise ValueError("a primitive without positions or indices")
     uv, light, color = (values(named.get(n)) for n in ("TEXCOORD_0", "TEXCOORD_1", "COLOR_0"))
-    for part in (point, uv, light, color):
-        if part is not None and (len(part) != len(point) or not np.isfinite(part).all()):
+    for part, components in ((point, 3), (uv, 2), (light, 2), (color, 4)):
+        if part is None:
+            continue
+        if len(part) != len(point) or not np.isfinite(part).all():
             raise ValueError("attributes of other lengths, or not finite")
+        if part.shape[1] != components:
+            raise ValueError(f"an attribute of {part.shape[1]} components instead of {components}")
     if not len(indices) or len(indices) % 3 or indices.min() < 0 or indices.max() >= len(point):
         raise ValueError("indices that are no triangles of the vertices")
     material = document["materials"][primitive["material"]]["extras"]["material"]
-    if type(material) is not int or point.shape[1] != 3:
-        raise ValueError("a material without a number, or positions of other than 3 components")
+    if type(material) is not int:
+        raise ValueError("a material without a number")
     return Primitive(
         material,
         point,

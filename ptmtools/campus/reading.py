@@ -19,7 +19,8 @@ def read_campus(folder: str | os.PathLike[str]) -> Campus:
 
     Raises
     ------
-    InputError: PTM-I832 it cannot be read, PTM-I833 it is not as its schema says.
+    InputError: PTM-I832 it cannot be read, PTM-I833 it is not as its schema says, or an object has
+        fewer or more meshes than the campus has levels.
     LimitError: PTM-L831 it is too long.
     """
     file = Path(folder) / INDEX
@@ -42,12 +43,16 @@ def parse_campus(data: bytes, file: Path) -> Campus:
     if len(data) > LONGEST:
         raise LimitError("PTM-L831", "is too long for the index of a campus", file=file)
     try:
-        return Campus.from_document(schemas.read(data, schemas.CAMPUS))
+        campus = Campus.from_document(schemas.read(data, schemas.CAMPUS))
     except schemas.ShapeError as fault:
-        raise InputError(
-            "PTM-I833",
-            fault.message,
-            file=file,
-            place=fault.place or None,
-            remedy="write it again with `ptm campus`",
-        ) from None
+        raise _wrong(file, fault.place or None, fault.message) from None
+    for place, each in enumerate(campus.objects):
+        if len(each.meshes) != campus.lods:
+            what = f"has {len(each.meshes)} items, not {campus.lods}"
+            raise _wrong(file, f"objects[{place}].meshes", what)
+    return campus
+
+
+def _wrong(file: Path, place: str | None, what: str) -> InputError:
+    remedy = "write it again with `ptm campus`"
+    return InputError("PTM-I833", what, file=file, place=place, remedy=remedy)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from ptmtools.campus import CampusOptions, make_campus
-from ptmtools.campus.second_set import model_light, model_masks
+from ptmtools.campus.lights import LightImage
+from ptmtools.campus.making import _light_source
+from ptmtools.campus.second_set import ModelLight, model_light, model_masks
 from ptmtools.errors import InputError
 from ptmtools.scene import IngestOptions, ingest
 from tests.campus.made import MTL, write_campus, write_gltf
@@ -119,3 +122,12 @@ def test_nobody_is_told_of_masks_that_few_ask_for(tmp_path: Path) -> None:
     (tmp_path / "shine.png").unlink()
     scene = ingest(model, IngestOptions(unit="m", up="y", strict=True))
     assert "shine.png" not in scene.files
+
+
+def test_the_source_of_a_lightmap_is_the_largest_image() -> None:
+    """By its longer side: no client should leave out what has more texels than another source."""
+    images = tuple(LightImage(np.zeros(shape, np.uint8)) for shape in ((101, 10), (100, 2000)))
+    painted = ModelLight(np.zeros((2, 3, 2)), np.array([0, 1], np.int32), images)
+    work = SimpleNamespace(painted=painted)
+    assert _light_source(cast("Any", work), np.array([0, 1])) == (2000, 100)
+    assert _light_source(cast("Any", work), np.array([0])) == (10, 101)

@@ -163,6 +163,51 @@ def test_a_mesh_that_is_none(copy: Path, alter: Callable[[bytes], bytes]) -> Non
     assert "PTM-D826" in codes(copy)
 
 
+def with_json(data: bytes, alter: Callable[[Document], object]) -> bytes:
+    """A GLB whose JSON is changed."""
+    (_, _, text), (_, _, binary) = glb_chunks(data)
+    document = json.loads(text)
+    alter(document)
+    return glb([(JSON, json.dumps(document).encode()), (BINARY, binary)])
+
+
+@pytest.mark.parametrize(
+    ("alter", "what"),
+    [
+        (lambda d: d["bufferViews"][0].update(byteLength=10**12), "views of 1000000"),
+        (lambda d: d["bufferViews"].append({"byteLength": 10**30}), "views of 1000000"),
+        (lambda d: d["bufferViews"].append({"byteLength": -5}), "-5"),
+        (lambda d: d["bufferViews"].append({}), "byteLength"),
+    ],
+)
+def test_a_mesh_that_says_it_is_larger_than_it_is(
+    copy: Path, alter: Callable[[Document], object], what: str
+) -> None:
+    name = "meshes/House_1_1.glb"
+    rewrite(copy, name, with_json((copy / name).read_bytes(), alter))
+    (issue,) = (i for i in validate(copy).issues if i.code == "PTM-D826")
+    assert what in issue.message
+
+
+@pytest.mark.parametrize(
+    ("lod", "attribute", "kind"),
+    [(1, "TEXCOORD_0", "SCALAR"), (1, "TEXCOORD_1", "SCALAR"), (1, "POSITION", "VEC2"),
+     (0, "COLOR_0", "VEC3")],
+)  # fmt: skip
+def test_attributes_of_other_components(copy: Path, lod: int, attribute: str, kind: str) -> None:
+    """Fewer, so that all are there."""
+
+    def alter(document: Document) -> None:
+        for primitive in document["meshes"][0]["primitives"]:
+            if attribute in primitive["attributes"]:
+                document["accessors"][primitive["attributes"][attribute]]["type"] = kind
+
+    name = f"meshes/House_1_{lod}.glb"
+    rewrite(copy, name, with_json((copy / name).read_bytes(), alter))
+    (issue,) = (i for i in validate(copy).issues if i.code == "PTM-D826")
+    assert "components" in issue.message
+
+
 def test_an_image_of_another_size_or_format(copy: Path) -> None:
     name = "textures/wall_256_d.jpg"
     with Image.open(copy / "textures/wall_128_d.jpg") as image:
@@ -183,6 +228,16 @@ def test_an_index_that_is_none(copy: Path, capsys: pytest.CaptureFixture[str]) -
     assert "ptm campus MODEL" in capsys.readouterr().err
     assert main(["info", str(copy)]) == 3
     assert "PTM-I833" in capsys.readouterr().err
+
+
+def test_an_object_of_fewer_meshes_is_no_surprise(
+    copy: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    change(copy, lambda d: d["objects"][1]["meshes"].pop())
+    assert main(["info", str(copy)]) == 3
+    told = capsys.readouterr().err
+    assert "objects[1].meshes: has 1 items, not 2" in told
+    assert "PTM-I833" in told
 
 
 def test_an_index_that_cannot_be_read(copy: Path, tmp_path: Path) -> None:

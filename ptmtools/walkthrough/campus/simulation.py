@@ -89,8 +89,9 @@ class CampusRun:
 
     @property
     def idle_share(self) -> float:
-        """Of the walk's time, that in which nothing was on the way."""
-        return float(np.diff(self.idle, axis=1).sum() / self.time[-1])
+        """Of the walk's time, that in which nothing was on the way; 0 of a walk of one frame."""
+        whole = float(self.time[-1])
+        return float(np.diff(self.idle, axis=1).sum()) / whole if whole else 0.0
 
     @property
     def pauses(self) -> int:
@@ -125,6 +126,7 @@ def simulate_campus(
     link = Link(conditions or options.link(trace))
     client = CampusClient(world.stock, link, quality, options)
     frames, columns = world.frames, _Columns(world.stock)
+    wanted = min(max(options.nearest, 1), world.stock.objects)
     error = np.full(frames, np.nan)
     fetched = np.zeros(frames)
     memory, lacking = np.zeros(frames, np.int64), np.zeros(frames, np.int64)
@@ -141,7 +143,7 @@ def simulate_campus(
         waits.look(now)
         memory[f] = client.memory
         fetched[f] = link.bytes + sum(r.received for r in client.waiting)
-        lacking[f] = waits.lacking if client.order.size else max(options.nearest, 1)
+        lacking[f] = waits.lacking if client.order.size else wanted
         view = int(world.view[f])
         if world.tables is not None and view >= 0:
             error[f] = world.tables.wrong(view, *columns.of(client))

@@ -20,6 +20,7 @@ import numpy as np
 
 from ptmtools import schemas
 from ptmtools.arrays import Floats, Ints
+from ptmtools.campus.meshes import view_bytes
 from ptmtools.campus.model import CHANNELS, INDEX, LIGHT, PRESETS, SIZES, Campus, Quality
 from ptmtools.campus.names import texture_file
 from ptmtools.campus.reading import LONGEST, read_campus
@@ -44,7 +45,7 @@ class Stock:
     memory: (n,) of graphics memory; 0 of the index. most: (n,) what a client that knows only the
         index takes for that, never less: of a mesh the bytes of its file.
     boxes, barycentres: (m, 6), (m, 3) of the objects, metres.
-    bases: of textures, by their number; those that have a diffuse channel.
+    bases: of textures of the objects, by their number; those that have a diffuse channel.
     """
 
     campus: Campus
@@ -166,8 +167,8 @@ def _bytes(folder: Path, name: str, most: int) -> bytes:
 def _held(folder: Path, name: str, data: bytes) -> int:
     """Bytes of the vertices and indices of a mesh."""
     try:
-        views = schemas.parse(glb_chunks(data)[0][2])["bufferViews"]
-        return sum(int(view["byteLength"]) for view in views)
+        chunks = glb_chunks(data)
+        return view_bytes(schemas.parse(chunks[0][2]), chunks[1][2])
     except (ValueError, LookupError, TypeError, schemas.ShapeError) as fault:
         raise refused(folder / name, f"is no mesh of a campus ({fault})") from None
 
@@ -182,7 +183,13 @@ def _mipped(side: int) -> int:
 
 
 def _bases(campus: Campus) -> tuple[str, ...]:
-    named = (m.base for m in campus.materials if m.base is not None and CHANNELS[0] in m.channels)
+    """Those with colours of which some object has a material."""
+    used = {number for each in campus.objects for number in each.materials}
+    named = [
+        m.base
+        for number, m in enumerate(campus.materials)
+        if number in used and m.base is not None and CHANNELS[0] in m.channels
+    ]
     return tuple(dict.fromkeys(named))
 
 

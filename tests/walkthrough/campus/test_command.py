@@ -46,6 +46,18 @@ def test_options_and_json(folder: Path, walk: str, capsys: pytest.CaptureFixture
     assert max(low["memory"]["most"], cached["memory"]["most"]) <= 1 << 20
 
 
+def test_one_frame_and_more_near_than_there_are(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    eye, look = np.array([[-20.0, 1.6, 12]] * 2), np.array([[0.0, 0, -1]] * 2)
+    walk = tmp_path / "walk.json"
+    walk.write_text(walk_text(Walk(np.array([0.0, 0.1]), eye, look, 1.0472, 1.7778)))
+    asked = ["--walk", str(walk), "--nearest", "9" * 30, "--preset", "low", "--every", "0"]
+    assert main(["walk-campus", str(folder), *asked, "--json"]) == 0
+    (run,) = schemas.read(capsys.readouterr().out.encode(), schemas.CAMPUS_WALK)["runs"]
+    assert (run["idle"], run["late"]) == (0, 1)
+
+
 @pytest.mark.parametrize(
     ("asked", "code"),
     [

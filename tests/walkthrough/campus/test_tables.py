@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from functools import cache
 from itertools import product
@@ -249,16 +250,8 @@ def test_a_walk_with_every_preset(folder: Path) -> None:
 
 
 def test_a_campus_that_is_not_whole(folder: Path, tmp_path: Path) -> None:
-    def copy(name: str) -> Path:
-        made = tmp_path / name
-        for file in folder.rglob("*"):
-            if file.is_file():
-                to = made / file.relative_to(folder)
-                to.parent.mkdir(parents=True, exist_ok=True)
-                to.write_bytes(file.read_bytes())
-        return made
-
-    missing, changed, unlisted = (copy(name) for name in ("missing", "changed", "unlisted"))
+    names = ("missing", "changed", "unlisted")
+    missing, changed, unlisted = (Path(shutil.copytree(folder, tmp_path / name)) for name in names)
     next(missing.glob("meshes/*.glb")).unlink()
     file = next(changed.glob("textures/*.jpg"))
     file.write_bytes(file.read_bytes()[:-1] + b"x")
@@ -270,6 +263,16 @@ def test_a_campus_that_is_not_whole(folder: Path, tmp_path: Path) -> None:
         with pytest.raises(InputError, match=what) as fault:
             read_stock(made)
         assert fault.value.code == "PTM-I714"
+
+
+def test_materials_that_no_object_has_need_no_textures(folder: Path, tmp_path: Path) -> None:
+    made = Path(shutil.copytree(folder, tmp_path / "made"))
+    index = json.loads((made / "campus.json").read_text())
+    index["materials"].append(dict(index["materials"][0], base="nothing", channels=["d"]))
+    (made / "campus.json").write_text(json.dumps(index))
+    assert "nothing" not in read_stock(made).bases
+    (one,), (two,) = (walk_campus(each, WALK, CampusWalkOptions("low")) for each in (made, folder))
+    assert np.array_equal(one.error, two.error)
 
 
 @pytest.mark.parametrize(
