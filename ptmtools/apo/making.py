@@ -19,7 +19,7 @@ from ptmtools.apo.model import ApoOptions, Octree
 from ptmtools.apo.normals import corner_normals
 from ptmtools.apo.octree import Bounds
 from ptmtools.apo.painting import Paint, paint_of
-from ptmtools.apo.sampling import areas
+from ptmtools.apo.sampling import spacing_for
 from ptmtools.apo.texels import octree_of
 from ptmtools.arrays import Floats, Ints, Singles
 from ptmtools.executors import Executor
@@ -126,12 +126,14 @@ def octree_around(
     )
     corner = cube.inside(mesh.points)[mesh.triangles]
     surface = Surface(corner, mesh.normals[mesh.triangles].astype(np.float64)).cut_up(_LONGEST)
-    total = float(areas(surface.corner).sum())
     work = Work(
         source,
         surface,
         # Closer than half a leaf of the greatest depth samples say nothing more.
-        max(float(np.sqrt(total / (options.density * len(triangles)))), 0.5 ** (options.depth + 1)),
+        max(
+            spacing_for(surface.corner, options.density * len(triangles)),
+            0.5 ** (options.depth + 1),
+        ),
         Bounds(options.error, options.color_error, options.depth),
     )
     levels, missed = build(work, executor, progress)

@@ -14,6 +14,9 @@ import numpy as np
 
 from ptmtools.arrays import Floats, Ints
 
+#: By so much points are moved apart where they are too many.
+_FARTHER = 1.25
+
 
 class Points(NamedTuple):
     """Points of triangles.
@@ -39,6 +42,30 @@ def longest_first(corner: Floats) -> Ints:
     edge = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2)
     found: Ints = edge.argmax(axis=1)
     return found
+
+
+def spacing_for(corner: Floats, count: float) -> float:
+    """How far apart ``count`` points of (m, 3, 3) triangles are.
+
+    By area, unless thin triangles, whose points are a row however thin they are, would then have
+    more than as many again: then farther.
+    """
+    area = areas(corner)
+    longest = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).max(axis=1)
+    height = np.divide(2 * area, longest, out=np.zeros(len(corner)), where=longest > 0)
+    spacing = float(np.sqrt(area.sum() / count))
+    if not spacing:
+        return spacing
+    # At least one in each, so this ends.
+    while _points(height, longest, spacing) > 2 * max(count, len(corner)):
+        spacing *= _FARTHER
+    return spacing
+
+
+def _points(height: Floats, longest: Floats, spacing: float) -> float:
+    """About how many points triangles have."""
+    rows = np.maximum(height / spacing, 1)
+    return float((rows * np.maximum(longest / (2 * spacing), 1)).sum())
 
 
 def spread(corner: Floats, spacing: float) -> Points:

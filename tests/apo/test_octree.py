@@ -11,7 +11,7 @@ from hypothesis.extra import numpy as arrays
 
 from ptmtools.apo.cube import MARGIN, codes_of, cube_around
 from ptmtools.apo.octree import ENOUGH, Bounds, Level, Samples, averaged, divide, joined, pruned
-from ptmtools.apo.sampling import areas, at, spread
+from ptmtools.apo.sampling import areas, at, spacing_for, spread
 from ptmtools.arrays import Floats
 
 shares = st.floats(0, 1, exclude_max=True, width=32)
@@ -37,6 +37,20 @@ def test_a_thin_triangle_has_samples_along_its_length_and_none_too_many() -> Non
     x = np.sort(at(corner, points)[:, 0])
     assert len(x) == 25  # of 50 in a row half as long, half way up
     assert np.diff(x).max() < 0.03
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 300), st.sampled_from([1.0, 1e-2, 1e-4, 1e-9]))
+def test_samples_are_about_as_many_as_asked(seed: int, faces: int, thin: float) -> None:
+    """Of needles, too: by their area they would have thousands in a row."""
+    random = np.random.default_rng(seed)
+    corner = random.random((faces, 3, 3)) * [1, thin, thin]
+    count = 8 * faces
+    spacing = spacing_for(corner, count)
+    found = len(spread(corner, spacing).triangle)
+    assert faces <= found <= 3 * count
+    if thin == 1:
+        assert spacing == pytest.approx(np.sqrt(areas(corner).sum() / count))
+    assert spacing_for(corner * 0, count) == 0
 
 
 @pytest.mark.parametrize(
