@@ -17,6 +17,9 @@ from ptmtools.compiled import plain_kernel as kernel
 #: So many faces at an edge at most; an edge with more does not collapse.
 MOST_AT_EDGE = 64
 
+#: A vertex of so many corners is a hub.
+HUB = 32
+
 #: Where `State.number` counts faces, entries of the heap, marks given out, collapses made, and
 #: edges refused since all were tried; and says what collapses may do to the topology.
 FACES, ENTRIES, MARKS, MADE, REFUSED, TOPOLOGY = 0, 1, 2, 3, 4, 5
@@ -102,6 +105,17 @@ def prune(state: State, v: int) -> None:
 
 
 @kernel
+def is_hub(state: State, v: int) -> bool:
+    """Whether a vertex has many corners."""
+    corner = state.head[v]
+    for _ in range(HUB):
+        if corner < 0:
+            return False
+        corner = state.beyond[corner]
+    return True
+
+
+@kernel
 def meet(state: State, a: int, b: int) -> int:
     """Finds the faces at an edge and returns how many they are, -1 if too many.
 
@@ -109,7 +123,10 @@ def meet(state: State, a: int, b: int) -> int:
     itself and those from its ends to that vertex are kept.
     """
     triangle, kept, wedge, shared = state.triangle, state.kept, state.wedge, state.shared
-    count, corner = 0, state.head[a]
+    # Of the hub of a wheel every spoke would look at all others.
+    one, two = (b, a) if is_hub(state, a) else (a, b)
+    mine, theirs = (1, 0) if one == b else (0, 1)
+    count, corner = 0, state.head[one]
     while corner >= 0:
         t, k = corner // 3, corner % 3
         corner = state.beyond[corner]
@@ -117,20 +134,20 @@ def meet(state: State, a: int, b: int) -> int:
             continue
         after, last = (k + 1) % 3, (k + 2) % 3
         other, third = after, last
-        if triangle[t, last] == b:
+        if triangle[t, last] == two:
             other, third = last, after
-        elif triangle[t, after] != b:
+        elif triangle[t, after] != two:
             continue
         if count == MOST_AT_EDGE:
             return -1
         # The edge after a corner has the corner's bit; the one before it that of the last.
         to_other = k if other == after else last
         to_third = last if other == after else k
-        shared[count, 0] = wedge[t, k]
-        shared[count, 1] = wedge[t, other]
+        shared[count, mine] = wedge[t, k]
+        shared[count, theirs] = wedge[t, other]
         shared[count, 2] = triangle[t, third]
         shared[count, 3] = (kept[t] >> to_other) & 1
-        shared[count, 4] = (kept[t] >> to_third) & 1
-        shared[count, 5] = (kept[t] >> after) & 1
+        shared[count, 4 + mine] = (kept[t] >> to_third) & 1
+        shared[count, 4 + theirs] = (kept[t] >> after) & 1
         count += 1
     return count

@@ -353,3 +353,30 @@ def test_any_soup(seed: int, points: int, faces: int, target: int, painted: bool
         assert len(np.unique(left.triangles)) == len(left.points)
         many = any("faces are left" in note for note in found.notes)
         assert many == (len(left.triangles) > target)
+
+
+def test_what_is_painted_around_a_hub_stays_in_place() -> None:
+    """The point of a cone of 300 faces, each of which has its edges found from the rim."""
+    rng = np.random.default_rng(7)
+    turn = np.arange(300) * 2 * np.pi / 300
+    radius = 1 + 0.05 * rng.normal(size=300)
+    rim = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0 * turn], axis=1)
+    points = np.concatenate([[[0, 0, 1.0]], rim, [[0, 0, -1.0]]])
+    i, j = np.arange(300) + 1, (np.arange(300) + 1) % 300 + 1
+    triangles = np.concatenate(
+        [np.stack([0 * i, i, j], axis=1), np.stack([0 * i + 301, j, i], axis=1)]
+    ).astype(np.int32)
+    # A material for each quarter: lines of kept edges end at the hubs.
+    material = (np.tile(np.arange(300), 2) // 75).astype(np.int32)
+    given = Mesh(points, triangles, material, points[triangles][..., :2])
+    found = to(60, given).mesh
+    assert len(found.triangles) == 60
+    assert found.uv is not None
+    assert np.array_equal(found.uv, found.points[found.triangles][..., :2])
+    assert euler(found) == 2
+    assert found.material is not None
+    for number in range(4):
+        angle = np.arctan2(
+            *found.points[found.triangles[found.material == number]].mean(axis=1)[:, [1, 0]].T
+        )
+        assert (np.floor(angle % (2 * np.pi) / (np.pi / 2)) == number).all()
