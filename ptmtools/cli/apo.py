@@ -103,7 +103,7 @@ def _make(
     from ptmtools.executors import open_executor
     from ptmtools.executors.model import processors
     from ptmtools.scene import ingest
-    from ptmtools.scene.notes import warnings
+    from ptmtools.scene.notes import outside, warnings
 
     options, read = take(ApoOptions, values), take(IngestOptions, values)
     FORM.check(folder, force=force)
@@ -115,7 +115,7 @@ def _make(
             scene = ingest(model, read, progress, workers=workers or processors())
         made = make_apo(scene, options, executor, progress)
     FORM.write(folder, files_of(made), force=force)
-    for warning in [*warnings(scene.notes), *made.notes]:
+    for warning in [*warnings(outside(scene.notes)), *made.notes]:
         voice.warn(warning)
 
 

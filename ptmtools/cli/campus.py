@@ -45,23 +45,24 @@ def campus(
     options, reading = take(CampusOptions, values), take(IngestOptions, values)
     from ptmtools.campus.building import make_campus
     from ptmtools.executors.local import open_executor
-    from ptmtools.scene.notes import line, warnings
+    from ptmtools.scene.notes import line, outside, warnings
 
     with voice.progress() as progress, open_executor(workers) as executor:
         made = make_campus(
             model, folder, options, reading, executor, force=force, progress=progress
         )
+    said = outside(made.scene.notes)
     if as_json:
         seconds = {name: round(value, 3) for name, value in made.seconds.items()}
-        notes = [line(note) for note in made.scene.notes]
+        notes = [line(note) for note in said]
         voice.emit_json({**record(made.campus), "seconds": seconds, "notes": [*notes, *made.notes]})
         return
-    for warning in warnings(made.scene.notes):
+    for warning in warnings(said):
         voice.warn(warning)
     for note in made.notes:
         voice.warn(f"note: {note}")
     if voice.verbose:
-        for each in made.scene.notes:
+        for each in said:
             voice.warn(f"note: {line(each)}")
     voice.say(f"{folder}: {count(len(made.campus.files()) + 1, 'file')}")
     for text in summary(made.campus):

@@ -97,9 +97,12 @@ def _read_trimesh(path: Path, findings: Findings) -> Source:
         local = np.asarray(mesh.vertices, dtype=np.float64)
         if len(faces) and not 0 <= faces.min() <= faces.max() < len(local):
             raise InputError("PTM-I246", "a face names a vertex that does not exist", file=path)
+        # Infinite ones are told of with the faces that have them.
+        with np.errstate(invalid="ignore", over="ignore"):
+            points = local @ matrix[:3, :3].T + matrix[:3, 3]
         parts.append(
             Source(
-                points=local @ matrix[:3, :3].T + matrix[:3, 3],
+                points=points,
                 triangles=faces,
                 uv=np.zeros((len(faces), 3, 2)),
                 triangle_object=np.zeros(len(faces), dtype=np.int64),

@@ -28,6 +28,16 @@ WARNINGS = (
 )
 
 
+#: Of no meaning where a model is looked at from outside, as statues and the buildings of a campus
+#: are: there a face that is turned away from all rooms is as it should be.
+OF_ROOMS = frozenset({"PTM-N235"})
+
+
+def outside(notes: Iterable[Note]) -> list[Note]:
+    """Those that matter to who stands outside."""
+    return [note for note in notes if note.code not in OF_ROOMS]
+
+
 def line(note: Note, more: int = 0) -> str:
     """A note in one line, which may stand for more of its code."""
     where = f"{note.place}: " if note.place else ""

@@ -187,6 +187,8 @@ PLANTED: dict[str, list[Callable[[Path], object]]] = {
         lambda f: edit(f, lambda d: d["levels"].append(3)),
         lambda f: edit(f, lambda d: d.update(schema=2)),
         lambda f: edit(f, lambda d: d["cube"].update(side=0)),
+        lambda f: edit(f, lambda d: d["cube"].update(side=1e-308)),
+        lambda f: edit(f, lambda d: d["cube"]["low"].__setitem__(1, -1e308)),
         lambda f: edit(f, lambda d: d["normals"]["ends"].__setitem__(-1, 10**30)),
         lambda f: edit(f, lambda d: d["normals"]["ends"].__setitem__(-1, 4 * 10**9)),
     ],

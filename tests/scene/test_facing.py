@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
+from ptmtools.cli.main import main
 from ptmtools.scene import IngestOptions, ingest
 from ptmtools.scene.facing import TURNED_AWAY, turned_away
 
@@ -102,6 +103,18 @@ def test_it_is_noted_with_the_remedy(put: Put) -> None:
     assert scene.two_sided.all()
     assert scene.notes == ()
     assert ingest(put("sound.glb", glb(house()))).notes == ()
+
+
+def test_it_is_not_said_of_what_is_looked_at_from_outside(
+    put: Put, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Turned normals would be wrong there."""
+    path = str(put("house.glb", glb(inside_out(house()))))
+    for command in (["apo", path], ["campus", path, "--lightmaps", "none"]):
+        assert main([*command, "-o", str(tmp_path / command[0]), "-j", "1"]) == 0
+        assert "N235" not in capsys.readouterr().err
+    assert main(["info", path]) == 0
+    assert "N235" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", ["hospital", "gallery", "office"])

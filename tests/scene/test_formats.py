@@ -168,6 +168,16 @@ def test_nothing_is_imported_from_the_present_folder(
     assert len(ingest("a.dae").triangles) == 2
 
 
+@pytest.mark.filterwarnings("error")
+def test_infinite_coordinates_are_told_of_by_their_code_alone(put: Put) -> None:
+    head = (
+        PLY.format(more="", coords="").replace("vertex 4", "vertex 5").replace("face 1", "face 2")
+    )
+    scene = ingest(put("wall.ply", f"{head}{CORNERS}1 inf 0\n4 0 1 2 3\n3 0 1 4\n"))
+    assert len(scene.triangles) == 2
+    assert "PTM-N210" in {note.code for note in scene.notes}
+
+
 @pytest.mark.parametrize("name", ["wall.stl", "mixed.off"])
 def test_triangles_are_counted(put: Put, pymeshlab: None, name: str) -> None:
     path = put(name, MODELS[name])
