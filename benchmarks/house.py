@@ -1,88 +1,179 @@
-"""The shape of the code: sizes, circles between files, and places that name a stage.
+"""Measures the code: files, lines, statements, imports between packages, circles.
 
-    python benchmarks/house.py [ROOT …]
+    python benchmarks/house.py [ROOT …]     tables for each checkout, as Markdown
+    python benchmarks/house.py --check      exit 1 if an import goes up, and name it
 
-For each checkout a row for every folder, and then what should stay small. Logical lines are
-statements, docstrings not counted, however many physical lines they take.
+Logical lines are statements without docstrings. An import counts wherever it stands: at the top of
+a file, inside a function, under ``if TYPE_CHECKING``, or as text in a table
+(``"package.module:function"``). A *package* here is what stands directly below ``ptmtools``: a
+folder or a single file.
+
+Imports go down if packages can be put in an order in which each imports only later ones, that is,
+if they form no circle. ``ptmtools.lab`` simulates clients and compares settings: only the command
+line may import it, and nothing imports the command line.
 """
 
 from __future__ import annotations
 
+import argparse
 import ast
+import re
+import statistics
 import sys
-from collections import Counter
-from collections.abc import Iterator
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 
-TREES = ("ptmtools", "tests", "benchmarks")
-#: Names of stages that are not also everyday words of the code.
-STAGES = {"scene", "cells", "pvs", "ach", "textures", "emit"}
-LONG = 400
+PRODUCT, TOP, LABORATORY = "ptmtools", "cli", "lab"
+TREES = (PRODUCT, "tests", "benchmarks", "sample_data")
+#: Neither is ours to measure: what npm installs, what a build writes.
+SKIPPED = {"node_modules", "build", "dist", ".venv", "__pycache__"}
+WEB = {".js", ".mjs", ".ts", ".css", ".html", ".c", ".h"}
+#: A module, or a module and a name in it, as text.
+PLACE = re.compile(r"ptmtools(\.\w+)+(:\w+)?")
+LONG = 500
+
+Graph = Mapping[str, Set[str]]
 
 
 @dataclass(frozen=True)
 class Module:
-    """One file: its lines, its statements, what it imports and how often it names a stage."""
+    """One Python file: its dotted name, its sizes, and the modules that it imports."""
 
     path: Path
+    name: str
     lines: int
     logical: int
-    imports: frozenset[str]
-    stage_names: int
+    plain: frozenset[str]
+    """At run time, by a statement, at the top of the file or in a function."""
+    declared: frozenset[str]
+    """For types only, or as text that is imported when first used."""
+
+    @property
+    def package(self) -> str:
+        return self.name.split(".")[1] if "." in self.name else self.name
 
 
-def main() -> None:
-    for root in [Path(argument) for argument in sys.argv[1:]] or [Path()]:
-        report(root)
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("roots", nargs="*", type=Path, default=[Path()], metavar="ROOT")
+    parser.add_argument("--check", action="store_true", help="only check the imports")
+    given = parser.parse_args()
+    if not given.check:
+        for root in given.roots:
+            report(root)
+        return 0
+    wrong = [line for root in given.roots for line in violations(root)]
+    print("\n".join(wrong) or "Imports go down only.")
+    return int(bool(wrong))
+
+
+def violations(root: Path) -> list[str]:
+    """A line for each import, or circle of packages, that the rules forbid."""
+    modules = read_tree(root, PRODUCT)
+    wrong = [
+        f"{module.path} imports {target}: {rule}"
+        for module in modules
+        for target in sorted(module.plain | module.declared)
+        for package, allowed, rule in (
+            (LABORATORY, {LABORATORY, TOP}, f"only {TOP} may import the laboratory"),
+            (TOP, {TOP, "__main__"}, "nothing imports the command line"),
+        )
+        if package_of(target) == package and module.package not in allowed
+    ]
+    for circle in circles(between_packages(modules)):
+        wrong.append(f"packages in a circle: {', '.join(circle)}")
+        wrong += [
+            f"    {module.path} imports {target}"
+            for module in modules
+            for target in sorted(module.plain | module.declared)
+            if {module.package, package_of(target)} <= set(circle)
+            and module.package != package_of(target)
+        ]
+    return wrong
 
 
 def report(root: Path) -> None:
-    """Prints the figures of one checkout."""
-    print(f"{'folder':<28}{'files':>7}{'lines':>9}{'logical':>9}")
-    package: list[Module] = []
-    for tree in TREES:
-        modules = [read(root, file) for file in sorted((root / tree).rglob("*.py"))]
-        if tree == "ptmtools":
-            package = modules
-            rooms = Counter(module.path.relative_to(tree).parts[0] for module in modules)
-            for room in sorted(room for room in rooms if not room.endswith(".py")):
-                row(
-                    f"{tree}/{room}/",
-                    [m for m in modules if m.path.is_relative_to(f"{tree}/{room}")],
-                )
-        row(f"{tree}/", modules)
-    long = [module for module in package if module.lines > LONG]
-    naming = [module for module in package if module.stage_names]
-    print(f"files over {LONG} lines: {len(long)}")
-    print(f"folders of one module: {len(lonely(package))}")
-    found = circles(package)
-    print(f"circles between files: {len(found)}")
-    for circle in found:
-        print(f"    {', '.join(sorted(circle))}")
-    print(f"stage names as strings: {sum(m.stage_names for m in naming)} in {len(naming)} files")
+    """Prints the tables of one checkout."""
+    print(f"| {root.resolve().name} | files | lines | logical | median | largest |")
+    print("|---|---|---|---|---|---|")
+    trees = {tree: read_tree(root, tree) for tree in TREES}
+    product = trees[PRODUCT]
+    folders = sorted({m.package for m in product if len(m.path.parts) > 2})
+    for folder in folders:
+        size_row(f"{PRODUCT}/{folder}", [m for m in product if m.path.parts[1] == folder])
+    size_row(f"{PRODUCT}/*.py", [m for m in product if len(m.path.parts) == 2])
+    for tree, modules in trees.items():
+        size_row(f"**{tree}**", modules)
+    scripts = [path for tree in (PRODUCT, "web") for path in files(root / tree, WEB)]
+    web = {path: path.read_text("utf-8").count("\n") for path in scripts}
+    sizes = f"{len(web)} | {sum(web.values()):,} | | {middle(web.values())} | {most(web)}"
+    print(f"| **web and page** | {sizes} |")
+    words = {path: len(path.read_text("utf-8").split()) for path in files(root / "docs", {".md"})}
+    print(f"\ndocs: {len(words)} pages, {sum(words.values()):,} words")
+    print(f"files of {PRODUCT} over {LONG} lines: {sum(m.lines > LONG for m in product)}")
+    plain = {m.name: m.plain for m in product}
+    every = {m.name: m.plain | m.declared for m in product}
+    for title, graph in (
+        ("files, at run time", plain),
+        ("files, types and tables included", every),
+        ("packages", between_packages(product)),
+    ):
+        rings = circles(graph)
+        print(f"circles between {title}: {len(rings)}")
+        for ring in rings:
+            print(f"    {len(ring)}: {', '.join(ring)}")
+    if not circles(between_packages(product)):
+        print(f"packages, each above what it imports: {' '.join(order(between_packages(product)))}")
 
 
-def row(name: str, modules: list[Module]) -> None:
-    """Prints the sums over modules."""
-    lines, logical = sum(m.lines for m in modules), sum(m.logical for m in modules)
-    print(f"{name:<28}{len(modules):>7}{lines:>9,}{logical:>9,}")
+def size_row(name: str, modules: list[Module]) -> None:
+    """Prints the sizes of some modules; an empty ``__init__.py`` is no file of the median."""
+    lines = {module.path: module.lines for module in modules}
+    print(
+        f"| {name} | {len(modules)} | {sum(lines.values()):,} "
+        f"| {sum(m.logical for m in modules):,} | {middle(lines.values())} | {most(lines)} |"
+    )
+
+
+def middle(lines: Iterable[int]) -> int:
+    """The median of the files that have more than two lines."""
+    return round(statistics.median([count for count in lines if count > 2] or [0]))
+
+
+def most(lines: Mapping[Path, int]) -> str:
+    """The largest file and its lines."""
+    path = max(lines, key=lambda path: lines[path], default=None)
+    return f"{lines[path]:,} {path.name}" if path else ""
+
+
+def files(folder: Path, suffixes: Set[str]) -> list[Path]:
+    """The files below a folder that are part of the project, sorted."""
+    return sorted(
+        path
+        for path in folder.rglob("*")
+        if path.suffix in suffixes
+        and not SKIPPED & set(path.relative_to(folder).parts)
+        and path.is_file()
+    )
+
+
+def read_tree(root: Path, tree: str) -> list[Module]:
+    """The Python files of one tree of a checkout, measured."""
+    return [read(root, file) for file in files(root / tree, {".py"})]
 
 
 def read(root: Path, file: Path) -> Module:
     """Measures one file of a checkout."""
-    text = file.read_text()
+    text = file.read_text("utf-8")
     tree = ast.parse(text)
-    docstrings = {id(doc) for node in ast.walk(tree) if (doc := docstring(node)) is not None}
-    logical = sum(
-        isinstance(node, ast.stmt) and id(node) not in docstrings for node in ast.walk(tree)
-    )
-    names = sum(
-        isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value in STAGES
-        for node in ast.walk(tree)
-    )
     path = file.relative_to(root)
-    return Module(path, text.count("\n"), logical, frozenset(imported(tree, root)), names)
+    docs = {id(doc) for node in ast.walk(tree) if (doc := docstring(node)) is not None}
+    logical = sum(isinstance(node, ast.stmt) and id(node) not in docs for node in ast.walk(tree))
+    name = ".".join(path.with_suffix("").parts).removesuffix(".__init__")
+    plain, declared = imports(root, tree, name, docs)
+    return Module(path, name, text.count("\n"), logical, plain - {name}, declared - plain - {name})
 
 
 def docstring(node: ast.AST) -> ast.stmt | None:
@@ -90,71 +181,123 @@ def docstring(node: ast.AST) -> ast.stmt | None:
     if not isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
         return None
     first = node.body[0] if node.body else None
-    is_text = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
-    return first if is_text and isinstance(first.value.value, str) else None  # type: ignore[union-attr]
+    if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
+        return first if isinstance(first.value.value, str) else None
+    return None
 
 
-def imported(tree: ast.AST, root: Path) -> Iterator[str]:
-    """The modules of ours that a module imports anywhere, but for those that only types need."""
-    skipped = {
+def imports(
+    root: Path, tree: ast.AST, name: str, docs: Set[int]
+) -> tuple[frozenset[str], frozenset[str]]:
+    """The modules of the product that a file imports: at run time, and for types or as text."""
+    for_types = {
         id(inner)
         for node in ast.walk(tree)
-        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
         for inner in ast.walk(node)
     }
+    texts = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    plain: set[str] = set()
+    declared: set[str] = set()
     for node in ast.walk(tree):
-        if id(node) in skipped:
-            continue
+        places: Iterator[str] = iter(())
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names if alias.name.startswith("ptmtools"))
-        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("ptmtools"):
-            for alias in node.names:
-                inner = f"{node.module}.{alias.name}"
-                place = root / inner.replace(".", "/")
-                yield (
-                    inner
-                    if place.with_suffix(".py").exists() or place.is_dir()
-                    else str(node.module)
-                )
+            places = (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                base = ".".join([*name.split(".")[: -node.level], *base.split(".")]).strip(".")
+            places = (f"{base}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Constant | ast.JoinedStr) and id(node) not in texts:
+            text = written(node, name)
+            places = iter([text.replace(":", ".")] if PLACE.fullmatch(text) else [])
+        kept = {found for place in places if (found := module_of(root, place))}
+        by_statement = isinstance(node, ast.Import | ast.ImportFrom) and id(node) not in for_types
+        (plain if by_statement else declared).update(kept)
+    return frozenset(plain), frozenset(declared)
 
 
-def lonely(modules: list[Module]) -> list[Path]:
-    """Folders that hold one module besides an `__init__` of a line or two."""
-    folders = Counter(m.path.parent for m in modules if m.path.name != "__init__.py")
-    parents = {m.path.parent.parent for m in modules}
-    return [folder for folder, count in folders.items() if count == 1 and folder not in parents]
+def written(node: ast.Constant | ast.JoinedStr, name: str) -> str:
+    """A text of the source; in an f-string only ``__name__`` is replaced."""
+    if isinstance(node, ast.Constant):
+        return node.value if isinstance(node.value, str) else ""
+    parts = [
+        str(part.value)
+        if isinstance(part, ast.Constant)
+        else (name if ast.unparse(part).strip("f'\"{}") == "__name__" else "?")
+        for part in node.values
+    ]
+    return "".join(parts)
 
 
-def circles(modules: list[Module]) -> list[list[str]]:
-    """Groups of files that import each other, in however many steps (Tarjan)."""
-    named = {".".join(m.path.with_suffix("").parts).removesuffix(".__init__"): m for m in modules}
-    order: dict[str, int] = {}
+def module_of(root: Path, place: str) -> str | None:
+    """The longest part of a dotted name that is a file of the product, if there is any."""
+    parts = place.split(".")
+    while parts[0] == PRODUCT and len(parts) > 1:
+        path = root.joinpath(*parts)
+        if path.with_suffix(".py").is_file() or (path / "__init__.py").is_file():
+            return ".".join(parts)
+        parts.pop()
+    return None
+
+
+def package_of(module: str) -> str:
+    """The folder or file directly below the product in which a module stands."""
+    return module.split(".")[1]
+
+
+def between_packages(modules: list[Module]) -> dict[str, set[str]]:
+    """The packages that each package imports."""
+    graph: dict[str, set[str]] = defaultdict(set)
+    for module in modules:
+        targets = {package_of(target) for target in module.plain | module.declared}
+        graph[module.package] |= targets - {module.package}
+    return dict(graph)
+
+
+def order(graph: Graph) -> list[str]:
+    """Names, each before those that it imports; the graph has no circle."""
+    waiting = Counter(target for targets in graph.values() for target in targets)
+    ready = sorted((name for name in graph if not waiting[name]), reverse=True)
+    result: list[str] = []
+    while ready:
+        result.append(ready.pop())
+        for target in sorted(graph.get(result[-1], ()), reverse=True):
+            waiting[target] -= 1
+            if not waiting[target]:
+                ready.append(target)
+    return result
+
+
+def circles(graph: Graph) -> list[list[str]]:
+    """Groups of names that import each other, in however many steps (Tarjan 1972)."""
+    index: dict[str, int] = {}
     low: dict[str, int] = {}
     stack: list[str] = []
-    found: list[list[str]] = []
+    rings: list[list[str]] = []
 
     def visit(name: str) -> None:
-        order[name] = low[name] = len(order)
+        index[name] = low[name] = len(index)
         stack.append(name)
-        for other in named[name].imports & named.keys() - {name}:
-            if other not in order:
+        for other in sorted(graph[name] & graph.keys()):
+            if other not in index:
                 visit(other)
                 low[name] = min(low[name], low[other])
             elif other in stack:
-                low[name] = min(low[name], order[other])
-        if low[name] == order[name]:
-            circle = [stack.pop()]
-            while circle[-1] != name:
-                circle.append(stack.pop())
-            if len(circle) > 1:
-                found.append(circle)
+                low[name] = min(low[name], index[other])
+        if low[name] == index[name]:
+            at = stack.index(name)
+            ring = sorted(stack[at:])
+            del stack[at:]
+            if len(ring) > 1:
+                rings.append(ring)
 
     sys.setrecursionlimit(10_000)
-    for name in named:
-        if name not in order:
+    for name in graph:
+        if name not in index:
             visit(name)
-    return found
+    return rings
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
