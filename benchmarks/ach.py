@@ -19,7 +19,7 @@ speed       rays and sample points a second of each backend, and what the whole 
 processes   two processes against one
 
 Each part is a table in Markdown on the standard output, so that one ``--only`` prints what
-docs/tradeoffs.md shows of it. What else there is to say goes to the standard error, and all of it,
+docs/design/tradeoffs.md shows of it. Everything else goes to the standard error, and all of it,
 under headings, into `build/bench/ach.md`.
 """
 

@@ -116,14 +116,14 @@ def main() -> int:
     parser.add_argument("--check", action="store_true", help="write nothing; compare exact rows")
     given = parser.parse_args()
     failed = False
-    for page in sorted(ROOT.glob("docs/*.md")):
+    for page in sorted(ROOT.glob("docs/**/*.md")):
         for name in tables_of(page):
             timed = not TABLES[name].quick
             if name not in given.names if given.names else timed != given.timed:
                 continue
             if timed and given.check:
                 continue
-            where = f"docs/{page.name}: table {name}"
+            where = f"{page.relative_to(ROOT)}: table {name}"
             data = SHARED / TABLES[name].needs
             if not data.is_dir():
                 print(f"{where}: skipped, there is no {data}")

@@ -5,7 +5,7 @@ claims of the paper, row by row.
 
 Runs on the images of `../shared/textures`: of the photographs the 512 × 512 texels in the middle,
 so that nothing is scaled, and the textures of 1024 × 1024. Prints the tables of
-docs/format-interlace.md.
+docs/formats/interlace.md.
 
 - Adam7: a PNG written here, one deflate stream, filters and settings as Pillow's own; Pillow reads
   it back. Until a resolution: the bytes from which zlib has given the last row of the pass.

@@ -15,7 +15,7 @@ Severity = Literal["error", "warning"]
 
 @dataclass(frozen=True)
 class Issue:
-    """One finding of a validation; the codes stand in docs/database.md.
+    """One finding of a validation; the codes stand in docs/formats/database.md.
 
     Attributes
     ----------

@@ -32,7 +32,7 @@ from ptmtools.texture import (
 )
 
 LIMITS = Limits(decoded_bytes=1 << 24)
-#: Fields of the head of a `.ptm`: offset and bytes, as in docs/format-ptm.md.
+#: Fields of the head of a `.ptm`: offset and bytes, as in docs/formats/ptm.md.
 FIELDS = ((8, 2), (10, 1), (11, 1), (12, 4), (16, 4), (20, 1), (21, 1), (22, 1), (23, 1), (24, 4),
           (28, 4), (32, 4), (36, 4), (44, 8), (52, 8), (64, 8), (72, 8))  # fmt: skip
 

@@ -20,7 +20,7 @@ from ptmtools.findings import Findings, Severity, ValidationReport
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Limits
 
-#: Code → (severity, what it means). docs/format-apo.md repeats this table.
+#: Code → (severity, what it means). docs/formats/apo.md repeats this table.
 CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D850": ("error", "a file of an octree texture is missing, or cannot be read"),
     "PTM-D851": ("error", "apo.json does not match its schema, or contradicts itself"),

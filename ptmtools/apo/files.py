@@ -1,4 +1,4 @@
-"""An octree texture and its mesh as a folder (docs/format-apo.md; paper 2, §3.2 and §4).
+"""An octree texture and its mesh as a folder (docs/formats/apo.md; paper 2, §3.2 and §4).
 
 Each level of a stream ends with a full flush of deflate: from there on nothing refers to what was
 before, so that every prefix of whole levels inflates, and every level alone. The flushes of all

@@ -47,7 +47,7 @@ class ApoOptions:
 
 @dataclass(frozen=True)
 class Octree:
-    """An octree texture, whole or its first levels; docs/format-apo.md has its texels.
+    """An octree texture, whole or its first levels; docs/formats/apo.md has its texels.
 
     Attributes
     ----------

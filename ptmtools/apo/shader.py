@@ -1,5 +1,5 @@
 """The client's traversal as a fragment shader: normal mapping of the simplified mesh by the octree
-texture (Lacoste et al., section 3.2; docs/format-apo.md).
+texture (Lacoste et al., section 3.2; docs/formats/apo.md).
 
 The array of texels lies row by row in a texture of four unsigned bytes, `WIDTH` wide; the
 fragment's place in the cube is interpolated, its derivatives from pixel to pixel say where to stop.

@@ -1,4 +1,4 @@
-"""The nodes of an octree as texels, and back (docs/format-apo.md; paper 2, §3.2)."""
+"""The nodes of an octree as texels, and back (docs/formats/apo.md; paper 2, §3.2)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""What a client reads from an octree texture: the normal at a point (docs/format-apo.md, "Looking a
-normal up"; Lacoste et al., section 3.2).
+"""The normal of an octree texture at a point, as a client reads it (docs/formats/apo.md, "Looking
+a normal up"; Lacoste et al., section 3.2).
 
 Points are followed one by one in a kernel; `plain_look_up` takes all of them down a level at a
 time.

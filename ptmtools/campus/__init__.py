@@ -1,7 +1,7 @@
 """A model as a campus of objects with levels of detail (notes, section 4; the paper's II and III).
 
 `make_campus` writes a folder of meshes, textures by size and channel, lightmaps and one index,
-`campus.json`; docs/format-campus.md describes it. `read_campus` reads the index back.
+`campus.json`; docs/formats/campus.md describes it. `read_campus` reads the index back.
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ def apo(
     **values: Any,
 ) -> None:
     """Turn a mesh of many triangles into a simplified mesh and an octree texture of its normals,
-    which streams level by level (docs/format-apo.md), and draw such a folder.
+    which streams level by level (docs/formats/apo.md), and draw such a folder.
     """
     from ptmtools.apo.files import INDEX
     from ptmtools.apo.reading import read_index

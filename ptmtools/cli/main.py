@@ -93,8 +93,8 @@ def _stages() -> dict[str, Stage[Any]]:
 @click.group(
     cls=Commands,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog="`ptm COMMAND --help` explains a command. Exit statuses: docs/cli.md. Terms: "
-    "docs/glossary.md.",
+    epilog="`ptm COMMAND --help` explains a command. Exit statuses: docs/guide/cli.md. Terms: "
+    "docs/guide/glossary.md.",
 )
 @click.version_option(__version__, prog_name="ptm", message="%(prog)s %(version)s")
 @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")

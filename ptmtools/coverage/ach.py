@@ -4,8 +4,8 @@ For every cell, K points spread uniformly over its volume; at each, six square v
 each pixel, the cell of the surface that shows. ``ACH_j`` is the number of pixels of cell j over
 that of all cells of the PVS, so a row sums to 1.
 
-The paper takes 8 points and large views. The points decide (docs/coverage.md), so by default there
-are hundreds of them, with views of a few pixels.
+The paper takes 8 points and large views. The points decide (docs/design/coverage.md), so by default
+there are hundreds of them, with views of a few pixels.
 
 The paper draws "all the objects of its PVS". Here what else shows is found too, since only so can a
 pixel fall on a cell outside the PVS, which would be an error of the PVS or a crack in the model.

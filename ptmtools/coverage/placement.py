@@ -1,7 +1,7 @@
 """Where the sample points of a cell lie: spread over its volume.
 
 The paper takes "samples per cell whose COPs are uniformly distributed inside the cell" (§5).
-Position matters far more than resolution (docs/coverage.md), so there is a choice of how:
+Position matters far more than resolution (docs/design/coverage.md), so there is a choice of how:
 
 ``sobol``
     A scrambled Sobol' sequence in the cell's bounding box, of which the points in the cell are

@@ -61,7 +61,7 @@ class TextureRecord:
 
 @dataclass(frozen=True)
 class OctreeRecord:
-    """What the emitted files say of the octree texture of an object (docs/format-apo.md).
+    """What the emitted files say of the octree texture of an object (docs/formats/apo.md).
 
     Attributes
     ----------

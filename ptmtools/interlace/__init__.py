@@ -1,6 +1,6 @@
 """GPU image interlacing: an image as a row of files that sharpen it step by step (Englert et al.,
-"Efficient Image Distribution on the Web", 2014). One of the systems beside `.ptm`; docs/
-format-interlace.md has the format.
+"Efficient Image Distribution on the Web", 2014). One of the systems beside `.ptm`; the format
+is in docs/formats/interlace.md.
 
 The names below are loaded when first used, so that importing this package costs nothing.
 """

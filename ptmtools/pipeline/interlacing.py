@@ -2,7 +2,7 @@
 
 Of each `.ptm` the finest level is interlaced, as it is served: with what `--max-error` and `--trim`
 have left of it. Sides that are no powers of two are scaled, and one that is short is one file
-(docs/format-interlace.md). Floats, which images do not hold, are taken in eight bits, as clients
+(docs/formats/interlace.md). Floats, which images do not hold, are taken in eight bits, as clients
 show them.
 
 A database and an interlaced image know nothing of each other; this is above both.

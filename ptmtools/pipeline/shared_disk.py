@@ -2,9 +2,9 @@
 
 Only names and digests travel then: a worker reads the image where it lies and leaves what it makes
 in a folder of this run, from which it is moved to its place. (Through the process that builds, the
-bytes of images and textures keep eight workers busy and no more, docs/scaling.md.) The folder's
-name is new in every run, so whatever a forgotten worker of an earlier run still writes, it writes
-to nowhere.
+bytes of images and textures keep eight workers busy and no more, docs/design/scaling.md.) The
+folder's name is new in every run, so whatever a forgotten worker of an earlier run still writes,
+it writes to nowhere.
 """
 
 from __future__ import annotations

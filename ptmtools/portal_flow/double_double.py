@@ -6,7 +6,7 @@ coordinates are noise, and in a building that is turned the edges of doors that 
 longer do, by 1e-16 of its extent.
 
 Tried and dropped: integers of any length for what double-double cannot tell, which were asked for
-one sequence in a hundred and changed no set of any model (docs/visibility.md).
+one sequence in a hundred and changed no set of any model (docs/design/visibility.md).
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 A reader turns the file into triangles as the model has them (`obj`, `gltf`, `formats`); faces are
 then cleaned, the space is settled, and of the materials and images those are kept that some
 remaining face uses. What was guessed, dropped or missed stands in the notes, whose codes are in
-docs/cli.md.
+docs/guide/cli.md.
 """
 
 from __future__ import annotations

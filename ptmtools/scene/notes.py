@@ -1,4 +1,4 @@
-"""The notes of ingest as lines, and which of them are warnings; codes are in docs/cli.md."""
+"""The notes of ingest as lines, and which of them are warnings; codes are in docs/guide/cli.md."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
 """The shapes of the JSON documents that ptmtools writes or reads, and the strict reading of them.
 
-The schemas beside this file are published (docs/schemas.md), and they are the only description of
-the shapes: whoever reads a document here reads the schema with it. They are JSON Schema, draft
-2020-12, of which the keywords in `_RULES` are understood; a schema with another one does not
-compile. Three things are stricter than the draft: an integer is written without a fraction (2, not
-2.0), a number must be finite as a float64, and what a schema says nothing of is not nested deeper
-than `DEEPEST`.
+The schemas beside this file are published (docs/formats/schemas.md), and they are the only
+description of the shapes: whoever reads a document here reads the schema with it. They are JSON
+Schema, draft 2020-12, of which the keywords in `_RULES` are understood; a schema with another one
+does not compile. Three things are stricter than the draft: an integer is written without a fraction
+(2, not 2.0), a number must be finite as a float64, and what a schema says nothing of is not
+nested deeper than `DEEPEST`.
 
 A schema becomes nested functions, once. Lists of numbers, which are most of a large document, are
 checked by their set of types, their least and their greatest, ten times as fast as one by one. Of

@@ -1,7 +1,7 @@
 """The container: header and group table, before any texel is looked at.
 
 Everything a client needs to know about byte ranges is in the first few hundred bytes, under a CRC
-of its own. Specified in ``docs/format-ptm.md``.
+of its own. Specified in ``docs/formats/ptm.md``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How a level is cut into tiles (``docs/format-ptm.md``).
+"""How a level is cut into tiles (``docs/formats/ptm.md``).
 
 A level with a side of more than twice the tile's is cut into as many whole tiles as go into it
 each way; the last of a row or column takes what is left over, so that none is a sliver. Tiles

@@ -59,7 +59,7 @@ def page(title: str, site: Mapping[str, Any], script: str, preload: Sequence[str
     Parameters
     ----------
     title: of the page, as text.
-    site: what its script is told, see docs/publish.md. script: its URL.
+    site: what its script is told, see docs/guide/publish.md. script: its URL.
     preload: URLs of what it fetches first.
     """
     # Workers take the module out of the cache.

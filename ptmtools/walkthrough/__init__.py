@@ -1,1 +1,1 @@
-"""A walk over a modelled link, and what the walker sees of it (docs/walkthrough.md)."""
+"""A walk over a modelled link, and what the walker sees of it (docs/design/walkthrough.md)."""

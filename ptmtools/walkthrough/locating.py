@@ -9,7 +9,8 @@ import numpy as np
 
 from ptmtools.arrays import Floats, Ints
 
-#: Metres that an eye may be in front of a plane: leaves that touch then overlap (docs/hints.md).
+#: Metres that an eye may be in front of a plane: leaves that touch then overlap
+#: (docs/formats/hints.md).
 SLACK = 1e-3
 
 

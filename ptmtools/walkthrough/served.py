@@ -86,7 +86,7 @@ class Served:
     folder: it.
     index: `hints.json`. records: of each cell. statistics: of all of them.
     index_bytes, statistics_bytes: on the link, and record_bytes, geometry_bytes: (C,). All of it
-        counts as gzip makes it: servers send it so (docs/walkthrough.md).
+        counts as gzip makes it: servers send it so (docs/design/walkthrough.md).
     surfaces: the geometry of all cells.
     locator: of the cells.
     """

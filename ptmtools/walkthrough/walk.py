@@ -1,7 +1,7 @@
 """A walk: where a visitor's eye was, and where it looked, over time.
 
 Walks are made (`ptmtools.walkthrough.path`) or recorded from visitors, at any rate and not always
-evenly. Both are the same JSON document, whose schema is published (docs/walkthrough.md).
+evenly. Both are the same JSON document, whose schema is published (docs/design/walkthrough.md).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The way of the visitor: a walk document (docs/walkthrough.md) along the middle of the street."""
+"""The way of the visitor: a walk document (docs/design/walkthrough.md) along the street."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Octrees written and read by hand, straight from docs/format-apo.md."""
+"""Octrees written and read by hand, straight from docs/formats/apo.md."""
 
 from __future__ import annotations
 

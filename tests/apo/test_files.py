@@ -391,6 +391,6 @@ def test_frozen_folders() -> None:
 
 
 def test_the_documented_codes_are_those_that_there_are() -> None:
-    page = Path(__file__).resolve().parents[2] / "docs/format-apo.md"
+    page = Path(__file__).resolve().parents[2] / "docs/formats/apo.md"
     rows = re.findall(r"^\| (PTM-D\d+) \| (\w+) \| (.*) \|$", page.read_text(), re.MULTILINE)
     assert rows == [(code, *CODES[code]) for code in sorted(CODES)]

@@ -1,7 +1,7 @@
 """Small buildings, and what must come of each: which cells one can stand in, and where nobody can.
 
-It follows from the definitions in docs/cells.md, and was written down before the first run. Where
-these leave something open, nothing is expected.
+It follows from the definitions in docs/design/cells.md, and was written down before the first run.
+Where these leave something open, nothing is expected.
 """
 
 from __future__ import annotations

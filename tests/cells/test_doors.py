@@ -1,5 +1,5 @@
 """Door leaves: what is one, which of them open, and what follows. What is expected follows from the
-definitions in docs/cells.md; it was written before the first run.
+definitions in docs/design/cells.md; it was written before the first run.
 
 Rooms are 4 m high and lie along x; A ends at x = 4, B begins at x = 4.2, and the doorway between
 them is 1 m wide and 2.1 m high unless a test says otherwise.

@@ -1,5 +1,5 @@
 """Where somebody can stand, and that no such place is lost. What is expected follows from the
-definitions in docs/cells.md; it was written before the first run."""
+definitions in docs/design/cells.md; it was written before the first run."""
 
 from __future__ import annotations
 

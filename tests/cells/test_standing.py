@@ -1,4 +1,4 @@
-"""In which leaves one can stand, and what becomes of the others; as docs/cells.md defines it."""
+"""In which leaves one can stand, and the fate of the others, as docs/design/cells.md defines it."""
 
 from __future__ import annotations
 

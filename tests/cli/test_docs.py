@@ -14,10 +14,17 @@ import pytest
 from ptmtools.cli.main import ptm
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = sorted([*ROOT.glob("docs/*.md"), *ROOT.glob("*.md")])
+DOCS = sorted(ROOT.glob("docs/**/*.md"))
+PAGES = [
+    *DOCS,
+    *(p for at in ("*.md", "sample_data/*.md", "web/*/*.md") for p in sorted(ROOT.glob(at))),
+]
 FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 #: `[text](target)` and `![text](target)`, also over a line's end.
 LINK = re.compile(r"\]\(([^()\s]+)\)")
+#: A page or a picture that a file of the code names.
+NAMED_PAGE = re.compile(r"\b(docs/[\w/-]+\.(?:md|png|jpg))(#[\w-]+)?")
+SOURCES = {".py", ".js", ".mjs", ".c", ".h", ".json", ".md"}
 #: Code in a line, and a line of code.
 CODE = re.compile(r"`([^`\n]+)`|^ {4,}(\S.*)$", re.MULTILINE)
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
@@ -29,7 +36,7 @@ NEXT = re.compile(r"(,? and |, | to )(?:PTM-)?([A-Z]?)(\d{3})\b")
 def documented() -> tuple[set[str], set[str]]:
     """Codes that are named, and those that stand between two of them."""
     named, between = set(), set()
-    for file in (*ROOT.glob("docs/*.md"), ROOT / "README.md"):
+    for file in (*DOCS, ROOT / "README.md"):
         text = file.read_text("utf-8")
         for first in FIRST.finditer(text):
             letter, last = first[1], int(first[2])
@@ -75,7 +82,7 @@ def anchors(page: Path) -> set[str]:
     }
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_links_resolve(page: Path) -> None:
     for target in LINK.findall(FENCED.sub("", page.read_text("utf-8"))):
         if "://" in target:
@@ -84,6 +91,20 @@ def test_links_resolve(page: Path) -> None:
         file = (page.parent / name).resolve() if name else page
         assert file.is_file(), target
         assert not anchor or anchor in anchors(file), target
+
+
+def test_pages_that_the_code_names_exist() -> None:
+    tops = "ptmtools", "web", "tests", "benchmarks", "sample_data"
+    files = [f for top in tops for f in (ROOT / top).rglob("*") if f.suffix in SOURCES]
+    missing = []
+    for file in [*files, ROOT / "Makefile"]:
+        if "node_modules" in file.parts:
+            continue
+        for name, anchor in NAMED_PAGE.findall(file.read_text("utf-8")):
+            page = ROOT / name
+            if not page.is_file() or (anchor and anchor[1:] not in anchors(page)):
+                missing.append((str(file.relative_to(ROOT)), name + anchor))
+    assert missing == []
 
 
 def options_of_scripts() -> set[str]:
@@ -105,7 +126,9 @@ def options_of_commands() -> dict[str, set[str]]:
 
 #: Others speak of commands that were, or that somebody may add.
 @pytest.mark.parametrize(
-    "page", [p for p in PAGES if p.parent != ROOT or p.stem == "README"], ids=lambda p: p.name
+    "page",
+    [p for p in PAGES if p.parent != ROOT or p.stem == "README"],
+    ids=lambda page: str(page.relative_to(ROOT)),
 )
 def test_options_exist(page: Path) -> None:
     commands, scripts = options_of_commands(), options_of_scripts()

@@ -129,14 +129,14 @@ TRACE = {
 def test_schemas_are_schemas(name: str) -> None:
     schema = json.loads(schemas.schema_text(name))
     jsonschema.Draft202012Validator.check_schema(schema)
-    assert f"{name}.schema.json" in (DOCS / "schemas.md").read_text()
+    assert f"{name}.schema.json" in (DOCS / "formats/schemas.md").read_text()
     assert schema["$id"] == f"urn:ptmtools:{name}:{schema['properties']['schema']['const']}"
 
 
 @pytest.mark.parametrize("name", SERVED)
 def test_every_field_of_the_hints_is_described(name: str) -> None:
     schema = json.loads(schemas.schema_text(name))
-    page = (DOCS / "hints.md").read_text()
+    page = (DOCS / "formats/hints.md").read_text()
     objects = [schema, *(d for d in schema["$defs"].values() if d.get("type") == "object")]
     for parent in objects:
         for field, form in parent["properties"].items():

@@ -815,7 +815,7 @@ def test_no_folder(tmp_path: Path) -> None:
 
 
 def test_the_documented_codes_are_those_that_there_are() -> None:
-    text = (TESTS.parent / "docs/database.md").read_text()
+    text = (TESTS.parent / "docs/formats/database.md").read_text()
     rows = re.findall(r"^\| (PTM-D\d+) \| (\w+) \| (.*) \|$", text, re.MULTILINE)
     assert rows == [(code, *CODES[code]) for code in sorted(CODES)]
 

@@ -40,7 +40,7 @@ def written(
 
 
 class Client:
-    """Reads the hints as docs/hints.md has them."""
+    """Reads the hints as docs/formats/hints.md has them."""
 
     def __init__(self, www: Path) -> None:
         self.www = www

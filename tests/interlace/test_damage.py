@@ -325,7 +325,7 @@ def test_every_code_is_found_somewhere() -> None:
 
 
 def test_the_page_lists_the_codes() -> None:
-    page = (Path(__file__).resolve().parents[2] / "docs/format-interlace.md").read_text("utf-8")
+    page = (Path(__file__).resolve().parents[2] / "docs/formats/interlace.md").read_text("utf-8")
     rows = re.findall(r"^\| (PTM-D\d+) \| (\w+) \| (.*) \|$", page, re.MULTILINE)
     assert {code: (severity, meaning) for code, severity, meaning in rows} == dict(CODES)
 

@@ -58,5 +58,5 @@ def test_all_steps_of_an_image(shader: StepShader, size: tuple[int, int]) -> Non
 
 
 def test_the_page_has_this_shader() -> None:
-    page = Path(__file__).resolve().parents[2] / "docs/format-interlace.md"
+    page = Path(__file__).resolve().parents[2] / "docs/formats/interlace.md"
     assert f"```glsl{FRAGMENT}```" in page.read_text("utf-8")

@@ -55,7 +55,7 @@ def test_what_becomes_of_it(
     assert told <= {*feature.codes}
 
 
-TABLE = Path(__file__).parents[2] / "docs" / "prepare.md"
+TABLE = Path(__file__).parents[2] / "docs/guide/prepare.md"
 
 
 def rows_of_the_table() -> dict[tuple[str, str], str]:

@@ -145,7 +145,7 @@ def test_other_files(data: bytes, code: str) -> None:
     assert len(check(data)) == 1
 
 
-# Offsets as in docs/format-ptm.md.
+# Offsets as in docs/formats/ptm.md.
 @pytest.mark.parametrize(
     ("at", "packed", "code"),
     [

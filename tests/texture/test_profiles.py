@@ -85,12 +85,14 @@ def test_without_its_line_a_profile_is_unknown(toy: None, monkeypatch: pytest.Mo
 
 def test_the_table_is_what_the_pages_say(capsys: pytest.CaptureFixture[str]) -> None:
     assert len({profile.number for profile in PROFILES.values()}) == len(PROFILES)
-    numbers = re.search(r"\| profile: (.*?) \|", (DOCS / "format-ptm.md").read_text("utf-8"))
+    numbers = re.search(r"\| profile: (.*?) \|", (DOCS / "formats/ptm.md").read_text("utf-8"))
     assert numbers
     assert dict(re.findall(r"(\d+) `(\w+)`", numbers[1])) == {
         str(profile.number): name for name, profile in PROFILES.items()
     }
-    rows = re.findall(r"^\| `(\w+)` \| ", (DOCS / "codec.md").read_text("utf-8"), re.MULTILINE)
+    rows = re.findall(
+        r"^\| `(\w+)` \| ", (DOCS / "design/codec.md").read_text("utf-8"), re.MULTILINE
+    )
     assert rows[: len(PROFILES)] == list(PROFILES)
     assert main(["encode", "--help"]) == 0
     text = " ".join(capsys.readouterr().out.split())

@@ -15,7 +15,7 @@ import pytest
 from ptmtools.server.throttle import Throttle
 from ptmtools.viewer.site import Site
 
-DOCS = Path(__file__).parents[2] / "docs/publish.md"
+DOCS = Path(__file__).parents[2] / "docs/guide/publish.md"
 TEXTURES = re.compile(r"\.ptm$")
 
 
@@ -284,7 +284,7 @@ def test_links_and_questions_that_mean_nothing(visit: Callable[..., Any], museum
 
 
 def test_the_policy_of_the_docs(visit: Callable[..., Any], museum: Site) -> None:
-    """With the Content-Security-Policy of docs/publish.md nothing is refused."""
+    """With the Content-Security-Policy of docs/guide/publish.md nothing is refused."""
     told = re.search(r"^ *Content-Security-Policy: (.+)$", DOCS.read_text(), re.MULTILINE)
     assert told
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ptmtools.findings import Severity
 
-#: Code → (severity, what it means). docs/database.md repeats this table.
+#: Code → (severity, what it means). docs/formats/database.md repeats this table.
 CODES: dict[str, tuple[Severity, str]] = {
     "PTM-D650": (
         "error",

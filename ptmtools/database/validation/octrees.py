@@ -1,5 +1,5 @@
-"""What octree textures must satisfy beside what `hints.json` says of them (docs/format-apo.md), and
-beside the objects of the GLBs that they are of."""
+"""Checks octree textures against `hints.json` (docs/formats/apo.md) and against the objects of the
+GLBs that they belong to."""
 
 from __future__ import annotations
 

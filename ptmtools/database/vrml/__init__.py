@@ -1,4 +1,4 @@
 """Artifacts → VRML97: `root.wrl` and a file for every cell; and back: the strict reader of both.
 
-docs/database.md says what is in them.
+docs/formats/database.md says what is in them.
 """

@@ -3,7 +3,8 @@
 The coarsest level whole, in row-major order. Then for each level a group: the residual array, two
 bits for every component of every 2×2 block, and the partial level, which is the level in row-major
 order without the lower right texel s of each block. The paper leaves bit order, texel order and odd
-sizes open; ``docs/format-kinds.md`` and ``docs/format-ptm.md`` fix them. Samples are little endian.
+sizes open; ``docs/formats/ptm-kinds.md`` and ``docs/formats/ptm.md`` fix them. Samples are little
+endian.
 
 Integers: the two bits are the remainder of the block's sum by 4 and give s exactly (Eq. 3). Over a
 whole pyramid they cost 1/12 = 8.33 % of an image of 8 bits, which is 1/16 = 6.25 % of the pyramid

@@ -1,5 +1,5 @@
-// A walk as it was, for the simulator to walk it again (docs/walkthrough.md): a sample of each frame,
-// the age of the item buffer in it, and what the page had asked for before the first.
+// A walk as it was, for the simulator to walk it again (docs/design/walkthrough.md): a sample of each
+// frame, the age of the item buffer in it, and what the page had asked for before the first.
 
 import { clock } from "./net/fetcher.js";
 

@@ -1,4 +1,4 @@
-// The numbers of the overlay, for tests and for the curious (docs/viewer.md).
+// The numbers of the overlay, for tests and for the curious (docs/guide/viewer.md).
 
 /** @param {import("./walkthrough.js").Walkthrough} walk */
 export function stateOf(walk) {

@@ -1,5 +1,5 @@
 // The walk: each frame where the visitor is, what is drawn, what goes into texture memory and what is
-// asked for next (docs/client.md).
+// asked for next (docs/formats/client.md).
 
 import { beginningOf } from "./beginning.js";
 import { Comparison } from "./compare.js";

@@ -2,9 +2,9 @@
 and which of them each object needs.
 
 On the link every file is a request. The index and the meshes count as gzip makes them, as other
-clients' do (docs/walkthrough.md); images as they lie. In graphics memory a mesh takes the bytes of
-its vertices and indices, a texture or lightmap four bytes a texel and a third for its mip levels,
-whatever its channel.
+clients' do (docs/design/walkthrough.md); images as they lie. In graphics memory a mesh takes the
+bytes of its vertices and indices, a texture or lightmap four bytes a texel and a third for its mip
+levels, whatever its channel.
 """
 
 from __future__ import annotations

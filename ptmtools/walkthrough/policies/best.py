@@ -1,4 +1,4 @@
-"""`best`: what the viewer does (docs/client.md).
+"""`best`: what the viewer does (docs/formats/client.md).
 
 `Screen`, with what lies around by distance and by need, half and half. Distance is right about what
 one may walk up to, need about what one sees from where one can stand, and how fine; together they

@@ -32,7 +32,7 @@ from ptmtools.walkthrough.view.frustum import NEAR
 from ptmtools.walkthrough.world import World
 
 #: Width of a ring around the camera, metres. Narrower ones make worse pictures, wider ones none
-#: that are better everywhere (docs/neighbours.md).
+#: that are better everywhere (docs/design/neighbours.md).
 RING = 8.0
 
 

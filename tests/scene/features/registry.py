@@ -2,7 +2,7 @@
 
 Outcomes are those of the formats' specifications: glTF 2.0 and its extensions, the OBJ and MTL
 appendices of Wavefront's manual, and, for colours of vertices in OBJ, what scanners write.
-`docs/prepare.md` has them as a table, which `test_features.py` holds against these.
+`docs/guide/prepare.md` has them as a table, which `test_features.py` holds against these.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Writes ``docs/format-vectors.md``: small groups in hex with what a decoder meets on its way.
+"""Writes ``docs/formats/ptm-vectors.md``: small groups in hex with what a decoder meets on its way.
 
     PYTHONPATH=. python tests/texture/vectors/page.py
 
@@ -24,7 +24,7 @@ from ptmtools.texture.coders.repeats import coder as repeats, reference as repea
 from ptmtools.texture.coders.texel import coder as texel, reference as texel_reference
 from ptmtools.texture.pyramid import mean_below
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "format-vectors.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs/formats/ptm-vectors.md"
 Texels = NDArray[np.uint8]
 
 #: Sorts of symbols of the coder repeats, by their first table.
@@ -270,7 +270,7 @@ def page() -> str:
         [
             "# The `.ptm` format: test vectors\n",
             "Small files and groups, with the numbers that a decoder meets on its way, for whoever "
-            "implements\n[format-ptm.md](format-ptm.md) and finds that something is off. Bytes and "
+            "implements\n[ptm.md](ptm.md) and finds that something is off. Bytes and "
             "texels are in hexadecimal,\nother numbers in decimal unless they begin with 0x. "
             "`tests/texture/vectors/page.py` writes this page,\nfrom decoders that were written "
             "line by line from the specification.\n",

@@ -1,4 +1,4 @@
-// The Haar coder (docs/format-ptm.md, "Haar coder"), eight blocks at a time.
+// The Haar coder (docs/formats/ptm.md, "Haar coder"), eight blocks at a time.
 //
 // What is predicted of a row of differences, and the tables of its symbols, do not depend on the
 // symbols of the row itself. So one pass over a row predicts, one decodes, one makes differences of

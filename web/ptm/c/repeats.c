@@ -1,4 +1,4 @@
-// The repeats coder (docs/format-ptm.md, "Repeats coder"): blocks and texels that were seen before.
+// The repeats coder (docs/formats/ptm.md, "Repeats coder"): blocks and texels that repeat.
 
 #include "rans.h"
 

@@ -1,5 +1,5 @@
-// The texel coder for bytes within an error (docs/format-kinds.md, "The texel coder"): numbers are
-// values, and no fourth texel follows from the others.
+// The texel coder for bytes within an error (docs/formats/ptm-kinds.md, "The texel coder"): numbers
+// are values, and no fourth texel follows from the others.
 
 #include "rans.h"
 

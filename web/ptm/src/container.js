@@ -1,5 +1,5 @@
 // The head of a file: sizes, levels and their byte ranges, under a checksum of its own
-// (docs/format-ptm.md, "File").
+// (docs/formats/ptm.md, "File").
 
 import { crc32 } from "./crc32.js";
 import { PtmError } from "./errors.js";

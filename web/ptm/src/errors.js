@@ -1,4 +1,4 @@
-// What is wrong with a file, under the codes that `ptm` has for it (docs/cli.md).
+// What is wrong with a file, under the codes that `ptm` has for it (docs/guide/cli.md).
 
 export class PtmError extends Error {
   /**

@@ -1,5 +1,5 @@
 // The built-in frequency tables, which encoder and decoder agree on without sending them
-// (docs/format-ptm.md, "Tables and symbols"; docs/format-kinds.md, "Entropy coding").
+// (docs/formats/ptm.md, "Tables and symbols"; docs/formats/ptm-kinds.md, "Entropy coding").
 
 const SUM = 2048;
 const ESCAPE = 255;

@@ -1,4 +1,4 @@
-// How a level is cut into tiles (docs/format-ptm.md, "Groups and tiles").
+// How a level is cut into tiles (docs/formats/ptm.md, "Groups and tiles").
 
 /**
  * Tiles across and down.

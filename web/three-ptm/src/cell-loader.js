@@ -1,5 +1,5 @@
-// Cells from their GLBs, as docs/gltf.md describes them: in unlit materials, with textures of
-// one's own.
+// Cells from their GLBs, as docs/formats/gltf.md describes them: in unlit materials, with the textures
+// of this adapter.
 
 import { ClampToEdgeWrapping, Mesh, MeshBasicMaterial, RepeatWrapping, Texture } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";

@@ -1,4 +1,4 @@
-// Which cell holds a point (docs/hints.md, "leaves").
+// Which cell holds a point (docs/formats/hints.md, "leaves").
 
 import { Plane, Vector3 } from "three";
 

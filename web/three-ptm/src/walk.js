@@ -1,5 +1,5 @@
 // A walk through a database: what can be seen from the viewer's cell, as its hints say
-// (docs/hints.md).
+// (docs/formats/hints.md).
 
 import { Group } from "three";
 import { DecoderWorkers } from "ptm-decoder";

@@ -5,7 +5,7 @@ it walks the block rows of a level, predicts the three Haar differences of every
 the decoder knows, and either collects the residuals (encoding) or takes them from the rANS stream
 and writes the texels (decoding). A whole row of one coefficient is predicted before its first
 residual is needed, which lets the compiler use vector instructions and keeps four rANS lanes busy.
-The arithmetic is exact in 32-bit integers; the format is specified in ``docs/format-ptm.md``.
+The arithmetic is exact in 32-bit integers; the format is specified in ``docs/formats/ptm.md``.
 
 Allocating scratch arrays inside the pass was rejected: it added half to the time to compile it.
 """

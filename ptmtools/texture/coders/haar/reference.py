@@ -1,4 +1,4 @@
-"""A decoder of the Haar coder in plain Python, written line by line from ``docs/format-ptm.md``.
+"""A decoder of the Haar coder in plain Python, written line by line from ``docs/formats/ptm.md``.
 
 It shares nothing with the compiled decoder but the numbers of `layout`, the order of planes and how
 bytes are read. The tests compare the two; whoever ports the format can step through it. Thousands

@@ -4,7 +4,7 @@ A strip is 32 blocks wide. Its blocks are walked row by row, the four texels of 
 order p q r s. Every texel is predicted by least squares, and what is known about its residual is
 turned into binary decisions. One pass serves both directions, so that encoder and decoder cannot
 disagree about a prediction. See `coder` for the planes and the order of strips, and
-``docs/profile-small.md`` for the format.
+``docs/formats/ptm-small.md`` for the format.
 
 Everything here is in integers; see `squares` for the one part that is not.
 """

@@ -1,4 +1,4 @@
-"""A decoder of the context mixing coder in plain Python, written from ``docs/profile-small.md``.
+"""Decodes the context mixing coder in plain Python; written from ``docs/formats/ptm-small.md``.
 
 It shares nothing with the compiled decoder but the numeric tables and the order of planes. The
 tests compare the two; whoever ports the format can step through it. Thousands of times slower; no

@@ -1,4 +1,4 @@
-"""Frequency tables and rANS in plain Python, written line by line from ``docs/format-ptm.md``."""
+"""Frequency tables and rANS in plain Python, written line by line from ``docs/formats/ptm.md``."""
 
 from __future__ import annotations
 

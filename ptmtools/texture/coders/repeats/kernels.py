@@ -6,7 +6,7 @@ block seen in the same surroundings. If none of these is the one, smooth blocks
 are coded by their Haar differences, rough ones texel by texel: each is a neighbour, or the last
 texel seen in the same surroundings, or new, and then its samples are predicted. A texel is one
 32-bit number, so that components cost nothing while something repeats. There is no search: encoder
-and decoder take the same time, in proportion to the blocks. ``docs/format-ptm.md`` specifies it.
+and decoder take the same time, in proportion to the blocks. ``docs/formats/ptm.md`` specifies it.
 
 Tried, in sizes relative to PNG on an atlas of an office / a page of small text in colour: asking by
 the mean alone 1.35 / 3.37; by the neighbouring texels 1.31 / 1.36; by the means all around 2.22 /

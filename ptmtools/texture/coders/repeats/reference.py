@@ -1,4 +1,4 @@
-"""A decoder of the repeats coder in plain Python, written from ``docs/format-ptm.md``.
+"""A decoder of the repeats coder in plain Python, written from ``docs/formats/ptm.md``.
 
 It shares nothing with the compiled decoder but the order of planes and how bytes are read. The
 tests compare the two; whoever ports the format can step through it. No damage is looked for.

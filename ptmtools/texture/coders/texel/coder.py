@@ -6,7 +6,7 @@ A group is one byte that names its form, then what that form needs:
 - *plain*: all texels of the level, whatever is below: nothing takes more than this and one byte.
 - *coded*, with built-in or with sent weights: every texel predicted from the level below and the
   texels before it, the residual as a token (coded with rANS by the activity around it) and plain
-  bits. ``kernels`` has the pass, ``docs/format-kinds.md`` the format.
+  bits. ``kernels`` has the pass, ``docs/formats/ptm-kinds.md`` the format.
 
 Whole pyramids over what zstd -19 makes of the finest level alone: photographs of 16 bits 0.82, as
 float32 0.90, half-float environment maps 0.66 … 0.80, Radiance files 0.68 … 0.83, 8 bits widened to

@@ -7,7 +7,7 @@ and plain bits. Encoder and decoder share all of it, so they cannot disagree abo
 
 Everything is exact: integers below 2^53, and for the range of the fourth texel of floats additions
 and multiplications of float64 in a fixed order. The format is specified in
-``docs/format-kinds.md``.
+``docs/formats/ptm-kinds.md``.
 
 A whole row at a time, as in the Haar coder, was rejected: it must do without the texels to the
 left, and a texel at a time is fast enough for what is not 8 bits.

@@ -1,4 +1,4 @@
-"""A decoder of the texel coder in plain Python, written line by line from ``docs/format-kinds.md``.
+"""Decodes the texel coder in plain Python; written line by line from ``docs/formats/ptm-kinds.md``.
 
 It shares nothing with the compiled decoder but the numbers of `layout`, the order of planes and how
 bytes are read. The tests compare the two; whoever ports the format can step through it. Thousands

@@ -1,4 +1,4 @@
-// The shapes of a cell, from its GLB: the form that docs/gltf.md describes, and nothing beyond it.
+// The shapes of a cell, from its GLB: the form that docs/formats/gltf.md specifies, and no other.
 
 /**
  * Triangles with one look.

@@ -1,5 +1,5 @@
-// The record of a cell: read, and refused if it is not what docs/hints.md describes, since a file may
-// be damaged and still be JSON.
+// The record of a cell: read, and refused if it is not what docs/formats/hints.md describes, since a file
+// may be damaged and still be JSON.
 
 /** @typedef {import("./site.js").CellRecord} CellRecord */
 

@@ -1,5 +1,5 @@
-// The policy of docs/client.md: what is worth most for its bytes, by the pixels of the view, by
-// what is near and by what is needed. What should be in texture memory is chosen to the last level
+// The policy of docs/formats/client.md: what is worth most for its bytes, by the pixels of the view,
+// by what is near and by what is needed. What should be in texture memory is chosen to the last level
 // that fits; what is missing of that is asked for in ranges of a fraction of a second, so that
 // little is under way that may not be wanted any more. When nothing is missing it goes on with what
 // is worth most beyond the budget.

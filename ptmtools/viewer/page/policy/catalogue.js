@@ -21,7 +21,7 @@
  */
 
 /**
- * The parts of an index that are read here (docs/hints.md).
+ * The parts of an index that are read here (docs/formats/hints.md).
  * @typedef {object} Index
  * @property {{width: number, height: number, components: number, texelBytes: number,
  *   gpuTexelBytes?: number, ends: number[], differences?: number[], color?: number[]}[]} textures

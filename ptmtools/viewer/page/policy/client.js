@@ -1,5 +1,5 @@
 // A client on a walk: it knows what has arrived, and a policy says from that what should be in
-// texture memory and what to ask for next (docs/client.md).
+// texture memory and what to ask for next (docs/formats/client.md).
 
 import { Downloads } from "./downloads.js";
 import { knownOf, shapesOf } from "./knowledge.js";

@@ -1,7 +1,7 @@
 // What is known of a cell, from its record and its geometry.
 
 /**
- * The parts of a record that are read here (docs/hints.md).
+ * The parts of a record that are read here (docs/formats/hints.md).
  * @typedef {object} CellRecord
  * @property {number[]} adjacent
  * @property {number[]} visible
@@ -20,7 +20,7 @@
  * @property {number[]} visible cells that it may see, itself first
  * @property {Float64Array} coverage of each of these; none is 0
  * @property {number[]} textures of all that it may see
- * @property {number[][] | undefined} need see docs/hints.md
+ * @property {number[][] | undefined} need see docs/formats/hints.md
  * @property {Float64Array} hull points of its leaves, x, y, z of each
  * @property {CellRecord["portals"]} portals
  */

@@ -5,7 +5,8 @@ import { dot, facing } from "./vectors.js";
 /** @typedef {ArrayLike<number>} Vector */
 /** @typedef {{leaves: {points: number[][], faces: number[][]}[], adjacent: number[]}} CellRecord */
 
-// Metres that an eye may be in front of a plane: leaves that touch then overlap (docs/hints.md).
+// Metres that an eye may be in front of a plane: leaves that touch then overlap
+// (docs/formats/hints.md).
 const SLACK = 1e-3;
 
 /**

@@ -1,4 +1,4 @@
-// The Haar coder (docs/format-ptm.md, "Haar coder"): a row of one difference at a time, whose
+// The Haar coder (docs/formats/ptm.md, "Haar coder"): a row of one difference at a time, whose
 // predictions and tables do not depend on the symbols of the row itself.
 
 import { damaged } from "../errors.js";

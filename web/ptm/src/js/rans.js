@@ -1,4 +1,4 @@
-// Frequency tables and interleaved rANS (docs/format-ptm.md, "Tables and symbols").
+// Frequency tables and interleaved rANS (docs/formats/ptm.md, "Tables and symbols").
 
 import { damaged } from "../errors.js";
 

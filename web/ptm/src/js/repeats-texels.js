@@ -1,4 +1,5 @@
-// Sums of texels and of their bytes: keys, differences, means (docs/format-ptm.md, "Repeats coder").
+// Sums of texels and of their bytes: keys, differences, means (docs/formats/ptm.md, "Repeats
+// coder").
 
 import { damaged } from "../errors.js";
 

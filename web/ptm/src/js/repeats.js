@@ -1,4 +1,4 @@
-// The repeats coder (docs/format-ptm.md, "Repeats coder"): blocks and texels that were seen before.
+// The repeats coder (docs/formats/ptm.md, "Repeats coder"): blocks and texels that repeat.
 // Texels and keys are signed numbers of 32 bits here, which comes to the same.
 
 import { damaged } from "../errors.js";

@@ -1,4 +1,4 @@
-// What a texel is predicted from, and the built-in weights (docs/format-kinds.md).
+// What a texel is predicted from, and the built-in weights (docs/formats/ptm-kinds.md).
 
 /** Rows and columns, from p, of the ten neighbours of p, q, r and s. */
 export const NEIGHBOURS = [
