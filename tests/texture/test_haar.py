@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from ptmtools.texture.coders.haar import coder as haar
-from ptmtools.texture.coders.haar.reference import decode_haar
-from ptmtools.texture.coders.rans.reference import read_tables
 from ptmtools.texture.coders.reading import Reader
 from ptmtools.texture.pyramid import mean_below
 from tests.texture.coding import textured
+from tests.texture.oracles.haar import decode_haar
+from tests.texture.oracles.rans import read_tables
 
 
 @pytest.mark.parametrize(

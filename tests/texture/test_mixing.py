@@ -6,10 +6,10 @@ import pytest
 from ptmtools.errors import InputError
 from ptmtools.texture.coders.mixing import tables
 from ptmtools.texture.coders.mixing.coder import _split, decode_mixing, encode_mixing
-from ptmtools.texture.coders.mixing.reference import ReferenceState, decode_reference
 from ptmtools.texture.profiles import small
 from ptmtools.texture.pyramid import build_pyramid, mean_below
 from tests.texture.coding import coded_groups
+from tests.texture.oracles.mixing import ReferenceState, decode_reference
 
 
 def _image(height, width, components, seed=1):

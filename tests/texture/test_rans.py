@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
 from ptmtools.texture.coders.rans import kernels, tables
-from ptmtools.texture.coders.rans.reference import Symbols, built_in, normalised, read_tables
 from ptmtools.texture.coders.rans.sizes import Sink
 from ptmtools.texture.coders.rans.stream import Stream, encode_symbols, read_stream
 from ptmtools.texture.coders.reading import Reader
+from tests.texture.oracles.rans import Symbols, built_in, normalised, read_tables
 
 TABLES = 29
 

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from ptmtools.texture.coders.repeats import coder as repeats, symbols
-from ptmtools.texture.coders.repeats.reference import decode_repeats
 from ptmtools.texture.pyramid import mean_below
+from tests.texture.oracles.repeats import decode_repeats
 
 
 def zoo() -> dict[str, NDArray[np.uint8]]:

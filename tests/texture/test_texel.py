@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
 from ptmtools.texture.coders.rans import tables
-from ptmtools.texture.coders.texel import coder, kernels, layout, numbering, reference
+from ptmtools.texture.coders.texel import coder, kernels, layout, numbering
 from ptmtools.texture.profiles.raw import group_length
 from ptmtools.texture.pyramid import build_pyramid, mean_below
 from ptmtools.texture.samples import KINDS, from_ordered, round_to, to_ordered
+from tests.texture.oracles import texel as reference
 
 DTYPES = [np.dtype(name) for name in KINDS]
 WIDE = [np.dtype(name) for name in ("uint16", "float16", "float32")]

@@ -17,12 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.texture import EncodeOptions, encode, read_header
-from ptmtools.texture.coders.haar import coder as haar, reference as haar_reference
+from ptmtools.texture.coders.haar import coder as haar
 from ptmtools.texture.coders.planes import plane_order
-from ptmtools.texture.coders.rans.reference import Symbols, built_in
-from ptmtools.texture.coders.repeats import coder as repeats, reference as repeats_reference
-from ptmtools.texture.coders.texel import coder as texel, reference as texel_reference
+from ptmtools.texture.coders.repeats import coder as repeats
+from ptmtools.texture.coders.texel import coder as texel
 from ptmtools.texture.pyramid import mean_below
+from tests.texture.oracles import (
+    haar as haar_reference,
+    repeats as repeats_reference,
+    texel as texel_reference,
+)
+from tests.texture.oracles.rans import Symbols, built_in
 
 PAGE = Path(__file__).resolve().parents[3] / "docs/formats/ptm-vectors.md"
 Texels = NDArray[np.uint8]

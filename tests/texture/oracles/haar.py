@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from ptmtools.texture.coders.haar import layout
 from ptmtools.texture.coders.planes import plane_order, references
-from ptmtools.texture.coders.rans.reference import Symbols, read_tables
 from ptmtools.texture.coders.reading import Reader
+from tests.texture.oracles.rans import Symbols, read_tables
 
 Row = list[int]
 Plane = list[Row]

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.haar.reference import edge
 from ptmtools.texture.coders.mixing import tables
 from ptmtools.texture.coders.planes import plane_order
+from tests.texture.oracles.haar import edge
 
 SQUASH: list[int] = tables.squash().tolist()
 STRETCH: list[int] = tables.stretch(tables.squash()).tolist()

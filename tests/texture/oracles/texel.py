@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.texture.coders.planes import plane_order, references
-from ptmtools.texture.coders.rans.reference import Symbols, normalised, read_tables
 from ptmtools.texture.coders.reading import Reader
 from ptmtools.texture.coders.texel import layout
+from tests.texture.oracles.rans import Symbols, normalised, read_tables
 
 CLASSES, NARROW, GRID, TABLES = 18, 216, 232, 236
 

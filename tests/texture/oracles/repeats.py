@@ -11,10 +11,10 @@ from collections import defaultdict
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.haar.reference import by_value, edge
 from ptmtools.texture.coders.planes import plane_order
-from ptmtools.texture.coders.rans.reference import Symbols, read_tables
 from ptmtools.texture.coders.reading import Reader
+from tests.texture.oracles.haar import by_value, edge
+from tests.texture.oracles.rans import Symbols, read_tables
 
 #: A texel: one integer for each component.
 Texel = tuple[int, ...]
