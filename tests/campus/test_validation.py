@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import zlib
 from collections.abc import Callable
@@ -281,3 +282,9 @@ def test_meshes_of_strangers(copy: Path, alter: Callable[[Document], object]) ->
 def test_sizes_that_no_file_has(copy: Path) -> None:
     change(copy, put("textures", 0, "bytes", value=10**30))
     assert codes(copy) == {"PTM-D821"}
+
+
+def test_the_page_lists_the_codes() -> None:
+    page = Path(__file__).resolve().parents[2] / "docs/formats/campus.md"
+    rows = re.findall(r"^\| (PTM-D\d+) \| (\w+) \| (.*) \|$", page.read_text("utf-8"), re.MULTILINE)
+    assert {code: (severity, meaning) for code, severity, meaning in rows} == CODES
