@@ -100,10 +100,9 @@ lint: $(VENV)/.installed-dev
 
 bench-codec: $(VENV)/.installed-dev
 	@mkdir -p build/bench
-	-@$(BIN)/python benchmarks/codec/fetch_hdr.py
 	$(BIN)/python benchmarks/codec/sizes.py
 	$(BIN)/python benchmarks/codec/progressive.py
-	$(BIN)/python benchmarks/codec/floats.py
+	$(BIN)/python benchmarks/codec/floats.py --fetch
 	$(BIN)/python benchmarks/codec/near_lossless.py
 	$(BIN)/python benchmarks/codec/huge.py
 	$(BIN)/python benchmarks/codec/startup.py
@@ -120,7 +119,7 @@ bench-walk: build/museum/.made $(VENV)/.installed-dev
 	$(BIN)/python benchmarks/walk_table.py
 
 bench-web: build/museum/.made $(VENV)/.installed-dev
-	$(BIN)/python benchmarks/walk_scenes.py museum rooms
+	$(BIN)/python benchmarks/scenes.py museum rooms
 	@for scene in museum rooms; do set -x; \
 	  $(BIN)/python -m benchmarks.web_rivals "build/bench/walks/$$scene.db"; \
 	  $(BIN)/python -m benchmarks.web_rivals "build/bench/walks/$$scene.db" --memory; \
@@ -133,7 +132,7 @@ bench: $(VENV)/.installed-dev
 	@for map in $(PTM_SHARED)/prt/*.prt; do [ -f "$$map" ] || continue; set -x; \
 	  $(BIN)/python benchmarks/prt.py "$$map" -o "build/bench/$$(basename "$$map" .prt).npz" \
 	    --reference "$${map%.prt}.visible.npz"; { set +x; } 2>/dev/null; done
-	@[ ! -d build/museum.db ] || { set -x; $(BIN)/python benchmarks/false_negatives.py build/museum.db; }
+	@[ ! -d build/museum.db ] || { set -x; $(BIN)/ptm validate build/museum.db --segments 1000000; }
 	$(BIN)/python benchmarks/ach.py sample_data/two_rooms/two_rooms.obj --only presets speed
 	$(BIN)/python benchmarks/emission.py
 	$(BIN)/python benchmarks/formats.py
@@ -156,8 +155,6 @@ docs-timings: build/museum/.made $(VENV)/.installed-dev
 docs-pictures: build/museum/.made
 	$(BIN)/ptm build-scene build/museum/museum.obj -o build/museum.db
 	$(BIN)/python benchmarks/docs_pictures.py build/museum.db
-	$(BIN)/python benchmarks/interlace_picture.py
-	$(BIN)/python benchmarks/apo_picture.py
 
 clean:
 	rm -rf build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -33,8 +33,8 @@ from dataclasses import replace
 from typing import Any, TextIO
 
 import numpy as np
-from at_hand import MODELS, ROOT, model_file
 from numpy.typing import NDArray
+from scenes import MODELS, ROOT, model_file
 
 from ptmtools.cells import subdivide
 from ptmtools.cells.model import Cells

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from unittest.mock import patch
 
 import numpy as np
-from at_hand import TWO_ROOMS, model_file
+from scenes import TWO_ROOMS, model_file
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.cells.grouping import grouped, leaf_of_cell

@@ -22,7 +22,7 @@ from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-from at_hand import MODELS, MUSEUM, ROOT
+from scenes import MODELS, MUSEUM, ROOT
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide, subdivision
 from ptmtools.scene import Scene, ingest

@@ -1,6 +1,7 @@
-"""Draws the pictures of the docs. ``python benchmarks/docs_pictures.py build/museum.db``
+"""Draws the pictures of the docs: ``python benchmarks/docs_pictures.py build/museum.db``
 
-Takes the database of the sample museum and writes into ``docs/pictures``:
+Reads the database of the sample museum and its images (`make sample`), and writes into
+``docs/pictures``:
 
 plan.png     both floors, with what the middle room sees shaded by its coverage hints
 levels.jpg   a painting, as its levels show it while the `.ptm` arrives
@@ -8,6 +9,9 @@ view.jpg     the view from a viewpoint with the first levels of all textures, an
              rays cast at the model, no browser
 walk.jpg     the page of `ptm serve` in Chromium, with the map and the details open
 door-*.png   two rooms with a door leaf in the doorway: with the door closed one is lost
+interlace.jpg  two paintings at an eighth and a quarter of their sides: means of texels (a level of
+             the `.ptm`) beside the texels of the first interlaced files, with bytes and PSNR
+apo.jpg      a bust as modelled, simplified, and with some levels of its octree
 """
 
 from __future__ import annotations
@@ -18,18 +22,28 @@ import json
 import shutil
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-sys.path[:0] = [str(Path(__file__).parent)]
+ROOT = Path(__file__).resolve().parent.parent
+sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "sample_data")]
+import make_statues  # noqa: E402
+from interlace import box, by_files, by_ptm, psnr  # noqa: E402
 from render import LOOKS, View, load, render  # noqa: E402
 
 from ptmtools import texture  # noqa: E402
+from ptmtools.apo.making import make_apo, smooth, welded  # noqa: E402
+from ptmtools.apo.model import ApoOptions  # noqa: E402
+from ptmtools.apo.picture import RenderOptions, render as draw_octree  # noqa: E402
 from ptmtools.cli.main import main as command  # noqa: E402
+from ptmtools.executors import open_executor  # noqa: E402
+from ptmtools.scene.model import Material, Scene  # noqa: E402
+from ptmtools.scene.orientation import tolerance_of  # noqa: E402
+from ptmtools.texture import read_image  # noqa: E402
 
-ROOT = Path(__file__).resolve().parent.parent
 PICTURES = ROOT / "docs" / "pictures"
 TWO_ROOMS = ROOT / "sample_data/two_rooms"
 #: The room whose visible set is shaded, and the viewpoint that is shown.
@@ -39,6 +53,16 @@ PAINTING, LEVELS, SIDE = "painting_09", (4, 6, 8, 10), 240
 COARSE, WIDTH, HEIGHT = 5, 480, 340
 #: A door leaf that fills the doorway of the two rooms, as a line to add to the OBJ file.
 DOOR_LEAF = "o door_leaf\nusemtl doorway\nf 9/1 14/2 12/3 11/4\n"
+#: Of `interlace.jpg`.
+PAINTINGS = ("painting_09", "painting_10")
+DRAWN, GAP, CAPTION = 256, 8, 22
+HALVINGS = (3, 2)
+#: Of `apo.jpg`.
+TRIANGLES, FACES = 400_000, 2_000
+#: Levels of the octree beside the source and the simplified mesh.
+OCTREE_LEVELS = (7, 8, 9, None)
+#: Pixels of a panel, which is drawn larger by a factor.
+PANEL_WIDTH, PANEL_HEIGHT, TIMES = 260, 330, 2
 
 
 def ptm(*arguments: str) -> None:
@@ -108,6 +132,84 @@ def walk(database: Path) -> Image.Image:
     return picture.convert("RGB")
 
 
+def interlaced(folder: Path) -> Image.Image:
+    """Rows: paintings; columns: sizes, each as means and as interlaced."""
+    columns = 2 * len(HALVINGS)
+    size = columns * (DRAWN + GAP) - GAP, len(PAINTINGS) * (DRAWN + CAPTION)
+    drawn = Image.new("RGB", size, "white")
+    draw, font = ImageDraw.Draw(drawn), ImageFont.load_default(12)
+    for row, name in enumerate(PAINTINGS):
+        image = read_image(folder / f"{name}.png")
+        bytes_of = by_ptm(image), by_files("png")(image)
+        for place, halvings in enumerate(HALVINGS):
+            every = 1 << halvings
+            side = len(image) >> halvings
+            means, picked = box(image, every, every), image[::every, ::every]
+            size_of = f"{side} x {side}"
+            texts = (
+                f"means, {size_of}: {bytes_of[0][side]:,} B (.ptm)",
+                f"interlaced, {size_of}: {bytes_of[1][side]:,} B, {psnr(means, picked):.1f} dB",
+            )
+            for kind, (texels, text) in enumerate(zip((means, picked), texts, strict=True)):
+                x, y = (2 * place + kind) * (DRAWN + GAP), row * (DRAWN + CAPTION)
+                shown = Image.fromarray(texels).resize((DRAWN, DRAWN), Image.Resampling.NEAREST)
+                drawn.paste(shown, (x, y))
+                draw.text((x, y + DRAWN + 3), text, "black", font)
+    return drawn
+
+
+def octree_levels() -> Image.Image:
+    """A bust: its triangles, the simplified mesh, and that mesh with levels of the octree."""
+    statue = make_statues.make_statue("bust", make_statues.StatueOptions(triangles=TRIANGLES))
+    points, triangles = welded(statue.points.astype(np.float64), statue.triangles)
+    n = len(triangles)
+    none = np.zeros(n, np.int32)
+    scene = Scene(
+        points,
+        triangles,
+        np.zeros((n, 3, 2)),
+        none,
+        none,
+        np.ones(n, bool),
+        ("bust",),
+        (Material("stone"),),
+        tolerance_of(points, triangles),
+    )
+    with open_executor() as executor:
+        made = make_apo(scene, ApoOptions(faces=FACES), executor)
+    look = RenderOptions(
+        azimuth=20, elevation=8, distance=1.75, field_of_view=32,
+        width=PANEL_WIDTH * TIMES, height=PANEL_HEIGHT * TIMES,
+    )  # fmt: skip
+    own, source, octree = made.mesh, smooth(points, triangles), made.octree
+    plain = replace(look, levels=0)
+    panels = [
+        (
+            f"{n:,} triangles",
+            draw_octree(octree, points, triangles, plain, source.normals.astype(float)),
+        ),
+        (
+            f"{len(own.triangles):,} triangles",
+            draw_octree(octree, own.points, own.triangles, plain, own.normals.astype(float)),
+        ),
+    ]
+    for levels in OCTREE_LEVELS:
+        name = f"and {levels or octree.levels} levels"
+        wanted = replace(look, levels=levels)
+        panels.append((name, draw_octree(octree, own.points, own.triangles, wanted)))
+    sheet = Image.new("RGB", (PANEL_WIDTH * len(panels), PANEL_HEIGHT))
+    font = ImageFont.load_default(15)
+    for k, (name, drawn) in enumerate(panels):
+        panel = Image.fromarray(drawn.picture).resize(
+            (PANEL_WIDTH, PANEL_HEIGHT), Image.Resampling.BOX
+        )
+        sheet.paste(panel, (PANEL_WIDTH * k, 0))
+        ImageDraw.Draw(sheet).text(
+            (PANEL_WIDTH * k + 8, PANEL_HEIGHT - 24), name, font=font, fill="white"
+        )
+    return sheet
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("database", type=Path, help="of the sample museum")
@@ -118,6 +220,8 @@ def main() -> None:
     levels(database / f"www/textures/{PAINTING}.ptm").save(PICTURES / "levels.jpg", quality=85)
     views(database).save(PICTURES / "view.jpg", quality=85)
     walk(database).save(PICTURES / "walk.jpg", quality=85)
+    interlaced(ROOT / "build/museum/textures").save(PICTURES / "interlace.jpg", quality=80)
+    octree_levels().save(PICTURES / "apo.jpg", quality=88)
     with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(TWO_ROOMS, f"{folder}/model")
         model = Path(folder, "model", "two_rooms.obj")

@@ -57,7 +57,9 @@ TABLES = {
         BY_AREA.format("gallery", "8 4 2"),
     ),
     "ptm-bytes": Table(
-        "benchmarks/codec/bytes.py", "benchmarks/codec/bytes.py raw fast", "textures"
+        "benchmarks/codec/sizes.py --bytes raw fast small",
+        "benchmarks/codec/sizes.py --bytes raw fast",
+        "textures",
     ),
     "rooms": Table("benchmarks/rooms.py museum hospital willowgarage"),
     "sizes-of-cells": Table("benchmarks/pvs_trade.py"),

@@ -25,9 +25,9 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from at_hand import MODELS, MUSEUM, model_file
 from numpy.typing import NDArray
 from PIL import Image
+from scenes import MODELS, MUSEUM, model_file
 
 from ptmtools import AchOptions, compute_ach
 from ptmtools.cells import Cells, subdivide

@@ -2,7 +2,7 @@
 
 rooms         sample museums of 12, 50, 200 and 800 rooms (`sample_data/make_museum.py`)
 walls         the museum of 12 rooms, its walls subdivided into 200,000 to 5 million triangles
-furniture     the same with curved furniture of as many triangles (`grown`)
+furniture     the same with curved furniture of as many triangles (`enlarging.py`)
 
 They have the least textures, are made in a temporary folder, or in ``--folder``, and go through the
 stages with default options:
@@ -41,7 +41,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from grown import grown
+from enlarging import enlarged
 from memory import with_peak
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
@@ -155,7 +155,7 @@ def make_model(kind: str, size: int, folder: Path) -> None:
     maker += ["--rooms", str(rooms), "--size", "16", "--force"]
     subprocess.run(maker, check=True, stdout=subprocess.DEVNULL)
     if kind != "rooms":
-        model.write_bytes(b"".join(grown(ingest(model), kind, size, "museum.mtl")))
+        model.write_bytes(b"".join(enlarged(ingest(model), kind, size, "museum.mtl")))
 
 
 def measured(kind: str, size: int, folder: Path, options: list[str]) -> dict[str, Any]:

@@ -26,9 +26,9 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from at_hand import SHARED
 from numpy.typing import NDArray
 from PIL import Image
+from scenes import SHARED
 
 from ptmtools.interlace import InterlaceOptions, interlace, join, split
 from ptmtools.interlace.model import axes_of

@@ -6,7 +6,7 @@ of the files, so they are left out. What is an edge is decided by our own rays a
 a pixel: between two neighbouring rays the material changes, or the surface's plane does (by
 more than `BEND`, or by a step of more than `STEP` of the distance), or one of them hits nothing;
 also behind glass. A pixel is masked if there is an edge within it or within one of its eight
-neighbours. Texture is no edge: what a browser makes of that is modelled (mipmap.py), not excused.
+neighbours. Texture is no edge: what a browser makes of that is modelled (render.py), not excused.
 
 Sky is left out of the PSNR too, since to show nothing where nothing is would raise it; how much of
 the sky shows something else is told apart.

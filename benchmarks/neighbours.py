@@ -30,8 +30,7 @@ from itertools import groupby
 from pathlib import Path
 
 import numpy as np
-from at_hand import ROOT
-from walk_scenes import ptm
+from scenes import ROOT, ptm
 
 from ptmtools.arrays import Floats
 from ptmtools.quantities import size

@@ -47,7 +47,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from at_hand import MODELS, ROOT, TWO_ROOMS, model_file
+from scenes import MODELS, ROOT, TWO_ROOMS, model_file
 
 # Nothing large is imported here: a child starts with what its parent has of memory on its record.
 

@@ -26,8 +26,8 @@ import time
 from dataclasses import replace
 
 import numpy as np
-from at_hand import MODELS, model_file
 from numpy.typing import NDArray
+from scenes import MODELS, model_file
 from walk import at_hand, cell_texts, load, passed, standard_walk, texels_at_hand
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide

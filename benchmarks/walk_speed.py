@@ -1,6 +1,6 @@
 """How long the simulator takes: ``python benchmarks/walk_speed.py [SCENE…]``
 
-A walk of five minutes through the sample museum and through the museum of 40 rooms (`walk_scenes`):
+A walk of five minutes through the sample museum and through the museum of 40 rooms (`scenes.py`):
 processor seconds of preparing it, and of what in that; then of a run of each policy at 512
 kbit/s and 10 % of texture memory. Machine code is loaded before.
 
@@ -19,7 +19,7 @@ import time
 from cProfile import Profile
 from pstats import Stats
 
-from walk_scenes import database_of, make_scene, walk_file
+from scenes import database_of, make_scene, walk_file
 
 from ptmtools.quantities import parse_memory
 from ptmtools.walkthrough.comparing import budget_of

@@ -1,12 +1,13 @@
 """16-bit and float images: exact, how large, and how far the paper's formula is off.
 
-    python benchmarks/codec/floats.py [IMAGE …]
+    python benchmarks/codec/floats.py [IMAGE …] [--fetch]
 
-Images are made (random bit patterns; magnitudes from 1e-38 to 1e38; a lit room with highlights;
-a depth map; a height field in 16 bits) and read: those that are named, or those that
-`fetch_hdr.py` has fetched. Beside the whole pyramid in our profiles: zstd of the raw finest
-level, and of it with the bytes of samples apart, at level 19; 16-bit PNG where it applies; OpenEXR
-(ZIP) if the module is at hand. Bytes of the raw finest level = 1.
+Images are generated (random bit patterns; magnitudes from 1e-38 to 1e38; a lit room with
+highlights; a depth map; a height field in 16 bits) and read: the named ones, or three photographed
+panoramas that ``--fetch`` takes from the npm package @pmndrs/assets (CC0; Poly Haven, 512 × 256,
+half floats, OpenEXR). Compared with the whole pyramid in our profiles: zstd at level 19 of the raw
+finest level, also with its bytes in planes; 16-bit PNG where it applies; OpenEXR (ZIP) if that
+module is installed. Bytes of the raw finest level = 1.
 
 The paper's fourth texel (§4.1), 4·I - a - b - c in float32, is compared with the exact one: share
 of blocks in which it differs, and its largest relative error.
@@ -15,6 +16,12 @@ of blocks in which it differs, and its largest relative error.
 from __future__ import annotations
 
 import argparse
+import base64
+import re
+import shutil
+import subprocess
+import tarfile
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +35,9 @@ from ptmtools.texture.comparison import best
 
 Samples = NDArray[Any]
 SIDE = 768
+#: The panoramas, as base64 in JavaScript.
+PACKAGE = "@pmndrs/assets@1.7.0"
+NAMES = ("apartment", "city", "forest")
 
 
 def made() -> dict[str, Samples]:
@@ -54,6 +64,29 @@ def made() -> dict[str, Samples]:
         "height field, uint16": field.astype(np.uint16)[:, :, None],
         "noise, uint16": bits[:, :, :3].astype(np.uint16),
     }
+
+
+def fetch_panoramas() -> None:
+    """Downloads the panoramas that are missing; says so if there is no npm."""
+    folder = OUTPUT / "hdr"
+    wanted = {name: folder / f"{name}.exr" for name in NAMES}
+    if all(path.exists() for path in wanted.values()):
+        return
+    if not shutil.which("npm"):
+        print("no npm: the panoramas are left out (on Debian or Ubuntu: apt install npm)")
+        return
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as place:
+        subprocess.run(["npm", "pack", "--silent", PACKAGE], cwd=place, check=True)
+        (archive,) = Path(place).glob("*.tgz")
+        with tarfile.open(archive) as packed:
+            for name, path in wanted.items():
+                member = packed.extractfile(f"package/hdri/{name}.exr.js")
+                assert member is not None
+                found = re.search(rb"base64,([A-Za-z0-9+/=]+)", member.read())
+                assert found is not None
+                path.write_bytes(base64.b64decode(found[1]))
+                print(path)
 
 
 def exact(image: Samples, profile: str) -> tuple[int, float, float]:
@@ -86,8 +119,6 @@ def open_exr(image: Samples) -> dict[str, int]:
         import OpenEXR
     except ImportError:
         return {}
-    import tempfile
-
     with tempfile.TemporaryDirectory() as folder:
         path = f"{folder}/a.exr"
         names = ("Y", "YA", "RGB", "RGBA")[image.shape[2] - 1]
@@ -117,7 +148,10 @@ def main() -> None:
     """Prints the table."""
     parser = argparse.ArgumentParser(description="16-bit and float images.")
     parser.add_argument("images", nargs="*", type=Path)
+    parser.add_argument("--fetch", action="store_true", help="download the panoramas first")
     given = parser.parse_args()
+    if given.fetch:
+        fetch_panoramas()
     images = made()
     for file in given.images or sorted((OUTPUT / "hdr").glob("*.*")):
         images[file.name] = load_image(file).array()

@@ -48,28 +48,28 @@ def main() -> None:
         count = max(1, round(given.count * KINDS[name].weight / whole))
         summary = run(name, KINDS[name].make, given.seed, given.start, count, given.jobs)
         found.append(summary)
-        tell(summary)
+        print_summary(summary)
     total = sum(summary.read for summary in found)
-    findings = sum(len(summary.told.findings) for summary in found)
+    findings = sum(len(summary.tally.findings) for summary in found)
     seconds = sum(summary.seconds for summary in found)
     print(f"{total:,} inputs, seed {given.seed}, in {seconds:,.0f} s: {findings} findings")
     sys.exit(bool(findings))
 
 
-def tell(summary: Summary) -> None:
-    """One line of a kind, and its findings."""
-    told = summary.told
-    refused = sum(n for code, n in told.outcomes.items() if code.startswith("PTM-"))
+def print_summary(summary: Summary) -> None:
+    """Prints one line for a kind, and its findings."""
+    tally = summary.tally
+    refused = sum(n for code, n in tally.outcomes.items() if code.startswith("PTM-"))
     each = summary.seconds * 1000 / max(1, summary.read)
     print(
         f"{summary.name:<10}{summary.read:>9,}{summary.read - refused:>8,}{refused:>9,}"
-        f"{each:>6.1f} ms{told.longest:>7.2f} s{told.most / 1e6:>6.0f} MB  {len(told.findings)}",
+        f"{each:>6.1f} ms{tally.longest:>7.2f} s{tally.most / 1e6:>6.0f} MB  {len(tally.findings)}",
         flush=True,
     )
-    common = ", ".join(f"{what} {n:,}" for what, n in told.outcomes.most_common(12))
+    common = ", ".join(f"{what} {n:,}" for what, n in tally.outcomes.most_common(12))
     print(f"          {common}")
     alike: dict[str, list[int]] = {}
-    for number, what in told.findings:
+    for number, what in tally.findings:
         alike.setdefault(what, []).append(number)
     for what, numbers in list(alike.items())[:15]:
         more = f" and {len(numbers) - 1} more" if len(numbers) > 1 else ""
@@ -85,7 +85,7 @@ def show(which: str, seed: int, output: str | None) -> None:
         outside.mkdir()
         target = KINDS[name].make(inside, outside)
         case = target.make(generator(seed, name, int(number)))
-        print(f"{len(case.data)} bytes, {case.told!r:.200}")
+        print(f"{len(case.data)} bytes, {case.facts!r:.200}")
         if output:
             Path(output).write_bytes(case.data)
         print(target.read(case))

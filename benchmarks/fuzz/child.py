@@ -1,4 +1,9 @@
-"""A process that reads hostile inputs, one after the other, and tells what became of each."""
+"""The process that reads hostile inputs one after the other and reports the outcome of each.
+
+It also watches what a reader does besides reading. Python reports to an audit hook every file that
+is opened, renamed, linked or removed, and processes and connections; what compiled libraries open
+without Python shows in a comparison of the folders that must stay untouched.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +11,7 @@ import contextlib
 import io
 import os
 import resource
+import sys
 import time
 import traceback
 import warnings
@@ -16,35 +22,28 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from benchmarks.fuzz.target import Case, Target
-from benchmarks.fuzz.watch import (
-    Watch,
-    forget_most_memory,
-    listing,
-    memory_now,
-    most_memory,
-)
+from benchmarks.fuzz.mutation import Case, Target
 
 #: What a reader may take besides its limit, bytes: tables, copies, and the input itself many times.
 ALLOWANCE = 1 << 28
 #: Address space beyond what the process has when it begins. Reserving it is no fault; not getting
 #: it must be an error of ours.
 ADDRESSES = 1 << 31
-#: So many inputs are told of at a time, and the folder beside is looked at after as many.
+#: Inputs per report; the untouched folders are compared after each report.
 BATCH = 250
 
 
 @dataclass
-class Told:
-    """What became of some inputs.
+class Tally:
+    """Outcomes of some inputs.
 
     Attributes
     ----------
-    outcomes: of each kind, how many.
-    findings: number of the input, and what is wrong.
-    longest: processor time of one, seconds.
-    most: memory of one, bytes.
-    done: the number of the next.
+    outcomes: number of inputs by outcome.
+    findings: number of the input, and the fault.
+    longest: processor time of the slowest input, seconds.
+    most: memory of the largest input, bytes.
+    done: number of the next input.
     """
 
     outcomes: Counter[str] = field(default_factory=Counter)
@@ -61,13 +60,13 @@ def generator(seed: int, name: str, number: int) -> Random:
 
 def work(
     make: Any, name: str, folder: str, seed: int, start: int, stop: int, step: int, slow: float,
-    current: Any, told: Connection,
+    current: Any, reports: Connection,
 ) -> None:  # fmt: skip
     """Reads the inputs ``start``, ``start + step``, … below ``stop``; runs in a process of its own.
 
     slow: processor time that an input may take, seconds.
     current: shared number of the input that is being read.
-    told: where a `Told` goes after every batch; None is the end.
+    reports: receives a `Tally` after every batch, then None.
     """
     quiet()
     inside, outside, elsewhere = places(Path(folder))
@@ -78,7 +77,7 @@ def work(
         taken = int(file.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
     resource.setrlimit(resource.RLIMIT_AS, (taken + ADDRESSES, taken + ADDRESSES))
     before = listing(outside) | listing(elsewhere)
-    batch = Told()
+    batch = Tally()
     numbers = range(start, stop, step)
     for count, number in enumerate(numbers, 1):
         current.value = number
@@ -90,9 +89,9 @@ def work(
                 batch.findings.append((number, "something changed beside the folder"))
                 before = listing(outside) | listing(elsewhere)
             batch.done = number + step
-            told.send(batch)
-            batch = Told()
-    told.send(None)
+            reports.send(batch)
+            batch = Tally()
+    reports.send(None)
 
 
 def places(folder: Path) -> tuple[Path, Path, Path]:
@@ -122,7 +121,7 @@ def warm(target: Target, seed: int, name: str) -> None:
             target.read(target.make(generator(seed, name, number)))
 
 
-def read(target: Target, watch: Watch, case: Case, number: int, slow: float, batch: Told) -> None:
+def read(target: Target, watch: Watch, case: Case, number: int, slow: float, batch: Tally) -> None:
     """Reads one input and notes what came of it."""
     from ptmtools.errors import PtmError
 
@@ -174,3 +173,121 @@ def _where() -> str:
 def captured() -> contextlib.AbstractContextManager[io.StringIO]:
     """What commands print."""
     return contextlib.redirect_stdout(io.StringIO())
+
+
+_WRITE = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+#: Event → which of its arguments are paths that it changes, and which the descriptor of a folder
+#: that goes with each.
+_CHANGES: dict[str, tuple[tuple[int, int | None], ...]] = {
+    "os.rename": ((0, 2), (1, 3)), "os.link": ((1, 3),), "os.symlink": ((1, 2),),
+    "os.mkdir": ((0, 2),), "os.rmdir": ((0, 1),), "os.remove": ((0, 1),),
+    "os.truncate": ((0, None),), "os.chmod": ((0, 2),), "os.chown": ((0, 3),),
+    "os.utime": ((0, 3),),
+    "os.setxattr": ((0, None),), "os.removexattr": ((0, None),),
+    "shutil.rmtree": ((0, 1),), "shutil.move": ((0, None), (1, None)),
+}  # fmt: skip
+_FORBIDDEN = ("subprocess.", "os.system", "os.exec", "os.posix_spawn", "os.fork", "socket.connect",
+              "socket.bind", "socket.getaddrinfo", "urllib.", "pickle.find_class")  # fmt: skip
+
+
+class Watch:
+    """Notes what is done outside of ``inside`` between `begin` and `end`.
+
+    Parameters
+    ----------
+    inside: the folder in which anything may be written.
+    outside: a folder that may not even be read.
+    """
+
+    def __init__(self, inside: Path, outside: Path) -> None:
+        self._inside = os.path.realpath(inside)
+        self._outside = os.path.realpath(outside)
+        self._watching = False
+        self._faults: list[str] = []
+        sys.addaudithook(self._hook)
+
+    def begin(self) -> None:
+        """From now on."""
+        self._faults = []
+        self._watching = True
+
+    def end(self) -> list[str]:
+        """What was done since that may not be done."""
+        self._watching = False
+        return self._faults
+
+    def _hook(self, event: str, arguments: tuple[Any, ...]) -> None:
+        if not self._watching:
+            return
+        if event == "open":
+            self._opened(*arguments)
+        elif event in _CHANGES:
+            for path, folder in _CHANGES[event]:
+                self._changed(event, arguments[path], None if folder is None else arguments[folder])
+        elif event.startswith(_FORBIDDEN):
+            self._faults.append(f"{event} {str(arguments)[:200]}")
+
+    def _opened(self, path: Any, mode: Any, flags: Any) -> None:
+        if isinstance(path, int) or path is None:
+            return
+        real = os.path.realpath(os.fsdecode(path))
+        if isinstance(flags, int) and flags & os.O_NOFOLLOW:
+            real = _itself(os.fsdecode(path))
+        if isinstance(flags, int) and flags & _WRITE and not self._mine(real):
+            self._faults.append(f"opened {real} for writing")
+        elif self._within(real, self._outside):
+            self._faults.append(f"opened {real}")
+
+    def _changed(self, event: str, path: Any, descriptor: Any) -> None:
+        if isinstance(path, int):
+            return
+        name = os.fsdecode(path)
+        if isinstance(descriptor, int) and descriptor >= 0 and not os.path.isabs(name):
+            name = os.path.join(os.path.realpath(f"/proc/self/fd/{descriptor}"), name)
+        real = _itself(name)
+        if not self._mine(real):
+            self._faults.append(f"{event} {real}")
+
+    def _mine(self, real: str) -> bool:
+        # Kernels that are compiled on the way are kept beside their modules.
+        return self._within(real, self._inside) or "__pycache__" in real
+
+    @staticmethod
+    def _within(path: str, folder: str) -> bool:
+        return path == folder or path.startswith(folder + os.sep)
+
+
+def _itself(path: str) -> str:
+    """Where a path leads, a link at its end being itself."""
+    folder, name = os.path.split(os.path.abspath(path))
+    return os.path.join(os.path.realpath(folder), name)
+
+
+def listing(folder: Path) -> dict[str, tuple[int, int, int]]:
+    """Kind, size and time of change of all that lies in a folder; links are not followed."""
+    found = {}
+    for path in sorted(folder.rglob("*")):
+        status = os.lstat(path)
+        found[str(path)] = (status.st_mode, status.st_size, status.st_mtime_ns)
+    return found
+
+
+def memory_now() -> int:
+    """Bytes of memory that this process holds."""
+    with open("/proc/self/statm", "rb") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def most_memory() -> int:
+    """The most that it held since `forget_most_memory`."""
+    with open("/proc/self/status", "rb") as file:
+        for line in file:
+            if line.startswith(b"VmHWM:"):
+                return int(line.split()[1]) * 1024
+    return 0
+
+
+def forget_most_memory() -> None:
+    """Starts to count anew."""
+    with open("/proc/self/clear_refs", "wb") as file:
+        file.write(b"5")

@@ -20,8 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.fuzz.mutation import NAMES, NUMBERS, damaged, dumped, garbled, twisted
-from benchmarks.fuzz.target import Case
+from benchmarks.fuzz.mutation import NAMES, NUMBERS, Case, damaged, dumped, garbled, twisted
 from ptmtools.cli.main import main
 from ptmtools.pipeline.run import Artifacts
 from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS, STAGES
@@ -91,7 +90,7 @@ class Npz:
 
     def read(self, case: Case) -> str:
         """Reads it back as the stage that it is of, beside the others, and counts by it."""
-        artifacts = Artifacts(_Held({**self._arrays, case.told: case.data}, self._images))
+        artifacts = Artifacts(_Held({**self._arrays, case.facts: case.data}, self._images))
         scene, cells, pvs, ach = (artifacts[stage] for stage in (APO, CELLS, PVS, ACH))
         assert len(scene.corners) == len(scene.opaque)
         with np.errstate(all="ignore"):
@@ -152,8 +151,8 @@ def _rezipped(rng: Random, arrays: Mapping[str, Any]) -> bytes:
                 data = damaged(rng, data)
             if rng.random() < 0.05:
                 data = bytes(1 << 22)
-            told = rng.choice(NAMES) if rng.random() < 0.1 else f"{name}.npy"
-            info = zipfile.ZipInfo(told.replace("\0", "") or "x")
+            member = rng.choice(NAMES) if rng.random() < 0.1 else f"{name}.npy"
+            info = zipfile.ZipInfo(member.replace("\0", "") or "x")
             info.compress_type = kind
             archive.writestr(info, data)
             if rng.random() < 0.1:
@@ -241,11 +240,11 @@ class ManifestText:
         db = str(self._db)
         commands = ("info", "status", "info --json", "status --json", *WRITING)
         try:
-            if case.told < len(commands):
-                command, *options = commands[case.told].split()
+            if case.facts < len(commands):
+                command, *options = commands[case.facts].split()
                 commanded(command, db, *options)
         finally:
-            if case.told >= 4 and (self._db / "manifest.json").read_bytes() != case.data:
+            if case.facts >= 4 and (self._db / "manifest.json").read_bytes() != case.data:
                 self._restore()
         manifest = Manifest.from_bytes(case.data, file="manifest.json")
         assert Manifest.from_bytes(manifest.to_bytes(), file="manifest.json") == manifest
@@ -281,7 +280,7 @@ class Interrupted:
 
     def read(self, case: Case) -> str:
         """Opens the database to write in it, which finishes or drops what was begun."""
-        rng = Random(case.told)
+        rng = Random(case.facts)
         self._prepare(rng, case.data)
         with DatabaseWriter.open_for_stage(self._db) as writer:
             transaction = writer.begin(rng.choice(("textures", "emit")))
@@ -368,7 +367,7 @@ class Served:
 
     def read(self, case: Case) -> str:
         """Validates the database; most of the time the manifest agrees with it."""
-        name, agreed = case.told
+        name, agreed = case.facts
         manifest = self._manifest
         if agreed:
             before = sha256(self._files[name]).encode()

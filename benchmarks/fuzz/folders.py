@@ -1,7 +1,8 @@
-"""Hostile folders of octree textures and of campuses: the index, and files, many with the checksum
-corrected in the index.
+"""Hostile folders of octree textures, campuses and interlaced images.
 
-What the check of a folder finds nothing in can be read.
+The index is changed, or a file, often with its checksum corrected in the index. A folder in which
+the check finds no issue must be readable. A folder of interlaced images that is accepted although a
+file was damaged and the index was not corrected must give the exact image.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.fuzz.databases import MODEL, commanded
-from benchmarks.fuzz.mutation import NAMES, damaged, dumped, twisted
-from benchmarks.fuzz.target import Case
+from benchmarks.fuzz.mutation import NAMES, Case, damaged, dumped, twisted
+from benchmarks.fuzz.textures import LIMITS as TEXTURE_LIMITS, sealed_png, textures
 from ptmtools.apo import read_mesh, read_octree
 from ptmtools.apo.checking import check_folder
 from ptmtools.apo.files import INDEX as APO_INDEX
@@ -26,6 +27,16 @@ from ptmtools.apo.traversal import look_up
 from ptmtools.campus.model import INDEX as CAMPUS_INDEX, SIZES
 from ptmtools.campus.validation import check_campus
 from ptmtools.errors import PtmError
+from ptmtools.interlace import (
+    InterlaceOptions,
+    deinterlace,
+    interlace,
+    validate_interlaced,
+    write_folder,
+)
+from ptmtools.interlace.containers import CONTAINERS
+from ptmtools.interlace.model import INDEX as INTERLACE_INDEX
+from ptmtools.texture import Picture
 from ptmtools.texture.model import Limits
 from ptmtools.walkthrough.campus.stock import read_stock
 from ptmtools.walkthrough.campus.surfaces import read_surfaces, read_textures
@@ -82,7 +93,7 @@ class Folder:
 
     def read(self, case: Case) -> str:
         """Checks and reads, or asks a command."""
-        name, sealed, way = case.told
+        name, sealed, way = case.facts
         files = self._files | {name: case.data}
         if sealed:
             document = json.loads(files[self.index])
@@ -171,3 +182,74 @@ class CampusFolder(Folder):
         faces = [len(read_surfaces(self._folder, stock, level).corner) for level in (0, -1)]
         read_textures(self._folder, stock, SIZES[0])
         return f"{len(faces)} levels"
+
+
+class Interlaced:
+    """The readers of interlaced images: joining, the check and the command."""
+
+    limit = 2 * TEXTURE_LIMITS.decoded_bytes
+
+    def __init__(self, folder: Path, outside: Path) -> None:
+        self._folder = folder / "interlaced"
+        (outside / "secret.png").write_bytes(b"secret")
+        os.symlink(outside, folder / "away")
+        self._sets: list[dict[str, bytes]] = []
+        self._exact: list[bytes] = []
+        for name, container in CONTAINERS.items():
+            for _, texels in textures():
+                held = texels.shape[2] in container.components
+                if not held or texels.dtype.name not in container.kinds:
+                    continue
+                made = folder / f"{len(self._sets)}"
+                write_folder(made, interlace(Picture(texels), InterlaceOptions(4, name)))
+                self._exact.append(deinterlace(made).tobytes())
+                self._sets.append({file.name: file.read_bytes() for file in sorted(made.iterdir())})
+
+    def make(self, rng: Random) -> Case:
+        """The manifest with other values or bytes; or a file damaged, and sealed or not."""
+        which = rng.randrange(len(self._sets))
+        files = self._sets[which]
+        name = rng.choice((INTERLACE_INDEX, INTERLACE_INDEX, *files))
+        way = rng.randrange(8)
+        sealed = False
+        if name != INTERLACE_INDEX:
+            changed = damaged(rng, files[name], rng.choice(list(files.values())))
+            sealed = rng.random() < 0.6
+            if sealed and name.endswith("png") and rng.random() < 0.7:
+                changed = sealed_png(changed)
+        elif rng.random() < 0.3:
+            changed = damaged(rng, files[INTERLACE_INDEX])
+        else:
+            others = (*NAMES, "1.png", "9.webp", "2.jpg")
+            tree = twisted(rng, json.loads(files[INTERLACE_INDEX]), others)
+            changed = dumped(rng, tree)
+        return Case(changed, (which, name, sealed, way))
+
+    def read(self, case: Case) -> str:
+        """Joins, checks, or asks a command."""
+        which, name, sealed, way = case.facts
+        files = self._sets[which] | {name: case.data}
+        if sealed:
+            document = json.loads(files[INTERLACE_INDEX])
+            for entry in document["files"]:
+                if entry["name"] == name:
+                    entry |= {"bytes": len(case.data), "crc32": zlib.crc32(case.data)}
+            files[INTERLACE_INDEX] = json.dumps(document).encode()
+        self._folder.mkdir(exist_ok=True)
+        for old in self._folder.iterdir():
+            old.unlink()
+        for file, data in files.items():
+            (self._folder / file).write_bytes(data)
+        if way == 0:
+            return f"info {commanded('info', str(self._folder))[0]}"
+        report = validate_interlaced(self._folder, TEXTURE_LIMITS)
+        try:
+            found = deinterlace(self._folder, limits=TEXTURE_LIMITS)
+        except PtmError:
+            assert report.issues, "the check found nothing in what cannot be joined"
+            raise
+        if found.tobytes() == self._exact[which]:
+            return "exact"
+        assert sealed or name == INTERLACE_INDEX, "a wrong image"
+        assert found.nbytes <= TEXTURE_LIMITS.decoded_bytes
+        return f"another image of {np.dtype(found.dtype)}"

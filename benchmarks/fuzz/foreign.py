@@ -83,14 +83,16 @@ def read(kind: str, seed: int, number: int) -> tuple[str, float]:
         path = Path(folder, f"a.{suffix}")
         path.write_bytes(changed)
         try:
-            told = _decoded(path) if kind == "draco" else str(len(ingest(path, OPTIONS).triangles))
-            told = "read" if told else "nothing"
+            outcome = (
+                _decoded(path) if kind == "draco" else str(len(ingest(path, OPTIONS).triangles))
+            )
+            outcome = "read" if outcome else "nothing"
         except PtmError as error:
             died = "ended with status" in error.message or "did not end" in error.message
-            told = "died" if died else error.code
+            outcome = "died" if died else error.code
         except Exception as error:
-            told = f"! {type(error).__name__}: {error}"
-    return told, time.perf_counter() - start
+            outcome = f"! {type(error).__name__}: {error}"
+    return outcome, time.perf_counter() - start
 
 
 def _decoded(path: Path) -> str:
@@ -116,11 +118,11 @@ def main() -> None:
             tasks = [pool.submit(read, kind, given.seed, n) for n in range(given.count)]
             results = [task.result() for task in tasks]
             longest = max(seconds for _, seconds in results)
-            told = Counter(what for what, _ in results)
+            outcome = Counter(what for what, _ in results)
             wrong = [
                 n for n, (what, s) in enumerate(results) if what.startswith("!") or s > SECONDS
             ]
-            counts = ", ".join(f"{what} {count}" for what, count in told.most_common())
+            counts = ", ".join(f"{what} {count}" for what, count in outcome.most_common())
             print(f"{kind:<8} {len(results)} inputs, longest {longest:.1f} s: {counts}", flush=True)
             for n in wrong:
                 print(f"         ! {kind}:{n} {results[n]}", flush=True)

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from benchmarks.fuzz.databases import Interrupted, ManifestText, Npz, Served, Vrml
-from benchmarks.fuzz.folders import ApoFolder, CampusFolder
-from benchmarks.fuzz.interlaced import Interlaced
+from benchmarks.fuzz.folders import ApoFolder, CampusFolder, Interlaced
 from benchmarks.fuzz.models import Gltf, Handed, Mesh, Meshopt, Mtl, Obj
 from benchmarks.fuzz.textures import Images, Ptm
 

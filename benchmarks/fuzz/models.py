@@ -18,8 +18,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from benchmarks.fuzz.mutation import NAMES, NUMBERS, damaged, dumped, garbled, twisted
-from benchmarks.fuzz.target import Case
+from benchmarks.fuzz.mutation import NAMES, NUMBERS, Case, damaged, dumped, garbled, twisted
 from ptmtools.errors import InputError
 from ptmtools.scene import IngestOptions, Scene, ingest
 from ptmtools.store.archive import pack_arrays, unpack_arrays
@@ -224,8 +223,8 @@ def document() -> tuple[dict[str, Any], bytes]:
     packed = add(corners, 5126)
     part = {"buffer": 0, "byteOffset": len(blob), "byteLength": len(MESHOPT)}
     blob += MESHOPT
-    told = part | {"mode": "ATTRIBUTES", "count": 4, "byteStride": 12, "filter": "NONE"}
-    views[accessors[packed]["bufferView"]] |= {"extensions": {"EXT_meshopt_compression": told}}
+    extension = part | {"mode": "ATTRIBUTES", "count": 4, "byteStride": 12, "filter": "NONE"}
+    views[accessors[packed]["bufferView"]] |= {"extensions": {"EXT_meshopt_compression": extension}}
     colored = add((corners / 10).astype(np.float32), 5126)
     accessors[colored]["sparse"] = {
         "count": 2,
@@ -327,7 +326,7 @@ class Gltf:
 
     def read(self, case: Case) -> str:
         """Ingests it."""
-        path = self._folder / f"a.{case.told}"
+        path = self._folder / f"a.{case.facts}"
         path.write_bytes(case.data)
         return ingested(path)
 
@@ -380,7 +379,7 @@ class Mesh:
 
     def read(self, case: Case) -> str:
         """Ingests it."""
-        path = self._folder / f"a.{case.told}"
+        path = self._folder / f"a.{case.facts}"
         path.write_bytes(case.data)
         return ingested(path)
 
@@ -419,23 +418,23 @@ class Meshopt:
         """Other bytes, and sometimes another layout than they have."""
         data, mode, count, stride = rng.choice(self._streams)
         others = [stream for stream, *_ in self._streams]
-        told = {"mode": mode, "count": count, "byteStride": stride}
+        stream = {"mode": mode, "count": count, "byteStride": stride}
         if rng.random() < 0.3:
-            told["filter"] = rng.choice(self._filters)
+            stream["filter"] = rng.choice(self._filters)
         if rng.random() < 0.3:
-            told[rng.choice(("count", "byteStride"))] = rng.choice((0, 3, 4, 8, 256, *NUMBERS))
-        return Case(damaged(rng, data, rng.choice(others)), told)
+            stream[rng.choice(("count", "byteStride"))] = rng.choice((0, 3, 4, 8, 256, *NUMBERS))
+        return Case(damaged(rng, data, rng.choice(others)), stream)
 
     def read(self, case: Case) -> str:
         """Decodes it, as the reader of glTF does."""
         from ptmtools.scene.gltf.meshopt import decode
 
         try:
-            found = decode(case.data, case.told)
+            found = decode(case.data, case.facts)
         except ValueError as error:
             raise InputError("PTM-I249", str(error)) from None
-        assert len(found) == case.told["count"] * case.told["byteStride"]
-        return case.told["mode"].lower()
+        assert len(found) == case.facts["count"] * case.facts["byteStride"]
+        return case.facts["mode"].lower()
 
 
 class Handed:
@@ -477,17 +476,17 @@ class Handed:
             return Case(damaged(rng, self._arrays), self._answer)
         answer = json.loads(json.dumps(self._answer))
         try:
-            told = json.loads(dumped(rng, twisted(rng, answer, self._names)))
+            reply = json.loads(dumped(rng, twisted(rng, answer, self._names)))
         except (ValueError, RecursionError):
-            told = answer
-        return Case(self._arrays, told)
+            reply = answer
+        return Case(self._arrays, reply)
 
     def read(self, case: Case) -> str:
         """Takes it over."""
         from ptmtools.scene.source import Findings
 
         (self._scratch / "source.npz").write_bytes(case.data)
-        self._handed.run_apart = lambda *given, **options: case.told
+        self._handed.run_apart = lambda *given, **options: case.facts
         taken = self._handed.take_over(
             "", "the library", self._model, Findings(self._model), str(self._scratch)
         )

@@ -1,11 +1,16 @@
-"""Ways to damage bytes, texts and JSON. All chances come from the generator that is handed in."""
+"""Damages bytes, texts and JSON; declares what a target of the fuzzer is.
+
+All random choices come from the generator that the caller passes.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from random import Random
-from typing import Any
+from typing import Any, Protocol
 
 #: Numbers at which arithmetic, counters and comparisons turn over.
 NUMBERS = (0, 1, 2, 3, 4, 7, 8, 16, 0x7F, 0x80, 0xFF, 0x100, 0x7FFF, 0x8000, 0xFFFF, 0x10000,
@@ -44,6 +49,37 @@ NAMES = (
 OFTEN = (1, 1, 1, 2, 3, 5)
 #: About so long may an input become, bytes.
 LONGEST = 1 << 18
+
+
+@dataclass(frozen=True)
+class Case:
+    """One input, and the facts that its maker needs again when it is read."""
+
+    data: bytes
+    facts: Any = None
+
+
+class Target(Protocol):
+    """A reader under test. It is made in the process that uses it.
+
+    Attributes
+    ----------
+    limit: bytes that a read may take by its own options, whatever the input says.
+    """
+
+    limit: int
+
+    def __init__(self, folder: Path, outside: Path) -> None:
+        """Only ``folder`` may be written; ``outside`` lies beside it and must stay untouched."""
+
+    def make(self, rng: Random) -> Case:
+        """An input; the same for the same state of ``rng``."""
+
+    def read(self, case: Case) -> str:
+        """Reads it and returns the outcome in a word or two.
+
+        Raises PtmError if it refuses the input; any other exception is a finding.
+        """
 
 
 def damaged(

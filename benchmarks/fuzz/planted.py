@@ -12,7 +12,7 @@ from random import Random
 
 import numpy as np
 
-from benchmarks.fuzz.target import Case
+from benchmarks.fuzz.mutation import Case
 from ptmtools.errors import InputError
 
 #: What is wrong → words of the finding.
@@ -57,7 +57,7 @@ class Planted:
         self._warm -= 1
         if self._warm >= 0:
             return "warm"
-        match case.told:
+        match case.facts:
             case "an error of ours":
                 raise InputError("PTM-I001", "refused")
             case "another error":

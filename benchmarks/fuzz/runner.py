@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from benchmarks.fuzz.child import Told, work
+from benchmarks.fuzz.child import Tally, work
 
 #: Processor time that an input may take, seconds; and after how many of the clock it hangs, several
 #: times as many on a busy machine.
@@ -27,13 +27,13 @@ class Summary:
 
     name: str
     wanted: int
-    told: Told = field(default_factory=Told)
+    tally: Tally = field(default_factory=Tally)
     seconds: float = 0.0
 
     @property
     def read(self) -> int:
         """How many inputs were read to the end."""
-        return self.told.outcomes.total()
+        return self.tally.outcomes.total()
 
 
 def run(
@@ -56,14 +56,14 @@ def run(
         while any(part.running for part in parts):
             for part in parts:
                 if part.running:
-                    part.attend(summary.told)
-            if len(summary.told.findings) > ENOUGH:
+                    part.attend(summary.tally)
+            if len(summary.tally.findings) > ENOUGH:
                 for part in parts:
                     part.stop()
                 break
             time.sleep(0.02)
     summary.seconds = time.perf_counter() - begun
-    summary.told.findings.sort()
+    summary.tally.findings.sort()
     return summary
 
 
@@ -89,31 +89,31 @@ class _Part:
     def _begin(self) -> None:
         self._lives += 1
         context = multiprocessing.get_context("spawn")
-        self._told, sends = context.Pipe(duplex=False)
+        self._reports, sends = context.Pipe(duplex=False)
         self._current = context.Value("q", -1, lock=False)
         self._seen, self._since = -1, time.monotonic()
         folder = self._folder / str(self._lives)
         self._process = context.Process(
             target=work,
             kwargs={**self._settings, "folder": str(folder), "start": self._next,
-                    "current": self._current, "told": sends},
+                    "current": self._current, "reports": sends},
             daemon=True,
         )  # fmt: skip
         self._process.start()
         sends.close()
 
-    def attend(self, told: Told) -> None:
-        """Takes what was told, and sees whether the process lives and goes on."""
-        while self._told.poll():
+    def attend(self, tally: Tally) -> None:
+        """Adds the reports of the process to the tally; replaces a process that died or hangs."""
+        while self._reports.poll():
             try:
-                batch = self._told.recv()
+                batch = self._reports.recv()
             except EOFError:
-                self._died(told)
+                self._died(tally)
                 return
             if batch is None:
                 self.stop()
                 return
-            _add(told, batch)
+            _add(tally, batch)
             self._next = batch.done
         number = self._current.value
         if number != self._seen:
@@ -121,25 +121,25 @@ class _Part:
         waited = time.monotonic() - self._since
         if waited > (self._hangs if number >= 0 else SETUP):
             if number < 0:
-                told.findings.append((number, "could not be set up"))
+                tally.findings.append((number, "could not be set up"))
                 self.stop()
                 return
-            told.findings.append((number, f"hangs: no end after {waited:.0f} s"))
+            tally.findings.append((number, f"hangs: no end after {waited:.0f} s"))
             self._process.kill()
-            self._succeed(number, told)
+            self._succeed(number, tally)
 
-    def _died(self, told: Told) -> None:
+    def _died(self, tally: Tally) -> None:
         self._process.join(5)
         number = self._current.value
-        told.findings.append((number, f"the process ended with status {self._process.exitcode}"))
+        tally.findings.append((number, f"the process ended with status {self._process.exitcode}"))
         if number < 0:
             self.stop()
             return
-        self._succeed(number, told)
+        self._succeed(number, tally)
 
-    def _succeed(self, number: int, told: Told) -> None:
-        """The next process goes on behind the input that ended this one. What was not told of the
-        batch is lost, and is not counted."""
+    def _succeed(self, number: int, tally: Tally) -> None:
+        """Starts the next process behind the input that ended this one. The unreported rest of the
+        batch is lost and not counted."""
         self.stop()
         self._next = number + self._step
         if self._next < self._stop and self._lives < ENOUGH:
@@ -151,11 +151,11 @@ class _Part:
         self.running = False
         self._process.kill()
         self._process.join()
-        self._told.close()
+        self._reports.close()
 
 
-def _add(told: Told, batch: Told) -> None:
-    told.outcomes += batch.outcomes
-    told.findings += batch.findings
-    told.longest = max(told.longest, batch.longest)
-    told.most = max(told.most, batch.most)
+def _add(tally: Tally, batch: Tally) -> None:
+    tally.outcomes += batch.outcomes
+    tally.findings += batch.findings
+    tally.longest = max(tally.longest, batch.longest)
+    tally.most = max(tally.most, batch.most)

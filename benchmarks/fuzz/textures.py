@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.fuzz.mutation import NUMBERS, damaged
-from benchmarks.fuzz.target import Case
+from benchmarks.fuzz.mutation import NUMBERS, Case, damaged
 from ptmtools.texture import (
     EncodeOptions,
     Limits,
@@ -91,7 +90,7 @@ class Ptm:
 
     def read(self, case: Case) -> str:
         """Decodes; AssertionError if a wrong image came out though checksums were left alone."""
-        which, mended, way, chance = case.told
+        which, mended, way, chance = case.facts
         if way == 1:
             return self._windows(case.data, chance)
         if way == 2:
@@ -171,14 +170,14 @@ class Images:
 
     def read(self, case: Case) -> str:
         """Loads; texels are all made."""
-        if case.told == 2:
+        if case.facts == 2:
             return self._of_a_scene(case.data)
         source: Any = case.data
-        if case.told:
+        if case.facts:
             self._file.write_bytes(case.data)
             source = self._file
         picture = load_image(source, LIMITS)
-        assert picture.array().nbytes <= 2 * LIMITS.decoded_bytes or case.told
+        assert picture.array().nbytes <= 2 * LIMITS.decoded_bytes or case.facts
         return f"{picture.texels.dtype}"
 
     def _of_a_scene(self, data: bytes) -> str:

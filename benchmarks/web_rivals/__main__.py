@@ -31,7 +31,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "benchmarks")]
 
 from render import load  # noqa: E402
-from walk_scenes import database_of  # noqa: E402
+from scenes import database_of  # noqa: E402
 
 from benchmarks.web_rivals import memory  # noqa: E402
 from benchmarks.web_rivals.entrants import RIVALS, WALK, Entrant, require, rival, walk_page  # noqa: E402

@@ -25,9 +25,9 @@ COUNT = {"manifest": 200, "apo": 150, "staged": 60, "campus": 60, "served": 25}
 def test_nothing_but_errors_of_ours(kind: str) -> None:
     count = COUNT.get(kind, 400)
     summary = run(kind, KINDS[kind].make, seed=0, start=0, count=count)
-    assert summary.told.findings == []
+    assert summary.tally.findings == []
     assert summary.read == count
-    assert len(summary.told.outcomes) > 1 or kind == "served"
+    assert len(summary.tally.outcomes) > 1 or kind == "served"
 
 
 def test_every_fault_is_found() -> None:
@@ -36,7 +36,7 @@ def test_every_fault_is_found() -> None:
     assert set(planted.values()) == set(FAULTS)
     summary = run("planted", Planted, 7, 0, len(numbers), slow=0.5, hangs=5.0)
     found: dict[int, str] = {}
-    for number, what in summary.told.findings:
+    for number, what in summary.tally.findings:
         found[number] = found.get(number, "") + what
     late = "writes beside without Python"  # seen as soon as the folders are compared
     assert any(FAULTS[late] in what for what in found.values())

@@ -1,6 +1,6 @@
 """No false negative on real models, and the check that says so fails when a portal is removed.
 
-The same with 10⁶ segments: ``python benchmarks/false_negatives.py DB…``.
+The same with more segments: ``ptm validate DB --segments 1000000``.
 """
 
 from __future__ import annotations

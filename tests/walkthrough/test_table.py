@@ -10,9 +10,8 @@ from typing import Any
 import pytest
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
-import walk_runs
-from walk_runs import Case, made
-from walk_table import tables
+import walk_table
+from walk_table import Case, made, tables
 
 
 def row(policy: str, walk: int, e: float, **more: Any) -> dict[str, Any]:
@@ -70,7 +69,7 @@ def test_scenes_and_conditions_are_apart() -> None:
 def test_a_run_that_is_there_is_not_made_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(walk_runs, "_world", lambda scene, walk: (scene, str(walk)))
+    monkeypatch.setattr(walk_table, "_world", lambda scene, walk: (scene, str(walk)))
     case = Case("museum", 1, "ach", "4M", "10%")
     other = Case("museum", 1, "ach", "4M", "30%")
     assert case.key != other.key

@@ -1,4 +1,4 @@
-"""Models with as many triangles as asked for, in as many rooms: ``grown(model, kind, triangles)``
+"""Adds triangles to a model without adding rooms: ``enlarged(scene, kind, triangles, library)``
 
 walls       the opaque surfaces are subdivided, each triangle into k² alike, so that all are about
             as large: the structure itself has the triangles, with T-junctions where k differs
@@ -31,7 +31,7 @@ A_ROOM = 8
 _LINES = 1 << 18
 
 
-def grown(scene: Scene, kind: str, triangles: int, library: str) -> list[bytes]:
+def enlarged(scene: Scene, kind: str, triangles: int, library: str) -> list[bytes]:
     """The OBJ, in parts, of a scene with about so many triangles; ``library`` is its MTL."""
     corners, uv, owner = scene.corners, scene.uv, scene.triangle_object
     names, material = list(scene.objects), scene.triangle_material
@@ -197,7 +197,7 @@ def _obj(
 
 def main(arguments: list[str]) -> int:
     model, kind, triangles, out = arguments
-    parts = grown(ingest(model), kind, int(float(triangles)), f"{Path(model).stem}.mtl")
+    parts = enlarged(ingest(model), kind, int(float(triangles)), f"{Path(model).stem}.mtl")
     Path(out).write_bytes(b"".join(parts))
     return 0
 

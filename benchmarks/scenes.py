@@ -1,16 +1,21 @@
-"""The databases and walks that the walkthrough is measured on: ``python benchmarks/walk_scenes.py``
+"""The test models, and the databases and walks of the simulator's benchmarks.
+
+    python benchmarks/scenes.py [museum rooms mixed hospital]
+
+makes the databases that are missing in ``build/bench/walks``, each with three walks of 150 seconds:
 
 museum        the sample museum (`make sample`): 12 rooms, 31 textures of 1024 × 1024 texels
 rooms         a museum of 40 rooms and 120 textures of 1024 × 1024 texels
 mixed         the same, the side of each texture drawn from 256, 512, 1024 and 2048 texels
 hospital      of the shared data: 9 small textures, and much furniture
 
-Each with three walks of 150 seconds. What is missing is made in ``build/bench/walks``, two scenes
-at a time; the museums of 40 rooms take most of it, since their pictures are painted first.
+Two scenes are made at a time. The museums of 40 rooms take longest: their pictures are painted
+first.
 """
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Iterable
@@ -18,7 +23,19 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
-from at_hand import MODELS, ROOT
+
+ROOT = Path(__file__).resolve().parent.parent
+SHARED = Path(os.environ.get("PTM_SHARED", ROOT.parent / "shared"))
+TWO_ROOMS = ROOT / "sample_data/two_rooms/two_rooms.obj"
+MUSEUM = "museum"
+#: OBJ files by name; `make sample` writes the museum.
+MODELS = {
+    MUSEUM: ROOT / "build/museum/museum.obj",
+    **{
+        name: SHARED / f"scenes/{name}/{name}.obj"
+        for name in ("hospital", "willowgarage", "office", "gallery")
+    },
+}
 
 FOLDER = ROOT / "build/bench/walks"
 #: Sides of the textures of the museums that are made here.
@@ -27,8 +44,13 @@ ROOMS, TEXTURES = 40, 120
 SCENES = ("museum", *SIDES, "hospital")
 #: Seeds of the walks, and how long each is, s.
 WALKS, SECONDS = (1, 2, 3), 150
-#: What clients other than the default ones need; browsers without a decoder are not measured.
+#: Per-texture hints are for the policy `ach-texture`; the fallback images are not measured.
 BUILD = ("--per-texture", "--fallback-size", "256")
+
+
+def model_file(given: str) -> Path:
+    """The file of a name in `MODELS`; any other text is a path."""
+    return MODELS.get(given, Path(given))
 
 
 def database_of(scene: str) -> Path:
@@ -58,7 +80,7 @@ def make_scene(scene: str) -> None:
 
 
 def make_mixed(folder: Path, sides: tuple[int, ...]) -> None:
-    """A museum of which each texture has one of so many sides."""
+    """Writes a museum; the side of each texture is drawn from ``sides``."""
     sys.path.insert(0, str(ROOT / "sample_data"))
     from make_museum import MuseumOptions, make_museum, write
 
@@ -74,7 +96,7 @@ def make_scenes(scenes: Iterable[str]) -> None:
 
 
 def ptm(*arguments: object) -> None:
-    """Runs the command; what it says is not shown, but for errors."""
+    """Runs `ptm` with those arguments and prints only its errors."""
     call = [sys.executable, "-m", "ptmtools", *map(str, arguments), "--quiet"]
     subprocess.run(call, check=True, cwd=ROOT)
 
