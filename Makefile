@@ -11,8 +11,8 @@
 # make fuzz    100,000 damaged and hostile files for every reader (half an hour)
 # make sample  only the sample museum
 # make setup   only the virtual environment
-# make docs-tables     print the exact tables of the docs into their pages (ten minutes)
-# make docs-timings    print the timed ones, on a machine that does nothing else (an hour)
+# make docs-tables     print the exact tables of benchmarks/RESULTS.md into it (ten minutes)
+# make docs-timings    print its timed tables, on a machine that does nothing else (an hour)
 # make docs-pictures   draw the pictures of the docs
 # make clean   remove what was built, except the virtual environment
 

@@ -1,13 +1,13 @@
-"""Prints the tables of the docs into their pages. ``python benchmarks/docs_tables.py [NAME…]``
+"""Prints tables into benchmarks/RESULTS.md: ``python benchmarks/docs_tables.py [NAME…]``
 
-A page holds a table between two lines, ``<!-- table: NAME -->`` and ``<!-- /table -->``. `TABLES`
-says which command prints it; what it prints as Markdown replaces what stood there. Without names
-these are the exact tables, which are the same on every machine; with ``--timed`` the others, which
-want a quiet one.
+A table stands between two lines, ``<!-- table: NAME -->`` and ``<!-- /table -->``. `TABLES` holds
+the command that prints it; its output, as Markdown, replaces the old table. Without names the
+script prints the exact tables, which are the same on every machine; with ``--timed`` the others,
+which need a machine without other work.
 
-``--check`` writes nothing. It runs the quick form of each exact table, the rows that take a few
-seconds, and fails where a row that is printed does not stand in the page. `make lint` does this.
-A table whose data are not at hand is skipped with a message; with ``CI=true`` that is an error.
+``--check`` writes nothing. It runs the quick command of each exact table, which prints the rows
+that take a few seconds, and fails if a printed row is not in the page (`make lint`). A table whose
+data are missing is skipped with a message; with ``CI=true`` that is an error.
 """
 
 from __future__ import annotations
@@ -23,20 +23,21 @@ from itertools import groupby
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+RESULTS = ROOT / "benchmarks/RESULTS.md"
 SHARED = Path(os.environ.get("PTM_SHARED", ROOT.parent / "shared"))
 MARKED = re.compile(r"(<!-- table: (\S+) -->\n\n?)(.*?)(\n?<!-- /table -->)", re.DOTALL)
 
 
 @dataclass(frozen=True)
 class Table:
-    """How a table is made.
+    """The commands that print one table.
 
     Attributes
     ----------
     command: a script of this project and its arguments; prints the whole table.
-    quick: the same for some rows of it; empty for timings, which are not compared.
-    needs: the folder below the shared data without which it cannot be made.
-    part: which of the tables that the command prints, counted from 0.
+    quick: the same for some rows; empty for timings, which are not compared.
+    needs: the folder of the shared data that the command reads.
+    part: number of the table among those that the command prints, from 0.
     """
 
     command: str
@@ -93,22 +94,22 @@ def tables_of(page: Path) -> dict[str, list[str]]:
     return {name: body.splitlines() for _, name, body, _ in MARKED.findall(page.read_text("utf-8"))}
 
 
-def changed(name: str, page: Path) -> list[str]:
-    """Rows that the quick command prints and the page lacks."""
-    table, standing = TABLES[name], tables_of(page)[name]
+def changed(name: str) -> list[str]:
+    """Rows that the quick command prints and that are not in the page."""
+    table, standing = TABLES[name], tables_of(RESULTS)[name]
     return [line for line in printed(table.quick)[table.part] if line not in standing]
 
 
-def write(name: str, page: Path) -> None:
-    """Puts what the command prints into the page."""
+def write(name: str) -> None:
+    """Replaces a table of the page by the output of its command."""
     lines = "\n".join(printed(TABLES[name].command)[TABLES[name].part])
 
-    def put(found: re.Match[str]) -> str:
-        if found[2] != name:
-            return found[0]
+    def replacement(match: re.Match[str]) -> str:
+        if match[2] != name:
+            return match[0]
         return f"<!-- table: {name} -->\n\n{lines}\n\n<!-- /table -->"
 
-    page.write_text(MARKED.sub(put, page.read_text("utf-8")), "utf-8")
+    RESULTS.write_text(MARKED.sub(replacement, RESULTS.read_text("utf-8")), "utf-8")
 
 
 def main() -> int:
@@ -118,27 +119,25 @@ def main() -> int:
     parser.add_argument("--check", action="store_true", help="write nothing; compare exact rows")
     given = parser.parse_args()
     failed = False
-    for page in sorted(ROOT.glob("docs/**/*.md")):
-        for name in tables_of(page):
-            timed = not TABLES[name].quick
-            if name not in given.names if given.names else timed != given.timed:
-                continue
-            if timed and given.check:
-                continue
-            where = f"{page.relative_to(ROOT)}: table {name}"
-            data = SHARED / TABLES[name].needs
-            if not data.is_dir():
-                print(f"{where}: skipped, there is no {data}")
-                failed |= os.environ.get("CI", "").lower() == "true"
-            elif given.check:
-                for line in changed(name, page):
-                    print(f"{where}: the command now prints: {line}")
-                    failed = True
-            else:
-                print(f"{where} …", flush=True)
-                write(name, page)
+    for name in tables_of(RESULTS):
+        timed = not TABLES[name].quick
+        if name not in given.names if given.names else timed != given.timed:
+            continue
+        if timed and given.check:
+            continue
+        data = SHARED / TABLES[name].needs
+        if not data.is_dir():
+            print(f"table {name}: skipped, there is no {data}")
+            failed |= os.environ.get("CI", "").lower() == "true"
+        elif given.check:
+            for line in changed(name):
+                print(f"table {name}: the command now prints: {line}")
+                failed = True
+        else:
+            print(f"table {name} …", flush=True)
+            write(name)
     if failed:
-        print("The tables of the docs are not those of the program; run: make docs-tables")
+        print("benchmarks/RESULTS.md is out of date; run: make docs-tables")
     return int(failed)
 
 

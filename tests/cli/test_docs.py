@@ -17,7 +17,11 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCS = sorted(ROOT.glob("docs/**/*.md"))
 PAGES = [
     *DOCS,
-    *(p for at in ("*.md", "sample_data/*.md", "web/*/*.md") for p in sorted(ROOT.glob(at))),
+    *(
+        page
+        for folder in ("", "benchmarks/", "sample_data/", "web/*/")
+        for page in sorted(ROOT.glob(f"{folder}*.md"))
+    ),
 ]
 FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 #: `[text](target)` and `![text](target)`, also over a line's end.
