@@ -4,7 +4,7 @@ Every file but the page has a hash of its contents in its name, so that caches m
 and a site that changes is never half old. The index is that of the hints, with names and sizes of
 each file instead of templates: a client plans with what a record and the geometry of a cell cost.
 
-The geometry stays GLB. (Tried, `benchmarks/site_geometry.py`: differences of vertices in planes of
+The geometry stays GLB. (Tried, benchmarks/RESULTS.md: differences of vertices in planes of
 bytes save 22 to 44 % of it, but 0.02 to 0.04 s until the first room at 512 kbit/s; a GLB without
 the names and URIs that the page does not read, 5 %.)
 """

@@ -2,7 +2,7 @@
 
 `Screen`, with what lies around by distance and by need, half and half. Distance is right about what
 one may walk up to, need about what one sees from where one can stand, and how fine; together they
-take 3 % off either alone at half a megabit a second (`benchmarks/walk_ablations.py`). Without need
+take 3 % off either alone at half a megabit a second (benchmarks/RESULTS.md). Without need
 in the records, distance alone.
 """
 

@@ -1,7 +1,7 @@
 """`oracle`: knows the walk. What anything adds is the error that it will take away, discounted.
 
 Greedy like the others: the same engine, with the true tables instead of a guess. A lower bound by
-linear programming is apart (`benchmarks/walk_bound.py`).
+linear programming is apart (benchmarks/RESULTS.md).
 """
 
 from __future__ import annotations
