@@ -38,21 +38,19 @@ from scenes import MODELS, ROOT, model_file
 
 from ptmtools.cells import subdivide
 from ptmtools.cells.model import Cells
-from ptmtools.coverage.ach import compute_ach
+from ptmtools.coverage.ach import choose, compute_ach, triangles_of_a_pvs
 from ptmtools.coverage.backends import BACKENDS
-from ptmtools.coverage.backends.choice import choose, triangles_of_a_pvs
 from ptmtools.coverage.backends.opengl import OpenGLRenderer, create_context, is_software
 from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.options import PRESETS, AchOptions
 from ptmtools.coverage.sampling import CellHints, Sampler
 from ptmtools.errors import MissingComponentError
 from ptmtools.executors import open_executor
+from ptmtools.lab.tradeoff.experiment import run
+from ptmtools.lab.tradeoff.report import as_csv, picture
+from ptmtools.lab.tradeoff.stages import CoverageTrade
 from ptmtools.scene import ingest
 from ptmtools.scene.model import Scene
-from ptmtools.tradeoff.coverage import CoverageTrade
-from ptmtools.tradeoff.experiment import run
-from ptmtools.tradeoff.figure import picture
-from ptmtools.tradeoff.report import as_csv
 from ptmtools.visibility.model import Pvs
 from ptmtools.visibility.pvs import compute_pvs
 

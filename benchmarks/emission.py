@@ -32,13 +32,12 @@ from scenes import MODELS, MUSEUM, model_file
 from ptmtools import AchOptions, compute_ach
 from ptmtools.cells import Cells, subdivide
 from ptmtools.coverage.model import Ach
-from ptmtools.database import EmitOptions, TextureRecord, emit
-from ptmtools.database.content import Content
-from ptmtools.database.floats import row_texts
-from ptmtools.database.geometry import Geometry
-from ptmtools.database.gltf.cell import gltf_files
-from ptmtools.database.served import compressed
-from ptmtools.database.vrml.text import field
+from ptmtools.output import EmitOptions, TextureRecord, emit
+from ptmtools.output.content import Content, Geometry
+from ptmtools.output.emission import compressed
+from ptmtools.output.gltf import gltf_files
+from ptmtools.output.numbers import row_texts
+from ptmtools.output.vrml import field
 from ptmtools.scene import Scene, ingest
 from ptmtools.visibility import Pvs, compute_pvs
 

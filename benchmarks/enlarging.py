@@ -19,8 +19,8 @@ import numpy as np
 import orjson
 from numpy.typing import NDArray
 
-from ptmtools.cells.vectors import areas, normals
-from ptmtools.cells.welding import distinct
+from ptmtools.arrays import areas, normals
+from ptmtools.cells.connectivity import distinct
 from ptmtools.scene import Scene, ingest
 
 Floats = NDArray[np.float64]

@@ -45,11 +45,11 @@ from enlarging import enlarged
 from memory import with_peak
 
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
-from ptmtools.cells.grouping import grouped
+from ptmtools.cells.rooms import grouped
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
-from ptmtools.database import TextureRecord, emit
+from ptmtools.output import TextureRecord, emit
 from ptmtools.scene import Scene, SourceImage, ingest
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.visibility import Pvs, compute_pvs

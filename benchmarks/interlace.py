@@ -30,9 +30,9 @@ from numpy.typing import NDArray
 from PIL import Image
 from scenes import SHARED
 
-from ptmtools.interlace import InterlaceOptions, interlace, join, split
-from ptmtools.interlace.model import axes_of
-from ptmtools.interlace.steps import stride
+from ptmtools.neighbours.interlace import InterlaceOptions, interlace, join, split
+from ptmtools.neighbours.interlace.model import axes_of
+from ptmtools.neighbours.interlace.steps import stride
 from ptmtools.texture import (
     Picture,
     decode_levels,

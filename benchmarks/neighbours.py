@@ -33,19 +33,19 @@ import numpy as np
 from scenes import ROOT, ptm
 
 from ptmtools.arrays import Floats
+from ptmtools.lab.comparing import Played, SimulateOptions, play
+from ptmtools.lab.forms import FORMS, PTM
+from ptmtools.lab.measures import STANDS
+from ptmtools.lab.network import Conditions
+from ptmtools.lab.policies import POLICIES, Declared
+from ptmtools.lab.policies.whole_files import GpuiiClient
+from ptmtools.lab.report import link_text
+from ptmtools.lab.simulation import simulate
+from ptmtools.lab.walk import read_walk
+from ptmtools.lab.world import World, prepare, read_forms
+from ptmtools.output.served import read_served
 from ptmtools.quantities import size
-from ptmtools.walkthrough.comparing import Played, SimulateOptions, play
-from ptmtools.walkthrough.forms import FORMS, PTM
-from ptmtools.walkthrough.measures import STANDS
-from ptmtools.walkthrough.network import Conditions
-from ptmtools.walkthrough.policies import POLICIES, Declared
-from ptmtools.walkthrough.policies.gpuii import GpuiiClient
-from ptmtools.walkthrough.report import link_text
-from ptmtools.walkthrough.served import read_served
-from ptmtools.walkthrough.simulation import simulate
-from ptmtools.walkthrough.view.pyramids import read_pyramids
-from ptmtools.walkthrough.walk import read_walk
-from ptmtools.walkthrough.world import World, prepare, read_forms
+from ptmtools.rendering.pyramids import read_pyramids
 
 FOLDER = ROOT / "build/bench/neighbours"
 #: Those that take `.ptm`s, and the neighbouring systems; a row each.

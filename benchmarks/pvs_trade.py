@@ -148,7 +148,7 @@ def walk_of(folder: Path, model: Path) -> None:
 def cut(folder: Path, model: Path, area: float) -> dict[str, tuple[float, float]]:
     """Keeps the cells of both kinds; processor and wall seconds of each."""
     from ptmtools.cells import SubdivideOptions, subdivide
-    from ptmtools.cells.grouping import grouped
+    from ptmtools.cells.rooms import grouped
     from ptmtools.scene import ingest
 
     subdivide(ingest(TWO_ROOMS))
@@ -167,7 +167,7 @@ def flow(folder: Path, method: Any) -> dict[str, float]:
     import numpy as np
     from memory import with_peak
 
-    from ptmtools.cells.grouping import leaf_of_cell
+    from ptmtools.cells.rooms import leaf_of_cell
     from ptmtools.visibility import Pvs, PvsOptions, compute_pvs
 
     compute_pvs(stored(folder, "small"), PvsOptions(method=method))

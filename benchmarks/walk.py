@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.cells import Cells
-from ptmtools.database import TextureRecord
-from ptmtools.database.content import Content
-from ptmtools.database.vrml.cell import CellWriter
+from ptmtools.output import TextureRecord
+from ptmtools.output.content import Content
+from ptmtools.output.vrml import CellWriter
 from ptmtools.scene import Scene
 from ptmtools.visibility import Pvs
 

@@ -21,15 +21,15 @@ from pstats import Stats
 
 from scenes import database_of, make_scene, walk_file
 
+from ptmtools.lab.comparing import budget_of
+from ptmtools.lab.forms import PTM
+from ptmtools.lab.network import Conditions
+from ptmtools.lab.policies import POLICIES
+from ptmtools.lab.simulation import simulate
+from ptmtools.lab.walk import Walk, read_walk
+from ptmtools.lab.world import RATE, World, prepare
+from ptmtools.output.served import read_served
 from ptmtools.quantities import parse_memory
-from ptmtools.walkthrough.comparing import budget_of
-from ptmtools.walkthrough.forms import PTM
-from ptmtools.walkthrough.network import Conditions
-from ptmtools.walkthrough.policies import POLICIES
-from ptmtools.walkthrough.served import read_served
-from ptmtools.walkthrough.simulation import simulate
-from ptmtools.walkthrough.walk import Walk, read_walk
-from ptmtools.walkthrough.world import RATE, World, prepare
 
 #: The policies that take `.ptm`s.
 OURS = [name for name, policy in POLICIES.items() if policy.form == PTM]

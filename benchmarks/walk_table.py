@@ -39,18 +39,18 @@ from typing import Any
 
 from scenes import FOLDER, ROOT, SCENES, WALKS, database_of, make_scenes, walk_file
 
+from ptmtools.lab.comparing import budget_of
+from ptmtools.lab.forms import PTM
+from ptmtools.lab.measures import STANDS, measure
+from ptmtools.lab.network import Conditions
+from ptmtools.lab.policies import POLICIES
+from ptmtools.lab.simulation import simulate
+from ptmtools.lab.walk import read_walk
+from ptmtools.lab.world import World, prepare
+from ptmtools.output.served import Served, read_served
 from ptmtools.quantities import parse_bandwidth, parse_memory
-from ptmtools.walkthrough.comparing import budget_of
-from ptmtools.walkthrough.forms import PTM
-from ptmtools.walkthrough.measures import STANDS, measure
-from ptmtools.walkthrough.network import Conditions
-from ptmtools.walkthrough.policies import POLICIES
-from ptmtools.walkthrough.served import Served, read_served
-from ptmtools.walkthrough.simulation import simulate
-from ptmtools.walkthrough.view.pyramids import read_pyramids
-from ptmtools.walkthrough.view.records import Pyramids
-from ptmtools.walkthrough.walk import read_walk
-from ptmtools.walkthrough.world import World, prepare
+from ptmtools.rendering.pyramids import read_pyramids
+from ptmtools.rendering.records import Pyramids
 
 BANDWIDTHS = ("56k", "512k", "4M", "16M")
 MEMORIES = ("4MiB", "10%", "30%")

@@ -26,12 +26,7 @@ if TYPE_CHECKING:
     from ptmtools.coverage.ach import compute_ach as compute_ach
     from ptmtools.coverage.model import Ach as Ach
     from ptmtools.coverage.options import AchOptions as AchOptions
-    from ptmtools.database import (
-        EmitOptions as EmitOptions,
-        PlotOptions as PlotOptions,
-        emit as emit,
-        plot_plan as plot_plan,
-    )
+    from ptmtools.diagnostics import ValidationReport as ValidationReport
     from ptmtools.errors import (
         CheckError as CheckError,
         DatabaseError as DatabaseError,
@@ -41,7 +36,12 @@ if TYPE_CHECKING:
         OutputError as OutputError,
         PtmError as PtmError,
     )
-    from ptmtools.findings import ValidationReport as ValidationReport
+    from ptmtools.output import (
+        EmitOptions as EmitOptions,
+        PlotOptions as PlotOptions,
+        emit as emit,
+        plot_plan as plot_plan,
+    )
     from ptmtools.pipeline import (
         Artifacts as Artifacts,
         BuildReport as BuildReport,

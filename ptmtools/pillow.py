@@ -43,12 +43,10 @@ from PIL import Image, ImageFile
 
 from ptmtools.errors import InputError, PtmError
 from ptmtools.texture.container import MAGIC
-from ptmtools.texture.images.eight_bit import stripped
-from ptmtools.texture.images.opening import ORIENTATION, described, orientation_of
+from ptmtools.texture.images.opening import ORIENTATION, described, orientation_of, stripped
 from ptmtools.texture.model import Description, EncodeOptions, Limits, PtmHeader
 from ptmtools.texture.reader import PtmReader
-from ptmtools.texture.rows import Rows
-from ptmtools.texture.sources import ranges_of
+from ptmtools.texture.sources import Rows, ranges_of
 
 FORMAT = "PTM"
 #: Kind of sample and components → mode.

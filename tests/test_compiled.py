@@ -202,7 +202,7 @@ def test_a_constant_of_this_package(tmp_path: Path) -> None:
         ROOT, tmp_path / "ptmtools", ignore=shutil.ignore_patterns("__pycache__", "schemas")
     )
     program = (
-        "import numpy; from ptmtools.texture.coders.mixing.decisions import counted; "
+        "import numpy; from ptmtools.texture.coders.mixing_decisions import counted; "
         "print(counted(numpy.uint32(1 << 31), 1, 9))"
     )
     before = run(program, tmp_path)

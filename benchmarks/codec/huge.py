@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 import ptmtools.texture as texture
 from ptmtools.texture import EncodeOptions, Limits
-from ptmtools.texture.coders.haar import kernels  # noqa: F401  so that the baseline has them
+from ptmtools.texture.coders import haar_kernels as kernels  # noqa: F401  so that the baseline has them
 
 PLENTY = Limits(decoded_bytes=1 << 40)
 

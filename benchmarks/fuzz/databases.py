@@ -421,8 +421,8 @@ class Vrml:
 
     def read(self, case: Case) -> str:
         """Parses it."""
-        from ptmtools.database.fault import FileError
-        from ptmtools.database.vrml.reader import parse
+        from ptmtools.output.model import FileError
+        from ptmtools.output.vrml_reader import parse
 
         try:
             return f"{len(parse(case.data).nodes)} nodes"

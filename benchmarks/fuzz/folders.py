@@ -20,26 +20,25 @@ import numpy as np
 from benchmarks.fuzz.databases import MODEL, commanded
 from benchmarks.fuzz.mutation import NAMES, Case, damaged, dumped, twisted
 from benchmarks.fuzz.textures import LIMITS as TEXTURE_LIMITS, sealed_png, textures
-from ptmtools.apo import read_mesh, read_octree
-from ptmtools.apo.checking import check_folder
-from ptmtools.apo.files import INDEX as APO_INDEX
-from ptmtools.apo.traversal import look_up
-from ptmtools.campus.model import INDEX as CAMPUS_INDEX, SIZES
-from ptmtools.campus.validation import check_campus
 from ptmtools.errors import PtmError
-from ptmtools.interlace import (
+from ptmtools.lab.campus.stock import read_stock, read_surfaces, read_textures
+from ptmtools.neighbours.apo import read_mesh, read_octree
+from ptmtools.neighbours.apo.checking import check_folder
+from ptmtools.neighbours.apo.files import INDEX as APO_INDEX
+from ptmtools.neighbours.apo.traversal import look_up
+from ptmtools.neighbours.campus.model import INDEX as CAMPUS_INDEX, SIZES
+from ptmtools.neighbours.campus.validation import check_campus
+from ptmtools.neighbours.interlace import (
     InterlaceOptions,
     deinterlace,
     interlace,
     validate_interlaced,
     write_folder,
 )
-from ptmtools.interlace.containers import CONTAINERS
-from ptmtools.interlace.model import INDEX as INTERLACE_INDEX
+from ptmtools.neighbours.interlace.containers import CONTAINERS
+from ptmtools.neighbours.interlace.model import INDEX as INTERLACE_INDEX
 from ptmtools.texture import Picture
 from ptmtools.texture.model import Limits
-from ptmtools.walkthrough.campus.stock import read_stock
-from ptmtools.walkthrough.campus.surfaces import read_surfaces, read_textures
 
 LIMITS = Limits(1 << 26)
 

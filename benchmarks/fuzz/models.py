@@ -443,7 +443,7 @@ class Handed:
     limit = 1 << 26
 
     def __init__(self, folder: Path, outside: Path) -> None:
-        from ptmtools.scene import handed
+        from ptmtools.scene import messages as handed
         from ptmtools.scene.source import Findings, Source, SourceMaterial
 
         self._names = furnished(folder, outside)

@@ -27,15 +27,15 @@ from PIL import Image
 
 from benchmarks.web_rivals.images import in_form
 from benchmarks.web_rivals.packages import KTX2
+from ptmtools.lab.allocation import allocate
+from ptmtools.lab.measures import flip
+from ptmtools.lab.walk import Walk
+from ptmtools.lab.world import World, prepare
+from ptmtools.output.served import Served
+from ptmtools.rendering.pyramids import read_pyramids
+from ptmtools.rendering.records import Pyramids
+from ptmtools.rendering.render import Renderer
 from ptmtools.scene.model import Scene
-from ptmtools.walkthrough.allocation import allocate
-from ptmtools.walkthrough.flip import flip
-from ptmtools.walkthrough.served import Served
-from ptmtools.walkthrough.view.pyramids import read_pyramids
-from ptmtools.walkthrough.view.records import Pyramids
-from ptmtools.walkthrough.view.render import Renderer
-from ptmtools.walkthrough.walk import Walk
-from ptmtools.walkthrough.world import World, prepare
 
 WIDTH, HEIGHT, _SAMPLES = 320, 240, 3
 #: Of 4 × 4 texels.

@@ -11,10 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.database.gltf.buffer import BufferWriter
-from ptmtools.database.gltf.cell import flipped
-from ptmtools.database.gltf.container import pack
-from ptmtools.database.gltf.material import WRAPS, linear
+from ptmtools.output.gltf import WRAPS, BufferWriter, flipped, linear, pack
 from ptmtools.scene.model import Material, Scene
 
 UNLIT = "KHR_materials_unlit"

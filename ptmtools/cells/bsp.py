@@ -31,16 +31,14 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats
-from ptmtools.cells import caps
-from ptmtools.cells.door_planes import DoorPlanes
+from ptmtools.arrays import Bools, Floats, ranges
+from ptmtools.cells import split_planes as caps
 from ptmtools.cells.model import OUTSIDE
 from ptmtools.cells.options import SubdivideOptions
 from ptmtools.cells.planar import Geometry, difference, intersection
 from ptmtools.cells.polyhedron import Polyhedron, clip_polygon, cut, section
-from ptmtools.cells.reveals import Reveals
+from ptmtools.cells.split_planes import DoorPlanes, Reveals
 from ptmtools.cells.structure import Structure, WallPlane
-from ptmtools.cells.vectors import ranges
 from ptmtools.progress import Progress
 from ptmtools.tolerance import TIE_SHARE, Tolerance
 

@@ -19,18 +19,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.cells.detail import connected_pieces
-from ptmtools.cells.doorways import RELIEF, closing, parting
+from ptmtools.arrays import Bools, Floats, Ints, areas
+from ptmtools.cells.connectivity import Welded, connected, distinct
+from ptmtools.cells.doorways import RELIEF, Slabs, closing, parting
 from ptmtools.cells.facets import Facets
-from ptmtools.cells.merging import connected
-from ptmtools.cells.naming import Designated, called, says_door
-from ptmtools.cells.nearby import Nearby
 from ptmtools.cells.options import SubdivideOptions
-from ptmtools.cells.slabs import Slabs
+from ptmtools.cells.roles import Designated, called, connected_pieces, says_door
+from ptmtools.cells.search import Nearby
 from ptmtools.cells.structure import Opaque, Structure
-from ptmtools.cells.vectors import areas
-from ptmtools.cells.welding import Welded, distinct
 from ptmtools.scene.model import Scene
 
 #: A leaf is thinner than this, metres,

@@ -18,10 +18,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints, cross, normals, summed
+from ptmtools.cells.connectivity import Welded, across_edges, distinct
 from ptmtools.cells.planar import delaunay
-from ptmtools.cells.vectors import cross, normals, summed
-from ptmtools.cells.welding import Welded, across_edges, distinct
 from ptmtools.tolerance import Tolerance, ranked
 
 #: A corner lies in the plane of a region if it is within this share of the on-plane distance.
@@ -53,7 +52,7 @@ class Facets:
     @staticmethod
     def of(mesh: Welded, tolerance: Tolerance) -> Facets:
         """The regions of a mesh, the largest triangles first."""
-        from ptmtools.cells.facet_kernels import grow_regions
+        from ptmtools.cells.kernels import grow_regions
 
         corners = mesh.corners
         normal = normals(corners)

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.cells.merging import connected
-from ptmtools.cells.vectors import ranges
+from ptmtools.arrays import Bools, Floats, Ints, ranges
+from ptmtools.cells.connectivity import connected
 
 #: So many pairs of an edge and a corner are looked at together.
 _CHUNK = 1 << 21

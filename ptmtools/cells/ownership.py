@@ -21,9 +21,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints, normals
 from ptmtools.cells.bsp import Tree
-from ptmtools.cells.vectors import normals
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance
 
@@ -103,7 +102,7 @@ def _settled(
     """(n,) how far (n, 3, 3) triangles sink in one piece, to a node that cuts them or to leaf i as
     -2 - i, and (n,) whether they lie in the plane of a node on the way; such a one goes to the side
     that ``facing``, (n, 3), points to."""
-    from ptmtools.cells.ownership_kernels import sink
+    from ptmtools.cells.kernels import sink
 
     at = np.full(len(corners), 0 if len(tree.planes) else -2)
     lying = np.zeros(len(corners), dtype=bool)

@@ -11,28 +11,274 @@ regions.
 
 Tried and rejected: a grid of columns, as navigation meshes are made. Doors of 60 cm need cells of
 5 cm, of which a campus has a hundred million.
-"""
+
+What of flat regions of floor is clear of what stands about them, in plan.
+
+What of a triangle is as high above a floor as a band is projected onto it along the vertical,
+widened by a radius, and taken away. Above a slope, heights are measured from the slope. A circle
+is a polygon inside it. Floors and triangles are sorted by storeys, regions with much about them are
+cut in two, so the time is in proportion to what stands about.
+
+Polygons are united and cut on the grid of `planar`.
+
+Which leaves somebody can stand in: those that meet the eye region (`eyes`).
+
+Ceilings that hang lower than eyes may be are not asked for, so what is just above one counts as
+well. It costs a little and hides nothing."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
 
-from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.cells.clearance import CORNERS, PLAN, clear_of, halves, united_by
-from ptmtools.cells.detail import recognised
+from ptmtools.arrays import Bools, Floats, Ints, areas, normals, ranges
+from ptmtools.cells.connectivity import Welded
 from ptmtools.cells.facets import Facets
-from ptmtools.cells.naming import Designated
 from ptmtools.cells.options import SubdivideOptions, Walker
-from ptmtools.cells.planar import Geometry, delaunay, intersection
-from ptmtools.cells.reach import FLOOR_COSINE
+from ptmtools.cells.planar import Geometry, delaunay, difference, intersection
+from ptmtools.cells.polyhedron import Polyhedron
+from ptmtools.cells.portals import FLOOR_COSINE
+from ptmtools.cells.roles import Designated, recognised
+from ptmtools.cells.search import ByHeight
 from ptmtools.cells.structure import Structure
-from ptmtools.cells.vectors import areas, normals, ranges
-from ptmtools.cells.welding import Welded
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import Tolerance
+
+#: Floors so near to each other in height, as a share of the band that is looked at, are looked at
+#: together.
+_STOREY = 0.2
+#: A shape of less area for its length than this share of a radius is a line.
+_THIN = 4e-3
+#: A region is first held against one of the triangles about it, then against so many times more.
+_GROWTH = 1.25
+#: Regions with more triangles about them, and shapes of more corners, are cut in two,
+_CROWD, CORNERS = 256, 256
+#: unless they are no longer than this many times what they are held against is high, or wide.
+_SHORT, _NARROW = 1.2, 8.0
+#: Corners of a quarter of a circle.
+QUARTER = 4
+#: Axes of the plan.
+PLAN = [0, 2]
+
+
+def clear_of(
+    corners: Floats,
+    plan: Geometry,
+    slope: Floats,
+    band: tuple[float, float],
+    radius: float,
+    tolerance: Tolerance,
+) -> tuple[Geometry, Ints]:
+    """(k,) pieces of regions of floor that are no less than a ``radius`` from triangles, (n, 3, 3),
+    as high above them as a ``band``, metres; in plan. And (k,) the region of each.
+
+    The regions are (r,) polygons in ``plan``, whose heights are a·x + b·z + c by (r, 3) ``slope``.
+    """
+    left, whose, region = [plan[:0]], [np.zeros(0, dtype=np.int64)], np.arange(len(plan))
+    by_height = ByHeight(corners[:, :, 1].min(axis=1), corners[:, :, 1].max(axis=1))
+    while len(region):
+        row, near = _about(corners, by_height, plan, slope, band, radius)
+        crowded = (np.bincount(row, minlength=len(plan)) > _CROWD) & (
+            _length(plan) > _SHORT * band[1]
+        )
+        some = ~crowded[row]
+        free = _less(plan, slope, corners[near[some]], row[some], band, radius, tolerance)
+        kept = ~crowded & ~shapely.is_empty(free)
+        left.append(free[kept])
+        whose.append(region[kept])
+        plan, half = halves(plan[crowded], tolerance.grid)
+        slope, region = slope[crowded][half], region[crowded][half]
+    return np.concatenate(left), np.concatenate(whose)
+
+
+def united_by(row: Ints, shapes: Geometry, grid: float) -> tuple[Ints, Geometry]:
+    """(g,) the rows, (n,), that shapes have, ascending, and the union of those of each; none of
+    those only that are as wide as rounding, whose union is empty."""
+    if not len(shapes):
+        return row, shapes
+    order = np.argsort(row, kind="stable")
+    names, first, count = np.unique(row[order], return_index=True, return_counts=True)
+    shapes = shapes[order]
+    united = shapes[first]
+    for i in np.flatnonzero(count > 1):
+        united[i] = shapely.union_all(shapes[first[i] : first[i] + count[i]], grid_size=grid)
+    some = ~shapely.is_empty(united)
+    return names[some], united[some]
+
+
+def _about(
+    corners: Floats,
+    by_height: ByHeight,
+    plan: Geometry,
+    slope: Floats,
+    band: tuple[float, float],
+    radius: float,
+) -> tuple[Ints, Ints]:
+    """(p,) and (p,): pairs of a region of floor and a triangle, (n, 3, 3), as high above it as a
+    ``band``, whose box in plan is no more than a radius away."""
+    least, most = heights(plan, slope)
+    beside = radius * np.linalg.norm(slope[:, :2], axis=1)  # the slope goes on beyond the region
+    least, most = least - beside, most + beside
+    storey = np.floor(least / (_STOREY * (band[1] - band[0])))
+    rows, found = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    # Storey by storey, so that a floor is held against what is as high only.
+    for name in np.unique(storey):
+        here = np.flatnonzero(storey == name)
+        about = by_height.between(least[here].min() + band[0], most[here].max() + band[1])
+        flat = corners[about][:, :, PLAN]
+        boxes = shapely.box(*flat.min(axis=1).T, *flat.max(axis=1).T)
+        row, near = shapely.STRtree(boxes).query(plan[here], "dwithin", distance=radius)
+        row, near = here[row], about[near]
+        height = above(corners[near], slope[row])
+        meets = (height.min(axis=1) <= band[1]) & (height.max(axis=1) >= band[0])
+        rows.append(row[meets])
+        found.append(near[meets])
+    return np.concatenate(rows), np.concatenate(found)
+
+
+def _less(
+    plan: Geometry,
+    slope: Floats,
+    corners: Floats,
+    row: Ints,
+    band: tuple[float, float],
+    radius: float,
+    tolerance: Tolerance,
+) -> Geometry:
+    """(r,) regions less what is less than a radius from triangles, (n, 3, 3), each of which stands
+    about the region of its ``row``.
+
+    Of most regions, such as the tops of mouldings, the first few leave nothing, and of a wall of
+    many triangles, a few take what all do. So they are tried by turns, those first that may take
+    most, and only the ones that still come near to what is left."""
+    low, high = corners.min(axis=1)[:, PLAN] - radius, corners.max(axis=1)[:, PLAN] + radius
+    x0, z0, x1, z1 = shapely.bounds(plan).reshape(-1, 4)[row].T
+    across = np.minimum(high[:, 0], x1) - np.maximum(low[:, 0], x0)
+    along = np.minimum(high[:, 1], z1) - np.maximum(low[:, 1], z0)
+    order = np.lexsort((-across * along, row))
+    row, corners = row[order], corners[order]
+    turn = np.arange(len(row)) - np.searchsorted(row, row)
+    left = plan.copy()
+    first, end = 0, 1
+    while (turn >= first).any():
+        at = np.flatnonzero((turn >= first) & (turn < end))
+        at = at[~shapely.is_empty(left[row[at]])]
+        height = above(corners[at], slope[row[at]])
+        each, shadow = shadows(corners[at][:, :, PLAN], height, band, at)
+        # A radius away is not near, but for rounding.
+        near = shapely.dwithin(shadow, left[row[each]], (1 - 1e-6) * radius)
+        shadow, whose = _merged(shadow[near], row[each[near]], radius, tolerance)
+        # One by one: GEOS 3.14 buffers many lines at once with holes where they meet.
+        wide = shapely.buffer(shadow, radius, quad_segs=QUARTER)
+        names, taken = united_by(whose, wide, tolerance.grid)
+        left[names] = difference(left[names], taken, tolerance.grid)
+        first, end = end, int(_GROWTH * end) + 1
+    return left
+
+
+def _merged(
+    shapes: Geometry, row: Ints, radius: float, tolerance: Tolerance
+) -> tuple[Geometry, Ints]:
+    """Shapes and the (n,) row of each, those with an area united row by row: fewer to widen. Of
+    thin ones, such as a wall's, nothing would be left; those without width are lines."""
+    size, around = shapely.area(shapes), shapely.length(shapes)
+    line = size <= tolerance.rounding * around
+    flat = ~line & (size > _THIN * radius * around)
+    shapes[line] = _lines(shapes[line])
+    names, united = united_by(row[flat], shapes[flat], tolerance.grid)
+    parts, which = shapely.get_parts(united, return_index=True)
+    return np.append(shapes[~flat], parts), np.append(row[~flat], names[which])
+
+
+def _lines(shapes: Geometry) -> Geometry:
+    """(n,) from end to end of shapes without width, of which GEOS would widen one end only."""
+    points, of = shapely.get_coordinates(shapes, return_index=True)
+    first = np.searchsorted(of, np.arange(len(shapes)))
+    for _ in range(2):  # what is farthest from any point is an end, and from that, the other one
+        away = np.linalg.norm(points - points[first[of]], axis=1)
+        last, first = first, np.lexsort((-away, of))[np.searchsorted(of, np.arange(len(shapes)))]
+    return shapely.linestrings(np.stack([points[last], points[first]], axis=1))
+
+
+def _length(shapes: Geometry) -> Floats:
+    """(n,) the longer sides of the boxes around shapes."""
+    x0, y0, x1, y1 = shapely.bounds(shapes).reshape(-1, 4).T
+    longer: Floats = np.maximum(x1 - x0, y1 - y0)
+    return longer
+
+
+def heights(plan: Geometry, slope: Floats) -> tuple[Floats, Floats]:
+    """(r,) and (r,): the least and the greatest height, or a little beyond, of regions in plan."""
+    x0, z0, x1, z1 = shapely.bounds(plan).reshape(-1, 4).T
+    middle = slope[:, 0] * (x0 + x1) / 2 + slope[:, 1] * (z0 + z1) / 2 + slope[:, 2]
+    half = np.abs(slope[:, 0]) * (x1 - x0) / 2 + np.abs(slope[:, 1]) * (z1 - z0) / 2
+    return middle - half, middle + half
+
+
+def above(corners: Floats, slope: Floats) -> Floats:
+    """(n, k) heights of the corners of shapes, (n, k, 3), above the slope of each, (n, 3)."""
+    plan = np.einsum("ncx,nx->nc", corners[:, :, PLAN], slope[:, :2])
+    found: Floats = corners[:, :, 1] - plan - slope[:, 2:]
+    return found
+
+
+def shadows(
+    plan: Floats, height: Floats, band: tuple[float, float], whose: Ints
+) -> tuple[Ints, Geometry]:
+    """What of convex things is in a band of heights, in plan: their names, ascending, and shapes.
+    They are given by polygons or edges, (n, k, 2) in plan and (n, k) high, and (n,) names."""
+    points, valid = [plan], [(height >= band[0]) & (height <= band[1])]
+    following, after = np.roll(plan, -1, axis=1), np.roll(height, -1, axis=1)
+    for level in band:
+        crosses = (height - level) * (after - level) < 0
+        share = np.divide(level - height, after - height, out=np.zeros(height.shape), where=crosses)
+        points.append(plan + share[..., None] * (following - plan))
+        valid.append(crosses)
+    every, which = np.concatenate(points, axis=1), np.concatenate(valid, axis=1)
+    row, _ = np.nonzero(which)
+    order = np.argsort(whose[row], kind="stable")
+    names, group = np.unique(whose[row][order], return_inverse=True)
+    clouds = shapely.multipoints(every[which][order], indices=group.reshape(-1))
+    return names, np.asarray(shapely.convex_hull(clouds))
+
+
+def tiled(shapes: Geometry, margin: float, grid: float) -> tuple[Geometry, Geometry, Ints]:
+    """(m,) boxes that share out what is up to a margin from each of (n,) shapes, (m,) what of the
+    shape is up to a margin from each box, of few corners each, and (m,) its shape: what is done to
+    corners one by one is in proportion to their number."""
+    x0, y0, x1, y1 = shapely.bounds(shapes).reshape(-1, 4).T
+    own = shapely.box(x0 - margin, y0 - margin, x1 + margin, y1 + margin)
+    which = np.arange(len(shapes))
+    found: list[tuple[Geometry, Geometry, Ints]] = []
+    while True:
+        large = (shapely.get_num_coordinates(shapes) > CORNERS) & (_length(own) > _NARROW * margin)
+        found.append((own[~large], shapes[~large], which[~large]))
+        if not large.any():
+            boxes, pieces, names = zip(*found, strict=True)
+            return np.concatenate(boxes), np.concatenate(pieces), np.concatenate(names)
+        own, half = halves(own[large], grid)
+        x0, y0, x1, y1 = shapely.bounds(own).T
+        about = shapely.box(x0 - margin, y0 - margin, x1 + margin, y1 + margin)
+        shapes, which = intersection(shapes[large][half], about, grid), which[large][half]
+
+
+def halves(shapes: Geometry, grid: float) -> tuple[Geometry, Ints]:
+    """(m,) the polygons to both sides of the middles of (n,) shapes, and (m,) the shape of each."""
+    x0, y0, x1, y1 = shapely.bounds(shapes).reshape(-1, 4).T
+    middle = np.where(x1 - x0 > y1 - y0, (x0 + x1) / 2, x1)
+    level = np.where(x1 - x0 > y1 - y0, y1, (y0 + y1) / 2)
+    sides = (
+        shapely.box(x0, y0, middle, level),
+        shapely.box(np.where(middle < x1, middle, x0), np.where(level < y1, level, y0), x1, y1),
+    )
+    both = np.concatenate([intersection(shapes, side, grid) for side in sides])
+    parts, which = shapely.get_parts(both, return_index=True)
+    flat = shapely.area(parts) > 0
+    return parts[flat], which[flat] % max(len(shapes), 1)
+
 
 #: Places are sampled once in this area, m², and so often at most.
 _SAMPLE_AREA, _MOST_SAMPLES = 0.05, 500_000
@@ -162,3 +408,45 @@ def _triangles(free: Geometry, slope: Floats, grid: float) -> Floats:
     plan, slope = np.concatenate(found), slope[np.concatenate(of)]
     height = np.einsum("ncx,nx->nc", plan, slope[:, :2]) + slope[:, 2:]
     return np.stack([plan[..., 0], height, plan[..., 1]], axis=2)
+
+
+#: Eyes stay farther from what the body touches than rounding, but by no more of its radius.
+_SLACK = 0.1
+#: Pairs of leaf and floor that are compared at a time.
+_AT_ONCE = 1 << 16
+
+
+def eye_region(places: Places, walker: Walker, tolerance: Tolerance) -> Places:
+    """What eyes can be above: the places as wide as the body, but not into what it touches."""
+    inside = walker.radius * np.cos(np.pi / (4 * QUARTER))  # of a circle that is a polygon
+    reach = inside - min(2 * tolerance.plane, _SLACK * walker.radius)
+    box, plan, which = tiled(places.plan, walker.radius, tolerance.grid)
+    eyes = intersection(shapely.buffer(plan, reach, quad_segs=QUARTER), box, tolerance.grid)
+    some = ~shapely.is_empty(eyes)
+    return Places(eyes[some], places.slope[which[some]])
+
+
+def meets(
+    eyes: Places, bodies: Sequence[Polyhedron], walker: Walker, tolerance: Tolerance
+) -> Bools:
+    """(L,) which of the leaves meet an eye region."""
+    found = np.zeros(len(bodies), dtype=np.bool_)
+    band = 2 * tolerance.plane, walker.reach
+    low = np.array([body.points.min(axis=0) for body in bodies]).reshape(-1, 3)
+    high = np.array([body.points.max(axis=0) for body in bodies]).reshape(-1, 3)
+    boxes = shapely.box(*low[:, PLAN].T, *high[:, PLAN].T)
+    leaf, floor = shapely.STRtree(eyes.plan).query(boxes, "intersects")
+    least, most = heights(eyes.plan, eyes.slope)
+    near = (high[leaf, 1] > least[floor] + band[0]) & (low[leaf, 1] < most[floor] + band[1])
+    leaf, floor = leaf[near], floor[near]
+    edges = [body.points[body.edges] for body in bodies]
+    count = np.array([len(each) for each in edges], dtype=np.int64)
+    for first in range(0, len(leaf), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        pair = np.repeat(np.arange(len(leaf[some])), count[leaf[some]])
+        edge = np.concatenate([edges[i] for i in leaf[some].tolist()])
+        height = above(edge, eyes.slope[floor[some]][pair])
+        names, shadow = shadows(edge[:, :, PLAN], height, band, pair)
+        touches = shapely.intersects(shadow, eyes.plan[floor[some]][names])
+        found[leaf[some][names[touches]]] = True
+    return found

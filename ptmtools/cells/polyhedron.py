@@ -11,8 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ptmtools.arrays import Floats, Ints
-from ptmtools.cells.vectors import cross
+from ptmtools.arrays import Floats, Ints, cross
 
 #: Tag of a face that lies in the root box.
 BOX_FACE = -1

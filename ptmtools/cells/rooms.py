@@ -22,19 +22,55 @@ deep as its wall share nothing but the doorway); the volume of the convex hull t
 fill together (splits every room with a pillar, and joins small rooms through their doors); the
 largest sphere in each leaf instead of its cross-section (under a ceiling of 2.6 m all halls have
 the same).
-"""
+
+What it gains to part a room, and the leaves that are one cell because it gains too little.
+
+Whoever is in a cell has to fetch all that the cell may see, and whoever may see a cell has to
+fetch all of it. With v the volume of a leaf (how often somebody is in it), w the area of the
+surfaces in it (what it takes to fetch it) and S the leaves that it sees, a group G of leaves costs
+
+    apart     Σ v·w(S) + w·v(S)  over the leaves of G
+    together  v(G)·w(∪S) + w(G)·v(∪S)
+
+and the **gain** of parting it is 1 - apart / together, the share of the fetching that this saves.
+It is 0 in a hall, whatever the size of the rest of the building, and says the same in any unit.
+Groups are joined in the order of what parting the two together would gain, the lower numbered
+leaves first where it is the same, as long as that is less than the threshold.
+
+Leaves in which nobody can stand have no viewers, and nothing is gained by parting them from one
+another. They come last: what adds least to the cost of all groups is joined first, until half of
+the threshold has been added. So slivers and what few can see join whatever they are part of, and
+the top of a hall that the whole building sees stays by itself.
+
+Who sees whom is estimated (`sight`), not computed: the subdivision comes before visibility, and
+the estimate decides only where cells end, never what they see.
+
+Tried and rejected: what parting the two groups gains, each taken as the whole that it has become.
+Once a cell sees nearly everything, anything may join it, and little by little it is the building.
+
+Leaves become cells: each for itself, or grouped into rooms where parting gains too little.
+
+A room of several leaves is one cell, unless keeping some of them apart saves its viewers more than
+`SubdivideOptions.gain` of what they fetch: a corridor along many doors is worth parting, a hall is
+not. Cells never reach through a door (`rooms`), even if both sides see the same: what is behind a
+door covers little of the view, and the coverage hints can say so only of another cell."""
 
 from __future__ import annotations
 
 import heapq
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.cells.merging import Groups
+from ptmtools.arrays import Bools, Floats, Ints, areas
+from ptmtools.cells.connectivity import Groups
 from ptmtools.cells.model import Cells
+from ptmtools.cells.options import SubdivideOptions
+from ptmtools.cells.sight import from_places, sampled_sight
+from ptmtools.diagnostics import Warned
 
 if TYPE_CHECKING:
     Plan = Any
@@ -187,3 +223,200 @@ def _distance(points: Floats, polygon: Floats) -> Floats:
     share = np.clip(np.einsum("npek,nek->npe", to, along) / square[:, None], 0.0, 1.0)
     nearest = np.linalg.norm(to - share[..., None] * along[:, None], axis=3)
     return np.asarray(nearest.min(axis=(1, 2)))
+
+
+#: Gains that differ by less are equal, in digits: symmetrical buildings have many, which rounding
+#: must not put in order.
+#: Joining what has no viewers may add this share of the threshold to all that is fetched.
+ATTACHED = 0.5
+
+
+def join_by_gain(
+    sees: Bools, volume: Floats, area: Floats, pairs: NDArray[np.int32], gain: float
+) -> Ints:
+    """(L,) for each leaf the leaf that stands for its group.
+
+    Parameters
+    ----------
+    sees: (L, L) symmetric, which leaf sees which.
+    volume, area: (L,) of a leaf, m³ in which viewers are, and of the surfaces in it, m².
+    pairs: (n, 2) leaves through whose portals groups may grow.
+    gain: no group of which parting gains as much is made; 0 to 1.
+    """
+    every = np.stack([volume, area], axis=1)
+    parted = _Parted(sees.copy(), every.copy(), every, pairs)
+    group = parted.grown(lambda gained: gained < gain)
+    attached = _Attached(parted.sees, parted.own, every, group[pairs])
+    return attached.grown_by(ATTACHED * gain)[group]
+
+
+class _Costs(Groups):
+    """Groups, and what they cost."""
+
+    def __init__(self, sees: Bools, own: Floats, every: Floats, pairs: NDArray[np.integer]) -> None:
+        """``sees``: (L, L) which leaves a group sees; ``own``: (L, 2) its volume and area,
+        ``every``: those of the leaves. The first two change as groups grow, and a group that
+        has joined another has nothing."""
+        super().__init__(len(sees), pairs)
+        self.sees, self.own, self.every = sees, own, every
+        self.before = [self.of(row, each) for row, each in zip(sees, own, strict=True)]
+
+    def together(self, a: int, b: int) -> float:
+        """Of two groups as one."""
+        return self.of(self.sees[a] | self.sees[b], self.own[a] + self.own[b])
+
+    def of(self, seen: Bools, own: Floats) -> float:
+        """Of a group that sees leaves, (L,), and has a volume and an area."""
+        volume, area = self.every[seen].sum(axis=0)
+        return float(own[0] * area + own[1] * volume)
+
+    def join(self, a: int, b: int) -> list[tuple[int, int]]:
+        self.sees[a] |= self.sees[b]
+        self.own[a] += self.own[b]
+        self.own[b] = 0.0
+        super().join(a, b)
+        return [(a, c) for c in self.near[a]]
+
+
+class _Parted(_Costs):
+    """Groups with viewers, that cost what parting them gains."""
+
+    def cost(self, a: int, b: int) -> float:
+        if not (self.own[a][0] and self.own[b][0]):
+            return np.inf
+        together = self.together(a, b)
+        gain = 1 - (self.before[a] + self.before[b]) / together if together > 0 else 0.0
+        return round(gain, DIGITS)
+
+    def join(self, a: int, b: int) -> list[tuple[int, int]]:
+        self.before[a] += self.before[b]  # of all its leaves apart
+        return super().join(a, b)
+
+
+class _Attached(_Costs):
+    """Groups one of which has no viewers, that cost what joining them adds to all costs, as a
+    share."""
+
+    def __init__(self, sees: Bools, own: Floats, every: Floats, pairs: NDArray[np.integer]) -> None:
+        super().__init__(sees, own, every, pairs)
+        self._all = sum(self.before)
+        self._added = 0.0
+
+    def grown_by(self, share: float) -> Ints:
+        """(L,) the groups, before joining them has added so much; none is joined for 0."""
+        return self.grown(lambda added: self._added + added < share)
+
+    def cost(self, a: int, b: int) -> float:
+        if self.own[a][0] and self.own[b][0]:
+            return np.inf
+        added = self.together(a, b) - self.before[a] - self.before[b]
+        return round(added / self._all, 2 * DIGITS) if self._all else 0.0
+
+    def join(self, a: int, b: int) -> list[tuple[int, int]]:
+        self._added += self.cost(a, b)
+        self.before[a] = self.together(a, b)
+        return super().join(a, b)
+
+
+#: Shares of a triangle that differ by less are equal, in digits.
+GAIN_DIGITS = 6
+#: What is said of a model of one cell.
+ONE_HALL = Warned("visibility culling gains nothing here: 1 hall")
+
+
+def grouped(cells: Cells, options: SubdivideOptions) -> Cells:
+    """The cells that the options ask for, of cells that are single leaves.
+
+    Cells are numbered in the order of their first leaves; geometry in a boundary between two
+    leaves of one cell lies inside that cell.
+    """
+    leaf = leaf_of_cell(cells)
+    group = _groups(cells, options.gain)[leaf] if options.cells == "room" else leaf
+    name = np.append(numbered(group), np.int32(-1))
+    leaf_cell = np.full(cells.leaf_count, -1, dtype=np.int32)
+    leaf_cell[leaf] = name[:-1]
+    cells = replace(cells, leaf_cell=leaf_cell, triangle_cell=name[cells.triangle_cell])
+    if cells.cell_count == 1:
+        cells = replace(cells, notes=(*cells.notes, ONE_HALL))
+    return cells
+
+
+def leaf_of_cell(cells: Cells) -> Ints:
+    """(C,) the leaves that are cells, of cells that are single leaves."""
+    return np.flatnonzero(cells.leaf_cell >= 0)
+
+
+def numbered(group: NDArray[np.integer]) -> NDArray[np.int32]:
+    """(L,) groups renamed to 0, 1, … in the order in which they first occur."""
+    _, first, row = np.unique(group, return_index=True, return_inverse=True)
+    place = np.empty(len(first), dtype=np.int32)
+    place[np.argsort(first)] = np.arange(len(first))
+    return np.asarray(place[row.reshape(-1)])
+
+
+def rank_in_file(cells: Cells) -> Ints:
+    """(L,) the place of each leaf in an order that no transformation of the model changes: leaves
+    are compared by the share that they hold of the model's first triangle of which one of them
+    holds more, and go by number where they hold the same of all.
+
+    Leaves themselves are numbered as planes split them, and which side of a plane is its front
+    depends on how the model is turned.
+    """
+    leaf, piece, area = _sides(cells)
+    source = cells.triangle_source
+    count = int(source.max(initial=-1)) + 1
+    pair, row = np.unique(leaf * count + source[piece], return_inverse=True)
+    held = np.bincount(row, area[piece])
+    whole = np.bincount(source, area)[pair % max(count, 1)]
+    share = np.round(np.divide(held, whole, out=np.zeros(len(held)), where=whole > 0), GAIN_DIGITS)
+    holds = share > 0
+    return _in_order(pair[holds] // count, pair[holds] % count, share[holds], cells.leaf_count)
+
+
+def _in_order(leaf: Ints, source: Ints, share: Floats, leaves: int) -> Ints:
+    """(leaves,) the places of leaves in order, given the share that each, ascending, holds of each
+    source, ascending: the more of an earlier one, the earlier. A leaf that holds nothing more
+    comes last, not first."""
+    start = np.searchsorted(leaf, np.arange(leaves + 1))
+    source, share = np.append(source, np.iinfo(np.int64).max), np.append(share, 0.0)
+    before = np.zeros(leaves, dtype=np.int64)  # how many leaves come before each
+    tied, k = np.arange(leaves), 0
+    while len(tied):
+        at = np.where(start[tied] + k < start[tied + 1], start[tied] + k, len(leaf))
+        order = np.lexsort((-share[at], source[at], before[tied]))
+        tied, at = tied[order], at[order]
+        group = np.diff(before[tied], prepend=-1) > 0
+        run = group | (np.diff(source[at], prepend=-1) != 0) | (np.diff(share[at], prepend=-1) != 0)
+        row = np.arange(len(tied))
+        first_of_run = np.maximum.accumulate(np.where(run, row, 0))
+        before[tied] += first_of_run - np.maximum.accumulate(np.where(group, row, 0))
+        alone = run & np.append(run[1:], True)
+        tied, k = tied[~alone & (at < len(leaf))], k + 1
+    rank = np.empty(leaves, dtype=np.int64)
+    rank[np.lexsort((np.arange(leaves), before))] = np.arange(leaves)
+    return rank
+
+
+def _groups(cells: Cells, gain: float) -> NDArray[np.integer]:
+    rank = rank_in_file(cells)
+    room = room_of_leaf(cells, rank)
+    if gain >= 1 or len(np.unique(room)) == len(room):
+        return room
+    inner = cells.portal_leaf[room[cells.portal_leaf[:, 0]] == room[cells.portal_leaf[:, 1]]]
+    inner = inner[(cells.leaf_cell[inner] >= 0).all(axis=1)]
+    order = np.argsort(rank)
+    sees = from_places(sampled_sight(cells), cells.leaf_standing)[np.ix_(order, order)]
+    leaf, piece, area = _sides(cells)
+    surface = np.bincount(leaf, area[piece], cells.leaf_count).astype(np.float64)
+    viewers = cells.leaf_volumes() * cells.leaf_standing
+    return join_by_gain(sees, viewers[order], surface[order], rank[inner], gain)[rank]
+
+
+def _sides(cells: Cells) -> tuple[Ints, Ints, Floats]:
+    """(n,) leaves and (n,) pieces of geometry that belong to them, of cells that are single leaves;
+    what lies in a boundary counts on both sides. And (M,) the areas of the pieces, m²."""
+    front, back = np.append(leaf_of_cell(cells), -1)[cells.triangle_cell].T
+    behind = (back >= 0) & (back != front)
+    leaf = np.concatenate([front[front >= 0], back[behind]])
+    piece = np.concatenate([np.flatnonzero(front >= 0), np.flatnonzero(behind)])
+    return leaf, piece, areas(cells.vertex[cells.triangle])

@@ -12,7 +12,8 @@
 4. What cannot be seen from where one can stand (`standing`) is left out (`seen`). Each of the
    other leaves is a cell, or the leaves of a room are (`grouping`).
 5. Pieces of the geometry with the same owners are joined again (`joining`).
-"""
+
+A world in which nothing is seen is a mistake in the model, and not a result."""
 
 from __future__ import annotations
 
@@ -20,19 +21,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ptmtools.arrays import Floats
-from ptmtools.cells.assembly import assembled, kept_names
-from ptmtools.cells.division import Building, Space, bounds, divide, divide_inside
-from ptmtools.cells.emptiness import check_seen
-from ptmtools.cells.grouping import grouped
-from ptmtools.cells.joining import joined
-from ptmtools.cells.model import Cells
-from ptmtools.cells.naming import matches
-from ptmtools.cells.options import SubdivideOptions
-from ptmtools.cells.ownership import cut_to_leaves
-from ptmtools.cells.polyhedron import Polyhedron
-from ptmtools.cells.reach import ROOFED, roofed_share
-from ptmtools.cells.remarks import (
+from ptmtools.arrays import Floats, normals
+from ptmtools.cells.diagnostics import (
     of_detail,
     of_doors,
     of_leaves,
@@ -40,15 +30,70 @@ from ptmtools.cells.remarks import (
     of_triangles,
     of_unreached,
 )
-from ptmtools.cells.seen import seen_from_places
+from ptmtools.cells.division import (
+    Building,
+    Space,
+    assembled,
+    bounds,
+    divide,
+    divide_inside,
+    kept_names,
+)
+from ptmtools.cells.joining import joined
+from ptmtools.cells.model import Cells
+from ptmtools.cells.options import SubdivideOptions
+from ptmtools.cells.ownership import cut_to_leaves
+from ptmtools.cells.polyhedron import Polyhedron
+from ptmtools.cells.portals import ROOFED, roofed_share
+from ptmtools.cells.roles import matches
+from ptmtools.cells.rooms import grouped
+from ptmtools.cells.sight import seen_from_places
+from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
-from ptmtools.notes import Warned
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.scene.orientation import main_axes
 from ptmtools.tolerance import Tolerance
+
+
+def check_seen(scene: Scene, cells: Cells) -> None:
+    """Raises InputError PTM-I304 if from nowhere in the cells a face of the scene is seen."""
+    if _something_seen(scene, cells):
+        return
+    if scene.two_sided.all():
+        raise InputError(
+            "PTM-I304",
+            "no face of the model lies in or around a cell",
+            remedy="give a --viewpoint X,Y,Z inside a room",
+        )
+    raise InputError(
+        "PTM-I304",
+        "nothing of the model is seen from inside: no face around its cells is turned towards "
+        "them or has a back",
+        remedy="give --two-sided to draw every face from both sides, or turn the normals",
+    )
+
+
+def _something_seen(scene: Scene, cells: Cells) -> bool:
+    """Whether some face is two-sided or faces the box around its cell. In doubt it does: what lies
+    in a side of the root box is emitted with the cell there, whichever way it looks."""
+    piece, cell = cells.emitted(scene.two_sided)
+    if not len(piece) or scene.two_sided[cells.triangle_source[piece]].any():
+        return len(piece) > 0
+    low, high = np.full((2, cells.cell_count, 3), [[[np.inf]], [[-np.inf]]])
+    starts = cells.leaf_point_start[:-1]
+    kept = cells.leaf_cell >= 0
+    of = cells.leaf_cell[kept]
+    np.minimum.at(low, of, np.minimum.reduceat(cells.leaf_point, starts)[kept])
+    np.maximum.at(high, of, np.maximum.reduceat(cells.leaf_point, starts)[kept])
+    corners = cells.vertex[cells.triangle[piece]]
+    facing = normals(corners)
+    furthest = np.where(facing > 0, high[cell], low[cell])
+    ahead = np.einsum("nk,nk->n", furthest - corners[:, 0], facing)
+    return bool((ahead > cells.tolerance.thin * np.linalg.norm(facing, axis=1)).any())
+
 
 #: How far the first root box stands off the model, as a share of the model's extent.
 BOX_MARGIN = 0.01

@@ -10,12 +10,12 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from ptmtools.apo.model import ApoOptions
-from ptmtools.apo.picture import RenderOptions
 from ptmtools.cli.batch import no_name
 from ptmtools.cli.common import as_json, voiced, workers
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
+from ptmtools.neighbours.apo.model import ApoOptions
+from ptmtools.neighbours.apo.picture import RenderOptions
 from ptmtools.quantities import count, size
 from ptmtools.scene.options import IngestOptions
 
@@ -58,8 +58,7 @@ def apo(
     """Turn a mesh of many triangles into a simplified mesh and an octree texture of its normals,
     which streams level by level (docs/formats/apo.md), and draw such a folder.
     """
-    from ptmtools.apo.files import INDEX
-    from ptmtools.apo.reading import read_index
+    from ptmtools.neighbours.apo.files import INDEX, read_index
     from ptmtools.scene.ingestion import check_file
 
     if not mesh or "" in (folder, view):
@@ -98,10 +97,10 @@ def apo(
 def _make(
     voice: Voice, model: str, folder: str, values: dict[str, Any], workers: int, force: bool
 ) -> None:
-    from ptmtools.apo.files import FORM, files_of
-    from ptmtools.apo.making import make_apo
     from ptmtools.executors import open_executor
     from ptmtools.executors.model import processors
+    from ptmtools.neighbours.apo.files import FORM, files_of
+    from ptmtools.neighbours.apo.making import make_apo
     from ptmtools.scene import ingest
     from ptmtools.scene.notes import outside, warnings
 
@@ -145,9 +144,9 @@ def _refuse_making(values: dict[str, Any]) -> None:
 def _draw(folder: str, view: str, options: RenderOptions, force: bool) -> dict[str, Any]:
     import numpy as np
 
-    from ptmtools.apo.picture import render
-    from ptmtools.apo.reading import read_mesh, read_octree
     from ptmtools.files import write_bytes
+    from ptmtools.neighbours.apo.files import read_mesh, read_octree
+    from ptmtools.neighbours.apo.picture import render
     from ptmtools.texture.images import png_bytes
 
     mesh, octree = read_mesh(folder), read_octree(folder)

@@ -6,12 +6,11 @@ from typing import Any
 
 import click
 
-from ptmtools.campus.description import record
-from ptmtools.campus.options import CampusOptions
-from ptmtools.campus.summary import summary
 from ptmtools.cli.common import as_json, voiced, workers
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
+from ptmtools.neighbours.campus.options import CampusOptions
+from ptmtools.neighbours.campus.reading import record, summary
 from ptmtools.quantities import count
 from ptmtools.scene.options import IngestOptions
 
@@ -43,8 +42,8 @@ def campus(
     if not model or not folder:
         raise click.UsageError("a name is empty")
     options, reading = take(CampusOptions, values), take(IngestOptions, values)
-    from ptmtools.campus.building import make_campus
     from ptmtools.executors.local import open_executor
+    from ptmtools.neighbours.campus.building import make_campus
     from ptmtools.scene.notes import line, outside, warnings
 
     with voice.progress() as progress, open_executor(workers) as executor:

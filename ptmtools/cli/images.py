@@ -53,9 +53,8 @@ def encode(
     stdin. If an image cannot be read, that is reported and the others are encoded.
     """
     from ptmtools.texture.container import HEAD_MAX, read_header
-    from ptmtools.texture.encoder import encode_to
+    from ptmtools.texture.encoder import check_options, encode_to, level_above
     from ptmtools.texture.images import SUFFIXES, load_image
-    from ptmtools.texture.options import check_options, level_above
 
     options = take(EncodeOptions, values)
     check_options(options)
@@ -202,7 +201,7 @@ def decode(
     decoded, that is reported and the others are decoded.
     """
     from ptmtools.texture.images import WRITTEN, write_to
-    from ptmtools.texture.images.writing import writer
+    from ptmtools.texture.images.files import writer
     from ptmtools.texture.reader import open
 
     jobs = jobs_for(files, (".ptm",), output, "", tuple(WRITTEN))
@@ -266,7 +265,7 @@ def decode(
 def _refuse_image_suffix(output: str) -> None:
     """Raise OutputError PTM-O101 if what is written would pass for an image of another format."""
     from ptmtools.texture.images import SUFFIXES, WRITTEN
-    from ptmtools.texture.images.writing import LOSSY
+    from ptmtools.texture.images.files import LOSSY
 
     suffix = Path(output).suffix.lower()
     if suffix in (*SUFFIXES, *WRITTEN, *LOSSY):

@@ -16,7 +16,7 @@ from ptmtools.cli.common import as_json, voiced
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
 from ptmtools.errors import InputError, naming
-from ptmtools.pipeline.folders import FolderKind, kind_of
+from ptmtools.pipeline.validation import FolderKind, kind_of
 from ptmtools.quantities import count, size
 from ptmtools.scene.options import SUFFIXES, IngestOptions
 from ptmtools.texture.model import Description, PtmHeader, gpu_texel_bytes
@@ -64,10 +64,10 @@ def _info_folder(voice: Voice, folder: Path, kind: FolderKind, as_json: bool) ->
 
 def _info_database(voice: Voice, target: str, as_json: bool) -> None:
     from ptmtools.cli.stages import print_visitor
+    from ptmtools.pipeline.build import Visitor
     from ptmtools.pipeline.command import build_command, open_database
+    from ptmtools.pipeline.stage import words
     from ptmtools.pipeline.stages import STAGES
-    from ptmtools.pipeline.visitor import Visitor
-    from ptmtools.pipeline.words import words
 
     db = open_database(target)
     stages = db.manifest.stages
@@ -191,7 +191,7 @@ def _levels(header: PtmHeader) -> list[dict[str, Any]]:
 def _description(data: bytes, crc32: int) -> Description | None:
     import zlib
 
-    from ptmtools.texture.description import parse_description
+    from ptmtools.texture.container import parse_description
 
     try:
         return parse_description(data) if zlib.crc32(data) == crc32 else None

@@ -13,7 +13,7 @@ from ptmtools.cli.common import as_json, limited, voiced, writable
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
 from ptmtools.errors import naming
-from ptmtools.interlace.model import InterlaceOptions
+from ptmtools.neighbours.interlace.model import InterlaceOptions
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Limits
 
@@ -42,7 +42,7 @@ def interlace(
     The first file is a small picture by itself; each further one doubles the rows or the columns,
     until the last completes the image. Sides that are no powers of two are scaled to the nearest.
     """
-    from ptmtools.interlace.writing import FORM, interlace as split, write_folder
+    from ptmtools.neighbours.interlace.writing import FORM, interlace as split, write_folder
     from ptmtools.texture.images import load_image
 
     options = take(InterlaceOptions, values)
@@ -101,9 +101,9 @@ def deinterlace(
     voice: Voice, folder: str, step: int | None, output: str | None, force: bool, limits: Limits
 ) -> None:
     """Join the files of an interlaced image, all of them or the first few."""
-    from ptmtools.interlace.reading import deinterlace as joined, read_manifest
+    from ptmtools.neighbours.interlace.reading import deinterlace as joined, read_manifest
     from ptmtools.texture.images import write_image
-    from ptmtools.texture.images.writing import writer
+    from ptmtools.texture.images.files import writer
 
     if not folder or output == "":
         raise no_name()

@@ -11,7 +11,7 @@ from ptmtools.cli.output import Voice
 from ptmtools.quantities import count, size
 
 if TYPE_CHECKING:
-    from ptmtools.cells.enclosure import Enclosure
+    from ptmtools.cells.entrances import Enclosure
     from ptmtools.scene.inspection import Guess, Inspection
     from ptmtools.scene.options import IngestOptions
 
@@ -21,7 +21,7 @@ _SHOWN = 5
 
 def info_model(voice: Voice, target: str, options: IngestOptions, as_json: bool) -> None:
     """Reads a model and prints what it is. Raises what `ptmtools.scene.ingest` raises."""
-    from ptmtools.cells.enclosure import enclosure
+    from ptmtools.cells.entrances import enclosure
     from ptmtools.executors.model import processors
     from ptmtools.scene.inspection import inspect
 

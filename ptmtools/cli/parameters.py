@@ -1,4 +1,4 @@
-"""Command-line options made from the fields of an options dataclass; `ptmtools.pipeline.words` is
+"""Command-line options made from the fields of an options dataclass; `ptmtools.pipeline.stage` is
 the way back.
 
 The dataclass stays the one home of names, defaults and their explanation: a field `wall_area:
@@ -32,7 +32,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin
 import click
 from click.core import ParameterSource
 
-from ptmtools.pipeline.words import default_of, option_name
+from ptmtools.pipeline.stage import default_of, option_name
 
 T = TypeVar("T")
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]

@@ -11,13 +11,12 @@ from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
 from ptmtools.errors import naming
 from ptmtools.files import write_bytes
+from ptmtools.lab.path.making import Path, path_through
+from ptmtools.lab.path.options import PathOptions
+from ptmtools.lab.walk import walk_text
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
 from ptmtools.quantities import count
-from ptmtools.walkthrough.path.making import Path
-from ptmtools.walkthrough.path.options import PathOptions
-from ptmtools.walkthrough.path.through import path_through
-from ptmtools.walkthrough.walk import walk_text
 
 #: Rooms that are named without ``-v``.
 SHOWN = 12

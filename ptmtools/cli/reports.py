@@ -14,14 +14,14 @@ from ptmtools.cli.batch import no_name
 from ptmtools.cli.common import as_json, database, forced, limited, voiced, workers
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
-from ptmtools.database import PlotOptions
-from ptmtools.database.validation.findings import NOT_BUILT, SEEN_BY_BUILD
+from ptmtools.diagnostics import ValidationReport
 from ptmtools.errors import CheckError
-from ptmtools.findings import ValidationReport
+from ptmtools.output import PlotOptions
+from ptmtools.output.validation.findings import NOT_BUILT, SEEN_BY_BUILD
 from ptmtools.pipeline import Artifacts, shoot_segments, validate as check
 from ptmtools.pipeline.command import build_command, open_database
-from ptmtools.pipeline.folders import FOLDERS, kind_of
 from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS
+from ptmtools.pipeline.validation import FOLDERS, kind_of
 from ptmtools.quantities import count, size
 from ptmtools.texture.model import Limits
 from ptmtools.visibility import SegmentReport
@@ -34,7 +34,7 @@ target = click.argument("target", metavar="FILE|DB", type=click.Path())
 
 def _print_codes(context: click.Context, option: click.Option, asked: bool) -> None:
     if asked:
-        from ptmtools.database.validation.findings import CODES
+        from ptmtools.output.validation.findings import CODES
 
         tables = (CODES, *(kind.codes.load() for kind in FOLDERS.values()))
         every = {code: found for table in tables for code, found in table.items()}
@@ -115,8 +115,8 @@ def validate(
 @voiced
 def plot(voice: Voice, db: str, output: str, walk: str | None, force: bool, **values: Any) -> None:
     """Draw the floor plan of DB, storey by storey: cells, portals, and with --cell what it sees."""
-    from ptmtools.database import plot_plan
-    from ptmtools.walkthrough.walk import read_walk
+    from ptmtools.lab.walk import read_walk
+    from ptmtools.output import plot_plan
 
     walked = read_walk(walk) if walk is not None else None
     options = take(PlotOptions, values)

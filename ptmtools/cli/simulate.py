@@ -10,24 +10,24 @@ import click
 from ptmtools.cli.common import as_json, database, forced, voiced, writable
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
-from ptmtools.database.names import HINTS
 from ptmtools.errors import InputError, OutputError
 from ptmtools.files import refuse_existing, write_bytes, writing
+from ptmtools.lab import figures as figure, figures as pictures
+from ptmtools.lab.campus.world import prepare_campus
+from ptmtools.lab.comparing import SimulateOptions, counted, play, require_hints
+from ptmtools.lab.measures import require as require_flip
+from ptmtools.lab.path.making import path_through
+from ptmtools.lab.path.options import PathOptions
+from ptmtools.lab.report import as_csv, document, table
+from ptmtools.lab.walk import Walk, read_walk
+from ptmtools.lab.world import prepare, read_forms, relief_of
+from ptmtools.link import read_trace
+from ptmtools.output.names import HINTS
+from ptmtools.output.served import read_served
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
-from ptmtools.walkthrough import figure, pictures
-from ptmtools.walkthrough.campus.world import prepare_campus
-from ptmtools.walkthrough.comparing import SimulateOptions, counted, play, require_hints
-from ptmtools.walkthrough.flip import require as require_flip
-from ptmtools.walkthrough.path.options import PathOptions
-from ptmtools.walkthrough.path.through import path_through
-from ptmtools.walkthrough.relief.light import lit
-from ptmtools.walkthrough.report import as_csv, document, table
-from ptmtools.walkthrough.served import read_served
-from ptmtools.walkthrough.trace import read_trace
-from ptmtools.walkthrough.view.pyramids import read_pyramids
-from ptmtools.walkthrough.walk import Walk, read_walk
-from ptmtools.walkthrough.world import prepare, read_forms, relief_of
+from ptmtools.rendering.pyramids import read_pyramids
+from ptmtools.rendering.render import lit
 
 #: How long the walk is that is made where none is given, s.
 DURATION = 150.0

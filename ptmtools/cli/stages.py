@@ -26,16 +26,14 @@ from ptmtools.cli.common import (
 )
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
-from ptmtools.database.emitters.gltf import GLTF
 from ptmtools.lazy import Lazy
-from ptmtools.pipeline.build import build_scene as build, run_stage
-from ptmtools.pipeline.changes import NEVER_RUN
+from ptmtools.output.emitters import GLTF
+from ptmtools.pipeline.build import Visitor, build_scene as build, run_stage
 from ptmtools.pipeline.command import open_database
 from ptmtools.pipeline.report import BuildReport, StageReport
-from ptmtools.pipeline.run import Artifacts
+from ptmtools.pipeline.run import NEVER_RUN, Artifacts
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages import EMIT, PVS, STAGES
-from ptmtools.pipeline.visitor import Visitor
 from ptmtools.quantities import count, size
 from ptmtools.store.layout import SERVED
 
@@ -102,7 +100,7 @@ def _from_model(last: Stage[Any] | None) -> Callable[..., None]:
         options: list[Any] = [take(stage.options, values) for stage in stages]
         if dry_run:
             from ptmtools.cli.status import print_plan
-            from ptmtools.pipeline.plan import plan_build
+            from ptmtools.pipeline.build import plan_build
 
             plans = plan_build(model, db, *options, force=force)
             print_plan(voice, plans[: len(stages)], as_json)

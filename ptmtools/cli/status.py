@@ -15,7 +15,7 @@ from ptmtools.pipeline.stages import STAGES
 from ptmtools.quantities import count, size
 
 if TYPE_CHECKING:
-    from ptmtools.pipeline.plan import StagePlan
+    from ptmtools.pipeline.build import StagePlan
 
 #: Textures that are named without ``-v``.
 SHOWN_TEXTURES = 5

@@ -13,18 +13,16 @@ from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
 from ptmtools.coverage.options import MAX_SAMPLES
 from ptmtools.files import write_bytes
+from ptmtools.lab.path.making import path_through
+from ptmtools.lab.path.options import PathOptions
+from ptmtools.lab.tradeoff import report as sentences
+from ptmtools.lab.tradeoff.experiment import EXPERIMENTS, Subject, Trade, run
+from ptmtools.lab.tradeoff.knobs import KNOBS
+from ptmtools.lab.tradeoff.report import as_csv, picture, require, table
+from ptmtools.lab.tradeoff.walk import WalkOptions, WalkTrade, try_settings
+from ptmtools.lab.walk import Walk, read_walk
 from ptmtools.pipeline import Artifacts
 from ptmtools.pipeline.command import open_database
-from ptmtools.tradeoff import sentences
-from ptmtools.tradeoff.experiment import Trade, run
-from ptmtools.tradeoff.experiments import EXPERIMENTS, Subject
-from ptmtools.tradeoff.figure import picture, require
-from ptmtools.tradeoff.knobs import KNOBS
-from ptmtools.tradeoff.report import as_csv, table
-from ptmtools.tradeoff.walk import WalkOptions, WalkTrade, try_settings
-from ptmtools.walkthrough.path.options import PathOptions
-from ptmtools.walkthrough.path.through import path_through
-from ptmtools.walkthrough.walk import Walk, read_walk
 
 #: Sample points of the reference: at least so many that settings with fewer remain.
 LEAST_POINTS = 64
@@ -150,7 +148,7 @@ def tradeoff(
         found = [_walk_document(walk) for walk in walked]
         voice.emit_json([*found, *(_document(trade, wanted) for trade in trades)])
         return
-    blocks = [sentences.table(walk, wanted) for walk in walked]
+    blocks = [sentences.settings_table(walk, wanted) for walk in walked]
     for lines in [*blocks, *(table(trade, wanted) for trade in trades)]:
         for line in lines:
             voice.say(line)

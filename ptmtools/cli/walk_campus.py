@@ -9,7 +9,7 @@ import click
 from ptmtools.cli.common import as_json, voiced
 from ptmtools.cli.output import Voice
 from ptmtools.cli.parameters import options_of, take
-from ptmtools.walkthrough.campus.options import CampusWalkOptions
+from ptmtools.lab.campus.options import CampusWalkOptions
 
 
 @click.command("walk-campus")
@@ -68,12 +68,12 @@ def walk_campus(
     The output is Markdown: a row for each measure, and the MB received by every half minute.
     """
     options = take(CampusWalkOptions, values)
-    from ptmtools.walkthrough.campus.report import document, received, table
-    from ptmtools.walkthrough.campus.simulation import simulate_campus
-    from ptmtools.walkthrough.campus.world import prepare_campus
-    from ptmtools.walkthrough.served import read_served
-    from ptmtools.walkthrough.trace import read_trace
-    from ptmtools.walkthrough.walk import read_walk
+    from ptmtools.lab.campus.report import document, received, table
+    from ptmtools.lab.campus.simulation import simulate_campus
+    from ptmtools.lab.campus.world import prepare_campus
+    from ptmtools.lab.walk import read_walk
+    from ptmtools.link import read_trace
+    from ptmtools.output.served import read_served
 
     walk = read_walk(walk_file)
     trace = read_trace(trace_file) if trace_file else None

@@ -13,7 +13,7 @@ from ptmtools.lazy import Lazy
 from ptmtools.pipeline.build import WARM_UP
 
 #: What simplified meshes and octree textures need.
-OCTREES: Task = Lazy("ptmtools.apo.warm_up:warm_up")
+OCTREES: Task = Lazy("ptmtools.neighbours.apo.warm_up:warm_up")
 
 
 @click.command("warm-up")

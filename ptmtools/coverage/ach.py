@@ -10,25 +10,55 @@ there are hundreds of them, with views of a few pixels.
 The paper draws "all the objects of its PVS". Here what else shows is found too, since only so can a
 pixel fall on a cell outside the PVS, which would be an error of the PVS or a crack in the model.
 Such pixels are looked up again, left out of the hints and reported as missed mass (`tally`).
-"""
+
+Which backend draws the item buffers."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ptmtools.cells.model import Cells
-from ptmtools.coverage.backends.choice import choose
-from ptmtools.coverage.estimate import RULE_OF_THREE, estimate
+from ptmtools.coverage.backends import AUTO, BACKENDS, Backend
 from ptmtools.coverage.item_buffer import VIEWS
 from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
-from ptmtools.coverage.sampling import CellHints, Sampler
-from ptmtools.errors import InputError
+from ptmtools.coverage.sampling import RULE_OF_THREE, CellHints, Sampler, estimate
+from ptmtools.errors import InputError, MissingComponentError
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.model import Scene
 from ptmtools.visibility.model import Pvs
+
+
+def choose(cells: Cells, pvs: Pvs, options: AchOptions) -> Backend:
+    """The backend that the options name; for "auto" the one that is expected to take the least
+    processor time, of those that can run here.
+
+    Raises `MissingComponentError` PTM-M500 if one cannot run though a graphics device is named.
+    """
+    if options.backend != AUTO:
+        return BACKENDS[options.backend]
+    triangles, pixels = triangles_of_a_pvs(cells, pvs), len(VIEWS) * options.side**2
+    costs = {}
+    for name, backend in BACKENDS.items():
+        try:
+            costs[name] = backend.cost(triangles, pixels, options.gpu)
+        except MissingComponentError:
+            if options.gpu is not None:  # who names a device wants that one
+                raise
+    return BACKENDS[min(costs, key=costs.__getitem__)]
+
+
+def triangles_of_a_pvs(cells: Cells, pvs: Pvs) -> float:
+    """How many pieces of triangles the cells of a PVS have, on average over the cells."""
+    if not cells.cell_count:
+        return 0.0
+    front, back = cells.triangle_cell.T
+    each = np.bincount(front[front >= 0], minlength=cells.cell_count)
+    each += np.bincount(back[(back >= 0) & (back != front)], minlength=cells.cell_count)
+    return float(each[pvs.cell].sum()) / cells.cell_count
+
 
 #: Rays that a process of its own is worth: it takes a second or two to start, as 5 million rays do.
 WORTH_A_PROCESS = 1e7

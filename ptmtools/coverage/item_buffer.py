@@ -25,9 +25,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints, normals
 from ptmtools.cells.model import Cells
-from ptmtools.cells.vectors import normals
 from ptmtools.coverage.sample_points import SamplePoints
 from ptmtools.scene.model import Scene
 from ptmtools.tolerance import DEPTH_SHARE

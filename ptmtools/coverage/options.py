@@ -107,7 +107,7 @@ class AchOptions:
         return PRESETS[self.preset][2] if self.placement is None else self.placement
 
     def _check_tolerance(self, tolerance: float) -> None:
-        from ptmtools.coverage.estimate import GROUPS
+        from ptmtools.coverage.sampling import GROUPS
 
         if not 0 < tolerance < 1:
             raise _refused(

@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ptmtools.arrays import Bools, Floats
-from ptmtools.coverage.placement import FILLED, TRIES, Volume
-from ptmtools.coverage.sobol import sobol
+from ptmtools.coverage.placement import FILLED, TRIES, Volume, sobol
 from ptmtools.coverage.solids import Obstacles
 
 #: Points of a sequence that are tried together, at least.

@@ -26,11 +26,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.cells.merging import connected
+from ptmtools.arrays import Bools, Floats, Ints, areas
+from ptmtools.cells.connectivity import connected
 from ptmtools.cells.model import Cells
-from ptmtools.cells.nearby import Nearby
-from ptmtools.cells.vectors import areas
+from ptmtools.cells.search import Nearby
 from ptmtools.scene.model import Scene
 
 #: Directions of the parity rays. Fixed, in no simple relation to each other or to the axes, so
@@ -66,7 +65,7 @@ class Solid:
 
     def _odd(self, ray: int, points: Floats) -> Bools:
         """(n,) whether one of the rays from each of the (n, 3) points crosses an odd number."""
-        from ptmtools.coverage.clearance_kernels import crossings
+        from ptmtools.coverage.kernels import crossings
 
         turned = np.einsum("ij,kj->ik", points, FRAMES[ray])
         order, first, end = by_x(turned, self._turned[ray], 0.0)
@@ -185,7 +184,7 @@ class Obstacles:
     def clearance(self, points: Floats, enough: float) -> Floats:
         """(n,) distance in metres from each of the (n, 3) points to the nearest surface, at most
         ``enough``."""
-        from ptmtools.coverage.clearance_kernels import clearances
+        from ptmtools.coverage.kernels import clearances
 
         found = np.full(len(points), enough)
         if len(points):

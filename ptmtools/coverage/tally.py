@@ -19,9 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Ints
+from ptmtools.arrays import Bools, Ints, ranges
 from ptmtools.cells.model import Cells
-from ptmtools.cells.vectors import ranges
 from ptmtools.coverage.item_buffer import VIEWS, Renderer, Surfaces
 from ptmtools.coverage.sample_points import SamplePoints
 
@@ -149,7 +148,7 @@ class PixelCounter:
     ) -> None:
         """Draws views of the cells ``needed`` and adds their pixels to the ``tally``, whose
         ``column`` of each owner is -1 for one that is not expected."""
-        from ptmtools.coverage.tally_kernels import add_pixels
+        from ptmtools.coverage.kernels import add_pixels
 
         layers = self._renderer.show(points, needed)
         position = self._surfaces.normalised(points.position)

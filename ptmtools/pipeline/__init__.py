@@ -10,9 +10,13 @@ from typing import TYPE_CHECKING
 from ptmtools.lazy import names
 
 if TYPE_CHECKING:
-    from ptmtools.pipeline.build import build_scene as build_scene, run_stage as run_stage
+    from ptmtools.pipeline.build import (
+        StagePlan as StagePlan,
+        build_scene as build_scene,
+        plan_build as plan_build,
+        run_stage as run_stage,
+    )
     from ptmtools.pipeline.options import TextureOptions as TextureOptions
-    from ptmtools.pipeline.plan import StagePlan as StagePlan, plan_build as plan_build
     from ptmtools.pipeline.report import BuildReport as BuildReport, StageReport as StageReport
     from ptmtools.pipeline.run import Artifacts as Artifacts
     from ptmtools.pipeline.status import (

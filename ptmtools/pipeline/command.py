@@ -10,8 +10,8 @@ from pathlib import Path
 
 from ptmtools.errors import DatabaseError
 from ptmtools.files import open_regular
+from ptmtools.pipeline.stage import words
 from ptmtools.pipeline.stages import STAGES
-from ptmtools.pipeline.words import words
 from ptmtools.store.folder import DatabaseFolder, read_manifest
 from ptmtools.store.layout import MANIFEST
 from ptmtools.store.manifest import BUILD, StageRecord, listed_before

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
-from ptmtools.notes import warnings_in
+from ptmtools.diagnostics import warnings_in
 from ptmtools.pipeline.encoding import fallback_level, read_detail
-from ptmtools.pipeline.images import image_digests
+from ptmtools.pipeline.reading import image_digests
 from ptmtools.pipeline.replacing import octree_records
 from ptmtools.pipeline.run import Artifacts, Job
 from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS, TEXTURES
@@ -18,17 +18,17 @@ from ptmtools.store.manifest import StageRecord
 from ptmtools.store.transaction import Transaction
 
 if TYPE_CHECKING:
-    from ptmtools.coverage.need import Need
-    from ptmtools.database.model import TextureRecord
+    from ptmtools.coverage.required_levels import Need
+    from ptmtools.output.model import TextureRecord
     from ptmtools.texture.detail import Detail
 
 
 class EmissionJob(Job):
-    """Writes the served files; raises what `ptmtools.database.emit` raises."""
+    """Writes the served files; raises what `ptmtools.output.emit` raises."""
 
     def make(self, transaction: Transaction, work: StageRecord) -> StageRecord:
         """See `Job.make`."""
-        from ptmtools.database import emit
+        from ptmtools.output import emit
 
         run, textures = self.run, texture_records(self.run)
         report = emit(
@@ -65,7 +65,7 @@ class EmissionJob(Job):
         """How fine textures are needed, if that is asked for."""
         if not self.options.need:
             return None
-        from ptmtools.coverage.need import TextureSize, compute_need
+        from ptmtools.coverage.required_levels import TextureSize, compute_need
 
         run = self.run
         sizes = {t.image: TextureSize(t.width, t.height, len(t.levels)) for t in textures}
@@ -74,7 +74,7 @@ class EmissionJob(Job):
 
 def texture_records(run: Artifacts) -> tuple[TextureRecord, ...]:
     """What the emitted files say of the textures of a database."""
-    from ptmtools.database import TextureRecord
+    from ptmtools.output import TextureRecord
 
     def detail(name: str) -> Detail:
         kept = detail_file(name)

@@ -61,7 +61,7 @@ def read_detail(data: bytes) -> Detail:
 def without_finest(options: TextureOptions, count: int, width: int, height: int) -> TextureOptions:
     """The options that leave out so many of the finest levels of an image besides, but for the
     coarsest level that is kept without."""
-    from ptmtools.texture.options import kept_levels
+    from ptmtools.texture.encoder import kept_levels
     from ptmtools.texture.pyramid import level_sizes
 
     if not count:

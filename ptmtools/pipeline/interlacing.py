@@ -17,18 +17,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.database.content import Content
-from ptmtools.database.emitters.interlace import INTERLACE
-from ptmtools.database.model import TextureRecord
-from ptmtools.database.names import HINTS, INTERLACE_FILES, INTERLACE_FOLDER, texture_name
-from ptmtools.database.validation.served import ServedDatabase
-from ptmtools.database.validation.textures import ReadTexture
 from ptmtools.errors import DatabaseError, InputError, PtmError, naming
-from ptmtools.interlace.checking import validate_interlaced
-from ptmtools.interlace.model import INDEX, Interlaced
-from ptmtools.interlace.reading import deinterlace, read_manifest
-from ptmtools.interlace.scaling import scaled
-from ptmtools.interlace.writing import Written, interlace
+from ptmtools.neighbours.interlace.model import INDEX, Interlaced
+from ptmtools.neighbours.interlace.reading import deinterlace, read_manifest, validate_interlaced
+from ptmtools.neighbours.interlace.steps import scaled
+from ptmtools.neighbours.interlace.writing import Written, interlace
+from ptmtools.output.content import Content
+from ptmtools.output.emitters import INTERLACE
+from ptmtools.output.model import TextureRecord
+from ptmtools.output.names import HINTS, INTERLACE_FILES, INTERLACE_FOLDER, texture_name
+from ptmtools.output.validation.files import ServedDatabase
+from ptmtools.output.validation.textures import ReadTexture
 from ptmtools.texture import reader
 from ptmtools.texture.images import Picture
 from ptmtools.texture.model import Limits

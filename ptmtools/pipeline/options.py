@@ -38,7 +38,7 @@ class TextureOptions(EncodeOptions):
 
     def __post_init__(self) -> None:
         """Raises InputError PTM-I111 for what no image can be encoded with."""
-        from ptmtools.texture.options import check_options
+        from ptmtools.texture.encoder import check_options
 
         check_options(self)
         possible = {

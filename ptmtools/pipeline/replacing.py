@@ -15,8 +15,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ptmtools.database.names import OCTREE_FOLDER
-from ptmtools.notes import warnings_in
+from ptmtools.diagnostics import warnings_in
+from ptmtools.output.names import OCTREE_FOLDER
 from ptmtools.pipeline.run import Artifacts, Job
 from ptmtools.pipeline.stages.apo import APO
 from ptmtools.pipeline.stages.scene import SCENE
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from ptmtools.apo.replacing import ReplacedObject
-    from ptmtools.database.model import OctreeRecord
+    from ptmtools.neighbours.apo.replacing import ReplacedObject
+    from ptmtools.output.model import OctreeRecord
     from ptmtools.scene.model import Scene
 
 _ILLEGAL = re.compile(r"[^A-Za-z0-9_]+")
@@ -45,7 +45,7 @@ class ReplacingJob(Job):
         """Raises what `replaced` raises."""
         if not self.options.apo:
             return replace(work, counts={"octrees": 0})
-        from ptmtools.apo.replacing import replaced
+        from ptmtools.neighbours.apo.replacing import replaced
 
         run = self.run
         made = replaced(run[SCENE], self.options, run.workers.executor, run.progress)
@@ -102,7 +102,7 @@ def _written(file: str, made: ReplacedObject) -> tuple[dict[str, Any], bytes]:
     """The row of an octree in the list, and its stream."""
     import numpy as np
 
-    from ptmtools.apo.files import streamed
+    from ptmtools.neighbours.apo.files import streamed
 
     data, levels = streamed(made.octree.texels, made.octree)
     row = {
@@ -136,7 +136,7 @@ def octree_records(artifacts: Artifacts) -> tuple[OctreeRecord, ...]:
 
 def _record(row: Mapping[str, Any]) -> OctreeRecord:
     """Raises ValueError, KeyError or TypeError for what is no row of the list."""
-    from ptmtools.database.model import OctreeRecord
+    from ptmtools.output.model import OctreeRecord
 
     low, side = tuple(map(float, row["low"])), float(row["side"])
     levels, ends, checks = (tuple(map(int, row[name])) for name in ("levels", "ends", "crc32"))
@@ -152,7 +152,7 @@ def _record(row: Mapping[str, Any]) -> OctreeRecord:
 
 def load_scene(artifacts: Artifacts, arrays: Mapping[str, NDArray[np.generic]]) -> Scene:
     """See `Stage.load`."""
-    from ptmtools.apo.replacement import Replacement
+    from ptmtools.neighbours.apo.replacing import Replacement
 
     replacement = Replacement.from_arrays(arrays)
     numbers = [record.number for record in octree_records(artifacts)]

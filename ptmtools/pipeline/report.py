@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ptmtools.pipeline.visitor import Visitor
+    from ptmtools.pipeline.build import Visitor
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,8 @@ from ptmtools.executors.model import Executor
 from ptmtools.files import open_regular
 from ptmtools.pipeline.background import BackgroundLoop
 from ptmtools.pipeline.encoding import encoded_image
-from ptmtools.pipeline.images import image_digests, images_of
 from ptmtools.pipeline.options import TextureOptions
+from ptmtools.pipeline.reading import image_digests, images_of
 from ptmtools.pipeline.run import Artifacts, Job, Run
 from ptmtools.pipeline.shared_disk import ImageTask, encoded_there, shared_disk
 from ptmtools.pipeline.stage import Stage
@@ -271,7 +271,7 @@ def counts_of(headers: Iterable[PtmHeader]) -> dict[str, int]:
 def notes_on_size(names: Iterable[str], headers: Iterable[PtmHeader], most: int) -> Iterator[str]:
     """What ``--max-side`` has chosen where no level is of that size, as levels halve: the texture
     that is farthest below it."""
-    from ptmtools.texture.options import level_above
+    from ptmtools.texture.encoder import level_above
 
     below = []
     for name, header in zip(names, headers, strict=True):

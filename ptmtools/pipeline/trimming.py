@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ptmtools.errors import naming
-from ptmtools.pipeline.images import image_rows_of, images_of
 from ptmtools.pipeline.options import TextureOptions
+from ptmtools.pipeline.reading import image_rows_of, images_of
 from ptmtools.pipeline.run import Artifacts
 from ptmtools.pipeline.stages import APO, CELLS, PVS, SCENE
 from ptmtools.quantities import count, size
@@ -26,7 +26,7 @@ def unresolved(artifacts: Artifacts, options: TextureOptions) -> list[int]:
     rows = image_rows_of(artifacts)
     if not options.trim:
         return [0] * len(rows)
-    from ptmtools.coverage.resolution import Screen, unresolved_levels
+    from ptmtools.coverage.required_levels import Screen, unresolved_levels
 
     screen = Screen(options.trim_height, options.trim_fov, options.trim_distance)
 
@@ -57,7 +57,7 @@ def _sizes(artifacts: Artifacts, options: TextureOptions) -> list[tuple[int, int
 
 def _left_out(header: PtmHeader, options: TextureOptions) -> list[tuple[int, int]]:
     """(width, height) of the levels that only ``--trim`` has left out, coarsest first."""
-    from ptmtools.texture.options import kept_levels
+    from ptmtools.texture.encoder import kept_levels
     from ptmtools.texture.pyramid import level_sizes
 
     sizes = level_sizes(header.width, header.height)

@@ -2,14 +2,23 @@
 
 Rounding can make a line that runs along an edge miss both portals beside it; it then ends there,
 which only shortens it.
-"""
+
+Matrices of bits, (2K, W) little-endian words over directed portals: row p is what p sees.
+
+The way back through portal q is ``q ^ 1``; p sees q if and only if the way back from q sees that
+from p.
+
+A few straight lines, compiled: what they cross need not be searched for."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from ptmtools.arrays import Bools, Floats, Ints
-from ptmtools.compiled import plain_kernel as kernel
+import numpy as np
+
+from ptmtools.arrays import Bits, Bools, Floats, Ints
+from ptmtools.compiled import kernel, plain_kernel
+from ptmtools.portal_flow.storage import Geometry
 
 
 class Openings(NamedTuple):
@@ -23,7 +32,7 @@ class Openings(NamedTuple):
     out: Ints  # (2K,) the directed portals that lead out of a leaf
 
 
-@kernel
+@plain_kernel
 def sight_lines(
     openings: Openings, origin: Floats, along: Floats, portal: Ints, path: Ints, seen: Bools
 ) -> None:
@@ -46,7 +55,7 @@ def sight_lines(
                 seen[path[b], path[a]] = True
 
 
-@kernel
+@plain_kernel
 def follow(
     openings: Openings, q: int, origin: Floats, along: Floats, turn: float, path: Ints, steps: int
 ) -> int:
@@ -67,7 +76,7 @@ def follow(
     return steps
 
 
-@kernel
+@plain_kernel
 def passes(point: Floats, start: Ints, q: int, origin: Floats, along: Floats, turn: float) -> bool:
     """Whether the line through ``origin`` along ``turn * along`` passes directed portal q: all
     volumes that it makes with the edges then have one sign.
@@ -91,3 +100,136 @@ def passes(point: Floats, start: Ints, q: int, origin: Floats, along: Floats, tu
         across |= volume != 0
         ax, ay, az = bx, by, bz
     return across
+
+
+ONE = np.uint64(1)
+ZERO = np.uint64(0)
+# Index of the lowest set bit: a De Bruijn sequence of order 6 and its inverse.
+DE_BRUIJN = np.uint64(0x03F79D71B4CB0A89)
+LOW_BIT = np.zeros(64, dtype=np.int64)
+for _i in range(64):
+    LOW_BIT[((0x03F79D71B4CB0A89 << _i) & 0xFFFFFFFFFFFFFFFF) >> 58] = _i
+
+
+@plain_kernel
+def has(rows: Bits, p: int, q: int) -> bool:
+    """Whether bit q of row p is set."""
+    return bool((rows[p, q >> 6] >> np.uint64(q & 63)) & ONE)
+
+
+@plain_kernel
+def lowest(row: np.uint64) -> int:
+    """The index of the lowest bit of a word, not 0."""
+    return int(LOW_BIT[((row & (~row + ONE)) * DE_BRUIJN) >> np.uint64(58)])
+
+
+@plain_kernel
+def transpose(square: Bits) -> None:
+    """A square of 64 × 64 bits (64,), turned about its diagonal in place: halves change places,
+    then the halves of halves (Warren, Hacker's Delight, 7-3)."""
+    step, mask = 32, np.uint64(0x00000000FFFFFFFF)
+    while step > 0:
+        shift = np.uint64(step)
+        i = 0
+        while i < 64:
+            moved = ((square[i] >> shift) ^ square[i | step]) & mask
+            square[i] ^= moved << shift
+            square[i | step] ^= moved
+            i = ((i | step) + 1) & ~step
+        step >>= 1
+        mask ^= mask << np.uint64(step)
+
+
+@kernel
+def return_sight(known: Bits, first: int, last: int) -> None:
+    """Rows of the blocks first … last - 1 of 64: p sees q only if the way back from q sees that
+    from p. Rows may change meanwhile: what they lose so, p loses here anyway.
+    """
+    count, words = known.shape
+    square = np.empty(64, np.uint64)
+    odd = np.uint64(0xAAAAAAAAAAAAAAAA)
+    for block in range(first, last):
+        for w in range(words):
+            for i in range(64):
+                back = (w << 6) + i ^ 1
+                row = known[back, block] if back < count else ZERO
+                square[i] = (row & odd) >> ONE | (row & ~odd) << ONE
+            transpose(square)
+            for i in range(min(64, count - (block << 6))):
+                known[(block << 6) + i, w] &= square[i]
+
+
+@plain_kernel
+def drop_unreturned(known: Bits, p: int, dropped: Bits) -> None:
+    """Where p sees q no longer, ``dropped`` (W,), the way back from q does not see that from p."""
+    back = p ^ 1
+    w, keep = back >> 6, ~(ONE << np.uint64(back & 63))
+    for v in range(len(dropped)):
+        rest = dropped[v]
+        while rest != ZERO:
+            known[((v << 6) + lowest(rest)) ^ 1, w] &= keep
+            rest &= rest - ONE
+
+
+@plain_kernel
+def draw(state: np.uint64) -> tuple[np.uint64, float]:
+    """The next state of a 64-bit xorshift generator (not 0), and a number in [0, 1) from it."""
+    x = np.uint64(state)
+    x ^= x << np.uint64(13)
+    x ^= x >> np.uint64(7)
+    x ^= x << np.uint64(17)
+    return x, np.float64(x >> np.uint64(11)) * 2.0**-53
+
+
+@plain_kernel
+def place_in(g: Geometry, k: int, state: np.uint64, at: Floats) -> np.uint64:
+    """Puts a random point of portal k into ``at`` (3,); returns the generator's next state."""
+    first, count = g.start[k], g.start[k + 1] - g.start[k]
+    state, r = draw(state)
+    i = first + 1 + int(r * max(count - 2, 1))
+    j = min(i + 1, first + count - 1)
+    i = min(i, first + count - 1)
+    state, u = draw(state)
+    state, v = draw(state)
+    u = np.sqrt(u)
+    for a in range(3):
+        o = g.point[first, a]
+        at[a] = o + u * (g.point[i, a] - o + v * (g.point[j, a] - g.point[i, a]))
+    return state
+
+
+@plain_kernel
+def glance(g: Geometry, known: Bits, source: int, seen: Bits, line: Floats) -> int:
+    """Marks in ``seen`` (W,) what one random line to each possible portal crosses on its way.
+
+    A portal so marked is seen beyond doubt, so the search need not look out for it; a line that
+    goes astray by rounding only marks what is possible anyway. ``line`` (2, 3) is overwritten.
+    Returns the leaves walked.
+    """
+    origin, along = line[0], line[1]
+    state = np.uint64(source + 1) * np.uint64(0x9E3779B97F4A7C15)
+    walked = 0
+    for w in range(known.shape[1]):
+        rest = known[source, w]
+        while rest != ZERO:
+            target = (w << 6) + lowest(rest)
+            rest &= rest - ONE
+            if seen[w] & (ONE << np.uint64(target & 63)) != ZERO:
+                continue
+            state = place_in(g, source >> 1, state, origin)
+            state = place_in(g, target >> 1, state, along)
+            for a in range(3):
+                along[a] -= origin[a]
+            leaf = g.leaf[source]
+            at = g.out_start[leaf]
+            steps = 0
+            while at < g.out_start[leaf + 1] and steps < len(g.out_start):
+                q = g.out[at]
+                at += 1
+                if has(known, source, q) and passes(g.point, g.start, q, origin, along, 1.0):
+                    seen[q >> 6] |= ONE << np.uint64(q & 63)
+                    leaf = g.leaf[q]
+                    at = g.out_start[leaf]
+                    steps += 1
+            walked += steps + 1
+    return walked

@@ -21,17 +21,15 @@ from ptmtools.files import open_regular
 from ptmtools.progress import Progress, silent
 from ptmtools.scene.faces import KeptFaces, keep_faces
 from ptmtools.scene.facing import TURNED_AWAY, turned_away
-from ptmtools.scene.images import ImageStore
-from ptmtools.scene.masks import masked
+from ptmtools.scene.images import ImageStore, masked
 from ptmtools.scene.model import Camera, Material, Scene, Space, Storey
 from ptmtools.scene.options import IngestOptions
 from ptmtools.scene.orientation import tolerance_of
-from ptmtools.scene.signs import Named
 from ptmtools.scene.source import MAX_VERTICES, Findings, Source, SourceMaterial
 from ptmtools.scene.space import Said, parse_unit, settle, to_world, turned
 from ptmtools.scene.texels import uses_holes
-from ptmtools.scene.tiles import MOST, near_origin
-from ptmtools.scene.wrapping import told, unmirrored
+from ptmtools.scene.up_axis import Named
+from ptmtools.scene.wrapping import MOST, near_origin, told, unmirrored
 from ptmtools.tolerance import PLANE_SHARE
 
 #: Colours where the model gives none: plain faces, and a tint that leaves an image as it is.

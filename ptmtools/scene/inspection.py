@@ -11,13 +11,11 @@ from typing import Any
 import numpy as np
 
 from ptmtools.progress import Progress, silent
-from ptmtools.scene.gltf.document import document_json
-from ptmtools.scene.gltf.extensions import outcome_of
+from ptmtools.scene.gltf.document import document_json, outcome_of
 from ptmtools.scene.ingestion import ingest
 from ptmtools.scene.model import Scene, SourceImage
 from ptmtools.scene.options import IngestOptions
-from ptmtools.scene.readings import Reading, readings
-from ptmtools.scene.signs import Named, Up, looks
+from ptmtools.scene.up_axis import Named, Reading, Up, looks, readings
 from ptmtools.texture.images.opening import opened
 from ptmtools.texture.model import Limits
 

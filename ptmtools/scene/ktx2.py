@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ptmtools.errors import InputError, MissingComponentError
-from ptmtools.scene.apart import run_apart, serve
+from ptmtools.scene.sandbox import run_apart, serve
 from ptmtools.scene.source import FileRange
 
 MAGIC = b"\xabKTX 20\xbb\r\n\x1a\n"

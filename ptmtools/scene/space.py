@@ -18,16 +18,18 @@ from numpy.typing import NDArray
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError, LimitError
 from ptmtools.scene.model import Space
-from ptmtools.scene.readings import (
+from ptmtools.scene.source import Findings
+from ptmtools.scene.up_axis import (
     CLOSE_AXIS,
     CLOSE_UNIT,
     DOUBT_AXIS,
     UNITS,
+    Named,
     Reading,
+    Up,
+    looks,
     readings,
 )
-from ptmtools.scene.signs import Named, Up, looks
-from ptmtools.scene.source import Findings
 
 #: So many signs are named for a reading.
 _REASONS = 3

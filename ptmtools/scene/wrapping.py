@@ -4,7 +4,12 @@ Most surfaces with such a texture lie within one repetition, for which its coord
 mirrored instead, exactly. Where one does not, the image is made twice as large, with its mirror
 image beside it, and repeats as others do. (Rejected: to carry the mode over. VRML97 has none, so
 its files would show something else than the GLB cells.)
-"""
+
+Texture coordinates far from the origin, as projected map coordinates are.
+
+Files have them in single precision, which at 1,024 repetitions still tells apart the texels of an
+image of 4,096, and at five million has two steps to a repetition. Where a texture repeats, whole
+repetitions more or less show the same."""
 
 from __future__ import annotations
 
@@ -13,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ptmtools.arrays import Floats, Ints
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.errors import InputError
 from ptmtools.scene.images import ImageStore, integers
 from ptmtools.scene.model import Wrap
@@ -117,3 +122,28 @@ def _folded(coordinate: Floats) -> Floats | None:
 def told(wrap: SourceWrap) -> Wrap:
     """As a scene has it, which has no mirrored repetition (any more)."""
     return "repeat" if wrap == "mirror" else wrap
+
+
+#: Repetitions from the origin up to which coordinates stay as they are.
+FAR = 1024.0
+#: Beyond it single precision has no fractions.
+MOST = 2.0**24
+
+
+def near_origin(uv: Floats, group: Ints, repeats: Bools) -> Floats:
+    """(T, 3, 2) finite coordinates, moved near the origin by whole repetitions.
+
+    Parameters
+    ----------
+    group: (T,) what is moved as one: faces of one group stay as far from each other as they were.
+    repeats: (T, 2) whether the texture repeats along each axis, alike in a group. By an even number
+        it may be moved even where every other repetition is mirrored.
+    """
+    if not (uv.max(initial=0.0) > FAR or uv.min(initial=0.0) < -FAR):
+        return uv
+    far, uv = (np.abs(uv).max(axis=1) > FAR) & repeats, uv.copy()
+    order = np.argsort(group, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
+        for axis in np.flatnonzero(far[rows].any(axis=0)):
+            uv[rows, :, axis] -= 2 * np.floor(np.median(uv[rows, :, axis]) / 2)
+    return uv

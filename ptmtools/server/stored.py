@@ -14,8 +14,8 @@ from urllib.parse import quote
 
 from anyio.to_thread import run_sync
 
-from ptmtools.database.served import compressed
 from ptmtools.files import open_regular
+from ptmtools.output.emission import compressed
 from ptmtools.viewer.entry import Entry, state_of
 
 #: Bytes that are read, or handed on, at a time.

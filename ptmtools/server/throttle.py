@@ -1,6 +1,6 @@
 """A thin link between this server and all its clients together: a fluid, in small drops.
 
-The model is that of `ptmtools.walkthrough.network` on HTTP/1.1: a response begins one latency after
+The model is that of `ptmtools.lab.network` on HTTP/1.1: a response begins one latency after
 its request, then its head and its body flow, and what is under way shares the bandwidth equally.
 Here the fluid comes in pieces of which each flow has one on the link at a time, in turn; a piece is
 as large as the flow's share of `PIECE` seconds. So each flow receives one every 10 ms, whatever the
@@ -19,7 +19,7 @@ import math
 import time
 from dataclasses import dataclass
 
-from ptmtools.walkthrough.network import Conditions
+from ptmtools.lab.network import Conditions
 
 #: Seconds of the link that a round of pieces takes, one piece of each flow.
 PIECE = 0.01

@@ -9,21 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from ptmtools.compiled import plain_kernel as kernel
-from ptmtools.simplification.heap_kernels import (
-    Heap,
-    heapify,
-    move,
-    rise,
-    sink,
-    without_stale,
-)
 from ptmtools.simplification.legality_kernels import (
     has_counterparts,
     is_linked,
     keeps_faces,
     may_close,
 )
-from ptmtools.simplification.quadric_kernels import (
+from ptmtools.simplification.quadrics import (
     add,
     best_place,
     shift,
@@ -39,9 +31,15 @@ from ptmtools.simplification.state_kernels import (
     MARKS,
     REFUSED,
     TOPOLOGY,
+    Heap,
     State,
+    heapify,
     meet,
+    move,
     prune,
+    rise,
+    sink,
+    without_stale,
 )
 from ptmtools.simplification.surface import FREE, LINE
 from ptmtools.tolerance import ROUNDING_SHARE

@@ -10,11 +10,6 @@ from typing import TYPE_CHECKING
 from ptmtools.lazy import names
 
 if TYPE_CHECKING:
-    from ptmtools.texture.codec import (
-        check as check,
-        decode as decode,
-        decode_levels as decode_levels,
-    )
     from ptmtools.texture.container import read_header as read_header, whole_levels as whole_levels
     from ptmtools.texture.encoder import encode as encode, encode_to as encode_to
     from ptmtools.texture.images import (
@@ -32,6 +27,12 @@ if TYPE_CHECKING:
         PtmHeader as PtmHeader,
     )
     from ptmtools.texture.pyramid import build_pyramid as build_pyramid
-    from ptmtools.texture.reader import PtmReader as PtmReader, open as open
+    from ptmtools.texture.reader import (
+        PtmReader as PtmReader,
+        check as check,
+        decode as decode,
+        decode_levels as decode_levels,
+        open as open,
+    )
 
 __getattr__ = names(__name__)

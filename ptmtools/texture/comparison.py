@@ -160,8 +160,8 @@ def best(action: Callable[[], Any], repeat: int) -> tuple[float, Any]:
 
 
 def _profile(name: str) -> Codec:
-    from ptmtools.texture.codec import decode
     from ptmtools.texture.encoder import encode
+    from ptmtools.texture.reader import decode
 
     options = EncodeOptions(name)
     return Codec(

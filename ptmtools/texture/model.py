@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ptmtools.texture.profiles import PROFILES
+from ptmtools.texture.pyramid import Box
 from ptmtools.texture.samples import KINDS
-from ptmtools.texture.tiling import Box
 
 #: Longest side of an image, texels.
 MAX_SIDE = 1 << 16

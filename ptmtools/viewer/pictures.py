@@ -1,9 +1,9 @@
 """Pictures of viewpoints, as the page draws them: a poster, and a small one for each in the menu.
 
-Rays find what the pixels show (`ptmtools.walkthrough.view.rays`), and textures are sampled at the
+Rays find what the pixels show (`ptmtools.rendering.rays`), and textures are sampled at the
 level nearest to what a pixel covers, of those up to `FINEST` texels a side: of a texture that no
 picture shows nothing is read, and of the others their first bytes. (Tried: the compiled sampling of
-`ptmtools.walkthrough.view`, trilinear: nobody tells the two apart at this size, and where it is not
+`ptmtools.rendering`, trilinear: nobody tells the two apart at this size, and where it is not
 compiled yet that takes four seconds.)
 """
 
@@ -19,13 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.arrays import Floats, Ints
+from ptmtools.output.served import Served
+from ptmtools.rendering.rays import Camera, Caster
+from ptmtools.rendering.records import Sight, Triangles, triangles_of
 from ptmtools.texture.model import Limits
 from ptmtools.texture.parallel import ordered
 from ptmtools.texture.samples import in_eight_bits
-from ptmtools.walkthrough.served import Served
-from ptmtools.walkthrough.view.rays import Camera, Caster
-from ptmtools.walkthrough.view.records import Sight, Triangles
-from ptmtools.walkthrough.view.triangles import triangles_of
 
 #: Pixels of the poster, and of the small pictures; bytes that they may have.
 POSTER, POSTER_BYTES = (640, 360), 12_000

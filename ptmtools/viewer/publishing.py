@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import IO, Any
 from urllib.parse import unquote
 
-from ptmtools.database.served import compressed
 from ptmtools.errors import OutputError
 from ptmtools.files import (
     leads_inside,
@@ -30,6 +29,7 @@ from ptmtools.files import (
     write_with,
     writing,
 )
+from ptmtools.output.emission import compressed
 from ptmtools.progress import Progress, silent
 from ptmtools.store.folder import damaged, unreadable
 from ptmtools.store.layout import sha256

@@ -20,9 +20,10 @@ from pathlib import Path
 from typing import Any, Literal
 from urllib.parse import quote, unquote
 
-from ptmtools.database.served import compressed
 from ptmtools.errors import DatabaseError, InputError, LimitError
 from ptmtools.files import open_regular
+from ptmtools.output.emission import compressed
+from ptmtools.output.served import FORM, Served, read_served
 from ptmtools.pipeline.command import naming_command, open_database
 from ptmtools.pipeline.stages.emit import EMIT
 from ptmtools.progress import Progress, silent
@@ -32,7 +33,6 @@ from ptmtools.store.manifest import BUILD
 from ptmtools.viewer.entry import Entry, state_of
 from ptmtools.viewer.program import DIGITS, page, program_files
 from ptmtools.viewer.textures import web_texture
-from ptmtools.walkthrough.served import FORM, Served, read_served
 
 FORMAT = "ptmtools site"
 DATA = "data"

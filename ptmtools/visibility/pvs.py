@@ -2,23 +2,146 @@
 
 A viewer anywhere in a cell sees at most the cells of its row. The flow, its argument and its
 budget are in `flow`.
-"""
+
+Visibility by random lines alone: quick, and never more than there is to see.
+
+What a straight line crosses on its way through the portals sees each other; what no line happened
+to show counts as hidden. So the sets are a lower bound, not conservative: a client that loads by
+them shows holes. They serve to compare with. Lines are walked as in `cells.sight`, which spreads
+them evenly; random ones, as many as wanted, show more.
+
+Openings that show more than they should: where visibility leaks.
+
+A cell that sees several times as many cells as most do sees them through something: a window onto
+a courtyard, which is as it should be, or a gap under a wall that somebody forgot to close. Among
+the openings between cells through which it sees at least half of what it sees, the smallest is
+named."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools
+from ptmtools.arrays import Bools, Floats, Ints
 from ptmtools.cells.model import Cells
-from ptmtools.cells.seen import from_places, portals_of
+from ptmtools.cells.sight import LONGEST, from_places, portals_of
 from ptmtools.executors.model import Executor
 from ptmtools.executors.serial import Serial
-from ptmtools.portal_flow.flow import leaf_matrix, portal_flow
+from ptmtools.portal_flow.flow import PortalFlow, Portals, check, geometry, leaf_matrix, portal_flow
+from ptmtools.portal_flow.storage import Geometry
 from ptmtools.progress import Progress, silent
-from ptmtools.visibility.leaks import find_leaks
 from ptmtools.visibility.model import Pvs
 from ptmtools.visibility.options import PvsOptions
-from ptmtools.visibility.sampled import sampled_leaves
+
+#: Tasks that the lines are shared out to.
+SPANS = 64
+
+
+#: What the tasks share: portals, how many leaves, lines through each portal, and the seed.
+Shooting = tuple[Geometry, int, int, int]
+
+
+def sampled_leaves(
+    portals: Portals,
+    lines: int,
+    executor: Executor = Serial(),  # noqa: B008 - has no state
+    seed: int = 0,
+) -> Bools:
+    """(L, L) which leaf sees which on one of ``lines`` random lines through each portal.
+
+    Half of the lines aim at a random point of a random portal, half anywhere. Symmetric; each leaf
+    sees itself and its neighbours. The same for any ``executor``.
+
+    Raises what `flow.check` raises.
+    """
+    check(portals)
+    count, leaves = len(portals.leaf), portals.leaf_count
+    matrix = np.eye(leaves, dtype=np.bool_)
+    if count == 0:
+        return matrix
+    shooting = (geometry(portals), leaves, lines, seed)
+    step = -(-count // SPANS)
+    spans = [(first, min(first + step, count)) for first in range(0, count, step)]
+    for bits in executor.each(_shoot, shooting, spans, releases_lock=True):
+        matrix |= np.unpackbits(bits, axis=1, count=leaves).astype(np.bool_)
+    one, other = portals.leaf.T
+    matrix[one, other] = matrix[other, one] = True
+    return matrix
+
+
+def _shoot(shared: Shooting, span: tuple[int, int]) -> NDArray[np.uint8]:
+    """As a task: (L, ⌈L / 8⌉) bits, who sees whom by lines of the portals ``span``."""
+    from ptmtools.portal_flow.line_kernels import Openings, sight_lines
+
+    g, leaves, lines, seed = shared
+    openings = Openings(g.point, g.start, g.leaf, g.out_start, g.out)
+    path = np.empty(2 * LONGEST, np.int64)
+    seen = np.zeros((leaves, leaves), np.bool_)
+    for k in range(*span):
+        rng = np.random.default_rng([seed, k])
+        portal = np.full(lines, k)
+        origin = _points(rng, g, portal)
+        aimed = _points(rng, g, rng.integers(len(g.normal), size=lines)) - origin
+        anywhere = rng.normal(size=origin.shape)
+        along = np.where(rng.random((lines, 1)) < 0.5, aimed, anywhere)
+        speed = along @ g.normal[k]
+        across = np.abs(speed) > g.slack
+        along *= np.sign(speed)[:, None]
+        sight_lines(openings, origin[across], along[across], portal[across], path, seen)
+    return np.packbits(seen, axis=1)
+
+
+def _points(rng: np.random.Generator, g: Geometry, portal: Ints) -> Floats:
+    """(n, 3) a random point of each of (n,) portals, in a random triangle of its fan."""
+    first, size = g.start[portal], np.diff(g.start)[portal]
+    corner = 1 + rng.integers(np.maximum(size - 2, 1))
+    fan = [np.zeros_like(corner), corner, corner + 1]
+    a, b, c = (g.point[first + np.minimum(i, size - 1)] for i in fan)
+    u, v = np.sqrt(rng.random((len(portal), 1))), rng.random((len(portal), 1))
+    points: Floats = a + u * (b - a + v * (c - b))
+    return points
+
+
+#: A cell is looked at if it sees more than this times the median of all cells.
+SUSPICIOUS = 3.0
+#: So many of them, those that see most.
+MOST = 20
+#: Share of what the cell sees that must be seen through the opening.
+SHARE = 0.5
+
+
+def find_leaks(cells: Cells, flow: PortalFlow, matrix: Bools) -> NDArray[np.int32]:
+    """(n, 4) the leaks of a PVS, those that show most first: see `Pvs.leak`.
+
+    Parameters
+    ----------
+    flow: of the portals of ``cells``. matrix: (C, C) who sees whom.
+    """
+    found = []
+    if cells.portal_count:
+        sees = matrix.sum(axis=1)
+        bound = SUSPICIOUS * float(np.median(sees))
+        order = np.lexsort((np.arange(len(sees)), -sees))[:MOST]
+        found = [_leak(cells, flow, int(c), int(sees[c])) for c in order if sees[c] > bound]
+    return np.array([leak for leak in found if leak], np.int32).reshape(-1, 4)
+
+
+def _leak(cells: Cells, flow: PortalFlow, cell: int, sees: int) -> tuple[int, ...]:
+    enters, leaves = cells.portal_cell[:, ::-1].reshape(-1), cells.portal_cell.reshape(-1)
+    standing = cells.leaf_standing[cells.portal_leaf].reshape(-1)
+    out = np.flatnonzero((leaves == cell) & standing)
+    if not len(out):
+        return ()
+    seen = np.bitwise_or.reduce(flow.sees[out], axis=0)
+    reached = np.union1d(flow.portals_in(seen), out)
+    found = []
+    for q in reached[enters[reached] != leaves[reached]].tolist():
+        behind = enters[flow.portals_in(flow.sees[q] & seen)]
+        behind = np.append(behind, enters[q])
+        through = len(np.unique(behind[behind >= 0]))
+        if through >= SHARE * sees:
+            found.append((float(cells.portal_area[q >> 1]), q >> 1, through))
+    return (cell, sees, *min(found)[1:]) if found else ()
 
 
 def compute_pvs(

@@ -26,9 +26,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.arrays import Bools, Floats, Ints, Singles
+from ptmtools.arrays import Bools, Floats, Ints, Singles, areas, fans, volumes
 from ptmtools.cells.model import Cells
-from ptmtools.cells.vectors import areas, fans, volumes
 from ptmtools.errors import InputError
 from ptmtools.progress import Progress, silent
 from ptmtools.visibility.model import Pvs

@@ -8,10 +8,9 @@ import pytest
 import shapely
 
 from ptmtools.arrays import Floats
-from ptmtools.cells import SubdivideOptions, clearance
+from ptmtools.cells import SubdivideOptions, places as clearance
 from ptmtools.cells.options import Walker
-from ptmtools.cells.places import Floors, detail_of, find_places
-from ptmtools.cells.standing import eye_region
+from ptmtools.cells.places import Floors, detail_of, eye_region, find_places
 from ptmtools.cells.structure import Structure
 from ptmtools.tolerance import Tolerance
 from tests.cells.conftest import box

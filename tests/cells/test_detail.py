@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ptmtools.arrays import areas
 from ptmtools.cells import SubdivideOptions, structural_triangles, subdivide
 from ptmtools.cells.places import Floors, detail_of
 from ptmtools.cells.structure import Structure
-from ptmtools.cells.vectors import areas
 from ptmtools.scene.model import Material, Scene
 from tests.conftest import scene_of, subdivided
 

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 from ptmtools.cells import Cells, SubdivideOptions, structural_triangles, subdivide
+from ptmtools.cells.connectivity import connected
 from ptmtools.cells.entrances import Doors
-from ptmtools.cells.merging import connected
-from ptmtools.cells.naming import says_door
 from ptmtools.cells.options import DoorState
+from ptmtools.cells.roles import says_door
 from ptmtools.cells.structure import Opaque, Structure
+from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
-from ptmtools.notes import Warned
 from ptmtools.scene.model import Material, Scene
 from ptmtools.visibility import check_conservative, compute_pvs
 from tests.cells.conftest import box, panel

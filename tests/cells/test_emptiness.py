@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ptmtools.cells import subdivide
-from ptmtools.cells.emptiness import check_seen
+from ptmtools.cells.subdivision import check_seen
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Scene
 from tests.conftest import scene_of

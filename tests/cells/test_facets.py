@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import shapely
 
+from ptmtools.arrays import areas
 from ptmtools.cells import SubdivideOptions, subdivide
+from ptmtools.cells.connectivity import Welded
 from ptmtools.cells.facets import Facets
 from ptmtools.cells.structure import Structure, find_walls
-from ptmtools.cells.vectors import areas
-from ptmtools.cells.welding import Welded
 from ptmtools.tolerance import Tolerance
 from tests.conftest import scene_of, subdivided
 

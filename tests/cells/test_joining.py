@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ptmtools.arrays import areas
 from ptmtools.cells import SubdivideOptions, subdivide, subdivision
-from ptmtools.cells.joining import Mesh, joined
+from ptmtools.cells.connectivity import first_alike, welded
+from ptmtools.cells.joining import Mesh, joined, patches
 from ptmtools.cells.ownership import Pieces
-from ptmtools.cells.patches import patches
-from ptmtools.cells.triangulation import triangulated
-from ptmtools.cells.vectors import areas
-from ptmtools.cells.welding import first_alike, welded
+from ptmtools.cells.planar import triangulated
 from ptmtools.scene import ingest
 from ptmtools.scene.model import Material, Scene
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ptmtools.cells import SubdivideOptions, structural_triangles, subdivide
-from ptmtools.cells.naming import Designated
+from ptmtools.cells.roles import Designated
 from ptmtools.scene.model import Kind, Scene
 from tests.cells.test_detail import ball
 from tests.cells.test_doors import found, leaf, rooms, scene, solid

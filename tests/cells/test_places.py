@@ -9,13 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ptmtools.arrays import areas
 from ptmtools.cells import Cells, SubdivideOptions, subdivide
 from ptmtools.cells.options import Walker
 from ptmtools.cells.places import Floors, detail_of, find_places
 from ptmtools.cells.structure import Structure
-from ptmtools.cells.vectors import areas
+from ptmtools.diagnostics import Warned
 from ptmtools.errors import InputError
-from ptmtools.notes import Warned
 from ptmtools.scene.model import Scene
 from tests.conftest import scene_of, subdivided
 

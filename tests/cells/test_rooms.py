@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ptmtools.cells import Cells, SubdivideOptions, grouping, subdivide
-from ptmtools.cells.gain import join_by_gain
+from ptmtools.cells import Cells, SubdivideOptions, rooms as grouping, subdivide
+from ptmtools.cells.rooms import join_by_gain
 from ptmtools.cells.sight import _even, _lines, sampled_sight
 from ptmtools.errors import InputError
 from ptmtools.scene import ingest

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from ptmtools.cells import Cells, SubdivideOptions, structural_triangles, subdivide
-from ptmtools.cells.eyes import EyeRegion
-from ptmtools.cells.gain import join_by_gain
+from ptmtools.cells.model import EyeRegion
 from ptmtools.cells.options import WALKER
+from ptmtools.cells.rooms import join_by_gain
 from ptmtools.coverage.placement import Volume
-from ptmtools.notes import Warned
+from ptmtools.diagnostics import Warned
 from ptmtools.scene.model import Camera, Scene
 from ptmtools.visibility import check_conservative, compute_pvs
 from ptmtools.visibility.segments import _Eyes

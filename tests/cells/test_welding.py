@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ptmtools.cells import welding
-from ptmtools.cells.welding import Welded, across_edges, distinct
+from ptmtools.cells import connectivity as welding
+from ptmtools.cells.connectivity import Welded, across_edges, distinct
 
 ROWS = st.lists(st.tuples(*[st.sampled_from([0.0, -0.0, 1.0, 2.0**60, 1e-300])] * 3), max_size=40)
 

@@ -9,9 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from ptmtools.coverage.ach import compute_ach
+from ptmtools.coverage.ach import choose, compute_ach, triangles_of_a_pvs
 from ptmtools.coverage.backends import BACKENDS, Backend
-from ptmtools.coverage.backends.choice import choose, triangles_of_a_pvs
 from ptmtools.coverage.backends.embree import EmbreeRenderer
 from ptmtools.coverage.model import Ach
 from ptmtools.coverage.options import AchOptions
@@ -313,7 +312,7 @@ def test_auto_goes_by_the_device_and_the_size_of_the_task(
 ):
     context = SimpleNamespace(info={"GL_RENDERER": device}, release=lambda: None)
     monkeypatch.setattr("ptmtools.coverage.backends.opengl.create_context", lambda gpu: context)
-    where = "ptmtools.coverage.backends.choice.triangles_of_a_pvs"
+    where = "ptmtools.coverage.ach.triangles_of_a_pvs"
     monkeypatch.setattr(where, lambda cells, pvs: float(triangles))
     _, cells = room_row(2)
     assert choose(cells, all_visible(2), AchOptions(face=face)).name == expected

@@ -10,7 +10,8 @@ import pytest
 
 from ptmtools.coverage.ach import compute_ach
 from ptmtools.coverage.backends import BACKENDS
-from ptmtools.coverage.need import (
+from ptmtools.coverage.options import AchOptions
+from ptmtools.coverage.required_levels import (
     FACE,
     PIXEL,
     Need,
@@ -18,7 +19,6 @@ from ptmtools.coverage.need import (
     compute_need,
     levels_of_detail,
 )
-from ptmtools.coverage.options import AchOptions
 from ptmtools.coverage.sampling import Sampler
 from ptmtools.errors import InputError
 from ptmtools.pipeline import build_scene

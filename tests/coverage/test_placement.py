@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from ptmtools.cells.vectors import volumes
-from ptmtools.coverage.placement import TRIES, Volume, filling, strata
-from ptmtools.coverage.sobol import sobol, uniform
+from ptmtools.arrays import volumes
+from ptmtools.coverage.placement import TRIES, Volume, filling, sobol, strata, uniform
 
 FROZEN_SOBOL = [
     [

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ptmtools.cells.model import Cells
-from ptmtools.coverage.resolution import ALL, ANISOTROPY, ASPECT, Screen, unresolved_levels
+from ptmtools.coverage.required_levels import ALL, ANISOTROPY, ASPECT, Screen, unresolved_levels
 from ptmtools.scene.model import Material, Scene, SourceImage
 from ptmtools.visibility.model import Pvs
 

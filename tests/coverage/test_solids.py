@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from ptmtools.coverage.clearance_kernels import distance
+from ptmtools.coverage.kernels import distance
 from ptmtools.coverage.solids import Obstacles, edge_groups, edges, solids
 
 SPAN = st.floats(-4, 4).map(lambda x: round(x, 3))

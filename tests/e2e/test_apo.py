@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ptmtools.apo.model import Octree
-from ptmtools.apo.reading import Stream, inflated
-from ptmtools.apo.texels import fault_of
-from ptmtools.apo.traversal import look_up
 from ptmtools.cli.main import main
 from ptmtools.glb import JSON, glb_chunks
-from tests.apo.statues import STATUES, write_rooms
+from ptmtools.neighbours.apo.files import Stream, inflated
+from ptmtools.neighbours.apo.model import Octree
+from ptmtools.neighbours.apo.octree import fault_of
+from ptmtools.neighbours.apo.traversal import look_up
 from tests.e2e.conftest import Ptm, make_museum
+from tests.neighbours.apo.statues import STATUES, write_rooms
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "benchmarks")]

@@ -11,8 +11,8 @@ import pytest
 
 from ptmtools import schemas
 from ptmtools.store.layout import sha256
-from tests.database.damage import Damage, copied, hinted, put, removed, replaced, rewritten
 from tests.e2e.conftest import TWO_ROOMS, Ptm, make_museum
+from tests.output.damage import Damage, copied, hinted, put, removed, replaced, rewritten
 
 MODEL = TWO_ROOMS / "two_rooms.obj"
 

@@ -17,7 +17,7 @@ import pytest
 
 from ptmtools.cli.main import main
 from ptmtools.errors import DatabaseError
-from ptmtools.pipeline.images import images_of
+from ptmtools.pipeline.reading import images_of
 from ptmtools.pipeline.run import Artifacts
 from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS
 from ptmtools.store.archive import pack_arrays, unpack_arrays

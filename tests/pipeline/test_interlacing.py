@@ -12,10 +12,10 @@ import pytest
 from PIL import Image
 
 from ptmtools.cli.main import main
-from ptmtools.database import EmitOptions, validate_database
 from ptmtools.errors import InputError
-from ptmtools.interlace import deinterlace, interlace, read_manifest
-from ptmtools.interlace.scaling import scaled
+from ptmtools.neighbours.interlace import deinterlace, interlace, read_manifest
+from ptmtools.neighbours.interlace.steps import scaled
+from ptmtools.output import EmitOptions, validate_database
 from ptmtools.texture import decode
 from ptmtools.texture.images import Picture
 

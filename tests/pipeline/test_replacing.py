@@ -12,19 +12,19 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from ptmtools.apo.options import ReplaceOptions
 from ptmtools.cli.main import main
 from ptmtools.coverage.options import AchOptions
-from ptmtools.database.gltf.container import pack, unpack
-from ptmtools.database.names import HINTS
 from ptmtools.errors import DatabaseError
+from ptmtools.neighbours.apo.options import ReplaceOptions
+from ptmtools.output.gltf import pack, unpack
+from ptmtools.output.names import HINTS
 from ptmtools.pipeline import Artifacts, build_scene, database_status, plan_build, validate
 from ptmtools.pipeline.replacing import octree_files
 from ptmtools.pipeline.stages import ACH, APO, CELLS, EMIT, SCENE, STAGES
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import OCTREE_LIST, arrays_of, sha256
-from tests.apo.statues import write_rooms
+from tests.neighbours.apo.statues import write_rooms
 
 QUICK = AchOptions(samples=4, backend="embree")
 STATUES = ReplaceOptions(apo=("statue_*",), apo_faces=500, apo_error=0.2, apo_depth=6)

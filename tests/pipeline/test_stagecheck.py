@@ -13,8 +13,8 @@ import pytest
 
 from ptmtools.coverage.model import Ach
 from ptmtools.pipeline import validate
-from ptmtools.pipeline.stagecheck import check_stages
 from ptmtools.pipeline.stages import PVS, STAGES
+from ptmtools.pipeline.validation import check_stages
 from ptmtools.store.archive import pack_arrays
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.layout import sha256

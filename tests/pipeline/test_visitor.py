@@ -12,8 +12,8 @@ from PIL import Image
 
 from ptmtools.cli.main import main
 from ptmtools.pipeline import build_scene
+from ptmtools.pipeline.build import Visitor
 from ptmtools.pipeline.stages import CELLS, PVS
-from ptmtools.pipeline.visitor import Visitor
 from ptmtools.store.folder import DatabaseFolder
 from ptmtools.store.manifest import Manifest, StageRecord
 from ptmtools.visibility import PvsOptions

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ptmtools.errors import InputError, LimitError, MissingComponentError
-from ptmtools.scene import apart, ingest
+from ptmtools.scene import ingest, sandbox as apart
 from ptmtools.scene.formats import read_other
 from ptmtools.scene.source import Findings
 

@@ -26,8 +26,8 @@ from ptmtools.scene import (
     Scene,
     ingest,
     mtl as mtl_module,
+    obj as materials_module,
     obj as obj_module,
-    obj_materials as materials_module,
 )
 from ptmtools.scene.gltf import document as gltf_document
 from ptmtools.scene.images import ImageStore

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ptmtools.scene.lines import SampleLines
+from ptmtools.scene.facing import SampleLines
 
 from .made import box, divided, house, meadow, turned_in_plan, welded
 

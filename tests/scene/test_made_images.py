@@ -56,7 +56,7 @@ def test_of_16_bits_nothing_is_lost(textured: Textured) -> None:
     deep = np.array([[1000, 65535], [300, 7]], np.uint16)
     files = {"wall.png": png(deep), "m.png": png(MASK)}
     scene = ingest(textured("map_Kd wall.png\nmap_d m.png", files))
-    from ptmtools.texture.images.reading import load_image
+    from ptmtools.texture.images.files import load_image
 
     made = load_image(scene.images[0].load()).texels[0:2]
     assert made[..., 0].tolist() == deep.tolist()

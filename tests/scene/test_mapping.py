@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ptmtools.scene.mapping import gradients
+from ptmtools.scene.colors import gradients
 
 
 def test_gradients_of_triangles() -> None:

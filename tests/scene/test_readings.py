@@ -12,8 +12,17 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
-from ptmtools.scene.readings import CLOSE_AXIS, CLOSE_UNIT, UNITS, Reading, readings
-from ptmtools.scene.signs import Look, Named, Up, looks
+from ptmtools.scene.up_axis import (
+    CLOSE_AXIS,
+    CLOSE_UNIT,
+    UNITS,
+    Look,
+    Named,
+    Reading,
+    Up,
+    looks,
+    readings,
+)
 
 from .made import (
     box,

@@ -10,9 +10,9 @@ import pytest
 from ptmtools.arrays import Floats
 from ptmtools.errors import InputError
 from ptmtools.scene.model import Space
-from ptmtools.scene.signs import Named
 from ptmtools.scene.source import Findings
 from ptmtools.scene.space import UNITS, Said, parse_unit, settle, turned
+from ptmtools.scene.up_axis import Named
 
 from .made import box, corridor, house, site_plan, tower, welded, y_up
 

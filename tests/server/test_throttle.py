@@ -11,8 +11,8 @@ from random import Random
 import pytest
 
 from ptmtools.errors import InputError
+from ptmtools.lab.network import Conditions, Link as FluidLink
 from ptmtools.server.throttle import LATE, PIECE, Link, Throttle
-from ptmtools.walkthrough.network import Conditions, Link as FluidLink
 
 BANDWIDTHS = [56e3, 512e3, 4e6, 16e6]
 #: Seconds by which timers are late at most, as those of a busy machine are.

@@ -10,8 +10,8 @@ from hypothesis import given, strategies as st
 from numpy.typing import NDArray
 
 from ptmtools.simplification import Mesh, SimplifyOptions, simplify
-from ptmtools.simplification.holes import filled
 from ptmtools.simplification.surface import surface_of
+from ptmtools.simplification.topology import filled
 from tests.simplification.shapes import edge_faces, euler, facade, grid, normals, sphere
 
 

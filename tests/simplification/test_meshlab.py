@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from ptmtools.errors import InputError, MissingComponentError
-from ptmtools.simplification import SimplifyOptions, meshlab, simplify
+from ptmtools.simplification import SimplifyOptions, simplification as meshlab, simplify
 from tests.simplification.shapes import sphere
 
 TO_500 = SimplifyOptions(500, method="meshlab")

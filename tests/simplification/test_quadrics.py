@@ -8,24 +8,22 @@ from hypothesis import given, strategies as st
 
 from ptmtools.arrays import Floats
 from ptmtools.simplification.model import Mesh
-from ptmtools.simplification.quadric_kernels import (
-    add,
-    best_place,
-    shift,
-    shift_wedge,
-    value_at,
-    wedge_value_at,
-)
 from ptmtools.simplification.quadrics import (
     LINE_WEIGHT,
     SIZE,
+    add,
     attribute_shifted,
     attribute_value,
     attributes,
+    best_place,
+    shift,
+    shift_wedge,
     shifted,
     value,
+    value_at,
     vertex_quadrics,
     wedge_quadrics,
+    wedge_value_at,
 )
 from ptmtools.simplification.surface import surface_of
 from tests.simplification.shapes import cylinder, facade, sphere

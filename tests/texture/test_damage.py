@@ -13,9 +13,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from ptmtools.errors import InputError
-from ptmtools.texture.coders.haar import coder as haar
-from ptmtools.texture.coders.repeats import coder as repeats
-from ptmtools.texture.coders.texel import coder as texel
+from ptmtools.texture.coders import haar, repeats, texel
 from ptmtools.texture.profiles import paper, raw
 from ptmtools.texture.pyramid import mean_below
 from ptmtools.texture.samples import KINDS, from_ordered, to_ordered

@@ -23,9 +23,9 @@ from ptmtools.texture import (
     load_image,
     write_image,
 )
+from ptmtools.texture.images.floats import floats, save_radiance
 from ptmtools.texture.images.picture import oriented
 from ptmtools.texture.images.png import png_bytes
-from ptmtools.texture.images.radiance import floats, save_radiance
 from tests.texture.coding import same
 from tests.texture.files import chunk, png, saved
 

@@ -11,8 +11,8 @@ from hypothesis import given, strategies as st
 from numpy.typing import NDArray
 
 from ptmtools.texture import EncodeOptions, decode_levels, encode_to, read_header
-from ptmtools.texture.codec import examine
 from ptmtools.texture.detail import Detail, difference_between
+from ptmtools.texture.reader import examine
 
 TYPES = (np.uint8, np.uint16, np.float16, np.float32)
 OPTIONS = (

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ptmtools.texture.coders.haar import coder as haar
-from ptmtools.texture.coders.reading import Reader
+from ptmtools.texture.coders import haar
+from ptmtools.texture.coders.group import Reader
 from ptmtools.texture.pyramid import mean_below
 from tests.texture.coding import textured
 from tests.texture.oracles.haar import decode_haar

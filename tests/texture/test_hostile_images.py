@@ -19,7 +19,7 @@ from PIL import Image
 
 from ptmtools.errors import LimitError, PtmError
 from ptmtools.texture import Limits
-from ptmtools.texture.images import declared, load_image
+from ptmtools.texture.images import load_image, picture as declared
 from tests.texture import files
 from tests.texture.files import chunk
 
@@ -27,7 +27,7 @@ SIDE = 40_000
 #: Loads the files that are named and tells of each its error and by how much the process grew.
 CHILD = """
 import json, resource, sys, warnings
-import ptmtools.texture.images.deep, ptmtools.texture.images.openexr, numpy, numpy.lib.format
+import ptmtools.texture.images.deep, ptmtools.texture.images.floats, numpy, numpy.lib.format
 from PIL import (BmpImagePlugin, GifImagePlugin, JpegImagePlugin, PcxImagePlugin, PngImagePlugin,
     PpmImagePlugin, TgaImagePlugin, TiffImagePlugin, WebPImagePlugin)
 from ptmtools.errors import PtmError

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from ptmtools.errors import InputError
-from ptmtools.texture.coders.mixing import tables
-from ptmtools.texture.coders.mixing.coder import _split, decode_mixing, encode_mixing
+from ptmtools.texture.coders import mixing as tables
+from ptmtools.texture.coders.mixing import _split, decode_mixing, encode_mixing
 from ptmtools.texture.profiles import small
 from ptmtools.texture.pyramid import build_pyramid, mean_below
 from tests.texture.coding import coded_groups

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ptmtools.cli.main import main
 from ptmtools.errors import InputError
 from ptmtools.texture import EncodeOptions, check, decode, encode, load_image, write_image
-from ptmtools.texture.coders.reading import Reader
+from ptmtools.texture.coders.group import Reader
 from ptmtools.texture.profiles import PROFILES, Profile, Tile
 
 TOY = Profile("toy", 200, "for tests", module=__name__)

@@ -10,10 +10,9 @@ from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
-from ptmtools.texture.coders.rans import kernels, tables
-from ptmtools.texture.coders.rans.sizes import Sink
-from ptmtools.texture.coders.rans.stream import Stream, encode_symbols, read_stream
-from ptmtools.texture.coders.reading import Reader
+from ptmtools.texture.coders import rans as tables, rans_kernels as kernels
+from ptmtools.texture.coders.group import Reader
+from ptmtools.texture.coders.rans import Sink, Stream, encode_symbols, read_stream
 from tests.texture.oracles.rans import Symbols, built_in, normalised, read_tables
 
 TABLES = 29

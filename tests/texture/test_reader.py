@@ -16,7 +16,7 @@ import ptmtools.texture as texture
 from ptmtools.errors import InputError, LimitError
 from ptmtools.texture import Description, EncodeOptions, Limits, build_pyramid, encode
 from ptmtools.texture.container import pack_head
-from ptmtools.texture.tiling import Box, covering, tiles_under
+from ptmtools.texture.pyramid import Box, covering, tiles_under
 from tests.memory import little_memory
 
 TILED = EncodeOptions("raw", tile=16)

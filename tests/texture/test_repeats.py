@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.repeats import coder as repeats, symbols
+from ptmtools.texture.coders import repeats, repeats_blocks as symbols
 from ptmtools.texture.pyramid import mean_below
 from tests.texture.oracles.repeats import decode_repeats
 

@@ -10,8 +10,13 @@ from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 
 from ptmtools.errors import InputError
-from ptmtools.texture.coders.rans import tables
-from ptmtools.texture.coders.texel import coder, kernels, layout, numbering
+from ptmtools.texture.coders import (
+    rans as tables,
+    texel as coder,
+    texel_kernels as kernels,
+    texel_layout as layout,
+    texel_layout as numbering,
+)
 from ptmtools.texture.profiles.raw import group_length
 from ptmtools.texture.pyramid import build_pyramid, mean_below
 from ptmtools.texture.samples import KINDS, from_ordered, round_to, to_ordered

@@ -19,7 +19,7 @@ ROOT = HERE.parents[1]
 sys.path[:0] = [str(HERE), str(ROOT / "benchmarks")]
 from browser import Visitor, visiting  # noqa: E402
 
-from tests.walkthrough.conftest import Ptm, ptm, two_rooms  # noqa: E402
+from tests.lab.conftest import Ptm, ptm, two_rooms  # noqa: E402
 
 __all__ = ["Ptm", "ptm", "two_rooms"]
 

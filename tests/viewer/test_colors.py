@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ptmtools.database import validate_database
-from ptmtools.database.gltf.reader import ReadPrimitive, read_glb
 from ptmtools.glb import glb_chunks
+from ptmtools.output import validate_database
+from ptmtools.output.gltf_reader import ReadPrimitive, read_glb
 from ptmtools.scene.colors import to_linear, to_srgb
 from ptmtools.viewer.site import Site, SiteOptions, site_of
 from tests.scene.conftest import Gltf, png

@@ -15,10 +15,10 @@ import pytest
 from likeness import likeness, outline
 from render import Look, View, load, render
 
-from ptmtools.database.gltf.reader import ReadGlb, read_glb
+from ptmtools.output.gltf_reader import ReadGlb, read_glb
+from ptmtools.rendering.rays import Frustum
 from ptmtools.texture import open as open_ptm
 from ptmtools.viewer.site import Site
-from ptmtools.walkthrough.view.frustum import Frustum
 
 SKY = (0.16, 0.17, 0.19)
 #: Textured surfaces unlit; the others glow and are lit from the eye.

@@ -12,17 +12,15 @@ import pytest
 from hypothesis import example, given, settings, strategies as st
 
 from ptmtools.arrays import Floats
-from ptmtools.walkthrough.allocation import allocate, next_fetch
-from ptmtools.walkthrough.catalogue import catalogue_of
-from ptmtools.walkthrough.client import PRIOR
-from ptmtools.walkthrough.estimate import Estimate
-from ptmtools.walkthrough.network import Conditions, Link
-from ptmtools.walkthrough.policies.paper_kernels import refresh, share_out
-from ptmtools.walkthrough.request import Request
-from ptmtools.walkthrough.world import World
+from ptmtools.lab.allocation import allocate, next_fetch
+from ptmtools.lab.catalogue import catalogue_of
+from ptmtools.lab.client import PRIOR, Estimate
+from ptmtools.lab.network import Conditions, Link, Request
+from ptmtools.lab.policies.paper_kernels import refresh, share_out
+from ptmtools.lab.world import World
+from tests.lab.conftest import two_rooms, walk_file, world
+from tests.lab.worlds import SEEDS, any_world, catalogue, raw, standing
 from tests.viewer.watching import HERE, Witness, called, documents, same, tables, write
-from tests.walkthrough.conftest import two_rooms, walk_file, world
-from tests.walkthrough.worlds import SEEDS, any_world, catalogue, raw, standing
 from tests.web.node import missing, run
 
 __all__ = ["two_rooms", "walk_file", "world"]

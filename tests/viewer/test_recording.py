@@ -11,14 +11,14 @@ from urllib.parse import unquote
 import pytest
 
 from ptmtools.cli.main import main
+from ptmtools.lab.network import Conditions
+from ptmtools.lab.policies import POLICIES
+from ptmtools.lab.simulation import simulate
+from ptmtools.lab.walk import read_walk
+from ptmtools.lab.world import prepare
+from ptmtools.output.served import read_served
 from ptmtools.server.throttle import Throttle
 from ptmtools.viewer.site import Site
-from ptmtools.walkthrough.network import Conditions
-from ptmtools.walkthrough.policies import POLICIES
-from ptmtools.walkthrough.served import read_served
-from ptmtools.walkthrough.simulation import simulate
-from ptmtools.walkthrough.walk import read_walk
-from ptmtools.walkthrough.world import prepare
 
 LINK = Throttle(2e6, 0.05)
 #: Recording begins as soon as there is something to record.

@@ -17,8 +17,8 @@ import pytest
 from PIL import Image
 
 from ptmtools import schemas
-from ptmtools.database.served import compressed
 from ptmtools.errors import DatabaseError, InputError
+from ptmtools.output.emission import compressed
 from ptmtools.texture import EncodeOptions, decode, decode_levels, encode, read_header
 from ptmtools.viewer import pictures as drawing
 from ptmtools.viewer.site import DATA, Site, SiteOptions, link_bytes, site_of, title_of
@@ -138,12 +138,11 @@ def test_pictures(site: Site) -> None:
 
 def test_the_poster_shows_the_first_viewpoint(two_rooms: Path, site: Site) -> None:
     """It is what the compiled renderer of the simulation draws there, but for the light."""
-    from ptmtools.walkthrough.served import read_served
-    from ptmtools.walkthrough.view.pyramids import read_pyramids
-    from ptmtools.walkthrough.view.rays import Camera, Caster
-    from ptmtools.walkthrough.view.records import own_levels
-    from ptmtools.walkthrough.view.shading import shade
-    from ptmtools.walkthrough.view.triangles import triangles_of
+    from ptmtools.output.served import read_served
+    from ptmtools.rendering.kernels import shade
+    from ptmtools.rendering.pyramids import read_pyramids
+    from ptmtools.rendering.rays import Camera, Caster
+    from ptmtools.rendering.records import own_levels, triangles_of
 
     served = read_served(two_rooms)
     viewpoint = served.index["viewpoints"][0]

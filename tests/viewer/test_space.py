@@ -12,13 +12,12 @@ import numpy as np
 import pytest
 
 from ptmtools.arrays import Floats
-from ptmtools.walkthrough.locating import SLACK
-from ptmtools.walkthrough.policies.paper import _crossing
-from ptmtools.walkthrough.view.frustum import Frustum
-from ptmtools.walkthrough.view.rays import axes
-from ptmtools.walkthrough.world import World
+from ptmtools.lab.policies.paper import _crossing
+from ptmtools.lab.world import World
+from ptmtools.output.served import SLACK
+from ptmtools.rendering.rays import Frustum, axes
+from tests.lab.conftest import two_rooms, walk_file, world
 from tests.viewer.watching import called
-from tests.walkthrough.conftest import two_rooms, walk_file, world
 from tests.web.node import missing
 
 __all__ = ["two_rooms", "walk_file", "world"]

@@ -12,15 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from ptmtools.walkthrough.allocation import allocate
-from ptmtools.walkthrough.catalogue import Catalogue
-from ptmtools.walkthrough.client import Client, Kind
-from ptmtools.walkthrough.network import Conditions, Link
-from ptmtools.walkthrough.policies import POLICIES
-from ptmtools.walkthrough.policies.engine import HELD_ON, EngineClient
-from ptmtools.walkthrough.request import Request
-from ptmtools.walkthrough.simulation import simulate
-from ptmtools.walkthrough.world import World
+from ptmtools.lab.allocation import allocate
+from ptmtools.lab.catalogue import Catalogue
+from ptmtools.lab.client import Client, Kind
+from ptmtools.lab.network import Conditions, Link, Request
+from ptmtools.lab.policies import POLICIES
+from ptmtools.lab.policies.engine import HELD_ON, EngineClient
+from ptmtools.lab.simulation import simulate
+from ptmtools.lab.world import World
 from tests.web.node import run
 
 HERE = Path(__file__).resolve().parent

@@ -8,13 +8,12 @@ import shapely
 from hypothesis import given, settings, strategies as st
 
 from ptmtools.portal_flow import (
-    bit_kernels as bits,
     clipping_kernels as clipping,
     flow_kernels,
-    prepass_kernels as prepass,
+    flow_kernels as prepass,
+    line_kernels as bits,
 )
-from ptmtools.portal_flow.flow import Portals, geometry
-from ptmtools.portal_flow.searching import GROWTH, scratch
+from ptmtools.portal_flow.flow import GROWTH, Portals, geometry, scratch
 
 SLACK = 1e-12
 Z = np.array([[0.0, 0, 1]])

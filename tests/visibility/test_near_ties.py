@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from ptmtools.cells.seen import portals_of
+from ptmtools.cells.sight import portals_of
 from ptmtools.executors import Local
 from ptmtools.portal_flow import (
     double_double,
+    double_double as near_ties,
     double_double_kernels as kernels,
-    near_ties,
-    searching,
+    flow as searching,
 )
 from ptmtools.portal_flow.double_double import SequenceTest
 from ptmtools.portal_flow.flow import Portals, geometry, portal_flow

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ptmtools.cells.seen import portals_of
+from ptmtools.cells.sight import portals_of
 from ptmtools.executors import Local
 from ptmtools.portal_flow.flow import Portals, leaf_matrix, portal_flow
-from ptmtools.visibility.sampled import sampled_leaves
+from ptmtools.visibility.pvs import sampled_leaves
 from tests.visibility.test_pvs import ROW, ZIGZAG
 
 

@@ -64,7 +64,7 @@ class EmbreeRenderer:
         return found, self._surfaces.world(exact + depth[..., None] * along)
 
     def _rays(self, points: SamplePoints) -> tuple[Singles, Singles]:
-        from ptmtools.coverage.tally_kernels import cast_rays
+        from ptmtools.coverage.kernels import cast_rays
 
         count = len(points) * len(VIEWS) * self._face**2
         origin, along = (np.empty((count, 3), dtype=np.float32) for _ in range(2))

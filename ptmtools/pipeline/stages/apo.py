@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from ptmtools.apo.options import ReplaceOptions
 from ptmtools.lazy import Lazy
+from ptmtools.neighbours.apo.options import ReplaceOptions
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages.scene import SCENE
 from ptmtools.quantities import count, size

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ptmtools.database.model import EmitOptions
 from ptmtools.lazy import Lazy
+from ptmtools.output.model import EmitOptions
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages.ach import ACH
 from ptmtools.pipeline.stages.apo import APO

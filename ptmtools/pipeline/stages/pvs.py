@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+from ptmtools.diagnostics import Warned
 from ptmtools.lazy import Lazy
-from ptmtools.notes import Warned
 from ptmtools.pipeline.stage import Stage
 from ptmtools.pipeline.stages.cells import CELLS
 from ptmtools.visibility.options import PvsOptions

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.errors import MissingComponentError
-from ptmtools.scene.apart import run_apart, serve
 from ptmtools.scene.gltf.document import Document
+from ptmtools.scene.sandbox import run_apart, serve
 from ptmtools.store.archive import pack_arrays, unpack_arrays
 
 EXTENSION = "KHR_draco_mesh_compression"

@@ -18,7 +18,7 @@ from typing import IO
 
 from ptmtools.errors import InputError, LimitError, MissingComponentError, naming
 from ptmtools.files import open_regular
-from ptmtools.scene.handed import take_over
+from ptmtools.scene.messages import take_over
 from ptmtools.scene.source import MAX_VERTICES, Findings, Source
 
 #: ISO 10303-21: how such a file begins, and how it ends.

@@ -16,7 +16,7 @@ from typing import Any, Literal
 from pxr import Ar, Sdf, Tf, Usd, UsdGeom
 
 from ptmtools.errors import InputError
-from ptmtools.scene.apart import unreadable
+from ptmtools.scene.sandbox import unreadable
 from ptmtools.scene.source import Findings
 
 #: What the library is called in messages.

@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from ptmtools.errors import MissingComponentError
-from ptmtools.scene.apart import serve
-from ptmtools.scene.handed import hand_over, take_over
+from ptmtools.scene.messages import hand_over, take_over
 from ptmtools.scene.options import USD
+from ptmtools.scene.sandbox import serve
 from ptmtools.scene.source import MAX_VERTICES, Findings, Source
 
 #: So many files of the model's folder are looked at for their size.

@@ -9,10 +9,18 @@ stored; it is applied.
 
 from __future__ import annotations
 
+from ptmtools.texture.images.files import (
+    SUFFIXES,
+    WRITTEN,
+    check_image,
+    load_image,
+    read_image,
+    read_ptm,
+    write_image,
+    write_to,
+)
 from ptmtools.texture.images.picture import Picture
 from ptmtools.texture.images.png import png_bytes
-from ptmtools.texture.images.reading import SUFFIXES, check_image, load_image, read_image, read_ptm
-from ptmtools.texture.images.writing import WRITTEN, write_image, write_to
 
 __all__ = [
     "SUFFIXES",

@@ -28,11 +28,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.haar import coder as haar
-from ptmtools.texture.coders.reading import Reader, damaged
-from ptmtools.texture.coders.repeats import coder as repeats
+from ptmtools.texture.coders import haar, repeats
+from ptmtools.texture.coders.group import Reader, damaged, pack_levels, shapes_to, unpack_levels
 from ptmtools.texture.profiles import Tile, raw
-from ptmtools.texture.profiles.nested import pack_levels, shapes_to, unpack_levels
 from ptmtools.texture.profiles.raw import group_length
 from ptmtools.texture.pyramid import build_pyramid
 
@@ -58,8 +56,7 @@ Bytes = NDArray[np.uint8]
 
 def compile_ahead() -> None:
     """Compiles what `encode_tile` of bytes needs but for `repeats`, with which that begins."""
-    from ptmtools.texture.coders.rans.stream import empty_sink, encode_symbols
-    from ptmtools.texture.coders.rans.tables import built_in
+    from ptmtools.texture.coders.rans import built_in, empty_sink, encode_symbols
 
     encode_symbols(empty_sink(0, 1), 1, built_in())
     # So large that weights are fitted.
@@ -84,7 +81,7 @@ def decode_base(data: bytes | memoryview, shape: Shape, dtype: np.dtype[Any]) ->
         return unpack_levels(decode_tile, reader, _nothing(shapes[0], dtype), shapes)
     body = reader.rest()
     if coder == DEFLATED_1:
-        from ptmtools.texture.coders.deflated import inflate
+        from ptmtools.texture.coders.group import inflate
 
         return raw.decode_base(inflate(body, shape[0] * shape[1] * shape[2]), shape, dtype)
     if coder == STORED:
@@ -101,7 +98,7 @@ def encode_tile(
         if len(coded) > 1 + group_length((level.shape[0], level.shape[1], level.shape[2])):
             coded = bytes([STORED]) + raw.encode_tile(level, below).data
         return Tile(coded, level)
-    from ptmtools.texture.coders.texel import coder as texel
+    from ptmtools.texture.coders import texel
 
     data, texels = texel.encode(level, below, max_error)
     return Tile(data, texels)
@@ -118,7 +115,7 @@ def decode_tile(
     """The inverse of `encode_tile`. Raises InputError PTM-I112."""
     if below.dtype == np.uint8 and max_error == 0:
         return Tile(b"", _decode_bytes(data, below, shape))
-    from ptmtools.texture.coders.texel import coder as texel
+    from ptmtools.texture.coders import texel
 
     return Tile(b"", texel.decode(data, below, shape, max_error))
 
@@ -158,11 +155,11 @@ def _decode_bytes(data: bytes | memoryview, below: Bytes, shape: Shape) -> Bytes
     if coder in (HAAR, HAAR_1):
         return haar.decode(body, below, shape, coder == HAAR_1)
     if coder == DIFFERENCES_1:
-        from ptmtools.texture.coders.deflated import decode_differences
+        from ptmtools.texture.coders.group import decode_differences
 
         return decode_differences(body, below, shape)
     if coder == DEFLATED_1:
-        from ptmtools.texture.coders.deflated import inflate
+        from ptmtools.texture.coders.group import inflate
 
         return raw.decode_tile(inflate(body, group_length(shape)), below, shape).texels
     if coder == STORED:

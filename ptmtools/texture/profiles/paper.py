@@ -18,7 +18,7 @@ import numpy as np
 
 from ptmtools.errors import InputError
 from ptmtools.lazy import component
-from ptmtools.texture.coders.reading import Reader, damaged
+from ptmtools.texture.coders.group import Reader, damaged
 from ptmtools.texture.profiles import Tile, raw
 from ptmtools.texture.profiles.raw import (
     corners,

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.reading import Reader, damaged
+from ptmtools.texture.coders.group import Reader, damaged
 from ptmtools.texture.profiles import Tile
 from ptmtools.texture.samples import from_ordered, kind_of, round_to, to_ordered
 

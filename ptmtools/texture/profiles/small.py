@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ptmtools.texture.coders.reading import Reader, damaged
+from ptmtools.texture.coders.group import Reader, damaged, pack_levels, shapes_to, unpack_levels
 from ptmtools.texture.profiles import Tile
-from ptmtools.texture.profiles.nested import pack_levels, shapes_to, unpack_levels
 from ptmtools.texture.pyramid import build_pyramid
 
 if TYPE_CHECKING:
@@ -47,11 +46,11 @@ def encode_tile(
 ) -> Tile:
     """One byte that names the coder, then what it wrote."""
     if level.dtype != np.uint8:
-        from ptmtools.texture.coders.texel import coder as texel
+        from ptmtools.texture.coders import texel
 
         data, texels = texel.encode(level, below, max_error)
         return Tile(bytes([TEXEL]) + data, texels)
-    from ptmtools.texture.coders.mixing import coder as mixing
+    from ptmtools.texture.coders import mixing
 
     stream, texels, learned = mixing.encode_mixing(level, below, max_error, memory, threads)
     if max_error == 0 and (stream is None or 16 * len(stream) > _NOISY * level.nbytes):
@@ -79,11 +78,11 @@ def decode_tile(
         reader.end()
         return Tile(b"", level, memory)
     if coder == TEXEL and not eight_bits:
-        from ptmtools.texture.coders.texel import coder as texel
+        from ptmtools.texture.coders import texel
 
         return Tile(b"", texel.decode(reader.rest(), below, shape, max_error))
     if eight_bits and (coder == MIXED or (coder == EVEN and max_error == 0)):
-        from ptmtools.texture.coders.mixing import coder as mixing
+        from ptmtools.texture.coders import mixing
 
         body = reader.rest()
         if coder == EVEN:

@@ -16,7 +16,7 @@ import pytest
 from ptmtools.errors import InputError, LimitError, MissingComponentError, PtmError
 from ptmtools.scene import IngestOptions, ingest
 from ptmtools.scene.formats import read_other
-from ptmtools.scene.handed import NamedImage
+from ptmtools.scene.messages import NamedImage
 from ptmtools.scene.source import MAX_VERTICES, FileRange, Findings, Source
 from tests.scene.conftest import Put, noise, png
 

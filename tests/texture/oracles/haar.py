@@ -13,9 +13,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.haar import layout
-from ptmtools.texture.coders.planes import plane_order, references
-from ptmtools.texture.coders.reading import Reader
+from ptmtools.texture.coders import haar as layout
+from ptmtools.texture.coders.group import Reader, plane_order, references
 from tests.texture.oracles.rans import Symbols, read_tables
 
 Row = list[int]

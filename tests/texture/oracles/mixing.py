@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.mixing import tables
-from ptmtools.texture.coders.planes import plane_order
+from ptmtools.texture.coders import mixing as tables
+from ptmtools.texture.coders.group import plane_order
 from tests.texture.oracles.haar import edge
 
 SQUASH: list[int] = tables.squash().tolist()

@@ -7,8 +7,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from ptmtools.texture.coders.rans.tables import BUILT_IN_MEANS
-from ptmtools.texture.coders.reading import Reader
+from ptmtools.texture.coders.group import Reader
+from ptmtools.texture.coders.rans import BUILT_IN_MEANS
 
 Row = list[int]
 

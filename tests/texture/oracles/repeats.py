@@ -11,8 +11,7 @@ from collections import defaultdict
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.planes import plane_order
-from ptmtools.texture.coders.reading import Reader
+from ptmtools.texture.coders.group import Reader, plane_order
 from tests.texture.oracles.haar import by_value, edge
 from tests.texture.oracles.rans import Symbols, read_tables
 

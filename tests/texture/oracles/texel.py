@@ -17,9 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ptmtools.texture.coders.planes import plane_order, references
-from ptmtools.texture.coders.reading import Reader
-from ptmtools.texture.coders.texel import layout
+from ptmtools.texture.coders import texel_layout as layout
+from ptmtools.texture.coders.group import Reader, plane_order, references
 from tests.texture.oracles.rans import Symbols, normalised, read_tables
 
 CLASSES, NARROW, GRID, TABLES = 18, 216, 232, 236

@@ -17,10 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ptmtools.texture import EncodeOptions, encode, read_header
-from ptmtools.texture.coders.haar import coder as haar
-from ptmtools.texture.coders.planes import plane_order
-from ptmtools.texture.coders.repeats import coder as repeats
-from ptmtools.texture.coders.texel import coder as texel
+from ptmtools.texture.coders import haar, repeats, texel
+from ptmtools.texture.coders.group import plane_order
 from ptmtools.texture.pyramid import mean_below
 from tests.texture.oracles import (
     haar as haar_reference,

@@ -1,0 +1,171 @@
+"""Compiled growth of flat regions over a mesh, and of what hangs together (see `facets`).
+
+Compiled descent of whole triangles through a BSP tree (see `ownership`).
+
+Compiled test of points for being above floors (`eyes`)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.compiled import plain_kernel, plain_kernel as kernel
+
+
+@kernel
+def grow_regions(
+    point: Floats,
+    triangle: NDArray[np.int32],
+    beyond: NDArray[np.int32],
+    normal: Floats,
+    seeds: Ints,
+    slack: float,
+    region: Ints,
+    queue: Ints,
+) -> int:
+    """Grows flat regions and returns how many there are.
+
+    A region begins with a seed and takes in what lies beyond its edges as long as the corner that
+    is new lies in its plane, the mean of what it consists of so far.
+
+    Parameters
+    ----------
+    point, triangle, beyond: (V, 3), (n, 3) and (n, 3), as `Welded` and `across_edges` have them.
+    normal: (n, 3) normals, twice as long as the triangles are large; those of one plane point to
+        one side.
+    seeds: (n,) the triangles in the order in which they may begin a region.
+    slack: metres from the plane at which a corner still lies in it.
+    region: (n,) -1, where the number of each one's region is left.
+    queue: (n,) storage.
+    """
+    count = 0
+    for s in range(len(seeds)):
+        if region[seeds[s]] >= 0:
+            continue
+        region[seeds[s]] = count
+        queue[0] = seeds[s]
+        head, tail = 0, 1
+        # The region's mean normal, and its middle as seen from a corner of the seed.
+        base = triangle[seeds[s], 0]
+        nx = ny = nz = mx = my = mz = weight = 0.0
+        while head < tail:
+            t = queue[head]
+            head += 1
+            a = (normal[t, 0] ** 2 + normal[t, 1] ** 2 + normal[t, 2] ** 2) ** 0.5
+            nx, ny, nz = nx + normal[t, 0], ny + normal[t, 1], nz + normal[t, 2]
+            for k in range(3):
+                v = triangle[t, k]
+                mx += a * (point[v, 0] - point[base, 0])
+                my += a * (point[v, 1] - point[base, 1])
+                mz += a * (point[v, 2] - point[base, 2])
+            weight += 3.0 * a
+            size = (nx * nx + ny * ny + nz * nz) ** 0.5
+            if weight == 0.0 or size == 0.0:
+                break
+            px = point[base, 0] + mx / weight
+            py = point[base, 1] + my / weight
+            pz = point[base, 2] + mz / weight
+            for k in range(3):
+                other = beyond[t, k]
+                if other < 0 or region[other] >= 0:
+                    continue
+                if normal[other, 0] * nx + normal[other, 1] * ny + normal[other, 2] * nz <= 0.0:
+                    continue
+                flat = True
+                for c in range(3):
+                    v = triangle[other, c]
+                    away = nx * (point[v, 0] - px) + ny * (point[v, 1] - py)
+                    away += nz * (point[v, 2] - pz)
+                    flat &= abs(away) <= slack * size
+                if flat:
+                    region[other] = count
+                    queue[tail] = other
+                    tail += 1
+        count += 1
+    return count
+
+
+@kernel
+def hang_together(triangle: NDArray[np.int32], parent: Ints) -> None:
+    """Joins the corners of each of (n, 3) triangles in ``parent``, (V,) at first each its own, in
+    which each point then names, over others or at once, the least that it hangs together with."""
+    for t in range(len(triangle)):
+        for k in range(1, 3):
+            a, b = triangle[t, 0], triangle[t, k]
+            while parent[a] != a:
+                parent[a] = parent[parent[a]]
+                a = parent[a]
+            while parent[b] != b:
+                parent[b] = parent[parent[b]]
+                b = parent[b]
+            if a < b:
+                parent[b] = a
+            else:
+                parent[a] = b
+    for v in range(len(parent)):  # whoever it names has a lower number, and is done
+        parent[v] = parent[parent[v]]
+
+
+@kernel
+def sink(
+    plane: Floats,
+    child: NDArray[np.int32],
+    corner: Floats,
+    facing: Floats,
+    slack: float,
+    at: Ints,
+    lying: Bools,
+) -> None:
+    """Lets triangles sink until a plane cuts them.
+
+    Parameters
+    ----------
+    plane, child: (N, 4), (N, 2), the tree, as `Cells.node_plane` and `Cells.node_child` have it.
+    corner, facing: (n, 3, 3) triangles, and (n, 3) the side that each goes to where it lies in a
+        plane.
+    slack: metres from a plane at which a corner lies in it.
+    at: (n,) where each begins, and where it is left: a node that cuts it, or leaf i as -2 - i.
+    lying: (n,) set for those that lie in the plane of a node on the way.
+    """
+    for i in range(len(at)):
+        node = at[i]
+        while node >= 0:
+            a, b, c, d = plane[node, 0], plane[node, 1], plane[node, 2], plane[node, 3]
+            ahead = behind = False
+            for k in range(3):
+                away = corner[i, k, 0] * a + corner[i, k, 1] * b + corner[i, k, 2] * c + d
+                ahead |= away > slack
+                behind |= away < -slack
+            if ahead and behind:
+                break
+            if not ahead and not behind:
+                lying[i] = True
+                ahead = facing[i, 0] * a + facing[i, 1] * b + facing[i, 2] * c > 0
+            node = child[node, 0 if ahead else 1]
+        at[i] = node
+
+
+@plain_kernel
+def above_floor(
+    points: Floats, floor: Floats, first: Ints, end: Ints, reach: float, found: Bools
+) -> None:
+    """Sets ``found`` (n,) for those of the (n, 3) points that are over one of the (m, 3, 3)
+    triangles and at most ``reach`` above it; each triangle is held against the points from its
+    ``first`` to its ``end`` (m,)."""
+    for t in range(len(floor)):
+        a, b, c = floor[t, 0], floor[t, 1], floor[t, 2]
+        low, high = min(a[1], b[1], c[1]), max(a[1], b[1], c[1]) + reach
+        for i in range(first[t], end[t]):
+            p = points[i]
+            if found[i] or not low <= p[1] <= high:
+                continue
+            # Of an edge and the edge the other way round exactly opposite.
+            u = (b[0] - p[0]) * (c[2] - p[2]) - (b[2] - p[2]) * (c[0] - p[0])
+            v = (c[0] - p[0]) * (a[2] - p[2]) - (c[2] - p[2]) * (a[0] - p[0])
+            w = (a[0] - p[0]) * (b[2] - p[2]) - (a[2] - p[2]) * (b[0] - p[0])
+            if (u >= 0 and v >= 0 and w >= 0) or (u <= 0 and v <= 0 and w <= 0):
+                whole = u + v + w
+                if whole != 0:
+                    over = p[1] - (u * a[1] + v * b[1] + w * c[1]) / whole
+                    found[i] = 0 <= over <= reach

@@ -1,1 +1,0 @@
-"""Floor plans of a database, one for each of its storeys: `plan` draws them."""

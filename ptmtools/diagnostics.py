@@ -1,0 +1,172 @@
+"""What a check of files finds, who gathers it, and the report.
+
+What there is to say of a result: lines for people, of two ranks.
+
+A warning is a note that may cost an afternoon if it is overlooked: a guess that could as well have
+gone the other way, a model on its side, images that are missing. Warnings are few; they are shown
+as soon as they are known, before the stages that take long. All others are counted, and listed
+when asked for."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+#: Characters of a place or message.
+_LONGEST = 300
+
+Severity = Literal["error", "warning"]
+
+
+@dataclass(frozen=True)
+class Issue:
+    """One finding of a validation; the codes stand in docs/formats/database.md.
+
+    Attributes
+    ----------
+    code: stable identifier, PTM-D650 and up.
+    severity: an error makes the file wrong, a warning makes it doubtful.
+    file: relative to the database, or the path that was given.
+    place: where in the file, "" for all of it.
+    message: one line.
+    count: faults that it stands for, see `ptmtools.output.validation`.
+    """
+
+    code: str
+    severity: Severity
+    file: str
+    place: str
+    message: str
+    count: int = 1
+
+    def __str__(self) -> str:
+        where = f"{self.file}: {self.place}" if self.place else self.file
+        return f"{where}: {self.severity}: {self.message} [{self.code}]"
+
+
+@dataclass(frozen=True)
+class ValidationReport:
+    """
+    Attributes
+    ----------
+    issues: errors and warnings, by file, the worst of each first.
+    files: how many files were read.
+    bytes: how many bytes they hold.
+    notes: what else there is to say, one line each.
+    """
+
+    issues: tuple[Issue, ...]
+    files: int
+    bytes: int
+    notes: tuple[str, ...] = ()
+
+    @property
+    def errors(self) -> tuple[Issue, ...]:
+        return tuple(i for i in self.issues if i.severity == "error")
+
+    @property
+    def warnings(self) -> tuple[Issue, ...]:
+        return tuple(i for i in self.issues if i.severity == "warning")
+
+    @property
+    def error_count(self) -> int:
+        """Errors, those summed up included."""
+        return sum(i.count for i in self.errors)
+
+    @property
+    def warning_count(self) -> int:
+        """Warnings, likewise."""
+        return sum(i.count for i in self.warnings)
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is no error."""
+        return not self.errors
+
+
+class Findings:
+    """Gathers issues. The first few of one code in a file are kept one by one, the others counted.
+
+    Messages come from files that may hold anything: they are made printable, and cut.
+    """
+
+    #: Issues of one code kept one by one, per file.
+    MOST = 5
+
+    def __init__(self, codes: Mapping[str, tuple[Severity, str]]) -> None:
+        """``codes``: code → its severity, and what it means."""
+        self._codes = codes
+        self._issues: dict[tuple[str, str], list[Issue]] = {}
+        self._more: Counter[tuple[str, str]] = Counter()
+        #: Of the codes found, which others may have.
+        self._severity: dict[str, Severity] = {}
+
+    def add(self, code: str, file: str, place: str, message: str) -> None:
+        """One issue; its severity is the code's."""
+        severity, _ = self._codes[code]
+        self.take([Issue(code, severity, one_line(file), one_line(place), one_line(message))])
+
+    def at(self, file: str, place: str = "") -> Place:
+        """Who adds what is found there."""
+        return Place(self, file, place)
+
+    def take(self, issues: Iterable[Issue]) -> None:
+        """Issues that others found."""
+        for issue in issues:
+            key = (issue.file, issue.code)
+            self._severity[issue.code] = issue.severity
+            kept = self._issues.setdefault(key, [])
+            if len(kept) < self.MOST and issue.count == 1:
+                kept.append(issue)
+            else:
+                self._more[key] += issue.count
+
+    def issues(self) -> tuple[Issue, ...]:
+        """All of them, see `worst_first`."""
+        found = [issue for kept in self._issues.values() for issue in kept]
+        for (file, code), more in self._more.items():
+            message = f"{more} more of these"
+            found.append(Issue(code, self._severity[code], file, "", message, more))
+        return worst_first(found)
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place in a file, relative to the database, or all of the file; and who is told of it."""
+
+    found: Findings
+    file: str
+    place: str = ""
+
+    def add(self, code: str, message: str, place: str = "") -> None:
+        """One issue, here or at another place in the file."""
+        self.found.add(code, self.file, place or self.place, message)
+
+    def at(self, place: str) -> Place:
+        """Another place in the file."""
+        return Place(self.found, self.file, place)
+
+
+def worst_first(issues: Iterable[Issue]) -> tuple[Issue, ...]:
+    """By file; of each the errors before the warnings, by code: what is wrong with a file as a
+    whole has the lowest ones."""
+    return tuple(sorted(issues, key=lambda i: (i.file, i.severity != "error", i.code, i.count > 1)))
+
+
+def one_line(text: str) -> str:
+    """Text on one line that any terminal prints."""
+    text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
+
+
+class Warned(str):
+    """The text of a note that is a warning."""
+
+    __slots__ = ()
+
+
+def warnings_in(notes: Iterable[str]) -> tuple[str, ...]:
+    """Those of some notes that are warnings, as plain text."""
+    return tuple(str(note) for note in notes if isinstance(note, Warned))

@@ -1,0 +1,30 @@
+"""A walk through a campus with the client of its paper (notes, section 4; the paper's III and IV).
+
+A campus (`ptm campus`) is no database: there are no cells and no levels of a texture in one file,
+but meshes and textures as files of their own, which a client takes whole. So its client is no
+`Client` of `ptmtools.lab.policies`. Link, camera, walk and the error of the picture are the
+same as there, and `prepare_campus` compares with the full picture of a database of the same model,
+if one is given.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ptmtools.lazy import names
+
+if TYPE_CHECKING:
+    from ptmtools.lab.campus.client import CampusClient as CampusClient
+    from ptmtools.lab.campus.options import CampusWalkOptions as CampusWalkOptions
+    from ptmtools.lab.campus.simulation import (
+        CampusRun as CampusRun,
+        simulate_campus as simulate_campus,
+        walk_campus as walk_campus,
+    )
+    from ptmtools.lab.campus.stock import Stock as Stock, read_stock as read_stock
+    from ptmtools.lab.campus.world import (
+        CampusWorld as CampusWorld,
+        prepare_campus as prepare_campus,
+    )
+
+__getattr__ = names(__name__)

@@ -1,0 +1,102 @@
+"""Runs through a campus as Markdown: what each preset costs and shows, and its bytes over time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ptmtools.lab.campus.simulation import PAUSE, CampusRun
+
+FORMAT, SCHEMA = "ptmtools campus walk", 1
+#: Seconds from one row of the table of bytes to the next.
+EVERY = 30.0
+
+
+def table(runs: Sequence[CampusRun]) -> list[str]:
+    """A column for each preset, a row for each measure."""
+    rows: list[tuple[str, Callable[[CampusRun], str]]] = [
+        ("textures / lightmaps", lambda r: f"{r.quality.diffuse} / {r.quality.light}"),
+        ("all coarsest meshes are there after, s", lambda r: _or(r.begun, "{:.1f}")),
+        ("graphics memory of these, MB", lambda r: _mega(r.floor)),
+        ("graphics memory at most, MB", lambda r: _mega(int(r.memory.max()))),
+        ("received, MB", lambda r: _mega(r.body + r.overhead)),
+        ("requests", lambda r: f"{r.requests:,}"),
+        ("link idle", lambda r: f"{r.idle_share:.0%}"),
+        (f"pauses of {PAUSE:g} s or more", lambda r: f"{r.pauses}"),
+        ("one of the nearest is not in full", lambda r: f"{r.late:.0%}"),
+        ("from near to in full, s", lambda r: _or(r.delay, "{:.1f}")),
+        ("came too late, of all that became near", lambda r: f"{r.never} of {_all(r)}"),
+        ("textures that were there already", lambda r: f"{r.reused:.0%}"),
+        ("e", lambda r: _or(r.e, "{:.2f}")),
+    ]
+    return [*_head("", runs), *(_row(name, [of(run) for run in runs]) for name, of in rows)]
+
+
+def received(runs: Sequence[CampusRun], every: float = EVERY) -> list[str]:
+    """MB received with each preset, by when; beside them what came since the row before."""
+    time = runs[0].time
+    instants = [*np.arange(every, time[-1], every).tolist(), float(time[-1])]
+    lines, before = _head("s", runs), [0.0] * len(runs)
+    for instant in instants:
+        at = int(np.searchsorted(time, instant, "right")) - 1
+        now = [float(run.fetched[at]) for run in runs]
+        cells = [f"{_mega(n)} (+{_mega(n - b)})" for n, b in zip(now, before, strict=True)]
+        lines.append(_row(f"{instant:.0f}", cells))
+        before = now
+    return lines
+
+
+def document(campus: str, runs: Sequence[CampusRun]) -> dict[str, Any]:
+    """All runs as JSON has them, by its schema."""
+    return {
+        "format": FORMAT,
+        "schema": SCHEMA,
+        "campus": campus,
+        "seconds": float(runs[0].time[-1]),
+        "runs": [
+            {
+                "preset": run.quality.name,
+                "bandwidth": run.conditions.bandwidth,
+                "begun": run.begun,
+                "memory": {"start": run.floor, "most": int(run.memory.max())},
+                "bytes": round(run.body),
+                "overheadBytes": round(run.overhead),
+                "requests": run.requests,
+                "idle": run.idle_share,
+                "pauses": run.pauses,
+                "late": run.late,
+                "delay": _known(run.delay),
+                "shown": len(run.delays),
+                "never": run.never,
+                "reused": run.reused,
+                "e": _known(run.e),
+            }
+            for run in runs
+        ],
+    }
+
+
+def _known(value: float) -> float | None:
+    return None if np.isnan(value) else value
+
+
+def _head(first: str, runs: Sequence[CampusRun]) -> list[str]:
+    return [_row(first, [run.quality.name for run in runs]), "|---|" + "--:|" * len(runs)]
+
+
+def _row(name: str, cells: Sequence[str]) -> str:
+    return f"| {name} | {' | '.join(cells)} |"
+
+
+def _all(run: CampusRun) -> int:
+    return len(run.delays) + run.never
+
+
+def _mega(count: float) -> str:
+    return f"{count / 1e6:.1f}"
+
+
+def _or(value: float | None, form: str) -> str:
+    return "–" if value is None or np.isnan(value) else form.format(value)

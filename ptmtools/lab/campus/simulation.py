@@ -1,0 +1,326 @@
+"""Runs: a client with a preset walks through a campus over a link.
+
+As in `ptmtools.lab.simulation`, time goes from frame to frame, what arrives in between is
+handed to the client at once, and what is in graphics memory changes only with a frame.
+
+The client of a campus as a policy beside those of a database of the same model: the same walks,
+links, pictures and measures.
+
+Its lightmaps are left out: the other clients have no light. What it may take is graphics memory
+for meshes and textures, that of the others is for textures alone. What is counted of levels of
+textures, or of cells, has no meaning here, and is NaN."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field, replace
+from math import nan
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.lab.campus.client import CampusClient
+from ptmtools.lab.campus.options import QUALITIES, CampusWalkOptions
+from ptmtools.lab.campus.stock import Stock
+from ptmtools.lab.campus.world import COARSE, FINE, NOTHING, CampusWorld, prepare_campus
+from ptmtools.lab.measures import STANDS, Measures, measure, seconds_to
+from ptmtools.lab.network import Conditions, Link
+from ptmtools.lab.simulation import Run
+from ptmtools.lab.walk import Walk
+from ptmtools.lab.world import World
+from ptmtools.link import Trace
+from ptmtools.neighbours.campus.model import SIZES, Quality
+from ptmtools.output.served import Served
+from ptmtools.progress import Progress, silent
+
+#: Shorter pauses of the link, s, are no idle periods.
+PAUSE = 1.0
+
+
+@dataclass(frozen=True)
+class CampusRun:
+    """What came of a run; F frames.
+
+    Attributes
+    ----------
+    quality, conditions, budget: what was run; the budget is bytes of graphics memory, or None.
+    time: (F,) s.
+    error: (F,) e, the mean over the pixels of the root mean square over R, G and B, 0 to 255; NaN
+        in frames without tables.
+    memory: (F,) bytes of graphics memory in use. fetched: (F,) bytes of bodies received so far.
+    lacking: (F,) how many of the objects that are wanted in high detail are not shown so; all of
+        them before the client has the index.
+    begun: s until all coarsest meshes and least textures were there, or None.
+    floor: bytes of graphics memory that these take.
+    delays: s from becoming one of the nearest to being shown in full, of each time that it came to
+        that. never: how often it did not, before the object was far again, or the walk over.
+    reused: of the preset's textures, the share that was there when an object that uses them became
+        one of the nearest for the first time; 0 without textures.
+    idle: (p, 2) spans of time, s, in which nothing was on the way.
+    body, overhead: bytes received of bodies and headers. requests: how many. sorts: how often
+        objects were sorted.
+    """
+
+    quality: Quality
+    conditions: Conditions
+    budget: int | None
+    time: Floats
+    error: Floats
+    memory: Ints
+    fetched: Floats
+    lacking: Ints
+    begun: float | None
+    floor: int
+    delays: tuple[float, ...]
+    never: int
+    reused: float
+    idle: Floats
+    body: float
+    overhead: float
+    requests: int
+    sorts: int
+
+    @property
+    def e(self) -> float:
+        """Mean of the errors; NaN without tables."""
+        known = self.error[np.isfinite(self.error)]
+        return float(known.mean()) if len(known) else float("nan")
+
+    @property
+    def late(self) -> float:
+        """The share of the time in which at least one of the nearest is not shown in full."""
+        return float((self.lacking > 0).mean())
+
+    @property
+    def delay(self) -> float:
+        """Mean of the delays, s; NaN without any."""
+        return float(np.mean(self.delays)) if self.delays else float("nan")
+
+    @property
+    def idle_share(self) -> float:
+        """Of the walk's time, that in which nothing was on the way; 0 of a walk of one frame."""
+        whole = float(self.time[-1])
+        return float(np.diff(self.idle, axis=1).sum()) / whole if whole else 0.0
+
+    @property
+    def pauses(self) -> int:
+        """Idle spans of at least `PAUSE`."""
+        return int((np.diff(self.idle, axis=1) >= PAUSE).sum())
+
+
+def walk_campus(
+    folder: str | os.PathLike[str],
+    walk: Walk,
+    options: CampusWalkOptions = CampusWalkOptions(),  # noqa: B008 - a frozen value
+    served: Served | None = None,
+    *,
+    trace: Trace | None = None,
+    progress: Progress = silent,
+) -> list[CampusRun]:
+    """A walk through a campus with each preset of the options; see `prepare_campus` for ``served``
+    and for what is raised."""
+    world = prepare_campus(folder, walk, served, progress=progress)
+    return [simulate_campus(world, quality, options, trace) for quality in options.qualities]
+
+
+def simulate_campus(
+    world: CampusWorld,
+    quality: Quality,
+    options: CampusWalkOptions = CampusWalkOptions(),  # noqa: B008 - a frozen value
+    trace: Trace | None = None,
+    conditions: Conditions | None = None,
+) -> CampusRun:
+    """Walks. The same arguments give the same run, bit for bit. Other ``conditions`` take the place
+    of the link of the options and the trace."""
+    link = Link(conditions or options.link(trace))
+    client = CampusClient(world.stock, link, quality, options)
+    frames, columns = world.frames, _Columns(world.stock)
+    wanted = min(max(options.nearest, 1), world.stock.objects)
+    error = np.full(frames, np.nan)
+    fetched = np.zeros(frames)
+    memory, lacking = np.zeros(frames, np.int64), np.zeros(frames, np.int64)
+    waits, begun = _Waits(client), None
+    for f in range(frames):
+        now = float(world.time[f])
+        while finished := link.advance(now):
+            client.arrived(finished)
+            client.fetch()
+            if begun is None and client.begun:
+                begun = link.now
+        client.look(world.eye[f])
+        client.fetch()
+        waits.look(now)
+        memory[f] = client.memory
+        fetched[f] = link.bytes + sum(r.received for r in client.waiting)
+        lacking[f] = waits.lacking if client.order.size else wanted
+        view = int(world.view[f])
+        if world.tables is not None and view >= 0:
+            error[f] = world.tables.wrong(view, *columns.of(client))
+    idle = [[*span, float(world.time[-1])][:2] for span in client.idle]
+    low = np.unique([f for files in client.low for f in files]).astype(np.int64)
+    return CampusRun(
+        quality=quality,
+        conditions=link.conditions,
+        budget=options.budget,
+        time=world.time,
+        error=error,
+        memory=memory,
+        fetched=fetched,
+        lacking=lacking,
+        begun=begun,
+        floor=int(world.stock.memory[low].sum()),
+        delays=tuple(waits.delays),
+        never=waits.never + len(waits.since),
+        reused=waits.reused / waits.wanted if waits.wanted else 0.0,
+        idle=np.array(idle, dtype=np.float64).reshape(-1, 2),
+        body=float(fetched[-1]),
+        overhead=link.overhead_bytes,
+        requests=link.requests,
+        sorts=client.sorts,
+    )
+
+
+class _Columns:
+    """How objects and textures are shown, by what is in graphics memory."""
+
+    def __init__(self, stock: Stock) -> None:
+        lods = [stock.meshes(number) for number in range(stock.objects)]
+        self._coarse, self._fine = (
+            np.array([each[i] for each in lods], dtype=np.int64) for i in (0, -1)
+        )
+        bases = range(len(stock.bases))
+        self._file = np.array(
+            [[stock.diffuse(base, size) for size in SIZES] for base in bases], dtype=np.int64
+        ).reshape(-1, len(SIZES))
+
+    def of(self, client: CampusClient) -> tuple[Ints, Ints]:
+        """(m,) of the objects, and (T,) of the textures, as `Tables.wrong` takes them."""
+        shown = client.shown
+        mesh = np.where(shown[self._coarse], COARSE, NOTHING)
+        mesh[shown[self._fine]] = FINE
+        column = (shown[self._file] * np.arange(1, len(SIZES) + 1)).max(axis=1, initial=0)
+        return mesh, column.astype(np.int64)
+
+
+@dataclass
+class _Waits:
+    """How long objects that have become near wait for their high detail.
+
+    Attributes
+    ----------
+    since: when each object that waits became one of the nearest, s.
+    lacking: how many of the nearest are not shown in full.
+    wanted, reused: textures of objects that became near for the first time, and those of them that
+        were there.
+    """
+
+    client: CampusClient
+    since: dict[int, float] = field(default_factory=dict)
+    delays: list[float] = field(default_factory=list)
+    never: int = 0
+    lacking: int = 0
+    wanted: int = 0
+    reused: int = 0
+    _near: frozenset[int] = frozenset()
+    _met: set[int] = field(default_factory=set)
+
+    def look(self, now: float) -> None:
+        """There is a frame."""
+        near = frozenset(self.client.near)
+        for number in near - self._near:
+            self.since[number] = now
+            self._meet(number)
+        for number in self._near - near:
+            self.never += self.since.pop(number, None) is not None
+        self._near = near
+        full = {number: self.client.full(number) for number in self.client.near}
+        for number, shown in full.items():
+            if shown and number in self.since:
+                self.delays.append(now - self.since.pop(number))
+        self.lacking = sum(not shown for shown in full.values())
+
+    def _meet(self, number: int) -> None:
+        if number not in self._met:
+            self._met.add(number)
+            client = self.client
+            files = list(client.stock.textures(number, client.quality.diffuse))
+            self.wanted += len(files)
+            self.reused += int(client.there[files].sum())
+
+
+@dataclass(frozen=True)
+class CampusPolicy:
+    """A client of a campus, with a preset; ``name`` and ``about`` are for `--policy`."""
+
+    name: str
+    about: str
+    quality: Quality
+
+
+#: By name.
+CAMPUS_POLICIES = {
+    f"campus-{name}": CampusPolicy(
+        f"campus-{name}",
+        f"objects of --campus, the nearest in full, {choice.about}",
+        choice.quality,
+    )
+    for name, choice in QUALITIES.items()
+}
+
+
+def walk_beside(
+    place: CampusWorld, world: World, policy: CampusPolicy, link: Conditions, budget: int | None
+) -> tuple[Run, Measures]:
+    """A run through a campus, and its measures; ``world`` is the same walk through the database."""
+    tables = place.tables
+    if tables is None:
+        raise ValueError("the errors of the campus are not tabulated")
+    run = _run(place, world.still, policy, link, budget)
+    stands = place.standing(STANDS)
+    standing = _run(stands, np.ones(stands.frames, np.bool_), policy, link, budget)
+    nothing = np.zeros(place.stock.objects, np.int64), np.zeros(len(place.stock.bases), np.int64)
+    left = tables.wrong(int(place.view[0]), *nothing)
+    measures = replace(
+        measure(run, world, standing),
+        waste=nan,
+        stalls=nan,
+        uploads=nan,
+        switches=nan,
+        final=seconds_to(standing, left),
+    )
+    return run, measures
+
+
+def _run(
+    place: CampusWorld, still: Bools, policy: CampusPolicy, link: Conditions, budget: int | None
+) -> Run:
+    memory = "inf" if budget is None else str(max(budget, 1))
+    options = CampusWalkOptions(memory=memory, lightmaps=False)
+    run = simulate_campus(place, policy.quality, options, conditions=link)
+    frames = place.frames
+    unknown = np.full(frames, nan)
+    return Run(
+        policy=policy.name,
+        conditions=link,
+        budget=int(run.memory.max()) if budget is None else budget,
+        time=run.time,
+        still=still,
+        error=run.error,
+        square=unknown,
+        missing=unknown,
+        quality=unknown,
+        memory=run.memory,
+        fetched=run.fetched,
+        column=np.zeros((frames, 0), np.int64),
+        there=np.zeros((frames, 0), np.bool_),
+        body=run.body,
+        overhead=run.overhead,
+        cancelled=0.0,
+        documents=0,
+        useful=nan,
+        uploads=0,
+        switches=0,
+        requests=run.requests,
+        stalls=0,
+        overruns=0 if budget is None else int((run.memory > budget).sum()),
+    )

@@ -1,0 +1,250 @@
+"""All that the runs of a walk through a campus share.
+
+Tables along a walk through a campus: what is wrong with the picture, by what has been loaded.
+
+In each frame rays are cast at the meshes of the full picture, at all finest and at all coarsest
+meshes of the campus. A pixel belongs to the object whose finest mesh it shows, or if it shows none,
+the coarsest. What is wrong with it (root mean square over R, G and B, 0 to 255) is summed up by
+object and texture, once for finest and once for coarsest meshes, with nothing there (grey) and with
+the texture in each size. A run then only looks up: the part of an object is that of the mesh by
+which it is shown, each texture in the size at hand.
+
+An approximation, at silhouettes: a pixel that belongs to an object shows what the meshes of its
+kind show there when *all* objects are shown by that kind. Where a coarse mesh leaves open what the
+fine one covers, that is what lies behind by its coarse mesh, even if that object is shown by its
+fine one; and where it covers more, the pixel belongs to what is behind it and is shown by the kind
+of that. Nothing is there where nothing is hit: black, as in pictures of other clients.
+
+Where the full picture shows something and neither mesh does, or the other way round, meshes differ
+from the full picture's: that part of the error is in every run (`Tables.least`)."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Floats, Ints, Singles
+from ptmtools.errors import InputError, LimitError
+from ptmtools.lab.campus.stock import Stock, read_stock, read_surfaces, read_textures
+from ptmtools.lab.walk import Walk
+from ptmtools.lab.world import MOST_FRAMES, PIXELS, RATE
+from ptmtools.neighbours.campus.model import SIZES
+from ptmtools.output.served import Served, Surfaces
+from ptmtools.progress import Progress, silent
+from ptmtools.rendering.pyramids import read_pyramids
+from ptmtools.rendering.rays import Camera, Caster
+from ptmtools.rendering.records import Pyramids, triangles_of
+
+#: How an object is shown.
+NOTHING, COARSE, FINE = range(3)
+
+
+@dataclass(frozen=True)
+class Tables:
+    """What is on the screen; the rows of a frame are those from ``start[f]`` to ``start[f + 1]``.
+
+    Attributes
+    ----------
+    start: (F + 1,).
+    object, texture: (R,) int32; the texture is -1 for surfaces without.
+    kind: (R,) int8, `COARSE` or `FINE`.
+    error: (R, 4) its part of the frame's mean: nothing there, and the texture in each size.
+    least: (F,) what no object has a part in.
+    """
+
+    start: Ints
+    object: NDArray[np.int32]
+    texture: NDArray[np.int32]
+    kind: NDArray[np.int8]
+    error: Singles
+    least: Floats
+
+    def wrong(self, frame: int, mesh: Ints, column: Ints) -> float:
+        """e of a frame: (m,) how each object is shown, and (T,) each texture: 0 is nothing, then
+        the sizes."""
+        rows = slice(int(self.start[frame]), int(self.start[frame + 1]))
+        number, texture = self.object[rows], self.texture[rows]
+        shown = mesh[number]
+        # Grey is grey, whatever mesh lacks: that of the finest stands for it.
+        used = self.kind[rows] == np.where(shown == NOTHING, FINE, shown)
+        held = np.append(column, self.error.shape[1] - 1)[texture]
+        held = np.where(shown == NOTHING, 0, held)
+        part = np.take_along_axis(self.error[rows], held[:, None], axis=1)[:, 0]
+        return float(part[used].sum(dtype=np.float64) + self.least[frame])
+
+
+@dataclass(frozen=True)
+class Full:
+    """What the picture is compared with: surfaces with textures."""
+
+    surfaces: Surfaces
+    textures: Pyramids
+
+
+def look(
+    full: Full,
+    finest: Surfaces,
+    coarsest: Surfaces,
+    sizes: tuple[Pyramids, Pyramids, Pyramids],
+    camera: Camera,
+    eye: Floats,
+    direction: Floats,
+    progress: Progress = silent,
+) -> Tables:
+    """The tables of (F, 3) eyes and directions; ``cell`` of the surfaces is the object."""
+    from ptmtools.lab.campus.kernels import COLUMNS, Sizes, add_shown, full_colors
+
+    objects = int(max(finest.cell.max(initial=-1), coarsest.cell.max(initial=-1))) + 1
+    wide = len(sizes[0].levels) + 1
+    place = np.arange(objects * wide).reshape(objects, wide)
+    kinds = tuple((kind, Caster(s), triangles_of(s))
+                  for kind, s in ((COARSE, coarsest), (FINE, finest)))  # fmt: skip
+    one_picture = full.surfaces is finest
+    caster, triangles = kinds[1][1:] if one_picture else (None, triangles_of(full.surfaces))
+    caster = caster or Caster(full.surfaces)
+    pixels = camera.width * camera.height
+    exact, work = np.zeros((pixels, 3)), np.zeros((5, 3))
+    sums = np.zeros((objects * wide, COLUMNS))
+    start, rows, errors = [0], [np.zeros((0, 3), np.int64)], [np.zeros((0, COLUMNS), np.float32)]
+    least = np.zeros(len(eye))
+    for f in range(len(eye)):
+        progress(f, len(eye), "looking along the walk")
+        coarse, fine = (each.look(camera, eye[f], direction[f]) for _, each, _ in kinds)
+        sight = fine if one_picture else caster.look(camera, eye[f], direction[f])
+        full_colors(sight, triangles, full.textures, exact, work[:4])
+        owner = _owners((fine.triangle, finest), (coarse.triangle, coarsest))
+        for (kind, _, drawn), seen in zip(kinds, (coarse, fine), strict=True):
+            add_shown(owner, seen, drawn, Sizes(*sizes), exact, place, sums, work)
+            found = np.flatnonzero(sums.any(axis=1))
+            number, texture = np.divmod(found, wide)
+            texture[texture == wide - 1] = -1
+            rows.append(np.stack([number, texture, np.full(len(found), kind)], axis=1))
+            errors.append((sums[found] / pixels).astype(np.float32))
+            sums[found] = 0.0
+        start.append(start[-1] + len(rows[-1]) + len(rows[-2]))
+        nobody = exact[owner < 0]
+        least[f] = np.sqrt((nobody**2).mean(axis=1)).sum() / pixels
+    progress(len(eye), len(eye), "looking along the walk")
+    number, texture, kind = np.concatenate(rows).T
+    return Tables(
+        np.array(start), number.astype(np.int32), texture.astype(np.int32), kind.astype(np.int8),
+        np.concatenate(errors), least,
+    )  # fmt: skip
+
+
+def _owners(*seen: tuple[Ints, Surfaces]) -> Ints:
+    """(n,) the object of the first of the meshes that shows something."""
+    found = np.full(len(seen[0][0]), -1, np.int64)
+    for triangle, surfaces in seen:
+        open_ = (found < 0) & (triangle >= 0)
+        found[open_] = surfaces.cell[triangle[open_]]
+    return found
+
+
+@dataclass(frozen=True)
+class CampusWorld:
+    """A walk through a campus.
+
+    Attributes
+    ----------
+    stock: what can be fetched.
+    tables: of the errors, None if nobody asks for them. view: (F,) which of them each frame has, -1
+        for none.
+    time: (F,) s. eye: (F, 3) metres.
+    rate: frames a second.
+    """
+
+    stock: Stock
+    tables: Tables | None
+    view: Ints
+    time: Floats
+    eye: Floats
+    rate: float
+
+    @property
+    def frames(self) -> int:
+        """How many there are."""
+        return len(self.time)
+
+    @property
+    def lacking(self) -> float:
+        """e of what its meshes never show, on average over the frames that have tables; 0 without
+        any."""
+        some = self.view[self.view >= 0]
+        return 0.0 if self.tables is None else float(self.tables.least[some].mean())
+
+    def standing(self, seconds: float, frame: int = 0) -> CampusWorld:
+        """Who stays at a frame of this, so long."""
+        count = int(np.ceil(seconds * self.rate)) + 1
+        held = np.full(count, frame)
+        time = np.arange(count) / self.rate
+        return replace(self, view=self.view[held], time=time, eye=self.eye[held])
+
+
+def prepare_campus(
+    folder: str | os.PathLike[str],
+    walk: Walk,
+    served: Served | None = None,
+    pyramids: Pyramids | None = None,
+    *,
+    rate: float = RATE,
+    pixels: tuple[int, int] = PIXELS,
+    every: int = 1,
+    only: str = "*",
+    progress: Progress = silent,
+) -> CampusWorld:
+    """The world of a walk through a campus.
+
+    Parameters
+    ----------
+    served: a database of the same model; its full picture is what pictures are compared with. If
+        it is None, that is the campus with all finest meshes and largest textures: what
+        compression and a lesser size did to the images is then no error.
+    pyramids: its textures, if they have been read already.
+    rate: frames a second. pixels: of the pictures, across and down.
+    every: errors are tabulated of each frame whose number it divides, which takes most of the time;
+        0: of none.
+    only: names of the objects that there are, with * and ?.
+
+    Raises
+    ------
+    InputError: PTM-I701 the walk was recorded in a browser; PTM-I714, I832, I833 the campus is
+        incomplete or damaged, or has no such object.
+    LimitError: PTM-L700 the walk is too long; PTM-L831 the index is.
+    DatabaseError, LimitError: those of `read_pyramids`.
+    """
+    if walk.duration * rate > MOST_FRAMES:
+        raise LimitError(
+            "PTM-L700",
+            f"a walk of {walk.duration:g} s has more than {MOST_FRAMES:,} frames",
+            remedy="give a shorter one",
+        )
+    if walk.browser:
+        raise InputError(
+            "PTM-I701",
+            "a walk that was recorded in a browser is of its client, not of one of a campus",
+            remedy="give a walk of `ptm path`",
+        )
+    folder = Path(folder)
+    stock = read_stock(folder, only)
+    time = np.arange(int(np.floor(walk.duration * rate + 1e-9)) + 1) / rate
+    eye, direction = walk.at(time)
+    view, tables = np.full(len(time), -1, np.int64), None
+    if every:
+        pose = np.concatenate([eye, direction], axis=1)[::every]
+        seen, found = np.unique(pose, axis=0, return_inverse=True)
+        view[::every] = found.reshape(-1)
+        finest, coarsest = (read_surfaces(folder, stock, level) for level in (-1, 0))
+        small, middle, large = (read_textures(folder, stock, size) for size in SIZES)
+        full = Full(finest, large)
+        if served is not None:
+            textures = read_pyramids(served, progress) if pyramids is None else pyramids
+            full = Full(served.surfaces, textures)
+        camera = Camera(*pixels, walk.field_of_view, walk.aspect)
+        sizes = small, middle, large
+        tables = look(full, finest, coarsest, sizes, camera, seen[:, :3], seen[:, 3:], progress)
+    return CampusWorld(stock, tables, view, time, eye, rate)

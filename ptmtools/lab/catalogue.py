@@ -1,0 +1,304 @@
+"""What a client knows once it has the index, a record or the geometry of a cell, as arrays.
+
+Which of it a client may use at a moment depends on what has arrived; that is the client's part.
+
+Texture memory: what levels take, and which of them it should hold.
+
+A texture of which column k is resident holds levels 0 to k − 1: column 0 is nothing. GPUs have no
+texels of three bytes, so RGB counts four; the paper counts three."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Floats, Ints, normals
+from ptmtools.lab.walk import Browser
+from ptmtools.output.served import Document, Served
+from ptmtools.scene.colors import gradients
+from ptmtools.texture.model import gpu_texel_bytes
+
+
+class Columns(NamedTuple):
+    """What can be fetched of textures; beyond the last column of one all repeat it.
+
+    Attributes
+    ----------
+    last: (T,) of each texture; column 0 is nothing.
+    ends: (T, K) bytes that hold each column and those before it. memory: (T, K) of texture memory.
+    size: (T, K, 2) width and height of the finest image that each column shows.
+    """
+
+    last: Ints
+    ends: Ints
+    memory: Ints
+    size: Ints
+
+
+def texel_bytes(texture: Any, *, paper: bool = False) -> int:
+    """Bytes of a texel of an entry of the index; with ``paper``, as the paper counts."""
+    stored = int(texture["texelBytes"])
+    if paper:
+        return stored
+    return int(texture.get("gpuTexelBytes", gpu_texel_bytes(stored, texture["components"])))
+
+
+def columns_of(textures: Sequence[Any], *, paper: bool = False) -> Columns:
+    """Levels of `.ptm`s, for entries of the index: bytes are those of the file, and memory that of
+    all levels of a column."""
+    rows = []
+    for texture in textures:
+        shift = len(texture["ends"]) - 1 - np.arange(len(texture["ends"]))
+        sides = [np.maximum(1, texture[side] >> shift) for side in ("width", "height")]
+        each = np.cumsum(sides[0] * sides[1]) * texel_bytes(texture, paper=paper)
+        rows.append((texture["ends"], each, np.stack(sides, axis=1)))
+    return aligned(rows)
+
+
+def joined(first: Columns, second: Columns) -> Columns:
+    """Those of two lists of textures, one behind the other."""
+    wide = max(first.ends.shape[1], second.ends.shape[1])
+
+    def both(one: Ints, other: Ints) -> Ints:
+        rest = [(0, 0)] * (one.ndim - 2)
+        parts = (np.pad(a, [(0, 0), (0, wide - a.shape[1]), *rest], "edge") for a in (one, other))
+        return np.concatenate(list(parts))
+
+    tables = zip(first[1:], second[1:], strict=True)
+    return Columns(np.concatenate([first.last, second.last]), *(both(*pair) for pair in tables))
+
+
+def aligned(rows: Sequence[tuple[Any, Any, Any]]) -> Columns:
+    """Columns of textures that have any number of them: of each its (k,) ``ends`` and ``memory``,
+    and (k, 2) ``size``, without the first column."""
+    last = np.array([len(row[0]) for row in rows], dtype=np.int64)
+    shape = len(rows), int(last.max(initial=0)) + 1
+    ends, memory, size = (np.zeros(s, np.int64) for s in (shape, shape, (*shape, 2)))
+    for t, row in enumerate(rows):
+        n = int(last[t])
+        for table, values in zip((ends, memory, size), row, strict=True):
+            table[t, 1 : n + 1] = values
+            table[t, n + 1 :] = table[t, n]
+    return Columns(last, ends, memory, size)
+
+
+#: A level that only repeats the texels of the one below still sharpens what is filtered between
+#: them, so it adds at least this, 0 to 255.
+LEAST = 0.5
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """The shapes of all cells.
+
+    Attributes
+    ----------
+    cell, texture: (n,) int64, ascending by cell; the texture is -1 without.
+    low, high: (n, 3) corners of their boxes, metres.
+    side: (n, 2) metres that the width and the height of the texture's image take on the shape, on
+        average over its area; 0 where it shows one point of it.
+    """
+
+    cell: Ints
+    texture: Ints
+    low: Floats
+    high: Floats
+    side: Floats
+
+    def beside(self, more: Shapes) -> Shapes:
+        """These and more."""
+        order = np.argsort(np.concatenate([self.cell, more.cell]), kind="stable")
+        both: dict[str, Any] = {
+            name: np.concatenate([own, vars(more)[name]])[order] for name, own in vars(self).items()
+        }
+        return Shapes(**both)
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """What can be fetched, and what is said of it. K columns: nothing, then the levels, or what a
+    form has in place of them (`ptmtools.lab.forms`).
+
+    Attributes
+    ----------
+    levels: (T,) columns of each texture beside the first.
+    ends: (T, K) bytes of its file that hold each column; of several files, of all up to it.
+    memory: (T, K) of texture memory. size: (T, K, 2) width and height of the finest
+        image that a column shows.
+    differences: (T, K) of each column to the one before it, on average over its texels, 0 to 255,
+        at least `LEAST`; of what lies behind the last 0.
+    colors: (T, 3) mean colour, 0 to 255.
+    index_bytes, statistics_bytes, record_bytes, geometry_bytes: on the link; (C,) the latter two.
+    low, high: (C, 3) corners of the cells' boxes, metres, as the index rounds them: a client has
+        leaves only of cells whose record is there.
+    records, statistics: of each cell.
+    shapes: see `Shapes`.
+    """
+
+    levels: Ints
+    ends: Ints
+    memory: Ints
+    size: Ints
+    differences: Floats
+    colors: Floats
+    index_bytes: int
+    statistics_bytes: int
+    record_bytes: Ints
+    geometry_bytes: Ints
+    low: Floats
+    high: Floats
+    records: tuple[Document, ...]
+    statistics: Sequence[Document]
+    shapes: Shapes
+
+    @property
+    def texture_count(self) -> int:
+        """How many there are."""
+        return len(self.levels)
+
+    @property
+    def cell_count(self) -> int:
+        """How many there are."""
+        return len(self.records)
+
+    @property
+    def whole(self) -> int:
+        """Bytes of texture memory that all textures take, whole."""
+        return int(self.memory[:, -1].sum())
+
+    @cached_property
+    def first_shape(self) -> Ints:
+        """(C + 1,) where the shapes of each cell begin."""
+        return np.searchsorted(self.shapes.cell, np.arange(self.cell_count + 1))
+
+    @cached_property
+    def visible(self) -> tuple[Ints, ...]:
+        """Of each cell those that it may see, itself first."""
+        return tuple(np.array(record["visible"], dtype=np.int64) for record in self.records)
+
+    @cached_property
+    def coverage(self) -> tuple[Floats, ...]:
+        """Of each cell its average coverage hints, aligned with `visible`; none is 0."""
+        return tuple(
+            np.maximum(np.array(record["ach"], dtype=np.float64), record["floor"])
+            for record in self.records
+        )
+
+    @cached_property
+    def adjacent(self) -> tuple[Ints, ...]:
+        """Of each cell those beyond its portals."""
+        return tuple(np.array(record["adjacent"], dtype=np.int64) for record in self.records)
+
+    @cached_property
+    def in_sight(self) -> tuple[Ints, ...]:
+        """Of each cell the textures of all that it may see, as its record names them."""
+        return tuple(
+            np.unique(np.array([t for row in record["textures"] for t in row], dtype=np.int64))
+            for record in self.records
+        )
+
+    def as_found(self, browser: Browser) -> Catalogue:
+        """The same with records and geometry as large as a browser found them."""
+        return replace(
+            self, record_bytes=browser.record_bytes, geometry_bytes=browser.geometry_bytes
+        )
+
+    def in_columns(self, columns: Columns) -> Catalogue:
+        """The same textures with other columns, each of which says as little of what it adds."""
+        stored = _stored(columns.last, columns.ends.shape[1])
+        return replace(
+            self,
+            levels=columns.last,
+            ends=columns.ends,
+            memory=columns.memory,
+            size=columns.size,
+            differences=np.where(stored, LEAST, 0.0),
+        )
+
+    def with_memory(self, memory: Ints) -> Catalogue:
+        """The same with other texture memory (t, k) of the first textures."""
+        rows, wide = memory.shape
+        found = self.memory.copy()
+        found[:rows, :wide] = memory
+        found[:rows, wide:] = memory[:, -1:]
+        return replace(self, memory=found)
+
+    def beside(self, more: Columns, differences: Floats, shapes: Shapes | None = None) -> Catalogue:
+        """The same with more textures behind these, and shapes that show them; ``differences``
+        (T', K')."""
+        own = joined(Columns(self.levels, self.ends, self.memory, self.size), more)
+        wide = own.ends.shape[1]
+        each = [
+            np.pad(d, ((0, 0), (0, wide - d.shape[1]))) for d in (self.differences, differences)
+        ]
+        return replace(
+            self,
+            levels=own.last,
+            ends=own.ends,
+            memory=own.memory,
+            size=own.size,
+            differences=np.concatenate(each),
+            colors=np.concatenate([self.colors, np.zeros((len(more.last), 3))]),
+            shapes=self.shapes if shapes is None else self.shapes.beside(shapes),
+        )
+
+
+def catalogue_of(served: Served, differences: Floats, colors: Floats) -> Catalogue:
+    """The catalogue of a served folder; ``differences`` (T, L) and ``colors`` (T, 3) as `Pyramids`
+    has them, for hints that do not say them of every texture."""
+    textures = served.index["textures"]
+    levels, ends, memory, size = columns_of(textures)
+    beside = np.zeros(ends.shape)
+    beside[:, 1:] = differences[:, : ends.shape[1] - 1]
+    if all(len(row.get("differences", ())) == len(row["ends"]) for row in textures):
+        for into, row in zip(beside, textures, strict=True):
+            into[1 : len(row["ends"]) + 1] = row["differences"]
+    if textures and all("color" in row for row in textures):
+        colors = np.array([row["color"] for row in textures], dtype=np.float64)
+    boxes = np.array([cell["box"] for cell in served.index["cells"]], dtype=np.float64)
+    low, high = boxes.reshape(-1, 2, 3).transpose(1, 0, 2).copy()
+    stored = _stored(levels, ends.shape[1])
+    beside[stored] = np.maximum(beside[stored], LEAST)
+    return Catalogue(
+        levels=levels,
+        ends=ends,
+        memory=memory,
+        size=size,
+        differences=beside,
+        colors=colors,
+        index_bytes=served.index_bytes,
+        statistics_bytes=served.statistics_bytes,
+        record_bytes=served.record_bytes,
+        geometry_bytes=served.geometry_bytes,
+        low=low,
+        high=high,
+        records=served.records,
+        statistics=served.statistics["cells"],
+        shapes=_shapes(served),
+    )
+
+
+def _stored(last: Ints, wide: int) -> Bools:
+    """(T, K) which columns there are, the first aside."""
+    column = np.arange(wide)
+    found: Bools = (column > 0) & (column <= last[:, None])
+    return found
+
+
+def _shapes(served: Served) -> Shapes:
+    surfaces = served.surfaces
+    low, high = surfaces.boxes()
+    count = len(low)
+    cell, texture = (np.zeros(count, np.int64) for _ in range(2))
+    cell[surfaces.shape], texture[surfaces.shape] = surfaces.cell, surfaces.texture
+    drawn = np.isfinite(low[:, 0])
+    area = np.linalg.norm(normals(surfaces.corner), axis=1)
+    slope = np.linalg.norm(gradients(surfaces.corner, surfaces.uv), axis=2)
+    often = np.stack([np.bincount(surfaces.shape, area * s, count) for s in slope.T], axis=1)
+    whole = np.bincount(surfaces.shape, area, count)[:, None]
+    side = np.divide(whole, often, out=np.zeros((count, 2)), where=often > 0)
+    return Shapes(cell[drawn], texture[drawn], low[drawn], high[drawn], side[drawn])

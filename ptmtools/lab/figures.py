@@ -1,0 +1,144 @@
+"""A measure over time, a panel for each link and memory; needs matplotlib (extra ``plot``).
+
+Frames of a run as pictures, and the paper's Figure 3: what arrives before one's eyes."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterator, Sequence
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Floats
+from ptmtools.lab.comparing import Played
+from ptmtools.lab.policies import POLICIES
+from ptmtools.lab.report import link_text
+from ptmtools.lab.simulation import Run, simulate
+from ptmtools.lab.world import World
+from ptmtools.lazy import component
+from ptmtools.rendering.render import Renderer, as_bytes
+
+#: What may be drawn: how the axis is called, and the values of a run.
+MEASURES: dict[str, tuple[str, Callable[[Run], Floats]]] = {
+    "e": ("e, mean error of the pixels (0 to 255)", lambda run: run.error),
+    "rmse": ("root mean square error (0 to 255)", lambda run: np.sqrt(run.square)),
+    "missing": ("share of the wanted levels that is missing", lambda run: run.missing),
+    "quality": ("quality: levels there over levels existing", lambda run: run.quality),
+}
+COLORS = ("#1b6ca8", "#d1603d", "#5a9367", "#8d6a9f", "#b08d2e", "#5b6770", "#c2437a", "#2f8f8b")
+
+
+def require() -> None:
+    """Raises `MissingComponentError` PTM-M701 without matplotlib."""
+    component("matplotlib.figure", "PTM-M701", "matplotlib is missing", "plot")
+
+
+def picture(played: Sequence[Played], measure: str = "e") -> bytes:
+    """A PNG of one of `MEASURES`, on the first walk; what the viewpoint stands through is shaded.
+
+    Raises `MissingComponentError` PTM-M701 without matplotlib.
+    """
+    require()
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    label, values = MEASURES[measure]
+    first = [p for p in played if p.walk == played[0].walk]
+    blocks = [list(some) for _, some in groupby(first, lambda p: (p.run.conditions, p.memory))]
+    figure = Figure(figsize=(9, 3 * len(blocks)), dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    for number, block in enumerate(blocks):
+        axes = figure.add_subplot(len(blocks), 1, number + 1)
+        _draw(axes, block, values)
+        title = f"{link_text(block[0].run.conditions)}; texture memory {block[0].memory}"
+        axes.set(title=title, xlabel="s", ylabel=label)
+    out = io.BytesIO()
+    figure.savefig(out, format="png", metadata={"Software": None})
+    return out.getvalue()
+
+
+def _draw(axes: Any, block: list[Played], values: Callable[[Run], Floats]) -> None:
+    run = block[0].run
+    axes.fill_between(
+        run.time, 0, 1, where=run.still, step="mid", color="#f2f2f2", linewidth=0,
+        transform=axes.get_xaxis_transform(),
+    )  # fmt: skip
+    for k, one in enumerate(block):
+        style = {"color": COLORS[k % len(COLORS)], "label": one.run.policy}
+        axes.plot(one.run.time, values(one.run), linewidth=1, **style)
+    # What comes before anything is there would dwarf the rest.
+    drawn = [values(one.run) for one in block]
+    most = max((float(np.percentile(v, 98)) for v in drawn if np.isfinite(v).all()), default=0.0)
+    axes.set_ylim(0, 1.1 * most if most > 0 else 1)
+    axes.set_xlim(0, run.time[-1] or 1)
+    axes.grid(True, color="#e5e5e5", linewidth=0.5)
+    axes.legend(fontsize=7, loc="upper right")
+
+
+#: Lines of a picture.
+LINES = 540
+#: The instants of Figure 3, s.
+INSTANTS = (10.0, 35.0, 80.0)
+#: Lines of a picture of the strip, of its labels, and of the gap between pictures.
+_STRIP_LINES, _LABEL, _GAP = 360, 26, 6
+
+
+def frames(world: World, run: Run, every: float) -> Iterator[tuple[str, bytes]]:
+    """PNGs of the frames of a run, one each ``every`` seconds, by names that say when."""
+    world = world.in_form(POLICIES[run.policy].form)
+    renderer = Renderer(world, LINES)
+    step = max(1, round(every * world.rate))
+    for f in range(0, world.frames, step):
+        sight = renderer.look(world.eye[f], world.direction[f])
+        colors = renderer.colors(sight, run.there[f], run.column[f])
+        yield f"{world.time[f]:07.1f}.png", png(as_bytes(colors))
+
+
+def strip(world: World, played: Played) -> bytes:
+    """A PNG: what the client of a run shows after `INSTANTS` to who stands where the walk begins,
+    and the full picture."""
+    of = played.run
+    world = world.in_form(POLICIES[of.policy].form)
+    stays = world.standing(INSTANTS[-1])
+    run = simulate(stays, POLICIES[of.policy], of.conditions, of.budget)
+    renderer = Renderer(world, _STRIP_LINES, samples=3)
+    sight = renderer.look(stays.eye[0], stays.direction[0])
+    found = []
+    for instant in INSTANTS:
+        f = int(np.searchsorted(stays.time, instant - 0.5 / stays.rate))
+        colors = renderer.colors(sight, run.there[f], run.column[f])
+        label = f"{instant:g} s, {run.fetched[f] / 1e6:.2f} MB, e {run.error[f]:.2f}"
+        found.append((label, as_bytes(colors)))
+    found.append(("full", as_bytes(renderer.full(sight))))
+    title = f"{of.policy}, {link_text(of.conditions)}, texture memory {played.memory}"
+    return png(_side_by_side(found, title))
+
+
+def png(picture: NDArray[np.uint8]) -> bytes:
+    """(height, width, 3) as a PNG."""
+    from PIL import Image
+
+    out = io.BytesIO()
+    Image.fromarray(picture).save(out, "PNG")
+    return out.getvalue()
+
+
+def _side_by_side(
+    pictures: Sequence[tuple[str, NDArray[np.uint8]]], title: str
+) -> NDArray[np.uint8]:
+    """Labels above and pictures below, on white; the title above all."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    height, width = pictures[0][1].shape[:2]
+    wide = len(pictures) * (width + _GAP) + _GAP
+    sheet = Image.new("RGB", (wide, 2 * _LABEL + height + _GAP), "white")
+    draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(16)
+    draw.text((_GAP, 3), title, "black", font)
+    for k, (label, picture) in enumerate(pictures):
+        left = _GAP + k * (width + _GAP)
+        draw.text((left, _LABEL + 3), label, "black", font)
+        sheet.paste(Image.fromarray(picture), (left, 2 * _LABEL))
+    return np.asarray(sheet)

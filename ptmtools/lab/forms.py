@@ -1,0 +1,211 @@
+"""The forms in which clients take textures, as a table: what can be fetched, and what it shows.
+
+Of a texture in a form the columns come one after the other (`Catalogue`); what is on the screen
+with each of them is compared with the same picture, that of the `.ptm`s with all of their levels.
+To add a form: a module with two functions, and a line here; a policy says which one it takes.
+
+Textures as `.ptm`s: ranges of one file, each a level.
+
+Textures as interlaced images: files that are joined on the GPU, one after the other (Englert et
+al. 2014, §3.2).
+
+What is shown with so many files is the image that they make, and mip levels of it by box, as
+`generateMipmap` makes them: for these the paper has powers of two. So a texture takes 4/3 of its
+texels, and each step has mip levels of its own, of an image that was decimated unfiltered. The
+next step replaces the one before it.
+
+Files are requests of their own. Manifests are not on the link: axes follow from the paper's rules,
+and sizes could stand in the index. That the old image, the file and the new one are in texture
+memory together while they are joined is not counted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import accumulate
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.errors import DatabaseError, InputError, LimitError
+from ptmtools.lab.catalogue import Columns, aligned, columns_of
+from ptmtools.lazy import Lazy
+from ptmtools.neighbours.interlace.model import Interlaced
+from ptmtools.neighbours.interlace.reading import check_joined, read_manifest, read_part
+from ptmtools.neighbours.interlace.steps import join
+from ptmtools.output.served import Served
+from ptmtools.progress import Progress
+from ptmtools.rendering.pyramids import rgb
+from ptmtools.rendering.records import Pyramids, Shows
+from ptmtools.texture.model import Limits, gpu_texel_bytes
+
+__all__ = ["FORMS", "PTM", "Form"]
+
+
+@dataclass(frozen=True)
+class Form:
+    """A form.
+
+    Attributes
+    ----------
+    name, about: what it is called, and what it is.
+    columns: what can be fetched of the textures of a served folder, with RGB of three bytes in
+        texture memory if the second argument says so. Raises DatabaseError.
+    shows: what the columns show, given the `.ptm`s; None: the levels of those. Raises
+        DatabaseError, LimitError.
+    needs: the one of the index's texture sets or lists that it reads, and how to get it.
+    octrees: whether octree textures are fetched, too, which only lit pictures show.
+    """
+
+    name: str
+    about: str
+    columns: Lazy[Callable[[Served, bool], Columns]]
+    shows: Lazy[Callable[[Served, Pyramids, Progress], Shows]] | None = None
+    needs: tuple[str, str] | None = None
+    octrees: bool = False
+
+
+_LIST = (
+    Form("ptm", "levels of `.ptm`s", Lazy("ptmtools.lab.forms:level_columns")),
+    Form(
+        "interlaced",
+        "interlaced images",
+        Lazy("ptmtools.lab.forms:interlaced_columns"),
+        Lazy("ptmtools.lab.forms:shows"),
+        ("interlace", "write them with `ptm emit DB --format vrml,gltf,interlace`"),
+    ),
+    Form(
+        "octree",
+        "levels of `.ptm`s and of octree textures",
+        Lazy("ptmtools.lab.forms:level_columns"),
+        needs=("octrees", "build it with `ptm build-scene --apo`"),
+        octrees=True,
+    ),
+)
+#: By name, and the one that others are compared with.
+FORMS = {form.name: form for form in _LIST}
+PTM = "ptm"
+
+
+def level_columns(served: Served, paper: bool) -> Columns:
+    """See `Form.columns`."""
+    return columns_of(served.index["textures"], paper=paper)
+
+
+#: The form of the index's texture sets.
+_SET = "interlace"
+_AGAIN = "write them again with `ptm emit DB --format vrml,gltf,interlace`"
+#: A texture that needs more memory than this to decode is refused.
+_LIMITS = Limits(decoded_bytes=1 << 33)
+
+
+def interlaced_columns(served: Served, paper: bool) -> Columns:
+    """See `Form.columns`: a column is a file.
+
+    Raises DatabaseError: PTM-D005, D006 a manifest is missing or damaged, or not what the index
+    says.
+    """
+    rows = []
+    for t in range(len(served.index["textures"])):
+        manifest = _manifest(served, t)[1]
+        parts, stored = manifest.parts, manifest.texel_bytes
+        each = stored if paper else gpu_texel_bytes(stored, manifest.components)
+        held = [each * sum(w * h for w, h in mip_sizes(*part.joined)) for part in parts]
+        ends = [*accumulate(part.bytes for part in parts)]
+        rows.append((ends, held, [part.joined for part in parts]))
+    return aligned(rows)
+
+
+def shows(served: Served, own: Pyramids, progress: Progress) -> Shows:
+    """See `Form.shows`: of each column the image that its files make, and its mip levels.
+
+    Raises DatabaseError: as `columns`, and of the files. LimitError: PTM-L821, L823.
+    """
+    count = len(served.index["textures"])
+    chains: list[list[NDArray[np.uint8]]] = []
+    steps = []
+    for t in range(count):
+        progress(t, count, "joining interlaced images")
+        joined = [mip_levels(image) for image in _images(served, t)]
+        chains += joined
+        steps.append(len(joined))
+    first = np.cumsum([0, *steps[:-1]]) if steps else np.zeros(0, np.int64)
+    each = np.array(steps, dtype=np.int64)
+    pyramids = _packed(chains)
+    wide = int(each.max(initial=0)) + 1
+    row = first[:, None] + np.clip(np.arange(wide) - 1, 0, each[:, None] - 1)
+    held = np.where(np.arange(wide) > 0, pyramids.levels[row], 0)
+    return Shows(pyramids, row, held, each, own.mean)
+
+
+def mip_sizes(width: int, height: int) -> Iterator[tuple[int, int]]:
+    """Those of an image and of its mip levels, the finest first."""
+    yield width, height
+    while max(width, height) > 1:
+        width, height = max(1, width >> 1), max(1, height >> 1)
+        yield width, height
+
+
+def mip_levels(image: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
+    """An (h, w, 3) image, of powers of two, and its mip levels, the coarsest first: means of 2 × 2
+    texels, rounded."""
+    levels = [image]
+    while max(image.shape[:2]) > 1:
+        for axis in (0, 1):
+            if image.shape[axis] == 1:
+                image = np.repeat(image, 2, axis=axis)
+        total = np.full((image.shape[0] >> 1, image.shape[1] >> 1, 3), 2, np.uint16)
+        for y, x in np.ndindex(2, 2):
+            total += image[y::2, x::2]
+        image = (total >> 2).astype(np.uint8)
+        levels.append(image)
+    return levels[::-1]
+
+
+def _packed(chains: list[list[NDArray[np.uint8]]]) -> Pyramids:
+    levels = np.array([len(chain) for chain in chains], dtype=np.int64)
+    start = np.zeros((len(chains), int(levels.max(initial=1))), np.int64)
+    size = np.zeros((*start.shape, 2), np.int64)
+    texel = np.empty(sum(level.size for chain in chains for level in chain), np.uint8)
+    at = 0
+    for r, chain in enumerate(chains):
+        for n, level in enumerate(chain):
+            start[r, n], size[r, n] = at, level.shape[1::-1]
+            texel[at : at + level.size] = level.ravel()
+            at += level.size
+        chain.clear()
+    return Pyramids(texel, start, size, levels, np.zeros((len(chains), 3)), np.zeros(start.shape))
+
+
+def _images(served: Served, texture: int) -> Iterator[NDArray[np.uint8]]:
+    """(h, w, 3) the image that the first file makes, the first two, …"""
+    folder, interlaced = _manifest(served, texture)
+    check_joined(interlaced, len(interlaced.parts), _LIMITS, folder)
+    image = None
+    for part in interlaced.parts:
+        try:
+            texels = read_part(folder, interlaced, part)
+        except InputError as fault:
+            raise _damaged(fault) from None
+        image = texels if image is None or part.axis is None else join(image, texels, part.axis)
+        yield rgb(image)
+
+
+def _manifest(served: Served, texture: int) -> tuple[Path, Interlaced]:
+    """The set of a texture: its folder and its manifest."""
+    folder, row = served.texture_set(_SET, texture), served.index["textures"][texture]
+    try:
+        interlaced = read_manifest(folder)
+    except (InputError, LimitError) as fault:
+        raise _damaged(fault) from None
+    if interlaced.original != (row["width"], row["height"]):
+        raise DatabaseError(
+            "PTM-D006", "is not of the texture that the index has", file=folder, remedy=_AGAIN
+        )
+    return folder, interlaced
+
+
+def _damaged(fault: InputError | LimitError) -> DatabaseError:
+    code = "PTM-D005" if fault.code in ("PTM-I820", "PTM-I824") else "PTM-D006"
+    return DatabaseError(code, fault.message, file=fault.file, place=fault.place, remedy=_AGAIN)

@@ -1,0 +1,304 @@
+"""Where an eye can be on a walk, as a graph: places, and steps between them.
+
+A step costs metres, and more of them where it is narrow or steep, or leads over furniture, so that
+the cheapest way is the one that somebody would take.
+
+What is in the way of a body or of an eye: rays against all that a model shows, glass and
+furniture included, but for door leaves that stand open.
+
+Embree computes in single precision, here around the middle of the model.
+
+Places on floors, on a grid, and steps between them.
+
+The eye region's floor (`Cells.eye_floor`) is as wide as a body around where its middle can be, so
+it leads through the narrowest door. It is widened over lower floor too: of surfaces one step apart
+the foot is on the one that is there, which a ray straight down tells, and of these on the upper.
+
+An eye never goes through a surface. A body does where there is no other way: what the subdivision
+takes for detail, such as a chair, does not keep the walker from a room beyond. Such steps are
+dear."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Floats, Ints, ranges
+from ptmtools.cells.model import Cells, EyeRegion
+from ptmtools.cells.options import Walker
+from ptmtools.scene.model import Scene
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The places of an eye, and the steps between them.
+
+    Attributes
+    ----------
+    eye: (n, 3) metres.
+    cell: (n,) the cell that each is in, or -1.
+    space: (n,) metres to what stands about, at most `footing.ABOUT`; 0 where the foot is
+        on nothing.
+    start, target, cost: steps as CSR over places: (n + 1,), (m,) where each leads to, and (m,)
+        what it costs.
+    """
+
+    eye: Floats
+    cell: Ints
+    space: Floats
+    start: Ints
+    target: Ints
+    cost: Floats
+
+    @staticmethod
+    def of(eye: Floats, cell: Ints, space: Floats, steps: Ints, cost: Floats) -> Ground:
+        """From (k, 2) steps, each of which can be taken both ways, at (k,) costs."""
+        both = np.concatenate([steps, steps[:, ::-1]])
+        order = np.lexsort((both[:, 1], both[:, 0]))
+        start = np.searchsorted(both[order, 0], np.arange(len(eye) + 1))
+        return Ground(eye, cell, space, start, both[order, 1], np.tile(cost, 2)[order])
+
+    def main_part(self, standing: Bools) -> Ground:
+        """What hangs together and reaches most of the (C,) cells that ``standing`` marks; of parts
+        that reach as many, the one with most places."""
+        from ptmtools.lab.path.ground_kernels import spread_parts
+
+        if not len(self.eye):
+            return self
+        part = np.full(len(self.eye), -1, dtype=np.int64)
+        parts = spread_parts(self.start, self.target, part)
+        known = self.cell >= 0
+        known[known] = standing[self.cell[known]]
+        reached = np.unique(np.column_stack([part[known], self.cell[known]]), axis=0)[:, 0]
+        cells, places = np.bincount(reached, minlength=parts), np.bincount(part)
+        return self._kept(part == np.lexsort((-places, -cells))[0])
+
+    def _kept(self, kept: Bools) -> Ground:
+        name = np.cumsum(kept) - 1
+        source = np.repeat(np.arange(len(self.eye)), np.diff(self.start))
+        held = kept[source] & kept[self.target]
+        start = np.searchsorted(name[source[held]], np.arange(int(kept.sum()) + 1))
+        target, cost = name[self.target[held]], self.cost[held]
+        return Ground(self.eye[kept], self.cell[kept], self.space[kept], start, target, cost)
+
+    def way_to_nearest(self, source: int, goal: Bools) -> Ints:
+        """The places on the cheapest way from one to the nearest of those that (n,) ``goal`` marks,
+        both ends included; none if no way leads to one."""
+        from ptmtools.lab.path.ground_kernels import nearest_goal
+
+        return np.asarray(nearest_goal(self.start, self.target, self.cost, source, goal))
+
+
+#: Rays that are cast together: their arrays stay within the processor's cache.
+_RAYS = 1 << 16
+
+
+class Obstacles:
+    """The triangles of a scene that stand in the way."""
+
+    def __init__(self, scene: Scene, cells: Cells) -> None:
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
+        solid = np.ones(len(scene.triangles), dtype=np.bool_)
+        solid[cells.opened] = False
+        self._which = np.append(np.flatnonzero(solid), -1)
+        self._middle = (scene.points.min(axis=0) + scene.points.max(axis=0)) / 2
+        self._tree: Any = None
+        if solid.any():
+            self._tree = EmbreeScene(robust=True)
+            corners = scene.points[scene.triangles[solid]] - self._middle
+            TriangleMesh(self._tree, np.ascontiguousarray(corners, dtype=np.float32))
+
+    def crossed(self, start: Floats, end: Floats) -> Bools:
+        """(n,) whether something is between (n, 3) points and (n, 3) others, metres."""
+        found: Bools = self.first(start, end - start, 1.0)[0] >= 0
+        return found
+
+    def first(self, points: Floats, along: Floats, reach: float = np.inf) -> tuple[Ints, Floats]:
+        """What rays from (n, 3) points along (n, 3) vectors meet first within a ``reach``: (n,) the
+        scene's triangle, or -1, and (n,) how far away, or the reach; in lengths of the vectors."""
+        met, far = np.full(len(points), -1, dtype=np.int64), np.full(len(points), reach)
+        for row in range(0, len(points) if self._tree is not None else 0, _RAYS):
+            some = slice(row, row + _RAYS)
+            origin = np.ascontiguousarray(points[some] - self._middle, dtype=np.float32)
+            direction = np.ascontiguousarray(along[some], dtype=np.float32)
+            limit = np.full(len(origin), reach, dtype=np.float32)
+            hit = self._tree.run(origin, direction, dists=limit, output=True)
+            met[some] = self._which[hit["primID"]]
+            far[some] = np.where(met[some] >= 0, hit["tfar"], reach)
+        return met, far
+
+
+#: Metres between places; and of the finer grid in cells that the first one misses, as a share.
+GRID, _FINE = 0.25, 0.2
+#: Where the grid begins, as a share: not at round numbers, where walls are.
+_SHIFT = (5**0.5 - 1) / 2
+#: Metres from a place within which things stand about.
+ABOUT = 0.6
+#: The foot is on what is so near below or above a place, as a share of a step.
+_UNDERFOOT = 0.2
+#: Heights of the body that things are looked for at, as shares of that of the eye.
+BODY = (0.19, 0.62, 1.0)
+#: A step costs so many times its length: at most where things stand about, more where no body fits,
+#: where it goes up or down by more than half of a step, and through what an eye would see over.
+_BESIDE, _NARROW, _STEEP, _THROUGH = 4.0, 10.0, 3.0, 20.0
+#: Level directions in which things are looked for.
+_STEP_RAYS = 8
+
+
+def over_floors(cells: Cells, obstacles: Obstacles, eye_height: float) -> Ground:
+    """Places an eye's height above floors, metres, and the steps between them."""
+    eyes, walker = cells.eyes, cells.walker
+    point, firm = _surfaces(cells.eye_floor, GRID, eyes, obstacles, walker, eye_height)
+    cell = cells.locate(point).astype(np.int64)
+    missed = cells.standing
+    missed[cell[cell >= 0]] = False
+    floor = cells.eye_floor[_below(cells, missed, eye_height)]
+    if len(floor):
+        fine, there = _surfaces(floor, _FINE * GRID, eyes, obstacles, walker, eye_height)
+        within = cells.locate(fine)
+        extra = (within >= 0) & missed[within]
+        point, cell = np.concatenate([point, fine[extra]]), np.append(cell, within[extra])
+        firm = np.append(firm, there[extra])
+    steps = _steps(point, walker, eyes, obstacles)
+    space = np.where(firm, _space(point, obstacles, eye_height), 0.0)
+    return Ground.of(
+        point, cell, space, steps, _cost(point, space, steps, obstacles, walker, eye_height)
+    )
+
+
+def _below(cells: Cells, missed: Bools, eye_height: float) -> Bools:
+    """(n,) which triangles of floor some eye is above in a leaf of the (C,) cells marked."""
+    corner = cells.eye_floor + [0, eye_height, 0]
+    low, high = corner.min(axis=1), corner.max(axis=1)
+    found = np.zeros(len(corner), dtype=np.bool_)
+    leaves = np.flatnonzero(cells.leaf_standing & (cells.leaf_cell >= 0))
+    for leaf in leaves[missed[cells.leaf_cell[leaves]]]:
+        point = cells.leaf_points(leaf)
+        found |= ((low <= point.max(axis=0)) & (high >= point.min(axis=0))).all(axis=1)
+    return found
+
+
+def _surfaces(
+    floor: Floats,
+    grid: float,
+    eyes: EyeRegion,
+    obstacles: Obstacles,
+    walker: Walker,
+    eye_height: float,
+) -> tuple[Floats, Bools]:
+    """(n, 3) eyes over columns of a grid, one for each surface that a foot can be on, and (n,)
+    whether it is there: not over an edge, or within a table."""
+    column, point = grid_points(floor, grid)
+    eye = point + [0, eye_height, 0]
+    inside = eyes.contains(eye)
+    column, eye = column[inside], eye[inside]
+    down = np.tile([0.0, -1.0, 0.0], (len(eye), 1))
+    _, far = obstacles.first(eye, down, 2 * eye_height)
+    there = abs(far - eye_height) <= _UNDERFOOT * walker.step
+    chosen = _footholds(column, eye[:, 1], there, walker.step)
+    return eye[chosen], there[chosen]
+
+
+def grid_points(floor: Floats, grid: float) -> tuple[Ints, Floats]:
+    """What of columns on a ``grid``, metres, meets (m, 3, 3) triangles: (n, 2) the column, and
+    (n, 3) the point."""
+    plan = floor[:, :, [0, 2]] / grid - _SHIFT
+    edge = np.roll(plan, -1, axis=1) - plan
+    wide = edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0]
+    row = np.flatnonzero(wide != 0)
+    # Along each line of the grid that a triangle meets, from the least to the greatest crossing.
+    first = np.ceil(plan[row, :, 0].min(axis=1)).astype(np.int64)
+    count = np.floor(plan[row, :, 0].max(axis=1)).astype(np.int64) - first + 1
+    row, across = np.repeat(row, count), ranges(first, count)
+    turn = np.where(edge[row, :, 0] != 0, edge[row, :, 0], 1.0)
+    share = (across[:, None] - plan[row, :, 0]) / turn
+    meets = (edge[row, :, 0] != 0) & (share >= 0) & (share <= 1)
+    crossing = plan[row, :, 1] + share * edge[row, :, 1]
+    least = np.ceil(np.where(meets, crossing, np.inf).min(axis=1))
+    most = np.floor(np.where(meets, crossing, -np.inf).max(axis=1))
+    some = most >= least
+    row, across, first = row[some], across[some], least[some].astype(np.int64)
+    count = most[some].astype(np.int64) - first + 1
+    column = np.column_stack([np.repeat(across, count), ranges(first, count)])
+    row = np.repeat(row, count)
+    # By the shares of the corners.
+    away = column[:, None] - plan[row]
+    beside = edge[row][:, :, 0] * away[:, :, 1] - edge[row][:, :, 1] * away[:, :, 0]
+    share = np.roll(beside, -1, axis=1) / wide[row, None]
+    height = (share * floor[row, :, 1]).sum(axis=1)
+    at = (column + _SHIFT) * grid
+    return column, np.column_stack([at[:, 0], height, at[:, 1]])
+
+
+def _footholds(column: Ints, height: Floats, there: Bools, step: float) -> Ints:
+    """Which of the surfaces in each column a foot can be on: those that are there before those that
+    are not, the upper before the lower, and none less than a step from another."""
+    left = np.lexsort((-height, ~there, column[:, 1], column[:, 0]))
+    kept = [left[:0]]
+    while len(left):
+        same = (np.diff(column[left], axis=0) == 0).all(axis=1)
+        first = np.flatnonzero(np.append(True, ~same))
+        best = np.repeat(left[first], np.diff(np.append(first, len(left))))
+        kept.append(left[first])
+        left = left[abs(height[left] - height[best]) > step]
+    return np.sort(np.concatenate(kept))
+
+
+def _steps(point: Floats, walker: Walker, eyes: EyeRegion, obstacles: Obstacles) -> Ints:
+    """(k, 2) pairs of places from one of which an eye gets to the other in a step."""
+    reach = 1.5 * GRID
+    box = np.floor(point[:, [0, 2]] / reach).astype(np.int64)
+    box -= box.min(axis=0, initial=0) - 1
+    wide = int(box[:, 1].max(initial=0)) + 2
+    key = box[:, 0] * wide + box[:, 1]
+    order = np.argsort(key, kind="stable")
+    pairs = [np.zeros((0, 2), dtype=np.int64)]
+    for beside in (0, 1, wide - 1, wide, wide + 1):
+        low = np.searchsorted(key[order], key + beside)
+        count = np.searchsorted(key[order], key + beside, "right") - low
+        one, other = np.repeat(np.arange(len(point)), count), order[ranges(low, count)]
+        far = point[other] - point[one]
+        near = (np.hypot(far[:, 0], far[:, 2]) <= reach) & (abs(far[:, 1]) <= walker.step)
+        near &= (one < other) | (beside > 0)
+        pairs.append(np.column_stack([one, other])[near])
+    steps = np.concatenate(pairs)
+    steps = steps[np.lexsort((steps[:, 1], steps[:, 0]))]
+    start, end = point[steps[:, 0]], point[steps[:, 1]]
+    steps = steps[eyes.contains((start + end) / 2)]
+    return steps[~obstacles.crossed(point[steps[:, 0]], point[steps[:, 1]])]
+
+
+def _space(point: Floats, obstacles: Obstacles, eye_height: float) -> Floats:
+    """(n,) metres to the nearest thing on one level with the body, at most `ABOUT`."""
+    angle = 2 * np.pi * (np.arange(_STEP_RAYS) + 0.5) / _STEP_RAYS
+    space = np.full(len(point), ABOUT)
+    for height in BODY:
+        body = point - [0, (1 - height) * eye_height, 0]
+        for x, z in zip(np.cos(angle), np.sin(angle), strict=True):
+            along = np.tile([x, 0.0, z], (len(point), 1))
+            space = np.minimum(space, obstacles.first(body, along, ABOUT)[1])
+    return space
+
+
+def _cost(
+    point: Floats,
+    space: Floats,
+    steps: Ints,
+    obstacles: Obstacles,
+    walker: Walker,
+    eye_height: float,
+) -> Floats:
+    """(k,) what steps cost."""
+    start, end = point[steps[:, 0]], point[steps[:, 1]]
+    room = space[steps].min(axis=1)
+    cost = 1 + _BESIDE * (1 - room / ABOUT) ** 2 + _NARROW * (room < walker.radius)
+    cost += _STEEP * (abs(end[:, 1] - start[:, 1]) > walker.step / 2)
+    through = np.zeros(len(steps), dtype=np.bool_)
+    for height in BODY[:-1]:
+        below = [0, (1 - height) * eye_height, 0]
+        through |= obstacles.crossed(start - below, end - below)
+    return np.asarray((cost + _THROUGH * through) * np.linalg.norm(end - start, axis=1))

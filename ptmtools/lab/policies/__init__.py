@@ -1,0 +1,156 @@
+"""What clients there are, as a table: what each goes by, and what it needs to know.
+
+To add one: a module with a `Client`, or a policy of the `engine`, and a line here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from functools import partial
+
+from ptmtools.lab.client import Client
+from ptmtools.lab.forms import PTM
+from ptmtools.lab.network import Link
+from ptmtools.lab.policies import shares as around, shares as coverage
+from ptmtools.lab.policies.apo import ApoClient
+from ptmtools.lab.policies.engine import EngineClient, Policy
+from ptmtools.lab.policies.oracle import Oracle
+from ptmtools.lab.policies.paper import PaperClient
+from ptmtools.lab.policies.shares import BEST, Screen
+from ptmtools.lab.policies.whole_files import GpuiiClient, LruClient
+from ptmtools.lab.world import World
+
+
+class Knows(Enum):
+    """What a client must know, each beside what comes before it."""
+
+    HINTS = "hints"
+    CAMERA = "hints and camera"
+    SCREEN = "hints, camera and an item buffer"
+    FUTURE = "the future"
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A policy.
+
+    Attributes
+    ----------
+    name, about: for `--policy`.
+    knows: what it needs.
+    client: makes a client of it, in a world, on a link, with a budget.
+    needs: a field that the records of cells must have, and how to get it; None: as they always are.
+    form: in which it takes textures, a name in `ptmtools.lab.forms.FORMS`.
+    """
+
+    name: str
+    about: str
+    knows: Knows
+    client: Callable[[World, Link, int], Client]
+    needs: tuple[str, str] | None = None
+    form: str = PTM
+
+
+def _engine(
+    make: Callable[[World], Policy], *, statistics: bool = False
+) -> Callable[[World, Link, int], Client]:
+    def client(world: World, link: Link, budget: int) -> Client:
+        return EngineClient(world, link, budget, make(world), statistics=statistics)
+
+    return client
+
+
+def _same(policy: Policy, *, statistics: bool = False) -> Callable[[World, Link, int], Client]:
+    return _engine(lambda _: policy, statistics=statistics)
+
+
+_LIST = (
+    Declared("paper", "Marvie & Bouatouch, §6.1 and §6.2, as written", Knows.CAMERA, PaperClient),
+    Declared("lru", "files in the order met, and a cache", Knows.CAMERA, LruClient),
+    Declared(
+        "gpuii",
+        "interlaced images by rings around the camera, Englert et al., §3.3",
+        Knows.CAMERA,
+        GpuiiClient,
+        form="interlaced",
+    ),
+    Declared(
+        "ach",
+        "the paper's weights, average coverage, in the common engine",
+        Knows.CAMERA,
+        _same(coverage.Weighted(coverage.coverage_shares)),
+    ),
+    Declared(
+        "ach-views",
+        "the same by the six views",
+        Knows.CAMERA,
+        _same(coverage.Weighted(coverage.by_views), statistics=True),
+    ),
+    Declared(
+        "ach-texture",
+        "the same by texture, of hints with `--per-texture`",
+        Knows.CAMERA,
+        _same(coverage.Weighted(coverage.by_texture)),
+        needs=("textureShares", "measure it with `ptm ach DB --per-texture`, then `ptm emit DB`"),
+    ),
+    Declared(
+        "distance",
+        "the nearest first",
+        Knows.CAMERA,
+        _same(coverage.Weighted(coverage.distance_shares)),
+    ),
+    Declared(
+        "bbox",
+        "projected boxes, without occlusion",
+        Knows.CAMERA,
+        _same(coverage.Weighted(coverage.by_box)),
+    ),
+    Declared("screen", "what an item buffer shows", Knows.SCREEN, _same(Screen())),
+    Declared(
+        "screen+distance",
+        "screen, and what is near",
+        Knows.SCREEN,
+        _same(Screen(around.by_distance)),
+    ),
+    Declared(
+        "screen+ach",
+        "screen, and what covers the view on average",
+        Knows.SCREEN,
+        _same(Screen(around.by_coverage)),
+    ),
+    Declared(
+        "screen+need",
+        "screen, and what is needed from the cell",
+        Knows.SCREEN,
+        _same(Screen(around.by_need)),
+        needs=("need", "measure it with `ptm emit DB --need 16`"),
+    ),
+    Declared("best", "the viewer's: screen, need and distance", Knows.SCREEN, _same(BEST)),
+    Declared(
+        "apo",
+        "octree textures level by level, Lacoste et al., §4.2; all else as best",
+        Knows.SCREEN,
+        ApoClient,
+        form="octree",
+    ),
+    Declared(
+        "best+apo",
+        "best, with octree textures by the same measure",
+        Knows.SCREEN,
+        _same(BEST),
+        form="octree",
+    ),
+    Declared("oracle", "knows the walk, and is greedy", Knows.FUTURE, _engine(Oracle)),
+    Declared(
+        "oracle-exchange",
+        "the same, less greedy",
+        Knows.FUTURE,
+        _engine(partial(Oracle, exchanging=True)),
+    ),
+)
+#: By name.
+POLICIES = {policy.name: policy for policy in _LIST}
+
+__all__ = ["POLICIES", "Declared", "Knows"]

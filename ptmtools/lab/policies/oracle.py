@@ -1,0 +1,66 @@
+"""`oracle`: knows the walk. What anything adds is the error that it will take away, discounted.
+
+Greedy like the others: the same engine, with the true tables instead of a guess. A lower bound by
+linear programming is apart (benchmarks/RESULTS.md).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ptmtools.arrays import Singles
+from ptmtools.lab.policies.engine import EngineClient, Worth
+from ptmtools.lab.world import World
+
+#: What is to come counts 1/e after so many seconds; what is far off, besides, so little.
+SOON, LATER = 3.0, 60.0
+_LATER_SHARE, _SOON_HELD = 0.003, 1e-4
+
+
+class Oracle:
+    """A policy for one walk; ``exchanging`` takes steps that did not fit in exchange for others,
+    see `ptmtools.lab.allocation.exchange`."""
+
+    def __init__(self, world: World, soon: float = SOON, *, exchanging: bool = False) -> None:
+        self._exchanging = exchanging
+        self._now, self._cells = _drops(world)
+        self._soon = [_discounted(table, soon * world.rate) for table in (self._now, self._cells)]
+        self._later = [_discounted(t, LATER * world.rate) for t in (self._now, self._cells)]
+
+    def __call__(self, client: EngineClient) -> Worth:
+        """See `Policy`."""
+        f = client.frame
+        soon, later = (tables[0][f].astype(np.float64) for tables in (self._soon, self._later))
+        cells = self._soon[1][f] + _LATER_SHARE * self._later[1][f]
+        return Worth(
+            hold=self._now[f] + _SOON_HELD * soon,
+            fetch=soon + _LATER_SHARE * later,
+            geometry=cells.astype(np.float64),
+            ahead=later,
+            exact=self._exchanging,
+        )
+
+
+def _drops(world: World) -> tuple[Singles, Singles]:
+    """(F, T, K) by how much each column lessens the error of each frame, and (F, C) each cell's
+    geometry with all textures."""
+    stock, views = world.catalogue, world.views
+    count = views.frames
+    columns = np.zeros((count, stock.texture_count, stock.ends.shape[1]), np.float32)
+    cells = np.zeros((count, stock.cell_count), np.float32)
+    frame = np.repeat(np.arange(count), np.diff(views.start))
+    np.add.at(cells, (frame, views.cell), views.error[:, 0])
+    rows = np.flatnonzero(views.texture >= 0)
+    drop = views.error[rows, 1:-1] - views.error[rows, 2:]
+    np.add.at(columns[:, :, 1:], (frame[rows], views.texture[rows]), drop)
+    return columns[world.view], cells[world.view]
+
+
+def _discounted(table: Singles, frames: float) -> Singles:
+    """Sums over what is to come, each frame of which counts less than the one before."""
+    found, kept = np.empty_like(table), np.exp(-1 / frames)
+    total = np.zeros_like(table[0])
+    for f in range(len(table) - 1, -1, -1):
+        total = total * kept + table[f]
+        found[f] = total
+    return found

@@ -1,0 +1,201 @@
+"""`paper`: the client of Marvie & Bouatouch, §6.1 and §6.2, as written.
+
+In every frame it rendered (30 a second here; pictures are looked at five times a second):
+
+1. Cells of the visible set are culled by their hulls, and their coverage hints normalised over what
+   is left. From the greatest hint down, a cell gets its part of the memory that is left, by its
+   hint over those of the cells not served yet, and shares it equally among its shapes in the
+   frustum. What they do not use is left for the next.
+2. A texture with N bytes so far that is offered a: T is its next level, or its present one if there
+   is no other. If S(T) > N + a it keeps a, else it keeps what is missing to S(T). S is the whole
+   pyramid up to a level: the level alone would break the budget.
+3. Each texture adds or removes one level, or asks for one, if it may be had within δt: the latency,
+   and its bytes by the bandwidth of recent downloads.
+4. Where the viewpoint is still for `STILL_SECONDS`, the greater budget and δt hold.
+
+A client that enters a cell drops what its visible set does not use. The next cell, behind the first
+portal that the way of the last half second leads through within two seconds, is fetched ahead.
+Requests are made as soon as they are known, for the cell, then its visible set, then the next cell,
+then levels, which are asked for whole and never cancelled.
+
+Read in: a level is added only if it fits, and where the budget shrinks, levels are dropped until it
+is kept. By the letter levels are dropped one a frame while others are added at once, and a client
+that turns around, or walks on, would hold more than its budget.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.lab.client import Client, Kind, Range
+from ptmtools.lab.network import Link
+from ptmtools.lab.policies.paper_kernels import refresh, share_out
+from ptmtools.lab.world import World
+
+#: Frames a second that it renders.
+FRAMES = 30
+#: Way that is taken for the way on, and how far ahead, s.
+BEFORE, AHEAD = 0.5, 2.0
+#: Priorities of requests: levels, the next cell, the visible set, the cell.
+LEVEL, NEXT, VISIBLE, CURRENT = 1.0, 2.0, 3.0, 4.0
+
+
+@dataclass(frozen=True)
+class Patience:
+    """How long a level may take, s, while the viewpoint moves and while it is still."""
+
+    moving: float = 0.5
+    still: float = 20.0
+
+
+class PaperClient(Client):
+    """See the module; ``still_budget``, bytes, is that of a viewpoint that is still."""
+
+    def __init__(
+        self,
+        world: World,
+        link: Link,
+        budget: int,
+        still_budget: int | None = None,
+        patience: Patience = Patience(),
+    ) -> None:
+        super().__init__(world, link, budget)
+        self.ticks = max(1, round(FRAMES / world.rate))
+        self._still_budget = budget if still_budget is None else still_budget
+        self._patience = patience
+        stock = world.catalogue
+        self._pending = np.zeros(stock.texture_count, dtype=bool)
+        self._used = np.zeros(stock.texture_count, dtype=bool)
+        self._cells = np.zeros(0, np.int64)
+        self._weight = np.zeros(0)
+        self._shapes: Bools = np.zeros(len(stock.shapes.cell), dtype=bool)
+        self._hulls = [
+            np.concatenate([leaf["points"] for leaf in r["leaves"]]) for r in stock.records
+        ]
+
+    def look(self, frame: int) -> None:
+        """See `Client.look`."""
+        before = self.cell
+        super().look(frame)
+        if self.cell >= 0:
+            if self.cell != before:
+                self._enter()
+            self._cull()
+        self.tick()
+
+    def tick(self) -> None:
+        """A frame is rendered: steps 1 to 3, and requests for levels."""
+        if self.cell < 0:
+            return
+        stock, still = self.world.catalogue, bool(self.world.still[self.frame])
+        budget = self._still_budget if still else self.budget
+        shapes = stock.shapes
+        share = np.zeros(stock.texture_count)
+        share_out(
+            self._cells, self._weight, stock.first_shape, shapes.texture, self._shapes,
+            stock.memory, stock.levels, self.column, float(budget), share,
+        )  # fmt: skip
+        have = self.have
+        asks = refresh(share, stock.memory, stock.levels, have, self._pending, budget, self.column)
+        most = self._patience.still if still else self._patience.moving
+        for t in asks.tolist():
+            end = int(stock.ends[t, have[t] + 1])
+            size = end - int(self.textures.asked[t])
+            if self._used[t] and self.estimate.duration(size) <= most:
+                self._pending[t] = True
+                self.ask(Kind.TEXTURE, t, end, LEVEL)
+
+    def fetch(self) -> None:
+        """See `Client.fetch`: documents and geometry; levels are asked for by `tick`."""
+        if not self.files[Kind.INDEX].asked[0]:
+            self._whole(Kind.INDEX, 0, CURRENT)
+        if not self.index:
+            return
+        here = int(self.world.cell[self.frame])
+        self._whole(Kind.RECORD, here, CURRENT)
+        self._whole(Kind.GEOMETRY, here, CURRENT)
+        if self.cell < 0:
+            return
+        for other in self.known().tolist():
+            self._whole(Kind.GEOMETRY, other, VISIBLE)
+        following = self._next()
+        if following >= 0:
+            self._whole(Kind.RECORD, following, NEXT)
+            self._whole(Kind.GEOMETRY, following, NEXT)
+
+    def arrived(self, request: object) -> None:
+        """See `Client.arrived`."""
+        super().arrived(request)  # type: ignore[arg-type]
+        part = request.tag  # type: ignore[attr-defined]
+        if part.kind == Kind.TEXTURE:
+            self._pending[part.number] = False
+
+    def settle(self) -> None:
+        """See `Client.settle`: `tick` does it."""
+
+    def known(self) -> Ints:
+        """The visible set of the cell that it goes by."""
+        return self.world.catalogue.visible[self.cell]
+
+    def _whole(self, kind: Kind, number: int, priority: float) -> None:
+        """Asks for a file, or finds it more urgent than before."""
+        files = self.files[kind]
+        if not files.asked[number]:
+            self.ask(kind, number, int(files.size[number]), priority)
+        elif not files.whole[number]:
+            part = Range(kind, number, 0, int(files.size[number]))
+            for request in self.waiting:
+                if request.tag == part and request.priority < priority:
+                    self.link.reprioritise(request, priority)
+
+    def _enter(self) -> None:
+        """Drops what the visible set of a new cell does not use."""
+        self._used[:] = False
+        self._used[self.world.catalogue.in_sight[self.cell]] = True
+        self.column[~self._used] = 0
+
+    def _cull(self) -> None:
+        stock = self.world.catalogue
+        frustum = self.world.frustum(self.frame)
+        there = self.geometry.whole
+        known, hint = self.known(), stock.coverage[self.cell]
+        seen = np.array(
+            [there[c] and (c == self.cell or frustum.meets_hull(self._hulls[c])) for c in known]
+        )
+        order = np.argsort(-hint[seen], kind="stable")
+        self._cells, self._weight = known[seen][order], hint[seen][order]
+        self._shapes = frustum.meets_boxes(stock.shapes.low, stock.shapes.high) & (
+            stock.shapes.texture >= 0
+        )
+
+    def _next(self) -> int:
+        """The cell behind the first portal that the way of late leads through soon, or -1."""
+        world, f = self.world, self.frame
+        before = max(0, f - round(BEFORE * world.rate))
+        way = world.eye[f] - world.eye[before]
+        if f == before or not way.any():
+            return -1
+        way = way * (AHEAD / float(world.time[f] - world.time[before]))
+        found, nearest = -1, np.inf
+        for portal in world.catalogue.records[self.cell]["portals"]:
+            far = _crossing(world.eye[f], way, np.array(portal["polygon"], dtype=np.float64))
+            if far < nearest:
+                found, nearest = int(portal["neighbour"]), far
+        return found
+
+
+def _crossing(eye: Floats, way: Floats, polygon: Floats) -> float:
+    """Which share of a way leads to a convex polygon, or infinity if it does not lead through."""
+    turned = np.cross(polygon, np.roll(polygon, -1, axis=0)).sum(axis=0)
+    facing = float(turned @ way)
+    if facing == 0:
+        return float(np.inf)
+    share = float(turned @ (polygon[0] - eye)) / facing
+    if not 0 <= share <= 1:
+        return float(np.inf)
+    beside = polygon - (eye + share * way)
+    sides = np.cross(beside, np.roll(beside, -1, axis=0)) @ turned
+    return share if (sides >= 0).all() or (sides <= 0).all() else float(np.inf)

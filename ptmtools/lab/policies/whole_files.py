@@ -1,0 +1,198 @@
+"""Clients that ask for files whole, and for documents and geometry as soon as they know of them.
+
+`lru`: what is in the visible set is fetched whole in the order in which it is met, and what has
+not been seen for longest goes first.
+
+What one gets from files and a cache, without any hint but the visible sets.
+
+`gpuii`: interlaced images, as Englert et al. load them ("Efficient Image Distribution on the
+Web", 2014, §3.3).
+
+What is loaded next is the file that is most important, by four criteria:
+
+1. Its image is visible: a shape that shows it reaches into the frustum, by its box. Nothing is said
+   of what hides what, and nothing else is loaded ahead.
+2. It needs another step: the texels of the image that its files make so far are wider or higher
+   than pixels on a shape that shows it, as far away as the nearest point of that shape's box.
+3. It is near: rings around the camera, the nearest first.
+4. Within a ring the lowest step first, "to get a consistent look".
+
+Files come whole, as many at a time as HTTP/1.1 has connections; what has been asked for is not
+given up. Where no image needs another step, nothing is asked for.
+
+Read in: the width of a ring (`RING`); of what is equal in all of that the nearest image comes
+first. Texture memory, which the paper has only as "one step less", is filled with steps in that
+same order, and a step that finds no room is not loaded either; what is left holds what is there
+besides, as seen last."""
+
+from __future__ import annotations
+
+from abc import ABC
+
+import numpy as np
+
+from ptmtools.arrays import Floats, Ints
+from ptmtools.lab.client import Client, Kind
+from ptmtools.lab.network import Link
+from ptmtools.lab.policies.engine import CONNECTIONS
+from ptmtools.lab.world import World
+from ptmtools.rendering.rays import NEAR
+
+
+class WholeClient(Client, ABC):
+    """A client that does."""
+
+    def documents(self) -> bool:
+        """Asks for the index, then for the record of the cell and the geometry of what that may
+        see; whether the index is there."""
+        self.whole(Kind.INDEX, 0)
+        if not self.index:
+            return False
+        self.whole(Kind.RECORD, int(self.world.cell[self.frame]))
+        if self.cell >= 0:
+            for cell in self.world.catalogue.visible[self.cell].tolist():
+                self.whole(Kind.GEOMETRY, cell)
+        return True
+
+    def whole(self, kind: Kind, number: int) -> None:
+        """Asks for a file, behind all that was asked for before, unless it was."""
+        files = self.files[kind]
+        if not files.asked[number]:
+            self.ask(kind, number, int(files.size[number]), -self.link.requests)
+
+
+class LruClient(WholeClient):
+    """See the module."""
+
+    def __init__(self, world: World, link: Link, budget: int) -> None:
+        super().__init__(world, link, budget)
+        self._queue: list[int] = []
+        self._seen = np.full(world.catalogue.texture_count, -1, np.int64)
+
+    def look(self, frame: int) -> None:
+        """See `Client.look`."""
+        self.frame = frame
+        stock, shapes = self.world.catalogue, self.world.catalogue.shapes
+        frustum = self.world.frustum(frame)
+        there = self.geometry.whole[shapes.cell] & (shapes.texture >= 0)
+        met = shapes.texture[there & frustum.meets_boxes(shapes.low, shapes.high)]
+        for t in dict.fromkeys(met.tolist()):
+            if self._seen[t] < 0:
+                self._queue.append(t)
+            self._seen[t] = frame
+        assert len(self._queue) <= stock.texture_count
+        super().look(frame)
+
+    def settle(self) -> None:
+        """See `Client.settle`: the finest level that fits, the latest seen first."""
+        stock, have = self.world.catalogue, self.have
+        self.column[:] = 0
+        left = self.budget
+        for t in np.argsort(-self._seen, kind="stable").tolist():
+            if self._seen[t] < 0:
+                break
+            fits = int((stock.memory[t, : have[t] + 1] <= left).sum()) - 1
+            self.column[t] = max(fits, 0)
+            left -= int(stock.memory[t, self.column[t]])
+
+    def fetch(self) -> None:
+        """See `Client.fetch`: one after the other, whole."""
+        if not self.documents():
+            return
+        while self._queue and len(self.waiting) < CONNECTIONS:
+            self.whole(Kind.TEXTURE, self._queue.pop(0))
+
+
+#: Width of a ring around the camera, metres. Narrower ones make worse pictures, wider ones none
+#: that are better everywhere (docs/design/neighbours.md).
+RING = 8.0
+
+
+class GpuiiClient(WholeClient):
+    """See the module; ``ring`` is the width of a ring, metres.
+
+    Attributes
+    ----------
+    distance: (T,) metres to the nearest shape in the frustum that shows each texture, infinite
+        without one. wanted: (T,) columns that the screen needs.
+    """
+
+    def __init__(self, world: World, link: Link, budget: int, ring: float = RING) -> None:
+        super().__init__(world, link, budget)
+        count = world.catalogue.texture_count
+        self._ring = ring
+        self.distance: Floats = np.full(count, np.inf)
+        self.wanted: Ints = np.zeros(count, np.int64)
+        self._seen = np.full(count, -1, np.int64)
+        #: Texture and column of each step that is visible and needed, the most important first.
+        self._steps: list[tuple[int, int]] = []
+        self._target: Ints = np.zeros(count, np.int64)
+
+    def look(self, frame: int) -> None:
+        """See `Client.look`."""
+        self.frame = frame
+        self._see()
+        self._steps = self._ordered()
+        self._target = self._filled(self.wanted)[0]
+        super().look(frame)
+
+    def settle(self) -> None:
+        """See `Client.settle`."""
+        stock, have = self.world.catalogue, self.have
+        self.column, left = self._filled(np.minimum(self.wanted, have))
+        for t in np.lexsort((self.distance, -self._seen)).tolist():
+            if self._seen[t] < 0:
+                break
+            held = int(stock.memory[t, self.column[t]])
+            fits = int((stock.memory[t, : have[t] + 1] <= held + left).sum()) - 1
+            self.column[t] = max(fits, int(self.column[t]))
+            left -= int(stock.memory[t, self.column[t]]) - held
+
+    def fetch(self) -> None:
+        """See `Client.fetch`."""
+        if not self.documents():
+            return
+        stock = self.world.catalogue
+        for t, step in self._steps:
+            if len(self.waiting) >= CONNECTIONS:
+                break
+            end = int(stock.ends[t, step])
+            if step <= self._target[t] and self.textures.asked[t] < end:
+                self.ask(Kind.TEXTURE, t, end, -self.link.requests)
+
+    def _see(self) -> None:
+        """Finds what is visible, how near it is, and how far it is to be refined."""
+        stock, shapes = self.world.catalogue, self.world.catalogue.shapes
+        frustum = self.world.frustum(self.frame)
+        there = np.flatnonzero(self.geometry.whole[shapes.cell] & (shapes.texture >= 0))
+        met = there[frustum.meets_boxes(shapes.low[there], shapes.high[there])]
+        texture = shapes.texture[met]
+        far = np.maximum(frustum.distance(shapes.low[met], shapes.high[met]), NEAR)
+        self.distance = np.full(stock.texture_count, np.inf)
+        np.minimum.at(self.distance, texture, far)
+        pixels = np.zeros((stock.texture_count, 2))
+        pixel = far[:, None] * self.world.camera.pixel
+        np.maximum.at(pixels, texture, shapes.side[met] / pixel)
+        coarse = (stock.size[:, 1:] < pixels[:, None]).any(axis=2).sum(axis=1)
+        visible = np.isfinite(self.distance)
+        self.wanted = np.where(visible, np.minimum(coarse + 1, stock.levels), 0)
+        self._seen[visible] = self.frame
+
+    def _ordered(self) -> list[tuple[int, int]]:
+        texture = np.repeat(np.arange(len(self.wanted)), self.wanted)
+        first = np.cumsum(self.wanted) - self.wanted
+        step = np.arange(len(texture)) - first[texture] + 1
+        far = self.distance[texture]
+        order = np.lexsort((texture, far, step, far // self._ring))
+        return list(zip(texture[order].tolist(), step[order].tolist(), strict=True))
+
+    def _filled(self, most: Ints) -> tuple[Ints, int]:
+        """(T,) columns that fit, at most ``most``, by the order of steps; and the bytes left."""
+        memory = self.world.catalogue.memory
+        column, left = np.zeros_like(most), self.budget
+        for t, step in self._steps:
+            more = int(memory[t, step] - memory[t, step - 1])
+            if step <= most[t] and column[t] == step - 1 and more <= left:
+                column[t] = step
+                left -= more
+        return column, left

@@ -1,0 +1,159 @@
+"""The tables of a walk where octrees, or another geometry, are on the screen.
+
+The pixels of an octree's object are compared with what they should show, by the levels of the
+octree: their rows have it for a texture. Where the object has a texture, too, that has its own rows
+as everywhere, of the light on the simplified mesh; what both lack counts twice, and what one lacks
+once.
+
+With another database of the same model to compare with, pixels whose geometry differs are wrong by
+what they show, whatever is fetched: rows of the texture without levels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Ints, Singles
+from ptmtools.lab.relief.octrees import Octrees
+from ptmtools.output.served import Surfaces
+from ptmtools.rendering.rays import Caster
+from ptmtools.rendering.records import Pyramids, Sight, Triangles, own_levels, triangles_of
+from ptmtools.rendering.render import lamps
+
+#: Depths that differ by a smaller share are those of the same surface.
+APART = 1e-3
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Another database of the same model: its full picture is what others are compared with."""
+
+    surfaces: Surfaces
+    pyramids: Pyramids
+
+    @cached_property
+    def triangles(self) -> Triangles:
+        """As kernels take them."""
+        return triangles_of(self.surfaces)
+
+    @cached_property
+    def caster(self) -> Caster:
+        """Casts rays at it."""
+        return Caster(self.surfaces)
+
+    def look(self, sight: Sight) -> Sight:
+        """What is seen of it where something else is seen."""
+        return sight._replace(triangle=self.caster.first(sight.eye, sight.ray))
+
+    def shown(self, sight: Sight) -> Floats:
+        """(n, 3) its full picture of what is seen of it, 0 to 255."""
+        from ptmtools.rendering.kernels import shade
+
+        whole, cells = own_levels(self.pyramids), int(self.surfaces.cell.max(initial=-1)) + 1
+        found = np.empty((len(sight.ray), 3))
+        there = np.ones(cells, dtype=np.bool_)
+        shade(sight, self.triangles, whole, there, whole.last, found)
+        return found
+
+
+@dataclass(frozen=True)
+class Relief:
+    """What is lit in a walk, and what it is compared with.
+
+    Attributes
+    ----------
+    octrees: of the database that is walked through, maybe none.
+    reference: None: the database's own full picture.
+    """
+
+    octrees: Octrees
+    reference: Reference | None = None
+
+
+class Tally:
+    """Adds up frames.
+
+    Parameters
+    ----------
+    surfaces, triangles: that are walked through, as they are lit.
+    full: their textures. seen: (n,) which pixels a client's item buffer has.
+    """
+
+    def __init__(
+        self,
+        relief: Relief,
+        surfaces: Surfaces,
+        triangles: Triangles,
+        full: Pyramids,
+        seen: Bools,
+    ) -> None:
+        from ptmtools.rendering.kernels import Sums
+
+        self._relief, self._triangles, self._full, self._seen = relief, triangles, full, seen
+        self._lamps = lamps(surfaces.corner)
+        octrees, first = relief.octrees, len(full.levels)
+        # Behind the textures come the octrees, and one without levels.
+        wanted = np.where(octrees.of < 0, octrees.number, octrees.of) + first
+        stuck = np.full(len(wanted), first + octrees.number)
+        keys = np.stack([np.tile(triangles.cell, 2), np.concatenate([wanted, stuck])], axis=1)
+        self._pairs, pair = np.unique(keys, axis=0, return_inverse=True)
+        pair, self._stuck = pair.reshape(2, -1).astype(np.int64)
+        deepest = int(octrees.levels.max(initial=1))
+        columns = (deepest + 2, deepest + 2, deepest, deepest)
+        self._sums = Sums(pair, *(np.zeros((len(self._pairs), n)) for n in columns))
+        pixels = len(seen)
+        self._pixels = (pixels, pixels, pixels, max(int(seen.sum()), 1))
+        self._found: list[Ints] = []
+        self._rows = [[np.zeros((0, n), np.float32)] for n in columns]
+
+    def add(self, sight: Sight) -> Sight:
+        """Makes the rows of the next frame; returns what of it is left for other tables."""
+        from ptmtools.lab.relief.kernels import add_relief, depths, told
+
+        reference, octrees = self._relief.reference, self._relief.octrees
+        count = len(sight.triangle)
+        far, other, exact = np.zeros(count), np.zeros(count), np.zeros((count, 3))
+        depths(sight, self._triangles, far)
+        if reference is not None:
+            seen = reference.look(sight)
+            depths(seen, reference.triangles, other)
+            exact = reference.shown(seen)
+        special, plain = np.zeros(count, dtype=np.bool_), np.empty(count, np.int64)
+        given = reference is not None
+        told(sight, far, other, given, octrees.of, self._triangles.texture, APART, special, plain)
+        add_relief(
+            sight, self._triangles, self._lamps, octrees, self._full, exact, given, special,
+            self._seen, self._sums, self._stuck,
+        )  # fmt: skip
+        found = np.flatnonzero(self._sums.error.any(axis=1))
+        self._found.append(found)
+        for rows, table, pixels in zip(self._rows, self._sums[1:], self._pixels, strict=True):
+            rows.append((table[found] / pixels).astype(np.float32))
+            table[found] = 0.0
+        return sight._replace(triangle=plain)
+
+    @property
+    def rows(self) -> Rows:
+        """Those of all frames."""
+        frame = np.repeat(np.arange(len(self._found)), [len(found) for found in self._found])
+        pairs = self._pairs[np.concatenate([np.zeros(0, np.int64), *self._found])]
+        error, square, need, sight = map(np.concatenate, self._rows)
+        cell, texture = pairs.astype(np.int32).T
+        return Rows(frame, cell, texture, error, square, need, sight)
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of `Views`, and (R,) the frame of each, ascending."""
+
+    frame: Ints
+    cell: NDArray[np.int32]
+    texture: NDArray[np.int32]
+    error: Singles
+    square: Singles
+    need: Singles
+    sight: Singles

@@ -1,0 +1,221 @@
+"""One run: a client with a policy walks through a world over a link.
+
+Time goes from frame to frame. What arrives in between is handed to the client at once, and may make
+it ask for more; what is in texture memory changes only with a frame.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.lab.allocation import picture
+from ptmtools.lab.client import DOCUMENTS, Client, Kind
+from ptmtools.lab.network import Conditions, Link, Request
+from ptmtools.lab.policies import Declared
+from ptmtools.lab.world import World
+
+#: Seconds from one look of a client in a browser to the next, unless something has arrived.
+LOOK_SECONDS = 0.2
+
+
+@dataclass(frozen=True)
+class Run:
+    """What came of a run; F frames.
+
+    Attributes
+    ----------
+    policy, conditions, budget: what was run; the budget is bytes of texture memory.
+    time: (F,) s. still: (F,).
+    error: (F,) e, the mean over the pixels of the root mean square over R, G and B, 0 to 255.
+    square: (F,) the mean of its square.
+    missing: (F,) share of the wanted levels on the screen that are not there.
+    quality: (F,) the paper's: levels downloaded over levels existing, of the textures of the
+        visible set.
+    memory: (F,) bytes of texture memory in use. fetched: (F,) bytes of bodies received so far.
+    column: (F, T) what of each texture is in texture memory. there: (F, C) whose geometry is there.
+    body, overhead, cancelled: bytes received: bodies, headers, what came after a cancellation.
+    documents: bytes of bodies that are neither textures nor geometry.
+    useful: bytes of textures and geometry that were on the screen.
+    uploads: bytes that went to texture memory. switches: changes of a texture's finest level.
+    requests: how many. stalls: frames in which the cell the walker is in was not there.
+    overruns: frames above the budget.
+    """
+
+    policy: str
+    conditions: Conditions
+    budget: int
+    time: Floats
+    still: Bools
+    error: Floats
+    square: Floats
+    missing: Floats
+    quality: Floats
+    memory: Ints
+    fetched: Floats
+    column: Ints
+    there: Bools
+    body: float
+    overhead: float
+    cancelled: float
+    documents: int
+    useful: float
+    uploads: int
+    switches: int
+    requests: int
+    stalls: int
+    overruns: int
+
+
+def simulate(world: World, policy: Declared, conditions: Conditions, budget: int) -> Run:
+    """Walks, with textures in the policy's form. The same arguments give the same run, bit for bit.
+
+    Raises InputError PTM-I701 if the world was not made ready for that form.
+    """
+    world = world.in_form(policy.form)
+    link = Link(conditions)
+    client = policy.client(world, link, budget)
+    frames, stock, views = world.frames, world.catalogue, world.views
+    error, square, missing, quality, fetched = (np.zeros(frames) for _ in range(5))
+    memory = np.zeros(frames, np.int64)
+    column = np.zeros((frames, stock.texture_count), np.int64)
+    there = np.zeros((frames, stock.cell_count), dtype=bool)
+    shown = np.zeros(stock.ends.shape, dtype=bool)
+    drawn = np.zeros(stock.cell_count, dtype=bool)
+    each = np.arange(stock.texture_count)
+    passing = _Passing(client, link)
+    for f in range(frames):
+        for tick in range(1, client.ticks if f else 0):
+            part = tick / client.ticks
+            passing.until(float((1 - part) * world.time[f - 1] + part * world.time[f]))
+            client.tick()
+        passing.frame(f)
+        column[f], there[f] = client.column, client.geometry.whole
+        memory[f] = stock.memory[each, client.column].sum()
+        rows = views.rows(int(world.view[f]))
+        error[f], square[f], missing[f] = picture(
+            rows.start, rows.stop, views.cell, views.texture, views.error, views.square, views.need,
+            there[f], client.column, world.colored, shown, drawn,
+        )  # fmt: skip
+        quality[f] = _quality(client)
+        arriving = sum(request.received for request in client.waiting)
+        fetched[f] = link.bytes - passing.page_bytes + arriving
+        client.fetch()
+    steps = np.diff(column, axis=0, prepend=0)
+    before = column - steps
+    held = [stock.memory[each, columns] for columns in (column, before)]
+    textures = int((np.diff(stock.ends, axis=1) * shown[:, 1:]).sum())
+    return Run(
+        policy=policy.name,
+        conditions=conditions,
+        budget=budget,
+        time=world.time,
+        still=world.still,
+        error=error,
+        square=square,
+        missing=missing,
+        quality=quality,
+        memory=memory,
+        fetched=fetched,
+        column=column,
+        there=there,
+        body=float(fetched[-1]),
+        overhead=link.overhead_bytes,
+        cancelled=link.wasted,
+        documents=sum(int(client.files[kind].there.sum()) for kind in DOCUMENTS),
+        useful=textures + float(stock.geometry_bytes[drawn].sum()),
+        uploads=int(np.maximum(held[0] - held[1], 0).sum()),
+        switches=int(np.count_nonzero(steps)),
+        requests=link.requests - passing.page,
+        stalls=int((~there[np.arange(frames), world.cell]).sum()),
+        overruns=int((memory > budget).sum()),
+    )
+
+
+class _Passing:
+    """Time passes for a client, which in a browser does not look in every frame, and finds files on
+    the way that it has not asked for.
+
+    Attributes
+    ----------
+    page, page_bytes: how many files of the page itself were asked for, and the bytes of those that
+        have come.
+    """
+
+    def __init__(self, client: Client, link: Link) -> None:
+        self._client, self._link = client, link
+        self._browser = client.world.browser
+        self._given = deque(self._browser.files if self._browser else ())
+        self._begun, self._news, self._looked = False, False, -math.inf
+        self._late: deque[tuple[float, Request]] = deque()
+        self.page = self.page_bytes = 0
+
+    def until(self, moment: float) -> None:
+        """Time passes, and the client handles what arrives."""
+        while True:
+            due = self._late[0][0] if self._late else math.inf
+            finished = self._arrival(min(due, moment))
+            if finished:
+                free = self._link.now
+                if self._browser:
+                    free = self._browser.taken.until(free)
+                if free <= self._link.now and not self._late:
+                    self._handle(finished)
+                else:
+                    self._late.append((free, finished))
+            elif due < moment:
+                self._handle(self._late.popleft()[1])
+            else:
+                return
+
+    def frame(self, frame: int) -> None:
+        """Time passes up to a frame, and the client looks: in a browser several times a second, and
+        if there is something new."""
+        now = float(self._client.world.time[frame])
+        self.until(now)
+        self._begun = True
+        self._client.glance(frame)
+        if self._browser is None or self._news or now - self._looked >= LOOK_SECONDS:
+            self._looked, self._news = now, False
+            self._client.look(frame)
+
+    def _handle(self, finished: Request) -> None:
+        self._client.arrived(finished)
+        self._news = True
+        if self._begun:
+            self._client.fetch()
+
+    def _arrival(self, moment: float) -> Request | None:
+        """The next of the client's files to arrive by then."""
+        while self._given and self._given[0].asked <= moment:
+            finished = self._flow(max(self._given[0].asked, self._link.now))
+            if finished:
+                return finished
+            given = self._given.popleft()
+            if given.kind == "page":
+                self.page += 1
+                self._link.request(given.size, math.inf)
+            else:
+                self._client.give(Kind[given.kind.upper()], given.number, given.size)
+        return self._flow(moment)
+
+    def _flow(self, moment: float) -> Request | None:
+        while True:
+            finished = self._link.advance(moment)
+            self._client.estimate.observe(finished)
+            if finished is None or finished.tag is not None:
+                return finished
+            self.page_bytes += finished.size
+
+
+def _quality(client: Client) -> float:
+    """Levels downloaded over levels existing, of the textures that the visible set uses."""
+    if client.cell < 0:
+        return 0.0
+    textures = client.world.catalogue.in_sight[client.cell]
+    existing = client.world.catalogue.levels[textures].sum()
+    return float(client.have[textures].sum() / existing) if existing else 1.0

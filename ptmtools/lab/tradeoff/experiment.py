@@ -1,0 +1,204 @@
+"""What a stage's knobs buy: cost against error on the user's own scene.
+
+A stage has an `Experiment`: which settings of its knobs are worth trying, what each costs, and
+how far its result is from a reference that does not depend on the knobs. What to make of that is
+the same for all: which settings no other beats (the Pareto front), how the error falls with the
+work (a fitted power), and which is the cheapest for a wanted error.
+
+The experiments, as a table under the names of their stages.
+
+To add one: a module with an `Experiment` and a function that prepares it, and a line here."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from statistics import linear_regression
+from typing import TYPE_CHECKING, Any, Protocol
+
+from ptmtools.lazy import Lazy
+from ptmtools.pipeline.stages import ACH, CELLS, PVS, TEXTURES
+from ptmtools.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from ptmtools.pipeline.run import Artifacts
+    from ptmtools.pipeline.stage import Stage
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One choice of a stage's knobs.
+
+    Attributes
+    ----------
+    name: as a user would say it, unique within a stage ("--samples 64 --face 8").
+    knobs: option → value, as the options of the stage have them.
+    family: settings of one family differ in one thing, so that a power may be fitted to them;
+        empty for those that stand alone.
+    sound: False for what is only there to compare with, and is never the best.
+    """
+
+    name: str
+    knobs: Mapping[str, Any]
+    family: str = ""
+    sound: bool = True
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What came of a setting.
+
+    Attributes
+    ----------
+    seconds: of one process, for the whole database.
+    work: in the units that the experiment names; does not depend on the machine.
+    error: as the experiment names it; the mean over what was tried.
+    worst: the greatest error of them.
+    more: other figures, by name.
+    note: how it was done, where that may differ.
+    """
+
+    seconds: float
+    work: float
+    error: float
+    worst: float
+    more: Mapping[str, float] = field(default_factory=dict)
+    note: str = ""
+
+
+class Experiment(Protocol):
+    """A stage's knobs, their cost and their error.
+
+    Attributes
+    ----------
+    work, error: what is counted, and what the error is, with their units.
+    reference_error: the standard error of the reference itself, 0 where it is exact.
+    """
+
+    work: str
+    error: str
+    reference_error: float
+
+    def settings(self) -> Sequence[Setting]:
+        """Those worth trying, cheap ones first."""
+
+    def measure(self, setting: Setting) -> Measured:
+        """Runs the stage with a setting."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A setting, what came of it, and whether no other setting is as good for less."""
+
+    setting: Setting
+    measured: Measured
+    best: bool = False
+
+
+@dataclass(frozen=True)
+class Trade:
+    """An experiment that has been run.
+
+    Attributes
+    ----------
+    stage: its name.
+    work, error, reference_error: as in `Experiment`.
+    trials: by cost.
+    rates: family → exponent b of error ∝ work^b, by least squares over the logarithms of trials
+        that are above twice the error of the reference.
+    """
+
+    stage: str
+    work: str
+    error: str
+    reference_error: float
+    trials: tuple[Trial, ...]
+    rates: Mapping[str, float]
+
+    def cheapest(self, error: float) -> Trial | None:
+        """The cheapest trial with at most this error; None if there is none."""
+        return next((t for t in self.trials if t.best and t.measured.error <= error), None)
+
+
+def run(stage: str, experiment: Experiment, progress: Progress = silent) -> Trade:
+    """Tries all settings of a stage's experiment."""
+    settings = experiment.settings()
+    trials = []
+    for i, setting in enumerate(settings):
+        trials.append(Trial(setting, experiment.measure(setting)))
+        progress(i + 1, len(settings), f"trying {stage}")
+    return Trade(
+        stage,
+        experiment.work,
+        experiment.error,
+        experiment.reference_error,
+        pareto(trials),
+        rates(trials, 2 * experiment.reference_error),
+    )
+
+
+def pareto(trials: Sequence[Trial]) -> tuple[Trial, ...]:
+    """The trials by cost, the sound ones marked that have a smaller error than all cheaper ones."""
+    ordered = sorted(trials, key=lambda t: (t.measured.seconds, t.measured.error))
+    least = math.inf
+    found = []
+    for trial in ordered:
+        best = trial.setting.sound and trial.measured.error < least
+        found.append(Trial(trial.setting, trial.measured, best))
+        least = trial.measured.error if best else least
+    return tuple(found)
+
+
+def rates(trials: Sequence[Trial], above: float) -> dict[str, float]:
+    """See `Trade.rates`; families of fewer than three trials with errors greater than ``above``
+    have none."""
+    families: dict[str, tuple[list[float], list[float]]] = {}
+    for trial in trials:
+        m = trial.measured
+        if trial.setting.family and m.error > above and m.work > 0:
+            work, error = families.setdefault(trial.setting.family, ([], []))
+            work.append(math.log(m.work))
+            error.append(math.log(m.error))
+    return {
+        name: linear_regression(work, error).slope
+        for name, (work, error) in families.items()
+        if len(set(work)) >= 3
+    }
+
+
+def timed(work: Callable[[], Any]) -> tuple[Any, float]:
+    """What ``work`` returns, and the processor seconds of this process that it took."""
+    start = time.process_time()
+    found = work()
+    return found, time.process_time() - start
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What experiments are made on: a database, and how much effort to spend.
+
+    Attributes
+    ----------
+    artifacts: those of the database.
+    cells_tried, reference_points: as in `CoverageTrade`.
+    """
+
+    artifacts: Artifacts
+    cells_tried: int
+    reference_points: int
+
+    def options(self, stage: Stage[Any]) -> Any:
+        """The options of a stage's last run, or its defaults."""
+        run = self.artifacts.before(stage)
+        return self.artifacts.recorded(stage) if run else stage.options()
+
+
+#: Stage → the function that prepares its experiment, in the order of the stages.
+EXPERIMENTS: dict[str, Lazy[Callable[[Subject], Experiment]]] = {
+    CELLS.name: Lazy("ptmtools.lab.tradeoff.stages:prepare_cells"),
+    PVS.name: Lazy("ptmtools.lab.tradeoff.stages:prepare_visibility"),
+    ACH.name: Lazy("ptmtools.lab.tradeoff.stages:prepare"),
+    TEXTURES.name: Lazy("ptmtools.lab.tradeoff.stages:prepare_textures"),
+}

@@ -1,0 +1,170 @@
+"""The knobs of the stages whose price the walker pays, and the values that are worth trying.
+
+A database built again with another option, in a folder of its own.
+
+What a setting costs is what all stages after the scene then take: those that the option concerns
+run again, and the others took what they take with the database's own options."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from ptmtools.errors import InputError
+from ptmtools.lab.tradeoff.experiment import timed
+from ptmtools.pipeline import Artifacts
+from ptmtools.pipeline.build import run_stage
+from ptmtools.pipeline.stage import Options, Stage, option_name
+from ptmtools.pipeline.stages import ACH, CELLS, EMIT, PVS, STAGES, TEXTURES
+from ptmtools.progress import Progress, silent
+
+
+def _other(value: Any, own: Any) -> bool:
+    return bool(value != own)
+
+
+def _more(value: Any, own: Any) -> bool:
+    return bool(value > own)
+
+
+@dataclass(frozen=True)
+class Knob:
+    """One option of a stage.
+
+    Attributes
+    ----------
+    stage, field: of whose options.
+    values: to try.
+    worth: ``worth(value, own)``: whether to try a value beside the database's own. Pictures are
+        compared with what the database has, so of textures only what is coarser.
+    policy: who walks, if only some clients use what it makes; "" for whom the user asks for.
+    own: the property of the options that says what is in force; by default the field.
+    slow: values that take far longer, tried only if the knob is named.
+    of_longest: the values are shares of the longest side of a texture.
+    """
+
+    stage: Stage[Any]
+    field: str
+    values: tuple[Any, ...]
+    worth: Callable[[Any, Any], bool] = _other
+    policy: str = ""
+    own: str = ""
+    slow: tuple[Any, ...] = ()
+    of_longest: bool = False
+
+    @property
+    def option(self) -> str:
+        """As a user gives it, with its dashes."""
+        found = next(each for each in fields(self.stage.options) if each.name == self.field)
+        return f"--{option_name(found)}"
+
+    def said(self, value: Any) -> str:
+        """A value as a user gives it."""
+        if isinstance(value, bool):
+            return self.option if value else self.option.replace("--", "--no-", 1)
+        return f"{self.option} {value:g}" if isinstance(value, float) else f"{self.option} {value}"
+
+
+KNOBS = (
+    Knob(CELLS, "wall_area", (1.0, 4.0)),
+    Knob(CELLS, "cells", ("leaf", "room")),
+    Knob(PVS, "method", ("fast", "sampled", "full")),
+    Knob(ACH, "samples", (8, 1, 64, 512), policy="ach", own="points"),
+    Knob(TEXTURES, "profile", ("raw", "fast"), slow=("small",)),
+    Knob(TEXTURES, "max_error", (2, 4), _more),
+    Knob(TEXTURES, "max_side", (1 / 2, 1 / 4), of_longest=True),
+    Knob(TEXTURES, "trim", (True,), _more),
+    Knob(EMIT, "need", (16, 0)),
+)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One knob at another value than the database's own.
+
+    Attributes
+    ----------
+    own: that one, as `Knob.said` says it.
+    options: of its stage.
+    """
+
+    knob: Knob
+    value: Any
+    own: str
+    options: Options
+
+    @property
+    def name(self) -> str:
+        """As a user gives it."""
+        return self.knob.said(self.value)
+
+
+def settings(
+    own: Mapping[Stage[Any], Options],
+    longest: int,
+    named: Collection[str] = (),
+    *,
+    quick: bool = False,
+) -> Iterator[Setting]:
+    """What to try beside the ``own`` options of a database whose longest texture side is
+    ``longest`` texels: all knobs, or those of the ``named`` options, such as "max-side"; with
+    ``quick``, one value of each."""
+    for knob in KNOBS:
+        if named and knob.option.removeprefix("--") not in named:
+            continue
+        options = own[knob.stage]
+        here = getattr(options, knob.own or knob.field)
+        values = (*knob.values, *(knob.slow if named else ()))
+        if knob.of_longest:
+            values = tuple(int(share * longest) for share in values if share * longest >= 1)
+        tried = [value for value in values if knob.worth(value, here)]
+        for value in tried[:1] if quick else tried:
+            with suppress(InputError):  # what the other options do not allow
+                changed = replace(options, **{knob.field: value})
+                yield Setting(knob, value, knob.said(here), changed)
+
+
+def concerned(stage: Stage[Any], own: Mapping[Stage[Any], Options]) -> list[Stage[Any]]:
+    """A stage and those that read what it makes, in their order."""
+    found = [stage]
+    for later in STAGES.values():
+        if later in own and later not in found and set(later.read_with(own[later])) & set(found):
+            found.append(later)
+    return found
+
+
+#: Seconds of one core that each stage took.
+Seconds = dict[str, float]
+Own = Mapping[Stage[Any], Options]
+
+
+def own_options(artifacts: Artifacts) -> Own:
+    """Those that the stages last ran with, but for those that make the scene, of which the first
+    needs the model.
+
+    Raises DatabaseError PTM-D004 if one has not run, PTM-D002 for options that no stage has.
+    """
+    return {stage: artifacts.recorded(stage) for stage in STAGES.values() if not stage.hidden}
+
+
+@contextmanager
+def copied(db: Path) -> Iterator[Path]:
+    """A copy of a database, to be changed, for a while."""
+    with TemporaryDirectory(prefix="ptmtools-") as folder:
+        yield Path(shutil.copytree(db, Path(folder) / "db"))
+
+
+def build_again(db: Path, options: Own, progress: Progress = silent) -> Seconds:
+    """Runs the stages whose options are given, whether or not they are current, in the order of
+    the options, by one worker: nothing is kept that would have been cheap to keep."""
+    found: Seconds = {}
+    for stage, chosen in options.items():
+        run = partial(run_stage, db, chosen, workers=1, rebuild=True, progress=progress)
+        _, found[stage.name] = timed(run)
+    return found

@@ -1,0 +1,294 @@
+"""The outcome of experiments as a table of text, as CSV, and as pictures.
+
+Error against cost, a panel for every stage; needs matplotlib (extra ``plot``).
+
+What knobs are worth to a walker, in words; the table of all settings below."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from typing import Any
+
+from ptmtools.lab.report import rate_text
+from ptmtools.lab.tradeoff.experiment import Measured, Setting, Trade, Trial, pareto
+from ptmtools.lab.tradeoff.walk import FIRST, Seen, Tried, WalkTrade
+from ptmtools.lazy import component
+from ptmtools.quantities import size
+
+#: Of the CSV.
+COLUMNS = (
+    *("stage", "setting", "cpu_s", "work", "work_unit"),
+    *("error", "worst", "error_of", "best", "more"),
+)
+
+
+def table(trade: Trade, wanted: float | None = None) -> list[str]:
+    """Lines of text: every trial by cost, a star where no other is as good for less; the rates; and
+    the cheapest setting for the wanted error."""
+    names = [t.setting.name for t in trade.trials]
+    wide = max(map(len, [*names, "setting"]))
+    lines = [
+        f"{trade.stage}: error is the {trade.error}; work counts {trade.work}; seconds of one core",
+        f"  {'setting':<{wide}}  {'seconds':>9} {'work':>11} {'error':>8} {'worst':>8}",
+    ]
+    for trial in trade.trials:
+        m = trial.measured
+        star = "*" if trial.best else " "
+        more = "".join(f"  {k} {v:.3g}" for k, v in m.more.items() if v)
+        lines.append(
+            f"{star} {trial.setting.name:<{wide}}  {m.seconds:9.2f} {m.work:11,.0f} "
+            f"{m.error:8.4f} {m.worst:8.4f}{more}  {m.note}".rstrip()
+        )
+    if trade.reference_error:
+        lines.append(f"  standard error of the reference: {trade.reference_error:.4f}")
+    for family, rate in trade.rates.items():
+        lines.append(f"  {family}: error ∝ work^{rate:.2f}")
+    if wanted is not None:
+        found = trade.cheapest(wanted)
+        answer = (
+            found.setting.name if found else "none of these; the last one with a star comes closest"
+        )
+        lines.append(f"  cheapest for an error of at most {wanted:g}: {answer}")
+    return lines
+
+
+def as_csv(trades: Sequence[Trade]) -> str:
+    """All trials of all stages: what is in `Measured`, other figures as ``name=value``."""
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(COLUMNS)
+    for trade in trades:
+        for trial in trade.trials:
+            m = trial.measured
+            more = " ".join([*(f"{k}={v:.6g}" for k, v in m.more.items()), m.note]).strip()
+            cost = [f"{m.seconds:.4f}", f"{m.work:.6g}", trade.work]
+            error = [f"{m.error:.6g}", f"{m.worst:.6g}", trade.error]
+            rows.writerow([trade.stage, trial.setting.name, *cost, *error, int(trial.best), more])
+    return text.getvalue()
+
+
+COLORS = ("#1b6ca8", "#d1603d", "#5a9367", "#8d6a9f", "#b08d2e", "#5b6770", "#c2437a", "#2f8f8b")
+
+
+def require() -> None:
+    """Raises `MissingComponentError` PTM-M600 without matplotlib."""
+    component("matplotlib.figure", "PTM-M600", "matplotlib is missing", "plot")
+
+
+def picture(trades: Sequence[Trade]) -> bytes:
+    """A PNG: every trial, families joined, settings that no other beats named.
+
+    Raises `MissingComponentError` PTM-M600 without matplotlib.
+    """
+    require()
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8, 5 * max(len(trades), 1)), dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    for i, trade in enumerate(trades):
+        axes = figure.add_subplot(len(trades), 1, i + 1)
+        _draw(axes, trade)
+    out = io.BytesIO()
+    figure.savefig(out, format="png", metadata={"Software": None})
+    return out.getvalue()
+
+
+def _draw(axes: Any, trade: Trade) -> None:
+    families = list(dict.fromkeys(t.setting.family for t in trade.trials))
+    least = min((t.measured.error for t in trade.trials if t.measured.error > 0), default=1.0)
+    for number, family in enumerate(families):
+        members = [t for t in trade.trials if t.setting.family == family]
+        members.sort(key=lambda t: t.measured.work)
+        x = [t.measured.seconds for t in members]
+        y = [max(t.measured.error, least / 3) for t in members]
+        rate = f", error ∝ work^{trade.rates[family]:.2f}" if family in trade.rates else ""
+        style = {"color": COLORS[number % len(COLORS)], "label": (family or "others") + rate}
+        axes.plot(x, y, "o-" if family else "D", markersize=4, linewidth=1, **style)
+    for t in trade.trials:
+        if t.best:
+            at = (t.measured.seconds, max(t.measured.error, least / 3))
+            name = t.setting.name.replace("--", "")
+            axes.annotate(name, at, (4, 4), textcoords="offset points", fontsize=6)
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlabel="CPU seconds of one core, whole database",
+        ylabel=trade.error,
+        title=trade.stage,
+    )
+    if trade.reference_error:
+        axes.axhline(trade.reference_error, color="#999", linestyle=":", linewidth=1)
+    axes.grid(True, which="both", color="#eee")
+    axes.legend(fontsize=7)
+
+
+#: Nobody sees less: of e, as a share of it, and in steps of 8-bit colour.
+_SHARE, _STEPS = 0.005, 0.01
+#: Of bytes nobody cares for less; seconds are no more exact than this share of them all.
+_BYTES, _SECONDS = 0.005, 0.1
+Case = tuple[str, float | None, str]
+
+
+def said(trade: WalkTrade) -> list[str]:
+    """A sentence for each knob, on the setting that `telling` takes."""
+    return [
+        sentence(telling(list(some), trade.own), trade)
+        for _, some in groupby(trade.trials, lambda tried: tried.option)
+    ]
+
+
+def telling(some: Sequence[Tried], own: Tried) -> Tried:
+    """Of the settings of a knob the one to tell of: where the picture is best, if that is better
+    than the database's own; else, of those that nobody can tell from it, the one that saves most
+    bytes, then seconds; else the one that loses least."""
+    there = [tried for tried in some if not tried.problem]
+    if not there:
+        return some[0]
+    least = min(there, key=lambda tried: _change(tried, own))
+    if any(_noticed(*pair) for pair in _pairs(least, own)):
+        return least
+    alike = [t for t in there if not any(_noticed(*pair) for pair in _pairs(t, own))]
+    return min(alike, key=lambda tried: (tried.served, tried.build))
+
+
+def sentence(tried: Tried, trade: WalkTrade) -> str:
+    """What a setting saves, and what the walker sees of it."""
+    if tried.problem:
+        return f"{tried.name} cannot be tried: {tried.problem}."
+    own = trade.own
+    saved = _saved(tried, own)
+    pairs = _pairs(tried, own)
+    cases = [seen.case for _, seen in pairs]
+    noticed = [pair for pair in pairs if _noticed(*pair)]
+    changes = []
+    for way, some in groupby(noticed, lambda pair: "worse" if pair[1].e > pair[0].e else "better"):
+        parts = [
+            f"{_by(was, now)}{_where(now.case, cases)} (e {was.e:.2f} → {now.e:.2f})"
+            for was, now in some
+        ]
+        changes.append(f"{way} {_and(parts)}")
+    policies = {seen.policy for _, seen in pairs} - {seen.policy for seen in own.seen[:1]}
+    whose = f" to the client {policies.pop()}" if len(policies) == 1 else ""
+    if not changes:
+        seen = f"no difference{whose} that can be seen"
+    else:
+        seen = f"the picture{whose} is {_and(changes)}"
+        if len(noticed) < len(pairs):
+            seen += ", and the same otherwise"
+    return f"{tried.name} instead of {tried.own} {saved}; {seen}."
+
+
+def _saved(tried: Tried, own: Tried) -> str:
+    parts = []
+    more = tried.served / max(own.served, 1) - 1
+    if abs(more) >= _BYTES:
+        parts.append(
+            f"adds {_percent(more)} to the bytes" if more > 0 else
+            f"saves {_percent(-more)} of the bytes"
+        )  # fmt: skip
+    longer = tried.build - own.build
+    if abs(longer) >= _SECONDS * own.build:
+        parts.append(f"builds {abs(longer):.1f} s {'slower' if longer > 0 else 'faster'}")
+    return _and(parts) if parts else "costs the same"
+
+
+def _and(parts: Sequence[str]) -> str:
+    return " and ".join([", ".join(parts[:-1]), parts[-1]] if parts[1:] else parts)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:,.{0 if share >= 0.0995 else 1}f} %"
+
+
+def _by(was: Seen, now: Seen) -> str:
+    return f"by {_percent(abs(now.e / was.e - 1))} " if was.e else ""
+
+
+def _where(case: Case, cases: Sequence[Case]) -> str:
+    """Of a case what tells it from the others."""
+    policy, bandwidth, memory = case
+    text = f"at {rate_text(bandwidth)}"
+    if len({c[2] for c in cases}) > 1:
+        text += f" with {memory} of texture memory"
+    return f"{text} by {policy}" if len({c[0] for c in cases}) > 1 else text
+
+
+def _pairs(tried: Tried, own: Tried) -> list[tuple[Seen, Seen]]:
+    """What was seen of the database as it is, and with the setting, case by case."""
+    return [(was, now) for now in tried.seen if (was := own.by(now.case))]
+
+
+def _change(tried: Tried, own: Tried) -> float:
+    """Of e, as a share, on average over the cases."""
+    pairs = _pairs(tried, own)
+    return sum((now.e - was.e) / max(was.e, _STEPS) for was, now in pairs) / max(len(pairs), 1)
+
+
+def _noticed(was: Seen, now: Seen) -> bool:
+    return abs(now.e - was.e) >= max(_SHARE * was.e, _STEPS)
+
+
+def settings_table(trade: WalkTrade, wanted: float | None = None) -> list[str]:
+    """Lines of text: the sentences, then all settings, a block for each walker."""
+    lines = [*said(trade), ""]
+    lines += [
+        "e says how far the picture is from the full one of the database as it is: 0 to 255, on",
+        "average over pixels and frames, and what 95 % of the frames do not exceed. build: seconds",
+        "of one core, all stages after the scene. served: all that clients of the hints can fetch.",
+        f"fetched: on the walk, of {trade.seconds:.0f} s. first: until {FIRST:.0%} of the first "
+        "picture is there.",
+    ]
+    wide = max(len(tried.name) for tried in (*trade.trials, _AS_IS))
+    head = f"  {'setting':<{wide}} {'build':>8} {'served':>9} {'e':>7} {'change':>7} {'95%':>7} "
+    head += f"{'fetched':>9} {'first':>7}"
+    for case in trade.cases:
+        policy, bandwidth, memory = case
+        lines += ["", f"{policy}, {rate_text(bandwidth)}, texture memory {memory}", head]
+        lines += [f"  {row}" for row in _rows(trade, case, wide)]
+        if wanted is not None:
+            found = _trade(trade, case).cheapest(wanted)
+            name = found.setting.name if found else "none of these"
+            lines.append(f"  cheapest for an error of at most {wanted:g}: {name}")
+    problems = [f"{tried.name}: {tried.problem}" for tried in trade.trials if tried.problem]
+    return [*lines, "", *problems] if problems else lines
+
+
+_AS_IS = Tried("as it is", "", "", 0, 0)
+
+
+def _rows(trade: WalkTrade, case: Case, wide: int) -> Iterator[str]:
+    was = trade.own.by(case)
+    for tried in (trade.own, *trade.trials):
+        seen = tried.by(case)
+        if not seen or not was:
+            continue
+        change = f"{(seen.e - was.e) / was.e:+.1%}" if seen is not was and was.e else "–"
+        first = "–" if seen.first is None else f"{seen.first:.1f} s"
+        yield (
+            f"{tried.name or _AS_IS.name:<{wide}} {tried.build:6.1f} s {size(tried.served):>9} "
+            f"{seen.e:7.3f} {change:>7} {seen.p95:7.3f} {size(seen.fetched):>9} {first:>7}"
+        )
+
+
+def trades(trade: WalkTrade) -> list[Trade]:
+    """The same as other experiments have it, one for each walker: e against seconds of building."""
+    return [_trade(trade, case) for case in trade.cases]
+
+
+def _trade(trade: WalkTrade, case: Case) -> Trade:
+    policy, bandwidth, memory = case
+    where = f"{policy}, {rate_text(bandwidth)}, texture memory {memory}"
+    found = []
+    for tried in (trade.own, *trade.trials):
+        if seen := tried.by(case):
+            more = {"fetched": float(seen.fetched)}
+            if seen.first is not None:
+                more["first"] = seen.first
+            setting = Setting(tried.name or _AS_IS.name, {})
+            measured = Measured(tried.build, tried.served, seen.e, seen.p95, more)
+            found.append(Trial(setting, measured))
+    return Trade("walk", "bytes served", f"e ({where})", 0.0, pareto(found), {})

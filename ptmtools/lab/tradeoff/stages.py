@@ -1,0 +1,339 @@
+"""What the knobs of the subdivision buy.
+
+There is no right subdivision to compare with; what matters is that a client needs little of the
+building in memory. The error of a setting is the share of the building's volume that is potentially
+visible from a viewer's cell, on average over all places where the viewer may be.
+
+What the knobs of the coverage hints buy (see `experiment`).
+
+The error of a setting is the total variation between its hints of a cell and those of a reference:
+more points than any setting, of an independent scramble, with rays. Some cells stand for all.
+
+What the profiles of the textures buy.
+
+All of them give the pixels back as exactly as was asked for (the profile raw always to the bit), so
+what matters is few bytes. The error of a setting is the bytes of all levels over those of the
+uncompressed finest level.
+
+What the knobs of the visibility buy.
+
+The reference is the full search with a budget that hardly any portal exhausts. The error of a
+setting is its number of wrong pairs of cells over that of the right ones: pairs too many, or with
+sampled lines also missing ones, which is worse: a client that loads by such a set shows holes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells import SubdivideOptions, subdivide
+from ptmtools.cells.model import Cells
+from ptmtools.coverage.ach import choose
+from ptmtools.coverage.item_buffer import VIEWS
+from ptmtools.coverage.options import MAX_SAMPLES, PRESETS, AchOptions
+from ptmtools.coverage.sampling import CellHints, Sampler
+from ptmtools.errors import MissingComponentError
+from ptmtools.lab.tradeoff.experiment import Measured, Setting, Subject, timed
+from ptmtools.pipeline.stages import ACH, APO, CELLS, PVS, SCENE, TEXTURES
+from ptmtools.scene.model import Scene, SourceImage
+from ptmtools.texture import EncodeOptions, encode, read_image
+from ptmtools.texture.profiles import PROFILES
+from ptmtools.visibility.model import Pvs
+from ptmtools.visibility.options import PvsOptions
+from ptmtools.visibility.pvs import compute_pvs
+
+#: Leaves of a subdivision that is only there to have everything compiled.
+WARM = 4
+
+
+def prepare_cells(subject: Subject) -> CellsTrade:
+    """See `EXPERIMENTS`."""
+    return CellsTrade(subject.artifacts[APO], subject.options(CELLS))
+
+
+class CellsTrade:
+    """The experiment of the subdivision."""
+
+    work = "leaves"
+    error = "share of the building that a viewer may see"
+    reference_error = 0.0
+
+    def __init__(self, scene: Scene, options: SubdivideOptions) -> None:
+        self._scene, self._options = scene, options
+        few = subdivide(scene, replace(options, max_leaves=WARM))
+        compute_pvs(few, PvsOptions(method="fast"))  # now both are compiled
+
+    def settings(self) -> Sequence[Setting]:
+        """See `Experiment.settings`."""
+        area = self._options.wall_area
+        return [
+            Setting(
+                f"--cells {kind} --wall-area {area * factor:g}",
+                {"cells": kind, "wall_area": area * factor},
+                kind,
+            )
+            for kind in ("room", "leaf")
+            for factor in (4, 2, 1, 0.5)
+        ]
+
+    def measure(self, setting: Setting) -> Measured:
+        """See `Experiment.measure`."""
+        options = replace(self._options, **setting.knobs)
+        cells, seconds = timed(lambda: subdivide(self._scene, options))
+        mean, worst = compute_pvs(cells, PvsOptions(method="fast")).volume_at_hand
+        return Measured(
+            seconds=seconds,
+            work=float(cells.leaf_count),
+            error=mean,
+            worst=worst,
+            more={"cells": float(cells.cell_count), "portals": float(cells.portal_count)},
+        )
+
+
+#: The seed of the reference, but for a user who takes the same.
+REFERENCE_SEED = 2**31 - 1
+#: Its pixels a side: as good as more, since every point shifts them.
+REFERENCE_FACE = 4
+#: Points and pixels a side of other settings than the presets.
+GRID = (
+    ("sobol", (32, 128, 512, 2048), 2),
+    ("sobol", (8, 16, 64, 128, 256, 1024), 4),
+    ("sobol", (8, 32, 128, 512), 8),
+    ("sobol", (8, 32, 128), 16),
+    ("sobol", (8, 32), 64),
+    ("kd", (8, 16, 32), 8),
+    ("uniform", (8, 32, 128, 512), 8),
+)
+
+
+def prepare(subject: Subject) -> CoverageTrade:
+    """See `EXPERIMENTS`. Of the options what settings choose is left open."""
+    options = replace(subject.options(ACH), samples=None, face=None, placement=None, tolerance=None)
+    made = subject.artifacts
+    tried, points = subject.cells_tried, subject.reference_points
+    return CoverageTrade(made[APO], made[CELLS], made[PVS], options, tried, points)
+
+
+class CoverageTrade:
+    """The experiment of the coverage hints."""
+
+    work = "rays per cell"
+    error = "total variation of a cell's hints"
+
+    def __init__(
+        self,
+        scene: Scene,
+        cells: Cells,
+        pvs: Pvs,
+        options: AchOptions = AchOptions(),  # noqa: B008 - a frozen value
+        cells_tried: int = 16,
+        reference_points: int = MAX_SAMPLES,
+    ) -> None:
+        """``options``: what settings leave open, such as the backend and the weighting. `tried` are
+        the cells that stand for all, evenly spread; `truth` their hints by the reference, by cell.
+        """
+        self._scene, self._cells, self._pvs, self._options = scene, cells, pvs, options
+        self._most = reference_points
+        every = cells.cell_count
+        self.tried = np.unique(np.linspace(0, every - 1, min(cells_tried, every)).astype(int))
+        reference = replace(
+            options,
+            backend="embree",
+            samples=reference_points,
+            face=REFERENCE_FACE,
+            placement="sobol",
+            seed=REFERENCE_SEED - (options.seed == REFERENCE_SEED),
+            tolerance=None,
+        )
+        found, _, _ = self.hints(reference)
+        self.truth = {cell: hints.row.value for cell, hints in found.items()}
+        # Bounds of its error; its standard error is about half of that. Cells with too few usable
+        # points have none.
+        bounds = np.array([hints.row.uncertain for hints in found.values()], dtype=np.float64)
+        bounds = bounds[np.isfinite(bounds)]
+        self.reference_error = float(bounds.mean()) / 2 if len(bounds) else 0.0
+
+    def settings(self) -> Sequence[Setting]:
+        """See `Experiment.settings`; those of fewer points than the reference."""
+        presets = [Setting(f"--preset {name}", {"preset": name}) for name in PRESETS]
+        grid = [
+            Setting(
+                f"--samples {samples} --face {face} --placement {placement}",
+                {"samples": samples, "face": face, "placement": placement},
+                f"{placement}, {face}² pixels",
+            )
+            for placement, counts, face in GRID
+            for samples in counts
+        ]
+        points = {s.name: replace(self._options, **s.knobs).points for s in (*presets, *grid)}
+        return [s for s in (*presets, *grid) if points[s.name] < self._most]
+
+    def measure(self, setting: Setting) -> Measured:
+        """See `Experiment.measure`."""
+        options = replace(self._options, **setting.knobs)
+        found, seconds, backend = self.hints(options)
+        errors = self.errors(found)
+        points = np.array([hints.samples for hints in found.values()])
+        missed = np.array([hints.missed for hints in found.values()])
+        many = max(len(found), 1)
+        return Measured(
+            seconds=seconds,
+            work=float(points.sum()) * len(VIEWS) * options.side**2 / many,
+            error=float(errors.sum()) / many,
+            worst=float(errors.max(initial=0.0)),
+            more={
+                "p95": float(np.percentile(errors, 95)) if len(errors) else 0.0,
+                "missed": float(missed.sum()) / many,
+            },
+            note=backend,
+        )
+
+    def errors(self, found: Mapping[int, CellHints]) -> NDArray[np.float64]:
+        """(n,) total variation between hints of n of the cells tried, by cell, and the reference.
+
+        Raises KeyError for a cell that was not tried.
+        """
+        pairs = ((hints.row.value, self.truth[cell]) for cell, hints in found.items())
+        return np.array([np.abs(value - truth).sum() / 2 for value, truth in pairs])
+
+    def hints(
+        self, options: AchOptions, cells: Sequence[int] | None = None
+    ) -> tuple[dict[int, CellHints], float, str]:
+        """The hints of some of the cells tried, by cell, or of all of them; processor seconds for
+        all cells of the scene; and the backend."""
+        asked = [int(cell) for cell in (self.tried if cells is None else cells)]
+        backend = choose(self._cells, self._pvs, options)
+
+        def ready() -> Sampler:
+            return Sampler(self._scene, self._cells, self._pvs, options, backend)
+
+        ready().renderer.close()  # what is loaded but once is no part of the cost
+        sampler, before = timed(ready)
+        try:
+            if asked:
+                sampler.of_cell(asked[0])
+            found, seconds = timed(lambda: {cell: sampler.of_cell(cell) for cell in asked})
+            seconds *= self._cells.cell_count / max(len(asked), 1)
+            return found, before + seconds, backend.name
+        finally:
+            sampler.renderer.close()
+
+
+#: So many images stand for all of them, each by a corner of so many texels a side.
+TRIED, CORNER = 4, 512
+
+
+def prepare_textures(subject: Subject) -> TexturesTrade:
+    """See `EXPERIMENTS`."""
+    return TexturesTrade(subject.artifacts[SCENE].images, subject.options(TEXTURES))
+
+
+class TexturesTrade:
+    """The experiment of the texture profiles."""
+
+    work = "texels"
+    error = "bytes of all levels, as a share of the uncompressed finest"
+    reference_error = 0.0
+
+    def __init__(self, images: Sequence[SourceImage], options: EncodeOptions) -> None:
+        chosen = np.linspace(0, len(images) - 1, min(TRIED, len(images))).astype(int)
+        whole = [read_image(images[i].load()) for i in np.unique(chosen)]
+        self._pixels = [pixels[:CORNER, :CORNER] for pixels in whole]
+        tried = sum(pixels.size for pixels in self._pixels)
+        part = tried / max(sum(pixels.size for pixels in whole), 1)
+        self._times = len(images) / max(len(whole), 1) / (part or 1)
+        self._options = options
+        self._settings: list[Setting] = []
+        for name, profile in PROFILES.items():
+            knobs: dict[str, Any] = (
+                {"profile": name} if profile.lossy else {"profile": name, "max_error": 0}
+            )
+            with suppress(MissingComponentError):
+                if self._pixels:  # compiles what is compiled
+                    encode(self._pixels[0][:8, :8], replace(options, **knobs))
+                self._settings.append(Setting(f"--profile {name}", knobs))
+
+    def settings(self) -> Sequence[Setting]:
+        """See `Experiment.settings`."""
+        return self._settings
+
+    def measure(self, setting: Setting) -> Measured:
+        """See `Experiment.measure`."""
+        options = replace(self._options, **setting.knobs)
+        files, seconds = timed(lambda: [encode(pixels, options) for pixels in self._pixels])
+        raw = np.array([pixels.nbytes for pixels in self._pixels])
+        stored = np.array([len(data) for data in files])
+        return Measured(
+            seconds=seconds * self._times,
+            work=float(sum(pixels.shape[0] * pixels.shape[1] for pixels in self._pixels)),
+            error=float(stored.sum() / max(raw.sum(), 1)),
+            worst=float((stored / raw).max(initial=0.0)),
+        )
+
+
+#: The budget of the reference, which hardly any portal exhausts.
+AMPLE = 2_000_000
+#: Those that are tried, beside the one that the database was built with.
+BUDGETS = (200, 2_000, 20_000, 200_000)
+#: What settings do not say.
+_BASE = PvsOptions()
+
+
+def prepare_visibility(subject: Subject) -> VisibilityTrade:
+    """See `EXPERIMENTS`."""
+    return VisibilityTrade(subject.artifacts[CELLS], subject.options(PVS))
+
+
+class VisibilityTrade:
+    """The experiment of the visibility."""
+
+    work = "operations"
+    error = "wrong pairs of cells, as a share of the right ones"
+    reference_error = 0.0
+
+    def __init__(self, cells: Cells, options: PvsOptions) -> None:
+        """``options``: of them only the budget counts; the rest is what settings say."""
+        self._cells, self._own = cells, options.budget
+        ample = replace(_BASE, method="full", budget=max(AMPLE, options.budget))
+        self._truth = compute_pvs(cells, ample).to_matrix()
+        compute_pvs(cells, replace(_BASE, method="sampled", lines=1))  # now it is compiled
+
+    def settings(self) -> Sequence[Setting]:
+        """See `Experiment.settings`."""
+        return [
+            *(
+                Setting(
+                    f"--pvs sampled --pvs-lines {n}",
+                    {"method": "sampled", "lines": n},
+                    "sampled",
+                    sound=False,
+                )
+                for n in (10, 100, 1000)
+            ),
+            Setting("--pvs fast", {"method": "fast"}),
+            *(
+                Setting(f"--pvs full --pvs-budget {n}", {"method": "full", "budget": n}, "budget")
+                for n in sorted({*BUDGETS, self._own})
+            ),
+        ]
+
+    def measure(self, setting: Setting) -> Measured:
+        """See `Experiment.measure`."""
+        options = replace(_BASE, **setting.knobs)
+        pvs, seconds = timed(lambda: compute_pvs(self._cells, options))
+        found = pvs.to_matrix()
+        extra, missing = found & ~self._truth, self._truth & ~found
+        size = max(int(self._truth.sum()), 1)
+        each = (extra | missing).sum(axis=1) / np.maximum(self._truth.sum(axis=1), 1)
+        return Measured(
+            seconds=seconds,
+            work=float(pvs.work.sum()),
+            error=int((extra | missing).sum()) / size,
+            worst=float(each.max(initial=0.0)),
+            more={"missing": int(missing.sum()) / size},
+        )

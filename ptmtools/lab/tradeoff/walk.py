@@ -1,0 +1,290 @@
+"""What each knob is worth to somebody who walks through the building: the one currency.
+
+A setting changes one option. The database is built again with it, in a copy, and walked through on
+the same way, over the same links, with as many bytes of texture memory. e of the walker is always
+against the full picture of the database as it was, whatever its textures have become.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+
+import numpy as np
+
+from ptmtools.errors import PtmError
+from ptmtools.lab.catalogue import Catalogue, catalogue_of
+from ptmtools.lab.comparing import SimulateOptions, budget_of, counted, play, require_hints
+from ptmtools.lab.forms import PTM
+from ptmtools.lab.measures import SHARES
+from ptmtools.lab.policies import POLICIES
+from ptmtools.lab.tables import limited
+from ptmtools.lab.tradeoff.knobs import (
+    Own,
+    Seconds,
+    Setting,
+    build_again,
+    concerned,
+    copied,
+    own_options,
+    settings,
+)
+from ptmtools.lab.walk import Walk
+from ptmtools.lab.world import World, prepare
+from ptmtools.output.served import Served, Surfaces, read_served
+from ptmtools.pipeline import Artifacts
+from ptmtools.pipeline.build import WARM_UP
+from ptmtools.progress import Progress, silent
+from ptmtools.rendering.pyramids import read_pyramids
+from ptmtools.rendering.records import Pyramids
+
+#: Of the way to the full picture, whose time is told.
+FIRST = 0.9
+
+
+#: Those that walk through whatever a build makes.
+_OF_DATABASES = {name: policy for name, policy in POLICIES.items() if policy.form == PTM}
+
+
+@dataclass(frozen=True)
+class WalkOptions(SimulateOptions):
+    """Who walks, over what; everything else as in `SimulateOptions`."""
+
+    policy: str = field(default="best", metadata={"choices": _OF_DATABASES, "several": True})
+    memory: str = "10%"
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a walker saw.
+
+    Attributes
+    ----------
+    policy, bandwidth, memory: who walked, over what (bit/s, None for no limit), with how much.
+    e, p95: mean over the walk, and what 95 % of the frames do not exceed; 0 to 255.
+    fetched: bytes received on the walk.
+    first: s until `FIRST` of the first picture is there; None if it never is.
+    """
+
+    policy: str
+    bandwidth: float | None
+    memory: str
+    e: float
+    p95: float
+    fetched: int
+    first: float | None
+
+    @property
+    def case(self) -> tuple[str, float | None, str]:
+        """What is compared with what."""
+        return self.policy, self.bandwidth, self.memory
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What came of a setting.
+
+    Attributes
+    ----------
+    name, own: the setting and what the database has instead, as a user gives them; both are empty
+        for the database as it is.
+    option: of the setting.
+    build: seconds of one core that all stages after the scene take.
+    served: bytes of what clients of the hints can fetch.
+    seen: by each walker.
+    problem: why the setting could not be tried; "" if it was.
+    """
+
+    name: str
+    own: str
+    option: str
+    build: float
+    served: int
+    seen: tuple[Seen, ...] = ()
+    problem: str = ""
+
+    def by(self, case: tuple[str, float | None, str]) -> Seen | None:
+        """What was seen in a case."""
+        return next((seen for seen in self.seen if seen.case == case), None)
+
+
+@dataclass(frozen=True)
+class WalkTrade:
+    """All settings tried on one walk.
+
+    Attributes
+    ----------
+    seconds: how long the walk is.
+    own: the database as it is. trials: the settings, in the order of their knobs.
+    """
+
+    seconds: float
+    own: Tried
+    trials: tuple[Tried, ...]
+
+    @property
+    def cases(self) -> list[tuple[str, float | None, str]]:
+        """All that were compared, as `Seen.case` says them."""
+        return [seen.case for seen in self.own.seen]
+
+
+def try_settings(
+    db: Path,
+    artifacts: Artifacts,
+    walk: Walk,
+    options: WalkOptions,
+    knobs: Collection[str] = (),
+    *,
+    quick: bool = False,
+    progress: Progress = silent,
+    tell: Callable[[str], None] = lambda line: None,
+) -> WalkTrade:
+    """Tries settings on a walk through a database, which is not changed.
+
+    Parameters
+    ----------
+    artifacts: of the database. options: who walks, over what.
+    knobs, quick: see `settings`.
+    tell: is told what is tried and how long that may take, once that is known.
+
+    Raises
+    ------
+    DatabaseError: PTM-D004, PTM-D008 a stage has not run, or not by this release; those of
+        `read_served`.
+    InputError: PTM-I700 the walk leads elsewhere; PTM-I701 a policy's hints are not there.
+    """
+    served = read_served(db)
+    require_hints(served, options.policies)
+    own = own_options(artifacts)
+    chosen = list(settings(own, _longest(served), knobs, quick=quick))
+    begin = time.perf_counter()
+    original = prepare(served, walk, progress=progress)
+    looked = time.perf_counter() - begin
+    progress(0, len(chosen), "trying settings")
+    WARM_UP.load()()
+    with copied(db) as copy:
+        seconds = build_again(copy, own)
+    least = sum(
+        looked + sum(seconds[s.name] for s in concerned(setting.knob.stage, own))
+        for setting in chosen
+    )
+    tell(f"{len(chosen)} settings on a walk of {walk.duration:.0f} s; about {minutes(least)}")
+    walker = _Walker(walk, original, options)
+    others = list(dict.fromkeys(s.knob.policy for s in chosen if s.knob.policy))
+    seen = [s for policy in ("", *others) for s in walker.walks(original, policy)]
+    trials = []
+    for done, setting in enumerate(chosen):
+        with copied(db) as copy:
+            trials.append(_tried(copy, setting, own, seconds, walker))
+        progress(done + 1, len(chosen), "trying settings")
+    as_is = Tried("", "", "", sum(seconds.values()), served_bytes(original.catalogue), tuple(seen))
+    return WalkTrade(walk.duration, as_is, tuple(trials))
+
+
+class _Walker:
+    """Walks the same way through databases that were built from the same model."""
+
+    def __init__(self, walk: Walk, original: World, options: WalkOptions) -> None:
+        self._walk, self._original, self._options = walk, original, options
+        stock = counted(original, options)
+        # The same bytes for all, whatever share of theirs that is.
+        self._memory = {
+            str(max(budget_of(stock, m), 1)): m.text for m in dict.fromkeys(options.memories)
+        }
+
+    def world(self, served: Served) -> World:
+        """Of the same walk, as compared with the original."""
+        return compared(served, self._walk, self._original)
+
+    def walks(self, world: World, policy: str = "") -> list[Seen]:
+        """What clients of a policy, or those asked for, see."""
+        options = replace(
+            self._options,
+            policy=policy or self._options.policy,
+            memory=",".join(self._memory),
+        )
+        return [
+            Seen(
+                each.run.policy,
+                each.run.conditions.bandwidth,
+                self._memory[each.memory],
+                each.measures.e.mean,
+                each.measures.e.p95,
+                each.measures.bytes,
+                each.measures.final[SHARES.index(FIRST)],
+            )
+            for each in play({"": counted(world, options)}, options)
+        ]
+
+
+def _tried(copy: Path, setting: Setting, own: Own, seconds: Seconds, walker: _Walker) -> Tried:
+    stage = setting.knob.stage
+    try:
+        options = {**own, stage: setting.options}
+        took = build_again(copy, {each: options[each] for each in concerned(stage, options)})
+        world = walker.world(read_served(copy))
+        seen = walker.walks(world, setting.knob.policy)
+    except PtmError as fault:
+        return Tried(setting.name, setting.own, setting.knob.option, 0, 0, problem=fault.message)
+    build = sum({**seconds, **took}.values())
+    bytes_ = served_bytes(world.catalogue)
+    return Tried(setting.name, setting.own, setting.knob.option, build, bytes_, tuple(seen))
+
+
+def compared(served: Served, walk: Walk, original: World) -> World:
+    """The world of a walk through a database; its errors are against the textures of another
+    one's world, of the same model and the same walk.
+
+    Where only the finest levels of its textures are missing, the tables of the other one know what
+    is seen without them; with the same geometry, nothing is looked at again.
+    """
+    own, full = read_pyramids(served), original.pyramids
+    if not begins_with(full, own):
+        return prepare(served, walk, own, full=full)
+    same = _same(served.surfaces, original.served.surfaces)
+    world = prepare(served, walk, full, views=original.views if same else None)
+    return replace(
+        world,
+        pyramids=own,
+        catalogue=catalogue_of(served, own.differences, own.mean),
+        views=limited(world.views, own.levels),
+    )
+
+
+def begins_with(full: Pyramids, few: Pyramids) -> bool:
+    """Whether each texture of the one has the coarsest levels of that of the other, and no more."""
+    if len(few.levels) != len(full.levels) or (few.levels > full.levels).any():
+        return False
+    for t, count in enumerate(few.levels.tolist()):
+        if (few.size[t, :count] != full.size[t, :count]).any():
+            return False
+        length = 3 * int(few.size[t, :count].prod(axis=1).sum())
+        a, b = int(few.start[t, 0]), int(full.start[t, 0])
+        if (few.texel[a : a + length] != full.texel[b : b + length]).any():
+            return False
+    return True
+
+
+def _same(one: Surfaces, other: Surfaces) -> bool:
+    return all(
+        np.array_equal(getattr(one, each.name), getattr(other, each.name))
+        for each in fields(Surfaces)
+    )
+
+
+def _longest(served: Served) -> int:
+    """The longest side of a texture, texels."""
+    return max((max(t["width"], t["height"]) for t in served.index["textures"]), default=0)
+
+
+def served_bytes(stock: Catalogue) -> int:
+    """All that clients of the hints can fetch."""
+    documents = stock.index_bytes + stock.statistics_bytes + int(stock.record_bytes.sum())
+    return documents + int(stock.geometry_bytes.sum()) + int(stock.ends[:, -1].sum())
+
+
+def minutes(seconds: float) -> str:
+    """A duration as people say it."""
+    return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} minutes"

@@ -1,0 +1,345 @@
+"""All that the runs of a walk share: what is served, what is on the screen, where the walker is.
+
+Made once, which takes most of the time; a run then takes a second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.errors import InputError, LimitError
+from ptmtools.lab.catalogue import Catalogue, catalogue_of
+from ptmtools.lab.forms import FORMS, PTM
+from ptmtools.lab.relief.tables import Relief
+from ptmtools.lab.tables import Views, look_at_forms
+from ptmtools.lab.walk import Browser
+from ptmtools.output.served import Served
+from ptmtools.progress import Progress, silent
+from ptmtools.rendering.pyramids import read_pyramids
+from ptmtools.rendering.rays import Camera, Frustum
+from ptmtools.rendering.records import Pyramids, Shows
+
+if TYPE_CHECKING:
+    from ptmtools.lab.walk import Walk
+
+#: Frames a second that are looked at.
+RATE = 5.0
+#: Pixels of the item buffer that errors are summed over.
+PIXELS = (160, 90)
+#: Pixels of the item buffer of a browser, whatever the form of its screen.
+_ITEM_PIXELS = 3600
+#: Frames of a walk at most: some five hours.
+MOST_FRAMES = 100_000
+#: Share of the walk that may lie in no cell.
+_ASTRAY = 0.05
+#: A viewpoint that in the last second moved less (metres) and turned less (cosine) is still.
+STILL_SECONDS, _STILL_METRES, _STILL_COSINE = 1.0, 1e-3, np.cos(np.radians(1.0))
+
+
+@dataclass(frozen=True)
+class World:
+    """A walk through a database.
+
+    Attributes
+    ----------
+    served, pyramids: what is shown: of the `.ptm`s all levels.
+    catalogue: what clients know.
+    views, view: what is on the screen, and (F,) which of the views each frame has.
+    camera: of the item buffer.
+    time: (F,) s. eye, direction: (F, 3).
+    cell: (F,) that the eye is in; where it is in none, the one before.
+    still: (F,) whether the viewpoint has not moved for a second.
+    rate: frames a second.
+    one_range: whether a client has one range of a file on the way at a time, as browsers must.
+    browser: how the walk was walked in one, or None. Times then are since navigation, and a frame
+        has the view of the item buffer that is at hand.
+    drawn: (F,) the frame in which that was drawn, -1 if there is none; None unless in a browser.
+    colored: whether clients know the mean colour of each texture; else it is grey until its first
+        level comes.
+    form: in which clients take textures, a name in `ptmtools.lab.forms.FORMS`.
+    shows: what the columns show, None for the levels of the pyramids.
+    relief: octrees, which come behind the textures, and what pictures are compared with; None:
+        there are none, and nothing else.
+    beside: the same in other forms, by name.
+    """
+
+    served: Served
+    pyramids: Pyramids
+    catalogue: Catalogue
+    views: Views
+    view: Ints
+    camera: Camera
+    time: Floats
+    eye: Floats
+    direction: Floats
+    cell: Ints
+    still: Bools
+    rate: float = RATE
+    colored: bool = True
+    one_range: bool = False
+    browser: Browser | None = None
+    drawn: Ints | None = None
+    form: str = PTM
+    shows: Shows | None = None
+    relief: Relief | None = None
+    beside: Mapping[str, World] = field(default_factory=dict)
+
+    @property
+    def frames(self) -> int:
+        """How many there are."""
+        return len(self.time)
+
+    def in_form(self, form: str) -> World:
+        """The same for clients that take textures in a form.
+
+        Raises InputError PTM-I701 if it was not made ready for that.
+        """
+        if form == self.form:
+            return self
+        if form not in self.beside:
+            raise InputError(
+                "PTM-I701",
+                f"textures are not at hand as {FORMS[form].about} here",
+                remedy="walk with another policy, or by `ptm simulate`",
+            )
+        return self.beside[form]
+
+    def changed(self, change: Callable[[World], World]) -> World:
+        """A change of this and of what is beside it."""
+        beside = {name: change(world) for name, world in self.beside.items()}
+        return replace(change(self), beside=beside)
+
+    def counted_by_paper(self) -> World:
+        """The same with RGB of three bytes in texture memory."""
+        columns = FORMS[self.form].columns.load()(self.served, True)
+        return replace(self, catalogue=self.catalogue.with_memory(columns.memory))
+
+    def frustum(self, frame: int) -> Frustum:
+        """What the camera of a frame takes in."""
+        aspect, angle = self.camera.aspect, self.camera.field_of_view
+        return Frustum(self.eye[frame], self.direction[frame], angle, aspect)
+
+    def standing(self, seconds: float) -> World:
+        """Who stays at the first frame of this, so long."""
+        rate = RATE if self.browser else self.rate
+        count = int(np.ceil(seconds * rate)) + 1
+        first = np.zeros(count, np.int64)
+        time = np.arange(count) / rate
+        return replace(
+            self,
+            view=self.view[first],
+            time=time,
+            eye=self.eye[first],
+            direction=self.direction[first],
+            cell=self.cell[first],
+            still=time >= STILL_SECONDS,
+            rate=rate,
+            browser=None,
+            drawn=None,
+            beside={name: world.standing(seconds) for name, world in self.beside.items()},
+        )
+
+
+def prepare(
+    served: Served,
+    walk: Walk,
+    pyramids: Pyramids | None = None,
+    *,
+    rate: float = RATE,
+    pixels: tuple[int, int] = PIXELS,
+    progress: Progress = silent,
+    full: Pyramids | None = None,
+    views: Views | None = None,
+    forms: Mapping[str, Shows] | None = None,
+    relief: Relief | None = None,
+) -> World:
+    """The world of a walk.
+
+    Parameters
+    ----------
+    pyramids: of this database, if they have been read already.
+    rate: frames a second. pixels: of the item buffer, across and down.
+    full: that pictures are compared with instead; see `look`.
+    views: of this walk, if they have been made already.
+    forms: other forms that clients may take textures in, as `read_forms` reads them.
+    relief: octrees, and another database to compare with, if it is lit (`relief_of`).
+
+    Raises
+    ------
+    InputError: PTM-I700 the walk does not lead through this database.
+    LimitError: PTM-L700 it is too long.
+    DatabaseError, LimitError: those of `read_pyramids`.
+    """
+    if walk.duration * rate > MOST_FRAMES:
+        raise LimitError(
+            "PTM-L700",
+            f"a walk of {walk.duration:g} s has more than {MOST_FRAMES:,} frames",
+            remedy="give a shorter one",
+        )
+    browser = walk.browser
+    if browser:
+        _require_fitting(browser, served)
+        rate, time = (len(walk.time) - 1) / walk.duration, walk.time
+        eye, direction, cell = walk.eye, walk.direction, browser.cell
+        if (cell < 0).any():
+            cell = np.where(cell < 0, served.locator.along(eye), cell)
+    else:
+        time = np.arange(int(np.floor(walk.duration * rate + 1e-9)) + 1) / rate
+        eye, direction = walk.at(time)
+        cell = served.locator.along(eye)
+    astray = cell < 0
+    if astray.mean() > _ASTRAY:
+        raise InputError(
+            "PTM-I700",
+            f"{astray.mean():.0%} of the walk lies in none of the cells",
+            remedy="give a walk through this very database, such as `ptm path DB` makes",
+        )
+    known = np.maximum.accumulate(np.where(astray, -1, np.arange(len(cell))))
+    cell = cell[np.where(known < 0, int(np.argmax(~astray)), known)]
+    textures = read_pyramids(served, progress) if pyramids is None else pyramids
+    if full is None and relief and relief.reference:
+        full = relief.reference.pyramids
+    camera = Camera(*pixels, walk.field_of_view, walk.aspect)
+    pose, drawn = np.concatenate([eye, direction], axis=1), None
+    if browser:
+        camera, drawn = _camera(walk, browser), _drawn(time, browser.age)
+        pose = pose[np.where(drawn < 0, np.arange(len(time)), drawn)]
+    seen, view = np.unique(pose, axis=0, return_inverse=True)
+    others: list[Views] = []
+    if views is None:
+        eyes, looks = seen[:, :3], seen[:, 3:]
+        shows = [*(forms or {}).values()]
+        views, *others = look_at_forms(
+            served.surfaces, textures, shows, camera, eyes, looks, progress, full=full,
+            relief=relief,
+        )  # fmt: skip
+    catalogue = catalogue_of(served, textures.differences, textures.mean)
+    catalogue = catalogue.as_found(browser) if browser else catalogue
+    world = World(
+        served=served,
+        pyramids=textures,
+        catalogue=catalogue,
+        views=views,
+        view=view.reshape(-1).astype(np.int64),
+        camera=camera,
+        time=time + browser.begun if browser else time,
+        eye=eye,
+        direction=direction,
+        cell=cell,
+        still=_still(time, eye, direction),
+        rate=rate,
+        one_range=browser is not None,
+        browser=browser,
+        drawn=drawn,
+        relief=relief,
+    )
+    beside = {
+        name: replace(
+            world,
+            form=name,
+            catalogue=world.catalogue.in_columns(FORMS[name].columns.load()(served, False)),
+            views=found,
+            shows=shown,
+        )
+        for (name, shown), found in zip((forms or {}).items(), others, strict=True)
+    }
+    world = replace(world, beside=beside)
+    if relief is None:
+        return world
+    from ptmtools.lab.relief.octrees import with_octrees, without_octrees
+
+    octrees = relief.octrees
+    world = world.changed(lambda w: replace(w, catalogue=without_octrees(w.catalogue, octrees)))
+    if not octrees.number:
+        return world
+    drawing = [form.name for form in FORMS.values() if form.octrees]
+    fetched = with_octrees(catalogue, served, octrees)
+    more = {name: replace(world, form=name, catalogue=fetched, beside={}) for name in drawing}
+    return replace(world, beside={**world.beside, **more})
+
+
+def relief_of(
+    served: Served,
+    pyramids: Pyramids,
+    against: Served | None = None,
+    *,
+    lit: bool = True,
+    progress: Progress = silent,
+) -> Relief | None:
+    """The octrees of a database, and another of the same model with whose full picture pictures are
+    compared; both are ``lit`` (`relief.light.lit`) or neither, and then there are no octrees.
+
+    Raises
+    ------
+    InputError: PTM-I703 the other database has other textures.
+    DatabaseError: those of `read_octrees` and `read_pyramids`.
+    """
+    from ptmtools.lab.relief.octrees import no_octrees, read_octrees
+    from ptmtools.lab.relief.tables import Reference
+
+    if against is None and not lit:
+        return None
+    reference = None
+    if against is not None:
+        names = [[row["file"] for row in of.index["textures"]] for of in (served, against)]
+        if names[0] != names[1]:
+            raise InputError(
+                "PTM-I703",
+                "has other textures than what is walked through",
+                file=against.folder,
+                remedy="give a database of the same model, with --against",
+            )
+        full = read_pyramids(against, progress)
+        same = all(np.array_equal(full[k], pyramids[k]) for k in range(len(full)))
+        reference = Reference(against.surfaces, pyramids if same else full)
+    octrees = read_octrees(served) if lit else no_octrees(served.surfaces)
+    return Relief(octrees, reference)
+
+
+def read_forms(
+    served: Served, pyramids: Pyramids, names: Iterable[str], progress: Progress = silent
+) -> dict[str, Shows]:
+    """What textures show in the forms of those names, but for the `.ptm`s themselves.
+
+    Raises DatabaseError, LimitError: see `Form.shows`.
+    """
+    known = (FORMS[name] for name in dict.fromkeys(names))
+    return {f.name: f.shows.load()(served, pyramids, progress) for f in known if f.shows}
+
+
+def _require_fitting(browser: Browser, served: Served) -> None:
+    if len(browser.record_bytes) != served.cell_count:
+        raise InputError(
+            "PTM-I700",
+            f"was recorded among {len(browser.record_bytes)} cells, not {served.cell_count}",
+            remedy="give the database whose site it was recorded on",
+        )
+
+
+def _camera(walk: Walk, browser: Browser) -> Camera:
+    """With twice as many pixels each way as the viewer's item buffer has."""
+    tall = max(1, round(np.sqrt(_ITEM_PIXELS / walk.aspect)))
+    wide = max(1, round(_ITEM_PIXELS / tall))
+    return Camera(2 * wide, 2 * tall, walk.field_of_view, walk.aspect, browser.lines)
+
+
+def _drawn(time: Floats, age: Floats) -> Ints:
+    """(F,) the frame in which the item buffer was drawn that is at hand in each, -1 without one."""
+    # It is dated by the beginning of its frame, frames by their end.
+    frames: Ints = np.where(age < 0, -1, np.searchsorted(time, time - age, "right"))
+    return frames
+
+
+def _still(time: Floats, eye: Floats, direction: Floats) -> Bools:
+    found = np.zeros(len(time), dtype=bool)
+    begin = np.searchsorted(time, time - STILL_SECONDS - 1e-9)
+    for f in np.flatnonzero(time >= STILL_SECONDS).tolist():
+        last = slice(int(begin[f]), f + 1)
+        moved = np.abs(eye[last] - eye[f]).max()
+        found[f] = moved < _STILL_METRES and (direction[last] @ direction[f]).min() > _STILL_COSINE
+    return found

@@ -1,0 +1,1 @@
+"""Neighbouring systems: octree textures, interlaced images, campus levels of detail."""

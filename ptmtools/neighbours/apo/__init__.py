@@ -1,0 +1,23 @@
+"""Appearance-preserving octree textures (Lacoste et al.): a high-polygon mesh becomes a simplified
+one, and an octree of its normals that is a GPU data structure and a stream at once.
+
+`make_apo` makes both of a mesh, `files_of` the files of a folder; `read_octree` and `read_mesh`
+read one back, or its first levels.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ptmtools.lazy import names
+
+if TYPE_CHECKING:
+    from ptmtools.neighbours.apo.files import (
+        files_of as files_of,
+        read_mesh as read_mesh,
+        read_octree as read_octree,
+    )
+    from ptmtools.neighbours.apo.making import Made as Made, make_apo as make_apo
+    from ptmtools.neighbours.apo.model import ApoOptions as ApoOptions, Octree as Octree
+
+__getattr__ = names(__name__)

@@ -1,0 +1,140 @@
+"""The check of a folder with an octree texture, and what `ptm info` says of one."""
+
+from __future__ import annotations
+
+import os
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ptmtools.diagnostics import Findings, Severity, ValidationReport
+from ptmtools.errors import InputError, PtmError
+from ptmtools.files import open_below
+from ptmtools.neighbours.apo.files import (
+    COLORS,
+    INDEX,
+    MESH,
+    NORMALS,
+    OBJ,
+    Index,
+    mesh_bytes,
+    mesh_of,
+    read_index,
+    read_octree,
+)
+from ptmtools.neighbours.apo.octree import fault_of
+from ptmtools.quantities import count, size
+from ptmtools.texture.model import Limits
+
+#: Code → (severity, what it means). docs/formats/apo.md repeats this table.
+CODES: dict[str, tuple[Severity, str]] = {
+    "PTM-D850": ("error", "a file of an octree texture is missing, or cannot be read"),
+    "PTM-D851": ("error", "apo.json does not match its schema, or contradicts itself"),
+    "PTM-D852": ("error", "a stream of texels is damaged, or longer than its levels"),
+    "PTM-D853": ("error", "the texels are no octree, breadth first"),
+    "PTM-D854": ("error", "the simplified mesh is damaged, or not that of apo.json"),
+    "PTM-D855": ("error", "the simplified mesh leads out of the cube of the octree"),
+    "PTM-D856": ("warning", "a file that `ptm apo` did not write"),
+}
+_NAMES = (INDEX, NORMALS, COLORS, MESH, OBJ)
+
+
+def check_folder(folder: Path, limits: Limits) -> ValidationReport:
+    """Checks all that can be checked without the source."""
+    found = Findings(CODES)
+    try:
+        there = sorted(os.listdir(folder))
+    except OSError as fault:
+        raise InputError(
+            "PTM-I844", f"cannot be read ({fault.strerror or fault})", file=folder
+        ) from None
+    for name in there:
+        if name not in _NAMES:
+            found.add("PTM-D856", name, "", "is not part of an octree texture")
+    sizes = {name: _size(folder, name, found) for name in there if name in _NAMES}
+    held = {name: bytes_ for name, bytes_ in sizes.items() if bytes_ is not None}
+    try:
+        index = read_index(folder)
+    except PtmError as fault:
+        found.add("PTM-D851", INDEX, fault.place or "", fault.message)
+    else:
+        wanted = [NORMALS, MESH, OBJ, *([COLORS] if index.colors else [])]
+        for name in wanted:
+            if name not in there:
+                found.add("PTM-D850", name, "", "is missing")
+        _check_octree(folder, index, held, found)
+        if MESH in held:
+            _check_mesh(folder, index, held[MESH], found)
+    return ValidationReport(found.issues(), len(held), sum(held.values()))
+
+
+def _size(folder: Path, name: str, found: Findings) -> int | None:
+    """Bytes of a file, if it is one."""
+    try:
+        with open_below(folder, name) as file:
+            return os.fstat(file.fileno()).st_size
+    except OSError as fault:
+        found.add("PTM-D850", name, "", f"cannot be read ({fault.strerror or fault})")
+        return None
+
+
+def _check_octree(folder: Path, index: Index, held: Mapping[str, int], found: Findings) -> None:
+    for stream in (index.normals, index.colors):
+        if stream and held.get(stream.file, 0) > stream.ends[-1]:
+            found.add("PTM-D852", stream.file, "", "goes on behind the last level")
+    if NORMALS not in held or (index.colors and COLORS not in held):
+        return
+    try:
+        octree = read_octree(folder)
+    except PtmError as fault:
+        found.add("PTM-D852", Path(fault.file or NORMALS).name, fault.place or "", fault.message)
+        return
+    if wrong := fault_of(octree):
+        found.add("PTM-D853", NORMALS, *wrong)
+
+
+def _check_mesh(folder: Path, index: Index, size: int, found: Findings) -> None:
+    if size != index.mesh["bytes"]:
+        found.add("PTM-D854", MESH, "", "is not the file that apo.json describes")
+        return
+    try:
+        data = mesh_bytes(folder)
+        if zlib.crc32(data) != index.mesh["crc32"]:
+            found.add("PTM-D854", MESH, "", "is not the file that apo.json describes")
+            return
+        mesh = mesh_of(data)
+    except PtmError as fault:
+        found.add("PTM-D854", MESH, "", fault.message)
+        return
+    if len(mesh.triangles) != index.mesh["faces"]:
+        found.add("PTM-D854", MESH, "", "has not as many faces as apo.json says")
+    q = (mesh.points - index.low) / index.side
+    if outside := int(((q < 0) | (q >= 1)).any(axis=1).sum()):
+        found.add("PTM-D855", MESH, "", f"{count(outside, 'point')} outside of the cube")
+
+
+def _about(deviation: float | None) -> str:
+    return "an unknown distance" if deviation is None else f"about {deviation:.3g} m"
+
+
+def describe(folder: Path) -> tuple[tuple[str, ...], Mapping[str, Any]]:
+    """What `ptm info` prints of an octree texture, and its record."""
+    index = read_index(folder)
+    document, streams = index.document, [s for s in (index.normals, index.colors) if s]
+    source, mesh = document["source"], index.mesh
+    lines = [
+        f"{'mesh':<9} {mesh['faces']:,} faces of {source['triangles']:,}, {size(mesh['bytes'])}; "
+        f"deviates by {_about(source['deviation'])}",
+        f"{'octree':<9} {count(index.levels, 'level')}, {int(index.start[-1]):,} texels, "
+        f"{size(4 * int(index.start[-1]) * len(streams))} of texture memory",
+        f"{'level':>9} {'texels':>10} {'bytes':>10} {'up to here':>11}",
+    ]
+    ends = np.sum([stream.ends for stream in streams], axis=0)
+    for k, (texels, part) in enumerate(
+        zip(np.diff(index.start).tolist(), np.diff(ends, prepend=0).tolist(), strict=True)
+    ):
+        lines.append(f"{k:>9} {texels:>10,} {part:>10,} {int(ends[k]):>11,}")
+    return tuple(lines), document

@@ -1,0 +1,357 @@
+"""An octree texture and its mesh as a folder (docs/formats/apo.md; paper 2, §3.2 and §4).
+
+Each level of a stream ends with a full flush of deflate: from there on nothing refers to what was
+before, so that every prefix of whole levels inflates, and every level alone. The flushes of all
+levels together cost some 5 bytes each.
+
+The simplified mesh as a GLB of one primitive, and as an OBJ; and the GLB back.
+
+An octree texture back from its folder, or from the beginning of its stream.
+
+A folder may come from a stranger: the index is read by its schema and must not contradict itself,
+and sizes are held against what addresses allow before memory is taken for them."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools import schemas
+from ptmtools.arrays import Floats, Ints
+from ptmtools.errors import InputError, LimitError, naming
+from ptmtools.files import open_below
+from ptmtools.glb import BINARY, INT, JSON, SHORT, BufferWriter, glb_chunks, one_mesh
+from ptmtools.neighbours.apo.making import Made, Simple
+from ptmtools.neighbours.apo.model import ADDRESS_BITS, Octree
+from ptmtools.whole_folder import FolderForm
+
+
+def glb_of(mesh: Simple) -> bytes:
+    """A GLB: positions, normals, indices."""
+    buffer = BufferWriter()
+    attributes = {
+        "POSITION": buffer.positions(mesh.points),
+        "NORMAL": buffer.vectors(mesh.normals),
+    }
+    indices = buffer.indices(mesh.triangles, len(mesh.points))
+    return one_mesh([{"attributes": attributes, "indices": indices}], buffer)
+
+
+def obj_of(mesh: Simple) -> bytes:
+    """The same as an OBJ."""
+    point, triangle = mesh.points.astype(np.float32), mesh.triangles
+    lines = ["# The simplified mesh of an octree texture; see apo.json."]
+    lines += ["v " + " ".join(str(v) for v in row) for row in point]
+    lines += ["vn " + " ".join(str(v) for v in row) for row in mesh.normals]
+    corners = (triangle.astype(np.int64) + 1).tolist()
+    lines += ["f " + " ".join(f"{v}//{v}" for v in row) for row in corners]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def mesh_of(data: bytes) -> Simple:
+    """The mesh of a GLB that `glb_of` wrote.
+
+    Raises InputError PTM-I846: it is not such a GLB.
+    """
+    try:
+        chunks = {kind: body for kind, _, body in glb_chunks(data)}
+        document = schemas.parse(chunks[JSON])
+        views, accessors = document["bufferViews"], document["accessors"]
+        vertices, corners = (int(accessors[k]["count"]) for k in (0, 2))
+        indices = {SHORT: "<u2", INT: "<u4"}[accessors[2]["componentType"]]
+        wanted = (3 * vertices, "<f4"), (3 * vertices, "<f4"), (corners, indices)
+        arrays = []
+        for k, (count, kind) in enumerate(wanted):
+            begin, length = int(views[k]["byteOffset"]), count * np.dtype(kind).itemsize
+            if count <= 0 or begin < 0 or begin + length > len(chunks[BINARY]):
+                raise ValueError("an accessor leads out of its bytes")
+            arrays.append(np.frombuffer(chunks[BINARY], kind, count, begin).reshape(-1, 3))
+        point, normal, triangle = arrays
+        if triangle.max() >= vertices or not all(np.isfinite(a).all() for a in (point, normal)):
+            raise ValueError("an index is out of range, or a number not finite")
+    except (ValueError, LookupError, TypeError, OverflowError) as fault:
+        raise InputError(
+            "PTM-I846",
+            f"is no GLB of a simplified mesh ({fault.args[-1] if fault.args else 'damaged'})",
+            remedy="write it again with `ptm apo`",
+        ) from None
+    return Simple(point.astype(np.float64), triangle.astype(np.int32), normal)
+
+
+FORMAT, SCHEMA = "ptmtools apo", 1
+INDEX, NORMALS, COLORS, MESH, OBJ = "apo.json", "apo.bin", "color.bin", "mesh.glb", "mesh.obj"
+FORM = FolderForm(INDEX, FORMAT, "ptm apo", lambda p: p in (INDEX, NORMALS, COLORS, MESH, OBJ))
+
+
+def streamed(texels: NDArray[np.uint8], octree: Octree) -> tuple[bytes, dict[str, list[int]]]:
+    """The stream of (n, 4) texels of an octree, where each level ends in it, and checksums."""
+    deflate = zlib.compressobj(zlib.Z_BEST_COMPRESSION)
+    parts: list[bytes] = []
+    ends, checks, at = [], [], 0
+    for k in range(octree.levels):
+        level = texels[octree.start[k] : octree.start[k + 1]].tobytes()
+        last = k == octree.levels - 1
+        flushed = zlib.Z_FINISH if last else zlib.Z_FULL_FLUSH
+        part = deflate.compress(level) + deflate.flush(flushed)
+        parts.append(part)
+        at += len(part)
+        ends.append(at)
+        checks.append(zlib.crc32(level))
+    return b"".join(parts), {"ends": ends, "crc32": checks}
+
+
+def files_of(made: Made) -> Iterator[tuple[str, bytes]]:
+    """Name and contents of each file, the index last."""
+    octree, streams = made.octree, {}
+    wanted = {"normals": (NORMALS, octree.texels), "colors": (COLORS, octree.colors)}
+    for what, (name, texels) in wanted.items():
+        if texels is not None:
+            data, levels = streamed(texels, octree)
+            streams[what] = {"file": name, **levels}
+            yield name, data
+    mesh = glb_of(made.mesh)
+    yield MESH, mesh
+    yield OBJ, obj_of(made.mesh)
+    document = json.dumps(_document(made, streams, mesh), indent=1, allow_nan=False)
+    yield INDEX, f"{document}\n".encode()
+
+
+def _document(made: Made, streams: dict[str, Any], mesh: bytes) -> dict[str, Any]:
+    octree = made.octree
+    return {
+        "format": FORMAT,
+        "schema": SCHEMA,
+        "space": {
+            "origin": list(made.space.origin),
+            "unit": made.space.metres,
+            "up": made.space.up,
+        },
+        "cube": {"low": octree.low.tolist(), "side": octree.side},
+        "levels": np.diff(octree.start).tolist(),
+        **streams,
+        "mesh": {
+            "file": MESH,
+            "faces": len(made.mesh.triangles),
+            "bytes": len(mesh),
+            "crc32": zlib.crc32(mesh),
+        },
+        "source": {
+            "triangles": made.source,
+            "deviation": made.deviation if math.isfinite(made.deviation) else None,
+            "missed": made.missed,
+        },
+        "options": asdict(made.options),
+    }
+
+
+_AGAIN = "write it again with `ptm apo`"
+#: An index of 21 levels has 3 kB; more fields may be added.
+_INDEX_MOST = 1 << 20
+#: Deflate makes nothing larger than by this factor and so many bytes besides.
+_GROWTH, _BESIDES = 1.01, 64
+#: Bytes of a GLB of 4 million vertices.
+_MESH_MOST = 1 << 28
+
+
+@dataclass(frozen=True)
+class Stream:
+    """A file of texels: where each level ends, and its checksum."""
+
+    file: str
+    ends: tuple[int, ...]
+    crc32: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Index:
+    """What `apo.json` says.
+
+    Attributes
+    ----------
+    start: (L + 1,) the texel at which each level begins.
+    low, side: of the cube.
+    normals, colors: the streams; colours may be None.
+    mesh: faces, bytes and checksum of the mesh's file.
+    document: all of it.
+    """
+
+    start: Ints
+    low: Floats
+    side: float
+    normals: Stream
+    colors: Stream | None
+    mesh: Mapping[str, Any]
+    document: Mapping[str, Any]
+
+    @property
+    def levels(self) -> int:
+        """How many there are."""
+        return len(self.start) - 1
+
+
+def read_index(folder: str | os.PathLike[str]) -> Index:
+    """The index of an octree texture.
+
+    Raises
+    ------
+    InputError: PTM-I841 no octree texture there; PTM-I842 not as its schema says, or of another
+        number; PTM-I843 it contradicts itself; PTM-I844 it cannot be read.
+    LimitError: PTM-L840 more texels than there are addresses; PTM-L841 too large for an index.
+    """
+    file = Path(folder) / INDEX
+    if not os.path.lexists(file):
+        there = Path(folder).is_dir()
+        raise InputError(
+            "PTM-I841",
+            f"holds no octree texture: there is no {INDEX} in it" if there else "is no folder",
+            file=folder,
+            remedy="name a folder that `ptm apo` wrote",
+        )
+    data = _bytes_of(folder, INDEX, _INDEX_MOST)
+    with naming(file):
+        return _index(data)
+
+
+def _index(data: bytes) -> Index:
+    try:
+        document = schemas.parse(data)
+        said = document if isinstance(document, dict) else {}
+        if (said.get("format"), said.get("schema")) != (FORMAT, SCHEMA):
+            raise schemas.ShapeError(
+                f"is {said.get('format')!r}, schema {said.get('schema')!r}, not "
+                f"{FORMAT!r}, schema {SCHEMA}"
+            )
+        schemas.check(document, schemas.APO)
+    except schemas.ShapeError as fault:
+        raise InputError(
+            "PTM-I842", fault.message, place=fault.place or None, remedy=_AGAIN
+        ) from None
+    start: Ints = np.concatenate([[0], np.cumsum(document["levels"], dtype=np.float64)])
+    if start[-1] > 1 << ADDRESS_BITS:
+        raise LimitError(
+            "PTM-L840",
+            f"has {start[-1]:.4g} texels, more than the {1 << ADDRESS_BITS:,} that addresses can "
+            "tell apart",
+            remedy=_AGAIN,
+        )
+    found = Index(
+        start.astype(np.int64),
+        np.array(document["cube"]["low"], dtype=np.float64),
+        float(document["cube"]["side"]),
+        _stream(document["normals"]),
+        _stream(document["colors"]) if "colors" in document else None,
+        document["mesh"],
+        document,
+    )
+    _check(found)
+    return found
+
+
+def _stream(row: Mapping[str, Any]) -> Stream:
+    return Stream(row["file"], tuple(row["ends"]), tuple(row["crc32"]))
+
+
+def _check(index: Index) -> None:
+    wrong = ""
+    streams = [(index.normals, NORMALS), *([(index.colors, COLORS)] if index.colors else [])]
+    for stream, name in streams:
+        if stream.file != name:
+            wrong = f"a stream is called {stream.file[:40]!r} instead of {name!r}"
+        elif {len(stream.ends), len(stream.crc32)} != {index.levels}:
+            wrong = f"{name} has not as many levels as there are"
+        elif ((size := np.diff(stream.ends, prepend=0)) <= 0).any():
+            wrong = f"the levels of {name} do not follow each other"
+        elif (size > 4 * np.diff(index.start) * _GROWTH + _BESIDES).any():
+            wrong = f"a level of {name} takes more than its texels"
+    if index.mesh["file"] != MESH:
+        wrong = f"the mesh is called {str(index.mesh['file'])[:40]!r} instead of {MESH!r}"
+    if wrong:
+        raise InputError("PTM-I843", wrong, remedy=_AGAIN)
+
+
+def read_octree(folder: str | os.PathLike[str], levels: int | None = None) -> Octree:
+    """The first ``levels`` of an octree texture, or all of it.
+
+    Raises
+    ------
+    InputError, LimitError: those of `read_index`; PTM-I840 there are not so many levels; PTM-I845 a
+        stream is damaged.
+    """
+    index = read_index(folder)
+    wanted = index.levels if levels is None else levels
+    if not 1 <= wanted <= index.levels:
+        raise InputError(
+            "PTM-I840",
+            f"there is no octree of {wanted} levels",
+            file=folder,
+            remedy=f"give 1 to {index.levels}",
+        )
+    texels = _texels(folder, index, index.normals, wanted)
+    colors = _texels(folder, index, index.colors, wanted) if index.colors else None
+    return Octree(texels, index.start[: wanted + 1], index.low, index.side, colors)
+
+
+def _texels(
+    folder: str | os.PathLike[str], index: Index, stream: Stream, levels: int
+) -> NDArray[np.uint8]:
+    data = _bytes_of(folder, stream.file, stream.ends[levels - 1], whole=False)
+    with naming(Path(folder) / stream.file):
+        return inflated(data, index.start[: levels + 1], stream)
+
+
+def inflated(data: bytes, start: Ints, stream: Stream) -> NDArray[np.uint8]:
+    """(n, 4) texels of the first levels, of the beginning of a stream.
+
+    Raises InputError PTM-I845: it is damaged, or too short.
+    """
+    inflate, parts, at = zlib.decompressobj(), [], 0
+    for k, end in enumerate(stream.ends[: len(start) - 1]):
+        size = 4 * int(start[k + 1] - start[k])
+        try:
+            part = inflate.decompress(data[at:end], size + 1)
+        except zlib.error:
+            part = b""
+        if end > len(data) or len(part) != size or zlib.crc32(part) != stream.crc32[k]:
+            what = "ends before it is whole" if end > len(data) else "is damaged"
+            raise InputError("PTM-I845", what, place=f"level {k}", remedy=_AGAIN)
+        parts.append(part)
+        at = end
+    return np.frombuffer(b"".join(parts), np.uint8).reshape(-1, 4)
+
+
+def read_mesh(folder: str | os.PathLike[str]) -> Simple:
+    """The simplified mesh of an octree texture.
+
+    Raises InputError: PTM-I844 it cannot be read; PTM-I846 it is damaged. LimitError PTM-L841.
+    """
+    with naming(Path(folder) / MESH):
+        return mesh_of(mesh_bytes(folder))
+
+
+def mesh_bytes(folder: str | os.PathLike[str]) -> bytes:
+    """The mesh's file. Raises InputError PTM-I844, LimitError PTM-L841."""
+    return _bytes_of(folder, MESH, _MESH_MOST)
+
+
+def _bytes_of(folder: str | os.PathLike[str], name: str, most: int, *, whole: bool = True) -> bytes:
+    """A file, or with ``whole`` False its first ``most`` bytes."""
+    file = Path(folder) / name
+    try:
+        with open_below(folder, name) as stream:
+            data = stream.read(most + whole)
+    except OSError as fault:
+        raise InputError(
+            "PTM-I844", f"cannot be read ({fault.strerror or fault})", file=file, remedy=_AGAIN
+        ) from None
+    if len(data) > most:
+        raise LimitError("PTM-L841", f"has more than {most:,} bytes", file=file, remedy=_AGAIN)
+    return data

@@ -1,0 +1,160 @@
+"""From a model of many triangles to a simplified mesh and the octree of its normals.
+
+The steps of paper 2, §3.1: the mesh is brought into a cube and simplified; the simplified mesh is
+sampled, and rays find what of the source each sample stands for; the octree is divided until the
+normals in a leaf are alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Floats, Ints, Singles
+from ptmtools.executors import Executor
+from ptmtools.neighbours.apo.blocks import Surface, Work, build
+from ptmtools.neighbours.apo.model import ApoOptions, Octree
+from ptmtools.neighbours.apo.normals import corner_normals
+from ptmtools.neighbours.apo.octree import Bounds, cube_around, octree_of
+from ptmtools.neighbours.apo.sampling import Paint, Source, paint_of, spacing_for
+from ptmtools.progress import Progress, silent
+from ptmtools.scene.model import Scene, Space
+from ptmtools.simplification import Mesh, SimplifyOptions, simplify
+
+#: The longest edge of a triangle that is sampled as one, as a share of the cube: two cells of the
+#: blocks, so that a triangle lies in few of them.
+_LONGEST = 0.125
+_TWICE = "faces that lie in the same place count once: a place has one normal"
+
+
+@dataclass(frozen=True)
+class Simple:
+    """A simplified mesh.
+
+    Attributes
+    ----------
+    points: (V, 3) float64, in the units of the source. triangles: (T, 3) int32.
+    normals: (V, 3) float32 unit normals, smooth everywhere.
+    """
+
+    points: Floats
+    triangles: NDArray[np.int32]
+    normals: Singles
+
+
+@dataclass(frozen=True)
+class Made:
+    """What `make_apo` makes.
+
+    Attributes
+    ----------
+    mesh, octree: see their classes.
+    source: triangles of the source.
+    deviation: of the simplified mesh from the source, in its units, as the quadrics estimate it.
+    missed: share of the samples from which no ray found the source.
+    options: what it was made with.
+    space: how the model's coordinates became those of the mesh.
+    notes: what there is to say, one line each.
+    """
+
+    mesh: Simple
+    octree: Octree
+    source: int
+    deviation: float
+    missed: float
+    options: ApoOptions
+    space: Space
+    notes: tuple[str, ...] = ()
+
+
+def make_apo(
+    scene: Scene, options: ApoOptions, executor: Executor, progress: Progress = silent
+) -> Made:
+    """The simplified mesh and the octree texture of all triangles of a scene.
+
+    Raises
+    ------
+    LimitError: PTM-L840 the octree has too many texels.
+    MissingComponentError: PTM-M290 ``method`` asks for pymeshlab, which cannot be loaded.
+    """
+    points, triangles = welded(scene.points, scene.triangles)
+    triangles, kept = once(triangles)
+    simplified = simplify(
+        Mesh(points, triangles), SimplifyOptions(options.faces, method=options.method), progress
+    )
+    mesh = smooth(simplified.mesh.points, simplified.mesh.triangles)
+    paint = paint_of(scene, kept) if options.color else None
+    octree, missed = octree_around(mesh, points, triangles, options, paint, executor, progress)
+    return Made(
+        mesh,
+        octree,
+        len(triangles),
+        simplified.error,
+        missed,
+        options,
+        scene.space,
+        (*simplified.notes, *([_TWICE] if len(kept) < len(scene.triangles) else [])),
+    )
+
+
+def octree_around(
+    mesh: Simple,
+    points: Floats,
+    triangles: NDArray[np.int32],
+    options: ApoOptions,
+    paint: Paint | None,
+    executor: Executor,
+    progress: Progress = silent,
+) -> tuple[Octree, float]:
+    """The octree of the normals of (T, 3) triangles between (P, 3) points, each of which is there
+    once, around what was made of them; and the share of its samples that no ray found them from.
+
+    Raises LimitError PTM-L840: it has too many texels.
+    """
+    cube = cube_around(np.concatenate([points, mesh.points]))
+    source = Source(
+        cube.inside(points).astype(np.float32),
+        triangles,
+        corner_normals(points, triangles).astype(np.float32),
+        paint,
+    )
+    corner = cube.inside(mesh.points)[mesh.triangles]
+    surface = Surface(corner, mesh.normals[mesh.triangles].astype(np.float64)).cut_up(_LONGEST)
+    work = Work(
+        source,
+        surface,
+        # Closer than half a leaf of the greatest depth samples say nothing more.
+        max(
+            spacing_for(surface.corner, options.density * len(triangles)),
+            0.5 ** (options.depth + 1),
+        ),
+        Bounds(options.error, options.color_error, options.depth),
+    )
+    levels, missed = build(work, executor, progress)
+    return octree_of(levels, cube), missed
+
+
+def once(triangles: NDArray[np.int32]) -> tuple[NDArray[np.int32], Ints]:
+    """Triangles of which none has the same corners as another, and their numbers: of a face with
+    two sides one is kept, since a place has one normal."""
+    _, first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
+    kept = np.sort(first)
+    return triangles[kept], kept
+
+
+def smooth(points: Floats, triangles: NDArray[np.int32]) -> Simple:
+    """A mesh with normals that are smooth at creases too: between rays that spread apart there a
+    part of the source would be left out."""
+    corner = corner_normals(points, triangles, 180.0)
+    normals = np.zeros((len(points), 3), np.float32)
+    normals[triangles.ravel()] = corner.reshape(-1, 3)  # equal at all corners of a point
+    return Simple(points, triangles, normals)
+
+
+def welded(points: Floats, triangles: NDArray[np.int32]) -> tuple[Floats, NDArray[np.int32]]:
+    """The same triangles over points each of which is there once."""
+    rows = np.ascontiguousarray(points + 0.0).view([("", np.float64)] * 3).ravel()
+    _, first, number = np.unique(rows, return_index=True, return_inverse=True)
+    return points[first], number.reshape(-1)[triangles].astype(np.int32)

@@ -1,0 +1,166 @@
+"""The normal of an octree texture at a point, as a client reads it (docs/formats/apo.md, "Looking
+a normal up"; Lacoste et al., section 3.2).
+
+Points are followed one by one in a kernel; `plain_look_up` takes all of them down a level at a
+time.
+Addresses that lead out of the octree, as damaged files have them, are taken for absent children.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.compiled import plain_kernel
+from ptmtools.neighbours.apo.model import Octree
+
+#: Deeper than any octree: nothing stops there.
+NEVER = 127
+#: Texels in a row of the 2-D texture that the array is laid out in for graphics hardware.
+WIDTH = 4096
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where look-ups of n points end.
+
+    Attributes
+    ----------
+    address: (n,) of the texel whose normal is taken.
+    depth: (n,) of its node; 0 is the cube.
+    normals: (n, 3) unit normals.
+    """
+
+    address: Ints
+    depth: Ints
+    normals: Floats
+
+
+def look_up(
+    octree: Octree, q: Floats, levels: int | None = None, stop: Ints | int | None = None
+) -> Found:
+    """The normals at (n, 3) points ``q`` of the cube with ``levels`` there (all of the octree's, if
+    None), at most to the depths ``stop``, one or (n,).
+
+    Points outside the cube count as the nearest within it. ValueError if there is no level.
+    """
+    inside, depth = _asked(octree, q, levels, stop)
+    at, deep = np.empty(len(q), dtype=np.int64), np.empty(len(q), dtype=np.int64)
+    _walk(np.ascontiguousarray(octree.texels), inside, depth, at, deep)
+    return Found(at, deep, unpacked(octree.texels[at]))
+
+
+def plain_look_up(
+    octree: Octree, q: Floats, levels: int | None = None, stop: Ints | int | None = None
+) -> Found:
+    """What `look_up` computes, to be read and compared with."""
+    rest, limit = _asked(octree, q, levels, stop)
+    texel = octree.texels.astype(np.int64)
+    at, depth = np.zeros(len(q), dtype=np.int64), np.zeros(len(q), dtype=np.int64)
+    going = np.arange(len(q))
+    while len(going):
+        here = at[going]
+        present = texel[here, 3]
+        on: Bools = (present != 0) & (depth[going] < limit[going]) & (here + 1 < len(texel))
+        going, here, present = going[on], here[on], present[on]
+        doubled = 2 * rest[going]
+        half = doubled >= 1
+        rest[going] = doubled - half
+        child = half @ np.array([1, 2, 4])
+        red, green, blue, inner = texel[here + 1].T
+        below = (1 << child) - 1
+        first = red + (green << 8) + (blue << 16)
+        there = first + np.bitwise_count(present & below) + np.bitwise_count(inner & below)
+        on = (present >> child & 1 == 1) & (there < len(texel))
+        going = going[on]
+        at[going] = there[on]
+        depth[going] += 1
+    return Found(at, depth, unpacked(octree.texels[at]))
+
+
+def stop_depth(step: Floats) -> Ints:
+    """⌈log₂(1 / D)⌉ of distances D >= 0 in the cube; `NEVER` for 0. Exact: it is −⌊log₂ D⌋, so the
+    exponent of D as a number in floating point."""
+    _, exponent = np.frexp(step)
+    depth = np.where(step > 0, 1 - exponent, NEVER)
+    return np.minimum(depth, NEVER).astype(np.int64)
+
+
+def rows_of(texels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """(n, 4) texels as (h, `WIDTH`, 4) rows of a texture, the end filled with zeros; texel a is in
+    row a div `WIDTH`."""
+    height = max(1, -(-len(texels) // WIDTH))
+    out = np.zeros((height * WIDTH, 4), dtype=np.uint8)
+    out[: len(texels)] = texels
+    return out.reshape(height, WIDTH, 4)
+
+
+def unpacked(texels: NDArray[np.uint8]) -> Floats:
+    """(n, 3) unit normals of (n, 4) texels."""
+    vector = texels[:, :3] / 127.5 - 1.0
+    return np.asarray(vector / np.linalg.norm(vector, axis=1, keepdims=True))
+
+
+def _asked(
+    octree: Octree, q: Floats, levels: int | None, stop: Ints | int | None
+) -> tuple[Floats, Ints]:
+    """Points within the cube, and (n,) how deep each may go."""
+    deepest = (octree.levels if levels is None else min(levels, octree.levels)) - 1
+    if deepest < 0:
+        raise ValueError("there is no level to look up in")
+    inside = np.clip(np.asarray(q, dtype=np.float64), 0.0, np.nextafter(1.0, 0.0))
+    limit = np.full(len(q), deepest, dtype=np.int64)
+    if stop is not None:
+        limit = np.minimum(limit, stop)
+    return np.nan_to_num(inside, nan=0.0), limit
+
+
+@plain_kernel
+def _ones(mask: int) -> int:
+    count = 0
+    while mask:
+        mask &= mask - 1
+        count += 1
+    return count
+
+
+@plain_kernel
+def child_of(texel: NDArray[np.uint8], address: int, child: int) -> int:
+    """The address of a child, 0 to 7, of the node at an address of (n, 4) texels; -1 if there is
+    none."""
+    count = np.int64(len(texel))
+    present = int(np.int64(texel[address, 3]))
+    if present >> child & 1 == 0 or address + 1 >= count:
+        return -1
+    below = (1 << child) - 1
+    inner = int(np.int64(texel[address + 1, 3]))
+    first = int(np.int64(texel[address + 1, 0]))
+    first += int(np.int64(texel[address + 1, 1])) << 8
+    first += int(np.int64(texel[address + 1, 2])) << 16
+    there = first + _ones(present & below) + _ones(inner & below)
+    return there if there < count else -1
+
+
+@plain_kernel
+def _walk(texel: NDArray[np.uint8], q: Floats, limit: Ints, at: Ints, deep: Ints) -> None:
+    for i in range(len(q)):
+        x, y, z = q[i, 0], q[i, 1], q[i, 2]
+        address, depth = 0, 0
+        while depth < limit[i]:
+            x, y, z = 2 * x, 2 * y, 2 * z
+            child = 0
+            if x >= 1:
+                child, x = child + 1, x - 1
+            if y >= 1:
+                child, y = child + 2, y - 1
+            if z >= 1:
+                child, z = child + 4, z - 1
+            there = child_of(texel, address, child)
+            if there < 0:
+                break
+            address = there
+            depth += 1
+        at[i], deep[i] = address, depth

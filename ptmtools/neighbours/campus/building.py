@@ -1,0 +1,233 @@
+"""A model becomes a campus folder: reading, objects and textures in parallel, the index.
+
+Nothing in the folder depends on the number of workers, on time, or on the folder's name.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.executors.model import Executor
+from ptmtools.executors.serial import Serial
+from ptmtools.lazy import component
+from ptmtools.neighbours.campus.making import ObjectMade, Work, make_object
+from ptmtools.neighbours.campus.model import ALPHA, FORM, INDEX, Campus, CampusMaterial, Names
+from ptmtools.neighbours.campus.objects import notes_on, parts_of
+from ptmtools.neighbours.campus.occlusion import Surroundings
+from ptmtools.neighbours.campus.options import CampusOptions
+from ptmtools.neighbours.campus.second_set import model_light, model_masks
+from ptmtools.neighbours.campus.textures import BaseImage, Mask, texture_files
+from ptmtools.progress import Progress, silent
+from ptmtools.scene.ingestion import ingest
+from ptmtools.scene.model import Material, Scene
+from ptmtools.scene.options import IngestOptions
+
+
+@dataclass(frozen=True)
+class Made:
+    """What was written.
+
+    Attributes
+    ----------
+    campus: the index.
+    scene: that of the model, for its notes.
+    notes: what else there is to say.
+    seconds: by phase.
+    covered, computed: texels of lightmaps that are read on faces, and those that were computed.
+    """
+
+    campus: Campus
+    scene: Scene
+    notes: tuple[str, ...]
+    seconds: Mapping[str, float]
+    covered: int
+    computed: int
+
+
+def make_campus(
+    model: str | os.PathLike[str],
+    folder: str | os.PathLike[str],
+    options: CampusOptions = CampusOptions(),  # noqa: B008 - a frozen value
+    reading: IngestOptions = IngestOptions(),  # noqa: B008
+    executor: Executor | None = None,
+    *,
+    force: bool = False,
+    progress: Progress = silent,
+) -> Made:
+    """Write the campus of a model.
+
+    Parameters
+    ----------
+    model: as for `ptmtools.scene.ingest`, with ``reading`` its options.
+    folder: new, or with ``force`` one that holds a campus.
+    executor: does the objects and textures; one after the other without.
+
+    Raises
+    ------
+    InputError: what ingest raises; PTM-I831 no lightmaps in the model.
+    LimitError: PTM-L830 too many objects.
+    OutputError: PTM-O001, O002, O003, O820, O821 of the folder.
+    MissingComponentError: PTM-M830 lightmaps are to be baked, and xatlas is not installed.
+    """
+    executor, path = executor or Serial(), Path(model)
+    FORM.check(folder, force=force)
+    if options.lightmaps != "none":
+        component("xatlas", "PTM-M830", "lightmaps need xatlas", "campus")
+    clock = _Clock()
+    scene = ingest(path, reading, progress, workers=executor.workers)
+    masks, notes = model_masks(path, scene, reading)
+    painted = model_light(path, reading) if options.lightmaps == "model" else None
+    parts = parts_of(scene, options.small)
+    names = Names()
+    bases, of_image = _bases(scene, masks, names)
+    materials, material = _materials(scene, of_image, bases)
+    work = Work(
+        scene.points,
+        scene.triangles,
+        scene.uv,
+        scene.colors,
+        scene.two_sided,
+        material,
+        materials,
+        Surroundings.of(scene),
+        options,
+        painted,
+    )
+    clock.end("reading")
+    with FORM.staged(folder, force=force) as put:
+        textures = []
+        limits = reading.limit << 20, options.quality
+        for done, written in enumerate(executor.each(texture_files, limits, bases)):
+            progress(done, len(bases), "textures")
+            for record, data in written:
+                put(record.file, data)
+                textures.append(record)
+        clock.end("textures")
+        made: list[ObjectMade] = []
+        tasks = [(names.take(part.label, "object"), part) for part in parts]
+        for done, each in enumerate(executor.each(make_object, work, tasks)):
+            progress(done, len(tasks), "objects")
+            for file, data in each.meshes:
+                put(file, data)
+            for record, data in each.lightmaps:
+                put(record.file, data)
+                textures.append(record)
+            made.append(ObjectMade(each.record, (), (), each.notes, each.covered, each.computed))
+        progress(len(tasks), len(tasks), "objects")
+        clock.end("objects")
+        campus = Campus(
+            scene.space.origin,
+            scene.space.metres,
+            scene.space.up,
+            options.lods,
+            options.lightmaps,
+            tuple(each.record for each in made),
+            materials,
+            tuple(textures),
+        )
+        put(INDEX, index_bytes(campus))
+    clock.end("writing")
+    return Made(
+        campus,
+        scene,
+        (*notes, *notes_on(parts), *(note for each in made for note in each.notes)),
+        clock.seconds,
+        sum(each.covered for each in made),
+        sum(each.computed for each in made),
+    )
+
+
+def index_bytes(campus: Campus) -> bytes:
+    """The bytes of campus.json."""
+    text = json.dumps(campus.to_document(), indent=1, ensure_ascii=False, allow_nan=False)
+    return f"{text}\n".encode("utf-8", "replace")
+
+
+@dataclass
+class _Clock:
+    """How long phases take."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+    _since: float = field(default_factory=time.perf_counter)
+
+    def end(self, phase: str) -> None:
+        now = time.perf_counter()
+        self.seconds[phase], self._since = now - self._since, now
+
+
+def _bases(
+    scene: Scene, masks: Mapping[int, Mask], names: Names
+) -> tuple[list[BaseImage], dict[int, int]]:
+    """The textures, one for each distinct image and mask; and which of them each material has."""
+    found: dict[tuple[int, str], int] = {}
+    bases: list[BaseImage] = []
+    of: dict[int, int] = {}
+    for number, material in enumerate(scene.materials):
+        if material.image < 0:
+            continue
+        image, mask = scene.images[material.image], masks.get(number)
+        # By what is in the mask: two files may hold the same.
+        key = material.image, "" if mask is None else _digest(mask)
+        if key not in found:
+            found[key] = len(bases)
+            name = names.take(Path(image.name).stem, "texture")
+            bases.append(BaseImage(name, image, alpha=False, mask=mask))
+        of[number] = found[key]
+        if _cut_out(scene, material):
+            known = bases[found[key]]
+            bases[found[key]] = BaseImage(known.base, known.image, True, known.mask)
+    return bases, of
+
+
+def _cut_out(scene: Scene, material: Material) -> bool:
+    """Whether the alpha of its image counts."""
+    return material.transparent and not scene.images[material.image].plain
+
+
+def _digest(mask: Mask) -> str:
+    from ptmtools.store.layout import sha256
+
+    return f"{sha256(mask.load())} {mask.band} {mask.inverted}"
+
+
+def _materials(
+    scene: Scene, of: Mapping[int, int], bases: list[BaseImage]
+) -> tuple[tuple[CampusMaterial, ...], NDArray[np.int32]]:
+    """The materials of a campus, one for each of the scene's and the sides that it is seen from;
+    and (T,) which of them each face has."""
+    key = 2 * scene.triangle_material.astype(np.int64) + scene.two_sided
+    used, place = np.unique(key, return_inverse=True)
+    found = []
+    for number, both in (divmod(one, 2) for one in used.tolist()):
+        base = bases[of[number]] if number in of else None
+        given = scene.materials[number]
+        channels = () if base is None else base.channels
+        if base is not None and not _cut_out(scene, given):
+            channels = tuple(channel for channel in channels if channel != ALPHA)
+        found.append(_material(given, base, channels, bool(both)))
+    return tuple(found), place.ravel().astype(np.int32)
+
+
+def _material(
+    given: Material, base: BaseImage | None, channels: tuple[str, ...], both: bool
+) -> CampusMaterial:
+    tested = given.cutoff is not None
+    return CampusMaterial(
+        name=given.name,
+        base=None if base is None else base.base,
+        channels=channels,
+        wrap=(given.wrap_s, given.wrap_t),
+        color=given.color,
+        opacity=given.opacity,
+        alpha="mask" if tested else "blend" if given.transparent else "opaque",
+        cutoff=given.cutoff,
+        two_sided=both,
+    )

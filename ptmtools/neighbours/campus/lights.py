@@ -1,0 +1,232 @@
+"""Where the light of a surface comes from: rays, or the lightmap of the model.
+
+Which side of a face with two sides counts: that on which viewers can be.
+
+Outside of a building its walls see the sky, or what sees it; within a closed one nothing does,
+however large it is and however narrow the court before it. So walks by random rays begin on both
+sides, turned back by what they meet, and that side counts from which more of them come to the sky;
+where as many do from either, as of a fence, or as good as none, as within, the lighter one. Faces
+of one plane that share an edge are decided together, by points spread over all of them. Where the
+two sides are close, more points are asked.
+
+(Tried: the lighter side of each face by itself, by 16 rays from its middle. Rays that end on
+something far away count nearly as if they escaped, so a hall of 20 m is lighter within than a court
+of 3 m, and a face whose middle lies behind a drainpipe has the other side than the wall around
+it.)"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Ints, Singles
+from ptmtools.neighbours.campus.atlas import components
+from ptmtools.neighbours.campus.occlusion import (
+    Surroundings,
+    areas,
+    escaping,
+    light,
+    normals,
+    outermost,
+    points_on,
+    spread_over,
+    turns,
+)
+from ptmtools.scene.source import SourceWrap
+from ptmtools.tolerance import PARALLEL_COSINE
+
+#: (n,) faces, (n, 3) points on them, (n,) shares of a circle by which points differ → (n,) linear
+#: light from 0 to 1.
+Look = Callable[[Ints, Floats, Floats], Singles]
+#: What n rays leave of grain is within this, divided by the root of n.
+_GRAIN = 0.8
+
+
+@dataclass(frozen=True)
+class Rays:
+    """The light of (T, 3, 3) faces by rays along (T, 3) unit normals; see `light`.
+
+    Faces that are up to ``error`` metres off the surface that they stand for have its light.
+    """
+
+    around: Surroundings
+    normal: Floats
+    samples: int
+    reach: float
+    error: float = 0.0
+
+    @staticmethod
+    def of(
+        around: Surroundings,
+        corner: Floats,
+        samples: int,
+        reach: float,
+        error: float = 0.0,
+        side: Floats | float = 1.0,
+    ) -> Rays:
+        """Of faces that are lit on (T,) sides, 1 the front and -1 the back."""
+        normal = normals(corner) * np.broadcast_to(side, len(corner))[:, None]
+        return Rays(around, normal, samples, reach, error)
+
+    @property
+    def grain(self) -> float:
+        """By how much the light found at a point may differ from that found beside it, where it is
+        the same."""
+        return _GRAIN / math.sqrt(self.samples)
+
+    def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
+        normal = self.normal[face]
+        place = outermost(self.around, point, normal, self.error)
+        return light(self.around, place, normal, turn, self.samples, self.reach)
+
+
+@dataclass(frozen=True)
+class LightImage:
+    """A lightmap of the model as a material has it.
+
+    Attributes
+    ----------
+    texels: (h, w) linear light in 255ths, rows from the top; materials share those of one image.
+    wrap: beyond [0, 1], across and up.
+    strength: how much of the light it decides, in [0, 1]; the rest is white.
+    """
+
+    texels: NDArray[np.uint8]
+    wrap: tuple[SourceWrap, SourceWrap] = ("repeat", "repeat")
+    strength: float = 1.0
+
+
+@dataclass(frozen=True)
+class Painted:
+    """The light of a model's own lightmap.
+
+    Attributes
+    ----------
+    corner, uv: (T, 3, 3) and (T, 3, 2), of the model's faces; uv from the lower left.
+    image: (T,) index into `images`, -1 for faces without, which are white.
+    images: see `LightImage`.
+    source: (F,) for each face that is asked about the one of the model's that it came from.
+    """
+
+    corner: Floats
+    uv: Floats
+    image: NDArray[np.int32]
+    images: tuple[LightImage, ...]
+    source: NDArray[np.integer[Any]]
+
+    @property
+    def grain(self) -> float:
+        """None: what is painted is exact."""
+        return 0.0
+
+    def __call__(self, face: Ints, point: Floats, turn: Floats) -> Singles:
+        of = self.source[face]
+        a, b, c = np.moveaxis(self.corner[of], 1, 0)
+        u, v, w = b - a, c - a, point - a
+        uu, uv, vv = (np.einsum("nk,nk->n", p, q) for p, q in ((u, u), (u, v), (v, v)))
+        wu, wv = (np.einsum("nk,nk->n", w, q) for q in (u, v))
+        area = np.maximum(uu * vv - uv * uv, np.finfo(float).tiny)
+        share = np.stack([(vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area], axis=1)
+        # A coarse face may lie beyond the face that it came from.
+        share = np.clip(share, 0.0, 1.0)
+        share /= np.maximum(share.sum(axis=1, keepdims=True), 1.0)
+        corners = self.uv[of]
+        at = corners[:, 0] + share[:, :1] * (corners[:, 1] - corners[:, 0])
+        at += share[:, 1:] * (corners[:, 2] - corners[:, 0])
+        found = np.ones(len(point), np.float32)
+        for index, image in enumerate(self.images):
+            these = self.image[of] == index
+            found[these] = 1 - image.strength * (1 - _bilinear(image, at[these]))
+        return found
+
+
+def _bilinear(image: LightImage, at: Floats) -> Singles:
+    """(n,) of an image at (n, 2) coordinates from its lower left."""
+    texels, (across, up) = image.texels, image.wrap
+    left, right, s = _between(at[:, 0], texels.shape[1], across)
+    above, below, t = _between(1 - at[:, 1], texels.shape[0], up)
+    upper = texels[above, left] * (1 - s) + texels[above, right] * s
+    lower = texels[below, left] * (1 - s) + texels[below, right] * s
+    return np.asarray((upper * (1 - t) + lower * t) / 255, np.float32)
+
+
+def _between(at: Floats, count: int, wrap: SourceWrap) -> tuple[Ints, Ints, Floats]:
+    """The two of ``count`` texels in a row between whose centres coordinates lie, and the share of
+    the second."""
+    if wrap == "mirror":
+        at = 1 - np.abs(1 - at % 2)
+    place = (at % 1 if wrap == "repeat" else np.clip(at, 0, 1)) * count - 0.5
+    first = np.floor(place).astype(np.int64)
+    if wrap == "repeat":
+        return first % count, (first + 1) % count, place - first
+    return np.maximum(first, 0), np.minimum(first + 1, count - 1), place - first
+
+
+#: Points of a plane from which walks begin on either side, first, and where that leaves it open;
+#: walks of each, and how often one is turned back: from the underside of a sill to the ground, to a
+#: wall, to the sky.
+_POINTS, _MORE, _WALKS, _BOUNCES = 8, 32, 16, 3
+#: Two sides differ where their counts of rays do by so many standard deviations.
+_SURE = 3.0
+#: At so many faces that share an edge planes are followed through it.
+_AT_AN_EDGE = 4
+
+
+def open_sides(around: Surroundings, corner: Floats, both: Bools, reach: float) -> Floats:
+    """(T,) -1 for faces of which the back counts, and 1 for all others.
+
+    ``corner`` is (T, 3, 3); ``both``, (T,), says which have two sides; ``reach`` is as in
+    `CampusOptions`.
+    """
+    normal = normals(corner)
+    area = areas(corner)
+    wanted = both & (area > 0)
+    if not wanted.any():
+        return np.ones(len(corner))
+    plane = planes(corner, normal, wanted)
+    # As seen from the first face of its plane.
+    sign = np.where(np.einsum("tx,tx->t", normal, normal[plane]) < 0, -1.0, 1.0)
+    front, back = np.zeros(len(corner)), np.zeros(len(corner))
+
+    def look(chosen: Ints, points: int, *, sky: bool) -> None:
+        """Set `front` and `back` of planes, by the numbers of their first faces."""
+        face = spread_over(area, np.where(wanted, plane, -1), chosen, points).ravel()
+        point, turn = (
+            points_on(corner[face], np.tile(np.arange(points), len(chosen))),
+            turns(len(face)),
+        )
+        for found, side in ((front, 1.0), (back, -1.0)):
+            way = side * sign[face, None] * normal[face]
+            rays = around, point, way, turn, _WALKS
+            seen = escaping(*rays, _BOUNCES) if sky else light(*rays, reach)
+            found[chosen] = seen.reshape(len(chosen), points).sum(axis=1)
+
+    chosen = np.unique(plane[wanted])
+    for points, sky in ((_POINTS, True), (_MORE, True), (_MORE, False)):
+        look(chosen, points, sky=sky)
+        close = np.abs(front - back) <= _SURE * np.sqrt(front + back)
+        chosen = chosen[close[chosen]]
+    return np.where(wanted, np.where((back > front)[plane], -sign, sign), 1.0)
+
+
+def planes(corner: Floats, normal: Floats, of: Bools) -> Ints:
+    """(T,) for each of (T, 3, 3) faces the first of those that lie in its plane and are connected
+    with it by edges; only those ``of`` which it is asked are connected."""
+    count = len(corner)
+    vertex = np.unique(corner.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)
+    edge = np.sort(np.stack([vertex, np.roll(vertex, -1, axis=1)], axis=2), axis=2).reshape(-1, 2)
+    order = np.lexsort((edge[:, 1], edge[:, 0]))
+    edge, face = edge[order], order // 3
+    pairs = [np.zeros((0, 2), np.int64)]
+    for step in range(1, _AT_AN_EDGE):
+        one, other = face[:-step], face[step:]
+        alike = (edge[:-step] == edge[step:]).all(axis=1) & of[one] & of[other]
+        alike &= np.abs(np.einsum("nx,nx->n", normal[one], normal[other])) >= PARALLEL_COSINE
+        pairs.append(np.stack([one[alike], other[alike]], axis=1))
+    joined = np.concatenate(pairs)
+    return components(joined[:, [0, 1, 1]], count).astype(np.int64)

@@ -1,0 +1,360 @@
+"""What a campus folder holds: the records of campus.json, whose schema has their meaning and units.
+
+Plain values; nothing heavy is imported.
+
+Names of files: safe on any system, and unique without regard to case.
+
+Which shader a material has: it follows from the channels that exist (the paper's II.B).
+
+A combination of channels is a shader of its own: "diffuse + lightmap", "diffuse + lightmap +
+alpha". A material without textures is a colour.
+
+How far an object is from a viewpoint, approximately (the paper's III, figure 4).
+
+From the barycentre of the object a segment leads to the viewpoint; the distance is from where it
+leaves the object's bounding box to the viewpoint, and 0 for a viewpoint in the box. It is never
+less than the distance to the box itself, and never more than that to the barycentre."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from ptmtools.arrays import Floats
+from ptmtools.whole_folder import FolderForm
+
+INDEX = "campus.json"
+FORMAT, SCHEMA = "ptmtools campus", 1
+MESHES, TEXTURES = "meshes", "textures"
+#: Sides of textures and of lightmaps, texels (the paper's table 1).
+SIZES = (128, 256, 512)
+LIGHT_SIZES = (512, 1024, 2048)
+#: Channels of a material: diffuse, alpha, mask; and of an object, light.
+DIFFUSE, ALPHA, MASK, LIGHT = "d", "a", "m", "l"
+CHANNELS = (DIFFUSE, ALPHA, MASK)
+
+Vector = tuple[float, float, float]
+Box = tuple[float, float, float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Quality:
+    """A preset (the paper's table 2): sides of textures and lightmaps; whether the browser has all
+    files already."""
+
+    name: str
+    diffuse: int
+    light: int
+    cached: bool = False
+
+
+PRESETS = (
+    Quality("Low", 128, 512),
+    Quality("Medium", 256, 1024),
+    Quality("High", 256, 2048),
+    Quality("Ultra", 512, 2048),
+    Quality("Ultra cached", 512, 2048, cached=True),
+)
+
+
+@dataclass(frozen=True)
+class MeshFile:
+    """A mesh of an object; `error` is the simplification's, metres, 0 of the finest."""
+
+    file: str
+    faces: int
+    bytes: int
+    crc32: int
+    error: float
+
+
+@dataclass(frozen=True)
+class CampusObject:
+    """A building, or another element.
+
+    Attributes
+    ----------
+    name: that its files begin with.
+    label: for visitors.
+    parts: names of the model's objects in it.
+    box: least x, y, z, greatest x, y, z of all its meshes, metres.
+    barycentre: the centre of the surface of its finest mesh.
+    viewpoint: position and unit direction of a visitor who is taken to it.
+    materials: that its meshes use, indices.
+    lightmap: base name of its lightmaps, or None.
+    meshes: from the coarsest to the finest.
+    """
+
+    name: str
+    label: str
+    parts: tuple[str, ...]
+    box: Box
+    barycentre: Vector
+    viewpoint: tuple[Vector, Vector]
+    materials: tuple[int, ...]
+    lightmap: str | None
+    meshes: tuple[MeshFile, ...]
+
+
+@dataclass(frozen=True)
+class CampusMaterial:
+    """How surfaces look.
+
+    Attributes
+    ----------
+    base: base name of its textures, None without.
+    channels: those of its textures that count for it.
+    color: sRGB, multiplied with the diffuse texture.
+    alpha: "opaque", "mask" (tested against `cutoff`) or "blend".
+    two_sided: whether its faces have a back.
+    """
+
+    name: str
+    base: str | None = None
+    channels: tuple[str, ...] = ()
+    wrap: tuple[str, str] = ("repeat", "repeat")
+    color: Vector = (1.0, 1.0, 1.0)
+    opacity: float = 1.0
+    alpha: Literal["opaque", "mask", "blend"] = "opaque"
+    cutoff: float | None = None
+    two_sided: bool = True
+
+
+@dataclass(frozen=True)
+class TextureFile:
+    """A texture or lightmap of one size and channel; `source` is the width and height of what it
+    was made of, which may be less."""
+
+    file: str
+    base: str
+    size: int
+    channel: str
+    bytes: int
+    crc32: int
+    source: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Preset:
+    """A quality and what it costs: `bytes` of all files that it needs, `download` what is left of
+    them to load."""
+
+    name: str
+    diffuse: int
+    light: int
+    cached: bool
+    bytes: int
+    download: int
+
+
+@dataclass(frozen=True)
+class Campus:
+    """The index.
+
+    Attributes
+    ----------
+    origin, unit, up: how the model's coordinates became world metres, as in hints.json.
+    lods: meshes of each object.
+    lightmaps: "bake", "model" or "none".
+    start: bytes of what every visitor loads first: the coarsest mesh of each object and all
+        textures of the least size.
+    """
+
+    origin: Vector
+    unit: float
+    up: str
+    lods: int
+    lightmaps: str
+    objects: tuple[CampusObject, ...]
+    materials: tuple[CampusMaterial, ...]
+    textures: tuple[TextureFile, ...]
+
+    @property
+    def start(self) -> int:
+        return sum(o.meshes[0].bytes for o in self.objects) + self._bytes(SIZES[0], CHANNELS)
+
+    @property
+    def presets(self) -> tuple[Preset, ...]:
+        """What all of the campus takes in each quality, for who has come near every object: every
+        mesh, textures of the least size, of the preset's, and its lightmaps."""
+        meshes = sum(mesh.bytes for each in self.objects for mesh in each.meshes)
+        found = []
+        for quality in PRESETS:
+            total = meshes + self._bytes(quality.light, (LIGHT,))
+            total += sum(self._bytes(size, CHANNELS) for size in {SIZES[0], quality.diffuse})
+            found.append(
+                Preset(**vars(quality), bytes=total, download=0 if quality.cached else total)
+            )
+        return tuple(found)
+
+    def _bytes(self, size: int, channels: tuple[str, ...]) -> int:
+        return sum(t.bytes for t in self.textures if t.size == size and t.channel in channels)
+
+    def files(self) -> dict[str, tuple[int, int]]:
+        """Bytes and CRC-32 of every file but the index, by name."""
+        found = {t.file: (t.bytes, t.crc32) for t in self.textures}
+        for each in self.objects:
+            found |= {mesh.file: (mesh.bytes, mesh.crc32) for mesh in each.meshes}
+        return found
+
+    def to_document(self) -> dict[str, Any]:
+        """As campus.json has it."""
+        return {
+            "format": FORMAT,
+            "schema": SCHEMA,
+            "origin": self.origin,
+            "unit": self.unit,
+            "up": self.up,
+            "lods": self.lods,
+            "lightmaps": self.lightmaps,
+            "start": self.start,
+            "presets": [vars(preset) for preset in self.presets],
+            "objects": [
+                {
+                    "name": o.name,
+                    "label": o.label,
+                    "parts": o.parts,
+                    "box": o.box,
+                    "barycentre": o.barycentre,
+                    "viewpoint": dict(zip(("position", "direction"), o.viewpoint, strict=True)),
+                    "materials": o.materials,
+                    "lightmap": o.lightmap,
+                    "meshes": [vars(mesh) for mesh in o.meshes],
+                }
+                for o in self.objects
+            ],
+            "materials": [_material_document(material) for material in self.materials],
+            "textures": [vars(texture) for texture in self.textures],
+        }
+
+    @staticmethod
+    def from_document(found: Mapping[str, Any]) -> Campus:
+        """Of a document that its schema allows."""
+        return Campus(
+            origin=tuple(found["origin"]),
+            unit=found["unit"],
+            up=found["up"],
+            lods=found["lods"],
+            lightmaps=found["lightmaps"],
+            objects=tuple(map(_object, found["objects"])),
+            materials=tuple(map(_material, found["materials"])),
+            textures=tuple(
+                TextureFile(**_fields(TextureFile, row) | {"source": tuple(row["source"])})
+                for row in found["textures"]
+            ),
+        )
+
+
+def _material_document(material: CampusMaterial) -> dict[str, Any]:
+    found = {**vars(material), "twoSided": material.two_sided}
+    del found["two_sided"]
+    return found
+
+
+def _fields(cls: Any, row: Mapping[str, Any]) -> dict[str, Any]:
+    """Of a record, those that we know: others may have been added."""
+    return {name: row[name] for name in cls.__dataclass_fields__ if name in row}
+
+
+def _material(row: Mapping[str, Any]) -> CampusMaterial:
+    found = _fields(CampusMaterial, row) | {"two_sided": row["twoSided"]}
+    for name in ("channels", "wrap", "color"):
+        found[name] = tuple(found[name])
+    return CampusMaterial(**found)
+
+
+def _object(row: Mapping[str, Any]) -> CampusObject:
+    found = _fields(CampusObject, row)
+    for name in ("parts", "box", "barycentre", "materials"):
+        found[name] = tuple(found[name])
+    viewpoint = row["viewpoint"]
+    found["viewpoint"] = tuple(viewpoint["position"]), tuple(viewpoint["direction"])
+    found["meshes"] = tuple(MeshFile(**_fields(MeshFile, mesh)) for mesh in row["meshes"])
+    return CampusObject(**found)
+
+
+#: Names that Windows keeps for devices, with or without a suffix.
+_DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)$", re.IGNORECASE)
+#: Longest name that is given out, in characters; a number may follow.
+_LONGEST = 60
+#: What a folder of ours consists of, besides its index.
+_OURS = re.compile(
+    rf"({MESHES}/[A-Za-z0-9_-]+_\d+\.glb|"
+    rf"{TEXTURES}/[A-Za-z0-9_-]+_\d+_[{DIFFUSE}{ALPHA}{MASK}{LIGHT}]\.jpg)"
+)
+FORM = FolderForm(
+    INDEX, FORMAT, "ptm campus", lambda name: name == INDEX or bool(_OURS.fullmatch(name))
+)
+
+
+class Names:
+    """Gives out names."""
+
+    def __init__(self) -> None:
+        self._taken: set[str] = set()
+        #: Of each name the number that was last added to it.
+        self._last: dict[str, int] = {}
+
+    def take(self, text: str, otherwise: str) -> str:
+        """A name after ``text``, or ``otherwise`` if nothing of that can stand in one."""
+        plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+        stem = re.sub(r"[^A-Za-z0-9-]+", "_", plain).strip("_")[:_LONGEST].strip("_") or otherwise
+        if _DEVICES.match(stem):
+            stem = f"{otherwise}_{stem}"
+        unique, count = stem, self._last.get(stem.lower(), 1)
+        while unique.lower() in self._taken:
+            count += 1
+            unique = f"{stem}-{count}"
+        self._taken.add(unique.lower())
+        self._last[stem.lower()] = count
+        return unique
+
+
+def mesh_file(name: str, lod: int) -> str:
+    """``meshes/library_0.glb``; 0 is the coarsest."""
+    return f"{MESHES}/{name}_{lod}.glb"
+
+
+def texture_file(base: str, size: int, channel: str) -> str:
+    """``textures/wall_512_d.jpg``."""
+    return f"{TEXTURES}/{base}_{size}_{channel}.jpg"
+
+
+#: In the order in which a name has them.
+PARTS = {DIFFUSE: "diffuse", LIGHT: "lightmap", ALPHA: "alpha", MASK: "mask"}
+
+
+def shader(channels: Iterable[str]) -> str:
+    """The name of the shader for the channels that are there, such as "diffuse+lightmap+alpha".
+
+    Raises KeyError for an unknown channel.
+    """
+    there = set(channels)
+    if unknown := there - set(PARTS):
+        raise KeyError(min(unknown))
+    first = "" if DIFFUSE in there else "color"
+    return "+".join(filter(None, [first, *(PARTS[c] for c in PARTS if c in there)]))
+
+
+def distances(eye: Floats, boxes: Floats, barycentres: Floats) -> Floats:
+    """(…, m) metres from each viewpoint to each object.
+
+    Parameters
+    ----------
+    eye: (…, 3) viewpoints.
+    boxes: (m, 6) least x, y, z, then greatest x, y, z.
+    barycentres: (m, 3), each within its box.
+    """
+    low, high = boxes[:, :3], boxes[:, 3:]
+    way = np.asarray(eye, np.float64)[..., None, :] - barycentres
+    # The share of the way at which it passes the last side, along each axis; never where it is
+    # parallel to them.
+    room = np.where(way > 0, high - barycentres, low - barycentres)
+    share = np.divide(room, way, out=np.full(way.shape, np.inf), where=way != 0)
+    left = np.clip(share, 0.0, 1.0).min(axis=-1)
+    return np.asarray((1.0 - left) * np.linalg.norm(way, axis=-1))

@@ -1,0 +1,305 @@
+"""How much light reaches a point: ambient occlusion by rays of Embree.
+
+Rays go out into the hemisphere over a point, denser by the cosine of their angle to the normal, and
+the light is the share of them that escape. The directions are a Hammersley set, turned about the
+normal by an angle that every point has of its own, so that what 64 rays leave of error is a grain
+and not bands. An object occludes itself and all others; so does a level ground under the scene.
+Transparent materials do not occlude.
+
+A ray that hits something at distance d counts d / reach, and 1 beyond (ambient obscurance, Zhukov,
+Iones and Kronin 1998): with plain occlusion, ``reach`` inf, every room is black, and every wall is
+half as light as a floor however high it stands, since half of its rays end on the ground.
+
+Embree computes in float32. Its tree is built around the middle of the scene, and rays begin as far
+above a surface as the scene's tolerance for planes.
+
+Points spread over surfaces, the same every time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Ints, Singles
+from ptmtools.scene.model import Scene
+from ptmtools.tolerance import DEPTH_SHARE
+
+#: Rays that are cast together: their arrays stay within the processor's cache.
+RAYS = 2**17
+_GOLDEN = 0.6180339887498949
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What occludes.
+
+    Attributes
+    ----------
+    points, triangles: (V, 3) metres and (T, 3) of what takes light.
+    middle: (3,) subtracted before anything goes to float32.
+    ground: height of the ground, metres.
+    lift: how far above its surface a ray begins, metres.
+    """
+
+    points: Floats
+    triangles: NDArray[np.int32]
+    middle: Floats
+    ground: float
+    lift: float
+
+    @staticmethod
+    def of(scene: Scene) -> Surroundings:
+        """Those of a scene's objects: its opaque faces."""
+        low, high = scene.points.min(axis=0), scene.points.max(axis=0)
+        return Surroundings(
+            scene.points,
+            scene.triangles[scene.opaque],
+            (low + high) / 2,
+            float(low[1]),
+            scene.tolerance.plane,
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "tree"}
+
+    @cached_property
+    def tree(self) -> Any:
+        """The committed Embree scene; None of no faces."""
+        if not len(self.triangles):
+            return None
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
+        tree = EmbreeScene(robust=True)
+        TriangleMesh(tree, (self.points - self.middle).astype(np.float32), self.triangles)
+        return tree
+
+    def free(self, origin: Floats, target: Floats) -> Bools:
+        """(n,) whether nothing lies between (n, 3) points, but what is at the target itself."""
+        way = target - origin
+        far = np.linalg.norm(way, axis=1)
+        if self.tree is None:
+            return np.ones(len(far), np.bool_)
+        along = (way / np.maximum(far, np.finfo(float).tiny)[:, None]).astype(np.float32)
+        start = (origin - self.middle).astype(np.float32)
+        # Not quite as far as the target, which lies on a surface.
+        short = (far * (1 - DEPTH_SHARE) - self.lift).astype(np.float32)
+        # A copy: Embree writes into what it is given.
+        hit = self.tree.run(start, along, dists=short.copy(), query="DISTANCE")
+        return np.asarray(hit >= short)
+
+    def below(self, point: Floats, far: float) -> Floats:
+        """(n,) the heights of what lies first under (n, 3) points, at most so ``far``; where that
+        is nothing, of the ground."""
+        return self._upright(point, far, -1.0)
+
+    def above(self, point: Floats, far: float) -> Floats:
+        """The same of what lies first over points."""
+        return self._upright(point, far, 1.0)
+
+    def _upright(self, point: Floats, far: float, way: float) -> Floats:
+        found = np.full(len(point), self.ground)
+        if self.tree is None:
+            return found
+        along = np.zeros((len(point), 3), np.float32)
+        along[:, 1] = way
+        limit = np.full(len(point), far + self.lift, np.float32)
+        start = (point - self.middle).astype(np.float32)
+        hit = self.tree.run(start, along, dists=limit.copy(), query="DISTANCE")
+        there = hit < limit
+        found[there] = (point[:, 1] + way * hit)[there]
+        return found
+
+
+def outermost(around: Surroundings, point: Floats, normal: Floats, within: float) -> Floats:
+    """(n, 3) points moved to the outermost surface that is nearer than ``within`` metres along
+    their normals, before or behind; those where there is none stay.
+
+    The faces of a coarse mesh lie beneath the model's own, which would shade them.
+    """
+    if around.tree is None or within <= around.lift:
+        return point
+    start = (point + within * normal - around.middle).astype(np.float32)
+    limit = np.full(len(point), 2 * within, np.float32)
+    back = (-normal).astype(np.float32)
+    far = around.tree.run(start, back, dists=limit.copy(), query="DISTANCE")
+    moved = np.where(far < limit, within - far.astype(np.float64), 0.0)
+    return np.asarray(point + moved[:, None] * normal)
+
+
+def light(
+    around: Surroundings,
+    point: Floats,
+    normal: Floats,
+    turn: Floats,
+    samples: int,
+    reach: float,
+) -> Singles:
+    """(n,) light from 0 to 1 at (n, 3) points with (n, 3) unit normals.
+
+    Parameters
+    ----------
+    turn: (n,) in [0, 1), by which share of a circle the directions are turned.
+    samples, reach: as in `CampusOptions`.
+    """
+    fan = hemisphere(samples)
+    found = np.empty(len(point), np.float32)
+    step = max(1, RAYS // samples)
+    for at in range(0, len(point), step):
+        part = slice(at, at + step)
+        along = (fan @ _frames(normal[part], turn[part])).reshape(-1, 3)
+        lifted = point[part] + around.lift * normal[part]
+        origin = np.repeat((lifted - around.middle).astype(np.float32), samples, axis=0)
+        share = _escaping(around, origin, along, reach)
+        found[part] = share.reshape(-1, samples).mean(axis=1)
+    return found
+
+
+def escaping(
+    around: Surroundings,
+    point: Floats,
+    normal: Floats,
+    turn: Floats,
+    samples: int,
+    bounces: int,
+) -> Ints:
+    """(n,) how many of ``samples`` walks from (n, 3) points into the hemispheres over (n, 3)
+    normals come to the sky, each turned back into a new direction by what it meets, at most
+    ``bounces`` times. ``turn`` as of `light`."""
+    fan = hemisphere(samples)
+    count = np.zeros(len(point), np.int64)
+    step = max(1, RAYS // samples)
+    for at in range(0, len(point), step):
+        part = slice(at, at + step)
+        along = (fan @ _frames(normal[part], turn[part])).reshape(-1, 3)
+        lifted = point[part] + around.lift * normal[part] - around.middle
+        origin = np.repeat(lifted, samples, axis=0)
+        walk = np.arange(len(origin))
+        for bounce in range(bounces + 1):
+            far, against = _met(around, origin, along)
+            out = np.isinf(far)
+            count[part] += np.bincount(walk[out] // samples, minlength=len(lifted))
+            if bounce == bounces or out.all():
+                break
+            kept = ~out
+            origin, walk, back = origin[kept], walk[kept], against[kept]
+            origin = origin + far[kept, None] * along[kept] + around.lift * back
+            ways = fan[(walk * 5 + 3 * bounce + 1) % samples]
+            turned = np.asarray((walk + bounce + 1) * _GOLDEN % 1.0, np.float64)
+            frames = _frames(back, turned)
+            along = np.einsum("nk,nkx->nx", ways, frames)
+    return count
+
+
+def _met(around: Surroundings, origin: Floats, along: Singles) -> tuple[Floats, Floats]:
+    """(n,) how far rays from the middle of the scene go, inf to the sky; (n, 3) the normals of what
+    they meet, against them."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        down = (around.ground - around.middle[1] - origin[:, 1]) / along[:, 1]
+    far = np.where(along[:, 1] < 0, np.maximum(down, 0), np.inf)
+    against = np.zeros((len(far), 3))
+    against[:, 1] = 1.0
+    if around.tree is not None:
+        hit = around.tree.run(origin.astype(np.float32), along.astype(np.float32), output=True)
+        nearer = (hit["primID"] >= 0) & (hit["tfar"] < far)
+        far[nearer] = hit["tfar"][nearer]
+        face = around.points[around.triangles[hit["primID"][nearer]]]
+        way = normals(face)
+        facing = np.einsum("nx,nx->n", way, along[nearer]) < 0
+        against[nearer] = np.where(facing[:, None], way, -way)
+    return far, against
+
+
+def hemisphere(samples: int) -> Singles:
+    """(samples, 3) directions over z, with a density in proportion to the cosine."""
+    number = np.arange(samples)
+    inverse, digit, rest = np.zeros(samples), 0.5, number.copy()
+    while rest.any():
+        inverse += digit * (rest & 1)
+        rest, digit = rest >> 1, digit / 2
+    share, angle = (number + 0.5) / samples, 2 * math.pi * inverse
+    out = np.sqrt(share)
+    along = [out * np.cos(angle), out * np.sin(angle), np.sqrt(1 - share)]
+    return np.stack(along, axis=1).astype(np.float32)
+
+
+def normals(corner: Floats) -> Floats:
+    """(T, 3) unit normals of (T, 3, 3) triangles; of those without area, up."""
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    return np.where(length > 0, across / np.where(length > 0, length, 1.0), [0.0, 1.0, 0.0])
+
+
+def turns(count: int) -> Floats:
+    """(count,) shares of a circle that are far apart in a row."""
+    return np.asarray(np.arange(count) * _GOLDEN % 1.0)
+
+
+def _frames(normal: Floats, turn: Floats) -> Singles:
+    """(n, 3, 3) rows: two tangents, turned, and the normal."""
+    # Duff et al. 2017, without a branch but for the sign.
+    x, y, z = normal.T
+    sign = np.where(z < 0, -1.0, 1.0)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    first = np.stack([1 + sign * x * x * a, sign * b, -sign * x], axis=1)
+    second = np.stack([b, sign + y * y * a, -y], axis=1)
+    angle = 2 * math.pi * turn
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    return np.stack([c * first + s * second, c * second - s * first, normal], axis=1).astype(
+        np.float32
+    )
+
+
+def _escaping(around: Surroundings, origin: Singles, along: Singles, reach: float) -> Singles:
+    """(n,) how much each ray counts."""
+    far = np.full(len(origin), min(reach, np.finfo(np.float32).max), np.float32)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        down = (np.float32(around.ground - around.middle[1]) - origin[:, 1]) / along[:, 1]
+    limit = np.where((along[:, 1] < 0) & (down < far), np.maximum(down, 0), far)
+    if around.tree is not None:
+        # A copy: Embree writes into what it is given.
+        limit = around.tree.run(origin, along, dists=limit.astype(np.float32), query="DISTANCE")
+    if math.isinf(reach):
+        return (limit >= far).astype(np.float32)
+    return np.minimum(limit / np.float32(reach), np.float32(1))
+
+
+#: Multiples of these modulo 1 are far apart in both directions (Roberts' R2 sequence).
+SPREAD = 0.7548776662466927, 0.5698402909980532
+
+
+def areas(corner: Floats) -> Floats:
+    """(T,) of (T, 3, 3) triangles."""
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    return np.asarray(np.linalg.norm(across, axis=1) / 2)
+
+
+def points_on(corner: Floats, number: Ints) -> Floats:
+    """(n, 3) a point in each of (n, 3, 3) triangles, the one that (n,) numbers say; points of
+    different numbers are far apart in one and the same triangle."""
+    along = np.sqrt(number * SPREAD[0] % 1.0)
+    aside = number * SPREAD[1] % 1.0
+    share = np.stack([1 - along, along * (1 - aside), along * aside], axis=1)
+    return np.asarray(np.einsum("nk,nkx->nx", share, corner))
+
+
+def spread_over(area: Floats, group: Ints, chosen: Ints, count: int) -> Ints:
+    """(len(chosen), count) faces by area: of each chosen group of faces as many, each as often as
+    its share of the group's area says.
+
+    ``area`` and ``group`` are (T,); each group that is chosen has some area.
+    """
+    order = np.argsort(group, kind="stable")
+    total = np.concatenate([[0.0], np.cumsum(area[order])])
+    first = np.searchsorted(group[order], chosen)
+    last = np.searchsorted(group[order], chosen, side="right")
+    share = (np.arange(count) + 0.5) / count
+    place = total[first, None] + share * (total[last] - total[first])[:, None]
+    found = np.searchsorted(total, place, side="right") - 1
+    return np.asarray(order[np.clip(found, first[:, None], last[:, None] - 1)])

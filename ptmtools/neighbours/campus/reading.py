@@ -1,0 +1,169 @@
+"""The index of a campus, read back.
+
+What a campus weighs: by level of detail, by size and channel of textures, beside the paper's.
+
+What `ptm info` says of a campus."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ptmtools import schemas
+from ptmtools.errors import InputError, LimitError
+from ptmtools.files import open_below
+from ptmtools.neighbours.campus.model import (
+    CHANNELS,
+    DIFFUSE,
+    INDEX,
+    LIGHT,
+    LIGHT_SIZES,
+    SIZES,
+    Campus,
+)
+from ptmtools.quantities import count, size
+
+#: An index longer than this is none, bytes.
+LONGEST = 1 << 28
+
+
+def read_campus(folder: str | os.PathLike[str]) -> Campus:
+    """The index of a campus folder. What else a campus must be is for `check_campus`.
+
+    Raises
+    ------
+    InputError: PTM-I832 it cannot be read, PTM-I833 it is not as its schema says, or an object has
+        fewer or more meshes than the campus has levels.
+    LimitError: PTM-L831 it is too long.
+    """
+    file = Path(folder) / INDEX
+    try:
+        with open_below(folder, INDEX) as stream:
+            data = stream.read(LONGEST + 1)
+    except (OSError, ValueError) as fault:
+        why = getattr(fault, "strerror", None) or str(fault)
+        raise InputError(
+            "PTM-I832",
+            f"cannot be read ({why})",
+            file=file,
+            remedy="name a folder that `ptm campus` wrote",
+        ) from None
+    return parse_campus(data, file)
+
+
+def parse_campus(data: bytes, file: Path) -> Campus:
+    """The campus that the bytes of an index describe; raises as `read_campus`."""
+    if len(data) > LONGEST:
+        raise LimitError("PTM-L831", "is too long for the index of a campus", file=file)
+    try:
+        campus = Campus.from_document(schemas.read(data, schemas.CAMPUS))
+    except schemas.ShapeError as fault:
+        raise _wrong(file, fault.place or None, fault.message) from None
+    for place, each in enumerate(campus.objects):
+        if len(each.meshes) != campus.lods:
+            what = f"has {len(each.meshes)} items, not {campus.lods}"
+            raise _wrong(file, f"objects[{place}].meshes", what)
+    return campus
+
+
+def _wrong(file: Path, place: str | None, what: str) -> InputError:
+    remedy = "write it again with `ptm campus`"
+    return InputError("PTM-I833", what, file=file, place=place, remedy=remedy)
+
+
+#: Average sizes of the paper's table 1, KB (of 1024 bytes), by side.
+PAPER_TEXTURES = {128: 3.09, 256: 10.63, 512: 78.81}
+PAPER_LIGHTMAPS = {512: 88.32, 1024: 258.56, 2048: 784.23}
+_WORDS = {"d": "diffuse", "a": "alpha", "m": "mask", "l": "lightmap"}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Textures of one side and channel: how many, their bytes, those of files that are larger than
+    their source, and the paper's average, KB."""
+
+    channel: str
+    size: int
+    files: int
+    bytes: int
+    enlarged: int
+    paper: float
+
+    @property
+    def average(self) -> float:
+        """KB of 1024 bytes."""
+        return self.bytes / self.files / 1024
+
+
+def kinds(campus: Campus) -> list[Kind]:
+    """The textures of a campus, by channel and size."""
+    found = []
+    for channel, sizes, paper in (
+        *((channel, SIZES, PAPER_TEXTURES) for channel in CHANNELS),
+        (LIGHT, LIGHT_SIZES, PAPER_LIGHTMAPS),
+    ):
+        for side in sizes:
+            these = [t for t in campus.textures if t.channel == channel and t.size == side]
+            if these:
+                total = sum(t.bytes for t in these)
+                enlarged = sum(t.bytes for t in these if side > max(t.source))
+                found.append(Kind(channel, side, len(these), total, enlarged, paper[side]))
+    return found
+
+
+def summary(campus: Campus) -> Iterator[str]:
+    """Lines for people."""
+    parts = sum(len(o.parts) for o in campus.objects)
+    joined = f" of the model's {parts:,}" if parts != len(campus.objects) else ""
+    shared = sum(len(o.materials) for o in campus.objects)
+    bases = {m.base for m in campus.materials if m.base is not None}
+    yield (
+        f"{count(len(campus.objects), 'object')}{joined}, "
+        f"{count(len(campus.materials), 'material')} used {shared:,} times, "
+        f"{count(len(bases), 'image')}"
+    )
+    yield f"{'meshes':<12} {'faces':>12} {'average':>10} {'bytes':>10} {'worst error':>12}"
+    for lod in range(campus.lods):
+        level = [o.meshes[lod] for o in campus.objects]
+        faces = sum(m.faces for m in level)
+        yield (
+            f"level {lod:<6} {faces:>12,} {faces / len(level):>10,.0f} "
+            f"{size(sum(m.bytes for m in level)):>10} {max(m.error for m in level):>10.3g} m"
+        )
+    yield f"{'textures':<12} {'size':>6} {'files':>6} {'bytes':>10} {'average':>10} {'paper':>10}"
+    for kind in kinds(campus):
+        paper = f"{kind.paper:.2f} KB"
+        yield (
+            f"{_WORDS[kind.channel]:<12} {kind.size:>6} {kind.files:>6,} {size(kind.bytes):>10} "
+            f"{kind.average:>7.2f} KB {paper:>10}"
+        )
+    enlarged = sum(kind.enlarged for kind in kinds(campus) if kind.channel == DIFFUSE)
+    if enlarged:
+        yield f"{size(enlarged)} of the diffuse textures are larger than what they were made of"
+    yield f"{'start':<25} {size(campus.start):>10}"
+    for preset in campus.presets:
+        what = f"{preset.diffuse} / {preset.light}"
+        yield (
+            f"{preset.name:<12} {what:>12} {size(preset.bytes):>10} "
+            f"{size(preset.download):>10} to load"
+        )
+
+
+def describe_campus(folder: Path) -> tuple[tuple[str, ...], Mapping[str, Any]]:
+    """Lines for people, and the same as JSON. Raises what `read_campus` raises."""
+    campus = read_campus(folder)
+    return tuple(summary(campus)), record(campus)
+
+
+def record(campus: Any) -> dict[str, Any]:
+    """Of a `Campus`, what `ptm campus --json` and `ptm info --json` print."""
+    document = campus.to_document()
+    return {
+        "objects": len(campus.objects),
+        "faces": [sum(o.meshes[lod].faces for o in campus.objects) for lod in range(campus.lods)],
+        "textures": [asdict(kind) | {"average": kind.average} for kind in kinds(campus)],
+        **{name: document[name] for name in ("unit", "origin", "lightmaps", "start", "presets")},
+    }

@@ -1,0 +1,248 @@
+"""What a model has beside what a scene knows: lightmaps, and reflection masks.
+
+===========  ===============================================  =====================================
+format       lightmap                                         mask
+===========  ===============================================  =====================================
+glTF         red of occlusionTexture, whichever set of        1 − roughness: green of
+             coordinates it has                               metallicRoughnessTexture, inverted
+OBJ          none                                             map_Ks, its luminance
+others       none                                             none
+===========  ===============================================  =====================================
+
+A mask has the texture coordinates of the colours, or is left out. Of OBJ the scene's own reader
+tells where the masks are. A glTF is read a second time, with the other texture in place of the
+colours': its faces are then cleaned as they were before, and are the scene's, one by one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Floats, Ints
+from ptmtools.errors import InputError, LimitError, PtmError
+from ptmtools.neighbours.campus.lights import LightImage
+from ptmtools.neighbours.campus.textures import Mask, decoded_lightmap
+from ptmtools.scene.faces import keep_faces
+from ptmtools.scene.model import Scene
+from ptmtools.scene.options import IngestOptions
+from ptmtools.scene.reference import Folder
+from ptmtools.scene.source import FileRange, Findings, Source, Texture
+
+if TYPE_CHECKING:
+    from ptmtools.scene.gltf.material import TextureOf
+
+_GLTF = (".glb", ".gltf")
+#: What becomes of a file that a model names.
+_NOT_THERE = {"missing": "not found", "outside": "lies outside the model's folder"}
+
+
+@dataclass(frozen=True)
+class ModelLight:
+    """The lightmaps of a model.
+
+    Attributes
+    ----------
+    uv: (T, 3, 2) of the scene's faces, origin at the lower left.
+    image: (T,) index into `images`, -1 for faces without.
+    images: one for each material that has one.
+    """
+
+    uv: Floats
+    image: NDArray[np.int32]
+    images: tuple[LightImage, ...]
+
+
+def model_light(model: Path, options: IngestOptions) -> ModelLight:
+    """The lightmaps of a model, for the faces of its scene.
+
+    Raises InputError: PTM-I831 it has none, or its format cannot, or one that it names is missing;
+    what reading and decoding raise.
+    """
+    read = None
+    if model.suffix.lower() in _GLTF:
+        read = _again(model, options, lambda entry: entry.get("occlusionTexture"))
+    if read is None:
+        raise InputError(
+            "PTM-I831",
+            "has no lightmaps",
+            file=model,
+            remedy="give --lightmaps bake, or a glTF with occlusionTexture",
+        )
+    used = np.unique(read.source.triangle_material[read.faces]).tolist()
+    index = np.full(len(read.source.materials), -1, np.int32)
+    images: list[LightImage] = []
+    decoded: dict[Callable[[], bytes], NDArray[np.uint8]] = {}
+    for number in used:
+        if not read.asked[number]:
+            continue
+        material = read.source.materials[number]
+        if (texture := material.texture) is None:
+            raise _missing(model, material.name, number, read)
+        if texture.read not in decoded:
+            decoded[texture.read] = _red(texture, material.name, options)
+        index[number] = len(images)
+        wrap = texture.wrap_s, texture.wrap_t
+        images.append(LightImage(decoded[texture.read], wrap, texture.strength))
+    uv = read.source.uv[read.faces]
+    finite = np.asarray(np.isfinite(uv).all(axis=(1, 2)))
+    return ModelLight(
+        np.where(finite[:, None, None], uv, 0.0),
+        index[read.source.triangle_material[read.faces]],
+        tuple(images),
+    )
+
+
+def _missing(model: Path, material: str, number: int, read: _Read) -> InputError:
+    """The error for a lightmap that a material names and nobody finds."""
+    # Each material that got no texture it asked for left a note, in the same order.
+    textures = zip(read.asked, read.source.materials, strict=True)
+    lost = [k for k, (asked, m) in enumerate(textures) if asked and m.texture is None]
+    said = read.missing[min(lost.index(number), len(read.missing) - 1)]
+    return InputError(
+        "PTM-I831",
+        f"the lightmap of material {material}, {said}",
+        file=model,
+        remedy="put it where the model says (or give --allow-outside, where it lies elsewhere), or "
+        "give --lightmaps bake",
+    )
+
+
+def _red(texture: Texture, material: str, options: IngestOptions) -> NDArray[np.uint8]:
+    """(h, w) of a lightmap. Raises what decoding raises, and InputError PTM-I256."""
+    try:
+        image = decoded_lightmap(texture.read(), options.limit << 20, texture.label)
+    except InputError as fault:
+        place, remedy = f"lightmap of material {material}", "mend it, or give --lightmaps bake"
+        raise InputError(
+            fault.code, fault.message, file=texture.label, place=place, remedy=remedy
+        ) from None
+    except OSError as fault:
+        what = fault.strerror or str(fault)
+        raise InputError("PTM-I256", what, file=fault.filename or texture.label) from None
+    return np.asarray(image.getchannel("R"))
+
+
+def model_masks(
+    model: Path, scene: Scene, options: IngestOptions
+) -> tuple[dict[int, Mask], tuple[str, ...]]:
+    """The masks of a model that was read as ``scene``, by the number of its material, and notes on
+    those that cannot be had."""
+    suffix = model.suffix.lower()
+    if suffix in _GLTF:
+        return _gltf_masks(model, scene, options)
+    return _shines(model, scene, options)
+
+
+@dataclass(frozen=True)
+class _Read:
+    """A glTF with other textures.
+
+    Attributes
+    ----------
+    source: as it was read.
+    faces: (T,) which of its faces the scene has.
+    asked: for each of its materials, whether it names such a texture.
+    missing: what was said of textures that are not there, in the order of the materials.
+    """
+
+    source: Source
+    faces: Ints
+    asked: tuple[bool, ...]
+    missing: tuple[str, ...]
+
+
+def _again(model: Path, options: IngestOptions, texture_of: TextureOf) -> _Read | None:
+    """A glTF with other textures; None if no material has such a texture."""
+    from ptmtools.scene.gltf.document import document_json
+    from ptmtools.scene.gltf.reader import read_gltf
+
+    if not any(map(texture_of, document_json(model).get("materials", []))):
+        return None
+    asked: list[bool] = []
+
+    def asking(entry: dict[str, Any]) -> dict[str, Any] | None:
+        use = texture_of(entry)
+        asked.append(use is not None)
+        return use
+
+    findings = Findings(model, options.allow_outside)
+    source = read_gltf(model, findings, options.max_triangles, asking)
+    missing = [note.message for note in findings.notes if note.code in ("PTM-N204", "PTM-N205")]
+    faces = keep_faces(source.points, source.triangles).source
+    return _Read(source, faces, tuple(asked), tuple(missing))
+
+
+def _gltf_masks(
+    model: Path, scene: Scene, options: IngestOptions
+) -> tuple[dict[int, Mask], tuple[str, ...]]:
+    def glossy(entry: Mapping[str, Any]) -> Any:
+        return entry.get("pbrMetallicRoughness", {}).get("metallicRoughnessTexture")
+
+    if (read := _again(model, options, glossy)) is None:
+        return {}, ()
+    source, faces = read.source, read.faces
+    material = source.triangle_material[faces]
+    found, notes = {}, []
+    for number, index in enumerate(np.unique(material).tolist()):
+        texture = source.materials[index].texture
+        if texture is None or scene.materials[number].image < 0:
+            continue
+        its = material == index
+        if "mirror" in (texture.wrap_s, texture.wrap_t) or not np.array_equal(
+            source.uv[faces][its], scene.uv[its]
+        ):
+            notes.append(_left_out(scene.materials[number].name, "other texture coordinates"))
+            continue
+        mask = Mask(texture.read, texture.label, band=1, inverted=True)
+        if fault := _fault(mask, options):
+            notes.append(_left_out(scene.materials[number].name, fault))
+        else:
+            found[number] = mask
+    return found, tuple(notes)
+
+
+def _shines(
+    model: Path, scene: Scene, options: IngestOptions
+) -> tuple[dict[int, Mask], tuple[str, ...]]:
+    """Those that the scene's own reader came across."""
+    folder = Folder(model.absolute().parent, options.allow_outside)
+    found, notes = {}, []
+    for number, (its, shine) in enumerate(zip(scene.materials, scene.shines, strict=True)):
+        if its.image < 0 or shine is None:
+            continue
+        there = None if shine.fault else folder.find(shine.file, shine.base)
+        if there is None:
+            notes.append(_left_out(its.name, shine.fault))
+        elif there.path is None:
+            why = _NOT_THERE[there.outcome]
+            notes.append(_left_out(its.name, f"map_Ks {shine.file}: {why}"))
+        else:
+            mask = Mask(FileRange(there.path), there.path.name)
+            if fault := _fault(mask, options):
+                notes.append(_left_out(its.name, f"map_Ks {shine.file}: {fault}"))
+            else:
+                found[number] = mask
+    return found, tuple(notes)
+
+
+def _fault(mask: Mask, options: IngestOptions) -> str:
+    """Why a mask is no image, or "". Raises LimitError."""
+    try:
+        decoded_lightmap(mask.load(), options.limit << 20, mask.label)
+    except LimitError:
+        raise
+    except PtmError as fault:
+        return fault.message
+    except OSError as fault:
+        return fault.strerror or str(fault)
+    return ""
+
+
+def _left_out(material: str, why: str) -> str:
+    return f"the mask of material {material} is left out: {why}"

@@ -1,0 +1,185 @@
+"""The textures of a campus: each distinct image in three sizes, with a file for each channel.
+
+They are squares, as the paper has them: the aspect is in the texture coordinates, which are shares
+of the image. The set is complete: an image of 200 texels has a file of 512, too, which says no more
+than that of 256, and the index records what it was made of, so that a client may leave it out.
+Made smaller, a texel is the mean of what it covers, in the encoded values, as the levels of a
+`.ptm` are; made larger, it is interpolated. Alpha is a file of its own, and colours are not
+multiplied by it; but where an image has alpha that counts, a colour has the weight of its alpha, so
+that what is not seen does not fringe what is.
+"""
+
+from __future__ import annotations
+
+import io
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Singles
+from ptmtools.errors import naming
+from ptmtools.neighbours.campus.model import ALPHA, DIFFUSE, MASK, SIZES, TextureFile, texture_file
+from ptmtools.texture.images import load_image
+from ptmtools.texture.model import Limits
+from ptmtools.texture.samples import in_eight_bits
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+    from ptmtools.scene.model import SourceImage
+
+#: A file's record and its bytes.
+Written = tuple[TextureFile, bytes]
+
+
+@dataclass(frozen=True)
+class Mask:
+    """Where a reflection mask comes from: `load` returns the bytes of an image, of which a band
+    (0 to 2, or -1 for the luminance) says how much is reflected, or where it is ``inverted`` how
+    little."""
+
+    load: Callable[[], bytes]
+    label: str
+    band: int = -1
+    inverted: bool = False
+
+
+@dataclass(frozen=True)
+class BaseImage:
+    """What the textures of one base name are made of; `alpha`: whether that channel is wanted."""
+
+    base: str
+    image: SourceImage | None
+    alpha: bool
+    mask: Mask | None = None
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Those that it has, in their order."""
+        there = (DIFFUSE, self.image), (ALPHA, self.alpha), (MASK, self.mask)
+        return tuple(channel for channel, wanted in there if wanted)
+
+
+def texture_files(limits: tuple[int, int], base: BaseImage) -> list[Written]:
+    """The files of a base name. ``limits``: the most bytes of a decoded image, and the quality.
+
+    Raises what decoding raises.
+    """
+    most, quality = limits
+    found: list[Written] = []
+    if base.image is not None:
+        image = _decoded(base.image.load(), most, base.image.name)
+        alpha = None
+        if base.alpha:
+            alpha = image.getchannel("A") if "A" in image.getbands() else _white(image)
+        colors = image.convert("RGB")
+        for size in SIZES:
+            fitted = squared(colors, size) if alpha is None else weighted(colors, alpha, size)
+            data = jpeg(fitted, quality)
+            found.append(_written(base.base, size, DIFFUSE, data, image.size))
+            if alpha is not None:
+                data = jpeg(squared(alpha, size), quality)
+                found.append(_written(base.base, size, ALPHA, data, image.size))
+    if base.mask is not None:
+        image = _decoded(base.mask.load(), most, base.mask.label)
+        held = np.asarray(
+            image.convert("L")
+            if base.mask.band < 0
+            else image.convert("RGB").getchannel(base.mask.band)
+        )
+        shine = _grey(255 - held if base.mask.inverted else held)
+        for size in SIZES:
+            data = jpeg(squared(shine, size), quality)
+            found.append(_written(base.base, size, MASK, data, shine.size))
+    return found
+
+
+def light_files(
+    base: str, maps: list[tuple[int, NDArray[np.uint8], tuple[int, int]]], quality: int
+) -> list[Written]:
+    """The files of a lightmap, given as side, (side, side) or (side, side, 3) texels, source."""
+    return [
+        _written(base, size, "l", jpeg(_grey(texels), quality), source)
+        for size, texels, source in maps
+    ]
+
+
+def jpeg(image: Image.Image, quality: int) -> bytes:
+    """The bytes of a JPEG file, the same for the same texels."""
+    held = io.BytesIO()
+    image.save(held, "JPEG", quality=quality, optimize=True)
+    return held.getvalue()
+
+
+def squared(image: Image.Image, size: int) -> Image.Image:
+    """An image as a square: the mean where it becomes smaller, interpolated where it becomes
+    larger, along each axis by itself."""
+    from PIL.Image import Resampling
+
+    for axis in (0, 1):
+        if image.size[axis] != size:
+            shape = (size, image.height) if axis == 0 else (image.width, size)
+            less = size < image.size[axis]
+            image = image.resize(shape, Resampling.BOX if less else Resampling.BICUBIC)
+    return image
+
+
+def weighted(colors: Image.Image, alpha: Image.Image, size: int) -> Image.Image:
+    """The colours of an image as a square, each with the weight of its ``alpha``; where all of that
+    is 0, what `squared` makes of them."""
+    from PIL import Image
+
+    share = np.asarray(alpha, np.float32)
+    total = _resized(share, size)
+    plain = squared(colors, size)
+    held = np.asarray(plain, np.float32).copy()
+    # Interpolation overshoots beside what is clear.
+    there = total >= 1
+    for band in range(3):
+        of = _resized(np.asarray(colors.getchannel(band), np.float32) * share, size)
+        held[there, band] = of[there] / total[there]
+    return Image.fromarray(np.rint(np.clip(held, 0, 255)).astype(np.uint8))
+
+
+def decoded_lightmap(data: bytes, most: int, label: str) -> Image.Image:
+    """An image as RGB. Raises what decoding raises."""
+    return _decoded(data, most, label).convert("RGB")
+
+
+def _resized(texels: Singles, size: int) -> Singles:
+    from PIL import Image
+
+    return np.asarray(squared(Image.fromarray(texels), size), np.float32)
+
+
+def _written(base: str, size: int, channel: str, data: bytes, source: tuple[int, int]) -> Written:
+    name, crc = texture_file(base, size, channel), zlib.crc32(data)
+    return TextureFile(name, base, size, channel, len(data), crc, source), data
+
+
+def _decoded(data: bytes, most: int, label: str) -> Image.Image:
+    """An image of 8 bits: L, RGB or RGBA. Its orientation says nothing, as for all textures."""
+    from PIL import Image
+
+    with naming(label):
+        texels = in_eight_bits(load_image(data, Limits(most)).array())
+    kinds = {1: "L", 2: "LA", 3: "RGB", 4: "RGBA"}
+    shown = texels[:, :, 0] if texels.shape[2] == 1 else texels
+    image = Image.fromarray(np.ascontiguousarray(shown), kinds[texels.shape[2]])
+    return image.convert("RGBA") if image.mode == "LA" else image
+
+
+def _grey(texels: NDArray[np.uint8]) -> Image.Image:
+    from PIL import Image
+
+    return Image.fromarray(np.ascontiguousarray(texels))
+
+
+def _white(image: Image.Image) -> Image.Image:
+    from PIL import Image
+
+    return Image.new("L", image.size, 255)

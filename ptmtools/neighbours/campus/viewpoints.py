@@ -1,0 +1,111 @@
+"""Where a visitor is put who wants to see an object: on the ground, at the height of eyes.
+
+Candidates stand all around its box, as far away as lets the whole box into the view, nearer and
+farther. Those count that stand on the ground under the open sky: what lies highest there is what
+lies lowest, within a step. So none is within a solid, on a roof, in a tree or under a bridge. Of
+them that one is taken from which most of the object is seen, past all others; where several are
+alike the first, before the widest side. An object of which nothing is seen from any such place,
+because it stands in a building, is looked at from beside it, on whatever floor there is.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ptmtools.arrays import Floats
+from ptmtools.neighbours.campus.model import Vector
+from ptmtools.neighbours.campus.occlusion import Surroundings, areas, points_on, spread_over
+
+#: Height of eyes, and how near and how far from a box one stands, metres.
+EYE, NEAREST, FARTHEST = 1.6, 3.0, 150.0
+#: Half of the angle that the box fits into.
+_HALF_VIEW = math.radians(25)
+#: Shares of the distance that are tried, and directions around the box.
+_SHARES, _WAYS = (1.0, 0.7, 0.5, 0.25, 1.5), 24
+#: How many points of the object are looked at; gains below this share count as none.
+_POINTS, _ALIKE = 64, 0.05
+#: Who stands no more than this over what lies lowest, metres, stands on the ground.
+STEP = 0.6
+
+
+def viewpoint(around: Surroundings, corner: Floats, box: Floats) -> tuple[Vector, Vector]:
+    """Position and unit direction of a visitor who looks at an object.
+
+    Parameters
+    ----------
+    around: the whole scene.
+    corner: (T, 3, 3) faces of the object.
+    box: (6,) its bounding box.
+    """
+    low, high = box[:3], box[3:]
+    middle = (low + high) / 2
+    target = _points_of(corner)
+    place = _candidates(low, high)
+    top, ground = _heights(around, place)
+    outside = np.column_stack([place[:, 0], top + EYE, place[:, 1]])
+    seen = np.where(top <= ground + STEP, _seen(around, outside, target), 0.0)
+    eyes = outside
+    if not seen.max() > _ALIKE:
+        # From the height of eyes down to a floor; first those beside the foot of the object.
+        head = np.column_stack([place[:, 0], np.full(len(place), low[1] + EYE), place[:, 1]])
+        floor = around.below(head, EYE + STEP)
+        floor = np.where(floor > head[:, 1] - EYE - STEP, floor, low[1])
+        within = np.column_stack([place[:, 0], floor + EYE, place[:, 1]])
+        eyes = np.concatenate([outside, within])
+        seen = np.concatenate([seen, _seen(around, within, target)])
+        if not seen.any():
+            # Wholly hidden: wherever one can stand.
+            seen = np.concatenate([(top <= ground + STEP) * 1.0, np.zeros(len(within))])
+    eye = eyes[int(np.flatnonzero(seen > seen.max() - _ALIKE)[0])]
+    way = middle - eye
+    x, y, z = (way / np.linalg.norm(way)).tolist()
+    a, b, c = eye.tolist()
+    return (a, b, c), (x, y, z)
+
+
+def _candidates(low: Floats, high: Floats) -> Floats:
+    """(n, 2) x and z around a box, first those as far away as shows all of it, before the middle of
+    its widest side."""
+    half, middle = (high - low)[[0, 2]] / 2, (low + high)[[0, 2]] / 2
+    turn = 2 * math.pi * np.arange(_WAYS) / _WAYS
+    # Alternately to both sides of the first one.
+    turn = turn[np.argsort(np.minimum(np.arange(_WAYS), _WAYS - np.arange(_WAYS)), kind="stable")]
+    way = np.stack([np.sin(turn), np.cos(turn)], axis=1)
+    if half[1] > half[0]:
+        way = way[:, ::-1]
+    # To the edge of the box, and half of what is seen of it from there.
+    with np.errstate(divide="ignore"):
+        edge = (half / np.abs(way)).min(axis=1)
+    across = np.abs(way[:, ::-1]) @ half
+    far = np.maximum(across, (high[1] - low[1]) / 2) / math.tan(_HALF_VIEW)
+    away = np.clip(np.outer(_SHARES, far), NEAREST, FARTHEST)
+    return np.asarray((middle + (edge + away)[..., None] * way).reshape(-1, 2))
+
+
+def _heights(around: Surroundings, place: Floats) -> tuple[Floats, Floats]:
+    """(n,) of what lies highest and of what lies lowest at (n, 2) places; the ground of the scene
+    is what lies lowest where there is nothing else."""
+    least, most = around.points[:, 1].min(), around.points[:, 1].max()
+    height = most - least + EYE
+    at = np.column_stack([place[:, 0], np.full(len(place), most + EYE), place[:, 1]])
+    top = around.below(at, 2 * height)
+    under = at.copy()
+    under[:, 1] = least - EYE
+    return top, around.above(under, 2 * height)
+
+
+def _points_of(corner: Floats) -> Floats:
+    """(n, 3) points spread over a surface by area."""
+    area = areas(corner)
+    if not area.sum() > 0:
+        return np.asarray(corner.mean(axis=1)[:_POINTS])
+    face = spread_over(area, np.zeros(len(area), np.int64), np.zeros(1, np.int64), _POINTS)[0]
+    return points_on(corner[face], np.arange(1, _POINTS + 1))
+
+
+def _seen(around: Surroundings, eyes: Floats, target: Floats) -> Floats:
+    """(n,) the share of points that is seen from each of (n, 3) eyes."""
+    origin, end = np.repeat(eyes, len(target), axis=0), np.tile(target, (len(eyes), 1))
+    return np.asarray(around.free(origin, end).reshape(len(eyes), -1).mean(axis=1))

@@ -1,0 +1,174 @@
+"""What an interlaced image is: options, the axes of its steps, its manifest. Plain values.
+
+The paper halves rows and columns alternately until a side reaches the minimum (§3.1). Read as pairs
+of a row and a column step, as its counts want it (512² is 5 files, 4096² is 11): a pair is made as
+long as it leaves both sides at the minimum or above. So there are 2 × pairs + 1 files, and an image
+smaller than twice the minimum is one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from ptmtools.neighbours.interlace.containers import CONTAINERS
+
+#: The index of a folder, and what it says of itself.
+INDEX, FORMAT, SCHEMA = "interlace.json", "ptmtools interlaced image", 1
+#: Lines of which kind a file interleaves with the image before it.
+Axis = Literal["rows", "columns"]
+Size = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class InterlaceOptions:
+    """How an image is interlaced.
+
+    Attributes
+    ----------
+    min: no side is halved below this, texels (pixels of a texture).
+    format: of the files
+    quality: of JPEG files, 1 to 100.
+    """
+
+    min: int = 128
+    format: str = field(default="png", metadata={"choices": CONTAINERS})
+    quality: int = 90
+
+
+@dataclass(frozen=True)
+class Part:
+    """One file, and the image that all files up to it make.
+
+    Attributes
+    ----------
+    name: of the file, in the folder.
+    width, height: of the image in it, texels.
+    bytes, crc32: of the file.
+    axis: whether its lines become the odd rows or the odd columns; None for the first file.
+    joined: (width, height) of the image that it completes.
+    """
+
+    name: str
+    width: int
+    height: int
+    bytes: int
+    crc32: int
+    axis: Axis | None
+    joined: Size
+
+
+@dataclass(frozen=True)
+class Interlaced:
+    """The manifest of an interlaced image.
+
+    Attributes
+    ----------
+    width, height: of the whole image as it is stored, powers of two, texels.
+    original: (width, height) before it was scaled to powers of two.
+    container: format of the files, a name in `CONTAINERS`.
+    lossless: whether joined files are the stored image exactly.
+    components: 1 grey, 2 grey and alpha, 3 RGB, 4 RGB and alpha.
+    kind: of the samples, "uint8" or "uint16".
+    min: of `InterlaceOptions`.
+    parts: the files, in the order in which they are needed.
+    """
+
+    width: int
+    height: int
+    original: Size
+    container: str
+    lossless: bool
+    components: int
+    kind: str
+    min: int
+    parts: tuple[Part, ...]
+
+    @property
+    def texel_bytes(self) -> int:
+        """Bytes of a texel, decoded."""
+        return self.components * (2 if self.kind == "uint16" else 1)
+
+    @property
+    def bytes(self) -> int:
+        """Of all files, without the manifest."""
+        return sum(part.bytes for part in self.parts)
+
+    def document(self) -> dict[str, Any]:
+        """The manifest as JSON; `ptmtools/schemas/interlace.schema.json` describes it."""
+        return {
+            "format": FORMAT,
+            "schema": SCHEMA,
+            "width": self.width,
+            "height": self.height,
+            "original": _sides(self.original),
+            "container": self.container,
+            "lossless": self.lossless,
+            "components": self.components,
+            "kind": self.kind,
+            "min": self.min,
+            "files": [
+                {
+                    "name": part.name,
+                    "width": part.width,
+                    "height": part.height,
+                    "bytes": part.bytes,
+                    "crc32": part.crc32,
+                    "axis": part.axis,
+                    "joined": _sides(part.joined),
+                }
+                for part in self.parts
+            ],
+        }
+
+    @staticmethod
+    def of(document: dict[str, Any]) -> Interlaced:
+        """The manifest in a document that is as the schema says."""
+        parts = tuple(
+            Part(
+                file["name"],
+                file["width"],
+                file["height"],
+                file["bytes"],
+                file["crc32"],
+                file["axis"],
+                (file["joined"]["width"], file["joined"]["height"]),
+            )
+            for file in document["files"]
+        )
+        return Interlaced(
+            document["width"],
+            document["height"],
+            (document["original"]["width"], document["original"]["height"]),
+            document["container"],
+            document["lossless"],
+            document["components"],
+            document["kind"],
+            document["min"],
+            parts,
+        )
+
+
+def _sides(size: Size) -> dict[str, int]:
+    return {"width": size[0], "height": size[1]}
+
+
+def axes_of(width: int, height: int, smallest: int) -> tuple[Axis, ...]:
+    """Axes of the steps that join the files of an image of these sides, the first step first."""
+    pairs = 0
+    while min(width, height) >> (pairs + 1) >= smallest:
+        pairs += 1
+    return ("columns", "rows") * pairs
+
+
+def sizes_of(width: int, height: int, axes: Iterable[Axis]) -> list[tuple[Size, Size]]:
+    """(size of its image, size after joining) of each file, given the whole and the axes of its
+    steps; the first file first."""
+    found: list[tuple[Size, Size]] = []
+    for axis in reversed(list(axes)):
+        joined = width, height
+        width, height = (width >> 1, height) if axis == "columns" else (width, height >> 1)
+        found.append(((width, height), joined))
+    found.append(((width, height), (width, height)))
+    return found[::-1]

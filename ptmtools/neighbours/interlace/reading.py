@@ -1,0 +1,345 @@
+"""An interlaced image back from its folder: the manifest, the files, the joined image.
+
+A folder may come from a stranger. The manifest is read by its schema and must not contradict
+itself; a file is opened only under the name that its number gives, if it is a regular file of the
+size recorded; sizes are held against the limit before memory is taken for them.
+
+The check of an interlaced image: every byte is read, and every file decoded."""
+
+from __future__ import annotations
+
+import os
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from ptmtools import schemas
+from ptmtools.diagnostics import Findings, Place, Severity, ValidationReport
+from ptmtools.errors import InputError, LimitError, PtmError, naming
+from ptmtools.files import open_below
+from ptmtools.neighbours.interlace.containers import CONTAINERS, Texels
+from ptmtools.neighbours.interlace.model import INDEX, Interlaced, Part, axes_of, sizes_of
+from ptmtools.neighbours.interlace.steps import join
+from ptmtools.quantities import count, size
+from ptmtools.texture.model import Limits
+
+_LIMITS = Limits()
+#: A manifest of 33 files has 7 kB; more fields may be added.
+_MANIFEST_MOST = 1 << 20
+#: A file may have so many bytes for each byte of its texels, and so many besides.
+_BYTES, _BYTES_BESIDES = 8, 1 << 20
+_AGAIN = "write it again with `ptm interlace`"
+
+
+def read_manifest(folder: str | os.PathLike[str]) -> Interlaced:
+    """The manifest of an interlaced image.
+
+    Raises
+    ------
+    InputError: PTM-I820 no interlaced image there; PTM-I821 not as its schema says; PTM-I822 of
+        another schema number; PTM-I823 it contradicts itself; PTM-I824 it cannot be read.
+    LimitError: PTM-L822 too large for a manifest.
+    """
+    file = Path(folder) / INDEX
+    if not os.path.lexists(file):
+        there = Path(folder).is_dir()
+        raise InputError(
+            "PTM-I820",
+            f"holds no interlaced image: there is no {INDEX} in it" if there else "is no folder",
+            file=folder,
+            remedy="name a folder that `ptm interlace` wrote",
+        )
+    data = _bytes_of(Path(folder), INDEX, _MANIFEST_MOST, "PTM-L822", "a manifest")
+    with naming(file):
+        interlaced = Interlaced.of(_document(data))
+        _check_chain(interlaced)
+    return interlaced
+
+
+def _document(data: bytes) -> dict[str, Any]:
+    try:
+        document = schemas.parse(data)
+        number = document.get("schema") if isinstance(document, dict) else None
+        if type(number) is int and number != 1:
+            raise InputError(
+                "PTM-I822",
+                f"has the schema number {str(number)[:20]}; this program knows 1",
+                remedy="update ptmtools, or write the folder again",
+            )
+        schemas.check(document, schemas.INTERLACE)
+    except schemas.ShapeError as fault:
+        raise InputError(
+            "PTM-I821",
+            f"is not the manifest of an interlaced image: {fault.message}",
+            place=fault.place or None,
+            remedy=_AGAIN,
+        ) from None
+    return cast("dict[str, Any]", document)
+
+
+def _check_chain(interlaced: Interlaced) -> None:
+    """Raise InputError PTM-I823 unless names, axes and sizes of files are those of one image."""
+
+    def require(holds: bool, message: str, place: str = "") -> None:
+        if not holds:
+            raise InputError("PTM-I823", message, place=place or None, remedy=_AGAIN)
+
+    for side in (interlaced.width, interlaced.height):
+        require(side & (side - 1) == 0, f"a side of {side} is no power of two")
+    container = CONTAINERS[interlaced.container]
+    require(interlaced.lossless == container.lossless, "lossless is not what the container is")
+    held = interlaced.components in container.components and interlaced.kind in container.kinds
+    require(held, f"{interlaced.container} does not hold such samples")
+    parts = interlaced.parts
+    axes = [part.axis for part in parts[1:] if part.axis]
+    require(parts[0].axis is None, "the first file has an axis", "files[0]")
+    require(len(axes) == len(parts) - 1, "a file after the first has no axis")
+    known = sizes_of(interlaced.width, interlaced.height, axes)
+    require(min(known[0][0]) > 0, "there are more files than sides that can be halved")
+    for number, (part, (own, joined)) in enumerate(zip(parts, known, strict=True)):
+        place = f"files[{number}]"
+        name = f"{number + 1}.{interlaced.container}"
+        require(part.name == name, f"is called {part.name}, not {name}", place)
+        require(
+            (part.width, part.height) == own and part.joined == joined,
+            f"must be {own[0]} x {own[1]} and make {joined[0]} x {joined[1]} texels, by the axes "
+            "and the size of the whole",
+            place,
+        )
+
+
+def deinterlace(
+    folder: str | os.PathLike[str], step: int | None = None, limits: Limits = _LIMITS
+) -> Texels:
+    """The (h, w, c) image that the first ``step`` files make, by default all of them; only those
+    are read.
+
+    Raises
+    ------
+    InputError: what `read_manifest` and `read_part` raise; PTM-I827 there is no such step.
+    LimitError: PTM-L821 more texels than ``limits`` allow.
+    """
+    interlaced = read_manifest(folder)
+    most = len(interlaced.parts)
+    step = most if step is None else step
+    if not 1 <= step <= most:
+        raise InputError(
+            "PTM-I827",
+            f"there is no step {step}: it has {count(most, 'file')}",
+            file=folder,
+            remedy=f"--step is a number from 1 to {most}",
+        )
+    check_joined(interlaced, step, limits, folder)
+    image = read_part(Path(folder), interlaced, interlaced.parts[0])
+    for part in interlaced.parts[1:step]:
+        assert part.axis is not None
+        image = join(image, read_part(Path(folder), interlaced, part), part.axis)
+    return image
+
+
+def check_joined(
+    interlaced: Interlaced, step: int, limits: Limits, folder: str | os.PathLike[str]
+) -> None:
+    """Raise LimitError PTM-L821 if the image after a step is beyond the limit."""
+    width, height = interlaced.parts[step - 1].joined
+    if width * height * interlaced.texel_bytes > limits.decoded_bytes:
+        raise LimitError(
+            "PTM-L821",
+            f"is {width} x {height} texels of {count(interlaced.texel_bytes, 'byte')}, more than "
+            f"the limit of {limits.decoded_bytes} bytes",
+            file=folder,
+            remedy="raise the limit (--limit), or join fewer files (--step)",
+        )
+
+
+def read_part(folder: Path, interlaced: Interlaced, part: Part) -> Texels:
+    """The (h, w, c) texels of one file.
+
+    Raises
+    ------
+    InputError: PTM-I824 it is missing, no regular file or not readable; PTM-I825 it is not the
+        file that the manifest describes; PTM-I826 it is no such image.
+    LimitError: PTM-L823 its size is beyond all reason.
+    """
+    return part_texels(folder / part.name, part_bytes(folder, interlaced, part), interlaced, part)
+
+
+def part_bytes(folder: Path, interlaced: Interlaced, part: Part) -> bytes:
+    """The bytes of a file, which are those recorded; raises as `read_part`."""
+    texels = part.width * part.height * interlaced.texel_bytes
+    most = _BYTES * texels + _BYTES_BESIDES
+    what = f"{part.width} x {part.height} texels"
+    data = _bytes_of(folder, part.name, most, "PTM-L823", what)
+    wrong = None
+    if len(data) != part.bytes:
+        wrong = f"has {len(data)} bytes instead of {part.bytes}"
+    elif zlib.crc32(data) != part.crc32:
+        wrong = "has another checksum than recorded"
+    if wrong:
+        raise InputError(
+            "PTM-I825", wrong, file=folder / part.name, remedy=f"download it again, or {_AGAIN}"
+        )
+    return data
+
+
+def part_texels(file: Path, data: bytes, interlaced: Interlaced, part: Part) -> Texels:
+    """The texels in the bytes of a file; raises InputError PTM-I826."""
+    from ptmtools.texture.images import load_image
+
+    container = CONTAINERS[interlaced.container]
+    shape = part.height, part.width, interlaced.components
+    try:
+        if not data.startswith(container.magic):
+            raise ValueError(f"not a {interlaced.container}")
+        # What is larger is refused before it is decoded; WebP counts four bytes a texel.
+        held = part.width * part.height * max(4, interlaced.texel_bytes)
+        picture = load_image(data, Limits(decoded_bytes=held))
+        if picture.texels.shape[:2] != shape[:2]:
+            height, width = picture.texels.shape[:2]
+            raise ValueError(f"{width} x {height} instead of {part.width} x {part.height} texels")
+        if picture.texels.dtype.name != interlaced.kind:
+            raise ValueError(f"samples of {picture.texels.dtype} instead of {interlaced.kind}")
+        return np.asarray(container.read(picture.array(), interlaced.components))
+    except (ValueError, PtmError) as fault:
+        reason = fault.message if isinstance(fault, PtmError) else str(fault)
+        raise InputError(
+            "PTM-I826",
+            f"is not the image that the manifest describes ({reason})",
+            file=file,
+            remedy=_AGAIN,
+        ) from None
+
+
+def _bytes_of(folder: Path, name: str, most: int, code: str, what: str) -> bytes:
+    """The bytes of a regular file; raises InputError PTM-I824, LimitError with that code."""
+    file = folder / name
+    try:
+        with open_below(folder, name) as stream:
+            length = os.fstat(stream.fileno()).st_size
+            if length > most:
+                raise LimitError(
+                    code, f"has {length} bytes, too many for {what}", file=file, remedy=_AGAIN
+                )
+            return stream.read(most)
+    except FileNotFoundError:
+        raise InputError(
+            "PTM-I824", "is missing", file=file, remedy=f"download it again, or {_AGAIN}"
+        ) from None
+    except OSError as fault:
+        raise InputError(
+            "PTM-I824",
+            f"cannot be read ({fault.strerror or fault})",
+            file=file,
+            remedy="check what it is, and its permissions",
+        ) from None
+
+
+def describe(folder: Path) -> tuple[tuple[str, ...], Mapping[str, Any]]:
+    """What ``ptm info`` prints of a folder, and its record; raises as `read_manifest`."""
+    interlaced = read_manifest(folder)
+    width, height = interlaced.original
+    scaled = (
+        ""
+        if (width, height) == (interlaced.width, interlaced.height)
+        else (f", scaled from {width} x {height}")
+    )
+    lines = [
+        f"{interlaced.width} x {interlaced.height}{scaled}, "
+        f"{count(interlaced.components, 'component')} of {interlaced.kind}, "
+        f"{'lossless' if interlaced.lossless else 'lossy'}, "
+        f"{count(len(interlaced.parts), 'file')}, {size(interlaced.bytes)}",
+        "file          image  joined by         makes         bytes   share      up to here",
+    ]
+    end = 0
+    for part in interlaced.parts:
+        end += part.bytes
+        own, joined = f"{part.width} x {part.height}", f"{part.joined[0]} x {part.joined[1]}"
+        lines.append(
+            f"{part.name:<7} {own:>11}  {part.axis or '':<9} {joined:>13} {part.bytes:>13,} "
+            f"{part.bytes / interlaced.bytes:>7.2%} {end:>15,}"
+        )
+    return tuple(lines), interlaced.document()
+
+
+CODES: Mapping[str, tuple[Severity, str]] = {
+    "PTM-D800": ("error", "interlace.json cannot be read, or is not as its schema says"),
+    "PTM-D801": ("error", "interlace.json has another schema number"),
+    "PTM-D802": ("error", "interlace.json contradicts itself: names, axes or sizes of the files"),
+    "PTM-D803": ("error", "a file of an interlaced image is missing or cannot be read"),
+    "PTM-D804": ("error", "a file of an interlaced image has another size or checksum"),
+    "PTM-D805": ("error", "a file of an interlaced image is not the image that is described"),
+    "PTM-D806": ("warning", "a file in the folder of an interlaced image that it does not name"),
+    "PTM-D807": ("warning", "files too large for --limit: only their checksums were compared"),
+    "PTM-D808": ("warning", "an image is split otherwise than its minimum asks for"),
+}
+#: What reading raises → what the check finds.
+_FOUND = {
+    "PTM-I821": "PTM-D800",
+    "PTM-I822": "PTM-D801",
+    "PTM-I823": "PTM-D802",
+    "PTM-I824": "PTM-D803",
+    "PTM-I825": "PTM-D804",
+    "PTM-I826": "PTM-D805",
+    "PTM-L822": "PTM-D800",
+    "PTM-L823": "PTM-D804",
+}
+
+
+def validate_interlaced(folder: Path, limits: Limits = _LIMITS) -> ValidationReport:
+    """Checks a folder of `ptm interlace`; what is wrong stands in the report.
+
+    ``limits``: for the whole image; beyond them checksums are compared, and nothing is decoded.
+    Raises InputError PTM-I820 if there is no interlaced image.
+    """
+    found = Findings(CODES)
+    files = 1
+    try:
+        size = os.lstat(folder / INDEX).st_size
+        interlaced = read_manifest(folder)
+    except InputError as fault:
+        if fault.code == "PTM-I820":
+            raise
+        code = "PTM-D800" if fault.code == "PTM-I824" else _FOUND[fault.code]
+        found.add(code, INDEX, fault.place or "", fault.message)
+        return ValidationReport(found.issues(), files, 0)
+    _check_split(interlaced, found.at(INDEX))
+    decoded = True
+    try:
+        check_joined(interlaced, len(interlaced.parts), limits, folder)
+    except LimitError as fault:
+        found.add("PTM-D807", INDEX, "", fault.message)
+        decoded = False
+    for part in interlaced.parts:
+        length = _check_part(folder, interlaced, part, decoded, found.at(part.name))
+        size += length
+        files += length > 0
+    named = {INDEX, *(part.name for part in interlaced.parts)}
+    for name in sorted(set(os.listdir(folder)) - named):
+        found.add("PTM-D806", name, "", "is not named in interlace.json")
+    return ValidationReport(found.issues(), files, size)
+
+
+def _check_split(interlaced: Interlaced, at: Place) -> None:
+    wanted = axes_of(interlaced.width, interlaced.height, interlaced.min)
+    if tuple(part.axis for part in interlaced.parts[1:]) != wanted:
+        at.add(
+            "PTM-D808",
+            f"a minimum of {interlaced.min} asks for {count(len(wanted) + 1, 'file')}, columns and "
+            "rows in turn",
+            "files",
+        )
+
+
+def _check_part(folder: Path, interlaced: Interlaced, part: Part, decoded: bool, at: Place) -> int:
+    """Checks one file; how many bytes were read."""
+    data = b""
+    try:
+        data = part_bytes(folder, interlaced, part)
+        if decoded:
+            part_texels(folder / part.name, data, interlaced, part)
+    except InputError as fault:
+        at.add(_FOUND[fault.code], fault.message)
+    return len(data)

@@ -1,0 +1,26 @@
+"""Artifacts → VRML97, hints and plans; and back: the check of what stands on disk (paper §6)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ptmtools.lazy import names
+
+if TYPE_CHECKING:
+    from ptmtools.output.emission import emit as emit
+    from ptmtools.output.model import (
+        EmitOptions as EmitOptions,
+        EmitReport as EmitReport,
+        GivenViewpoint as GivenViewpoint,
+        PlotOptions as PlotOptions,
+        PlotReport as PlotReport,
+        TextureRecord as TextureRecord,
+        Viewpoint as Viewpoint,
+    )
+    from ptmtools.output.plan import plot_plan as plot_plan
+    from ptmtools.output.validation.database import (
+        validate_database as validate_database,
+        validate_ptm as validate_ptm,
+    )
+
+__getattr__ = names(__name__)

@@ -1,0 +1,246 @@
+"""What all emitters write from: the artifacts, the textures and viewpoints, and what is derived
+from them once for all.
+
+The geometry of a cell as indexed shapes: one per object, material and sidedness.
+
+Positions and texture coordinates are rounded to float32 once for the whole scene and welded by
+equality there, so that a vertex shared by two pieces is one vertex in the file, and a corner
+shared by two cells has the same text in both. Pieces of which two corners become one in that
+rounding have no area left; they are dropped and counted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.model import Cells
+from ptmtools.coverage.model import Ach
+from ptmtools.output.model import EmitOptions, OctreeRecord, TextureRecord, Viewpoint
+from ptmtools.output.numbers import shares_of, single
+from ptmtools.progress import Progress, silent
+from ptmtools.scene.colors import gradients
+from ptmtools.scene.model import Scene
+from ptmtools.visibility.model import Pvs
+
+if TYPE_CHECKING:
+    from ptmtools.coverage.required_levels import Need
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Triangles of one object with one material, all of them solid or all two-sided.
+
+    Attributes
+    ----------
+    object, material: indices into the scene's.
+    two_sided: whether both sides are seen.
+    point, uv: (n,), (k,) rows of `Geometry.point` and `Geometry.uv`.
+    triangle, uv_triangle: (m, 3) indices into `point` and `uv`.
+    color: (m, 3, 3) uint8 sRGB of the corners, None where all are white.
+    """
+
+    object: int
+    material: int
+    two_sided: bool
+    point: NDArray[np.int64]
+    uv: NDArray[np.int64]
+    triangle: NDArray[np.int64]
+    uv_triangle: NDArray[np.int64]
+    color: NDArray[np.uint8] | None = None
+
+
+class Geometry:
+    """All shapes of all cells, by cell, object, material and sidedness.
+
+    Lists of varying length are CSR, as in `Cells`.
+
+    Attributes
+    ----------
+    point, uv: (n, 3), (k, 2) float32, the distinct positions and texture coordinates.
+    cell_start: (C + 1,) the shapes of each cell.
+    object, material, two_sided: (S,) of each shape.
+    triangle, uv_triangle: (M, 3) corners as indices into `shape_point` and `shape_uv`, counted
+        from the shape's first.
+    triangle_start: (S + 1,) the triangles of each shape.
+    shape_point, point_start: (P,) rows of `point`, ascending; (S + 1,) those of each shape.
+    shape_uv, uv_start: the same for `uv`.
+    color: (M, 3, 3) uint8 sRGB of the corners of triangles; None if the scene has no colours.
+    collapsed: pieces dropped by the rounding, over all cells.
+    """
+
+    def __init__(self, scene: Scene, cells: Cells) -> None:
+        piece, cell = cells.emitted(scene.two_sided)
+        self.point, point_of = _welded(single(cells.vertex, "vertices"))
+        self.uv, uv_of = _welded(single(cells.vertex_uv, "texture coordinates"))
+        corner = point_of[cells.triangle[piece]].reshape(-1, 3)
+        flat = (corner == np.roll(corner, 1, axis=1)).any(axis=1)
+        self.collapsed = int(flat.sum())
+        piece, cell, corner = piece[~flat], cell[~flat], corner[~flat]
+        source = cells.triangle_source[piece]
+        thing, material = scene.triangle_object[source], scene.triangle_material[source]
+        things, materials = max(len(scene.objects), 1), max(len(scene.materials), 1)
+        key = cell.astype(np.int64) * things + thing
+        key = (key * materials + material) * 2 + scene.two_sided[source]
+        order = np.argsort(key, kind="stable")
+        key = key[order]
+        change = np.ones(len(order), dtype=np.bool_)
+        change[1:] = key[1:] != key[:-1]
+        first = np.flatnonzero(change)
+        shape = np.cumsum(change) - 1
+        one = order[first]
+        self.object, self.material = thing[one], material[one]
+        self.two_sided = scene.two_sided[source[one]]
+        self.triangle_start = np.append(first, len(order))
+        self.cell_start = np.searchsorted(cell[one], np.arange(cells.cell_count + 1))
+        self.shape_point, self.point_start, self.triangle = _indexed(
+            corner[order], shape, len(first), len(self.point)
+        )
+        self.color = _corner_colors(scene, cells, piece[order])
+        uv_corner = uv_of[cells.triangle[piece[order]]].reshape(-1, 3)
+        self.shape_uv, self.uv_start, self.uv_triangle = _indexed(
+            uv_corner, shape, len(first), len(self.uv)
+        )
+
+    def areas(self) -> NDArray[np.float64]:
+        """(S,) m² of each shape."""
+        count = np.diff(self.triangle_start)
+        first = np.repeat(self.point_start[:-1], count)[:, None]
+        corners = self.point[self.shape_point[first + self.triangle]].astype(np.float64)
+        edge = corners[:, 1:] - corners[:, :1]
+        area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1) / 2
+        total = np.zeros(len(count))
+        np.add.at(total, np.repeat(np.arange(len(count)), count), area)
+        return total
+
+    def shape(self, s: int) -> Shape:
+        """One of them."""
+        points, uvs, rows = (
+            slice(*start[s : s + 2].tolist())
+            for start in (self.point_start, self.uv_start, self.triangle_start)
+        )
+        return Shape(
+            int(self.object[s]),
+            int(self.material[s]),
+            bool(self.two_sided[s]),
+            self.shape_point[points],
+            self.shape_uv[uvs],
+            self.triangle[rows],
+            self.uv_triangle[rows],
+            None if self.color is None or (self.color[rows] == 255).all() else self.color[rows],
+        )
+
+    def shapes(self, cell: int) -> Iterator[Shape]:
+        """The shapes of a cell."""
+        return map(self.shape, range(*self.cell_start[cell : cell + 2].tolist()))
+
+
+def _corner_colors(
+    scene: Scene, cells: Cells, piece: NDArray[np.integer]
+) -> NDArray[np.uint8] | None:
+    """(M, 3, 3) the colours of pieces' corners, each as its triangle of the scene goes on there;
+    None if the scene has none."""
+    if scene.colors is None:
+        return None
+    source = cells.triangle_source[piece]
+    corners, colors = scene.corners[source], scene.colors[source].astype(np.float64)
+    away = cells.vertex[cells.triangle[piece]] - corners[:, :1]
+    found = colors[:, :1] + np.einsum("mkx,mcx->mck", gradients(corners, colors), away)
+    return np.asarray(np.clip(np.rint(found), 0, 255).astype(np.uint8))
+
+
+def _indexed(
+    corner: NDArray[np.int64], shape: NDArray[np.int64], shapes: int, count: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """What the triangles of each shape use, and where each shape's begins; and the (m, 3) corners
+    as indices into that, counted from the shape's first."""
+    used, place = np.unique(shape[:, None] * count + corner, return_inverse=True)
+    start = np.searchsorted(used, np.arange(shapes + 1) * count)
+    return used % max(count, 1), start, place.reshape(-1, 3) - start[shape][:, None]
+
+
+def _welded(rows: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """The distinct rows of (n, 2 or more) in lexical order, and the place of each row among them.
+
+    Floats become integers of the same order, two of which are sorted as one.
+    """
+    bits = np.ascontiguousarray(rows.T).view(np.uint32)
+    negative = bits >> np.uint32(31) == 1
+    columns = np.where(negative, ~bits, bits | np.uint32(1 << 31)).astype(np.uint64)
+    rank = columns[0]
+    for column in columns[1:]:
+        _, place = np.unique((rank << np.uint64(32)) | column, return_inverse=True)
+        rank = place.astype(np.uint64)
+    welded = np.empty((int(place.max(initial=-1)) + 1, rows.shape[1]), dtype=np.float32)
+    welded[place] = rows
+    return welded, place.astype(np.int64)
+
+
+@dataclass(frozen=True)
+class Content:
+    """
+    Attributes
+    ----------
+    textures: in the order of the hints; one for every image that a material in use names.
+    viewpoints: the places to start from.
+    progress: is called for every cell.
+    need: how fine textures are needed, where that was measured.
+    octrees: the octree textures of objects.
+    workers: threads that may be used.
+    """
+
+    scene: Scene
+    cells: Cells
+    pvs: Pvs
+    ach: Ach
+    textures: tuple[TextureRecord, ...]
+    viewpoints: tuple[Viewpoint, ...] = ()
+    options: EmitOptions = EmitOptions()  # noqa: RUF009 - a frozen value
+    progress: Progress = silent
+    need: Need | None = None
+    octrees: tuple[OctreeRecord, ...] = ()
+    workers: int = 1
+
+    @cached_property
+    def geometry(self) -> Geometry:
+        """The shapes of all cells; raises PTM-D601 if a number is not finite in float32."""
+        return Geometry(self.scene, self.cells)
+
+    @cached_property
+    def leaves(self) -> list[list[int]]:
+        """The leaves of each cell, ascending."""
+        order, count = np.argsort(self.cells.leaf_cell, kind="stable"), self.cells.cell_count
+        first = np.searchsorted(self.cells.leaf_cell[order], np.arange(count))
+        return [leaves.tolist() for leaves in np.split(order, first)[1:]]
+
+    @cached_property
+    def records(self) -> Mapping[int, tuple[int, TextureRecord]]:
+        """Image of the scene → its place in `textures`, and its record there."""
+        return {record.image: (place, record) for place, record in enumerate(self.textures)}
+
+    @cached_property
+    def octree_of(self) -> Mapping[int, int]:
+        """Object of the scene → the place of its octree in `octrees`."""
+        return {record.number: place for place, record in enumerate(self.octrees)}
+
+    @cached_property
+    def paint(self) -> NDArray[np.int64]:
+        """(S,) of each shape its texture's place in `textures`; -1 for none."""
+        place = [self.records[m.image][0] if m.image >= 0 else -1 for m in self.scene.materials]
+        paint: NDArray[np.int64] = np.array(place, dtype=np.int64)[self.geometry.material]
+        return paint
+
+    @cached_property
+    def painted(self) -> list[NDArray[np.int64]]:
+        """Of each cell the places in `textures` that its shapes use, ascending."""
+        cells = np.split(self.paint, self.geometry.cell_start[1:-1])
+        return [np.unique(used[used >= 0]) for used in cells]
+
+    @cached_property
+    def shares(self) -> list[list[float]]:
+        """Of each cell its ACH as it is written, aligned with its row of the PVS."""
+        return [shares_of(row) for row in np.split(self.ach.value, self.pvs.start[1:-1])]

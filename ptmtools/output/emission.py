@@ -1,0 +1,286 @@
+"""Artifacts → the files that are served (paper §6), by the emitters that are asked for.
+
+Files below a folder, written a few at a time, with gzip copies if wanted.
+
+A file is on the disk before it has its name (`ptmtools.files`), and most of the time goes into
+waiting for that; meanwhile the next ones are made.
+
+A gzip copy is what servers hand out in place of a file (nginx: `gzip_static on`) and what VRML
+browsers open by themselves. It holds no name and no time, so its bytes depend on nothing but the
+file and the version of zlib.
+
+What a database means for a visitor: what it takes to look at it, and what is at hand on a walk.
+
+All are bytes as they lie on the disk, textures losslessly and whole unless said otherwise.
+
+A *VRML browser* opens the root and loads everything that this leads to: all cells, and the
+fallback image of every texture. A client of the *hints* fetches the index, the record of the cell
+that it is in, and of what that cell sees the geometry and the textures; the geometry in a form
+that has no entry of its own, and so is there for such clients, if one was written. For it **the
+first room is complete** when the index, the record of the first viewpoint's cell, the geometry of
+all cells that it sees and the textures of the cell itself are there, and of the textures of the
+other cells the coarsest level: nothing is missing, and the room is as fine as the model. **At
+hand** is what it holds in a cell once everything it sees is whole. Means are over
+places, not over cells: a cell counts by its volume."""
+
+from __future__ import annotations
+
+import os
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.model import Cells
+from ptmtools.coverage.model import Ach
+from ptmtools.errors import DatabaseError
+from ptmtools.files import real_folder, refuse_existing, write_bytes, writing
+from ptmtools.output.content import Content
+from ptmtools.output.emitters import GZIP, Emitter, chosen_emitters
+from ptmtools.output.model import EmitOptions, EmitReport, OctreeRecord, TextureRecord
+from ptmtools.output.names import BUNDLE, HINTS, RECORD_FILES, path_of
+from ptmtools.output.viewpoints import place_viewpoints
+from ptmtools.progress import Progress, silent
+from ptmtools.scene.model import Scene
+from ptmtools.texture.parallel import ordered
+from ptmtools.visibility.model import Pvs, over_places
+
+if TYPE_CHECKING:
+    from ptmtools.coverage.required_levels import Need
+
+
+#: Files that wait for the disk at a time.
+_WRITERS = 8
+#: Deflate, no name, no time, best compression, no system (RFC 1952).
+_GZIP = bytes([0x1F, 0x8B, 8, 0, 0, 0, 0, 0, 2, 255])
+#: Suffixes of files that are copied.
+_TEXT = (".wrl", ".json")
+
+
+def compressed(data: bytes) -> bytes:
+    """A gzip file of these bytes."""
+    deflate = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
+    body = deflate.compress(data) + deflate.flush()
+    check = zlib.crc32(data).to_bytes(4, "little")
+    return _GZIP + body + check + (len(data) & 0xFFFFFFFF).to_bytes(4, "little")
+
+
+def write_files(
+    folder: Path, files: Iterable[tuple[str, str | bytes]], *, force: bool, gzip: bool
+) -> Iterator[dict[str, int]]:
+    """Of each file what was written, itself and a copy, as name → bytes; at the end all are on the
+    disk.
+
+    Parameters
+    ----------
+    folder: an existing one.
+    files: name relative to the folder, and contents; folders on the way are made.
+    force: overwrite files; a gzip copy that is not written again goes.
+    gzip: write copies of VRML and JSON files.
+
+    Raises OutputError: PTM-O001 to PTM-O003, PTM-O005, of the first file that cannot be written.
+    """
+
+    def write(file: tuple[str, str | bytes]) -> dict[str, int]:
+        name, content = file
+        data = content.encode() if isinstance(content, str) else content
+        copy = folder / f"{name}{GZIP}"
+        real_folder(folder, name.rpartition("/")[0])
+        write_bytes(folder / name, data, force=force)
+        if gzip and name.endswith(_TEXT):
+            packed = compressed(data)
+            write_bytes(copy, packed, force=force)
+            return {name: len(data), f"{name}{GZIP}": len(packed)}
+        if force:
+            with writing(copy):
+                copy.unlink(missing_ok=True)
+        return {name: len(data)}
+
+    return ordered(write, files, _WRITERS)
+
+
+@dataclass(frozen=True)
+class Visit:
+    """See the module's description.
+
+    Attributes
+    ----------
+    browser: bytes that a VRML browser fetches; None without VRML.
+    first_room: bytes until the first room is complete.
+    mean_at_hand, most_at_hand: bytes.
+    mean_volume, most_volume: share of the volume of all cells that is at hand.
+    mean_texels, most_texels: share of the texels in use; None without textures.
+    """
+
+    browser: int | None
+    first_room: int
+    mean_at_hand: int
+    most_at_hand: int
+    mean_volume: float
+    most_volume: float
+    mean_texels: float | None
+    most_texels: float | None
+
+
+def visit_of(content: Content, sizes: Mapping[str, int]) -> Visit:
+    """What what has been written means for a visitor.
+
+    ``sizes``: bytes of each file, by its path in the served folder.
+    """
+    pvs, records = content.pvs, content.textures
+    forms = [e for e in chosen_emitters(content.options.format) if e.cell_files]
+    nothing = np.zeros(pvs.cell_count, np.int64)
+    fetched = [f for f in forms if not f.entry] or forms
+    geometry = _geometry(content, fetched[0], sizes) if fetched else nothing
+    paints = np.zeros((pvs.cell_count, len(records)), dtype=np.bool_)
+    for cell, places in enumerate(content.painted):
+        paints[cell, places] = True
+    sees = np.array([paints[pvs.row(c)].any(axis=0) for c in range(pvs.cell_count)])
+    used = np.flatnonzero(paints.any(axis=0))
+    whole, coarsest = (
+        np.array([r.levels[n].end if r.levels else 0 for r in records], np.int64) for n in (-1, 0)
+    )
+    at_hand = pvs.at_hand(geometry) + sees @ whole
+    first = content.viewpoints[0].cell
+    opening = [
+        sizes[HINTS],
+        sizes[path_of(first, RECORD_FILES)],
+        geometry[pvs.row(first)].sum(),
+        whole[paints[first]].sum(),
+        coarsest[sees[first] & ~paints[first]].sum(),
+    ]
+    texels = np.array([r.width * r.height for r in records], np.float64)
+    shares: tuple[float, float] | tuple[None, None] = (None, None)
+    if len(used):
+        shares = over_places(sees @ texels / texels[used].sum(), pvs.viewers)
+    mean, most = over_places(at_hand, pvs.viewers)
+    volume = pvs.volume_at_hand
+    images = sum(records[i].fallback_bytes for i in used.tolist() if content.options.fallback)
+    browsed = [sizes[f.entry] + _total(_geometry(content, f, sizes)) for f in forms if f.entry]
+    return Visit(
+        browser=browsed[0] + images if browsed else None,
+        first_room=int(sum(opening)),
+        mean_at_hand=round(mean),
+        most_at_hand=round(most),
+        mean_volume=volume[0],
+        most_volume=volume[1],
+        mean_texels=shares[0],
+        most_texels=shares[1],
+    )
+
+
+def _geometry(content: Content, form: Emitter, sizes: Mapping[str, int]) -> NDArray[np.int64]:
+    """(C,) bytes of the cells in a form."""
+    paths = (path_of(cell, form.cell_files) for cell in range(content.cells.cell_count))
+    return np.array([sizes[path] for path in paths], np.int64)
+
+
+def _total(sizes: NDArray[np.int64]) -> int:
+    return int(sizes.sum())
+
+
+def emit(
+    scene: Scene,
+    cells: Cells,
+    pvs: Pvs,
+    ach: Ach,
+    textures: tuple[TextureRecord, ...],
+    out: str | os.PathLike[str],
+    options: EmitOptions = EmitOptions(),  # noqa: B008 - a frozen value
+    progress: Progress = silent,
+    *,
+    force: bool = False,
+    need: Need | None = None,
+    octrees: tuple[OctreeRecord, ...] = (),
+    workers: int = 1,
+) -> EmitReport:
+    """Writes the files of every emitter that ``options.format`` names into the folder ``out``. The
+    textures themselves are written by the stage before.
+
+    Parameters
+    ----------
+    textures: one record for every image that a material in use names.
+    force: overwrite files of these names, gzip copies included.
+    need: how fine the textures are needed, if that is to be written.
+    octrees: the octree textures of objects, which are there already.
+    workers: threads that may be used.
+
+    Raises
+    ------
+    DatabaseError: PTM-D600 there are no cells; PTM-D601 a number is not finite in float32;
+        PTM-D602 an image has no record; PTM-D603 a cell is flat in float32; PTM-D604 the
+        artifacts do not belong together.
+    InputError: PTM-I600 a given viewpoint lies in no cell.
+    OutputError: PTM-O001 to PTM-O003, PTM-O005, see `ptmtools.files`.
+    LimitError: PTM-L600 a cell is longer than a GLB can be.
+    """
+    folder = Path(out)
+    _check(scene, cells, pvs, ach, textures)
+    emitters = chosen_emitters(options.format)
+    owned = [name for emitter in emitters for name in emitter.owns]
+    for name in owned:
+        if not force:
+            remedy = "name another folder, or give --force to overwrite it"
+            refuse_existing(folder / name, remedy)
+    viewpoints, notes = place_viewpoints(scene, cells, options, textures)
+    content = Content(
+        scene, cells, pvs, ach, textures, viewpoints, options, progress, need, octrees, workers
+    )
+    written = [emitter.files(content) for emitter in emitters]
+    for name in owned:
+        if name.endswith("/"):
+            real_folder(folder, name[:-1])
+    sizes: dict[str, int] = {}
+    entries = {emitter.entry for emitter in emitters}
+    for given in written:
+        # What leads to others comes when those are there.
+        for _, files in groupby(given, lambda file: file[0] in entries):
+            for some in write_files(folder, files, force=force, gzip=options.gzip):
+                sizes |= some
+    return EmitReport(
+        files=tuple(sizes),
+        viewpoints=viewpoints,
+        shapes=len(content.geometry.object),
+        triangles=len(content.geometry.triangle),
+        collapsed=content.geometry.collapsed,
+        bytes=sum(sizes.values()),
+        first_look=sum(size for name, size in sizes.items() if name.endswith(BUNDLE)),
+        visit=visit_of(content, sizes),
+        notes=notes,
+    )
+
+
+def _check(
+    scene: Scene, cells: Cells, pvs: Pvs, ach: Ach, textures: Iterable[TextureRecord]
+) -> None:
+    if cells.cell_count == 0:
+        raise DatabaseError(
+            "PTM-D600", "there are no cells", remedy="subdivide a model that has rooms"
+        )
+    count, source = cells.cell_count, np.unique(cells.triangle_source)
+    fault = ""
+    if len(source) and source[-1] >= len(scene.triangles):
+        fault = "the cells hold pieces of triangles that the scene lacks"
+    elif not len(pvs.start) == len(ach.start) == count + 1:
+        rows = f"{len(pvs.start) - 1} and {len(ach.start) - 1}"
+        fault = f"pvs and ach have {rows} cells, not {count}"
+    elif not np.array_equal(pvs.start, ach.start) or len(ach.value) != len(pvs.cell):
+        fault = "pvs and ach have rows of different lengths"
+    if fault:
+        raise DatabaseError(
+            "PTM-D604",
+            f"the stages do not belong together: {fault}",
+            remedy="run the stages again, from `cells` on",
+        )
+    used = {scene.materials[m].image for m in np.unique(scene.triangle_material[source]).tolist()}
+    for image in sorted(used - {-1} - {texture.image for texture in textures}):
+        raise DatabaseError(
+            "PTM-D602",
+            f"the texture {scene.images[image].name!r} was not encoded",
+            remedy="run the stage `textures` again",
+        )

@@ -1,0 +1,367 @@
+"""A cell as a GLB: a node and a mesh for each object, a primitive for each of its shapes.
+
+The shapes are those of the VRML file, in its order. Triangles are indexed; a vertex is a position
+with, where the material has an image, its texture coordinates, whose origin is the upper left in
+glTF, and with its colour where the shape has several. There are no normals: the scene has none, and
+surfaces without are flat (glTF 2.0, section 3.7.2.1). Each shape has positions of its own: with one
+accessor for the whole cell the files of the sample museum are 13 % smaller, those of the hospital
+5 %, but clients take its bounds for the shape's, and some copy all of it for each.
+
+The accessors of one GLB and the bytes behind them.
+
+One buffer view for each kind of data: positions, texture coordinates, colours, wide indices,
+narrow ones.
+An array that was there before gets no second accessor. Vertices are in the order of their first
+use, so rectangles of all sizes share their six indices, and often their texture coordinates: the
+sample museum's files are 9 % smaller for it.
+
+The GLBs that `emit` writes: JSON and the bytes of one buffer, see `ptmtools.glb`.
+
+A material of the scene as glTF's, with the texture, sampler and image that it needs.
+
+=================================  =======================================================
+glTF                               from
+=================================  =======================================================
+baseColorFactor                    colour and opacity; glTF multiplies linear light, the scene
+                                   what is encoded as sRGB, so the colour is converted
+baseColorTexture                   the fallback image, by URI; nothing where there is none
+metallicFactor 0, roughness 1      nothing known: matt
+doubleSided                        the shape's sidedness
+alphaMode BLEND                    opacity below 1, or a used texel with alpha below 255
+alphaMode MASK, alphaCutoff        such texels of a material that tests them against a cutoff
+extras.ptm, extras.texture         the image's `.ptm`, and its place in the hints' textures
+extras.wrapS, extras.wrapT         the sampler's, for clients with textures of their own
+=================================  =======================================================
+
+(Tried: the texture as emissiveTexture
+over black, which shows it texel for texel as VRML does, without KHR_materials_unlit. Clients then
+find no base colour texture to put their own in, and alpha still needs one.)"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools import schemas
+from ptmtools.errors import LimitError
+from ptmtools.glb import BINARY, JSON, glb, glb_chunks
+from ptmtools.output.content import Content, Geometry, Shape
+from ptmtools.output.model import FileError, TextureRecord, shaped
+from ptmtools.output.names import GLTF_FILES, UP, cell_name, path_of
+from ptmtools.scene.colors import packed, to_linear, unpacked
+from ptmtools.scene.model import Material, Scene, Wrap
+
+_FLOAT, _SHORT, _INT = 5126, 5123, 5125
+_VERTICES, _INDICES = 34962, 34963
+#: Narrow indices end before 65535, which restarts a primitive.
+_NARROW = 65535
+#: In the order of the views: component type, type, bytes of an element, target.
+_KINDS = (
+    (_FLOAT, "VEC3", 12, _VERTICES),
+    (_FLOAT, "VEC2", 8, _VERTICES),
+    (_SHORT, "VEC4", 8, _VERTICES),
+    (_INT, "SCALAR", 4, _INDICES),
+    (_SHORT, "SCALAR", 2, _INDICES),
+)
+_POSITION, _COORDINATE, _COLOR, _WIDE, _THIN = range(5)
+#: Whole numbers below this are written without the ".0" that Python gives them.
+_WHOLE = 1e15
+
+
+class BufferWriter:
+    """Gathers arrays; each method returns the index of the array's accessor."""
+
+    def __init__(self) -> None:
+        self._bytes: tuple[list[bytes], ...] = ([], [], [], [], [])
+        self._size = [0, 0, 0, 0, 0]
+        self._accessors: list[dict[str, Any]] = []
+        self._known: dict[tuple[int, bytes], int] = {}
+
+    def positions(self, point: NDArray[np.float32]) -> int:
+        """(n, 3), with the bounds that glTF wants of them."""
+        bounds = {
+            "min": _numbers(point.min(axis=0)),
+            "max": _numbers(point.max(axis=0)),
+        }
+        return self._add(_POSITION, point.astype("<f4").tobytes(), bounds)
+
+    def coordinates(self, uv: NDArray[np.float32]) -> int:
+        """(n, 2)."""
+        return self._add(_COORDINATE, uv.astype("<f4").tobytes(), {})
+
+    def colors(self, light: NDArray[np.float64]) -> int:
+        """(n, 3) linear light from 0 to 1; 16 bits, as 8 would be too few in the dark."""
+        held = np.full((len(light), 4), 65535, "<u2")
+        held[:, :3] = np.rint(65535 * light)
+        return self._add(_COLOR, held.tobytes(), {"normalized": True})
+
+    def indices(self, triangle: NDArray[np.int64], vertices: int) -> int:
+        """(m, 3) indices into so many vertices."""
+        kind, form = (_THIN, "<u2") if vertices <= _NARROW else (_WIDE, "<u4")
+        return self._add(kind, triangle.astype(form).tobytes(), {})
+
+    def _add(self, kind: int, data: bytes, more: dict[str, Any]) -> int:
+        place = self._known.setdefault((kind, data), len(self._accessors))
+        if place == len(self._accessors):
+            component, form, size, _ = _KINDS[kind]
+            accessor: dict[str, Any] = {"bufferView": kind}
+            if self._size[kind]:
+                accessor["byteOffset"] = self._size[kind]
+            accessor |= {"componentType": component, "count": len(data) // size, "type": form}
+            self._accessors.append(accessor | more)
+            self._bytes[kind].append(data)
+            self._size[kind] += len(data)
+        return place
+
+    def finish(self) -> tuple[dict[str, Any], bytes]:
+        """The members "accessors", "bufferViews" and "buffers" of the document, and the bytes."""
+        if not self._accessors:
+            return {}, b""
+        views: list[dict[str, Any]] = []
+        place: dict[int, int] = {}
+        at = 0
+        for kind, (_, _, size, target) in enumerate(_KINDS):
+            if not self._size[kind]:
+                continue
+            place[kind] = len(views)
+            view: dict[str, Any] = {"buffer": 0}
+            if at:
+                view["byteOffset"] = at
+            view["byteLength"] = self._size[kind]
+            # Vertex data that several accessors share must have it, indices must not.
+            if target == _VERTICES and len(self._bytes[kind]) > 1:
+                view["byteStride"] = size
+            views.append(view | {"target": target})
+            at += self._size[kind]
+        members = {
+            "accessors": [a | {"bufferView": place[a["bufferView"]]} for a in self._accessors],
+            "bufferViews": views,
+            "buffers": [{"byteLength": at}],
+        }
+        return members, b"".join(part for parts in self._bytes for part in parts)
+
+
+def _numbers(values: NDArray[np.float32]) -> list[float]:
+    """As the shortest decimals that read back to the same float32."""
+    shortest = [float(str(v)) for v in values]
+    return [int(v) if v.is_integer() and abs(v) < _WHOLE else v for v in shortest]
+
+
+_LARGEST = 2**32 - 1
+#: The most bytes around JSON and buffer: headers and padding.
+_AROUND = 34
+
+
+def pack(document: Mapping[str, Any], binary: bytes) -> bytes:
+    """A GLB of a JSON document and the bytes of its only buffer, which may be empty.
+
+    Raises LimitError: PTM-L600 it is longer than a GLB can be, 4 GiB.
+    """
+    text = json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":")).encode(
+        "utf-8", "replace"
+    )
+    if (length := len(text) + len(binary) + _AROUND) > _LARGEST:
+        raise LimitError(
+            "PTM-L600",
+            f"a cell takes {length:,} bytes as GLB, more than the format can hold",
+            remedy="make smaller cells, or leave gltf out of --format",
+        )
+    return glb([(JSON, text), (BINARY, binary)][: 2 if binary else 1])
+
+
+def unpack(data: bytes) -> tuple[Any, bytes]:
+    """The JSON document of a GLB and its bytes, padding included.
+
+    Raises FileError: PTM-D731 if it is not what `pack` writes.
+    """
+    try:
+        chunks = [(kind, body) for kind, _, body in glb_chunks(data)]
+        if [kind for kind, _ in chunks[1:]] not in ([], [BINARY]) or glb(chunks) != data:
+            raise ValueError("not JSON and BIN alone, each of a multiple of 4 bytes", "byte 12")
+    except ValueError as fault:
+        raise FileError("PTM-D731", fault.args[1], fault.args[0]) from None
+    with shaped("PTM-D731", "JSON"):
+        return schemas.parse(chunks[0][1]), b"".join(body for _, body in chunks[1:])
+
+
+#: A sampler's number for each way to go on beyond [0, 1]; the first is the default.
+WRAPS: dict[Wrap, int] = {"repeat": 10497, "clamp": 33071}
+WHITE = [1.0, 1.0, 1.0, 1.0]
+
+
+@lru_cache(maxsize=4096)
+def linear(color: float) -> float:
+    """A component encoded as sRGB (IEC 61966-2-1) as linear light, single precision."""
+    return float(str(np.float32(to_linear(np.array(color)))))
+
+
+class MaterialWriter:
+    """Gathers the materials of one GLB."""
+
+    def __init__(
+        self,
+        materials: tuple[Material, ...],
+        textures: Mapping[int, tuple[int, TextureRecord]],
+        fallback: bool,
+    ) -> None:
+        """``textures``: for every image its place in the hints' list, and its record."""
+        self._scene = materials
+        self._records = textures
+        self._fallback = fallback
+        self._known: dict[tuple[int, bool], int] = {}
+        self._materials: list[dict[str, Any]] = []
+        self._textures: dict[tuple[int, int], int] = {}
+        self._images: dict[str, int] = {}
+        self._samplers: dict[tuple[Wrap, Wrap], int] = {}
+
+    def take(self, material: int, two_sided: bool) -> int:
+        """The index of a scene's material, seen from one side or from both."""
+        place = self._known.setdefault((material, two_sided), len(self._materials))
+        if place == len(self._materials):
+            self._materials.append(self._material(self._scene[material], two_sided))
+        return place
+
+    def members(self) -> dict[str, Any]:
+        """What the document has of "materials", "textures", "images" and "samplers"."""
+        textures: list[dict[str, Any]] = []
+        for image, sampler in self._textures:
+            textures.append({"source": image} | ({} if sampler < 0 else {"sampler": sampler}))
+        lists = {
+            "materials": self._materials,
+            "textures": textures,
+            "images": [{"uri": uri} for uri in self._images],
+            "samplers": [_wrap(*wraps) for wraps in self._samplers],
+        }
+        return {name: rows for name, rows in lists.items() if rows}
+
+    def _material(self, material: Material, two_sided: bool) -> dict[str, Any]:
+        alpha = min(max(material.opacity, 0.0), 1.0)
+        factor = [*map(linear, material.color), float(str(np.float32(alpha)))]
+        surface: dict[str, Any] = {} if factor == WHITE else {"baseColorFactor": factor}
+        extras: dict[str, Any] = {}
+        blends, cutoff = alpha < 1, None
+        if material.image >= 0:
+            place, record = self._records[material.image]
+            if material.transparent and record.components in (2, 4):
+                blends, cutoff = True, material.cutoff
+            extras = {"ptm": UP + quote(record.file), "texture": place}
+            extras |= _wrap(material.wrap_s, material.wrap_t)
+            if self._fallback and record.fallback is not None:
+                index = self._texture(UP + quote(record.fallback), material)
+                surface["baseColorTexture"] = {"index": index}
+        found: dict[str, Any] = {"name": material.name}
+        found["pbrMetallicRoughness"] = surface | {"metallicFactor": 0}
+        if cutoff is not None:
+            found |= {"alphaMode": "MASK", "alphaCutoff": cutoff}
+        elif blends:
+            found["alphaMode"] = "BLEND"
+        if two_sided:
+            found["doubleSided"] = True
+        return found | ({"extras": extras} if extras else {})
+
+    def _texture(self, uri: str, material: Material) -> int:
+        wraps = (material.wrap_s, material.wrap_t)
+        sampler = -1
+        if wraps != ("repeat", "repeat"):
+            sampler = self._samplers.setdefault(wraps, len(self._samplers))
+        image = self._images.setdefault(uri, len(self._images))
+        return self._textures.setdefault((image, sampler), len(self._textures))
+
+
+def _wrap(s: Wrap, t: Wrap) -> dict[str, int]:
+    named = {"wrapS": s, "wrapT": t}
+    return {name: WRAPS[wrap] for name, wrap in named.items() if wrap != "repeat"}
+
+
+def gltf_files(content: Content) -> Iterator[tuple[str, bytes]]:
+    """Path, relative to the served folder, and bytes of every GLB.
+
+    Raises LimitError: PTM-L600 a cell is longer than a GLB can be.
+    """
+    count = content.cells.cell_count
+    for cell in range(count):
+        content.progress(cell, count, "glTF")
+        yield path_of(cell, GLTF_FILES), _glb(content, cell)
+    content.progress(count, count, "glTF")
+
+
+def flipped(uv: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Texture coordinates with the origin at the upper left instead of the lower, or back."""
+    turned = np.array(uv, dtype=np.float64)
+    turned[..., 1] = 1 - turned[..., 1]
+    return turned.astype(np.float32)
+
+
+def _glb(content: Content, cell: int) -> bytes:
+    scene, geometry, buffer = content.scene, content.geometry, BufferWriter()
+    materials = MaterialWriter(scene.materials, content.records, content.options.fallback)
+    nodes: list[dict[str, Any]] = []
+    node: dict[str, Any]
+    meshes: list[dict[str, Any]] = []
+    last = -1
+    for shape in geometry.shapes(cell):
+        if shape.object != last:
+            last = shape.object
+            node = {"name": scene.objects[shape.object], "mesh": len(meshes)}
+            if (octree := content.octree_of.get(shape.object)) is not None:
+                node["extras"] = {"octree": octree}
+            nodes.append(node)
+            meshes.append({"primitives": []})
+        meshes[-1]["primitives"].append(_primitive(scene, geometry, shape, buffer, materials))
+    top: dict[str, Any] = {"name": cell_name(cell), "extras": {"cell": cell}}
+    if nodes:
+        top["nodes"] = list(range(len(nodes)))
+    document: dict[str, Any] = {
+        "asset": {"version": "2.0", "generator": "ptmtools"},
+        "scene": 0,
+        "scenes": [top],
+    }
+    if nodes:
+        document |= {"nodes": nodes, "meshes": meshes}
+    members, binary = buffer.finish()
+    return pack(document | materials.members() | members, binary)
+
+
+def _primitive(
+    scene: Scene,
+    geometry: Geometry,
+    shape: Shape,
+    buffer: BufferWriter,
+    materials: MaterialWriter,
+) -> dict[str, Any]:
+    textured = scene.materials[shape.material].image >= 0
+    # A vertex for each that differs in position, texture coordinates or colour.
+    width = len(shape.uv) if textured else 1
+    corner = shape.triangle * width + (shape.uv_triangle if textured else 0)
+    vertex, triangle = _by_first_use(corner)
+    color = None
+    if shape.color is not None:
+        both, triangle = _by_first_use(triangle << 24 | packed(shape.color))
+        vertex, color = vertex[both >> 24], unpacked(both & 0xFFFFFF)
+    attributes = {"POSITION": buffer.positions(geometry.point[shape.point[vertex // width]])}
+    if textured:
+        uv = geometry.uv[shape.uv[vertex % width]]
+        attributes["TEXCOORD_0"] = buffer.coordinates(flipped(uv))
+    if color is not None:
+        attributes["COLOR_0"] = buffer.colors(to_linear(color / 255))
+    return {
+        "attributes": attributes,
+        "indices": buffer.indices(triangle, len(vertex)),
+        "material": materials.take(shape.material, shape.two_sided),
+    }
+
+
+def _by_first_use(corner: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The distinct values of an (m, 3) array, in the order in which they come, and (m, 3) where
+    each is among them."""
+    distinct, first, place = np.unique(corner.ravel(), return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return distinct[order], rank[place.ravel()].reshape(-1, 3)

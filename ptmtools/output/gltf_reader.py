@@ -1,0 +1,238 @@
+"""A strict reader of the GLBs that `emit` writes, and of nothing else.
+
+What glTF allows beyond them is refused: `schemas/glb.schema.json` says what they may have. The
+reader stops at the first thing that is otherwise; every count is held against the bytes that are
+there before an array is made.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools import schemas
+from ptmtools.glb import COMPONENTS, ITEMS, elements, meaning
+from ptmtools.output.gltf import WHITE, WRAPS, unpack
+from ptmtools.output.model import FileError
+
+_VERTICES, _INDICES, _FLOAT = 34962, 34963, 5126
+
+
+@dataclass(frozen=True)
+class ReadMaterial:
+    """What a primitive looks like.
+
+    Attributes
+    ----------
+    factor: (r, g, b, a), linear light.
+    two_sided, blends: `doubleSided`; whether `alphaMode` is not OPAQUE.
+    cutoff: `alphaCutoff` if `alphaMode` is MASK, else None.
+    image: URI of the base colour texture, or None.
+    ptm, texture: URI of the `.ptm` and its place in the hints, or None.
+    wrap: numbers of the sampler for s and t.
+    """
+
+    factor: tuple[float, ...]
+    two_sided: bool
+    blends: bool
+    cutoff: float | None
+    image: str | None
+    ptm: str | None
+    texture: int | None
+    wrap: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class ReadPrimitive:
+    """Triangles of one shape.
+
+    Attributes
+    ----------
+    place: of the primitive in the document.
+    object, octree: what its node says: the name of an object, and the place of its octree texture
+        in the hints, or None.
+    point: (n, 3) float32.
+    uv: (n, 2) float32, origin at the upper left, or None.
+    color: (n, 3) linear light, or None.
+    triangle: (m, 3) int64 indices into `point` and `uv`.
+    """
+
+    place: str
+    object: str
+    octree: int | None
+    point: NDArray[np.float32]
+    uv: NDArray[np.float32] | None
+    color: NDArray[np.float64] | None
+    triangle: NDArray[np.int64]
+    material: ReadMaterial
+
+
+@dataclass(frozen=True)
+class ReadGlb:
+    """A cell as its GLB has it."""
+
+    name: str
+    cell: int
+    primitives: tuple[ReadPrimitive, ...]
+
+
+def read_glb(data: bytes) -> ReadGlb:
+    """The cell of a GLB.
+
+    Raises FileError: PTM-D731 no GLB; PTM-D732 not in the emission pattern; PTM-D733 an accessor
+    out of its bytes; PTM-D734 indices; PTM-D735 numbers.
+    """
+    document, binary = unpack(data)
+    try:
+        schemas.check(document, schemas.GLB)
+    except schemas.ShapeError as fault:
+        code = "PTM-D735" if fault.message.endswith(schemas.NOT_FINITE) else "PTM-D732"
+        raise FileError(code, fault.place or "document", fault.message) from None
+    return _Reader(document, binary).cell()
+
+
+class _Reader:
+    def __init__(self, document: dict[str, Any], binary: bytes) -> None:
+        self._tree = document
+        buffers = document.get("buffers", [])
+        if len(buffers) != (1 if binary else 0):
+            _foreign("buffers", f"{len(buffers)} buffers for {len(binary)} bytes")
+        length = buffers[0]["byteLength"] if buffers else 0
+        if not 0 <= len(binary) - length < 4:
+            raise FileError("PTM-D733", "buffers[0]", f"{length} bytes of {len(binary)}")
+        self._data = binary[:length]
+
+    def cell(self) -> ReadGlb:
+        scene = self._row("scenes", self._tree["scene"])
+        nodes = scene.get("nodes", [])
+        if nodes != list(range(len(nodes))) or any(
+            len(self._tree.get(name, [])) != len(nodes) for name in ("nodes", "meshes")
+        ):
+            _foreign("scene", "has not all nodes, or not a mesh for each")
+        primitives: list[ReadPrimitive] = []
+        for index in nodes:
+            node = self._row("nodes", index)
+            if node["mesh"] != index:
+                _foreign(f"nodes[{index}]", "has the mesh of another")
+            for n, primitive in enumerate(self._row("meshes", index)["primitives"]):
+                place = f"meshes[{index}].primitives[{n}]"
+                primitives.append(self._primitive(primitive, place, node))
+        return ReadGlb(scene["name"], scene["extras"]["cell"], tuple(primitives))
+
+    def _row(self, name: str, index: int) -> dict[str, Any]:
+        """An object of one of the document's lists."""
+        rows = self._tree.get(name, [])
+        if not 0 <= index < len(rows):
+            _foreign(f"{name}[{index}]", "there is no such object")
+        row: dict[str, Any] = rows[index]
+        return row
+
+    def _primitive(
+        self, primitive: dict[str, Any], place: str, node: dict[str, Any]
+    ) -> ReadPrimitive:
+        attributes = primitive["attributes"]
+        point = self._vertices(attributes["POSITION"], "VEC3")
+        self._check_bounds(attributes["POSITION"], point)
+        uv = None
+        if "TEXCOORD_0" in attributes:
+            uv = self._vertices(attributes["TEXCOORD_0"], "VEC2")
+            if len(uv) != len(point):
+                _foreign(place, f"{len(uv)} texture coordinates for {len(point)} positions")
+        color = self._colors(attributes, len(point), place)
+        index = self._elements(primitive["indices"], "SCALAR", (5123, 5125), _INDICES).ravel()
+        if len(index) % 3 or int(index.max()) >= len(point):
+            message = f"{len(index)} indices up to {index.max()} into {len(point)} vertices"
+            raise FileError("PTM-D734", place, message)
+        triangle = index.astype(np.int64).reshape(-1, 3)
+        material = self._material(primitive["material"])
+        octree = node.get("extras", {}).get("octree")
+        return ReadPrimitive(place, node["name"], octree, point, uv, color, triangle, material)
+
+    def _colors(
+        self, attributes: dict[str, int], count: int, place: str
+    ) -> NDArray[np.float64] | None:
+        if "COLOR_0" not in attributes:
+            return None
+        index = attributes["COLOR_0"]
+        rows = self._elements(index, "VEC4", (5123,), _VERTICES)
+        normalized = self._tree["accessors"][index].get("normalized", False)
+        if len(rows) != count or not normalized or (rows[:, 3] != 65535).any():
+            _foreign(place, f"{len(rows)} colours for {count} positions, or other than opaque ones")
+        return meaning(rows[:, :3], normalized=True)
+
+    def _vertices(self, index: int, form: str) -> NDArray[np.float32]:
+        rows = self._elements(index, form, (_FLOAT,), _VERTICES)
+        if not np.isfinite(rows).all():
+            raise FileError("PTM-D735", f"accessors[{index}]", "a number is not finite")
+        return rows.astype(np.float32)
+
+    def _elements(
+        self, index: int, form: str, components: tuple[int, ...], target: int
+    ) -> NDArray[Any]:
+        """(count, items) of an accessor that has such elements and a view for such data."""
+        place, accessor = f"accessors[{index}]", self._row("accessors", index)
+        view = self._row("bufferViews", accessor["bufferView"])
+        component = accessor["componentType"]
+        self._row("buffers", view["buffer"])
+        if accessor["type"] != form or component not in components:
+            _foreign(place, f"{accessor['type']} of component type {component}")
+        unit = np.dtype(COMPONENTS[component]).itemsize
+        size = ITEMS[form] * unit
+        if view["target"] != target or view.get("byteStride", size) != size:
+            _foreign(place, "its buffer view is for other data")
+        try:
+            found = elements(accessor, view, self._data)
+        except ValueError as fault:
+            raise FileError("PTM-D733", place, str(fault)) from None
+        begin = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        if begin % unit:
+            raise FileError("PTM-D733", place, f"begins at byte {begin}, not a multiple of {unit}")
+        return found
+
+    def _check_bounds(self, index: int, point: NDArray[np.float32]) -> None:
+        place, accessor = f"accessors[{index}]", self._tree["accessors"][index]
+        for name, held in (("min", point.min(axis=0)), ("max", point.max(axis=0))):
+            if name not in accessor:
+                _foreign(place, f"has no {name}")
+            written = np.array(accessor[name], np.float64)
+            # In single precision, as they are written.
+            with np.errstate(over="ignore"):
+                same = np.array_equal(written.astype(np.float32), held)
+            if not same:
+                message = f"{name} is not that of the data, {held.tolist()}"
+                raise FileError("PTM-D735", place, message)
+
+    def _material(self, index: int) -> ReadMaterial:
+        material = self._row("materials", index)
+        surface, extras = material["pbrMetallicRoughness"], material.get("extras", {})
+        factor = surface.get("baseColorFactor", WHITE)
+        wrap, image = _wrap(extras), None
+        if "baseColorTexture" in surface:
+            texture = self._row("textures", surface["baseColorTexture"]["index"])
+            image = self._row("images", texture["source"])["uri"]
+            sampler = self._row("samplers", texture["sampler"]) if "sampler" in texture else {}
+            if _wrap(sampler) != wrap:
+                _foreign(f"materials[{index}]", "its sampler wraps otherwise than its extras say")
+        return ReadMaterial(
+            factor=tuple(factor),
+            two_sided=material.get("doubleSided", False),
+            blends=material.get("alphaMode", "OPAQUE") != "OPAQUE",
+            cutoff=material.get("alphaCutoff", 0.5)
+            if material.get("alphaMode") == "MASK"
+            else None,
+            image=image,
+            ptm=extras.get("ptm"),
+            texture=extras.get("texture"),
+            wrap=wrap,
+        )
+
+
+def _wrap(sampler: dict[str, Any]) -> tuple[int, int]:
+    return sampler.get("wrapS", WRAPS["repeat"]), sampler.get("wrapT", WRAPS["repeat"])
+
+
+def _foreign(place: str, message: str) -> NoReturn:
+    raise FileError("PTM-D732", place, message)

@@ -1,0 +1,298 @@
+"""The index, `hints.json`: what a client needs before the first step, and no more.
+
+Tried: the level sizes and `gpuBytes` of textures beside the ends of their levels, for 0.4 kB more
+of the museum's 2.3 gzipped, although they follow from the rest; the URLs of each cell instead of
+templates, for 3.6 kB more of willowgarage's 5.5; no boxes, for 3.1 less, but then a client that
+comes to a place without a viewpoint would have to fetch all records to find its cell.
+
+The record of a cell: what a client that is in it needs, of the cell and of what it sees.
+
+The statistics: how far the coverage can be trusted, and how it differs by point and view.
+
+The files of the hints, in the order in which they refer to each other: the index comes last."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.model import Cells
+from ptmtools.output.emitters import chosen_emitters
+from ptmtools.output.first_look import FirstLooks
+from ptmtools.output.model import OctreeRecord, TextureRecord, Viewpoint
+from ptmtools.output.names import (
+    FIRST_LOOK_FILES,
+    HINTS,
+    RECORD_FILES,
+    STATISTICS,
+    cell_name,
+    path_of,
+)
+from ptmtools.output.numbers import coordinates, document_text, significant, whole
+from ptmtools.texture.model import gpu_texel_bytes
+
+if TYPE_CHECKING:
+    from ptmtools.coverage.required_levels import Need
+    from ptmtools.output.content import Content
+    from ptmtools.output.first_look import Piece
+    from ptmtools.texture.model import Level
+
+
+FORMAT = "ptmtools hints"
+#: Of the index, the records and the statistics.
+SCHEMA = 2
+
+
+def index_text(content: Content) -> str:
+    """The contents of `hints.json`.
+
+    Raises DatabaseError: PTM-D601 a number is not finite.
+    """
+    space, cells = content.scene.space, content.cells
+    emitters = chosen_emitters(content.options.format)
+    head: dict[str, Any] = {
+        "format": FORMAT,
+        "schema": SCHEMA,
+        "origin": list(space.origin),
+        "unit": space.metres,
+        "up": space.up,
+        "closed": cells.closed,
+        "avatarSize": list(content.options.avatar(cells.walker)),
+        "record": RECORD_FILES,
+        "geometry": {e.name: e.cell_files for e in emitters if e.cell_files},
+        "statistics": STATISTICS,
+    }
+    if sets := {e.name: e.texture_files for e in emitters if e.texture_files}:
+        head["textureSets"] = sets
+    if content.options.first_look:
+        head["firstLook"] = FIRST_LOOK_FILES
+    lists: dict[str, list[Any]] = {
+        "viewpoints": [_viewpoint(v) for v in content.viewpoints],
+        "textures": [_texture(r, content.options.fallback) for r in content.textures],
+        "octrees": [_octree(r) for r in content.octrees],
+        "cells": [
+            {"name": cell_name(c), "box": box} | ({} if standing else {"standing": False})
+            for c, (box, standing) in enumerate(
+                zip(_boxes(content), cells.standing.tolist(), strict=True)
+            )
+        ],
+    }
+    if not content.octrees:
+        del lists["octrees"]
+    return document_text(head, lists)
+
+
+def texel_bytes(level: Level) -> int:
+    """Bytes of a texel in texture memory, of the coarsest level."""
+    return level.gpu_bytes // (level.width * level.height)
+
+
+def _viewpoint(viewpoint: Viewpoint) -> dict[str, Any]:
+    return {
+        "name": viewpoint.name,
+        "description": viewpoint.description,
+        "position": coordinates(viewpoint.position, "viewpoints"),
+        "direction": coordinates(viewpoint.direction, "viewpoints"),
+        "fieldOfView": coordinates([viewpoint.field_of_view], "viewpoints")[0],
+        "cell": viewpoint.cell,
+    }
+
+
+def _texture(record: TextureRecord, fallback: bool) -> Mapping[str, Any]:
+    png = record.fallback if fallback else None
+    level = len(record.levels) - 1 if record.fallback_level is None else record.fallback_level
+    texel = texel_bytes(record.levels[0]) if record.levels else record.components
+    row: dict[str, Any] = {
+        "file": quote(record.file),
+        "fallback": None if png is None else quote(png),
+        "fallbackLevel": None if png is None else level,
+        "width": record.width,
+        "height": record.height,
+        "components": record.components,
+        "texelBytes": texel,
+        "gpuTexelBytes": gpu_texel_bytes(texel, record.components),
+        "ends": [level.end for level in record.levels],
+    }
+    if record.detail:
+        row["differences"] = [whole(value) for value in record.detail.differences]
+        row["color"] = list(record.detail.color)
+    return row
+
+
+def _octree(record: OctreeRecord) -> Mapping[str, Any]:
+    return {
+        "object": record.object,
+        "file": quote(record.file),
+        "cube": {"low": list(record.low), "side": record.side},
+        "levels": list(record.levels),
+        "ends": list(record.ends),
+        "crc32": list(record.crc32),
+    }
+
+
+def _boxes(content: Content) -> list[Any]:
+    """Of each cell the least and the greatest coordinates of its leaves, rounded outwards: to a
+    thousandth of the building at least, a hundredth at most."""
+    cells = content.cells
+    low, high = (
+        end.reduceat(cells.leaf_point, cells.leaf_point_start[:-1], axis=0)
+        for end in (np.minimum, np.maximum)
+    )
+    box = np.array([[*low[own].min(axis=0), *high[own].max(axis=0)] for own in content.leaves])
+    decimals = 2 - math.floor(math.log10(cells.tolerance.extent))
+    rounded = np.concatenate(
+        [_rounded_down(box[:, :3], decimals), -_rounded_down(-box[:, 3:], decimals)], axis=1
+    )
+    return [[int(v) if v.is_integer() else v for v in row] for row in (rounded + 0.0).tolist()]
+
+
+def _rounded_down(values: NDArray[np.float64], decimals: int) -> NDArray[np.float64]:
+    """To a whole multiple of 10 ** -decimals, not above the value."""
+    step = 10.0**-decimals
+    lower = np.round(np.floor(values / step) * step, decimals)
+    return np.where(lower > values, np.round(lower - step, decimals), lower)
+
+
+RECORD_FORMAT = "ptmtools cell"
+#: Significant digits of the need: sampling leaves two.
+NEED_DIGITS = 3
+
+
+class RecordWriter:
+    """Writes the records of one database; what they share is prepared once."""
+
+    def __init__(self, content: Content) -> None:
+        self._content = content
+        self._adjacent = content.cells.adjacent()
+        self._portals = _portals(content.cells)
+
+    def record(self, cell: int, first_look: Sequence[Piece] | None) -> str:
+        """The text of a cell's record; ``first_look`` is its bundle, None if there are none.
+
+        Raises DatabaseError PTM-D601.
+        """
+        content = self._content
+        seen = content.pvs.row(cell).tolist()
+        rows = content.ach.entries(cell)
+        head: dict[str, object] = {
+            "format": RECORD_FORMAT,
+            "schema": SCHEMA,
+            "cell": cell,
+            "name": cell_name(cell),
+            "adjacent": self._adjacent[cell].tolist(),
+            "visible": seen,
+            "ach": content.shares[cell],
+            "floor": significant(content.ach.floor[cell : cell + 1])[0],
+            "textures": [content.painted[other].tolist() for other in seen],
+        }
+        if content.ach.by_texture:
+            head["textureShares"] = [self._texture_shares(e) for e in range(rows.start, rows.stop)]
+        if first_look is not None:
+            head["firstLook"] = [[piece.texture, piece.level] for piece in first_look]
+        if content.need:
+            head["need"] = self._need(content.need, cell)
+        leaves = [_leaf(content.cells, leaf) for leaf in content.leaves[cell]]
+        return document_text(head, {"leaves": leaves, "portals": self._portals[cell]})
+
+    def _need(self, need: Need, cell: int) -> list[list[Any]]:
+        """Of each texture in sight its place, the coarsest level wanted, and shares."""
+        records, seen = self._content.records, self._content.pvs.row(cell).tolist()
+        in_sight = {place for other in seen for place in self._content.painted[other].tolist()}
+        rows = []
+        for entry in range(*need.start[cell : cell + 2].tolist()):
+            place = records[int(need.image[entry])][0]
+            shares = need.share[slice(*need.share_start[entry : entry + 2].tolist())]
+            if place in in_sight:
+                rows.append([place, int(need.first[entry]), *significant(shares, NEED_DIGITS)])
+        return sorted(rows)
+
+    def _texture_shares(self, entry: int) -> list[list[Any]]:
+        """The pairs of a texture, None for what has none, and its share of an entry of the ACH."""
+        ach, records = self._content.ach, self._content.records
+        of_entry = slice(*ach.texture_start[entry : entry + 2].tolist())
+        place = [records[i][0] if i in records else None for i in ach.texture[of_entry].tolist()]
+        return [list(p) for p in zip(place, significant(ach.texture_value[of_entry]), strict=True)]
+
+
+def _leaf(cells: Cells, leaf: int) -> dict[str, Any]:
+    faces = cells.face_start[cells.leaf_face_start[leaf] : cells.leaf_face_start[leaf + 1] + 1]
+    index = (cells.face_index[faces[0] : faces[-1]] - cells.leaf_point_start[leaf]).tolist()
+    return {
+        "points": coordinates(cells.leaf_points(leaf), "leaf points"),
+        "faces": [index[a:b] for a, b in pairwise((faces - faces[0]).tolist())],
+    }
+
+
+def _portals(cells: Cells) -> list[list[dict[str, Any]]]:
+    """For every cell its portals to other cells, each counter-clockwise seen from inside it."""
+    rows: list[list[dict[str, Any]]] = [[] for _ in range(cells.cell_count)]
+    area = coordinates(cells.portal_area, "portals") if cells.portal_count else []
+    ends = cells.portal_cell
+    for k in range(cells.portal_count):
+        behind, ahead = ends[k].tolist()
+        if behind == ahead or min(behind, ahead) < 0:
+            continue
+        polygon = coordinates(cells.portal(k), "portals")
+        for cell, neighbour, loop in ((behind, ahead, polygon[::-1]), (ahead, behind, polygon)):
+            rows[cell].append({"neighbour": neighbour, "area": area[k], "polygon": loop})
+    return rows
+
+
+STATISTICS_FORMAT = "ptmtools statistics"
+
+
+def statistics_text(content: Content) -> str:
+    """The text of `hints/statistics.json`; raises DatabaseError PTM-D601."""
+    ach = content.ach
+    head: dict[str, object] = {
+        "format": STATISTICS_FORMAT,
+        "schema": SCHEMA,
+        "coverage": {"backend": ach.backend, "renderer": ach.renderer},
+    }
+    textures = [{"sha256": record.sha256} for record in content.textures]
+    cells = [_cell(content, c) for c in range(content.cells.cell_count)]
+    return document_text(head, {"textures": textures, "cells": cells})
+
+
+def _cell(content: Content, cell: int) -> dict[str, Any]:
+    ach = content.ach
+    rows, own = ach.entries(cell), slice(cell, cell + 1)
+    return {
+        "samples": int(ach.samples[cell]),
+        "rejected": int(ach.rejected[cell]),
+        "missed": significant(ach.missed[own])[0],
+        "uncertain": significant(ach.uncertain[own])[0],
+        "unseenBelow": significant(ach.unseen_below[own])[0],
+        "error": significant(ach.error[rows]),
+        "p95": significant(ach.p95[rows]),
+        "seen": significant(ach.seen[rows]),
+        "views": [significant(view) for view in ach.views[rows].T],
+    }
+
+
+def hints_files(content: Content) -> Iterator[tuple[str, str | bytes]]:
+    """Path, relative to the served folder, and contents of each file.
+
+    Raises DatabaseError: PTM-D601 a number is not finite: for the index, at once.
+    """
+    return _files(content, index_text(content))
+
+
+def _files(content: Content, index: str) -> Iterator[tuple[str, str | bytes]]:
+    looks = FirstLooks(content) if content.options.first_look else None
+    writer, count = RecordWriter(content), content.cells.cell_count
+    for cell in range(count):
+        content.progress(cell, count, "hints")
+        pieces = looks.pieces(cell) if looks else None
+        yield path_of(cell, RECORD_FILES), writer.record(cell, pieces)
+        if looks and pieces:
+            yield path_of(cell, FIRST_LOOK_FILES), looks.bundle(pieces)
+    content.progress(count, count, "hints")
+    yield STATISTICS, statistics_text(content)
+    yield HINTS, index

@@ -1,0 +1,411 @@
+"""A floor plan per storey: cells, walls, portals, leaks, what was left out, and how much of the
+view others cover.
+
+Everything drawn is a true section at one height, so a plan shows what the stages computed and
+nothing that an artist would add. Without matplotlib the plan cannot be drawn (extra `plot`).
+
+The way of a walk in a floor plan, and where it looks while it stands."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats
+from ptmtools.cells.model import Cells
+from ptmtools.coverage.model import Ach
+from ptmtools.errors import DatabaseError, InputError
+from ptmtools.files import write_bytes
+from ptmtools.lazy import component
+from ptmtools.output.model import PlotOptions, PlotReport, storey_name
+from ptmtools.output.plan_marks import (
+    LEAK,
+    draw_leaks,
+    draw_left_out,
+    draw_view_only,
+    hatches,
+    leaks_by_portal,
+)
+from ptmtools.output.storeys import (
+    area,
+    cut_height,
+    leaf_section,
+    polygon_section,
+    storey_of,
+    storeys,
+    triangle_section,
+)
+from ptmtools.quantities import count
+from ptmtools.scene.model import Scene
+from ptmtools.visibility.model import Pvs
+
+#: (n, 3) eyes, metres, and (n, 3) unit vectors in which they look, at equal or similar steps.
+Way = tuple[Floats, Floats]
+#: Of its line, and of the arrows.
+WAY = "#1a7f4b"
+#: An eye rests that moves and turns by less than this from one step to the next: metres, radians.
+_STILL = 2e-3
+#: The length of an arrow, metres.
+_ARROW = 0.8
+
+
+def draw_way(
+    axis: Any, way: Way, floors: Sequence[float], storey: int, shown: Callable[[Floats], Floats]
+) -> None:
+    """Draws what of a way is in one storey, of those with these ``floors``; ``shown`` brings (…, 2)
+    plan coordinates to paper. An arrow stands for each direction in which a standing eye looks."""
+    eye, direction = way
+    here: Bools = np.array([storey_of(floors, y) == storey for y in eye[:, 1]], dtype=np.bool_)
+    line = np.where(here[:, None], shown(eye[:, [0, 2]]), np.nan)
+    axis.plot(line[:, 0], line[:, 1], color=WAY, linewidth=0.9, zorder=6)
+    change = np.abs(np.diff(eye, axis=0)).max(axis=1) + np.abs(np.diff(direction, axis=0)).max(
+        axis=1
+    )
+    still = np.append(change < _STILL, False)
+    begins = np.flatnonzero(still & ~np.append(False, still[:-1]) & here)
+    start = shown(eye[begins][:, [0, 2]])
+    end = shown((eye[begins] + _ARROW * direction[begins])[:, [0, 2]])
+    for tail, head in zip(start, end, strict=True):
+        arrow = {"arrowstyle": "->", "color": WAY, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0}
+        axis.annotate("", head, tail, arrowprops=arrow, zorder=6)
+
+
+_PAPER, _INK = "#ffffff", "#1c2733"
+_CELL_FILL, _CELL_EDGE = "#eaf0f4", "#a9bac6"
+_UNSEEN = "#f6f7f8"
+_WALL, _SEE_THROUGH, _PORTAL, _CHOSEN = "#1c2733", "#7d8fd8", "#f0562d", "#b0125b"
+_SHADES = "YlGnBu"
+#: The least share that has a shade of its own; smaller ones look like it.
+_FAINTEST = 1e-4
+#: The shade of all visible cells while no shares are known.
+_EVEN = 0.005
+#: Cells with a larger share have so dark a shade that their number is white.
+_DARK = 0.02
+#: Numbers are left out of cells narrower than this many points on paper.
+_NARROWEST = 9.0
+#: Inches: around everything, above the panels for title and legend, above each panel, below it
+#: for the scale bar, between panels, and for the colour bar.
+_MARGIN, _HEAD, _CAPTION, _FOOT, _GAP, _BAR = 0.15, 0.5, 0.26, 0.3, 0.25, 0.75
+#: Paper around the cells, as a share of the larger side: lines lie half outside of them.
+_RIM = 0.004
+#: A building deeper than this many times its width is turned by 90°.
+_DEEP = 1.15
+
+
+def plot_plan(
+    scene: Scene,
+    cells: Cells,
+    pvs: Pvs | None,
+    ach: Ach | None,
+    out: str | os.PathLike[str],
+    options: PlotOptions = PlotOptions(),  # noqa: B008 - a frozen value
+    *,
+    way: Way | None = None,
+    force: bool = False,
+) -> PlotReport:
+    """Draws the plan as a PNG; the same input gives the same bytes with the same matplotlib.
+
+    Parameters
+    ----------
+    pvs, ach: may be None while those stages have not run; a chosen cell needs the PVS, and is
+        shaded evenly without ACH.
+    way: of a walk, to be drawn as well.
+
+    Raises
+    ------
+    DatabaseError: PTM-D600 there are no cells.
+    InputError: PTM-I601 there is no such cell, or nothing visible is known yet.
+    MissingComponentError: PTM-M600 matplotlib is not installed.
+    OutputError: PTM-O001 to PTM-O003, see `ptmtools.files`.
+    """
+    if options.cell is not None and not 0 <= options.cell < cells.cell_count:
+        raise InputError(
+            "PTM-I601",
+            f"there is no cell {options.cell}",
+            remedy=f"cells are numbered 0 to {cells.cell_count - 1}",
+        )
+    if options.cell is not None and pvs is None:
+        raise InputError(
+            "PTM-I601", "what the cell sees has not been computed yet", remedy="run `ptm pvs` first"
+        )
+    agg = component(
+        "matplotlib.backends.backend_agg", "PTM-M600", "a plan needs matplotlib", "plot"
+    )
+    if cells.cell_count == 0:
+        raise DatabaseError(
+            "PTM-D600", "there are no cells", remedy="subdivide a model that has rooms"
+        )
+    floors = storeys(cells, options.height, options.storey_gap)
+    figure = _Plan(scene, cells, pvs, ach, options, floors, way).draw()
+    agg.FigureCanvasAgg(figure)
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", metadata={"Software": None}, facecolor=_PAPER)
+    data = buffer.getvalue()
+    write_bytes(out, data, force=force)
+    return PlotReport(os.fspath(out), tuple(floors), len(data))
+
+
+class _Plan:
+    def __init__(
+        self,
+        scene: Scene,
+        cells: Cells,
+        pvs: Pvs | None,
+        ach: Ach | None,
+        options: PlotOptions,
+        floors: Sequence[float],
+        way: Way | None,
+    ) -> None:
+        self._scene = scene
+        self._cells = cells
+        self._pvs = pvs
+        self._options = options
+        self._floors = floors
+        self._way = way
+        self._corners = cells.vertex[cells.triangle]
+        self._opaque = scene.opaque[cells.triangle_source]
+        self._leaks = leaks_by_portal(pvs)
+        self._shade: dict[int, float] | None = None
+        self._shares_known = ach is not None
+        if options.cell is not None and pvs is not None:
+            row = pvs.row(options.cell)
+            share = np.full(len(row), _EVEN) if ach is None else ach.row(options.cell)
+            self._shade = dict(zip(row.tolist(), share.tolist(), strict=True))
+        # Seen from above with X to the right and Z down, or Z to the right and X up.
+        plan = np.concatenate([cells.leaf_point, *cells.left_out])[:, [0, 2]]
+        width, depth = np.ptp(plan, axis=0)
+        self._turned = bool(depth > _DEEP * width)
+        shown = self._shown(plan)
+        low, high = shown.min(axis=0), shown.max(axis=0)
+        rim = _RIM * float((high - low).max())
+        self._low, self._high = low - rim, high + rim
+
+    def draw(self) -> Any:
+        """The whole figure."""
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import LogNorm
+        from matplotlib.figure import Figure
+
+        span = self._high - self._low
+        width = self._options.width
+        barred = self._shade is not None and self._shares_known
+        bar = _BAR if barred else 0.0
+        columns = 2 if len(self._floors) > 1 and span[0] < 1.6 * span[1] else 1
+        rows = -(-len(self._floors) // columns)
+        panel = (width - 2 * _MARGIN - bar - (columns - 1) * _GAP) / columns
+        tall = panel * float(span[1] / span[0])
+        height = _HEAD + rows * (_CAPTION + tall + _FOOT) + _MARGIN
+        figure = Figure(figsize=(width, height), dpi=self._options.dpi, facecolor=_PAPER)
+        shades = ScalarMappable(LogNorm(_FAINTEST, 1), _SHADES)
+        for i, floor in enumerate(self._floors):
+            row, column = divmod(i, columns)
+            left = _MARGIN + column * (panel + _GAP)
+            bottom = height - _HEAD - (row + 1) * (_CAPTION + tall + _FOOT) + _FOOT
+            axis = figure.add_axes((left / width, bottom / height, panel / width, tall / height))
+            axis.set_axis_off()
+            axis.set(xlim=(self._low[0], self._high[0]), ylim=(self._high[1], self._low[1]))
+            self._storey(axis, floor, shades, panel)
+            draw_left_out(axis, self._cells, self._floors, i, self._shown)
+            draw_leaks(axis, self._cells, self._leaks, self._floors, i, self._shown)
+            if self._way is not None:
+                draw_way(axis, self._way, self._floors, i, self._shown)
+        if barred:
+            long = min(0.8 * (height - _HEAD), 4.0)
+            low = height - _HEAD - _CAPTION - long
+            place = (1 - (_MARGIN + 0.58) / width, low / height, 0.14 / width, long / height)
+            self._colour_bar(figure, place, shades)
+        self._title(figure, height)
+        return figure
+
+    def _shown(self, plan: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(…, 2) plan coordinates (x, z) as (right, down) on paper."""
+        return np.stack([plan[..., 1], -plan[..., 0]], axis=-1) if self._turned else plan
+
+    def _storey(self, axis: Any, floor: float, shades: Any, panel: float) -> None:
+        from matplotlib.collections import LineCollection, PolyCollection
+
+        height = cut_height(self._cells, floor, self._options.height)
+        sections = list(self._sections(height))
+        polygons = [self._shown(polygon) for _, polygon in sections]
+        fills = [self._fill(cell, shades) for cell, _ in sections]
+        # Edges in their own fill close the seams between the leaves of a cell.
+        axis.add_collection(
+            PolyCollection(polygons, facecolors=fills, edgecolors=fills, linewidths=0.5)
+        )
+        draw_view_only(axis, self._cells, sections, self._shown)
+        edges = _outlines(sections)
+        for zorder, colour, width, segments in (
+            (2, _CELL_EDGE, 0.5, [e for outline in edges.values() for e in outline]),
+            (2, _CHOSEN, 5, edges.get(self._options.cell, [])),
+            (3, _PORTAL, 2.2, self._portals(height)),
+            (4, _SEE_THROUGH, 1.4, triangle_section(self._corners[~self._opaque], height)),
+            (5, _WALL, 1.2, triangle_section(self._corners[self._opaque], height)),
+        ):
+            lines = [self._shown(segment) for segment in segments]
+            settings = {"capstyle": "butt"} if zorder > 2 else {}
+            axis.add_collection(
+                LineCollection(lines, colors=colour, linewidths=width, zorder=zorder, **settings)
+            )
+        self._numbers(axis, sections, 72 * panel / float(self._high[0] - self._low[0]))
+        self._scale_bar(axis)
+        numbers = len({cell for cell, _ in sections})
+        name = storey_name(self._scene, floor, self._options.storey_gap)
+        axis.set_title(
+            f"{name}{': ' if name else ''}floor {floor:+.2f} m, cut at {height:+.2f} m: "
+            f"{count(numbers, 'cell')}",
+            fontsize=9,
+            color=_INK,
+            loc="left",
+            pad=6,
+            parse_math=False,  # a name may have dollar signs
+        )
+
+    def _sections(self, height: float) -> Iterator[tuple[int, NDArray[np.float64]]]:
+        for leaf in range(self._cells.leaf_count):
+            cell = int(self._cells.leaf_cell[leaf])
+            polygon = leaf_section(self._cells, leaf, height)
+            if len(polygon) >= 3 and cell >= 0:
+                yield cell, polygon
+
+    def _doors(self) -> list[int]:
+        """Portals between cells; those between the leaves of one cell are not drawn."""
+        ends = self._cells.portal_cell
+        return np.flatnonzero((ends[:, 0] != ends[:, 1]) & (ends >= 0).all(axis=1)).tolist()
+
+    def _portals(self, height: float) -> list[NDArray[np.float64]]:
+        cuts = (polygon_section(self._cells.portal(k), height) for k in self._doors())
+        return [cut for cut in cuts if cut is not None]
+
+    def _fill(self, cell: int, shades: Any) -> Any:
+        if self._shade is None:
+            return _CELL_FILL
+        share = self._shade.get(cell)
+        return _UNSEEN if share is None else shades.to_rgba(max(share, _FAINTEST))
+
+    def _numbers(
+        self, axis: Any, sections: list[tuple[int, NDArray[np.float64]]], points: float
+    ) -> None:
+        """Each cell's number once, in its largest section, if there is room; ``points`` of paper
+        make a metre."""
+        import shapely
+        from matplotlib.patheffects import withStroke
+
+        largest: dict[int, NDArray[np.float64]] = {}
+        for cell, polygon in sections:
+            if cell not in largest or area(polygon) > area(largest[cell]):
+                largest[cell] = polygon
+        for cell, polygon in largest.items():
+            text = str(cell)
+            width, depth = np.ptp(self._shown(polygon), axis=0) * points
+            size = min(depth * 0.6, width / (0.65 * len(text)), 8.0)
+            if min(width, depth) < _NARROWEST or size < 4.5:
+                continue
+            (middle,) = shapely.get_coordinates(shapely.centroid(shapely.Polygon(polygon)))
+            x, y = self._shown(middle)
+            dark = self._shade is not None and self._shade.get(cell, 0.0) > _DARK
+            ink, paper = (_PAPER, _INK) if dark else (_INK, _PAPER)
+            axis.text(
+                x,
+                y,
+                text,
+                fontsize=size,
+                color=ink,
+                ha="center",
+                va="center",
+                zorder=7,
+                path_effects=[withStroke(linewidth=1.6, foreground=paper, alpha=0.6)],
+            )
+
+    def _scale_bar(self, axis: Any) -> None:
+        length = _round_length(float(self._high[0] - self._low[0]) / 5)
+        share = length / float(self._high[0] - self._low[0])
+        tall = axis.get_position().height * axis.figure.get_figheight()
+        y = -0.16 / tall
+        where = {"transform": axis.transAxes, "clip_on": False, "color": _INK}
+        axis.plot([0, share], [y, y], linewidth=2.2, solid_capstyle="butt", **where)
+        for end in (0, share):
+            axis.plot([end, end], [y - 0.04 / tall, y + 0.04 / tall], linewidth=1, **where)
+        where.pop("clip_on")
+        axis.text(share, y, f"  {length:g} m", fontsize=8, va="center", **where)
+
+    def _colour_bar(self, figure: Any, place: tuple[float, ...], shades: Any) -> None:
+        bar = figure.add_axes(place)
+        drawn = figure.colorbar(shades, cax=bar)
+        drawn.set_ticks([1, 0.1, 0.01, 0.001, _FAINTEST])
+        drawn.set_ticklabels(["100 %", "10 %", "1 %", "0.1 %", "≤ 0.01 %"])
+        drawn.outline.set_visible(False)
+        bar.set_title("share of view", fontsize=9, color=_INK, pad=6)
+        bar.tick_params(labelsize=7, colors=_INK, length=2)
+        bar.minorticks_off()
+
+    def _title(self, figure: Any, height: float) -> None:
+        from matplotlib.lines import Line2D
+
+        cells, chosen = self._cells, self._options.cell
+        parts = [
+            count(cells.cell_count, "cell"),
+            f"{count(len(self._doors()), 'portal')} between them",
+        ]
+        if self._pvs is not None:
+            parts.append(f"{100 * self._pvs.volume_at_hand[0]:.1f} % of volume at hand")
+        if len(self._floors) > 1:
+            parts.append(f"{len(self._floors)} storeys")
+        place = {"ha": "left", "va": "center", "color": _INK}
+        y = 1 - 0.27 / height
+        figure.text(
+            _MARGIN / self._options.width,
+            y,
+            "  ·  ".join(parts),
+            fontsize=11,
+            weight="bold",
+            **place,
+        )
+        lines = [(_WALL, "opaque"), (_PORTAL, "portal")]
+        if not self._opaque.all():
+            lines.insert(1, (_SEE_THROUGH, "transparent"))
+        if self._leaks:
+            lines.append((LEAK, "leak, and cells that see too much by it"))
+        if self._way is not None:
+            lines.append((WAY, "walk"))
+        if chosen is not None and self._shade is not None:
+            lines.append((_CHOSEN, f"cell {chosen}, sees {len(self._shade)} cells"))
+        handles = [Line2D([], [], color=c, linewidth=2.5, label=label) for c, label in lines]
+        handles += hatches(cells)
+        figure.legend(
+            handles=handles,
+            loc="center right",
+            bbox_to_anchor=(1 - _MARGIN / self._options.width, y),
+            ncols=len(handles),
+            frameon=False,
+            fontsize=9,
+            labelcolor=_INK,
+            handlelength=1.3,
+            columnspacing=1.4,
+            borderpad=0,
+            borderaxespad=0,
+        )
+
+
+def _outlines(
+    sections: Sequence[tuple[int, NDArray[np.float64]]],
+) -> dict[int | None, list[NDArray[np.float64]]]:
+    """Cell → closed lines around the union of the sections of its leaves."""
+    import shapely
+
+    found: dict[int | None, list[NDArray[np.float64]]] = {}
+    for cell in sorted({cell for cell, _ in sections}):
+        leaves = [shapely.Polygon(polygon) for number, polygon in sections if number == cell]
+        rim = shapely.boundary(shapely.union_all(leaves) if len(leaves) > 1 else leaves[0])
+        found[cell] = [shapely.get_coordinates(line) for line in shapely.get_parts(rim)]
+    return found
+
+
+def _round_length(length: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten that is at most ``length``."""
+    power = 10.0 ** np.floor(np.log10(length))
+    return float(max(m for m in (1, 2, 5) if m * power <= length * 1.0001) * power)

@@ -1,0 +1,253 @@
+"""Places to stand in the rooms of a scene: one in each of the cells with the largest floors, at
+eye height, away from the walls, where there is most to see (`outlook`).
+
+Where the floors are: the nearest upward-facing surface below a point.
+
+The floor's triangles are listed by the squares of a grid in plan that their boxes touch, so that a
+question looks at the triangles of one square."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.model import Cells
+from ptmtools.output.model import Vector
+from ptmtools.output.storeys import area, leaf_section
+from ptmtools.output.views import Outlook
+from ptmtools.scene.model import Scene
+
+#: A surface is a floor if its normal is at most 45° off the vertical.
+_FLOOR_SLOPE = np.cos(np.pi / 4)
+#: Squares along each side of the grid, at most.
+_SQUARES = 128
+
+
+class Ground:
+    """The floors of a scene."""
+
+    def __init__(self, scene: Scene) -> None:
+        corners = scene.corners
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        up, length = normal[:, 1], np.linalg.norm(normal, axis=1)
+        floor = np.where(scene.two_sided, abs(up), up) > _FLOOR_SLOPE * length
+        self._corners = corners[floor & (length > 0)]
+        plan = self._corners[:, :, [0, 2]]
+        low, high = plan.min(axis=1, initial=np.inf), plan.max(axis=1, initial=-np.inf)
+        self._side = int(np.clip(np.sqrt(len(plan)), 1, _SQUARES))
+        self._least = low.min(axis=0, initial=np.inf)
+        self._most = high.max(axis=0, initial=-np.inf)
+        first, last = self._square(low), self._square(high)
+        wide = last - first + 1
+        count = wide.prod(axis=1)
+        triangle = np.repeat(np.arange(len(plan)), count)
+        place = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
+        across = wide[triangle, 1]
+        square = (first[triangle, 0] + place // across) * self._side
+        square += first[triangle, 1] + place % across
+        order = np.argsort(square, kind="stable")
+        self._triangle = triangle[order]
+        self._start = np.searchsorted(square[order], np.arange(self._side**2 + 1))
+
+    def below(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n,) height of the nearest floor at or below each of (n, 3) points, or -inf."""
+        found = np.full(len(points), -np.inf)
+        plan = points[:, [0, 2]]
+        over = np.flatnonzero(((self._least <= plan) & (plan <= self._most)).all(axis=1))
+        square = self._square(plan[over]) @ [self._side, 1]
+        count = self._start[square + 1] - self._start[square]
+        point = np.repeat(over, count)
+        place = np.arange(len(point)) - np.repeat(np.cumsum(count) - count, count)
+        near = self._triangle[np.repeat(self._start[square], count) + place]
+        a, b, c = np.moveaxis(self._corners[near], 1, 0)
+        ab, ac, ap = b - a, c - a, points[point] - a
+        det = ab[:, 0] * ac[:, 2] - ab[:, 2] * ac[:, 0]
+        u = (ap[:, 0] * ac[:, 2] - ap[:, 2] * ac[:, 0]) / det
+        v = (ab[:, 0] * ap[:, 2] - ab[:, 2] * ap[:, 0]) / det
+        height = a[:, 1] + u * ab[:, 1] + v * ac[:, 1]
+        hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (height <= points[point, 1])
+        np.maximum.at(found, point[hit], height[hit])
+        return found
+
+    def _square(self, plan: NDArray[np.float64]) -> NDArray[np.int64]:
+        """(n, 2) row and column of the squares of (n, 2) points within the floors' box."""
+        extent = np.maximum(self._most - self._least, np.finfo(np.float64).tiny)
+        share = (plan - self._least) / extent
+        square: NDArray[np.int64] = (share * self._side).astype(np.int64)
+        return np.minimum(np.maximum(square, 0), self._side - 1)
+
+
+#: Leaves in which a place is looked for, the largest first: of one cell, and of all, at least and
+#: for every room that is wanted.
+_OF_A_CELL = 3
+_LEAVES = 96
+_PER_ROOM = 4
+#: Places tried in a leaf, along each axis of its plan.
+_GRID = 7
+#: Places of a leaf whose views are compared, the freest first.
+_TRIES = 12
+#: A room is as good as the largest to begin in if its floor is at least this share of that one's.
+_AS_LARGE = 0.5
+#: A browser stands on what is highest around the eye: X_ITE in a square of half that side, turned
+#: with the view. A bench or a step beside the feet would lift the eye, by this or more, metres.
+_LIFT = 0.01
+_AROUND = np.array(
+    [
+        (share * np.cos(turn), share * np.sin(turn))
+        for share in (np.sqrt(2), 1.0, 0.5)
+        for turn in np.arange(16) * np.pi / 8
+    ]
+)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where to stand in a cell.
+
+    Attributes
+    ----------
+    cell: its index.
+    position: (3,) of the eye.
+    yaw: radians, counter-clockwise from -Z, of the best view.
+    worth: of that view.
+    floor: the height of what one stands on.
+    """
+
+    cell: int
+    position: NDArray[np.float64]
+    yaw: float
+    worth: float
+    floor: float
+
+
+@dataclass(frozen=True)
+class _Room:
+    """A leaf in which one can stand: its floor's height, and its section at the eye's."""
+
+    leaf: int
+    floor: float
+    section: NDArray[np.float64]
+
+
+def places(
+    cells: Cells, ground: Ground, outlook: Outlook, avatar_size: Vector, count: int
+) -> list[Place]:
+    """At most ``count``: of the largest rooms of a storey the one with most to see, then those with
+    the largest floors."""
+    eye = avatar_size[1]
+    rooms = []
+    for leaf in largest_leaves(cells, max(_LEAVES, _PER_ROOM * count)):
+        floor = _floor(cells, leaf, ground)
+        section = leaf_section(cells, leaf, floor + eye)
+        if len(section) >= 3:
+            rooms.append(_Room(leaf, floor, section))
+    found: dict[int, Place] = {}
+    begin: list[Place] = []
+    least = 0.0
+    for room in sorted(rooms, key=lambda room: (-area(room.section), room.leaf)):
+        cell, size = int(cells.leaf_cell[room.leaf]), area(room.section)
+        if len(found) >= count and size < least:
+            break
+        if cell not in found:
+            place = _place_in(room, cells, ground, outlook, avatar_size)
+            if place is not None:
+                found[cell] = place
+                least = least or _AS_LARGE * size
+                if size >= least and abs(place.floor - (begin or [place])[0].floor) < eye:
+                    begin.append(place)
+    first = max(begin, key=lambda place: place.worth, default=None)
+    ordered = sorted(found.values(), key=lambda place: place is not first)
+    return ordered[:count]
+
+
+def largest_leaves(cells: Cells, count: int) -> list[int]:
+    """At most so many leaves in which one can stand, by the volume of their boxes; of a cell the
+    largest few."""
+    boxes = [np.ptp(cells.leaf_points(i), axis=0).prod() for i in range(cells.leaf_count)]
+    taken = np.zeros(cells.cell_count, dtype=np.int64)
+    found = []
+    for leaf in np.argsort(-np.array(boxes), kind="stable").tolist():
+        cell = cells.leaf_cell[leaf]
+        if cells.leaf_standing[leaf] and taken[cell] < _OF_A_CELL:
+            taken[cell] += 1
+            found.append(leaf)
+        if len(found) == count:
+            break
+    return found
+
+
+def _floor(cells: Cells, leaf: int, ground: Ground) -> float:
+    """The height of the floor of a leaf, and not of the table in its middle: half of it is no
+    higher."""
+    middle = cells.leaf_points(leaf).mean(axis=0)
+    section = leaf_section(cells, leaf, float(middle[1]))
+    plan = _grid(section) if len(section) >= 3 else middle[None, [0, 2]]
+    below = np.sort(ground.below(np.insert(plan, 1, middle[1], axis=1)))
+    return float(below[len(below) // 2])
+
+
+def _place_in(
+    room: _Room,
+    cells: Cells,
+    ground: Ground,
+    outlook: Outlook,
+    avatar_size: Vector,
+) -> Place | None:
+    keep_off, eye, step = avatar_size
+    grid, walls = _grid(room.section), outlook.walls(room.floor + eye)
+    # A wall outside of the section is farther off than the section's own sides.
+    least, most = room.section.min(axis=0), room.section.max(axis=0)
+    near = ((walls.max(axis=1) >= least) & (walls.min(axis=1) <= most)).all(axis=1)
+    sides = np.stack([room.section, np.roll(room.section, -1, axis=0)], axis=1)
+    clearance = np.minimum(_distance(grid, walls[near]), _distance(grid, sides))
+    grid = grid[np.argsort(-clearance, kind="stable")][: int((clearance >= keep_off).sum())]
+    position = np.insert(grid, 1, room.floor + eye, axis=1)
+    floor = ground.below(position)
+    position[:, 1] = floor + eye
+    good = (abs(floor - room.floor) <= step) & (cells.locate_leaf(position) == room.leaf)
+    left, tried = np.flatnonzero(good), np.zeros(0, dtype=np.int64)
+    while len(left) and len(tried) < _TRIES:
+        some, left = left[:_TRIES], left[_TRIES:]
+        level = _level(position[some], floor[some], ground, keep_off)
+        tried = np.append(tried, some[level])[:_TRIES]
+    if len(tried) == 0:
+        return None
+    view = outlook.best(position[tried], room.floor + eye)
+    cell, i = int(cells.leaf_cell[room.leaf]), tried[view.place]
+    return Place(cell, position[i], view.yaw, view.worth, float(floor[i]))
+
+
+def _level(
+    position: NDArray[np.float64], floor: NDArray[np.float64], ground: Ground, radius: float
+) -> NDArray[np.bool_]:
+    """(n,) whether no floor around (n, 3) positions lies above the one at the position itself."""
+    around = np.repeat(position[:, None], len(_AROUND), axis=1)
+    around[..., [0, 2]] += radius * _AROUND
+    height = ground.below(around.reshape(-1, 3)).reshape(len(position), len(_AROUND))
+    return np.asarray((height < floor[:, None] + _LIFT).all(axis=1))
+
+
+def _grid(polygon: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 2) points of a regular grid that lie inside a convex counter-clockwise polygon."""
+    share = (np.arange(_GRID) + 0.5) / _GRID
+    least, most = polygon.min(axis=0), polygon.max(axis=0)
+    grid = np.stack(np.meshgrid(share, share, indexing="ij"), axis=-1).reshape(-1, 2)
+    points = least + grid * (most - least)
+    a, b = polygon, np.roll(polygon, -1, axis=0)
+    edge, to = b - a, points[:, None] - a
+    inside = np.all(edge[:, 0] * to[..., 1] - edge[:, 1] * to[..., 0] > 0, axis=1)
+    kept: NDArray[np.float64] = points[inside]
+    return kept if len(kept) else polygon.mean(axis=0)[None]
+
+
+def _distance(points: NDArray[np.float64], segments: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) distance of each (n, 2) point to the nearest of (m, 2, 2) segments; inf if none."""
+    a, along = segments[:, 0], segments[:, 1] - segments[:, 0]
+    length = np.maximum((along**2).sum(axis=1), np.finfo(np.float64).tiny)
+    to = points[:, None] - a
+    share = np.clip((to * along).sum(axis=2) / length, 0, 1)
+    off = share[..., None] * along - to
+    nearest: NDArray[np.float64] = np.sqrt((off**2).sum(axis=2)).min(axis=1, initial=np.inf)
+    return nearest

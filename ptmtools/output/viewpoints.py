@@ -1,0 +1,311 @@
+"""The places from which a walk begins (paper §6: "a set of viewpoints from which the navigation
+can start"), and those by which one comes from room to room.
+
+The user's own, else the model's cameras; then one in each of the largest rooms that have none, see
+`rooms` and `outlook`, in the order of a walk, see `tour`: a browser that knows nothing of cells has
+them in its menu and goes to the next one at a key. A browser in WALK mode drops the viewpoint onto
+the floor, so it is put there beforehand: at the height of the eye above the nearest upward-facing
+surface below.
+
+(Tried: an Anchor on every portal, with a transparent polygon to click on. view3dscene 4.2 and
+X_ITE 15 draw nothing of it, to the last pixel; but in X_ITE a drag that begins on it jumps instead
+of walking, and at the museum's first viewpoint that is 42 % of the picture. Readers that know no
+transparency show a wall in every door.)
+
+The order in which rooms are walked through.
+
+A browser that knows nothing of cells leads from viewpoint to viewpoint in the order of the file:
+the next one should be next door. The shortest ways from the first room make a tree (Dijkstra, over
+leaves and portals); rooms follow each other as one meets them walking around it, the branch that
+leads least far first, one storey after the other."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from heapq import heappop, heappush
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.cells.model import Cells
+from ptmtools.errors import InputError
+from ptmtools.output.model import EmitOptions, TextureRecord, Viewpoint, storey_name
+from ptmtools.output.standpoints import Ground, largest_leaves, places
+from ptmtools.output.views import Outlook
+from ptmtools.scene.model import Scene
+from ptmtools.tolerance import ROUNDING_SHARE
+
+#: A way through an opening that is too low to walk through counts as so many times as long.
+_CLIMB = 10.0
+#: A portal with a normal this near to the vertical leads up or down, and has no height.
+_LEVEL = np.cos(np.pi / 4)
+
+
+def walk(cells: Cells, start: int, stops: Sequence[int], tall: float) -> list[int]:
+    """The order in which a walk from the leaf ``start`` meets the leaves ``stops``: indices into
+    it. Those to which nothing leads come last.
+
+    Parameters
+    ----------
+    tall: openings of at least this height are walked through, metres.
+    """
+    length, before = _ways(cells, start, tall)
+    reach: dict[int, float] = {}
+    onwards: dict[int, set[int]] = {}
+    here: dict[int, list[int]] = {}
+    for i, stop in enumerate(stops):
+        if stop != start and before[stop] < 0:
+            continue
+        here.setdefault(stop, []).append(i)
+        leaf, far = stop, length[stop]
+        while leaf >= 0:
+            reach[leaf] = max(reach.get(leaf, 0.0), far)
+            if before[leaf] >= 0:
+                onwards.setdefault(before[leaf], set()).add(leaf)
+            leaf = before[leaf]
+    order: list[int] = []
+    waiting = [start]
+    while waiting:
+        leaf = waiting.pop()
+        order += here.get(leaf, [])
+        waiting += sorted(onwards.get(leaf, ()), key=lambda leaf: (-reach[leaf], -leaf))
+    return order + sorted(set(range(len(stops))) - set(order))
+
+
+def storey_numbers(floors: Sequence[float], apart: float) -> list[int]:
+    """The storey of each of these heights, from 0 for the lowest: a new one begins where a height
+    is more than ``apart`` metres above the next lower one."""
+    order = np.argsort(floors, kind="stable")
+    rise = np.diff(np.array(floors)[order], prepend=floors[order[0]] if len(floors) else 0.0)
+    found = np.empty(len(floors), dtype=np.int64)
+    found[order] = np.cumsum(rise > apart)
+    return [int(storey) for storey in found]
+
+
+def _ways(cells: Cells, start: int, tall: float) -> tuple[list[float], list[int]]:
+    """For each leaf how far it is from ``start``, and the leaf before it on the way, -1 if none."""
+    edges: list[list[tuple[int, float]]] = [[] for _ in range(cells.leaf_count)]
+    if cells.portal_count:
+        middle, door = (
+            np.add.reduceat(point, start[:-1]) / np.diff(start)[:, None]
+            for point, start in (
+                (cells.leaf_point, cells.leaf_point_start),
+                (cells.portal_point, cells.portal_start),
+            )
+        )
+        up, begin = cells.portal_point[:, 1], cells.portal_start[:-1]
+        rise = np.maximum.reduceat(up, begin) - np.minimum.reduceat(up, begin)
+        way = np.linalg.norm(middle[cells.portal_leaf] - door[:, None], axis=2).sum(axis=1)
+        way[(abs(cells.portal_plane[:, 1]) < _LEVEL) & (rise < tall)] *= _CLIMB
+        for (a, b), far in zip(cells.portal_leaf.tolist(), way.tolist(), strict=True):
+            edges[a].append((b, far))
+            edges[b].append((a, far))
+    length, before = [np.inf] * cells.leaf_count, [-1] * cells.leaf_count
+    length[start] = 0.0
+    waiting = [(0.0, start)]
+    while waiting:
+        far, leaf = heappop(waiting)
+        if far > length[leaf]:
+            continue
+        for neighbour, way in edges[leaf]:
+            if far + way < length[neighbour]:
+                length[neighbour], before[neighbour] = far + way, leaf
+                heappush(waiting, (far + way, neighbour))
+    return length, before
+
+
+#: The narrowest field of view that a camera may keep, radians.
+_NARROWEST = 1e-2
+#: A floor is within reach if it lies at most this many eye heights below.
+_REACH = 2.0
+#: VRML97 wants the field of view inside (0, π); wider cameras are narrowed to this.
+_WIDEST = 3.0
+
+
+def place_viewpoints(
+    scene: Scene, cells: Cells, options: EmitOptions, textures: Sequence[TextureRecord] = ()
+) -> tuple[tuple[Viewpoint, ...], tuple[str, ...]]:
+    """The viewpoints of a database, the first the one to begin at, and notes on those that were
+    left out. They look where ``textures`` are; those that are not given show nothing.
+
+    Raises InputError: PTM-I600 if a viewpoint that the user gave lies in no cell.
+    """
+    ground, outlook = Ground(scene), Outlook(scene, textures)
+    notes: list[str] = []
+    if options.viewpoints:
+        begun = _given(cells, ground, outlook, options)
+    else:
+        begun = _cameras(scene, cells, ground, options, notes)
+    if options.viewpoint_count or not begun:
+        begun = [*begun, *_touring(scene, cells, ground, outlook, options, begun)]
+    return tuple(replace(v, name=f"VP_{i}") for i, v in enumerate(begun)), tuple(notes)
+
+
+def orientation(direction: NDArray[np.float64]) -> tuple[float, float, float, float]:
+    """(x, y, z, angle): the rotation that turns -Z to ``direction`` and keeps Y as far up as it
+    can; a vertical direction keeps X to the right."""
+    back = -direction / np.linalg.norm(direction)
+    right = np.cross([0.0, 1.0, 0.0], back)
+    length = np.linalg.norm(right)
+    right = right / length if length > ROUNDING_SHARE else np.array([1.0, 0.0, 0.0])
+    m = np.stack([right, np.cross(back, right), back], axis=1)
+    # The largest of the quaternion's components first: no cancellation at any angle.
+    t = np.array([m[0, 0], m[1, 1], m[2, 2], np.trace(m)])
+    i = int(t.argmax())
+    if i == 3:
+        v = np.array([m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]])
+        w = 1 + t[3]
+    else:
+        j, k = (i + 1) % 3, (i + 2) % 3
+        v = np.zeros(3)
+        v[[i, j, k]] = 1 + 2 * t[i] - t[3], m[j, i] + m[i, j], m[k, i] + m[i, k]
+        w = m[k, j] - m[j, k]
+    most = float(abs(v).max())
+    if most == 0:
+        return (0.0, 1.0, 0.0, 0.0)
+    axis = v / most  # whose square may be less than a float can be
+    size = float(np.linalg.norm(axis))
+    axis, angle = axis / size + 0.0, float(2 * np.arctan2(most * size, w))
+    if angle > np.pi:
+        angle -= 2 * np.pi
+    x, y, z = axis.tolist()
+    return (x, y, z, angle)
+
+
+def _viewpoint(
+    description: str,
+    position: NDArray[np.float64],
+    direction: NDArray[np.float64],
+    field_of_view: float,
+    cell: int,
+) -> Viewpoint:
+    """Without a name so far."""
+    unit = direction / np.linalg.norm(direction) + 0.0
+    x, y, z = position.tolist()
+    dx, dy, dz = unit.tolist()
+    turn = orientation(unit)
+    return Viewpoint("", description, (x, y, z), (dx, dy, dz), turn, field_of_view, cell)
+
+
+def _heading(yaw: float) -> NDArray[np.float64]:
+    return np.array([-np.sin(yaw), 0.0, -np.cos(yaw)])
+
+
+def _standing(
+    cells: Cells, ground: Ground, position: NDArray[np.float64], options: EmitOptions
+) -> tuple[NDArray[np.float64], int]:
+    """A place and its cell, -1 if nobody can stand there; on the floor below if one is in reach
+    and one can stand there."""
+    eye = options.avatar(cells.walker)[1]
+    floor = float(ground.below(position[None])[0])
+    if position[1] - floor <= _REACH * eye:
+        stood = np.array([position[0], floor + eye, position[2]])
+        cell = _cell_to_stand_in(cells, stood)
+        if cell >= 0:
+            return stood, cell
+    return position, _cell_to_stand_in(cells, position)
+
+
+def _cell_to_stand_in(cells: Cells, position: NDArray[np.float64]) -> int:
+    """The cell of the leaf at a place, -1 if nobody can stand in it."""
+    leaf = int(cells.locate_leaf(position)[0])
+    return int(cells.leaf_cell[leaf]) if leaf >= 0 and cells.leaf_standing[leaf] else -1
+
+
+def _cameras(
+    scene: Scene, cells: Cells, ground: Ground, options: EmitOptions, notes: list[str]
+) -> list[Viewpoint]:
+    placed: list[Viewpoint] = []
+    for camera in scene.cameras:
+        position, cell = _standing(cells, ground, np.array(camera.position), options)
+        if cell < 0:
+            notes.append(f"camera {camera.name!r} lies in no cell and was left out")
+            continue
+        field = min(max(camera.field_of_view, _NARROWEST), _WIDEST)
+        name = camera.name or f"Camera {len(placed) + 1}"
+        placed.append(_viewpoint(name, position, np.array(camera.direction), field, cell))
+    return placed
+
+
+def _given(cells: Cells, ground: Ground, outlook: Outlook, options: EmitOptions) -> list[Viewpoint]:
+    placed = []
+    for i, wanted in enumerate(options.viewpoints):
+        position, cell = _standing(cells, ground, np.array(wanted.position), options)
+        if cell < 0:
+            x, y, z = wanted.position
+            where, remedy = "not inside any cell", "with the origin at the centre of the floor"
+            if cells.locate_leaf(np.array(wanted.position))[0] >= 0:
+                where = "where nobody can stand"
+                remedy = "or divide the model again with this --viewpoint"
+            raise InputError(
+                "PTM-I600",
+                f"the viewpoint {x:g},{y:g},{z:g} is {where}",
+                remedy=f"give world metres, Y up, {remedy}",
+            )
+        if wanted.yaw is None:
+            yaw = outlook.best(position[None], float(position[1])).yaw
+        else:
+            yaw = float(np.radians(wanted.yaw))
+        name, field = f"Viewpoint {i + 1}", options.field_of_view
+        placed.append(_viewpoint(name, position, _heading(yaw), field, cell))
+    return placed
+
+
+def _touring(
+    scene: Scene,
+    cells: Cells,
+    ground: Ground,
+    outlook: Outlook,
+    options: EmitOptions,
+    begun: Sequence[Viewpoint],
+) -> list[Viewpoint]:
+    """One for each room that has none yet, in the order of a walk from the first."""
+    taken = {v.cell for v in begun}
+    count = max(options.viewpoint_count, not begun)
+    found = places(cells, ground, outlook, options.avatar(cells.walker), count + len(taken))
+    found = [place for place in found if place.cell not in taken][:count]
+    if not found:
+        return [] if begun else [_anywhere(cells, outlook, options)]
+    leaf = cells.locate_leaf(np.array([place.position for place in found])).tolist()
+    start = int(cells.locate_leaf(np.array(begun[0].position))[0]) if begun else leaf[0]
+    eye = options.avatar(cells.walker)[1]
+    order = walk(cells, start, leaf, eye)
+    storey = storey_numbers([place.floor for place in found], eye)
+    first = list(dict.fromkeys(storey[i] for i in order))
+    order.sort(key=lambda i: first.index(storey[i]))
+    called = _storey_names(scene, [place.floor for place in found], storey, eye)
+    number: Counter[str] = Counter()
+    views: list[Viewpoint] = []
+    for i in order:
+        place, field = found[i], options.field_of_view
+        level = called[i] if len(first) > 1 else ""
+        number[level] += 1
+        name = f"{level}, room {number[level]}" if level else f"Room {number[level]}"
+        views.append(_viewpoint(name, place.position, _heading(place.yaw), field, place.cell))
+    return views
+
+
+def _storey_names(
+    scene: Scene, floors: Sequence[float], storey: Sequence[int], gap: float
+) -> list[str]:
+    """What the storey of each floor is called: by its own height, else by that of the lowest floor
+    there, else by its number."""
+    lowest: dict[int, float] = {}
+    for floor, number in zip(floors, storey, strict=True):
+        lowest[number] = min(floor, lowest.get(number, floor))
+    return [
+        storey_name(scene, floor, gap)
+        or storey_name(scene, lowest[number], gap)
+        or f"Storey {number + 1}"
+        for floor, number in zip(floors, storey, strict=True)
+    ]
+
+
+def _anywhere(cells: Cells, outlook: Outlook, options: EmitOptions) -> Viewpoint:
+    """In the middle of the largest leaf."""
+    (leaf,) = largest_leaves(cells, 1)
+    middle = cells.leaf_points(leaf).mean(axis=0)
+    view, cell = outlook.best(middle[None], float(middle[1])), int(cells.leaf_cell[leaf])
+    return _viewpoint("Room 1", middle, _heading(view.yaw), options.field_of_view, cell)

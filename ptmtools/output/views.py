@@ -1,0 +1,245 @@
+"""Where to look from a place: where there is most to see, and of views that are worth about as much
+along the longest.
+
+What there is to see is counted by rays (`pictures`). How far one sees is measured all around, in a
+horizontal section of the walls: a direction counts as the mean free distance over a sector about
+it, so that a slit between two walls does not win; one that leaves the model counts as blind.
+
+(Tried: the longest view alone. It is often along a bare wall. Embree rays from the middle of a
+cell, for the longest view: they see down doorways, but the middle of a hall is as often a table.)
+
+How much there is to see from a place, all around: where pictures are.
+
+Rays all around find what shows where. Each resolves as many texels as it has pixels on a screen of
+1080 lines, or fewer where a texel is larger than a pixel; of a texture that repeats, such as a
+tile of a floor, no more count than it has, as finely as it shows. A view is worth the cube root of
+what it shows of a texture, times its contrast, summed up: four pictures
+are worth more than one that fills the view, and a plastered wall next to nothing. It loses as much
+of that as it has of what is near: one wants to stand back. What is transparent and has no image is
+looked through.
+
+(Tried: the texels themselves. The best view of a room is then that of one picture which does not
+fit into it; with square roots it still is in a corridor. Texels counted in each 64th of a texture:
+five times as slow, and hardly another view.)"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import normals
+from ptmtools.output.model import TextureRecord
+from ptmtools.output.storeys import triangle_section
+from ptmtools.scene.model import Scene
+
+#: Directions tried.
+DIRECTIONS = 72
+#: Columns of rays around a place for each of them; rows are as far apart as columns.
+_FINER = 2
+_COLUMNS = _FINER * DIRECTIONS
+_STEP = 2 * np.pi / _COLUMNS
+#: A view has 60° from top to bottom, and 16:9. What lies outside this share of it, in the middle,
+#: does not count: a picture is to be whole.
+_UP = np.tan(np.radians(30))
+_ASPECT = 16 / 9
+_WITHIN = 0.8
+_ACROSS = int(_WITHIN * np.arctan(_ASPECT * _UP) / _STEP)
+_ROWS = int(_WITHIN * 2 * _UP / _STEP)
+#: Pixels of a screen of 1080 lines, for a radian up or across its middle.
+_PIXELS = 540 / _UP
+#: See `_contrast`; and what white is in a texture's detail.
+_SIDE, _WHITE = 64, 255
+#: What is nearer than this is near, metres; at most half of a view.
+_NEAR = 2.0
+
+
+def _contrast(texture: TextureRecord) -> float:
+    """By how much the colours of a texture differ from their surroundings, a sixteenth of the
+    picture wide, as a share of white: what the finest level of at most `_SIDE` texels and the one
+    below it add. What is finer is grain, which plaster and carpet have as much of as a painting;
+    from where one looks at a painting, it is not seen."""
+    if texture.detail is None:
+        return 0.0
+    small = [n for n, x in enumerate(texture.levels) if min(x.width, x.height) <= _SIDE]
+    last = max(small, default=0)
+    return sum(texture.detail.differences[max(last - 1, 0) : last + 1]) / _WHITE
+
+
+class Pictures:
+    """The textures of a scene on its triangles."""
+
+    def __init__(self, scene: Scene, textures: Sequence[TextureRecord]) -> None:
+        self._texels = np.zeros(len(scene.images) + 1)
+        self._detail = np.zeros(len(scene.images) + 1)
+        for texture in textures:
+            self._texels[texture.image] = texture.width * texture.height
+            self._detail[texture.image] = _contrast(texture)
+        image = np.array([m.image for m in scene.materials], dtype=np.int64)
+        drawn = np.flatnonzero(scene.opaque | (image[scene.triangle_material] >= 0))
+        corners = scene.corners[drawn]
+        self._image = image[scene.triangle_material[drawn]]
+        self._normal = normals(corners)
+        twice_area = np.linalg.norm(self._normal, axis=1)
+        self._normal /= np.maximum(twice_area, np.finfo(np.float64).tiny)[:, None]
+        edge = scene.uv[drawn, 1:] - scene.uv[drawn, :1]
+        twice_uv = abs(edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0])
+        share = np.divide(twice_uv, twice_area, out=np.zeros_like(twice_uv), where=twice_area > 0)
+        self._density = share * self._texels[self._image]  # texels to the square metre
+        # Embree computes in float32.
+        box = corners.reshape(-1, 3) if len(corners) else np.zeros((1, 3))
+        self._middle = (box.min(axis=0) + box.max(axis=0)) / 2
+        self._scale = 1 / scene.tolerance.extent
+        self._local = self._normalised(corners)
+        self._tree: Any = None
+
+    def worth(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n, DIRECTIONS) of the views from (n, 3) places; 0 where most of what shows is near, or
+        nothing at all."""
+        worth = np.zeros((len(places), DIRECTIONS))
+        if not (self._detail[self._image] > 0).any():
+            return worth
+        turn, rise = _STEP * np.arange(_COLUMNS), _STEP * (np.arange(_ROWS) - (_ROWS - 1) / 2)
+        way = np.empty((_COLUMNS, _ROWS, 3))
+        way[..., 0], way[..., 2] = -np.sin(turn)[:, None], -np.cos(turn)[:, None]
+        way[..., 1] = rise
+        ways = np.tile(way.reshape(-1, 3), (len(places), 1))
+        triangle, far = self._cast(np.repeat(places, _COLUMNS * _ROWS, axis=0), ways)
+        near = (far < _NEAR) | (triangle < 0)
+        free = _sectors(1 - near.reshape(len(places), _COLUMNS, _ROWS).mean(axis=2))
+        free /= 2 * _ACROSS + 1
+        ray = np.flatnonzero((triangle >= 0) & (self._detail[self._image[triangle]] > 0))
+        hit = triangle[ray]
+        image, slant = self._image[hit], abs((self._normal[hit] * ways[ray]).sum(axis=1))
+        # Texels and pixels to the square of a radian.
+        texels = self._density[hit] * far[ray] ** 2 / np.maximum(slant, np.finfo(np.float64).eps)
+        pixels = np.minimum(texels, _PIXELS**2)
+        place, column = np.divmod(ray // _ROWS, _COLUMNS)
+        shows, which = np.unique(place * len(self._texels) + image, return_inverse=True)
+        each = np.bincount(which * _COLUMNS + column, pixels, len(shows) * _COLUMNS)
+        seen = _sectors(_STEP**2 * each.reshape(-1, _COLUMNS))
+        most = np.zeros(len(shows))
+        share = np.divide(pixels, texels, out=np.zeros_like(texels), where=texels > 0)
+        np.maximum.at(most, which, share * self._texels[image])
+        place, image = np.divmod(shows, len(self._texels))
+        value = self._detail[image, None] * np.cbrt(np.minimum(seen, most[:, None]))
+        np.add.at(worth, place, value)
+        return np.where(free >= 0.5, worth * free, 0.0)
+
+    def _cast(
+        self, origin: NDArray[np.float64], way: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """Of (k, 3) rays: (k,) the triangle that each hits first, or -1, and (k,) how far, in
+        lengths of ``way``."""
+        from embreex.mesh_construction import TriangleMesh
+        from embreex.rtcore_scene import EmbreeScene
+
+        if self._tree is None:
+            self._tree = EmbreeScene(robust=True)
+            TriangleMesh(self._tree, self._local)
+        found = self._tree.run(self._normalised(origin), way.astype(np.float32), output=True)
+        far = found["tfar"].astype(np.float64) / self._scale
+        return found["primID"].astype(np.int64), far
+
+    def _normalised(self, points: NDArray[np.float64]) -> NDArray[np.float32]:
+        local: NDArray[np.float32] = ((points - self._middle) * self._scale).astype(np.float32)
+        return local
+
+
+def _sectors(columns: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
+    """(n, DIRECTIONS) sums over the columns that a view in each direction has, of (n, _COLUMNS)."""
+    around = np.concatenate([columns[:, -_ACROSS:], columns, columns[:, :_ACROSS]], axis=1)
+    sums = np.cumsum(np.insert(around, 0, 0.0, axis=1), axis=1)
+    return np.asarray((sums[:, 2 * _ACROSS + 1 :] - sums[:, : -2 * _ACROSS - 1])[:, ::_FINER])
+
+
+#: Views worth at least this share of the best are worth about as much.
+_AS_GOOD = 0.97
+#: How many directions to either side make a sector (±15°).
+_SECTOR = 3
+#: What angles may be wrong by, in steps from one direction to the next.
+_LEEWAY = 1e-6
+#: Walls seen from places at a time.
+_AT_ONCE = 1 << 16
+_YAW = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+_X, _Z = -np.sin(_YAW), -np.cos(_YAW)
+
+
+@dataclass(frozen=True)
+class View:
+    """What is best seen from some places.
+
+    Attributes
+    ----------
+    place: which of them it is seen from.
+    yaw: radians, counter-clockwise from -Z.
+    worth: see `Pictures.worth`.
+    """
+
+    place: int
+    yaw: float
+    worth: float
+
+
+class Outlook:
+    """What one sees of a scene.
+
+    Attributes
+    ----------
+    walls: (m, 2, 2) segments in plan, the section of the opaque triangles at a height; made once
+        for each: rooms of a storey share one.
+    """
+
+    def __init__(self, scene: Scene, textures: Sequence[TextureRecord]) -> None:
+        self.walls: Callable[[float], NDArray[np.float64]] = cache(
+            partial(triangle_section, scene.corners[scene.opaque])
+        )
+        self._pictures = Pictures(scene, textures)
+
+    def best(self, places: NDArray[np.float64], height: float) -> View:
+        """From (n, 3) places, about as high as ``height``."""
+        worth = self._pictures.worth(places)
+        good = worth >= _AS_GOOD * worth.max()
+        length = np.where(good, lengths(places[:, [0, 2]], self.walls(height)), -1.0)
+        place, way = np.unravel_index(int(length.argmax()), length.shape)
+        return View(int(place), float(_YAW[way]), float(worth[place, way]))
+
+
+def lengths(places: NDArray[np.float64], walls: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, DIRECTIONS) mean free distance of the sector about each direction, metres, from (n, 2)
+    places among (m, 2, 2) walls."""
+    some = max(1, _AT_ONCE // max(len(walls), 1))
+    free = np.concatenate([_free(places[i : i + some], walls) for i in range(0, len(places), some)])
+    sector = np.arange(-_SECTOR, _SECTOR + 1)
+    around = (np.arange(DIRECTIONS)[:, None] + sector) % DIRECTIONS
+    mean: NDArray[np.float64] = free[:, around].mean(axis=2)
+    return mean
+
+
+def _free(places: NDArray[np.float64], walls: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 72) metres to the first wall in each direction; 0 where there is none."""
+    along = walls[:, 1] - walls[:, 0]
+    ends = walls - places[:, None, None]
+    # Each wall only with the directions that it can stand in.
+    angle = np.arctan2(-ends[..., 0], -ends[..., 1]) * (DIRECTIONS / (2 * np.pi))
+    turn = angle[..., 1] - angle[..., 0]
+    turn -= DIRECTIONS * np.round(turn / DIRECTIONS)
+    low = np.minimum(angle[..., 0], angle[..., 0] + turn)
+    first = np.ceil(low - _LEEWAY).astype(np.int64).ravel()
+    count = np.floor(low + abs(turn) + _LEEWAY).astype(np.int64).ravel() + 1 - first
+    pair = np.repeat(np.arange(len(first)), count)
+    step = np.arange(len(pair)) - np.repeat(np.cumsum(count) - count, count)
+    way = (first[pair] + step) % DIRECTIONS
+    a, b, x, z = ends[..., 0, :].reshape(-1, 2)[pair], along[pair % len(along)], _X[way], _Z[way]
+    det = x * b[:, 1] - z * b[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / det
+        share = (a[:, 0] * z - a[:, 1] * x) / det
+    hit = (det != 0) & (distance > 0) & (share >= 0) & (share <= 1)
+    nearest = np.full(len(places) * DIRECTIONS, np.inf)
+    np.minimum.at(nearest, (pair // len(along) * DIRECTIONS + way)[hit], distance[hit])
+    return np.where(np.isfinite(nearest), nearest, 0.0).reshape(-1, DIRECTIONS)

@@ -1,0 +1,351 @@
+"""The text of a cell's file: a PTMCell node, then the cell's shapes.
+
+PTMCell rides beside ordinary nodes in a PROTO whose body draws nothing, so a browser that knows
+nothing of it still shows the cell. What a shape looks like, and why (seen in view3dscene 4.2 and
+X_ITE 15, the same in both unless said):
+
+================================  ==================================================
+texture                           ImageTexture alone: shown unlit, texel for texel
+texture × colour                  ImageTexture and one Color for all faces: unlit, multiplied.
+                                  A Material's diffuseColor multiplies too, but is lit, and
+                                  emissiveColor hides the texture in view3dscene. VRML97 to the
+                                  letter shows the bare texture.
+texture, opacity < 1              ImageTexture and Material (diffuseColor, transparency): lit,
+                                  as only a Material has a transparency
+no texture                        Material (diffuseColor, transparency): lit by the headlight,
+                                  and a quarter as bright by itself (emissiveColor). A
+                                  headlight alone leaves floors, ceilings and corridor walls
+                                  black, since it shines along them
+colours of corners                Color and colorIndex, in place of the diffuse colour; with a
+                                  texture unlit, multiplied
+================================  ==================================================
+
+(Tried: baking the colour into a second image. It is not lossless, and costs a texture. Ambient
+light in the root file instead of a glow: X_ITE shows none.)
+
+Fields of VRML97 as text: strings, and lists of strings, points and indices.
+
+The rows of a list are parted by a comma, or by a line's end after so many of them: one character,
+which VRML97 reads as white space.
+
+The emission pattern: the nodes and fields that the VRML files are made of.
+
+All VRML files of a database: the cells, and `root.wrl`, where a walk can begin."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from urllib.parse import quote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.output.content import Content
+from ptmtools.output.hull import convex_hull
+from ptmtools.output.model import TextureRecord
+from ptmtools.output.names import ROOT, VRML_FILES, DefNames, cell_file, cell_name, path_of
+from ptmtools.output.numbers import decimal, row_texts, single
+from ptmtools.scene.colors import packed, unpacked
+from ptmtools.scene.model import Material
+
+
+def field(items: Sequence[str], per_line: int = 8, between: str = ",") -> str:
+    """A multiple-valued field of these items, with a line's end after every ``per_line``."""
+    if not items:
+        return "[ ]"
+    rows = [between.join(items[i : i + per_line]) for i in range(0, len(items), per_line)]
+    return "[ " + "\n".join(rows) + " ]"
+
+
+def listed(items: Sequence[str], per_line: int) -> str:
+    """A field of strings or of single numbers."""
+    return field(items, per_line, ", ")
+
+
+def chosen(rows: Sequence[str], index: NDArray[np.integer], per_line: int = 8) -> str:
+    """The field of some of the rows."""
+    return field([rows[i] for i in index.tolist()], per_line)
+
+
+def loops(polygons: NDArray[np.integer], per_line: int = 8) -> str:
+    """The field of (m, k) indices, each row closed by -1."""
+    return field([f"{row} -1" for row in row_texts(polygons)], per_line)
+
+
+def quoted(text: str) -> str:
+    """An SFString."""
+    flat = " ".join(text.split())
+    return '"' + flat.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+HEADER = "#VRML V2.0 utf8\n"
+#: The version of the pattern, in WorldInfo's first info string.
+PATTERN = 1
+
+#: Node → field → type; for SFNode the node that must stand there. A "?" follows the type of what
+#: may be left out.
+NODES: dict[str, dict[str, str]] = {
+    "WorldInfo": {"title": "SFString?", "info": "MFString?"},
+    "NavigationInfo": {"type": "MFString?", "avatarSize": "MFFloat?", "headlight": "SFBool?"},
+    "Viewpoint": {
+        "position": "SFVec3f",
+        "orientation": "SFRotation",
+        "fieldOfView": "SFFloat",
+        "description": "SFString",
+    },
+    "Inline": {"url": "MFString", "bboxCenter": "SFVec3f", "bboxSize": "SFVec3f"},
+    "Shape": {"appearance": "Appearance", "geometry": "IndexedFaceSet"},
+    "Appearance": {"material": "Material?", "texture": "ImageTexture?"},
+    "Material": {
+        "diffuseColor": "SFColor?",
+        "emissiveColor": "SFColor?",
+        "transparency": "SFFloat?",
+    },
+    "ImageTexture": {"url": "MFString", "repeatS": "SFBool?", "repeatT": "SFBool?"},
+    "IndexedFaceSet": {
+        "solid": "SFBool?",
+        "coord": "Coordinate",
+        "coordIndex": "MFInt32",
+        "texCoord": "TextureCoordinate?",
+        "texCoordIndex": "MFInt32?",
+        "color": "Color?",
+        "colorIndex": "MFInt32?",
+        "colorPerVertex": "SFBool?",
+    },
+    "Coordinate": {"point": "MFVec3f"},
+    "TextureCoordinate": {"point": "MFVec2f"},
+    "Color": {"color": "MFColor"},
+}
+_CELL = {
+    "cellName": "SFString",
+    "hullPoint": "MFVec3f",
+    "hullIndex": "MFInt32",
+    "adjacentUrl": "MFString",
+    "visibleUrl": "MFString",
+    "ach": "MFFloat",
+}
+#: What PROTOs declare, whose bodies draw nothing: a cell of one leaf, a cell of several, and the
+#: cell of a viewpoint.
+CELL = ("PTMCell", _CELL)
+CELL_OF_LEAVES = ("PTMCell", _CELL | {"leafPoint": "MFVec3f", "leafStart": "MFInt32"})
+VIEWPOINT_CELL = ("PTMViewpointCell", {"viewpoint": "SFString", "cellUrl": "MFString"})
+PROTOS = (CELL, CELL_OF_LEAVES, VIEWPOINT_CELL)
+
+
+def declaration(name: str, fields: Mapping[str, str]) -> str:
+    """The text of a PROTO."""
+    width = max(map(len, fields))
+    rows = []
+    for field, type in fields.items():
+        default = "[ ]" if type.startswith("MF") else '""'
+        rows.append(f"  field {type:<8} {field:<{width}} {default}\n")
+    return f"PROTO {name} [\n{''.join(rows)}] {{\n  WorldInfo {{ }}\n}}\n"
+
+
+#: How bright an untextured surface is without light, as a share of its colour.
+_GLOW = 0.25
+#: Decimals of a colour of a corner, which is one of 256 levels.
+_DIGITS = 3
+_WHOLE = np.ones(3)
+
+
+class CellWriter:
+    """Writes the cells of one scene; what they share is prepared once.
+
+    Raises DatabaseError: PTM-D601 a number is not finite in float32; PTM-D603 a cell is flat.
+    """
+
+    def __init__(self, content: Content) -> None:
+        self._geometry = g = content.geometry
+        self._objects, self._materials = content.scene.objects, content.scene.materials
+        self._urls = {
+            image: f"url {listed(_urls(record, content.options.fallback), 2)}"
+            for image, (_, record) in content.records.items()
+        }
+        cells, self._pvs = content.cells, content.pvs
+        self._adjacent = cells.adjacent()
+        self._cell_url = [quoted(cell_file(c)) for c in range(cells.cell_count)]
+        self._ach = row_texts(single(np.concatenate(content.shares), "ach")[:, None])
+        self._point, self._uv = row_texts(g.point), row_texts(g.uv)
+        self._leaves = [
+            [single(cells.leaf_points(leaf), "leaf points") for leaf in leaves]
+            for leaves in content.leaves
+        ]
+        self._hulls = [convex_hull(np.concatenate(leaves)) for leaves in self._leaves]
+
+    def cell(self, cell: int) -> tuple[str, NDArray[np.float32]]:
+        """The file of one cell, and the (2, 3) least and greatest corner of all that it holds."""
+        g = self._geometry
+        hull, triangles = self._hulls[cell]
+        seen = np.arange(self._pvs.start[cell], self._pvs.start[cell + 1])
+        leaves = self._leaves[cell]
+        lists = {
+            "cellName": quoted(cell_name(cell)),
+            "hullPoint": _points(hull),
+            "hullIndex": loops(triangles, 16),
+            "adjacentUrl": self._cells(self._adjacent[cell]),
+            "visibleUrl": self._cells(self._pvs.cell[seen]),
+            "ach": chosen(self._ach, seen, 16),
+        }
+        if len(leaves) > 1:
+            start = np.cumsum([0, *map(len, leaves[:-1])])
+            lists["leafPoint"] = _points(np.concatenate(leaves))
+            lists["leafStart"] = listed([str(i) for i in start.tolist()], 16)
+        proto = CELL if len(leaves) == 1 else CELL_OF_LEAVES
+        parts = [HEADER, declaration(*proto), "PTMCell {\n"]
+        parts += [f"  {name:<11} {text}\n" for name, text in lists.items()]
+        parts.append("}\n")
+
+        names = DefNames(f"C{cell}")
+        first, last = g.cell_start[cell : cell + 2].tolist()
+        taken = [names.take(self._objects[i]) for i in g.object[first:last].tolist()]
+        textures: dict[tuple[int, str, str], str] = {}
+        for shape, name in zip(range(first, last), taken, strict=True):
+            parts.append(self._shape(shape, name, names, textures))
+        used = g.point[g.shape_point[g.point_start[first] : g.point_start[last]]]
+        held = np.concatenate([hull, used])
+        return "".join(parts), np.stack([held.min(axis=0), held.max(axis=0)])
+
+    def _cells(self, cells: NDArray[np.int32]) -> str:
+        return listed([self._cell_url[c] for c in cells.tolist()], 8)
+
+    def _shape(
+        self, shape: int, name: str, names: DefNames, textures: dict[tuple[int, str, str], str]
+    ) -> str:
+        s = self._geometry.shape(shape)
+        material = self._materials[s.material]
+        parts = [
+            f"DEF {name} Shape {{\n  appearance Appearance {{\n",
+            _surface(material, s.color),
+            self._texture(material, names, textures),
+            "  }\n  geometry IndexedFaceSet {\n",
+            "    solid FALSE\n" if s.two_sided else "",
+            f"    coord Coordinate {{ point {chosen(self._point, s.point)} }}\n",
+            f"    coordIndex {loops(s.triangle)}\n",
+        ]
+        if material.image >= 0:
+            uv = chosen(self._uv, s.uv)
+            parts.append(f"    texCoord TextureCoordinate {{ point {uv} }}\n")
+            parts.append(f"    texCoordIndex {loops(s.uv_triangle)}\n")
+            tinted = material.opacity >= 1 and material.color != (1.0, 1.0, 1.0)
+            if tinted and s.color is None:
+                zeros = field(["0"] * len(s.triangle), 48, " ")
+                parts.append(f"    color Color {{ color [ {_color(material)} ] }}\n")
+                parts.append(f"    colorIndex {zeros}\n    colorPerVertex FALSE\n")
+        if s.color is not None:
+            colors, place = np.unique(packed(s.color), return_inverse=True)
+            rows = row_texts(single(np.round(unpacked(colors) / 255, _DIGITS), "colours"))
+            parts.append(f"    color Color {{ color {field(rows)} }}\n")
+            parts.append(f"    colorIndex {loops(place.reshape(-1, 3))}\n")
+        parts.append("  }\n}\n")
+        return "".join(parts)
+
+    def _texture(
+        self, material: Material, names: DefNames, written: dict[tuple[int, str, str], str]
+    ) -> str:
+        """The texture of an Appearance; "" where there is none. Each is ``written`` once in a file
+        and then named: some browsers make a texture of every node, whatever its file."""
+        if material.image < 0:
+            return ""
+        key = material.image, material.wrap_s, material.wrap_t
+        if key in written:
+            return f"    texture USE {written[key]}\n"
+        name = written[key] = names.take("texture")
+        wrap = " repeatS FALSE" if material.wrap_s == "clamp" else ""
+        wrap += " repeatT FALSE" if material.wrap_t == "clamp" else ""
+        return f"    texture DEF {name} ImageTexture {{ {self._urls[material.image]}{wrap} }}\n"
+
+
+def _surface(material: Material, colors: NDArray[np.uint8] | None) -> str:
+    """The material of an Appearance; "" where it is that of no Material node. Of a shape with
+    ``colors`` of its own these take the place of the diffuse colour, and their mean glows."""
+    if material.image >= 0 and material.opacity >= 1:
+        return ""
+    fields = f"diffuseColor {_color(material)}"
+    if material.image < 0:
+        mean = np.ones(3) if colors is None else colors.mean(axis=(0, 1)) / 255
+        fields += f" emissiveColor {_color(material, _GLOW * mean)}"
+    if material.opacity < 1:
+        fields += f" transparency {decimal(1 - min(max(material.opacity, 0.0), 1.0))}"
+    return f"    material Material {{ {fields} }}\n"
+
+
+def _color(material: Material, share: NDArray[np.float64] = _WHOLE) -> str:
+    held = (s * min(max(c, 0.0), 1.0) for c, s in zip(material.color, share, strict=True))
+    return " ".join(map(decimal, held))
+
+
+def _urls(record: TextureRecord, fallback: bool) -> list[str]:
+    files = [record.fallback, record.file] if fallback else [record.file]
+    return [quoted("../" + quote(file)) for file in files if file is not None]
+
+
+def _points(points: NDArray[np.float32]) -> str:
+    return field(row_texts(points))
+
+
+def vrml_files(content: Content) -> Iterator[tuple[str, str]]:
+    """Path, relative to the served folder, and text of each file.
+
+    Raises DatabaseError: PTM-D601 a number is not finite in float32; PTM-D603 a cell is flat: at
+    once.
+    """
+    return _files(content, CellWriter(content))
+
+
+def _files(content: Content, writer: CellWriter) -> Iterator[tuple[str, str]]:
+    boxes, count = [], content.cells.cell_count
+    for c in range(count):
+        content.progress(c, count, "cells")
+        text, box = writer.cell(c)
+        boxes.append(box)
+        yield path_of(c, VRML_FILES), text
+    content.progress(count, count, "cells")
+    yield ROOT, _root_text(content, boxes)
+
+
+def _root_text(content: Content, boxes: Sequence[NDArray[np.float32]]) -> str:
+    """The root file; ``boxes`` are the (2, 3) bounds of every cell's contents."""
+    viewpoints, options = content.viewpoints, content.options
+    info = [quoted(f"ptm:database {PATTERN}")]
+    entered = [path_of(v.cell, VRML_FILES) for v in viewpoints]
+    info += [
+        quoted(f"ptm:viewpoint {v.name} {url}") for v, url in zip(viewpoints, entered, strict=True)
+    ]
+    avatar = ", ".join(decimal(x) for x in options.avatar(content.cells.walker))
+    parts = [
+        HEADER,
+        declaration(*VIEWPOINT_CELL),
+        f"WorldInfo {{\n  title {quoted(options.title)}\n  info {listed(info, 1)}\n}}\n",
+        f'NavigationInfo {{ type [ "WALK", "ANY" ] avatarSize [ {avatar} ] headlight TRUE }}\n',
+    ]
+    poses = (
+        row_texts(single([np.ravel(getattr(v, name)) for v in viewpoints], "viewpoints"))
+        for name in ("position", "orientation", "field_of_view")
+    )
+    parts += [
+        f"DEF {v.name} Viewpoint {{ position {position} orientation {turn}"
+        f" fieldOfView {field} description {quoted(v.description)} }}\n"
+        for v, position, turn, field in zip(viewpoints, *poses, strict=True)
+    ]
+    parts += [
+        f"PTMViewpointCell {{ viewpoint {quoted(v.name)} cellUrl [ {quoted(url)} ] }}\n"
+        for v, url in zip(viewpoints, entered, strict=True)
+    ]
+    for cell, (centre, size) in enumerate(zip(*map(row_texts, _centred(boxes)), strict=True)):
+        url = quoted(path_of(cell, VRML_FILES))
+        parts.append(f"Inline {{ url [ {url} ] bboxCenter {centre} bboxSize {size} }}\n")
+    return "".join(parts)
+
+
+def _centred(
+    boxes: Sequence[NDArray[np.float32]],
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Centres and sizes (n, 3) in float32 that together hold the boxes (n, 2, 3): sizes are rounded
+    up."""
+    low, high = np.moveaxis(np.array(boxes, np.float64), 1, 0)
+    centre = single((low + high) / 2, "bounding boxes")
+    half = np.maximum(high - centre, centre - low)
+    size = single(2 * half, "bounding boxes")
+    short = size.astype(np.float64) < 2 * half
+    return centre, np.where(short, np.nextafter(size, np.float32(np.inf)), size)

@@ -1,0 +1,334 @@
+"""Compiled sampling of textures, and the sums of errors by level (see `tables`).
+
+What is called for every pixel becomes part of its caller: to hand over all arrays of the records
+takes half as long again.
+
+Compiled colours of pixels, by the levels that are there; sampled as `kernels` samples for its
+errors."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ptmtools.arrays import Bools, Floats, Ints
+from ptmtools.compiled import inlined_kernel, kernel, plain_kernel
+from ptmtools.rendering.records import Pyramids, Shows, Sight, Triangles
+
+#: What is shown where nothing is known: 0 to 255.
+GREY = 128.0
+
+
+class Sums(NamedTuple):
+    """What frames show, by pair of cell and texture.
+
+    Attributes
+    ----------
+    pair: (m,) of each triangle.
+    error, square: (P, L + 2) root mean squares over R, G and B, and their squares, with nothing,
+        the mean colour, level 0, level 1, … as the finest that is there; or the columns of `Shows`
+        in place of levels.
+    need, sight: (P, L) how much each level is wanted, 0 to 1 a pixel, of all pixels and of those of
+        a client's item buffer; the first stands for surfaces without texture.
+    """
+
+    pair: Ints
+    error: Floats
+    square: Floats
+    need: Floats
+    sight: Floats
+
+
+@plain_kernel
+def wrapped(at: float, side: int) -> int:
+    """Which texel is at a whole number along a side of a texture that repeats."""
+    if 0.0 <= at < side:  # most are, and divisions are dear
+        return int(at)
+    return int(at - np.floor(at / side) * side) % side
+
+
+@plain_kernel
+def around(at: float, side: int, clamped: bool) -> tuple[int, int, float]:
+    """The two texels around a texture coordinate along a side, and the share of the second."""
+    place = at * side - 0.5
+    low = np.floor(place)
+    if clamped:
+        last = side - 1.0
+        first, second = int(min(max(low, 0.0), last)), int(min(max(low + 1.0, 0.0), last))
+    else:
+        first = wrapped(low, side)
+        second = first + 1 if first + 1 < side else 0
+    return first, second, place - low
+
+
+@inlined_kernel
+def sample(
+    textures: Pyramids, t: int, level: int, u: float, v: float, clamped: Bools, color: Floats
+) -> None:
+    """Writes the bilinear sample of a level of a texture at (u, v) to ``color`` (3,), 0 to 255;
+    ``clamped`` (2,) as of `Surfaces`."""
+    texel, start = textures.texel, textures.start[t, level]
+    width, height = textures.size[t, level, 0], textures.size[t, level, 1]
+    x0, x1, across = around(u, width, clamped[0])
+    y0, y1, down = around(v, height, clamped[1])
+    a, b = start + (y0 * width + x0) * 3, start + (y0 * width + x1) * 3
+    c, d = start + (y1 * width + x0) * 3, start + (y1 * width + x1) * 3
+    for k in range(3):
+        upper = texel[a + k] + across * (float(texel[b + k]) - texel[a + k])
+        lower = texel[c + k] + across * (float(texel[d + k]) - texel[c + k])
+        color[k] = upper + down * (lower - upper)
+
+
+@plain_kernel
+def blend(
+    textures: Pyramids,
+    t: int,
+    detail: float,
+    u: float,
+    v: float,
+    clamped: Bools,
+    color: Floats,
+    coarse: Floats,
+) -> None:
+    """As `sample`, between the two levels around a level of detail, of 0 and up to the coarsest;
+    ``coarse`` (3,) to work in."""
+    sharp = textures.levels[t] - 1 - int(detail)
+    sample(textures, t, sharp, u, v, clamped, color)
+    sample(textures, t, max(sharp - 1, 0), u, v, clamped, coarse)
+    for k in range(3):
+        color[k] += (detail - int(detail)) * (coarse[k] - color[k])
+
+
+@plain_kernel
+def level_of_detail(
+    ray: Floats, axes: Floats, normal: Floats, offset: Floats, gradient: Floats, pixel: float
+) -> float:
+    """log2 of the texels of the finest level that a pixel covers, as OpenGL has it: the larger of
+    the derivatives across and up the screen; -99 where it covers none.
+
+    Parameters
+    ----------
+    ray: (3,) with component 1 along the view. axes: (2, 3) right and up.
+    normal: (3,) of the plane, any length. offset: (3,) from the eye to a point of the plane.
+    gradient: (2, 3) texels per metre of u and v. pixel: its side at depth 1.
+    """
+    facing = normal[0] * ray[0] + normal[1] * ray[1] + normal[2] * ray[2]
+    if facing == 0.0:
+        return 99.0
+    depth = (normal[0] * offset[0] + normal[1] * offset[1] + normal[2] * offset[2]) / facing
+    most = 0.0
+    for k in range(2):
+        slope = (normal[0] * axes[k, 0] + normal[1] * axes[k, 1] + normal[2] * axes[k, 2]) / facing
+        total = 0.0
+        for c in range(2):
+            move = 0.0
+            for j in range(3):
+                move += gradient[c, j] * (axes[k, j] - ray[j] * slope)
+            total += move * move
+        most = max(most, total)
+    covered = np.sqrt(most) * abs(depth) * pixel
+    return float(np.log2(covered)) if covered > 1e-30 else -99.0
+
+
+@inlined_kernel
+def texel_under(
+    sight: Sight, i: int, triangles: Triangles, textures: Pyramids, t: int, room: Floats
+) -> tuple[float, float, float]:
+    """Texture coordinates of what a pixel shows, and its level of detail (see `level_of_detail`) in
+    a pyramid, which is 0 at least and at most that of the coarsest level.
+
+    ``i`` is the pixel, ``t`` the pyramid; ``room`` (3, 3) to work in.
+    """
+    f = sight.triangle[i]
+    finest = textures.levels[t] - 1
+    ray, normal, gradient = sight.ray[i], triangles.normal[f], triangles.gradient[f]
+    offset, scaled = room[0], room[1:]
+    facing, depth = 0.0, 0.0
+    for k in range(3):
+        offset[k] = triangles.corner[f, 0, k] - sight.eye[k]
+        facing += normal[k] * ray[k]
+        depth += normal[k] * offset[k]
+        scaled[0, k] = gradient[0, k] * textures.size[t, finest, 0]
+        scaled[1, k] = gradient[1, k] * textures.size[t, finest, 1]
+    depth = depth / facing if facing != 0.0 else 0.0
+    u, v = triangles.uv[f, 0, 0], triangles.uv[f, 0, 1]
+    for k in range(3):
+        step = depth * ray[k] - offset[k]
+        u += gradient[0, k] * step
+        v += gradient[1, k] * step
+    detail = level_of_detail(ray, sight.axes, normal, offset, scaled, sight.pixel)
+    return u, v, min(max(detail, 0.0), float(finest))
+
+
+@plain_kernel
+def distance(color: Floats, exact: Floats) -> float:
+    """The mean square over R, G and B by which two colours (3,) differ."""
+    total = 0.0
+    for k in range(3):
+        total += (color[k] - exact[k]) ** 2
+    return total / 3.0
+
+
+@plain_kernel
+def add_frame(
+    sight: Sight,
+    seen: Bools,
+    triangles: Triangles,
+    textures: Pyramids,
+    full: Pyramids,
+    same: bool,
+    sums: Sums,
+    room: Floats,
+) -> None:
+    """Adds what the pixels of one frame show.
+
+    Parameters
+    ----------
+    seen: (n,) whether the pixel is also one of the client's own item buffer.
+    full: what the picture is compared with; ``same`` if these are the textures.
+    room: (L + 7, 3) to work in.
+    """
+    exact, coarse, work, shown = room[0], room[1], room[2:5], room[5:]
+    shown[0] = GREY
+    for i in range(len(sight.triangle)):
+        f = sight.triangle[i]
+        if f < 0:
+            continue
+        p, t, color = sums.pair[f], triangles.texture[f], triangles.color[f]
+        if t < 0:
+            for k in range(3):
+                exact[k] = 255.0 * color[k]
+            square = distance(shown[0], exact)
+            sums.error[p, 0] += np.sqrt(square)
+            sums.square[p, 0] += square
+            sums.need[p, 0] += 1.0
+            if seen[i]:
+                sums.sight[p, 0] += 1.0
+            continue
+        clamped, finest = triangles.clamped[f], textures.levels[t] - 1
+        if not same:
+            u, v, detail = texel_under(sight, i, triangles, full, t, work)
+            blend(full, t, detail, u, v, clamped, exact, coarse)
+        u, v, detail = texel_under(sight, i, triangles, textures, t, work)
+        sharp = finest - int(detail)  # the finest level that is sampled
+        for n in range(sharp + 1):
+            sample(textures, t, n, u, v, clamped, shown[n + 2])
+        below = max(sharp - 1, 0)
+        for k in range(3):
+            step = shown[below + 2, k] - shown[sharp + 2, k]
+            shown[sharp + 2, k] += (detail - int(detail)) * step
+            shown[1, k] = textures.mean[t, k]
+            if same:
+                exact[k] = shown[sharp + 2, k]
+            exact[k] *= color[k]
+            for n in range(1, sharp + 3):
+                shown[n, k] *= color[k]
+        # Levels that are finer than what is sampled change nothing.
+        last = sharp if same else finest
+        for n in range(last + 3):
+            square = distance(shown[min(n, sharp + 2)], exact)
+            sums.error[p, n] += np.sqrt(square)
+            sums.square[p, n] += square
+        for n in range(last + 1):
+            wanted = min(max(finest - n + 1.0 - detail, 0.0), 1.0)
+            sums.need[p, n] += wanted
+            if seen[i]:
+                sums.sight[p, n] += wanted
+
+
+@plain_kernel
+def add_columns(
+    sight: Sight,
+    seen: Bools,
+    triangles: Triangles,
+    shows: Shows,
+    full: Pyramids,
+    sums: Sums,
+    room: Floats,
+) -> None:
+    """As `add_frame`, of textures each column of which has levels of its own.
+
+    A column is wanted as far as the finest level of the one before it is too coarse: where texels
+    of its own finest level are no smaller than pixels, or, between that and half of it, in part;
+    the first always is.
+    """
+    exact, coarse, work, color = room[0], room[1], room[2:5], room[5]
+    for i in range(len(sight.triangle)):
+        f = sight.triangle[i]
+        if f < 0:
+            continue
+        p, t, tint = sums.pair[f], triangles.texture[f], triangles.color[f]
+        if t < 0:
+            for k in range(3):
+                exact[k] = 255.0 * tint[k]
+                color[k] = GREY
+            square = distance(color, exact)
+            sums.error[p, 0] += np.sqrt(square)
+            sums.square[p, 0] += square
+            sums.need[p, 0] += 1.0
+            if seen[i]:
+                sums.sight[p, 0] += 1.0
+            continue
+        clamped = triangles.clamped[f]
+        u, v, detail = texel_under(sight, i, triangles, full, t, work)
+        blend(full, t, detail, u, v, clamped, exact, coarse)
+        for k in range(3):
+            exact[k] *= tint[k]
+        for n in range(shows.last[t] + 2):
+            if n < 2:
+                for k in range(3):
+                    color[k] = shows.mean[t, k] * tint[k] if n else GREY
+            else:
+                row = shows.row[t, n - 1]
+                below = float(shows.pyramids.levels[row] - shows.held[t, n - 1])
+                u, v, detail = texel_under(sight, i, triangles, shows.pyramids, row, work)
+                wanted = min(max(below + 1.0 - detail, 0.0), 1.0) if n > 2 else 1.0
+                sums.need[p, n - 2] += wanted
+                if seen[i]:
+                    sums.sight[p, n - 2] += wanted
+                at = max(detail, below)
+                blend(shows.pyramids, row, at, u, v, clamped, color, coarse)
+                for k in range(3):
+                    color[k] *= tint[k]
+            square = distance(color, exact)
+            sums.error[p, n] += np.sqrt(square)
+            sums.square[p, n] += square
+
+
+@kernel
+def shade(
+    sight: Sight,
+    triangles: Triangles,
+    shows: Shows,
+    there: Bools,
+    column: Ints,
+    shown: Floats,
+) -> None:
+    """Writes to ``shown`` (n, 3) what the pixels of one frame show, 0 to 255: grey where the
+    geometry is not there, the mean colour of textures of which nothing is, black where nothing is.
+
+    ``there`` (C,) geometry, and ``column`` (T,) of each texture.
+    """
+    work, coarse = np.zeros((3, 3)), np.zeros(3)
+    for i in range(len(sight.triangle)):
+        f, pixel = sight.triangle[i], shown[i]
+        if f < 0:
+            pixel[:] = 0.0
+            continue
+        if not there[triangles.cell[f]]:
+            pixel[:] = GREY
+            continue
+        t = triangles.texture[f]
+        held = column[t] if t >= 0 else 0
+        if held > 0:
+            textures, row = shows.pyramids, shows.row[t, held]
+            u, v, detail = texel_under(sight, i, triangles, textures, row, work)
+            # The finest level that is there bounds the level of detail from below.
+            detail = max(detail, float(textures.levels[row] - shows.held[t, held]))
+            blend(textures, row, detail, u, v, triangles.clamped[f], pixel, coarse)
+        else:
+            for k in range(3):
+                pixel[k] = shows.mean[t, k] if t >= 0 else 255.0
+        for k in range(3):
+            pixel[k] *= triangles.color[f, k]

@@ -1,0 +1,114 @@
+"""Pictures of frames, with exactly the levels that a client has, or with all.
+
+As for the tables, levels are chosen as for the screen of the walk, of 1080 lines unless it was
+recorded: a smaller picture is that one made smaller. At 960 × 540 with two samples each way its
+samples are the pixels of the screen.
+
+The light of lit pictures: one lamp far away, and some light from everywhere.
+
+The lamp wraps around (half Lambert, squared), so that relief shows on all sides of a statue. It
+multiplies colours as sRGB encodes them, as the rest of the simulator does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.arrays import Bools, Floats, Ints, normals
+from ptmtools.output.served import Served
+from ptmtools.rendering.rays import Camera, Caster
+from ptmtools.rendering.records import Shows, Sight, own_levels, triangles_of
+
+if TYPE_CHECKING:
+    from ptmtools.lab.world import World
+
+
+#: Share of the light that comes from everywhere, and a unit vector towards the lamp.
+AMBIENT = 0.3
+LAMP = tuple(float(v) for v in np.array([0.5, 0.7, 0.6]) / np.linalg.norm([0.5, 0.7, 0.6]))
+
+
+def lamps(corner: Floats) -> Floats:
+    """(n,) how much light falls on triangles (n, 3, 3), which are flat: `AMBIENT` to 1."""
+    normal = normals(corner)
+    length = np.linalg.norm(normal, axis=1)
+    along = np.divide(normal @ LAMP, length, out=np.zeros(len(corner)), where=length > 0)
+    found: Floats = AMBIENT + (1 - AMBIENT) * ((1 + along) / 2) ** 2
+    return found
+
+
+def lit(served: Served) -> Served:
+    """The same under the lamp."""
+    surfaces = served.surfaces
+    color = surfaces.color * lamps(surfaces.corner)[:, None]
+    return replace(served, surfaces=replace(surfaces, color=color))
+
+
+class Renderer:
+    """Draws pictures of ``height`` lines, as wide as the walk's view is, with ``samples`` each way
+    of every pixel."""
+
+    def __init__(self, world: World, height: int, samples: int = 2) -> None:
+        self.height, self.samples = height, samples
+        self.width = max(1, round(height * world.camera.aspect))
+        self._world, self._full = world, own_levels(world.pyramids)
+        self._shows = self._full if world.shows is None else world.shows
+        camera = world.camera
+        self._camera = Camera(
+            self.width * samples,
+            height * samples,
+            camera.field_of_view,
+            camera.aspect,
+            camera.lines,
+        )
+        self._triangles = triangles_of(world.served.surfaces)
+        self._caster = Caster(world.served.surfaces)
+        self._lamps = lamps(world.served.surfaces.corner) if world.relief else np.zeros(0)
+
+    def look(self, eye: Floats, direction: Floats) -> Sight:
+        """What is seen from an eye (3,) in a direction (3,)."""
+        return self._caster.look(self._camera, eye, direction)
+
+    def colors(self, sight: Sight, there: Bools, column: Ints) -> Floats:
+        """(height, width, 3) 0 to 255, with the geometry of cells (C,) that is there and a column
+        (T,) of each texture."""
+        return self._drawn(sight, self._shows, there, column)
+
+    def full(self, sight: Sight) -> Floats:
+        """The same with everything there, in whatever form clients take it: all levels of the
+        pyramids and of octrees, or what the walk is compared with."""
+        relief = self._world.relief
+        if relief and relief.reference:
+            return self._picture(relief.reference.shown(relief.reference.look(sight)))
+        there = np.ones(self._world.catalogue.cell_count, dtype=np.bool_)
+        last = self._full.last
+        if relief:
+            last = np.concatenate([last, relief.octrees.levels])
+        return self._drawn(sight, self._full, there, last)
+
+    def _drawn(self, sight: Sight, shows: Shows, there: Bools, column: Ints) -> Floats:
+        from ptmtools.rendering.kernels import shade
+
+        shown = np.empty((len(sight.ray), 3))
+        shade(sight, self._triangles, shows, there, column, shown)
+        if self._world.relief:
+            from ptmtools.lab.relief.kernels import relieve
+
+            octrees, first = self._world.relief.octrees, len(self._world.pyramids.levels)
+            held = column[first : first + octrees.number]
+            relieve(sight, self._triangles, self._lamps, octrees, there, held, shown)
+        return self._picture(shown)
+
+    def _picture(self, shown: Floats) -> Floats:
+        """(height, width, 3) of (n, 3) samples."""
+        each = (self.height, self.samples, self.width, self.samples, 3)
+        found: Floats = shown.reshape(each).mean(axis=(1, 3))
+        return found
+
+
+def as_bytes(colors: Floats) -> NDArray[np.uint8]:
+    """Colours as 8 bits hold them."""
+    return np.rint(np.clip(colors, 0, 255)).astype(np.uint8)

@@ -1,1 +1,0 @@
-"""Haar differences, predicted and coded with rANS: `coder` says how."""

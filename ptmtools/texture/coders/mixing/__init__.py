@@ -1,1 +1,0 @@
-"""The context mixing coder: the `small` profile's way with 8-bit levels."""

@@ -1,0 +1,572 @@
+"""Compiled loop of the context mixing coder: one vertical strip of one plane of a level.
+
+A strip is 32 blocks wide. Its blocks are walked row by row, the four texels of a block in the
+order p q r s. Every texel is predicted by least squares, and what is known about its residual is
+turned into binary decisions. One pass serves both directions, so that encoder and decoder cannot
+disagree about a prediction. See `coder` for the planes and the order of strips, and
+``docs/formats/ptm-small.md`` for the format.
+
+Everything here is in integers; see `squares` for the one part that is not.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ptmtools.compiled import inlined_kernel, plain_kernel, prefetch
+from ptmtools.texture.coders import mixing as tables
+from ptmtools.texture.coders.mixing_decisions import (
+    CONFIRMED,
+    COUNTERS,
+    EXPECTED,
+    FEATURES,
+    FOUND,
+    KINDS,
+    LOGIT_TOP,
+    MATCHES,
+    NODE_ROWS,
+    NODES,
+    RATE,
+    SLOT,
+    SQUASH,
+    STRETCH,
+    SURE,
+    TAG,
+    TARGET,
+    WEIGHT_BITS,
+    WHERE,
+    code_bit,
+    decide,
+    decide_flat,
+    learn,
+    look_up,
+    open_slots,
+    predict,
+)
+
+#: Before arithmetic that 32 bits do not hold.
+wide: Any = np.int64
+
+#: Positions of a texel: p q r s of a block, and an edge texel, which belongs to none.
+POSITIONS = 5
+EDGE = 4
+#: Least magnitude of every bucket: 1, 2, 3-4, 5-8, …
+BUCKETS = np.array([1, 2, 3, 5, 9, 17, 33, 65, 129, 257, 513], np.int64)
+#: From this bucket on, the bits within are coded by the density alone.
+DEEP = 2
+#: First node for the bits within a bucket.
+WITHIN = np.array([0, 0, 0, 1, 4, 11, 14, 17, 20, 20], np.int64)
+#: Slot in which the counters of a node lie.
+GROUP = np.arange(NODES) // TAG
+SOFT_PLUS = tables.soft_plus()
+SURVIVAL = tables.survival()
+MAGNITUDE = tables.magnitude()
+MAGNITUDE_TOP = tables.MAGNITUDE_TOP
+MAGNITUDES = tables.MAGNITUDES
+#: Levels of the second magnitude of a scale's context.
+SECOND = 12
+#: Observations that count fully in a mean magnitude: later ones weigh 1/100.
+SCALE_COUNT = 99
+#: Weight of a sample in the least squares, by the mean magnitude in 1/8: 2^16 / (2 + mean).
+IMPORTANCE = np.array([(1 << 19) // (16 + m) for m in range(2048)], np.int32)
+
+# Where the features of the least squares lie, (dy, dx) from the texel or, of parents, in blocks
+# from the block. Texels that are not known yet read as their parent.
+W, N, NW, NE, WW, NN, NEE = (0, -1), (-1, 0), (-1, -1), (-1, 1), (0, -2), (-2, 0), (-1, 2)
+TEXELS_AT = (
+    (W, N, NW, NE, (1, -1), WW, NN, NEE),
+    (W, N, NW, NE, WW, NEE, NN, (1, -2)),
+    (W, N, NW, NE, NN, WW, (1, -1), (-2, 1)),
+    (N, NW, NE, WW, NN),
+    (W, N, NW, NE, WW, NN),
+)
+_E, _S, _SE, _SW, _NE = (0, 1), (1, 0), (1, 1), (1, -1), (-1, 1)
+PARENTS_AT = (
+    (_E, _S, _SE, _SW, _NE),
+    (_E, _S, _SE, _NE, _SW),
+    (_E, _S, _SE, _SW),
+    (_E, _S, _SE),
+    (),
+)
+_COLOUR = ((0, 0), W, N, (0, 1), (1, 0))
+COLOUR_AT = (_COLOUR, _COLOUR, _COLOUR, ((0, 0), (1, 0), N, (0, 1)), ((0, 0), W, N))
+TEXEL_COUNT = np.array([len(places) for places in TEXELS_AT], np.int64)
+PARENT_COUNT = np.array([len(places) for places in PARENTS_AT], np.int64)
+COLOUR_COUNT = np.array([len(places) for places in COLOUR_AT], np.int64)
+
+
+class Canvas(NamedTuple):
+    """All planes of a level, one after the other in flat arrays."""
+
+    cells: Any  # int32: texels as decoded (first the parents of all), then residuals (first 0)
+    parents: Any  # int32
+    flats: Any  # uint8: 1 where a block was coded as equal to its parent
+    goal: Any  # int32: the texels to encode; in decoding, anything of that size
+    offsets: Any  # (3, 5, 8) int64: `TEXELS_AT`, `PARENTS_AT`, `COLOUR_AT` as flat offsets
+
+
+class Place(NamedTuple):
+    """Where a plane lies in the flat arrays."""
+
+    texels: int  # of its first texel, padding apart
+    parents: int  # of its first parent
+    stride: int  # from a texel to that below
+    across: int  # from a parent to that below
+    errors: int  # from a texel to its residual
+    first: int  # from a texel to the same of the first reference, 0 if there is none
+    second: int  # and of the second
+    before: int  # from a parent to the same of the first reference
+
+
+class State(NamedTuple):
+    """What a plane has learned, level after level; arrays are changed in place."""
+
+    normal: Any  # (5, 24, 24) float64: see squares
+    pending: Any  # (5, 16, 25) int32
+    weights: Any  # (5, 24) int32
+    seen: Any  # (5, 2) int64
+    bias: Any  # (5 * 729,) int32: mean residual by context, 16 fractional bits
+    scale: Any  # (5 * 24 * 12, 2) int32: mean magnitude by context, 16 fractional bits; count
+    mix: Any  # (rows, 16) int32: weights of the mixer, see decisions
+    chances: Any  # (n,) int32
+    flat: Any  # (432,) uint32: counters of flat blocks
+
+
+class Tables(NamedTuple):
+    """What a plane learns of one level only, and scratch space."""
+
+    slots: Any  # (6 * 2^n * 16,) uint32: counters by hashed context
+    values: Any  # (3 * 2^n,) int32: last value by hashed context | times confirmed << 8
+    notes: Any  # (23,) int64
+    x: Any  # (16,) int32
+    left: Any  # (24, 24) float64
+    right: Any  # (24, 24) float64
+
+
+@plain_kernel
+def _five(e: int) -> Any:
+    """Residual to one of 9 classes: five magnitudes, two signs."""
+    a = abs(e)
+    return 0 if a == 0 else (1 if e > 0 else 2) + 2 * ((a > 1) + (a > 3) + (a > 8))
+
+
+@plain_kernel
+def _level(a: int) -> Any:
+    return MAGNITUDE[min(a, MAGNITUDE_TOP)]
+
+
+@plain_kernel
+def _hash(a: int, b: int, c: int, d: int) -> Any:
+    h = (a * 0x2F0B4C47 + b * 0x9E3779B1 + c * 0x85EBCA77 + d * 0xC2B2AE3D) & 0xFFFFFFFF
+    h ^= h >> 15
+    h = (h * 0x2C1B3C6D) & 0xFFFFFFFF
+    return h ^ (h >> 13)
+
+
+@plain_kernel
+def _soft_plus(u: int) -> Any:
+    if u > LOGIT_TOP:
+        return u << 4
+    return SOFT_PLUS[max(u, -LOGIT_TOP) + LOGIT_TOP]
+
+
+@plain_kernel
+def _squash(u: int) -> Any:
+    return SQUASH[min(max(u, -LOGIT_TOP), LOGIT_TOP) + LOGIT_TOP]
+
+
+@plain_kernel
+def _halves(length: int, boundary: int, inverse: int) -> Any:
+    """Logit of the upper of two neighbouring intervals, ``length`` / 2 each, of a logistic density.
+
+    boundary: between the two, from the centre. All in 1/256 texel, inverse scale in 1/65536.
+    """
+    slope = 2 * _squash((boundary * inverse) >> 16) - 65536
+    x = -(((length * inverse) >> 17) * slope >> 16)
+    return min(max(x, -LOGIT_TOP), LOGIT_TOP)
+
+
+@inlined_kernel
+def _quantised(e: int, step: int) -> Any:
+    """e / step, rounded, halves away from 0 (there are none: steps are odd)."""
+    if step == 1:
+        return e
+    half = step >> 1
+    return (e + half) // step if e >= 0 else -((half - e) // step)
+
+
+@inlined_kernel
+def _residual(
+    encoding: bool, goal: int, m: int, mu: int, inverse: int, lo: int, hi: int, step: int,
+    last: bool, deep: int, node_row: int, near_row: int, notes: Any, x: Any, mix: Any, chances: Any,
+    slots: Any, mask: int, coder: Any, buffer: Any,
+) -> Any:  # fmt: skip
+    """Codes one texel between lo and hi: returns its value.
+
+    m: prediction rounded; mu: prediction in 1/256; inverse: 65536 / scale. ``last``: the fourth of
+    a block, found by a binary search; else 0?, sign, bucket of the magnitude, bits in the bucket.
+    """
+    if lo >= hi:
+        return lo
+    origin = lo if last else m
+    g = _quantised(goal - origin, step)
+    off = origin * 256 - mu
+    half, span = step * 128, step * 256
+    phase, kind, node, sign, d = 0, 0, 0, 1, 0
+    bucket, path, most, below, above = 0, 0, 0, 0, 0
+    low, high = 0, 0
+    group = 0
+    open_slots(0, notes, slots, mask)
+    if last:
+        phase, kind, above = 4, 3, hi - lo
+    while True:
+        if phase == 0:
+            below_p, above_p = ((half - off) * inverse) >> 16, ((half + off) * inverse) >> 16
+            low, high = _soft_plus(below_p), _soft_plus(above_p)
+            zero = 65536 - _squash(-below_p) - _squash(-above_p)
+            x[0] = STRETCH[min(max(zero >> 4, 0), 4095)]
+        elif phase == 1:
+            kind, node = 1, 1
+            x[0] = min(max((low - high) >> 4, -LOGIT_TOP), LOGIT_TOP)
+        elif phase == 2:
+            kind, node = 2, (2 if sign > 0 else 9) + min(bucket, 6)
+            d = BUCKETS[bucket + 1]
+            low = high
+            high = _soft_plus(((d * span - half + sign * off) * inverse) >> 16)
+            x[0] = SURVIVAL[min(max((high - low) >> 4, 0), LOGIT_TOP)]
+        else:
+            node = path
+            if phase == 3:
+                inside = WITHIN[bucket] + path if bucket <= 4 or path < 3 else 21
+                node = (16 if sign > 0 else 40) + inside
+            d = (below + above + 1) >> 1
+            x[0] = _halves((above - below + 1) * span, d * span - half + sign * off, inverse)
+        # Large residuals that no match foresees: contexts know no more than the density, but in
+        # the first plane, where they often do.
+        if (
+            phase == 3
+            and deep <= bucket
+            and max(notes[FOUND], notes[FOUND + 1], notes[FOUND + 2]) < 0
+        ):
+            p = min(max(_squash(x[0]), 1), 65535)
+            bit = code_bit(encoding, _answer(phase, g, sign, d), p, coder, buffer)
+            if bit:
+                below = d
+            else:
+                above = d - 1
+            path = 2 * path + 1 + bit
+            if below >= above:
+                return min(max(origin + sign * below * step, 0), 255)
+            continue
+        # Fifteen nodes share a slot.
+        if GROUP[node] != group:
+            group = GROUP[node]
+            open_slots(group, notes, slots, mask)
+        bit = _answer(phase, g, sign, d)
+        for i in range(MATCHES):
+            e = _quantised(notes[FOUND + i] - origin, step)
+            notes[EXPECTED + i] = _answer(phase, e, sign, d)
+
+        bit = decide(
+            encoding, bit, kind, node - TAG * group, node_row + node, near_row + kind * 9, notes,
+            x, mix, chances, slots, coder, buffer,
+        )  # fmt: skip
+
+        if phase >= 3:
+            if bit:
+                below = d
+            else:
+                above = d - 1
+            path = 2 * path + 1 + bit
+        elif phase == 2:
+            bucket += bit
+            if bit == 0 or BUCKETS[bucket + 1] > most:
+                phase = 3
+        elif phase == 0 and bit:
+            return m
+        elif phase == 0 and lo < m < hi:
+            phase = 1
+            continue
+        else:
+            sign = (1 if bit else -1) if phase == 1 else (1 if m < hi else -1)
+            high = high if sign > 0 else low
+            most = _quantised(hi - m if sign > 0 else m - lo, step)
+            phase = 2 if BUCKETS[1] <= most else 3
+        if phase == 3 and path == 0:
+            kind, below, above = 2, BUCKETS[bucket], min(BUCKETS[bucket + 1] - 1, most)
+        if phase >= 3 and below >= above:
+            return min(max(origin + sign * below * step, 0), 255)
+
+
+@inlined_kernel
+def _answer(phase: int, e: int, sign: int, d: int) -> Any:
+    """The bit of a decision if the residual is e."""
+    if phase == 0:
+        return 1 if e == 0 else 0
+    if phase == 1:
+        return 1 if e > 0 else 0
+    return 1 if e * sign >= d else 0
+
+
+@inlined_kernel
+def _gather(
+    k: int, t: int, block: int, base: int, refs: int, place: Any, cells: Any, parents: Any,
+    offsets: Any, pending: Any, n: int,
+) -> Any:  # fmt: skip
+    """Features of texel t into the sample pending[k, n]; returns how many there are."""
+    count = TEXEL_COUNT[k]
+    for i in range(count):
+        pending[k, n, i] = cells[t + offsets[0, k, i]] - base
+    for i in range(PARENT_COUNT[k]):
+        pending[k, n, count + i] = parents[block + offsets[1, k, i]] - base
+    count += PARENT_COUNT[k]
+    for r in range(refs):
+        at = t + (place.first if r == 0 else place.second)
+        corner = at - (k >> 1) * place.stride - (k & 1)
+        if k < 3:
+            under = corner + place.stride
+            here = (cells[corner] + cells[corner + 1] + cells[under] + cells[under + 1]) >> 2
+        else:
+            here = wide(cells[at - 1])
+        for i in range(COLOUR_COUNT[k]):
+            pending[k, n, count + i] = cells[at + offsets[2, k, i]] - here
+        count += COLOUR_COUNT[k]
+    return count
+
+
+@inlined_kernel
+def _texel(
+    encoding: bool, k: int, t: int, block: int, step: int, refs: int, place: Any,
+    cells: Any, parents: Any, goal: Any, offsets: Any, state: Any, tables_: Any, coder: Any,
+    buffer: Any,
+) -> None:  # fmt: skip
+    """Codes texel t, at position k of its block, and learns from it."""
+    notes, slots, values = tables_.notes, tables_.slots, tables_.values
+    mask, places = slots.size // (SLOT * COUNTERS) - 1, values.size // MATCHES
+    stride, up = place.stride, block - place.across
+    mean = wide(parents[block])
+    w, n = wide(cells[t - 1]), wide(cells[t - stride])
+    nw, ne = wide(cells[t - stride - 1]), wide(cells[t - stride + 1])
+    base = mean if k < 3 else w
+    east, south = wide(parents[block + 1]), wide(parents[block + place.across])
+    v1, v2, v1w = wide(0), wide(0), wide(0)
+    if refs > 0:
+        v1, v1w = wide(cells[t + place.first]), wide(cells[t + place.first - 1])
+    if refs > 1:
+        v2 = wide(cells[t + place.second])
+
+    # What the parent's sum leaves.
+    lo, hi, known = wide(0), wide(255), wide(0)
+    last = k == 3 and step == 1
+    if step == 1 and k < EDGE:
+        if k == 1:
+            known = w
+        elif k == 2:
+            known = n + ne
+        elif k == 3:
+            known = nw + n + w
+        rest = 4 * mean - known
+        lo, hi = max(rest - 255 * (3 - k), 0), min(rest + 3, 255)
+
+    notes[WHERE] = _hash(7, (w * 256 + n) * 256 + ne, (nw * 256 + v1) * 256 + v2, 0)
+    if refs > 0:
+        notes[WHERE + 1] = _hash(17, v1 * 256 + v2, v1w * 256 + w, 0)
+        notes[WHERE + 2] = _hash(27, v1 * 256 + v2, 0, 0)
+    else:
+        first = t - (k >> 1) * stride - (k & 1)
+        sides = wide(cells[first - 1]) * 256 + cells[first - stride]
+        notes[WHERE + 1] = _hash(17, mean * 65536 + sides, east * 256 + south, k * 131 + known * 4)
+        notes[WHERE + 2] = _hash(27, w * 256 + n, ne, k)
+    for i in range(MATCHES):
+        notes[WHERE + i] = i * places + (notes[WHERE + i] & (places - 1))
+        prefetch(values, notes[WHERE + i])
+    waiting = state.seen[k, 1]
+    features = _gather(
+        k, t, block, base, refs, place, cells, parents, offsets, state.pending, waiting
+    )
+
+    # Residuals around, and those of other planes here.
+    e = t + place.errors
+    ew, en = wide(cells[e - 1]), wide(cells[e - stride])
+    enw, ene = wide(cells[e - stride - 1]), wide(cells[e - stride + 1])
+    near, far = abs(en) + abs(ew), abs(enw) + abs(ene)
+    if k == 0:
+        activity = 2 * near + far + abs(cells[e + stride - 1]) + abs(cells[e - 2 * stride])
+    elif k == 1:
+        activity = 2 * near + far + abs(cells[e - 2]) + abs(cells[e - stride + 2])
+    elif k == 3:
+        activity = 2 * near + 2 * abs(enw) + abs(ene)
+    else:
+        activity = 2 * near + far + abs(cells[e - 2]) + abs(cells[e - 2 * stride])
+    e1, e2 = wide(0), wide(0)
+    if refs == 0:
+        slope = (
+            abs(east - mean) + abs(south - mean)
+            + abs(parents[block - 1] - mean) + abs(parents[up] - mean)
+        )  # fmt: skip
+        s1, s2 = _level(activity), _level(2 * slope) >> 1
+    else:
+        t1 = t + place.first + place.errors
+        e1 = wide(cells[t1])
+        here = 2 * abs(e1)
+        if refs > 1:
+            e2 = wide(cells[t + place.second + place.errors])
+            here = abs(e1) + abs(e2)
+        around = (
+            abs(cells[t1 - 1]) + abs(cells[t1 - stride])
+            + abs(cells[t1 + stride]) + abs(cells[t1 + 1])
+        )  # fmt: skip
+        s1, s2 = _level((activity + around) >> 1), _level(2 * here) >> 1
+
+    row = (k * MAGNITUDES + s1) * SECOND + s2
+    scale = wide(state.scale[row, 0])
+    tilt = ((k * 9 + _five(ew)) * 9 + _five(en)) * 9 + (_five(e1) if refs > 0 else _five(enw))
+    mu = (predict(state.pending, state.weights, k, waiting) + state.bias[tilt]) >> (WEIGHT_BITS - 8)
+    mu = min(max(mu + base * 256, -32768), 98304)
+    rounded = (mu + 128) >> 8
+    m = min(max(rounded, lo), hi)
+    # A quotient of integers, rounded down: float64 holds it exactly, and divides faster.
+    inverse = wide(4294967296.0 / ((scale * 47186 >> 16) + 1311))
+    fraction = min(max((mu - m * 256 + 128) >> 6, 0), 3)
+    size = _level((scale * 6) >> 16)
+
+    guess = lo if last else m
+    final = 1 if last else 0
+    notes[0] = _hash(k, size, fraction, 1)
+    if last:
+        notes[1] = _hash(20 + k, min(max((mu - lo * 256 + 2560) >> 6, 0), 99), s1 >> 1, 0)
+    else:
+        notes[1] = _hash(20 + k, tilt, fraction, s1 >> 2)
+    if refs > 0:
+        notes[2] = _hash(60 + final, guess, v1, v2)
+        other = _five(e2) if refs > 1 else _five(ew)
+        notes[3] = _hash(40 + k, _five(e1) * 9 + other, s1 >> 2, fraction)
+    else:
+        notes[2] = _hash(80 + final, guess, w, size >> 3)
+        bend = (_five(w - nw) * 9 + _five(n - nw)) * 9 + _five(ne - n if k == 1 else east - mean)
+        notes[3] = _hash(40 + k, bend, size >> 1, fraction)
+    # Where the neighbours' values, shifted as the reference shifts, lie from the prediction.
+    left, over = w - guess, n - guess
+    if refs > 0:
+        left, over = left + v1 - v1w, over + v1 - cells[t + place.first - stride]
+    left, over = min(max(left, -20), 20), min(max(over, -20), 20)
+    notes[4] = _hash(90 + k, left * 41 + over, size >> 2, 0)
+
+    far_w, far_n = nw - guess, ne - guess
+    if refs > 1:
+        far_w = w + v2 - cells[t + place.second - 1] - guess
+        far_n = n + v2 - cells[t + place.second - stride] - guess
+    elif refs > 0:
+        far_w += v1 - cells[t + place.first - stride - 1]
+        far_n += v1 - cells[t + place.first - stride + 1]
+    far_w, far_n = min(max(far_w, -20), 20), min(max(far_n, -20), 20)
+    notes[5] = _hash(110 + k, far_w * 41 + far_n, left * 41 + over, 0)
+
+    look_up(notes, slots, mask)
+    matched = 0
+    for i in range(MATCHES):
+        entry = wide(values[notes[WHERE + i]])
+        v, times = entry & 255, entry >> 8
+        notes[SURE + i] = times
+        if times == 0 or v < lo or v > hi:
+            v = wide(-1)
+        elif i < 2:
+            matched += (1 if i == 0 else 3) * (2 if times > 3 else 1)
+        notes[FOUND + i] = v
+
+    deep = DEEP if refs > 0 else len(BUCKETS)
+    v = _residual(
+        encoding, wide(goal[t]), m, mu, inverse, lo, hi, step, last, deep, k * NODES,
+        NODE_ROWS + s1 * KINDS * 9 + matched, notes, tables_.x, state.mix, state.chances, slots,
+        mask, coder, buffer,
+    )  # fmt: skip
+
+    cells[t] = v
+    cells[e] = v - rounded if k == 3 else v - m
+    count = wide(state.scale[row, 1])
+    rate = RATE[count] if count < SCALE_COUNT else 655
+    state.scale[row, 0] = scale + (((abs(v * 256 - mu) * 256 - scale) * rate) >> 16)
+    state.scale[row, 1] = min(count + 1, SCALE_COUNT)
+    if k != 3:
+        state.bias[tilt] += ((v * 256 - mu) * 655) >> 8
+    for i in range(MATCHES):
+        at = notes[WHERE + i]
+        entry = wide(values[at])
+        times = entry >> 8
+        if entry & 255 == v and times > 0:
+            values[at] = v | min(times + 1, CONFIRMED - 1) << 8
+        else:
+            values[at] = v | (1 if times < 2 else times >> 2) << 8
+    state.pending[k, waiting, TARGET] = v - base
+    state.pending[k, waiting, FEATURES] = IMPORTANCE[min(scale >> 13, 2047)]
+    learn(
+        state.normal, state.pending, state.weights, state.seen, k, features, tables_.left,
+        tables_.right,
+    )  # fmt: skip
+
+
+@plain_kernel
+def _flat_context(block: int, refs: int, place: Any, parents: Any, flats: Any) -> Any:
+    """Context of "this block equals its parent", -1 where that need not be asked."""
+    mean, across = parents[block], place.across
+    same = 0
+    for dy in range(-1, 2):
+        for dx in range(-1, 2):
+            same += 1 if parents[block + dy * across + dx] == mean else 0
+    near = wide(flats[block - 1]) + 2 * wide(flats[block - across])
+    if near == 0 and same < 6:
+        return -1
+    diagonal = wide(flats[block - across - 1]) + 2 * wide(flats[block - across + 1])
+    reference = 1 + wide(flats[block + place.before]) if refs > 0 else 0
+    return ((near + 4 * diagonal) * 3 + reference) * 9 + same - 1
+
+
+@plain_kernel
+def _is_flat(t: int, mean: int, step: int, stride: int, goal: Any) -> Any:
+    for at in (t, t + 1, t + stride, t + stride + 1):
+        if abs(goal[at] - mean) > step >> 1:
+            return 0
+    return 1
+
+
+@plain_kernel
+def code_strip(
+    encoding: bool, height: int, width: int, first: int, end: int, step: int, refs: int,
+    place: Any, canvas: Any, state: Any, tables_: Any, coder: Any, buffer: Any,
+) -> None:  # fmt: skip
+    """Block columns first … end - 1 of a plane of height x width texels.
+
+    The strip that ends the level (2 end >= width - 1) takes the edge texels with it: the odd last
+    column from the top, then the odd last row from the left.
+    """
+    cells, parents, flats = canvas.cells, canvas.parents, canvas.flats
+    goal, offsets = canvas.goal, canvas.offsets
+    stride = place.stride
+    across, blocks = end - first, (end - first) * (height >> 1)
+    column = height & ~1 if width & 1 else 0
+    edges = column + (width if height & 1 else 0) if 2 * end >= width - 1 else 0
+    for i in range(blocks + edges):
+        if i < blocks:
+            by, bx = i // across, first + i % across
+            block = place.parents + by * place.across + bx
+            corner = place.texels + 2 * by * stride + 2 * bx
+            context = _flat_context(block, refs, place, parents, flats)
+            if context >= 0:
+                flat = 0
+                if encoding:
+                    flat = _is_flat(corner, parents[block], step, stride, goal)
+                flats[block] = decide_flat(encoding, flat, state.flat, context, coder, buffer)
+            begin, stop = (0, 4) if flats[block] == 0 else (0, 0)
+        else:
+            edge = i - blocks
+            y, x = (edge, width - 1) if edge < column else (height - 1, edge - column)
+            block, corner = place.parents, place.texels + y * stride + x
+            begin, stop = EDGE, EDGE + 1
+        for k in range(begin, stop):
+            t = corner + (k >> 1) * stride + (k & 1) if k < EDGE else corner
+            _texel(
+                encoding, k, t, block, step, refs, place, cells, parents, goal, offsets, state,
+                tables_, coder, buffer,
+            )  # fmt: skip

@@ -1,1 +1,0 @@
-"""Static entropy coding of symbols of many contexts: `tables` chooses, `stream` codes."""

@@ -1,0 +1,127 @@
+"""The repeats coder: a group's bytes around the compiled pass (`kernels` says what is coded).
+
+Layout of a coded group: the frequency tables; the stream of `rans.stream`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.texture.coders import rans as tables
+from ptmtools.texture.coders.group import Reader, plane_order
+from ptmtools.texture.coders.rans import Sink, check_end, empty_sink, encode_symbols, read_stream
+
+if TYPE_CHECKING:
+    from ptmtools.texture.coders.repeats_blocks import Source
+
+#: Weights in 1/64 of W, N, NW and NE, each less the block's mean, in predictions of p, q and r.
+WEIGHTS = np.array([[20, 24, -10, -7], [2, 27, -12, -2], [13, -7, -6, -39]], np.int64)
+
+#: Slots of a table, at most, in bits. 16 instead of 13: textures of models 2 to 3 % smaller, and
+#: half as long again to decode, because the tables do not stay in a core's own cache.
+MOST_BITS = 13
+
+#: Activity below which lies class 0, 1, 2 …
+CLASS_BOUNDS = (2, 4, 8, 16, 32, 64, 128, 256, 512)
+
+Bytes = NDArray[np.uint8]
+
+
+def find(level: Bytes, below: Bytes) -> Sink:
+    """The symbols that refine ``below`` (h >> 1, w >> 1, c) to ``level`` (h, w, c)."""
+    from ptmtools.texture.coders import repeats_kernels as kernels
+    from ptmtools.texture.coders.rans_kernels import split_numbers
+    from ptmtools.texture.coders.repeats_blocks import COUNT, TABLES
+
+    blocks = below.shape[0] * below.shape[1]
+    edge = level.shape[0] * level.shape[1] - 4 * blocks
+    numbers = np.empty(kernels.MOST_SYMBOLS * blocks + 5 * edge, np.uint32)
+    state = np.zeros(9, np.int64)
+    _pass(_packed(level), _packed(below), level.shape, numbers, None, state)
+    sink = empty_sink(int(state[COUNT]), TABLES)
+    split_numbers(numbers[: state[COUNT]], *sink)
+    return sink
+
+
+def new_texels(found: Sink) -> int:
+    """Texels that were not among the guesses, of the first three of each block."""
+    from ptmtools.texture.coders.repeats_blocks import GUESS, TEXEL
+    from ptmtools.texture.coders.repeats_kernels import DIFFERENCES
+
+    blocks = found.counts[GUESS:TEXEL, DIFFERENCES].sum()
+    texels = found.counts[TEXEL : TEXEL + 36, 5].sum()
+    return int(3 * blocks + texels)
+
+
+def write(found: Sink) -> bytes:
+    """The group of these symbols."""
+    return b"".join(encode_symbols(found, len(found.counts), tables.built_in()))
+
+
+def decode(data: bytes | memoryview, below: Bytes, shape: tuple[int, int, int]) -> Bytes:
+    """The inverse of `find` and `write`. Raises InputError PTM-I112 for what no encoder writes."""
+    from ptmtools.texture.coders import repeats_kernels as kernels
+    from ptmtools.texture.coders.repeats_blocks import ESCAPES_END, TABLES, Source
+
+    reader = Reader(data)
+    frequency = tables.parse(reader, TABLES, tables.built_in())
+    stream = read_stream(reader, kernels.MOST_SYMBOLS)
+    escaped = len(stream.escapes)
+    state = np.zeros(9, np.int64)
+    state[ESCAPES_END] = escaped
+    level = np.empty(shape[:2], np.uint32)
+    words = np.concatenate([stream.escapes, stream.words])
+    source = Source(tables.single_tables(frequency), words, escaped + stream.limit)
+    check_end(_pass(level, _packed(below), shape, None, source, state))
+    if shape[2] != 3:
+        return level.astype(f"<u{shape[2]}").view(np.uint8).reshape(shape)
+    texels = np.empty(shape, np.uint8)
+    kernels.move_rgb(False, texels, level)
+    return texels
+
+
+def _pass(
+    level: NDArray[np.uint32],
+    below: NDArray[np.uint32],
+    shape: tuple[int, ...],
+    sink: NDArray[np.uint32] | None,
+    source: Source | None,
+    state: NDArray[np.int64],
+) -> int:
+    """`kernels.repeats_pass`, with the tables that it fills."""
+    from ptmtools.texture.coders import repeats_kernels as kernels
+
+    height, width, components = shape
+    bits = min(max(below.size.bit_length(), 6), MOST_BITS)
+    return kernels.repeats_pass(
+        level.reshape(-1),
+        height,
+        width,
+        below,
+        plane_order(components),
+        WEIGHTS,
+        np.searchsorted(CLASS_BOUNDS, np.arange(1024), side="right").astype(np.uint8),
+        np.zeros((5, 1 << bits), np.uint32),
+        np.zeros(1 << bits, np.uint32),
+        np.zeros(below.shape[1] + 1, np.int64),
+        np.zeros(3, np.int64),
+        np.uint64(32 - bits),
+        sink,
+        source,
+        state,
+    )
+
+
+def _packed(level: Bytes) -> NDArray[np.uint32]:
+    """Texels (h, w, c) as one number each."""
+    from ptmtools.texture.coders import repeats_kernels as kernels
+
+    level = np.ascontiguousarray(level)
+    if level.shape[2] != 3:
+        return level.view(f"<u{level.shape[2]}")[:, :, 0].astype(np.uint32)
+    texels = np.empty(level.shape[:2], np.uint32)
+    kernels.move_rgb(True, level, texels)
+    return texels

@@ -1,1 +1,0 @@
-"""What repeats: flat areas, patterns, few colours. `coder` says how."""

@@ -1,1 +1,0 @@
-"""Samples of 16 bits, floats, and errors that are allowed. `coder` says how."""

@@ -1,0 +1,253 @@
+"""Which reader an image file gets, by its first bytes.
+
+Texels into image files; the suffix decides which, and only what is exact is written."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Callable
+from functools import partial
+from importlib import import_module
+from pathlib import PurePath
+from typing import IO, Any, BinaryIO, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ptmtools.errors import InputError, OutputError, naming
+from ptmtools.texture.container import HEAD_MAX, MAGIC, read_header
+from ptmtools.texture.images import floats as openexr, floats as radiance
+from ptmtools.texture.images.floats import NPY_MAGIC, read_npy
+from ptmtools.texture.images.picture import Picture, unsupported
+from ptmtools.texture.images.png import check_chunks
+from ptmtools.texture.model import Description, Limits
+from ptmtools.texture.sources import open_file
+
+#: Of the files that are taken for images where a folder is named.
+SUFFIXES = (
+    *(".png", ".jpg", ".jpeg", ".tif", ".tiff", ".tga", ".bmp", ".gif", ".webp", ".pcx"),
+    *(".ppm", ".pgm", ".pbm", ".pnm", ".hdr", ".exr", ".npy"),
+)
+_LIMITS = Limits()
+_PPM = (b"P2", b"P3", b"P5", b"P6")
+
+
+def load_image(source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS) -> Picture:
+    """An image file to encode: texels exactly as stored, and what the file says of them.
+
+    8 bits: PNG, JPEG (as it decodes), TIFF, TGA, BMP, GIF, WebP, PPM, PCX. 16 bits: PNG, TIFF,
+    PPM and PGM, .npy. Floats: TIFF, Radiance .hdr (float32), OpenEXR, .npy. TIFFs of several
+    components deeper than 8 bits need imagecodecs, OpenEXR files need OpenEXR.
+
+    1 component for grey (1-bit images become 0 and 255), 2 with alpha; 3 for RGB and palettes, 4
+    with alpha. A colour key (PNG tRNS) becomes an alpha of 0 or all bits. An .npy is (h, w) or
+    (h, w, c) of a type that a `.ptm` holds; it and binary 16-bit PPMs are mapped, not read, but
+    from a pipe, which is read whole.
+
+    Parameters
+    ----------
+    source: a path, or the bytes of a file.
+    limits: ``decoded_bytes`` is the most memory that the texels may take, judged by the size that
+        the head of the file declares.
+
+    Raises
+    ------
+    InputError: PTM-I120 no such file, PTM-I121 a folder, PTM-I122 not readable, PTM-I123 empty,
+        PTM-I124 not an image, PTM-I125 damaged or truncated, PTM-I126 samples or a colour model
+        that cannot be held exactly, PTM-I127 several frames.
+    LimitError: PTM-L104 more texels than are read.
+    MissingComponentError: PTM-M100, PTM-M101 a library that is not installed is needed.
+    """
+    if isinstance(source, bytes):
+        return _load(cast("BinaryIO", io.BytesIO(source)), None, limits)
+    path = os.fspath(source)
+    with open_file(path) as file, naming(path):
+        # What was a pipe cannot be opened, or mapped, by its name once more.
+        return _load(file, None if isinstance(file, io.BytesIO) else path, limits)
+
+
+def read_image(
+    source: str | os.PathLike[str] | bytes, limits: Limits = _LIMITS
+) -> NDArray[np.uint8]:
+    """The texels of an image file of 8 bits a component: (h, w, c) uint8, rows from the top.
+
+    Raises what `load_image` raises; InputError PTM-I126 also for deeper samples.
+    """
+    picture = load_image(source, limits)
+    with naming(None if isinstance(source, bytes) else source):
+        _check_depth(picture)
+        return picture.array()
+
+
+def check_image(source: bytes, limits: Limits = _LIMITS) -> None:
+    """Raises what `read_image` would raise, without unpacking texels: for an image that Pillow has
+    decoded already."""
+    file = cast("BinaryIO", io.BytesIO(source))
+    found = _opened(file, None, limits)
+    if isinstance(found, Picture):
+        _check_depth(found)
+
+
+def _check_depth(picture: Picture) -> None:
+    if picture.texels.dtype.name != "uint8":
+        raise InputError(
+            "PTM-I126",
+            f"has {picture.texels.dtype.name} samples; only 8-bit images are used here",
+            remedy="convert it to 8-bit RGB yourself, so that you see what that changes",
+        )
+
+
+def read_ptm(path: str | os.PathLike[str]) -> bytes:
+    """The bytes of a `.ptm`, of which the head has been found good.
+
+    Raises InputError: PTM-I120 to PTM-I122 as `load_image`; what `read_header` raises.
+    """
+    with open_file(path) as file:
+        data = file.read()
+    with naming(path):
+        read_header(data[:HEAD_MAX])
+    return data
+
+
+def _load(file: BinaryIO, path: str | None, limits: Limits) -> Picture:
+    from ptmtools.texture.images.opening import pillow_faults
+
+    found = _opened(file, path, limits)
+    if isinstance(found, Picture):
+        return found
+    with pillow_faults():
+        return found()
+
+
+def _opened(file: BinaryIO, path: str | None, limits: Limits) -> Picture | Callable[[], Picture]:
+    """An image; of one of 8 bits, which Pillow has opened and found good, what unpacks it."""
+    first = file.read(HEAD_MAX)
+    if not first:
+        raise InputError("PTM-I123", "is empty", remedy="download or export it again")
+    if first.startswith((MAGIC, b"PTM_1")):
+        read_header(first)  # says so if it is HP's format
+        raise InputError(
+            "PTM-I124",
+            "is a progressive texture map already, not an image",
+            remedy="use ptm decode to get an image from it",
+        )
+    if first.startswith(NPY_MAGIC):
+        return read_npy(file, path, limits)
+    if first.startswith(radiance.MAGIC):
+        return radiance.read_hdr(file, limits)
+    if first.startswith(openexr.OPENEXR_MAGIC):
+        return openexr.read_exr(file, path, limits)
+    return _by_pillow(file, path, first, limits)
+
+
+def _by_pillow(
+    file: BinaryIO, path: str | None, first: bytes, limits: Limits
+) -> Picture | Callable[[], Picture]:
+    from ptmtools.texture.images import deep, opening as eight_bit
+    from ptmtools.texture.images.opening import (
+        PNG,
+        TIFF,
+        high_colour,
+        lossy_format,
+        opened,
+        pillow_faults,
+    )
+
+    with pillow_faults():
+        if first.startswith(_PPM) and (picture := deep.read_ppm(file, path, limits)):
+            return picture
+        if first.startswith(PNG):
+            check_chunks(file)
+        if first.startswith(TIFF) and deep.is_deep(tags := deep.tiff_tags(file)):
+            return deep.read_tiff(file, tags, limits)
+        image = opened(file, limits)
+        eight_bit.one_frame(image)
+        depth = 8
+        if first.startswith(PNG):
+            depth, colour = first[24], first[25]
+            if depth == 16:
+                return deep.read_png(file, image, colour, limits)
+        elif image.format == "PPM" and _rescaled(image.tile):
+            raise unsupported("samples that do not fill their bits")
+        elif high_colour(image):
+            raise unsupported("samples of 5 or 6 bits")
+        eight_bit.check(image, limits)
+        return partial(eight_bit.read, image, depth, lossy_format(file, image))
+
+
+def _rescaled(tiles: list[Any]) -> bool:
+    """Whether Pillow scales the samples of a PPM: a maximum of other than 255 and 1."""
+    arguments = tiles[0].args if tiles else ()
+    maximum = arguments[1] if isinstance(arguments, tuple) and len(arguments) > 1 else 0
+    return maximum not in (0, 255)
+
+
+Samples = NDArray[Any]
+_PLAIN = Description()
+#: Suffixes of formats that would change texels, or might.
+LOSSY = (".jpg", ".jpeg", ".jxl", ".webp", ".avif", ".heic", ".gif")
+
+
+def write_image(
+    path: str | os.PathLike[str],
+    texels: Samples,
+    description: Description = _PLAIN,
+    force: bool = False,
+) -> None:
+    """Write (h, w, c) texels, 1 to 4 components, as an image file, whole or not at all.
+
+    By suffix: .png uint8 and uint16; .npy and .tif anything; .hdr and .exr floats, .hdr only what
+    it holds exactly (levels of a Radiance picture below the finest are seldom that). PNG and TIFF
+    keep the description, the others keep none of it.
+
+    Raises
+    ------
+    OutputError: PTM-O101 another suffix, PTM-O102 a format that does not hold these samples, and
+        those of `ptmtools.files.write_with`.
+    MissingComponentError: PTM-M101 OpenEXR is not installed.
+    """
+    from ptmtools.files import refuse_existing, write_with
+
+    suffix = PurePath(path).suffix
+    with naming(path):
+        writer(suffix)
+        if not force:
+            refuse_existing(path)
+        write_with(path, lambda file: write_to(file, suffix, texels, description), force=force)
+
+
+def write_to(
+    file: IO[bytes], suffix: str, texels: Samples, description: Description = _PLAIN
+) -> None:
+    """As `write_image`, into an open file."""
+    writer(suffix)(file, texels, description)
+
+
+Writer = Callable[[IO[bytes], "Samples", Description], object]
+
+
+def writer(suffix: str) -> Writer:
+    """What writes files of that suffix. Raises OutputError PTM-O101."""
+    found = WRITTEN.get(suffix.lower())
+    if found is None:
+        lossy = suffix.lower() in LOSSY
+        why = "is lossy and would change the texels" if lossy else "is not written"
+        raise OutputError(
+            "PTM-O101",
+            f"the suffix {suffix!r} {why}",
+            remedy=f"use one of {', '.join(WRITTEN)}",
+        )
+    write: Writer = getattr(import_module(f"ptmtools.texture.images.{found}"), f"save_{found}")
+    return write
+
+
+#: The module, and its function ``save_…``, that writes files of each suffix.
+WRITTEN = {
+    ".png": "png",
+    ".npy": "npy",
+    ".tif": "tiff",
+    ".tiff": "tiff",
+    ".hdr": "radiance",
+    ".exr": "openexr",
+}

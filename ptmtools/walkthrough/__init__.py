@@ -1,1 +1,0 @@
-"""A walk over a modelled link, and what the walker sees of it (docs/design/walkthrough.md)."""

@@ -1,0 +1,80 @@
+"""What a client keeps of its files, whatever comes first and whatever it gives up."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from hypothesis import given, strategies as st
+
+from ptmtools.lab.client import Files, Kind, Range
+from ptmtools.lab.network import Conditions, Link
+from ptmtools.lab.policies.whole_files import LruClient
+from tests.lab.worlds import catalogue, raw, standing
+
+ACTS = st.lists(
+    st.tuples(st.just("ask"), st.integers(1, 40))
+    | st.tuples(st.just("arrive"), st.integers(0, 9))
+    | st.tuples(st.just("give up"), st.integers(0, 40)),
+    max_size=30,
+)
+
+
+@given(ACTS)
+def test_files_against_single_bytes(acts: list[tuple[str, int]]) -> None:
+    """Whole ranges count, and those that were given up as far as they came."""
+    files = Files(Kind.TEXTURE, np.array([1000, 200]))
+    held = np.zeros(200, dtype=bool)
+    under_way: list[Range] = []
+    for act, number in acts:
+        asked = int(files.asked[1])
+        if act == "ask" and asked < 200:
+            part = files.ask(1, min(200, asked + number))
+            assert (part.kind, part.number, part.begin) == (Kind.TEXTURE, 1, asked)
+            under_way.append(part)
+        elif act == "arrive" and under_way:
+            part = under_way.pop(number % len(under_way))
+            files.arrived(part)
+            held[part.begin : part.end] = True
+        elif act == "give up" and under_way:
+            part = under_way[-1 - number % 2 * (len(under_way) - 1)]
+            received = min(number // 2, part.end - part.begin - 1)
+            last = part.end == asked
+            assert files.given_up(part, received) == last
+            if last:
+                under_way.remove(part)
+                held[part.begin : part.begin + received] = True
+                asked = part.begin + received
+            assert files.asked[1] == asked
+        assert files.there[1] == (200 if held.all() else held.argmin())
+        assert files.whole.tolist() == [False, held.all()]
+        assert files.there[1] <= files.asked[1]
+        assert files.asked[0] == files.there[0] == 0
+
+
+def test_the_last_byte_counts() -> None:
+    """A file, or a level, that lacks one is not there."""
+    textures = [raw(8), raw(4)]
+    stock = catalogue(textures, [(0, 0), (0, 1)])
+    client = LruClient(standing(stock, 1), Link(Conditions()), 1 << 40)
+    for kind, files in client.files.items():
+        for number, size in enumerate(files.size.tolist()):
+            files.arrived(files.ask(number, size - 1))
+            assert not files.whole[number]
+            files.arrived(files.ask(number, size))
+            assert files.whole[number], kind
+    for t, texture in enumerate(textures):
+        client.textures.there[t] = 0
+        for level, end in enumerate(itertools.accumulate(texture.groups)):
+            client.textures.there[t] = end - 1
+            assert client.have[t] == level
+            client.textures.there[t] = end
+            assert client.have[t] == level + 1
+
+
+def test_who_gives_up_before_anything_came_has_nothing_of_what_is_before_it() -> None:
+    files = Files(Kind.TEXTURE, np.array([200]))
+    files.ask(0, 100)
+    assert files.given_up(files.ask(0, 200), 0)
+    assert files.there[0] == 0
+    assert files.asked[0] == 100

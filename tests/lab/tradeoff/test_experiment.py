@@ -1,0 +1,104 @@
+"""Fronts, rates and the cheapest setting, on made-up experiments."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import pytest
+from hypothesis import given, strategies as st
+
+from ptmtools.lab.tradeoff.experiment import Measured, Setting, Trial, pareto, rates, run
+from ptmtools.lab.tradeoff.report import as_csv, table
+
+
+class Made:
+    """Errors that fall as work^-0.5, one dear and bad setting, and one that is not sound."""
+
+    work, error, reference_error = "steps", "distance", 0.01
+
+    def settings(self):
+        good = [Setting(f"--steps {n}", {"steps": n}, "steps") for n in (400, 100, 4, 1600)]
+        return [
+            *good,
+            Setting("--waste", {"steps": 4, "times": 1000}),
+            Setting("--guess", {"steps": 10**6, "times": 0}, sound=False),
+        ]
+
+    def measure(self, setting):
+        steps = setting.knobs["steps"]
+        seconds = steps * setting.knobs.get("times", 1)
+        return Measured(seconds, steps, steps**-0.5, 2 * steps**-0.5)
+
+
+def test_an_experiment():
+    calls = []
+    trade = run("made", Made(), lambda *call: calls.append(call))
+    assert [t.setting.name for t in trade.trials if t.best] == [
+        "--steps 4",
+        "--steps 100",
+        "--steps 400",
+        "--steps 1600",
+    ]
+    assert calls == [(i, 6, "trying made") for i in range(1, 7)]
+    assert trade.rates == {"steps": pytest.approx(-0.5)}
+    assert trade.cheapest(0.1).setting.name == "--steps 100"
+    assert trade.cheapest(0.099).setting.name == "--steps 400"
+    assert trade.cheapest(0.001) is None
+
+
+def test_errors_below_twice_that_of_the_reference_fit_no_rate():
+    class Blurred(Made):
+        reference_error = 0.06  # 100, 400 and 1600 steps are below twice that
+
+    assert run("made", Blurred()).rates == {}
+
+
+@given(
+    points=st.lists(
+        st.tuples(st.integers(0, 9), st.integers(0, 9), st.booleans()), min_size=1, max_size=30
+    )
+)
+def test_the_front_is_what_no_other_sound_trial_beats(points):
+    trials = [
+        Trial(Setting(str(i), {}, sound=sound), Measured(cost, 1, error, error))
+        for i, (cost, error, sound) in enumerate(points)
+    ]
+    found = pareto(trials)
+    assert [t.measured.seconds for t in found] == sorted(cost for cost, _, _ in points)
+    sound = [(cost, error) for cost, error, good in points if good]
+    expected = {
+        (c, e)
+        for c, e in sound
+        if not any((a, b) != (c, e) and a <= c and b <= e for a, b in sound)
+    }
+    assert {(t.measured.seconds, t.measured.error) for t in found if t.best} == expected
+    assert all(t.setting.sound for t in found if t.best)
+
+
+def test_two_trials_of_a_family_have_no_rate():
+    trials = [Trial(Setting(str(n), {}, "f"), Measured(n, n, 1 / n, 1 / n)) for n in (1, 2)]
+    assert rates(trials, 0) == {}
+
+
+def test_the_table_names_the_best_and_the_cheapest():
+    lines = table(run("made", Made()), 0.06)
+    assert [line[:13].strip() for line in lines if line.startswith("*")] == [
+        "* --steps 4",
+        "* --steps 100",
+        "* --steps 400",
+        "* --steps 160",
+    ]
+    assert "  standard error of the reference: 0.0100" in lines
+    assert "  steps: error ∝ work^-0.50" in lines
+    assert lines[-1] == "  cheapest for an error of at most 0.06: --steps 400"
+    assert "none of these" in table(run("made", Made()), 1e-9)[-1]
+
+
+def test_the_csv_has_every_trial():
+    rows = list(csv.DictReader(io.StringIO(as_csv([run("made", Made()), run("made", Made())]))))
+    assert len(rows) == 12
+    assert rows[1]["setting"] == "--steps 4"
+    assert float(rows[1]["error"]) == 0.5
+    assert rows[0]["setting"] == "--guess"
+    assert [row["best"] for row in rows[:3]] == ["0", "1", "1"]

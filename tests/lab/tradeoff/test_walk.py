@@ -1,0 +1,268 @@
+"""What knobs are worth to a walker: the sentences, the tables, and the real thing on two rooms."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from ptmtools.cli.main import main
+from ptmtools.coverage.options import AchOptions
+from ptmtools.lab.tables import look
+from ptmtools.lab.tradeoff.knobs import KNOBS, build_again, concerned, copied, own_options, settings
+from ptmtools.lab.tradeoff.report import said, sentence, settings_table as table, telling, trades
+from ptmtools.lab.tradeoff.walk import Seen, Tried, WalkTrade, begins_with, compared
+from ptmtools.lab.walk import Walk, read_walk
+from ptmtools.lab.world import World, prepare
+from ptmtools.output.model import EmitOptions
+from ptmtools.output.served import read_served
+from ptmtools.pipeline import Artifacts, build_scene
+from ptmtools.pipeline.build import run_stage
+from ptmtools.pipeline.command import open_database
+from ptmtools.pipeline.stages import EMIT, TEXTURES
+from ptmtools.rendering.pyramids import read_pyramids
+from tests.conftest import files_below
+
+TWO_ROOMS = Path(__file__).resolve().parents[3] / "sample_data/two_rooms/two_rooms.obj"
+
+
+@pytest.fixture(scope="module")
+def db(tmp_path_factory) -> Path:
+    """The two rooms, with noise on the walls, which no codec keeps for nothing."""
+    folder = tmp_path_factory.mktemp("walk")
+    shutil.copytree(TWO_ROOMS.parent, folder / "model")
+    random = np.random.default_rng(0)
+    for image in sorted((folder / "model").glob("*.png")):
+        Image.fromarray(random.integers(0, 256, (64, 64, 3), np.uint8)).save(image)
+    options = AchOptions(preset="fast", backend="embree"), EmitOptions()
+    build_scene(folder / "model" / TWO_ROOMS.name, folder / "rooms.db", *options, workers=1)
+    return folder / "rooms.db"
+
+
+@pytest.fixture(scope="module")
+def walk_file(db) -> Path:
+    file = db.parent / "walk.json"
+    assert main(["-q", "path", str(db), "-o", str(file), "--duration", "10"]) == 0
+    return file
+
+
+@pytest.fixture(scope="module")
+def walk(walk_file) -> Walk:
+    return read_walk(walk_file)
+
+
+@pytest.fixture(scope="module")
+def original(db, walk) -> World:
+    return prepare(read_served(db), walk)
+
+
+def built(db: Path, **changed):
+    """What is served of a copy with other options of its textures."""
+    own = own_options(Artifacts(open_database(db)))
+    options = {**own, TEXTURES: replace(own[TEXTURES], **changed)}
+    build_again(db, {stage: options[stage] for stage in concerned(TEXTURES, options)})
+    return read_served(db)
+
+
+def seen(e: float, bandwidth: float | None = 4e6, policy: str = "best", **more) -> Seen:
+    return replace(Seen(policy, bandwidth, "10%", e, 3 * e, 10**6, 1.5), **more)
+
+
+OWN = Tried("", "", "", 20.0, 10**7, (seen(2.0, 512e3), seen(1.0)))
+
+
+def tried(name: str, *es: float, build: float = 20.0, served: int = 10**7) -> Tried:
+    option = name.split()[0]
+    both = (seen(es[0], 512e3), seen(es[1]))
+    return Tried(name, f"{option} 0", option, build, served, both)
+
+
+def test_a_sentence_tells_what_is_saved_and_what_is_seen() -> None:
+    small = tried("--max-side 512", 2.001, 1.021, build=17.1, served=3_900_000)
+    trade = WalkTrade(60.0, OWN, (small,))
+    assert sentence(small, trade) == (
+        "--max-side 512 instead of --max-side 0 saves 61 % of the bytes and builds 2.9 s faster; "
+        "the picture is worse by 2.1 % at 4 Mbit/s (e 1.00 → 1.02), and the same otherwise."
+    )
+
+
+def test_who_sees_nothing_is_told_so() -> None:
+    same = tried("--samples 8", 2.0, 1.004, build=23.0, served=10_400_000)
+    assert sentence(same, WalkTrade(60.0, OWN, (same,))) == (
+        "--samples 8 instead of --samples 0 adds 4.0 % to the bytes and builds 3.0 s slower; "
+        "no difference that can be seen."
+    )
+    assert sentence(tried("--a 1", 2.0, 1.0), WalkTrade(60.0, OWN, ())) == (
+        "--a 1 instead of --a 0 costs the same; no difference that can be seen."
+    )
+
+
+def test_a_knob_of_some_clients_names_them() -> None:
+    own = replace(OWN, seen=(*OWN.seen, seen(3.0, policy="ach")))
+    rough = Tried("--samples 1", "--samples 8", "--samples", 20, 10**7, (seen(3.3, policy="ach"),))
+    text = sentence(rough, WalkTrade(60.0, own, (rough,)))
+    told = "the picture to the client ach is worse by 10 % at 4 Mbit/s (e 3.00 → 3.30)."
+    assert text.endswith(told)
+
+
+def test_what_cannot_be_built_says_why() -> None:
+    failed = Tried("--cells leaf", "--cells room", "--cells", 0, 0, problem="is too much")
+    trade = WalkTrade(60.0, OWN, (failed,))
+    assert said(trade) == ["--cells leaf cannot be tried: is too much."]
+    assert table(trade)[-1] == "--cells leaf: is too much"
+
+
+def test_of_a_knob_the_best_is_told_then_what_saves_most_then_what_loses_least() -> None:
+    better = tried("--k 1", 1.9, 0.9, served=2 * 10**7)
+    alike = tried("--k 2", 2.001, 1.001, served=9 * 10**6)
+    cheap = tried("--k 3", 2.003, 1.003, served=8 * 10**6)
+    bad, worst = tried("--k 4", 2.4, 1.2, served=10**6), tried("--k 5", 4.0, 3.0, served=10**5)
+    for some, told in (
+        ((bad, better, alike), better),
+        ((worst, alike, cheap, bad), cheap),
+        ((worst, bad), bad),
+    ):
+        assert telling(some, OWN) is told
+
+
+def test_the_table_has_a_block_for_each_walker_and_the_cheapest() -> None:
+    trade = WalkTrade(60.0, OWN, (tried("--k 1", 1.9, 0.9, build=30), tried("--k 2", 3.0, 2.0)))
+    lines = table(trade, 1.95)
+    assert lines[0].startswith("--k 1 instead of --k 0 builds 10.0 s slower; the picture is better")
+    assert sum("setting" in line and "served" in line for line in lines) == 2
+    assert [line.split()[-2:] for line in lines if "cheapest" in line] == [
+        ["--k", "1"],  # at 512 kbit/s
+        ["it", "is"],
+    ]
+    (row,) = (line for line in lines if line.startswith("  --k 2") and "+100.0%" in line)
+    assert row.split()[2:7] == ["20.0", "s", "10.0", "MB", "2.000"]
+    assert [len(each.trials) for each in trades(trade)] == [3, 3]
+
+
+def test_settings_are_other_than_the_databases_own_and_coarser_where_pictures_change(db) -> None:
+    own = own_options(Artifacts(open_database(db)))
+    names = {each.name for each in settings(own, 1024)}
+    assert {"--max-side 512", "--cells leaf", "--trim", "--pvs fast", "--samples 8"} <= names
+    assert not {"--max-side 1024", "--profile fast", "--profile small", "--pvs full"} & names
+    assert [s.name for s in settings(own, 1024, ["need"])] == ["--need 0"]
+    bare = {**own, EMIT: replace(own[EMIT], need=0)}
+    assert [s.name for s in settings(bare, 1024, ["need"])] == ["--need 16"]
+    lossy = {**own, TEXTURES: replace(own[TEXTURES], max_error=2, trim=True)}
+    names = {each.name for each in settings(lossy, 1)}
+    assert "--max-error 4" in names
+    assert not {"--max-error 2", "--max-side 0", "--trim", "--no-trim"} & names
+    (small,) = (s for s in settings(own, 9, ["profile"]) if s.value == "small")
+    assert (small.own, small.options.profile) == ("--profile fast", "small")
+    quick = list(settings(own, 1024, quick=True))
+    assert len({each.knob.option for each in quick}) == len(quick) <= len(KNOBS)
+    assert [s.name for s in concerned(TEXTURES, own)] == ["textures", "emit"]
+
+
+def test_what_lacks_levels_is_predicted_by_the_tables_of_the_original(db, walk, original) -> None:
+    """Looking again, with the coarse textures on the walls, gives the same."""
+    with copied(db) as copy:
+        coarse = built(copy, max_side=16)
+        world = compared(coarse, walk, original)
+        own = read_pyramids(coarse)
+    assert begins_with(original.pyramids, own)
+    assert not begins_with(own, original.pyramids)
+    assert own.levels.max() < original.pyramids.levels.max()
+    unique, first = np.unique(original.view, return_index=True)
+    again = look(
+        coarse.surfaces, own, original.camera, original.eye[first], original.direction[first],
+        full=original.pyramids,
+    )  # fmt: skip
+    assert len(unique) == again.frames
+    for name in ("start", "cell", "texture"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(world.views, name))
+    for name in ("error", "square", "need", "sight"):
+        np.testing.assert_allclose(
+            getattr(again, name), getattr(world.views, name), rtol=1e-4, atol=1e-6, err_msg=name
+        )
+    finest = own.levels[world.views.texture] + 1
+    textured = world.views.texture >= 0
+    left = world.views.error[np.arange(len(finest)), finest][textured]
+    assert left.sum() > 0, "what is gone is an error"
+    assert world.catalogue.ends[:, -1].sum() < original.catalogue.ends[:, -1].sum()
+
+
+def test_texels_that_differ_are_an_error_even_when_all_is_there(db, walk, original) -> None:
+    with copied(db) as copy:
+        world = compared(built(copy, max_error=8), walk, original)
+    assert not begins_with(original.pyramids, world.pyramids)
+    rows = np.flatnonzero(world.views.texture >= 0)
+    last = world.pyramids.levels[world.views.texture[rows]] + 1
+    left, exact = (views.error[rows, last] for views in (world.views, original.views))
+    assert left.sum() > 0
+    # A frame's errors are means over its pixels; no texel is off by more than was allowed.
+    assert left.max() <= 8
+    assert (exact == 0).all()
+    np.testing.assert_array_equal(world.views.error[rows, 0], original.views.error[rows, 0])
+
+
+def test_the_same_database_shows_the_same(db, walk, original) -> None:
+    world = compared(read_served(db), walk, original)
+    np.testing.assert_array_equal(world.views.error, original.views.error)
+    np.testing.assert_array_equal(world.views.sight, original.views.sight)
+
+
+def test_a_stage_runs_again_where_it_is_current(db) -> None:
+    own = own_options(Artifacts(open_database(db)))
+    with copied(db) as copy:
+        before = files_below(copy / "www")
+        assert list(build_again(copy, own)) == [stage.name for stage in own]
+        assert files_below(copy / "www") == before
+        assert not run_stage(copy, own[TEXTURES], workers=1).stages[0].ran
+
+
+def test_the_command(db, walk_file, tmp_path, capsys) -> None:
+    before = files_below(db)
+    file = tmp_path / "t.csv"
+    asked = ["tradeoff", str(db), "--stage", "walk", "--walk", str(walk_file), "--csv", str(file)]
+    knobs = ["--knob", "max-side", "--knob", "pvs", "--knob", "samples"]
+    links = ["--bandwidth", "64k,inf", "--memory", "inf"]
+    assert main([*asked, *knobs, *links, "--quick", "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert "3 settings on a walk of 10 s; about" in err
+    (found,) = json.loads(out)
+    assert found["stage"] == "walk"
+    assert [t["option"] for t in found["trials"]] == ["--pvs", "--samples", "--max-side"]
+    assert len(found["sentences"]) == 3
+    side = found["trials"][2]
+    assert side["served"] < found["own"]["served"]
+    by_case = {(s["policy"], s["bandwidth"]): s["e"] for s in found["own"]["seen"]}
+    assert set(by_case) == {(p, b) for p in ("best", "ach") for b in (64e3, None)}
+    (unlimited,) = (s["e"] for s in side["seen"] if s["bandwidth"] is None)
+    assert unlimited > by_case["best", None], "no link brings what was left out"
+    assert {s["policy"] for s in found["trials"][1]["seen"]} == {"ach"}
+    assert files_below(db) == before
+    rows = list(csv.DictReader(file.open(encoding="utf-8")))
+    assert {row["stage"] for row in rows} == {"walk"}
+    assert len(rows) == 4 + 2 * 3
+
+
+def test_a_policy_without_its_hints_is_refused_before_anything_is_built(
+    db, walk_file, tmp_path, capsys, monkeypatch
+) -> None:
+    with copied(db) as copy:
+        own = own_options(Artifacts(open_database(copy)))
+        build_again(copy, {EMIT: replace(own[EMIT], need=0)})
+        monkeypatch.setattr("ptmtools.lab.tradeoff.walk.build_again", pytest.fail)
+        asked = ["tradeoff", str(copy), "--stage", "walk", "--walk", str(walk_file)]
+        assert main([*asked, "--policy", "screen+need"]) == 3
+    assert "PTM-I701" in capsys.readouterr().err
+
+
+def test_a_walk_elsewhere_is_refused(db, tmp_path, capsys) -> None:
+    file = tmp_path / "away.json"
+    rows = [[t, 1e3, 1.6, 1e3 + t, 0, 0, 1] for t in (0.0, 8.0)]
+    document = {"format": "ptmtools walk", "schema": 1, "fieldOfView": 1.0, "aspect": 1.7}
+    file.write_text(json.dumps({**document, "samples": rows}))
+    assert main(["tradeoff", str(db), "--stage", "walk", "--walk", str(file)]) == 3
+    assert "PTM-I700" in capsys.readouterr().err

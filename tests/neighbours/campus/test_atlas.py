@@ -1,0 +1,135 @@
+"""Atlases: kernels against plain loops; what a lookup reads, on however thin a face."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+
+from ptmtools.arrays import Floats
+from ptmtools.neighbours.campus.atlas import claim, components, cover, nearest, unwrap
+from tests.neighbours.campus.made import level
+from tests.neighbours.campus.shapes import (
+    HOUSE,
+    bilinear,
+    indexed,
+    ledges,
+    loose,
+    samples,
+    triangles_of,
+)
+
+pytest.importorskip("xatlas", reason="pip install 'ptmtools[campus]'")
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 12))
+def test_cover_is_a_test_of_every_texel(seed: int, faces: int) -> None:
+    uv = np.random.default_rng(seed).random((faces, 3, 2))
+    size = 16
+    wanted = np.full((size, size), -1)
+    for row, column in np.ndindex(size, size):
+        at = np.array([column + 0.5, size - row - 0.5]) / size
+        for t in range(faces):
+            sides = [
+                np.linalg.det([b - a, at - a])
+                for a, b in zip(uv[t], np.roll(uv[t], -1, 0), strict=True)
+            ]
+            if min(sides) > 1e-12 or max(sides) < -1e-12:
+                wanted[row, column] = t
+                break
+    assert (cover(uv, size) == wanted).mean() > 0.99
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 30))
+def test_components_are_those_of_a_flood(seed: int, faces: int) -> None:
+    triangle = np.random.default_rng(seed).integers(0, 25, (faces, 3))
+    label = np.arange(25)
+    for _ in range(25):
+        for t in triangle:
+            label[t] = label[t].min()
+    assert np.array_equal(components(triangle, 25), label)
+
+
+def test_an_atlas_gives_each_face_a_place_of_its_own() -> None:
+    points, triangles = indexed(HOUSE)
+    atlas = unwrap(points, triangles)
+    assert atlas.side == 512
+    assert atlas.uv.shape == (len(triangles), 3, 2)
+    assert ((atlas.uv >= 0) & (atlas.uv <= 1)).all()
+    owner = cover(atlas.uv, 512)
+    a, b, c = np.moveaxis(atlas.uv * 512, 1, 0)
+    area = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
+    held = np.bincount(owner[owner >= 0], minlength=len(triangles))
+    assert np.allclose(held, area, rtol=0.1, atol=40), "faces lie over each other"
+    assert (owner >= 0).mean() > 0.3
+
+
+def test_texels_are_as_large_as_the_surface_everywhere() -> None:
+    points, triangles = indexed(HOUSE)
+    uv = unwrap(points, triangles).uv
+    lengths = np.linalg.norm(HOUSE - np.roll(HOUSE, 1, axis=1), axis=2)
+    drawn = np.linalg.norm(uv - np.roll(uv, 1, axis=1), axis=2)
+    ratio = drawn / lengths
+    assert ratio.max() / ratio.min() < 1.1
+
+
+@pytest.mark.parametrize("size", [512, 1024, 2048])
+@pytest.mark.parametrize(
+    "corner", [loose(3000), HOUSE, ledges(40)], ids=["loose", "house", "ledges"]
+)
+def test_every_face_reads_its_own_chart_alone(corner: Floats, size: int) -> None:
+    """However thin it is."""
+    atlas = unwrap(*indexed(corner))
+    assert atlas.side == 512
+    owner = claim(atlas.uv, cover(atlas.uv, size)).ravel()
+    face, _, at = samples(corner, atlas.uv, 20_000)
+    _, read, weight = bilinear(np.zeros((size, size)), at)
+    stranger = (owner[read] < 0) | (atlas.chart[owner[read]] != atlas.chart[face][:, None])
+    assert ((weight * stranger).sum(axis=1) > 0.01).mean() < 0.005
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 8))
+def test_what_a_face_reads_is_claimed_by_the_nearest(seed: int, faces: int) -> None:
+    random = np.random.default_rng(seed)
+    uv = random.random((faces, 1, 2)) + 10 ** random.uniform(-4, 0, (faces, 1, 1)) * (
+        random.random((faces, 3, 2)) - 0.5
+    )
+    uv, size = uv.clip(0, 1), 16
+    centre = cover(uv, size)
+    owner = claim(uv, centre)
+    assert np.array_equal(owner[centre >= 0], centre[centre >= 0])
+    face, _, at = samples(np.zeros((faces, 3, 3)), uv, 400)
+    _, read, _ = bilinear(np.zeros((size, size)), at)
+    assert (owner.ravel()[read] >= 0).all()
+    # Of the faces that read a texel its own is the nearest.
+    texel = np.stack([read % size, size - 1 - read // size], axis=2) + 0.5
+    flat, reader = texel.reshape(-1, 2) / size, np.repeat(face, 4)
+    ours, theirs = (
+        np.linalg.norm(np.einsum("nk,nkx->nx", nearest(uv[f], flat), uv[f]) - flat, axis=1)
+        for f in (owner.ravel()[read].ravel(), reader)
+    )
+    assert (ours <= theirs + 1e-9).all()
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_the_nearest_point_of_a_triangle(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    uv, at = random.random((1, 3, 2)), 3 * random.random((1, 2)) - 1
+    share = nearest(uv, at)
+    assert share.min() >= 0
+    assert share.sum() == pytest.approx(1)
+    others = random.dirichlet([0.5, 0.5, 0.5], 500)
+    far = np.linalg.norm(share @ uv[0] - at)
+    assert far <= np.linalg.norm(others @ uv[0] - at, axis=1).min() + 1e-9
+
+
+def test_too_many_charts_for_the_least_lightmap(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Thousands of loose faces, in small lightmaps."""
+    monkeypatch.setattr("ptmtools.neighbours.campus.atlas.LIGHT_SIZES", (64, 128))
+    assert unwrap(*indexed(loose(3000))).side != 64
+
+
+def test_a_long_object_is_packed_for_the_least_lightmap() -> None:
+    quads = [level((5 * i, 0), (5 * i + 5, 3), 0) for i in range(40)]
+    points, triangles = indexed(triangles_of(np.concatenate(quads)))
+    assert unwrap(points, triangles).side == 512
