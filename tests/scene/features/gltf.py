@@ -498,7 +498,7 @@ def _(put: Put) -> str:
     return glb(put, doc)
 
 
-@feature("glTF", "nodes that are hidden", "noted", the_quad, "PTM-N224")
+@feature("glTF", "hidden nodes", "noted", the_quad, "PTM-N224")
 def _(put: Put) -> str:
     doc = Gltf.wall()
     hidden = {"extensions": {"KHR_node_visibility": {"visible": False}}, "children": [2]}
@@ -528,14 +528,14 @@ def asked(text: str) -> None:
     assert "needs the glTF extension EXT_texture_avif, which is not read; run `npx" in text
 
 
-@feature("glTF", "an extension that is required and not known", "refused", asked, "PTM-I255")
+@feature("glTF", "unknown required extension", "refused", asked, "PTM-I255")
 def _(put: Put) -> str:
     doc = Gltf.wall()
     doc.tree["extensionsRequired"] = ["EXT_texture_avif"]
     return glb(put, doc)
 
 
-@feature("glTF", "an extension that is optional and not known", "noted", the_quad, "PTM-N224")
+@feature("glTF", "unknown optional extension", "noted", the_quad, "PTM-N224")
 def _(put: Put) -> str:
     doc = Gltf.wall()
     doc.tree["extensionsUsed"] = ["MSFT_lod"]

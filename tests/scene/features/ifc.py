@@ -43,7 +43,7 @@ def told(scene: Scene) -> None:
     assert kinds == {"IfcWall W": "structural", "IfcDoor D": "door", "IfcRailing R": "detail"}
 
 
-@feature("IFC", "what a product is to the building", "carried over", told)
+@feature("IFC", "roles of products", "carried over", told)
 def _(put: Put) -> str:
     made = building()
     for n, (kind, name) in enumerate((("IfcWall", "W"), ("IfcDoor", "D"), ("IfcRailing", "R"))):
@@ -69,7 +69,7 @@ def one_wall(scene: Scene) -> None:
     assert scene.objects == ("IfcWall W",)
 
 
-@feature("IFC", "nodes that are hidden", "noted", one_wall, "PTM-N242")
+@feature("IFC", "hidden nodes", "noted", one_wall, "PTM-N242")
 def _(put: Put) -> str:
     """A space, which is no thing."""
     made = building()

@@ -102,7 +102,7 @@ def _(put: Put) -> str:
     return obj(put, "map_Kd -clamp on -s 2 1 1 four.png", four_png=png(FOUR))
 
 
-@feature("OBJ", "a texture that is missing", "noted", untextured, "PTM-N204")
+@feature("OBJ", "missing texture", "noted", untextured, "PTM-N204")
 def _(put: Put) -> str:
     return obj(put, "map_Kd gone.png")
 
@@ -115,7 +115,7 @@ def suggested(scene: Scene) -> None:
     )
 
 
-@feature("OBJ", "a material library that is missing", "noted", suggested, "PTM-N203", "PTM-N207")
+@feature("OBJ", "missing material library", "noted", suggested, "PTM-N203", "PTM-N207")
 def _(put: Put) -> str:
     obj(put, "map_Kd four.png", four_png=png(FOUR))
     put("a.obj", f"mtllib house.mtl\n{QUAD}usemtl wall\n{FACE}")
@@ -128,7 +128,7 @@ def not_suggested(scene: Scene) -> None:
 
 
 @feature(
-    "OBJ", "a material library that is missing", "noted", not_suggested, "PTM-N203", "PTM-N207"
+    "OBJ", "missing material library", "noted", not_suggested, "PTM-N203", "PTM-N207"
 )
 def _several_libraries(put: Put) -> str:
     """Which of them is meant nobody knows."""

@@ -172,7 +172,7 @@ def _(put: Put) -> str:
     return written(put, on)
 
 
-@feature("USD", "nodes that are hidden", "noted", the_quad, "PTM-N262")
+@feature("USD", "hidden nodes", "noted", the_quad, "PTM-N262")
 def _(put: Put) -> str:
     on = made().stage()
     made().mesh(on)
