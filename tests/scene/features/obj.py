@@ -127,9 +127,7 @@ def not_suggested(scene: Scene) -> None:
     assert message == "mtllib house.mtl: not found"
 
 
-@feature(
-    "OBJ", "missing material library", "noted", not_suggested, "PTM-N203", "PTM-N207"
-)
+@feature("OBJ", "missing material library", "noted", not_suggested, "PTM-N203", "PTM-N207")
 def _several_libraries(put: Put) -> str:
     """Which of them is meant nobody knows."""
     put("b.mtl", "newmtl wall\n")
